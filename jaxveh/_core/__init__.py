@@ -1,0 +1,1 @@
+"""What every room shares: recordings, names, chosen parameters, bijectors, result codes, errors."""

@@ -1,0 +1,71 @@
+"""Errors that name the thing, the value and the allowed range, and say what to do next."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import numpy as np
+
+
+class InputError(ValueError):
+    """Something given to jaxveh is wrong and can be put right by whoever gave it (the programs exit with code 2)."""
+
+
+class FilterError(RuntimeError):
+    """A filter, a simulation or a fit ended with a failing result code; the message names the step and the reason."""
+
+
+class JaxvehWarning(UserWarning):
+    """Something is unusual but not wrong."""
+
+
+def is_concrete(*values) -> bool:
+    """Whether none of the values is a tracer, so that it may be looked at (checks skip tracers)."""
+    return not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(values))
+
+
+def check(name: str, value, holds, allowed: str, advice: str = "") -> None:
+    """Raise `InputError` naming `name`, `value` and the `allowed` range unless `holds(value)`; tracers pass.
+
+    `holds` is applied to the value as a NumPy array and must hold for every element.
+    """
+    if value is None or not is_concrete(value):
+        return
+    array = np.asarray(value)
+    if not np.all(holds(array)):
+        shown = array.item() if array.ndim == 0 else array
+        raise InputError(f"{name} = {shown}: must be {allowed}." + (f" {advice}" if advice else ""))
+
+
+def check_positive(name: str, value, unit: str = "", advice: str = "") -> None:
+    """Raise unless every element of `value` is finite and above zero."""
+    check(name, value, lambda v: np.isfinite(v) & (v > 0), f"positive and finite{f' ({unit})' if unit else ''}", advice)
+
+
+def check_finite(name: str, value, advice: str = "") -> None:
+    """Raise unless every element of `value` is finite."""
+    check(name, value, np.isfinite, "finite", advice)
+
+
+def check_at_least(name: str, value, least, advice: str = "") -> None:
+    """Raise unless every element of `value` is at least `least`."""
+    check(name, value, lambda v: v >= least, f"at least {least}", advice)
+
+
+def check_one_of(name: str, value, allowed) -> None:
+    """Raise unless `value` is one of `allowed`."""
+    if value not in tuple(allowed):
+        raise InputError(f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}.")
+
+
+def float_array(value) -> jax.Array:
+    """A strong float array of the default precision unless the value carries a float dtype of its own.
+
+    A Python float or a weak type would be a new compilation; see `equinox.field(converter=...)`.
+    """
+    if isinstance(value, (jax.Array, np.ndarray, np.generic)) and np.issubdtype(value.dtype, np.floating):
+        weak = getattr(value, "weak_type", False)
+        return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float) if weak else value.dtype)
+    if eqx.is_array_like(value):
+        return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float))
+    return value

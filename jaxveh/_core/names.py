@@ -1,0 +1,45 @@
+"""Names: states, inputs and measurements are NamedTuples of scalars, never an index into a vector."""
+
+from __future__ import annotations
+
+import functools
+from collections import namedtuple
+from collections.abc import Iterable, Mapping
+
+from jaxveh._core.errors import InputError
+
+
+@functools.cache
+def _record_type(name: str, fields: tuple[str, ...]):
+    return namedtuple(name, fields)  # noqa: PYI024  made at run time, one class a set of fields
+
+
+def record_type(name: str, fields: Iterable[str]):
+    """The NamedTuple class of this name and these fields; the same class each time, so that jit sees one structure."""
+    fields = tuple(fields)
+    twice = sorted({field for field in fields if fields.count(field) > 1})
+    if twice:
+        raise InputError(f"{name} has the field(s) {', '.join(twice)} twice: every name must be unique.")
+    return _record_type(name, fields)
+
+
+def record(name: str, values: Mapping):
+    """A NamedTuple instance with the mapping's keys as fields, in their order."""
+    return record_type(name, values.keys())(*values.values())
+
+
+def as_mapping(values, what: str = "values") -> dict:
+    """A NamedTuple or a mapping as an ordered dict of its fields."""
+    if isinstance(values, Mapping):
+        return dict(values)
+    if hasattr(values, "_asdict"):
+        return dict(values._asdict())
+    raise InputError(f"{what} = {type(values).__name__}: must be a NamedTuple or a mapping from names to values.")
+
+
+def check_names(what: str, names: Iterable[str], allowed: Iterable[str]) -> None:
+    """Raise unless every one of `names` is among `allowed`; the message lists what there is."""
+    allowed = tuple(allowed)
+    unknown = [name for name in names if name not in allowed]
+    if unknown:
+        raise InputError(f"{what}: unknown name(s) {', '.join(unknown)}; there are: {', '.join(allowed) or 'none'}.")

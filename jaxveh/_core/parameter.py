@@ -1,0 +1,163 @@
+"""Parameters: array leaves of a model with a unit and a domain, and `where`, the one way to pick them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxveh._core.bijectors import AbstractBijector, Positive, Real
+from jaxveh._core.errors import InputError, float_array
+
+Where = Callable[..., object]
+
+
+def parameter(unit: str = "-", domain: AbstractBijector | None = None, scale: float | None = None, **kwargs):
+    """Declare a field of an `eqx.Module` as a parameter: converted to a strong float array, with unit and domain.
+
+    `scale` is the typical magnitude of a parameter that may be zero or of either sign (curvature, shifts): a
+    relative prior spread refers to it. Positive parameters refer to their own value.
+    """
+    domain = Real() if domain is None else domain
+    metadata = {"unit": unit, "domain": domain, "scale": scale}
+    return eqx.field(converter=float_array, metadata=metadata, **kwargs)
+
+
+def positive(unit: str = "-", **kwargs):
+    """Declare a positive parameter (its random walk and its prior live on the logarithm)."""
+    return parameter(unit, Positive(), **kwargs)
+
+
+class Parameter(NamedTuple):
+    """One chosen parameter: its path in the tree, its name (`front.B`), its state field (`front_B`), unit and domain."""
+
+    path: str
+    name: str
+    field: str
+    unit: str
+    domain: AbstractBijector
+    scale: float | None
+
+
+class _Mark:
+    """Stands in for a leaf while `where` is resolved, so that identity survives."""
+
+    def __init__(self, index: int):
+        self.index = index
+
+
+def resolve(model, where: Where | None, inside: str = "") -> tuple[Parameter, ...]:
+    """The parameters that `where` picks from `model`, in the order of `where`; names come from the tree's paths.
+
+    `inside` is the path at which `model` sits in the tree that the parameters will be put into.
+
+    Raises `InputError` where `where` picks something that is no array leaf, or the same leaf twice.
+    """
+    if where is None:
+        return ()
+    paths, treedef = jtu.tree_flatten_with_path(model)
+    marks = [_Mark(i) for i in range(len(paths))]
+    try:
+        picked = where(jtu.tree_unflatten(treedef, marks))
+    except AttributeError as error:
+        raise InputError(f"where: {error}; it must pick leaves of {type(model).__name__}.") from None
+    indices = []
+    for leaf in jtu.tree_leaves(picked, is_leaf=lambda x: isinstance(x, _Mark)):
+        if not isinstance(leaf, _Mark):
+            raise InputError(f"where picked {leaf!r}: it must pick array leaves of {type(model).__name__}.")
+        indices.append(leaf.index)
+    if not indices:
+        raise InputError(f"where picked nothing from {type(model).__name__}: it must pick at least one leaf.")
+    if len(set(indices)) < len(indices):
+        twice = [_path_name(paths[i][0]) for i in indices if indices.count(i) > 1]
+        raise InputError(f"where picked {twice[0]} twice: each leaf can be chosen once.")
+    return tuple(_describe(model, paths[i][0], inside) for i in indices)
+
+
+def _path_name(path) -> str:
+    return ".".join(str(getattr(key, "name", getattr(key, "key", getattr(key, "idx", key)))) for key in path)
+
+
+def _describe(model, path, inside: str) -> Parameter:
+    """Walk down to the module that owns the leaf and read its field's metadata."""
+    owner, metadata = model, {}
+    for key in path:
+        if dataclasses.is_dataclass(owner) and isinstance(key, jtu.GetAttrKey):
+            metadata = {f.name: f.metadata for f in dataclasses.fields(owner)}.get(key.name, {})
+        owner = getattr(owner, key.name) if isinstance(key, jtu.GetAttrKey) else owner[getattr(key, "key", getattr(key, "idx", None))]
+    name = _path_name(path)
+    return Parameter(
+        path=f"{inside}.{name}" if inside else name,
+        name=name,
+        field=name.replace(".", "_"),
+        unit=metadata.get("unit", "-"),
+        domain=metadata.get("domain", Real()),
+        scale=metadata.get("scale"),
+    )
+
+
+def pick(model, parameters: tuple[Parameter, ...]) -> list:
+    """The leaves of these parameters, in order."""
+    return [_get(model, p.path) for p in parameters]
+
+
+def put(model, parameters: tuple[Parameter, ...], values):
+    """The model with these leaves replaced by `values` (`None` takes a leaf out)."""
+    paths = [p.path for p in parameters]
+    return eqx.tree_at(
+        lambda m: [_get(m, path) for path in paths], model, replace=list(values), is_leaf=lambda leaf: leaf is None
+    )
+
+
+def view(model, parameters: tuple[Parameter, ...], values):
+    """A tree shaped like `model` that holds only these parameters: `view(...).front.B`; every other leaf is None."""
+    empty = jax.tree.map(lambda _: None, model)
+    return put(empty, tuple(p._replace(path=p.name) for p in parameters), values)
+
+
+def _get(model, path: str):
+    for part in path.split("."):
+        model = model[int(part)] if part.isdigit() else (model[part] if isinstance(model, dict) else getattr(model, part))
+    return model
+
+
+def prior_spread(parameters: tuple[Parameter, ...], values, relative) -> list[jax.Array]:
+    """Standard deviations on the real line for a relative spread, one a parameter.
+
+    `relative` is one number, or a mapping from parameter names (`front.B`, or the last part `B`) to numbers; a
+    parameter whose domain is the whole line refers to its declared `scale`, else to its absolute value.
+    Raises `InputError` for a spread that is not positive, or an unbounded parameter at zero without a scale.
+    """
+    spreads = []
+    for p, value in zip(parameters, values, strict=True):
+        share = relative
+        if isinstance(relative, dict):
+            if p.name not in relative and p.name.split(".")[-1] not in relative:
+                raise InputError(f"prior: no spread for {p.name}; there are: {', '.join(relative)}.")
+            share = relative.get(p.name, relative.get(p.name.split(".")[-1]))
+        value = jnp.asarray(value)
+        share = jnp.asarray(share, value.dtype)
+        if isinstance(p.domain, Real):
+            spread = share * (abs(p.scale) if p.scale is not None else jnp.abs(value))
+        elif isinstance(p.domain, Positive):
+            spread = share
+        else:
+            spread = share * jnp.abs(value) / p.domain.slope(value)
+        spreads.append(jnp.broadcast_to(spread, value.shape))
+    _check_spreads(parameters, spreads)
+    return spreads
+
+
+def _check_spreads(parameters, spreads):
+    from jaxveh._core.errors import check
+
+    for p, spread in zip(parameters, spreads, strict=True):
+        check(
+            f"prior spread of {p.name}", spread, lambda s: (s > 0) & (s < float("inf")), "positive and finite",
+            "A parameter that is known exactly should not be estimated: leave it out of `where`.",
+        )  # fmt: skip

@@ -1,0 +1,154 @@
+"""A recording: named channels over one time base, with units and a note of where it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_one_of, is_concrete
+from jaxveh._core.names import check_names
+
+TRUTH = "true."
+
+
+class Recording(eqx.Module):
+    """Named channels over one time base.
+
+    **Fields**: `time` (T,) in seconds, strictly increasing, steps may be irregular. `channels`: a mapping from name to
+    (T,) array, NaN where a sensor did not speak. `units`: name to unit string. `source`: where it came from.
+
+    Channels of a simulation's truth are named `true.<name>`; `recording.truth` is a recording of those alone.
+    Units and source are static: a jitted function that takes a whole recording compiles anew when they change, so
+    `jaxveh.run` hands only the arrays to its compiled part.
+
+    **Raises** `InputError` for an empty log, channels of another length, non-monotonic or non-finite time.
+    """
+
+    time: jax.Array | np.ndarray
+    channels: dict[str, jax.Array]
+    units: tuple[tuple[str, str], ...] = eqx.field(static=True)
+    source: str = eqx.field(static=True)
+
+    def __init__(self, time, channels: Mapping[str, object], units: Mapping[str, str] | None = None, source: str = ""):
+        # Stamps of a long log need float64 even where everything else runs in float32: they stay on the host.
+        self.time = time if isinstance(time, jax.Array) else np.asarray(time, dtype=np.float64)
+        self.channels = {str(name): _float(values) for name, values in channels.items()}
+        self.units = tuple(sorted((units or {}).items()))
+        self.source = source
+
+    def __check_init__(self):
+        if self.time.ndim != 1 or self.time.shape[0] == 0:
+            raise InputError(f"recording: time has shape {self.time.shape}; it must be (T,) with at least one row.")
+        for name, values in self.channels.items():
+            if values.shape != self.time.shape:
+                raise InputError(f"recording: {name} has shape {values.shape}, time has {self.time.shape}; must agree.")
+        if is_concrete(self.time):
+            time = np.asarray(self.time)
+            if not np.all(np.isfinite(time)):
+                raise InputError(f"recording: time is not finite in row {int(np.argmin(np.isfinite(time)))}.")
+            steps = np.diff(time)
+            if np.any(steps <= 0):
+                k = int(np.argmax(steps <= 0))
+                raise InputError(
+                    f"recording: time[{k + 1}] = {time[k + 1]} after time[{k}] = {time[k]}: must be strictly "
+                    "increasing. Sort the rows and drop repeated stamps first."
+                )
+
+    def __getitem__(self, name: str) -> jax.Array:
+        check_names("recording", [name], self.channels)
+        return self.channels[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.channels
+
+    def __len__(self) -> int:
+        return self.time.shape[0]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The channels' names."""
+        return tuple(self.channels)
+
+    def unit(self, name: str) -> str:
+        """The unit of a channel, or `-` where none was given."""
+        return dict(self.units).get(name, "-")
+
+    @property
+    def truth(self) -> Recording:
+        """The simulated truth alone, under its plain names; raises where there is none."""
+        names = [name for name in self.channels if name.startswith(TRUTH)]
+        if not names:
+            raise InputError("recording.truth: this recording has no `true.` channels; only simulations carry truth.")
+        units = dict(self.units)
+        return Recording(
+            self.time,
+            {name.removeprefix(TRUTH): self.channels[name] for name in names},
+            {name.removeprefix(TRUTH): units[name] for name in names if name in units},
+            self.source,
+        )
+
+    def replace(self, source: str | None = None, units: Mapping[str, str] | None = None, **channels) -> Recording:
+        """A copy with channels added or replaced by keyword ((T,) arrays), and units of those that are new."""
+        merged = {**dict(self.units), **(units or {})}
+        return Recording(self.time, {**self.channels, **channels}, merged, self.source if source is None else source)
+
+    def select(self, names) -> Recording:
+        """Only these channels."""
+        check_names("recording.select", names, self.channels)
+        units = {name: unit for name, unit in self.units if name in names}
+        return Recording(self.time, {name: self.channels[name] for name in names}, units, self.source)
+
+    def without(self, *names: str) -> Recording:
+        """All but these channels, so that nothing downstream can see them."""
+        check_names("recording.without", names, self.channels)
+        return self.select([name for name in self.channels if name not in names])
+
+    def between(self, start: float, end: float) -> Recording:
+        """The rows with start <= time < end; raises where there are none (the log's own time)."""
+        time = np.asarray(self.time)
+        rows = np.flatnonzero((time >= start) & (time < end))
+        if rows.size == 0:
+            raise InputError(f"span {start}:{end}: holds no row; the log runs from {time[0]} to {time[-1]} s.")
+        return self.rows(slice(int(rows[0]), int(rows[-1]) + 1))
+
+    def rows(self, which: slice) -> Recording:
+        """The rows of a slice."""
+        channels = {name: values[which] for name, values in self.channels.items()}
+        return Recording(self.time[which], channels, dict(self.units), self.source)
+
+    def fill(self, channel: str, method: str = "hold", max_gap: float = np.inf) -> Recording:
+        """Fill NaNs of one channel by `hold` (last value) or `linear`, over gaps of at most `max_gap` seconds.
+
+        A gap is the time between the finite samples on its two sides. What is longer, or lies before the first or
+        after the last finite sample where the method cannot reach, stays NaN. Host side, outside jit.
+        """
+        check_one_of("method", method, ("hold", "linear"))
+        values, time = np.array(self[channel]), np.asarray(self.time)
+        known = np.flatnonzero(np.isfinite(values))
+        missing = np.flatnonzero(np.isnan(values))
+        if known.size == 0:
+            raise InputError(f"fill: {channel} has no finite sample at all; leave the channel out.")
+        after = np.searchsorted(known, missing)
+        inside = (after > 0) & ((after < known.size) | (method == "hold"))
+        missing, after = missing[inside], after[inside]
+        before = known[after - 1]
+        following = known[np.minimum(after, known.size - 1)]
+        reach = np.where(after < known.size, time[following], time[missing])
+        short = reach - time[before] <= max_gap
+        missing, before, following = missing[short], before[short], following[short]
+        if method == "hold":
+            values[missing] = values[before]
+        else:
+            share = (time[missing] - time[before]) / (time[following] - time[before])
+            values[missing] = values[before] + share * (values[following] - values[before])
+        return self.replace(**{channel: values})
+
+
+def _float(values) -> jax.Array:
+    if isinstance(values, jax.Array) and jnp.issubdtype(values.dtype, jnp.floating):
+        return values
+    return jnp.asarray(np.asarray(values) if not isinstance(values, jax.Array) else values, dtype=float)

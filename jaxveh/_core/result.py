@@ -1,0 +1,50 @@
+"""Result codes: failure is data, it travels with results through jit, vmap and scan."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import jax.numpy as jnp
+
+
+class Result(IntEnum):
+    """What became of a computation; 0 is success and the first failure of a run is kept."""
+
+    successful = 0
+    not_positive_definite = 1
+    all_particles_dead = 2
+    non_finite_input = 3
+    non_finite_state = 4
+    not_converged = 5
+    too_stiff = 6
+
+    @property
+    def message(self) -> str:
+        """What happened and what to do about it."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Result.successful: "successful",
+    Result.not_positive_definite: "a covariance lost positive definiteness (raise process noise or the prior's spread, "
+    "or use float64)",
+    Result.all_particles_dead: "every particle has zero weight: no particle explains the measurement (widen measurement "
+    "noise or the prior, use a heavy-tailed noise law, or more particles)",
+    Result.non_finite_input: "an input or a measurement is infinite, or an input is NaN (fill gaps with recording.fill)",
+    Result.non_finite_state: "the state is no longer finite (the model diverged: check parameters, step and signs)",
+    Result.not_converged: "the solver stopped before its tolerance was met (more steps, or better start values)",
+    Result.too_stiff: "the step is too long for the model's fastest pole (shorten the step or choose an implicit solver)",
+}
+
+
+def code(result: Result):
+    """The int32 scalar that stands for a result inside jit."""
+    return jnp.int32(int(result))
+
+
+def first_failure(codes):
+    """The first non-zero code along axis 0 and its index (-1 where all succeeded); codes: (T,) int32."""
+    failed = codes != 0
+    index = jnp.argmax(failed)
+    any_failed = jnp.any(failed)
+    return jnp.where(any_failed, codes[index], 0), jnp.where(any_failed, index, -1)

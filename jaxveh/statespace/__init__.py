@@ -1,0 +1,38 @@
+"""The one contract that a filter sees: models by name, noise laws, discretisation, chosen parameters as states."""
+
+from jaxveh.statespace.model import LinearInput, PerPoint, Prior, Row, StateSpace, cast
+from jaxveh.statespace.noise import (
+    AbstractNoise,
+    CauchyGaussianMixture,
+    Gaussian,
+    Independent,
+    MultivariateGaussian,
+    StudentT,
+)
+from jaxveh.statespace.parameters import parameter_view, put_parameters, start_from, with_parameters
+from jaxveh.statespace.process import AbstractProcessNoise, Continuous, Discrete
+from jaxveh.statespace.solvers import RK4, Propagate
+
+__all__ = [
+    "RK4",
+    "AbstractNoise",
+    "AbstractProcessNoise",
+    "CauchyGaussianMixture",
+    "Continuous",
+    "Discrete",
+    "Gaussian",
+    "Independent",
+    "LinearInput",
+    "MultivariateGaussian",
+    "PerPoint",
+    "Prior",
+    "Propagate",
+    "Row",
+    "StateSpace",
+    "StudentT",
+    "cast",
+    "parameter_view",
+    "put_parameters",
+    "start_from",
+    "with_parameters",
+]

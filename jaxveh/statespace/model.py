@@ -1,0 +1,238 @@
+"""The one contract that a filter sees: transition, observation, noises, prior, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError, float_array, is_concrete
+from jaxveh._core.names import check_names, record
+from jaxveh._core.recording import Recording
+from jaxveh.statespace.noise import AbstractNoise, Gaussian
+from jaxveh.statespace.process import AbstractProcessNoise
+
+
+class Row(NamedTuple):
+    """What a filter is given at one instant: time `t`, inputs `u` and measurements `y`, NaN where missing.
+
+    `u` and `y` are NamedTuples of scalars; for a whole recording each leaf is (T,).
+    """
+
+    t: Any
+    u: Any
+    y: Any
+
+
+class Prior(eqx.Module):
+    """The belief at the first row's time before its measurement: a mean, and a law of the deviation.
+
+    `mean` is the state's NamedTuple of scalars, `law` names every one of its fields (a `Gaussian` or a
+    `MultivariateGaussian`; a plain mapping of standard deviations becomes a `Gaussian`).
+    """
+
+    mean: Any
+    law: AbstractNoise
+
+    def __init__(self, mean, law):
+        if not hasattr(mean, "_fields"):
+            raise InputError(f"prior mean = {type(mean).__name__}: must be the state's NamedTuple.")
+        self.mean = jax.tree.map(float_array, mean)
+        self.law = law if isinstance(law, AbstractNoise) else Gaussian(law)
+
+    def __check_init__(self):
+        check_names("prior law", self.law.names, self.mean._fields)
+        missing = [name for name in self.mean._fields if name not in self.law.names]
+        if missing:
+            raise InputError(
+                f"prior: no spread for {', '.join(missing)}; every state needs a positive one "
+                "(what is known exactly is an input or a parameter, not a state)."
+            )
+
+    def sample(self, key, shape: tuple[int, ...] = ()):
+        """Draws of the state: the NamedTuple with arrays of `shape`."""
+        noise = self.law.sample(key, shape)
+        return type(self.mean)(*[m + noise[name] for name, m in self.mean._asdict().items()])
+
+    def covariance(self) -> jax.Array:
+        """(n, n) covariance in the order of the state's fields."""
+        order = np.array([self.law.names.index(name) for name in self.mean._fields])
+        return self.law.covariance()[order][:, order]
+
+
+class StateSpace(eqx.Module):
+    """A state-space model, by name.
+
+    - `system`: whatever the functions need, a tree of float arrays (a vehicle with its sensors; None where nothing). It is
+      held once, so that a gradient with respect to a parameter is one number.
+    - `transition(system, t0, t1, x, u) -> x`: the state at `t1` without noise. `observation(system, t, x, u) -> y`: what the
+      sensors would say without noise, a NamedTuple whose fields include every channel of `measurement_noise`.
+    - `process_noise`: `Continuous(law)`, `Discrete(law)` or None; `measurement_noise`: a law whose names are the measured
+      channels; `prior`: the belief before the first measurement.
+    - `inputs`: the recording's channels that `u` carries. `input_path`: `"held"` (u of the step's first row throughout)
+      or `"linear"` (the transition gets a `LinearInput`, which `Propagate` evaluates along the step).
+    - `report(system, t, x, u) -> NamedTuple`: the quantities an Estimate shows (means and spreads); default the state.
+    - `angles`: measured channels whose innovations wrap into (-pi, pi].
+
+    `x`, `u`, `y` are NamedTuples of scalars; a batch of states has arrays in the fields, and the functions are
+    elementwise in them (`PerPoint(f)` makes a function of single points so). States that are angles are unwrapped reals.
+    The functions are static (plain functions, or modules without arrays), so a new lambda each time compiles each time.
+    """
+
+    system: Any
+    process_noise: AbstractProcessNoise | None
+    measurement_noise: AbstractNoise
+    prior: Prior
+    transition_function: Callable = eqx.field(static=True)
+    observation_function: Callable = eqx.field(static=True)
+    report_function: Callable | None = eqx.field(static=True)
+    inputs: tuple[str, ...] = eqx.field(static=True)
+    angles: tuple[str, ...] = eqx.field(static=True)
+    input_path: str = eqx.field(static=True)
+    chosen: Any = eqx.field(static=True)
+
+    def __init__(
+        self,
+        *,
+        transition: Callable,
+        observation: Callable,
+        process_noise: AbstractProcessNoise | None,
+        measurement_noise: AbstractNoise | Mapping,
+        prior: Prior,
+        system: Any = None,
+        inputs: tuple[str, ...] = (),
+        report: Callable | None = None,
+        angles: tuple[str, ...] = (),
+        input_path: str = "held",
+        chosen: Any = None,
+    ):
+        self.system = system
+        self.transition_function, self.observation_function, self.report_function = transition, observation, report
+        self.process_noise = process_noise
+        law = measurement_noise
+        self.measurement_noise = law if isinstance(law, AbstractNoise) else Gaussian(law)
+        self.prior = prior
+        self.inputs, self.angles, self.input_path = tuple(inputs), tuple(angles), input_path
+        self.chosen = chosen
+
+    def __check_init__(self):
+        if self.process_noise is not None:
+            if not isinstance(self.process_noise, AbstractProcessNoise):
+                raise InputError(
+                    f"process_noise = {type(self.process_noise).__name__}: must be Continuous(law) (unit per root "
+                    "second) or Discrete(law) (a step), or None."
+                )
+            check_names("process noise", self.process_noise.law.names, self.states)
+        check_names("angles", self.angles, self.channels)
+        if self.input_path not in ("held", "linear"):
+            raise InputError(f"input_path = {self.input_path!r}: must be 'held' or 'linear'.")
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The state's field names."""
+        return self.prior.mean._fields
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels' names."""
+        return self.measurement_noise.names
+
+    def rows(self, recording: Recording) -> Row:
+        """The recording as rows for this model: each leaf (T,); host-side checks, skipped for tracers.
+
+        Raises `InputError` for a missing channel, NaN in an input (fill it on request first), or infinite values.
+        Where float32 rules, times count from the first row, so that steps keep their digits.
+        """
+        check_names("recording lacks a channel the model needs", (*self.inputs, *self.channels), recording.names)
+        dtype = self.prior.mean[0].dtype
+        u = {name: _channel(recording, name, dtype, is_input=True) for name in self.inputs}
+        y = {name: _channel(recording, name, dtype, is_input=False) for name in self.channels}
+        time = recording.time
+        if isinstance(time, np.ndarray) and dtype != np.float64:
+            time = time - time[0]
+        return Row(jnp.asarray(time, dtype), record("Inputs", u), record("Measurements", y))
+
+    def row(self, t, u: Mapping, y: Mapping) -> Row:
+        """One row for a live loop from plain numbers; channels left out of `y` are missing."""
+        check_names("inputs", u, self.inputs)
+        check_names("measurements", y, self.channels)
+        dtype = self.prior.mean[0].dtype
+        missing = [name for name in self.inputs if name not in u]
+        if missing:
+            raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
+        scalar = lambda value: jnp.asarray(value, dtype)  # noqa: E731
+        inputs = record("Inputs", {name: scalar(u[name]) for name in self.inputs})
+        measured = record("Measurements", {name: scalar(y.get(name, jnp.nan)) for name in self.channels})
+        return Row(scalar(t), inputs, measured)
+
+    def transition(self, t0, t1, x, u):
+        """The state at `t1` without noise, from the state `x` at `t0`."""
+        return self.transition_function(self.system, t0, t1, x, u)
+
+    def observation(self, t, x, u):
+        """What the sensors would say without noise."""
+        return self.observation_function(self.system, t, x, u)
+
+    def report(self, t, x, u):
+        """What an Estimate shows of a state (or of a batch of states), in physical units."""
+        return x if self.report_function is None else self.report_function(self.system, t, x, u)
+
+    def step_inputs(self, t0, t1, u0, u1):
+        """What `transition` gets as `u` between two rows."""
+        return u0 if self.input_path == "held" or not self.inputs else LinearInput(t0, t1, u0, u1)
+
+
+def _channel(recording: Recording, name: str, dtype, is_input: bool):
+    values = recording[name]
+    if is_concrete(values):
+        array = np.asarray(values)
+        if is_input and np.isnan(array).any():
+            k = int(np.argmax(np.isnan(array)))
+            raise InputError(
+                f"input channel {name} is NaN in {int(np.isnan(array).sum())} rows, first at t = {recording.time[k]} s: "
+                f'an input must be known. Fill it on request: recording.fill("{name}", "linear", max_gap=0.1).'
+            )
+        if np.isinf(array).any():
+            k = int(np.argmax(np.isinf(array)))
+            raise InputError(f"channel {name} is {array[k]} at t = {recording.time[k]} s: must be finite, or NaN if missing.")
+    return values.astype(dtype)
+
+
+class LinearInput(eqx.Module):
+    """Inputs that run linearly from `u0` at `t0` to `u1` at `t1`."""
+
+    t0: Any
+    t1: Any
+    u0: Any
+    u1: Any
+
+    def at(self, t):
+        """The inputs at time t, the NamedTuple of scalars."""
+        share = (t - self.t0) / (self.t1 - self.t0)
+        return jax.tree.map(lambda a, b: a + share * (b - a), self.u0, self.u1)
+
+
+class PerPoint(eqx.Module):
+    """Makes a function of single points, `f(system, *times, x, u)`, elementwise over a batch of states by `vmap`.
+
+    For models with matrices or branches inside; a function that is elementwise already is faster without.
+    """
+
+    function: Callable = eqx.field(static=True)
+
+    def __call__(self, system, *args):
+        *times, x, u = args
+        shape = jnp.broadcast_shapes(*[jnp.shape(leaf) for leaf in jax.tree.leaves(x)])
+        flat = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, shape).reshape(-1), x)
+        out = jax.vmap(lambda point: self.function(system, *times, point, u))(flat)
+        return jax.tree.map(lambda leaf: leaf.reshape(shape), out)
+
+
+def cast(tree, dtype):
+    """The same model, state or recording with every float array in `dtype` (float32 or float64)."""
+    to = lambda leaf: leaf.astype(dtype) if eqx.is_inexact_array(leaf) else leaf  # noqa: E731
+    return jax.tree.map(to, tree)

@@ -1,0 +1,296 @@
+"""Noise laws by field name: what is not named carries no noise."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Mapping
+from typing import ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.bijectors import Interval, Positive
+from jaxveh._core.errors import InputError, check, check_positive, float_array
+from jaxveh._core.names import as_mapping, record
+from jaxveh._core.parameter import parameter, positive
+
+LOG_2PI = 1.8378770664093453
+
+
+class AbstractNoise(eqx.Module):
+    """A zero-mean additive noise law over named scalar fields.
+
+    A batch is a mapping from each name to an array of any common shape.
+    """
+
+    has_covariance: eqx.AbstractVar[bool]
+
+    @property
+    @abc.abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """The fields that carry noise, in the order of `covariance`."""
+
+    @abc.abstractmethod
+    def sample(self, key, shape: tuple[int, ...] = ()) -> dict[str, jax.Array]:
+        """Independent draws: each name with an array of `shape`."""
+
+    @abc.abstractmethod
+    def log_prob(self, residual: Mapping[str, jax.Array], present: Mapping[str, jax.Array]) -> jax.Array:
+        """Log-density of residuals, the marginal over the fields present (booleans); absent residuals are not read."""
+
+    @abc.abstractmethod
+    def covariance(self) -> jax.Array:
+        """(k, k) covariance in the order of `names`; raises `InputError` where the law has none."""
+
+    @abc.abstractmethod
+    def scaled(self, factor) -> AbstractNoise:
+        """The law of `factor` times the noise."""
+
+
+def _levels():
+    """Declares noise levels by field name: positive, in the unit of the field."""
+    return eqx.field(metadata={"unit": "of the channel", "domain": Positive(), "scale": None})
+
+
+def _scales(values, what: str):
+    values = {name: float_array(value) for name, value in as_mapping(values, what).items()}
+    if not values:
+        raise InputError(f"{what} is empty: name at least one field, or give no law at all.")
+    for name, value in values.items():
+        check_positive(f"{what} of {name}", value, advice="A field without noise is left out.")
+    return record("Scales", values)
+
+
+def _masked(residual, present, name):
+    """The residual with zero where absent: replaced before the arithmetic, so that gradients stay finite."""
+    here = present[name]
+    return jnp.where(here, residual[name], jnp.zeros_like(residual[name])), here
+
+
+class Gaussian(AbstractNoise):
+    """Independent Gaussian noise, `Gaussian({"yaw_rate": 0.005, "a_y": 0.1})`: standard deviations in the fields' units."""
+
+    has_covariance: ClassVar[bool] = True
+    std: tuple = _levels()
+
+    def __init__(self, std):
+        self.std = _scales(std, "standard deviation")
+
+    @property
+    def names(self):
+        return self.std._fields
+
+    def sample(self, key, shape=()):
+        draws = numerics.normal(key, (len(self.names), *shape), self.std[0].dtype)
+        return {name: std * draws[i] for i, (name, std) in enumerate(self.std._asdict().items())}
+
+    def log_prob(self, residual, present):
+        terms = []
+        for name, std in self.std._asdict().items():
+            value, here = _masked(residual, present, name)
+            term = -0.5 * (value / std) ** 2 - jnp.log(std) - 0.5 * LOG_2PI
+            terms.append(jnp.where(here, term, jnp.zeros_like(term)))
+        return sum(terms[1:], terms[0])
+
+    def covariance(self):
+        return jnp.diag(jnp.stack([std**2 for std in self.std]))
+
+    def scaled(self, factor):
+        return Gaussian(jax.tree.map(lambda std: std * factor, self.std))
+
+
+class MultivariateGaussian(AbstractNoise):
+    """Correlated Gaussian noise: `fields` in the order of the (k, k) `matrix`, symmetric positive definite."""
+
+    has_covariance: ClassVar[bool] = True
+    fields: tuple[str, ...] = eqx.field(static=True)
+    matrix: jax.Array = eqx.field(converter=float_array)
+
+    def __check_init__(self):
+        k = len(self.fields)
+        if self.matrix.shape != (k, k):
+            raise InputError(f"covariance has shape {self.matrix.shape}: must be ({k}, {k}) for {', '.join(self.fields)}.")
+        check(
+            "covariance", self.matrix,
+            lambda m: abs(m - m.T).max() <= 1e-6 * abs(m).max() and bool((_eigenvalues(m) > 0).all()),
+            "symmetric and positive definite",
+        )  # fmt: skip
+
+    @property
+    def names(self):
+        return self.fields
+
+    def sample(self, key, shape=()):
+        draws = numerics.normal(key, (len(self.fields), *shape), self.matrix.dtype)
+        correlated = jnp.tensordot(numerics.cholesky(self.matrix), draws, axes=1)
+        return {name: correlated[i] for i, name in enumerate(self.fields)}
+
+    def log_prob(self, residual, present):
+        values, here = zip(*[_masked(residual, present, name) for name in self.fields], strict=True)
+        here = jnp.stack(jnp.broadcast_arrays(*here))
+        values = jnp.stack(jnp.broadcast_arrays(*values))
+        # The marginal of the present fields: absent ones become independent with unit variance and zero residual.
+        if here.ndim > 1:
+            here = here.reshape(here.shape[0], -1)[:, 0]
+        eye = jnp.eye(len(self.fields), dtype=self.matrix.dtype)
+        factor = numerics.cholesky(jnp.where(here[:, None] & here[None, :], self.matrix, eye))
+        white = numerics.solve_lower(factor, values.reshape(len(self.fields), -1))
+        count = jnp.sum(here).astype(self.matrix.dtype)
+        log_prob = -0.5 * jnp.sum(white**2, axis=0) - 0.5 * numerics.log_det(factor) - 0.5 * LOG_2PI * count
+        return log_prob.reshape(values.shape[1:])
+
+    def covariance(self):
+        return self.matrix
+
+    def scaled(self, factor):
+        return MultivariateGaussian(self.fields, self.matrix * factor**2)
+
+
+def _eigenvalues(matrix):
+    import numpy as np
+
+    return np.linalg.eigvalsh(np.asarray(matrix, dtype=np.float64))
+
+
+class StudentT(AbstractNoise):
+    """Independent Student-t noise with `dof` degrees of freedom (above zero) and scales by field name.
+
+    Its covariance, `scale^2 dof / (dof - 2)`, exists for dof > 2 only.
+    """
+
+    has_covariance: ClassVar[bool] = True
+    dof: jax.Array = positive("-")
+    scale: tuple = _levels()
+
+    def __init__(self, dof, scale):
+        self.dof = float_array(dof)
+        self.scale = _scales(scale, "scale")
+        check_positive("degrees of freedom", self.dof)
+
+    @property
+    def names(self):
+        return self.scale._fields
+
+    def sample(self, key, shape=()):
+        draws = numerics.student_t(key, self.dof, (len(self.names), *shape), self.scale[0].dtype)
+        return {name: scale * draws[i] for i, (name, scale) in enumerate(self.scale._asdict().items())}
+
+    def log_prob(self, residual, present):
+        dof, half = self.dof, 0.5 * (self.dof + 1)
+        constant = jax.lax.lgamma(half) - jax.lax.lgamma(0.5 * dof) - 0.5 * jnp.log(jnp.pi * dof)
+        terms = []
+        for name, scale in self.scale._asdict().items():
+            value, here = _masked(residual, present, name)
+            term = constant - jnp.log(scale) - half * jnp.log1p((value / scale) ** 2 / dof)
+            terms.append(jnp.where(here, term, jnp.zeros_like(term)))
+        return sum(terms[1:], terms[0])
+
+    def covariance(self):
+        check("degrees of freedom", self.dof, lambda dof: dof > 2, "above 2 for a covariance to exist",
+              "Use a particle filter, or more degrees of freedom.")  # fmt: skip
+        return jnp.diag(jnp.stack([scale**2 * self.dof / (self.dof - 2) for scale in self.scale]))
+
+    def scaled(self, factor):
+        return StudentT(self.dof, jax.tree.map(lambda scale: scale * factor, self.scale))
+
+
+class CauchyGaussianMixture(AbstractNoise):
+    """With probability `weight` a Cauchy law of `scale`, else a Gaussian of `std`, by field name.
+
+    Approximates an alpha-stable law (Qin et al. 2014, eqs 12 to 14, with the weight `(4 - alpha^2) / (3 alpha^2)` on the
+    Cauchy part, 1 <= alpha <= 2; erratum: the Gaussian density needs `exp(-x^2 / (2 R)) / sqrt(2 pi R)`). It has no
+    covariance, and as a law of a step it cannot be continuous in time.
+    """
+
+    has_covariance: ClassVar[bool] = False
+    weight: jax.Array = parameter("-", Interval(0.0, 1.0))
+    scale: tuple = _levels()
+    std: tuple = _levels()
+
+    def __init__(self, weight, scale, std):
+        self.weight = float_array(weight)
+        self.scale, self.std = _scales(scale, "Cauchy scale"), _scales(std, "standard deviation")
+        check("weight", self.weight, lambda w: (w >= 0) & (w <= 1), "from 0 to 1")
+        if self.scale._fields != self.std._fields:
+            raise InputError(f"scale names {self.scale._fields}, std names {self.std._fields}: must agree.")
+
+    @property
+    def names(self):
+        return self.std._fields
+
+    def sample(self, key, shape=()):
+        choice, heavy, light = jax.random.split(key, 3)
+        shape, dtype = (len(self.names), *shape), self.std[0].dtype
+        cauchy = numerics.uniform(choice, shape, dtype) < self.weight
+        wide, narrow = numerics.cauchy(heavy, shape, dtype), numerics.normal(light, shape, dtype)
+        scales = zip(self.names, self.scale, self.std, strict=True)
+        return {name: jnp.where(cauchy[i], s * wide[i], d * narrow[i]) for i, (name, s, d) in enumerate(scales)}
+
+    def log_prob(self, residual, present):
+        terms = []
+        for name, scale, std in zip(self.names, self.scale, self.std, strict=True):
+            value, here = _masked(residual, present, name)
+            heavy = jnp.log(self.weight) - jnp.log(jnp.pi * scale) - jnp.log1p((value / scale) ** 2)
+            light = jnp.log1p(-self.weight) - 0.5 * (value / std) ** 2 - jnp.log(std) - 0.5 * LOG_2PI
+            term = jnp.logaddexp(heavy, light)
+            terms.append(jnp.where(here, term, jnp.zeros_like(term)))
+        return sum(terms[1:], terms[0])
+
+    def covariance(self):
+        raise InputError(
+            "CauchyGaussianMixture has no covariance: use a particle filter, or a Gaussian or Student-t law."
+        )
+
+    def scaled(self, factor):
+        times = lambda values: jax.tree.map(lambda value: value * factor, values)  # noqa: E731
+        return CauchyGaussianMixture(self.weight, times(self.scale), times(self.std))
+
+
+class Independent(AbstractNoise):
+    """Several independent laws over disjoint fields, as one law."""
+
+    laws: tuple[AbstractNoise, ...]
+
+    def __check_init__(self):
+        names = self.names
+        if len(set(names)) < len(names):
+            raise InputError(f"noise laws share fields: {', '.join(names)}; each field has one law.")
+
+    @property
+    def has_covariance(self):
+        return all(law.has_covariance for law in self.laws)
+
+    @property
+    def names(self):
+        return tuple(name for law in self.laws for name in law.names)
+
+    def sample(self, key, shape=()):
+        keys = jax.random.split(key, len(self.laws))
+        draws = [law.sample(k, shape) for law, k in zip(self.laws, keys, strict=True)]
+        return {name: value for draw in draws for name, value in draw.items()}
+
+    def log_prob(self, residual, present):
+        terms = [law.log_prob(residual, present) for law in self.laws]
+        return sum(terms[1:], terms[0])
+
+    def covariance(self):
+        return jax.scipy.linalg.block_diag(*[law.covariance() for law in self.laws])
+
+    def scaled(self, factor):
+        return Independent(tuple(law.scaled(factor) for law in self.laws))
+
+
+def combine(*laws: AbstractNoise | None) -> AbstractNoise | None:
+    """One law of several over disjoint fields; independent Gaussians merge into one, so that one draw serves all."""
+    laws = [law for law in laws if law is not None]
+    if not laws:
+        return None
+    gaussian = [law for law in laws if isinstance(law, Gaussian)]
+    merged = {name: std for law in gaussian for name, std in law.std._asdict().items()}
+    others = [law for law in laws if not isinstance(law, Gaussian)]
+    if gaussian and len(merged) < sum(len(law.names) for law in gaussian):
+        raise InputError("noise laws share fields: each field has one law.")
+    parts = ([Gaussian(merged)] if gaussian else []) + others
+    return parts[0] if len(parts) == 1 else Independent(tuple(parts))

@@ -1,0 +1,193 @@
+"""Chosen parameters as states: they leave the model and become part of what is estimated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxveh._core.bijectors import AbstractBijector
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import as_mapping, record_type
+from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, put, resolve, view
+from jaxveh.statespace.model import Prior, StateSpace
+from jaxveh.statespace.noise import Gaussian, Independent
+from jaxveh.statespace.process import Continuous, join
+
+
+class Chosen(eqx.Module):
+    """Which fields of a joint state are the model's own, and which are parameters (on the real line)."""
+
+    states: tuple[str, ...] = eqx.field(static=True)
+    parameters: tuple[Parameter, ...] = eqx.field(static=True)
+    state_type: Any = eqx.field(static=True)
+    inside: str = eqx.field(static=True, default="")
+
+    @property
+    def joint_type(self):
+        """The joint state's NamedTuple class."""
+        return record_type("State", (*self.states, *[p.field for p in self.parameters]))
+
+    def split(self, x):
+        """The model's own state, and the parameters on the real line in a list."""
+        n = len(self.states)
+        return self.state_type(*x[:n]), list(x[n:])
+
+    def join(self, state, unconstrained):
+        """The joint state."""
+        return self.joint_type(*state, *unconstrained)
+
+    def physical(self, unconstrained) -> list:
+        """The parameters in physical units."""
+        return [p.domain.forward(value) for p, value in zip(self.parameters, unconstrained, strict=True)]
+
+    def fill(self, system, unconstrained):
+        """The system with its missing leaves put back."""
+        return put(system, self.parameters, self.physical(unconstrained))
+
+    def reported_parameters(self, report) -> list:
+        """The parameters' entries of a report, in the order of `parameters`."""
+        return [getattr(report, p.field) for p in self.parameters]
+
+
+class JointTransition(eqx.Module):
+    """Moves the model's own state with the parameters of the joint state; the parameters stay."""
+
+    function: Callable = eqx.field(static=True)
+    chosen: Chosen = eqx.field(static=True)
+
+    def __call__(self, system, t0, t1, x, u):
+        state, unconstrained = self.chosen.split(x)
+        state = self.function(self.chosen.fill(system, unconstrained), t0, t1, state, u)
+        return self.chosen.join(state, unconstrained)
+
+
+class JointObservation(eqx.Module):
+    """Observes the model's own state with the parameters of the joint state."""
+
+    function: Callable = eqx.field(static=True)
+    chosen: Chosen = eqx.field(static=True)
+
+    def __call__(self, system, t, x, u):
+        state, unconstrained = self.chosen.split(x)
+        return self.function(self.chosen.fill(system, unconstrained), t, state, u)
+
+
+class JointReport(eqx.Module):
+    """The model's own report followed by the parameters in physical units."""
+
+    function: Callable | None = eqx.field(static=True)
+    chosen: Chosen = eqx.field(static=True)
+
+    def __call__(self, system, t, x, u):
+        state, unconstrained = self.chosen.split(x)
+        own = state if self.function is None else self.function(self.chosen.fill(system, unconstrained), t, state, u)
+        physical = self.chosen.physical(unconstrained)
+        names = (*own._fields, *[p.field for p in self.chosen.parameters])
+        return record_type("Report", names)(*own, *physical)
+
+
+def with_parameters(
+    model: StateSpace,
+    where: Where,
+    prior: float | Mapping[str, float] | Gaussian,
+    walk: float | Mapping[str, float] = 0.0,
+    inside: str = "",
+    domain: AbstractBijector | None = None,
+) -> StateSpace:
+    """The model with the leaves that `where` picks from its system made states.
+
+    The leaves are removed from `model.system` and become the prior's mean, so that a gradient never silently is zero: it
+    reaches the start values as `model.prior.mean`. Each parameter walks on the real line of its own bijector.
+
+    **Arguments**: `where(system)`, or `where` of the part of the system at the path `inside`. `prior`: the relative
+    spread, one number or by name (`{"B": 0.1, "rear.D": 0.05}`); a positive parameter's is on its logarithm, an
+    unbounded one's times its declared scale. `walk`: the random walk's spread relative likewise, per root second
+    (zero: the parameters are constant and carry no process noise). `domain` overrides every parameter's own bijector
+    (`Real()`: an additive walk in physical units, as papers print it; spreads are then relative to the value or scale).
+
+    **Raises** `InputError` where a spread is zero or negative, or where `where` picks no leaf.
+    """
+    if model.chosen is not None:
+        raise InputError("with_parameters: this model estimates parameters already; choose them all in one `where`.")
+    parameters = resolve(_part(model.system, inside), where, inside)
+    if domain is not None:
+        parameters = tuple(p._replace(domain=domain) for p in parameters)
+    values = pick(model.system, parameters)
+    shaped = [p.name for p, value in zip(parameters, values, strict=True) if jnp.ndim(value) > 0]
+    if shaped:
+        raise InputError(f"where picked {shaped[0]}, an array: parameters that are states are scalars.")
+    chosen = Chosen(model.states, parameters, type(model.prior.mean), inside)
+    starts = [p.domain.inverse(value) for p, value in zip(parameters, values, strict=True)]
+    spreads = dict(zip([p.field for p in parameters], prior_spread(parameters, values, prior), strict=True))
+    own = model.prior.law
+    law = Gaussian({**own.std._asdict(), **spreads}) if isinstance(own, Gaussian) else Independent((own, Gaussian(spreads)))
+    return StateSpace(
+        system=put(model.system, parameters, [None] * len(parameters)),
+        transition=JointTransition(model.transition_function, chosen),
+        observation=JointObservation(model.observation_function, chosen),
+        report=JointReport(model.report_function, chosen),
+        process_noise=join(model.process_noise, _walk(parameters, values, walk)),
+        measurement_noise=model.measurement_noise,
+        prior=Prior(chosen.joint_type(*model.prior.mean, *starts), law),
+        inputs=model.inputs,
+        angles=model.angles,
+        input_path=model.input_path,
+        chosen=chosen,
+    )
+
+
+def _part(system, inside: str):
+    for name in filter(None, inside.split(".")):
+        system = getattr(system, name)
+    return system
+
+
+def _walk(parameters, values, relative):
+    if isinstance(relative, Mapping):
+        relative = as_mapping(relative)
+        walking = [(p, v) for p, v in zip(parameters, values, strict=True) if _share(p, relative) is not None]
+        relative = {p.name: _share(p, relative) for p, _ in walking}
+    elif isinstance(relative, (int, float)) and relative == 0:
+        walking = []
+    else:
+        walking = list(zip(parameters, values, strict=True))
+    if not walking:
+        return None
+    names, values = zip(*walking, strict=True)
+    spreads = prior_spread(names, values, relative)
+    return Continuous(Gaussian({p.field: s for p, s in zip(names, spreads, strict=True)}))
+
+
+def _share(p: Parameter, relative: dict):
+    return relative.get(p.name, relative.get(p.name.split(".")[-1]))
+
+
+def start_from(model: StateSpace, **physical) -> StateSpace:
+    """The same model with other prior means, given in physical units by field (`front_B=9.0`, `v_y=0.1`)."""
+    by_field = {} if model.chosen is None else {p.field: p for p in model.chosen.parameters}
+    unknown = [name for name in physical if name not in model.states]
+    if unknown:
+        raise InputError(f"start_from: unknown state(s) {', '.join(unknown)}; there are: {', '.join(model.states)}.")
+    new = {}
+    for name, value in physical.items():
+        like = getattr(model.prior.mean, name)
+        value = jnp.asarray(value, like.dtype)
+        new[name] = by_field[name].domain.inverse(value) if name in by_field else value
+    return eqx.tree_at(lambda m: m.prior.mean, model, model.prior.mean._replace(**new))
+
+
+def parameter_view(system, chosen: Chosen, report):
+    """A tree shaped like the part that `where` saw, with only the parameters of a report: `.front.B`; else None."""
+    return view(_part(system, chosen.inside), chosen.parameters, chosen.reported_parameters(report))
+
+
+def put_parameters(model: StateSpace, report) -> Any:
+    """The system with the parameters of one report (physical scalars) put back: an ordinary car again."""
+    if model.chosen is None:
+        return model.system
+    return put(model.system, model.chosen.parameters, model.chosen.reported_parameters(report))
+
+
