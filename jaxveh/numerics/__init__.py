@@ -1,0 +1,48 @@
+"""Atoms on plain arrays: elementary functions, random numbers, resampling, small matrices. Safe to jit, batch and differentiate."""
+
+from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
+from jaxveh.numerics.linear_algebra import (
+    cholesky,
+    inverse_psd,
+    log_det,
+    mahalanobis,
+    solve_lower,
+    solve_lower_transposed,
+    solve_psd,
+    symmetric,
+)
+from jaxveh.numerics.platform import barrier, on_cpu
+from jaxveh.numerics.random import cauchy, exponential, normal, student_t, uniform
+from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
+
+__all__ = [
+    "arctan",
+    "arctan2",
+    "barrier",
+    "cauchy",
+    "cholesky",
+    "cos",
+    "ess",
+    "exponential",
+    "hypot",
+    "inverse_psd",
+    "log",
+    "log_det",
+    "mahalanobis",
+    "multinomial",
+    "normal",
+    "normalise",
+    "on_cpu",
+    "residual",
+    "sin",
+    "solve_lower",
+    "solve_lower_transposed",
+    "solve_psd",
+    "sqrt",
+    "stratified",
+    "student_t",
+    "symmetric",
+    "systematic",
+    "tan",
+    "uniform",
+]

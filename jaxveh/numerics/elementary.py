@@ -1,0 +1,331 @@
+"""Elementary functions that are fast on the CPU and have finite derivatives where physics needs them.
+
+On the CPU, float32 and float64 arrays go through polynomials of our own (`polynomials`), several times faster than the
+library's; elsewhere, and for other types and weakly typed values (Python numbers), the library's functions are used. Every
+function has its own derivative rule, written in the same functions, so that both modes and all orders are as fast. Arrays of
+any shape; arguments of two-argument functions broadcast. NaN gives NaN. Errors stated are for float32 / float64.
+"""
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+from jax.typing import ArrayLike
+
+from jaxveh.numerics import polynomials
+from jaxveh.numerics.platform import on_cpu
+
+_TANGENT_OF_PI_8 = math.sqrt(2) - 1
+
+# Multiples of these parts are exact up to 2^13 (float32) and 2^26 (float64) half turns: Cody and Waite's reduction.
+_PI_PARTS_32 = (3.140625, 0.0009670257568359375, 6.278329573009626e-07)
+_PI_PARTS_64 = (3.1415926218032837, 3.1786509424591713e-08, 1.2246467991473532e-16)
+
+
+def sin(x: ArrayLike) -> Array:
+    """Sine of an angle in rad, any shape.
+
+    Absolute error below 2e-7 / 1e-15 for |x| <= 2e4 / 1e8 rad, relative to the result near 0. Beyond, the error grows as if
+    the angle had been rounded once more (|x| times the unit roundoff), and stays in [-1, 1]; infinity gives NaN.
+    """
+    return _sin(_floating(x))
+
+
+def cos(x: ArrayLike) -> Array:
+    """Cosine of an angle in rad, any shape; ranges and errors as for `sin`."""
+    return _cos(_floating(x))
+
+
+def tan(x: ArrayLike) -> Array:
+    """Tangent of an angle in rad, any shape: relative error below 4e-7 / 1e-15 in the range of `sin`."""
+    return _tan(_floating(x))
+
+
+def arctan(x: ArrayLike) -> Array:
+    """Arctangent in rad, any shape; every finite or infinite x. Absolute error below 2e-7 / 4e-16."""
+    return _arctan(_floating(x))
+
+
+def arctan2(y: ArrayLike, x: ArrayLike) -> Array:
+    """Angle of the point (x, y) in rad, in [-pi, pi]. Absolute error below 3e-7 / 1e-15 in all quadrants and on the axes.
+
+    At (0, 0) the value is 0 (with the sign of y) and both derivatives are 0, where the library's are NaN. The sign of a zero
+    y chooses between pi and -pi for negative x; the sign of a zero x is ignored. Derivatives hold where x^2 + y^2 neither
+    underflows nor overflows.
+    """
+    return _arctan2(*_same_type(y, x))
+
+
+def sqrt(x: ArrayLike) -> Array:
+    """Square root, any shape, correctly rounded; its derivative at 0 is 0 instead of infinite."""
+    return _sqrt(_floating(x))
+
+
+def hypot(x: ArrayLike, y: ArrayLike) -> Array:
+    """Length of (x, y), as sqrt(x^2 + y^2): accurate where the squares neither underflow nor overflow.
+
+    Both derivatives at (0, 0) are 0 instead of NaN.
+    """
+    return _hypot(*_same_type(x, y))
+
+
+def log(x: ArrayLike) -> Array:
+    """Natural logarithm, any shape: error below 2e-7 / 4e-16 relative to max(1, |log x|).
+
+    0 and subnormal numbers give -infinity, negative numbers NaN.
+    """
+    return _log(_floating(x))
+
+
+def sin_cos_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Array]:
+    """Sine and cosine of an angle uniform over the circle, made of a random word (uint32 for float32, uint64 for float64).
+
+    Two bits choose the signs, one whether the functions swap, the others an angle in (-pi / 4, pi / 4), so that no reduction
+    and no long polynomial is needed.
+    """
+    bits = 8 * word.dtype.itemsize
+    signed = jnp.int32 if bits == 32 else jnp.int64
+    # The low three bits select; of the others, the conversion keeps those that the floating type holds.
+    integer = lax.bitcast_convert_type(word | _bits(word, 7), signed)
+    r = integer.astype(dtype) * (math.pi / 4 / 2.0 ** (bits - 1))
+    t = r * r
+    sine = r + r * t * polynomials.evaluate(
+        polynomials.of_dtype(r, polynomials.OCTANT_SINE_32, polynomials.OCTANT_SINE_64), t
+    )
+    cosine = 1.0 + t * polynomials.evaluate(
+        polynomials.of_dtype(r, polynomials.OCTANT_COSINE_32, polynomials.OCTANT_COSINE_64), t
+    )
+    swap = (word & _bits(word, 1)) != _bits(word, 0)
+    first, second = jnp.where(swap, cosine, sine), jnp.where(swap, sine, cosine)
+    return _flip(first, word & _bits(word, 2), bits - 2), _flip(second, word & _bits(word, 4), bits - 3)
+
+
+def log_of_normal(x: Array) -> Array:
+    """Natural logarithm of positive, finite, normal float32 or float64 numbers; anything else gives a wrong number."""
+    unsigned, mantissa_bits = _layout(x)
+    signed = jnp.int32 if unsigned == jnp.uint32 else jnp.int64
+    origin = int(np.asarray(math.sqrt(0.5), x.dtype).view(signed))
+    word = lax.bitcast_convert_type(x, signed)
+    # x = 2^exponent * mantissa, with the mantissa between sqrt(1/2) and sqrt(2).
+    exponent = (word - jnp.asarray(origin, signed)) >> jnp.asarray(mantissa_bits, signed)
+    mantissa = lax.bitcast_convert_type(word - (exponent << jnp.asarray(mantissa_bits, signed)), x.dtype)
+    s = (mantissa - 1.0) / (mantissa + 1.0)
+    t = s * s
+    q = polynomials.evaluate(polynomials.of_dtype(x, polynomials.LOGARITHM_32, polynomials.LOGARITHM_64), t)
+    return exponent.astype(x.dtype) * math.log(2.0) + 2.0 * (s + s * t * q)
+
+
+# Types
+
+
+def _floating(x: ArrayLike) -> Array:
+    """As an array of floating point numbers; integers take the default type, as in `jax.numpy`."""
+    x = jnp.asarray(x)
+    if jnp.issubdtype(x.dtype, jnp.inexact):
+        return x
+    return x.astype(jnp.result_type(float))
+
+
+def _same_type(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+    dtype = jnp.result_type(x, y)
+    x, y = _floating(x), _floating(y)
+    if x.dtype == y.dtype:
+        return x, y
+    dtype = jnp.result_type(x, y) if jnp.issubdtype(dtype, jnp.inexact) else x.dtype
+    return x.astype(dtype), y.astype(dtype)
+
+
+def _ours(*arguments: Array) -> bool:
+    """Whether the polynomials apply; weakly typed values keep their weak type only through the library."""
+    return on_cpu() and all(x.dtype in (jnp.float32, jnp.float64) and not x.weak_type for x in arguments)
+
+
+def _layout(x: Array) -> tuple[type, int]:
+    return (jnp.uint32, 23) if x.dtype == jnp.float32 else (jnp.uint64, 52)
+
+
+def _bits(word: Array, value: int) -> Array:
+    return jnp.asarray(value, word.dtype)
+
+
+def _flip(x: Array, sign: Array, shift: int) -> Array:
+    """`x` with its sign flipped where the single bit left in `sign`, `shift` below the sign bit, is set."""
+    word = lax.bitcast_convert_type(x, sign.dtype)
+    return lax.bitcast_convert_type(word ^ (sign << _bits(sign, shift)), x.dtype)
+
+
+def _with_sign(magnitude: Array, sign: Array) -> Array:
+    """`magnitude` (not negative) with the sign bit of `sign`; as bits, because a comparison loses the sign of zero."""
+    unsigned, _ = _layout(magnitude)
+    mask = jnp.asarray(1 << (8 * magnitude.dtype.itemsize - 1), unsigned)
+    bits = lax.bitcast_convert_type(magnitude, unsigned) | (lax.bitcast_convert_type(sign, unsigned) & mask)
+    return lax.bitcast_convert_type(bits, magnitude.dtype)
+
+
+# Sine and cosine
+
+
+def _reduced_sine(x: Array, half_turns: Array, sign: Array) -> Array:
+    """sign * sin(x - pi * half_turns), for a difference within a quarter turn of 0."""
+    first, second, third = _PI_PARTS_32 if x.dtype == jnp.float32 else _PI_PARTS_64
+    r = ((x - half_turns * first) - half_turns * second) - half_turns * third
+    # Far outside the range the difference is rounding noise; the polynomial must not see it. NaN passes.
+    r = jnp.clip(r, -1.6, 1.6)
+    t = r * r
+    q = polynomials.evaluate(polynomials.of_dtype(x, polynomials.SINE_32, polynomials.SINE_64), t)
+    return sign * (r + r * t * q)
+
+
+def _alternating(count: Array) -> Array:
+    """(-1)^count of whole numbers."""
+    half = 0.5 * count
+    return 1.0 - 4.0 * (half - jnp.floor(half))
+
+
+@jax.custom_jvp
+def _sin(x: Array) -> Array:
+    if not _ours(x):
+        return jnp.sin(x)
+    count = jnp.round(x * (1 / math.pi))
+    return _reduced_sine(x, count, _alternating(count))
+
+
+@jax.custom_jvp
+def _cos(x: Array) -> Array:
+    if not _ours(x):
+        return jnp.cos(x)
+    # cos(r + pi / 2 + n pi) = -(-1)^n sin(r): the reduction subtracts n + 1/2 half turns.
+    count = jnp.round(x * (1 / math.pi) - 0.5)
+    return _reduced_sine(x, count + 0.5, -_alternating(count))
+
+
+@jax.custom_jvp
+def _tan(x: Array) -> Array:
+    if not _ours(x):
+        return jnp.tan(x)
+    return _sin(x) / _cos(x)
+
+
+@_sin.defjvp
+def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+    (x,), (dx,) = primals, tangents
+    return _sin(x), _cos(x) * dx
+
+
+@_cos.defjvp
+def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+    (x,), (dx,) = primals, tangents
+    return _cos(x), -_sin(x) * dx
+
+
+@_tan.defjvp
+def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+    (x,), (dx,) = primals, tangents
+    tangent = _tan(x)
+    return tangent, (1.0 + tangent * tangent) * dx
+
+
+# Arctangent
+
+
+def _first_octant(numerator: Array, denominator: Array) -> Array:
+    """arctan(numerator / denominator) for 0 <= numerator <= denominator, one division; 0 / 0 counts as 0.
+
+    Above pi / 8 it is pi / 4 + arctan((n - d) / (n + d)), which halves the degree of the polynomial.
+    """
+    above = numerator > _TANGENT_OF_PI_8 * denominator
+    top = jnp.where(above, numerator - denominator, numerator)
+    bottom = jnp.where(above, numerator + denominator, denominator)
+    r = top / jnp.where(bottom == 0.0, 1.0, bottom)
+    t = r * r
+    q = polynomials.evaluate(polynomials.of_dtype(r, polynomials.ARCTANGENT_32, polynomials.ARCTANGENT_64), t)
+    angle = r + r * t * q
+    return jnp.where(above, math.pi / 4 + angle, angle)
+
+
+def _from_constant(constant: float, angle: Array) -> Array:
+    """constant - angle, with what the type's rounding of the constant lost."""
+    high = float(np.asarray(constant, angle.dtype))
+    return high - (angle - (constant - high))
+
+
+@jax.custom_jvp
+def _arctan(x: Array) -> Array:
+    if not _ours(x):
+        return jnp.arctan(x)
+    size = jnp.abs(x)
+    steep = size > 1.0
+    angle = _first_octant(jnp.where(steep, 1.0, size), jnp.where(steep, size, 1.0))
+    return _with_sign(jnp.where(steep, _from_constant(math.pi / 2, angle), angle), x)
+
+
+@jax.custom_jvp
+def _arctan2(y: Array, x: Array) -> Array:
+    if not _ours(x, y):
+        return jnp.arctan2(y, jnp.where(x == 0.0, jnp.abs(x), x))
+    x, y = jnp.broadcast_arrays(x, y)
+    largest = float(jnp.finfo(x.dtype).max) / 4  # so that infinities and sums of the two stay finite
+    width, height = (jnp.where(jnp.abs(z) > largest, largest, jnp.abs(z)) for z in (x, y))
+    steep = height > width
+    angle = _first_octant(jnp.where(steep, width, height), jnp.where(steep, height, width))
+    angle = jnp.where(steep, _from_constant(math.pi / 2, angle), angle)
+    return _with_sign(jnp.where(x < 0.0, _from_constant(math.pi, angle), angle), y)
+
+
+@_arctan.defjvp
+def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+    (x,), (dx,) = primals, tangents
+    return _arctan(x), dx / (1.0 + x * x)
+
+
+@_arctan2.defjvp
+def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Array, Array]:
+    (y, x), (dy, dx) = primals, tangents
+    square = x * x + y * y
+    inverse = jnp.where(square == 0.0, 0.0, 1.0 / jnp.where(square == 0.0, 1.0, square))
+    return _arctan2(y, x), (x * inverse) * dy - (y * inverse) * dx
+
+
+# Roots and logarithm
+
+
+@jax.custom_jvp
+def _sqrt(x: Array) -> Array:
+    return jnp.sqrt(x)
+
+
+@_sqrt.defjvp
+def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+    (x,), (dx,) = primals, tangents
+    slope = jnp.where(x == 0.0, 0.0, 0.5 / _sqrt(jnp.where(x == 0.0, 1.0, x)))
+    return _sqrt(x), slope * dx
+
+
+@jax.custom_jvp
+def _hypot(x: Array, y: Array) -> Array:
+    return jnp.sqrt(x * x + y * y)
+
+
+@_hypot.defjvp
+def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Array, Array]:
+    (x, y), (dx, dy) = primals, tangents
+    length = _hypot(x, y)
+    inverse = jnp.where(length == 0.0, 0.0, 1.0 / jnp.where(length == 0.0, 1.0, length))
+    return length, (x * inverse) * dx + (y * inverse) * dy
+
+
+@jax.custom_jvp
+def _log(x: Array) -> Array:
+    if not _ours(x):
+        return jnp.log(x)
+    smallest = float(jnp.finfo(x.dtype).tiny)
+    value = jnp.where(x >= smallest, log_of_normal(x), jnp.where(x >= 0.0, -jnp.inf, jnp.nan))
+    return jnp.where(x == jnp.inf, jnp.inf, value)
+
+
+@_log.defjvp
+def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+    (x,), (dx,) = primals, tangents
+    return _log(x), dx / x

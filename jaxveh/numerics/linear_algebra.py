@@ -1,0 +1,139 @@
+"""Square-root algebra of small covariance matrices (..., n, n).
+
+Up to `WRITTEN_OUT` rows the formulas are written out in scalars, which XLA fuses into the surrounding step; above, and in
+one call per batch, the library's LAPACK routines do the work. A factor is always lower triangular, and leading axes are a batch.
+"""
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jaxveh.numerics.elementary import log
+
+WRITTEN_OUT = 6
+"""The largest number of rows whose formulas are written out in scalars."""
+
+Rows = list[list[Array]]
+
+
+def cholesky(matrix: Array) -> Array:
+    """Lower factor L (..., n, n) of L L^T = matrix (..., n, n), of which only the lower triangle is read.
+
+    A matrix that is not positive definite has NaN in the last diagonal element of its factor, at least.
+    """
+    n = _square(matrix, "matrix")
+    if n > WRITTEN_OUT:
+        return jnp.linalg.cholesky(matrix, symmetrize_input=False)
+    rows: Rows = []
+    inverses: list[Array] = []
+    for i in range(n):
+        row: list[Array] = []
+        for j in range(i):
+            row.append((matrix[..., i, j] - _dot(row[:j], rows[j][:j])) * inverses[j])
+        pivot = matrix[..., i, i] - _dot(row, row)
+        root = jnp.sqrt(jnp.where(pivot > 0.0, pivot, jnp.nan))
+        rows.append([*row, root])
+        inverses.append(1.0 / root)
+    return _from_rows(rows)
+
+
+def solve_lower(factor: Array, b: Array) -> Array:
+    """x of L x = b, for a factor L (..., n, n) and b (..., n), or (..., n, k) with as many axes as L."""
+    return _by_columns(_forward, factor, b)
+
+
+def solve_lower_transposed(factor: Array, b: Array) -> Array:
+    """x of L^T x = b; shapes as for `solve_lower`."""
+    return _by_columns(_backward, factor, b)
+
+
+def solve_psd(factor: Array, b: Array) -> Array:
+    """x of L L^T x = b: the solution for the matrix that was factored; shapes as for `solve_lower`."""
+    return solve_lower_transposed(factor, solve_lower(factor, b))
+
+
+def inverse_psd(factor: Array) -> Array:
+    """(L L^T)^-1 (..., n, n), symmetric, from the factor L (..., n, n)."""
+    n = _square(factor, "factor")
+    identity = jnp.broadcast_to(jnp.eye(n, dtype=factor.dtype), factor.shape)
+    inverse = solve_lower(factor, identity)
+    return jnp.swapaxes(inverse, -1, -2) @ inverse
+
+
+def log_det(factor: Array) -> Array:
+    """Logarithm of the determinant of L L^T (...,), from the factor L (..., n, n)."""
+    _square(factor, "factor")
+    return 2.0 * jnp.sum(log(jnp.diagonal(factor, axis1=-2, axis2=-1)), axis=-1)
+
+
+def mahalanobis(factor: Array, residual: Array) -> Array:
+    """r^T (L L^T)^-1 r (...,): the squared distance of a residual r (..., n) from 0."""
+    whitened = solve_lower(factor, residual)
+    return jnp.sum(whitened * whitened, axis=-1)
+
+
+def symmetric(matrix: Array) -> Array:
+    """The symmetric part (M + M^T) / 2 of a matrix (..., n, n)."""
+    _square(matrix, "matrix")
+    return 0.5 * (matrix + jnp.swapaxes(matrix, -1, -2))
+
+
+def _square(matrix: Array, name: str) -> int:
+    if matrix.ndim < 2 or matrix.shape[-1] != matrix.shape[-2] or matrix.shape[-1] == 0:
+        raise ValueError(f"{name} has shape {matrix.shape}; it must be (..., n, n) with n >= 1.")
+    return matrix.shape[-1]
+
+
+def _dot(a: list[Array], b: list[Array]) -> Array | float:
+    total: Array | float = 0.0
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total
+
+
+def _from_rows(rows: Rows) -> Array:
+    """The lower triangular matrix (..., n, n) of its rows of scalars (...,)."""
+    zero = jnp.zeros_like(rows[0][0])
+    n = len(rows)
+    return jnp.stack([jnp.stack([*row, *[zero] * (n - len(row))], -1) for row in rows], -2)
+
+
+def _by_columns(solve: Callable[[Array, list[Array]], list[Array]], factor: Array, b: Array) -> Array:
+    n = _square(factor, "factor")
+    vector = b.ndim == factor.ndim - 1
+    if b.ndim not in (factor.ndim - 1, factor.ndim) or b.shape[-1 if vector else -2] != n:
+        raise ValueError(f"b has shape {b.shape}; for a factor {factor.shape} it must be (..., {n}) or (..., {n}, k).")
+    if n > WRITTEN_OUT:
+        columns = b[..., None] if vector else b
+        solution = _library_solve(factor, columns, transposed=solve is _backward)
+        return solution[..., 0] if vector else solution
+    # A matrix is solved for all columns at once: a row of it stands where a vector has a scalar.
+    entries = factor if vector else factor[..., None, :, :]
+    rows = [b[..., i] if vector else b[..., i, :] for i in range(n)]
+    return jnp.stack(solve(entries, rows), -1 if vector else -2)
+
+
+def _library_solve(factor: Array, b: Array, *, transposed: bool) -> Array:
+    batch = jnp.broadcast_shapes(factor.shape[:-2], b.shape[:-2])
+    factor = jnp.broadcast_to(factor, batch + factor.shape[-2:])
+    b = jnp.broadcast_to(b, batch + b.shape[-2:])
+    return jax.lax.linalg.triangular_solve(factor, b, left_side=True, lower=True, transpose_a=transposed)
+
+
+def _forward(factor: Array, b: list[Array]) -> list[Array]:
+    x: list[Array] = []
+    for i, entry in enumerate(b):
+        known = _dot([factor[..., i, j] for j in range(i)], x)
+        x.append((entry - known) / factor[..., i, i])
+    return x
+
+
+def _backward(factor: Array, b: list[Array]) -> list[Array]:
+    n = len(b)
+    x: list[Array] = []
+    for i in reversed(range(n)):
+        known = _dot([factor[..., j, i] for j in reversed(range(i + 1, n))], x)
+        x.append((b[i] - known) / factor[..., i, i])
+    return x[::-1]

@@ -1,0 +1,29 @@
+"""The one place that decides, at trace time, between forms for the CPU and forms for an accelerator.
+
+On the CPU XLA recomputes an expression in each consumer that it fuses it into, and its trigonometric functions are slow;
+on an accelerator both are handled well. Everything in this package that differs by platform asks here.
+"""
+
+from typing import TypeVar
+
+import jax
+from jax import lax
+
+Tree = TypeVar("Tree")
+
+
+def on_cpu() -> bool:
+    """Whether code traced now is meant for the CPU: the platform of `jax_default_device`, else the default backend."""
+    device = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
+    if device is None:
+        return jax.default_backend() == "cpu"
+    return (device if isinstance(device, str) else device.platform) == "cpu"
+
+
+def barrier(tree: Tree) -> Tree:
+    """`tree`, which XLA on the CPU computes once and stores; on other platforms `tree` as it is.
+
+    Place it on values with several consumers (a new state, weights, random words). It batches and differentiates in both
+    modes; tangents and cotangents pass through barriers of their own.
+    """
+    return lax.optimization_barrier(tree) if on_cpu() else tree

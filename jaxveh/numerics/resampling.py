@@ -1,0 +1,143 @@
+"""Resampling: which particle each of the next generation descends from.
+
+Every scheme takes weights (N,), not negative and finite with a positive sum, normalised or not, and returns ancestors (n,),
+int32 and nondecreasing, with n = N unless asked otherwise. The expected number of children of particle i is n w_i / sum(w).
+
+Cumulated weights are whole numbers, of 2^30 (float32) or 2^52 (float64) parts of the sum. Their sums are exact in any order,
+so that rounding never loses a particle, goes past the last, breaks the order, or chooses one of zero weight; a weight below
+half a part counts as zero. Ancestors are integers: no gradient passes through them.
+"""
+
+import math
+import operator
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jaxveh.numerics import random
+from jaxveh.numerics.elementary import log
+from jaxveh.numerics.platform import barrier
+
+
+def systematic(key: Array, weights: Array, n: int | None = None) -> Array:
+    """One uniform offset for all n strata (Kitagawa, 1996): each particle has its expected number of children, +- 1."""
+    n = _size(weights, n)
+    parts, total = _cumulated_parts(weights)
+    offset = random.uniform(key, (), weights.dtype)
+    position = _position(parts, total, n, weights.dtype)
+    return _ancestors(jnp.where(parts == total, n, jnp.ceil(position - offset).astype(jnp.int32)), n)
+
+
+def stratified(key: Array, weights: Array, n: int | None = None) -> Array:
+    """One uniform offset for each of n strata (Kitagawa, 1996)."""
+    n = _size(weights, n)
+    parts, total = _cumulated_parts(weights)
+    offsets = barrier(random.uniform(key, (n,), weights.dtype))
+    position = _position(parts, total, n, weights.dtype)
+    whole = jnp.minimum(jnp.floor(position), n - 1)
+    stratum = barrier(whole.astype(jnp.int32))
+    # All strata below the position's are passed, its own if the offset is.
+    passed = stratum + (offsets[stratum] < position - whole).astype(jnp.int32)
+    return _ancestors(jnp.where(parts == total, n, passed), n)
+
+
+def multinomial(key: Array, weights: Array, n: int | None = None) -> Array:
+    """n independent draws, in order: sorted uniforms by exponential spacings, and a binary search."""
+    n = _size(weights, n)
+    parts, total = _cumulated_parts(weights)
+    return _search(parts, _sorted_parts(key, n, jnp.asarray(n, jnp.int32), total, weights.dtype))
+
+
+def residual(key: Array, weights: Array, n: int | None = None) -> Array:
+    """floor(n w_i) children each, the rest by multinomial draws from the remainders (Liu and Chen, 1998)."""
+    n = _size(weights, n)
+    expected = weights * (n / jnp.sum(weights))
+    # An expected number that rounding put just below a whole one counts as whole.
+    certain = jnp.floor(expected * (1.0 + 8.0 * float(jnp.finfo(weights.dtype).eps)))
+    remainder = jnp.maximum(expected - certain, 0.0)
+    certain = certain.astype(jnp.int32)
+    missing = n - jnp.sum(certain, dtype=jnp.int32)
+    parts, total = _cumulated_parts(jnp.where(missing > 0, remainder, 1.0))
+    drawn = _search(parts, _sorted_parts(key, n, missing, total, weights.dtype))
+    draw = jax.lax.iota(jnp.int32, n)
+    children = certain.at[drawn].add((draw < missing).astype(jnp.int32), mode="promise_in_bounds")
+    return _ancestors(jax.lax.cumsum(children), n)
+
+
+def ess(weights: Array) -> Array:
+    """Effective sample size (sum w)^2 / sum w^2 of weights (N,), between 1 and N; 0 if all are zero (Kong et al., 1994)."""
+    square = jnp.sum(weights * weights)
+    total = jnp.sum(weights)
+    return jnp.where(square > 0.0, total * total / jnp.where(square > 0.0, square, 1.0), 0.0)
+
+
+def normalise(log_weights: Array) -> tuple[Array, Array, Array]:
+    """Weights (N,) that sum to 1, the logarithm of the mean weight, and whether any particle is alive, of log weights (N,).
+
+    An entry that is not finite is dead and gets weight 0. If all are, the weights are uniform, the logarithm is -infinity and
+    `alive` is False. Gradients are finite in every case, and zero with respect to dead entries.
+    """
+    count = log_weights.shape[-1]
+    living = jnp.isfinite(log_weights)
+    alive = jnp.any(living)
+    largest = jax.lax.stop_gradient(jnp.max(jnp.where(living, log_weights, -jnp.inf)))
+    largest = jnp.where(alive, largest, 0.0)
+    shifted = jnp.where(living, log_weights, largest) - largest
+    raw = barrier(jnp.where(living, jnp.exp(shifted), 0.0))
+    total = jnp.where(alive, jnp.sum(raw), 1.0)
+    weights = jnp.where(alive, raw * (1.0 / total), 1.0 / count)
+    log_mean = jnp.where(alive, largest + log(total) - math.log(count), -jnp.inf)
+    return weights, log_mean, alive
+
+
+def _size(weights: Array, n: int | None) -> int:
+    if weights.ndim != 1 or weights.shape[0] == 0:
+        raise ValueError(
+            f"weights have shape {weights.shape}; they must be (N,) with N >= 1: use jax.vmap for batches."
+        )
+    if not jnp.issubdtype(weights.dtype, jnp.floating):
+        raise ValueError(f"weights are {weights.dtype.name}; they must be float32 or float64: convert them.")
+    n = weights.shape[0] if n is None else operator.index(n)
+    if not 1 <= n < 2**30:
+        raise ValueError(f"n is {n}; the number of ancestors must be between 1 and 2^30.")
+    return n
+
+
+def _cumulated_parts(weights: Array) -> tuple[Array, Array]:
+    """Cumulated weights in whole parts (N,), and their sum: 2^30 or 2^52 but for rounding."""
+    parts = _as_parts(weights)
+    cumulated = barrier(jax.lax.cumsum(parts))
+    return cumulated, cumulated[-1]
+
+
+def _as_parts(weights: Array) -> Array:
+    bits, integer = (30, jnp.int32) if weights.dtype == jnp.float32 else (52, jnp.int64)
+    return barrier(jnp.round(weights * (2.0**bits / jnp.sum(weights))).astype(integer))
+
+
+def _position(parts: Array, total: Array, n: int, dtype: jnp.dtype) -> Array:
+    """n times the cumulated weight, in [0, n]: monotone, because each operation is."""
+    return parts.astype(dtype) * (n / total.astype(dtype))
+
+
+def _ancestors(passed: Array, n: int) -> Array:
+    """Ancestors (n,) of the numbers of children `passed` (N,) of the particles up to and with each, nondecreasing, last n."""
+    passed = barrier(jnp.clip(passed, 0, n))
+    ended = jnp.zeros(n, jnp.int32).at[passed].add(1, mode="drop", indices_are_sorted=True)
+    return barrier(jax.lax.cumsum(barrier(ended)))
+
+
+def _sorted_parts(key: Array, n: int, count: Array, total: Array, dtype: jnp.dtype) -> Array:
+    """`count` <= n sorted uniform whole numbers in [0, total), then numbers that mean nothing but are in range; (n,)."""
+    spacing = random.exponential(key, (n + 1,), dtype)
+    used = jax.lax.iota(jnp.int32, n + 1) <= count
+    cumulated = barrier(jax.lax.cumsum(_as_parts(jnp.where(used, spacing, 0.0))))
+    uniform = cumulated[:-1].astype(dtype) * (1.0 / cumulated[-1].astype(dtype))
+    drawn = jnp.floor(uniform * total.astype(dtype)).astype(total.dtype)
+    return jnp.clip(drawn, 0, total - 1)
+
+
+def _search(cumulated: Array, drawn: Array) -> Array:
+    """The first particle whose cumulated parts exceed each drawn number."""
+    return barrier(jnp.searchsorted(cumulated, drawn, side="right").astype(jnp.int32))
