@@ -1,0 +1,85 @@
+"""The auxiliary particle filter: particles are chosen by how well they will explain the next measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh.filters.base import presence
+from jaxveh.filters.particle import (
+    AbstractParticleFilter,
+    ParticleBelief,
+    ParticleFilter,
+    add_noise,
+    check_particle_settings,
+    choose_ancestors,
+    gather,
+    log_of,
+    log_prob,
+    make_info,
+    need_key,
+)
+
+
+class AuxiliaryParticleFilter(AbstractParticleFilter):
+    """The auxiliary particle filter (Pitt & Shephard 1999; Bao et al. 2015, eqs 8 to 11).
+
+    First-stage weights `w_{k-1} p(y_k | mu_k)`, ancestor draw, propagation, second-stage weights
+    `p(y_k | x_k) / p(y_k | mu_k of the ancestor)` (erratum: the paper prints eq 11 otherwise, and its steps omit the
+    ancestor draw). `lookahead(model, t0, t1, x, u) -> mu` is the characteristic of the transition, elementwise; by
+    default its mean, the propagated state without noise, which then is not computed twice. Where the ESS of the
+    first-stage weights stays above `threshold`, no ancestors are drawn and the step is a bootstrap step.
+
+    Gradients hold the ancestors fixed and are biased, as in `ParticleFilter`, for noise levels too.
+    """
+
+    particles: int = eqx.field(static=True)
+    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    threshold: float = eqx.field(static=True, default=1.0)
+    lookahead: Callable | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self):
+        check_particle_settings(self.particles, self.threshold)
+
+    def init(self, model, row, key=None):
+        return ParticleFilter(self.particles, self.resampling, self.threshold).init(model, row, need_key(self, key))
+
+    def step(self, model, belief, row):
+        draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
+        u = model.step_inputs(belief.t, row.t, belief.u, row.u)
+        measured, present = presence(model, row)
+        characteristic = self._look(model, belief, row, u)
+        ahead, residual = log_prob(model, row, characteristic, measured, present)
+        first, log_first, alive_first = numerics.normalise(ahead + log_of(belief.weights))
+        ancestors, resampled = choose_ancestors(self, draw, first)
+        if self.lookahead is None:
+            moved = gather(characteristic, ancestors)
+        else:
+            moved = model.transition(belief.t, row.t, gather(belief.particles, ancestors), u)
+        moved = numerics.barrier(add_noise(model, noise, moved, row.t - belief.t))
+        logs, _ = log_prob(model, row, moved, measured, present)
+        chosen_ahead = gather((ahead,), ancestors)[0]
+        n = jnp.asarray(self.particles, logs.dtype)
+        drawn = logs - chosen_ahead
+        if resampled is not None:
+            # Without a draw: an ordinary importance step from the weights that were there.
+            drawn = jnp.where(resampled, drawn, logs + log_of(belief.weights) + jnp.log(n))
+            log_first = jnp.where(resampled, log_first, -jnp.log(n))
+        weights, log_second, alive_second = numerics.normalise(drawn)
+        log_likelihood = log_first + jnp.log(n) + log_second
+        after = ParticleBelief(moved, weights, belief.key, row.t, row.u, belief.count + 1)
+        alive = alive_first & alive_second
+        info = make_info(model, row, log_likelihood, residual, present, (belief.weights, weights), alive)
+        return after, info
+
+    def _look(self, model, belief, row, u):
+        if self.lookahead is None:
+            moved = model.transition(belief.t, row.t, belief.particles, u)
+        else:
+            moved = self.lookahead(model, belief.t, row.t, belief.particles, u)
+        n = self.particles
+        return numerics.barrier(jax.tree.map(lambda field: jnp.broadcast_to(field, (n,)), moved))

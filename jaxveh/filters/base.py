@@ -1,0 +1,90 @@
+"""What a filter is: `init` applies the first row, `step` propagates and applies the next; both report an info."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.names import record
+from jaxveh._core.result import Result, code
+from jaxveh.statespace import Row, StateSpace
+
+
+class Info(NamedTuple):
+    """What a person wants to know of one step.
+
+    `log_likelihood`: the increment, log p(y_k | y_0..k-1). `innovation`, `innovation_std`: measurement less prediction
+    and its predicted spread, NamedTuples by channel, NaN where missing. `nis`: normalised innovation squared over the
+    channels present (Gaussian filters; expected value: their number). `ess`: effective sample size after the
+    measurement, (particle filters, else NaN). `result`: code, see `jaxveh.Result`.
+    """
+
+    log_likelihood: Any
+    innovation: Any
+    innovation_std: Any
+    nis: Any
+    ess: Any
+    result: Any
+
+
+class AbstractBelief(eqx.Module):
+    """What a filter knows after a row: all that the next step needs, its `t`, `u` and the `count` of rows included."""
+
+    @abc.abstractmethod
+    def moments(self, model: StateSpace) -> tuple[Any, Any]:
+        """Mean and standard deviation of `model.report` under the belief: two NamedTuples of scalars."""
+
+
+class AbstractFilter(eqx.Module):
+    """The contract of every filter.
+
+    `init(model, row, key) -> (belief, info)` takes the prior as the belief at the first row's time and applies its
+    measurement, without propagation. `step(model, belief, row) -> (belief, info)` propagates with the inputs of the
+    previous row over the time between, then applies the row's measurement with its own inputs. Both return the
+    info of their row, so that the log-likelihoods add up to that of all measurements.
+    """
+
+    @abc.abstractmethod
+    def check(self, model: StateSpace) -> None:
+        """Raise `InputError` early, by name, where the model asks for what this filter cannot."""
+
+    @abc.abstractmethod
+    def init(self, model: StateSpace, row: Row, key=None) -> tuple[AbstractBelief, Info]:
+        """The belief after the first row."""
+
+    @abc.abstractmethod
+    def step(self, model: StateSpace, belief: AbstractBelief, row: Row) -> tuple[AbstractBelief, Info]:
+        """The belief after the next row."""
+
+
+def presence(model: StateSpace, row: Row) -> tuple[dict, dict]:
+    """Measurements with missing ones replaced by zero, and which are present: two mappings by channel.
+
+    NaN means missing; so does infinity here, and `input_result` reports it.
+    """
+    values = {name: getattr(row.y, name) for name in model.channels}
+    present = {name: jnp.isfinite(value) for name, value in values.items()}
+    filled = {name: jnp.where(present[name], value, jnp.zeros_like(value)) for name, value in values.items()}
+    return filled, present
+
+
+def input_result(model: StateSpace, row: Row):
+    """`non_finite_input` where an input or the time is not finite, or a measurement is infinite."""
+    bad = [~jnp.isfinite(leaf) for leaf in jax.tree.leaves((row.t, row.u))]
+    bad += [jnp.isinf(getattr(row.y, name)) for name in model.channels]
+    return jnp.where(jnp.any(jnp.stack(bad)), code(Result.non_finite_input), code(Result.successful))
+
+
+def wrap_angle(angle):
+    """The same angle in [-pi, pi)."""
+    return angle - 2 * jnp.pi * jnp.floor(angle / (2 * jnp.pi) + 0.5)
+
+
+def by_channel(model: StateSpace, values, present: dict):
+    """A NamedTuple by channel, NaN where the channel is missing; `values` in the order of the channels."""
+    pairs = zip(model.channels, values, strict=True)
+    return record("Measurements", {name: jnp.where(present[name], value, jnp.nan) for name, value in pairs})

@@ -1,0 +1,208 @@
+"""The bootstrap particle filter, and what every particle filter shares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
+from jaxveh._core.result import Result, code
+from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info, by_channel, input_result, presence, wrap_angle
+from jaxveh.statespace import StateSpace
+
+
+class ParticleBelief(AbstractBelief):
+    """Weighted particles: the state's NamedTuple with (N,) in each field, and normalised weights (N,)."""
+
+    particles: Any
+    weights: jax.Array
+    key: Any
+    t: Any
+    u: Any
+    count: Any
+
+    @property
+    def mean(self):
+        """Weighted mean of each field (parameters on the real line)."""
+        return jax.tree.map(lambda field: jnp.sum(self.weights * field), self.particles)
+
+    @property
+    def std(self):
+        """Weighted standard deviation of each field."""
+        return jax.tree.map(lambda field, m: _std(self.weights, field - m), self.particles, self.mean)
+
+    @property
+    def covariance(self):
+        """(n, n) weighted covariance in the order of the state's fields."""
+        centred = jnp.stack([field - m for field, m in zip(self.particles, self.mean, strict=True)])
+        return (centred * self.weights) @ centred.T
+
+    def quantile(self, share: float):
+        """The weighted quantile of each field: the smallest value with at least `share` of the weight at or below."""
+
+        def of(field):
+            order = jnp.argsort(field)
+            reached = jnp.cumsum(self.weights[order]) >= share
+            return field[order][jnp.argmax(reached)]
+
+        return jax.tree.map(of, self.particles)
+
+    def moments(self, model):
+        shown = model.report(self.t, self.particles, self.u)
+        n = self.weights.shape[0]
+        shown = jax.tree.map(lambda field: jnp.broadcast_to(field, (n,)), shown)
+        # Deviations from the first particle keep the digits of E[x^2] - E[x]^2, and one pass serves both moments.
+        base = jax.tree.map(lambda field: jax.lax.stop_gradient(field[0]), shown)
+        first = jax.tree.map(lambda field, b: jnp.sum(self.weights * (field - b)), shown, base)
+        second = jax.tree.map(lambda field, b: jnp.sum(self.weights * (field - b) ** 2), shown, base)
+        mean = jax.tree.map(lambda b, m: b + m, base, first)
+        std = jax.tree.map(lambda m, s: numerics.sqrt(jnp.maximum(s - m**2, 0)), first, second)
+        return mean, std
+
+
+def _std(weights, deviation):
+    return numerics.sqrt(jnp.sum(weights * deviation**2))
+
+
+class AbstractParticleFilter(AbstractFilter):
+    """Shared by particle filters: `particles` (at least 2), `resampling` scheme, `threshold` of the ESS.
+
+    `resampling(key, weights, n) -> ancestors` (see `numerics.systematic`, `stratified`, `multinomial`, `residual`).
+    `threshold`: resample where the ESS falls below this share of the particles; 1 (the default) resamples every step.
+    """
+
+    particles: eqx.AbstractVar[int]
+    resampling: eqx.AbstractVar[Callable]
+    threshold: eqx.AbstractVar[float]
+
+    def check(self, model):
+        del model
+
+
+def check_particle_settings(particles: int, threshold: float) -> None:
+    """Raise `InputError` for fewer than two particles or a threshold outside [0, 1]."""
+    if not isinstance(particles, int) or particles < 2:
+        raise InputError(f"particles = {particles}: must be a whole number of at least 2.")
+    if not 0 <= threshold <= 1:
+        raise InputError(f"threshold = {threshold}: must be from 0 (never resample) to 1 (every step).")
+
+
+def log_prob(model: StateSpace, row, particles, measured, present):
+    """log p(y | x) of each particle over the channels present, (N,), and the predicted measurements by channel."""
+    n = particles[0].shape[0]
+    observed = model.observation(row.t, particles, row.u)
+    predicted = {name: jnp.broadcast_to(getattr(observed, name), (n,)) for name in model.channels}
+    residual = {name: measured[name] - predicted[name] for name in model.channels}
+    for name in model.angles:
+        residual[name] = wrap_angle(residual[name])
+    logs = jnp.broadcast_to(model.measurement_noise.log_prob(residual, present), (n,))
+    return numerics.barrier(logs), residual
+
+
+def add_noise(model: StateSpace, key, particles, dt):
+    """The particles with a draw of the process noise over `dt` added to the fields that carry it."""
+    if model.process_noise is None:
+        return particles
+    noise = model.process_noise.over(dt).sample(key, particles[0].shape)
+    return particles._replace(**{name: getattr(particles, name) + value for name, value in noise.items()})
+
+
+def gather(particles, ancestors):
+    """The ancestors' states; the draw is held fixed under differentiation."""
+    take = lambda field: field.at[ancestors].get(mode="promise_in_bounds", indices_are_sorted=True)  # noqa: E731
+    return jax.tree.map(take, particles)
+
+
+def choose_ancestors(filter_, key, weights):
+    """Ancestors (N,) int32 and whether resampling took place (None: always, known when compiling)."""
+    drawn = filter_.resampling(key, jax.lax.stop_gradient(weights), filter_.particles)
+    if filter_.threshold >= 1:
+        return drawn, None
+    resampled = numerics.ess(weights) < filter_.threshold * filter_.particles
+    return jnp.where(resampled, drawn, jnp.arange(filter_.particles, dtype=drawn.dtype)), resampled
+
+
+def start_particles(filter_, model, row, key):
+    """Draws of the prior, with the key that later steps fold their count into."""
+    prior_key, key = jax.random.split(key)
+    particles = model.prior.sample(prior_key, (filter_.particles,))
+    return particles, key
+
+
+def make_info(model, row, log_likelihood, residual, present, weights, alive):
+    """The info of one step; `weights`: those of the prediction, whose residuals are given, and those after the row."""
+    before, after = weights
+    mean = {name: jnp.sum(before * residual[name]) for name in model.channels}
+    spread = {name: jnp.sum(before * (residual[name] - mean[name]) ** 2) for name in model.channels}
+    law = model.measurement_noise
+    noise = jnp.diagonal(law.covariance()) if law.has_covariance else jnp.full((len(model.channels),), jnp.nan, after.dtype)
+    std = [numerics.sqrt(spread[name] + noise[i]) for i, name in enumerate(law.names)]
+    result = input_result(model, row)
+    result = jnp.where((result == 0) & ~alive, code(Result.all_particles_dead), result)
+    dtype = after.dtype
+    return Info(
+        log_likelihood=log_likelihood,
+        innovation=by_channel(model, [mean[name] for name in model.channels], present),
+        innovation_std=by_channel(model, std, present),
+        nis=jnp.full((), jnp.nan, dtype),
+        ess=numerics.ess(after),
+        result=result,
+    )
+
+
+class ParticleFilter(AbstractParticleFilter):
+    """The bootstrap particle filter (Gordon, Salmond & Smith 1993; Sarkka 2013, algorithm 7.4 with the transition as proposal).
+
+    Gradients of the log-likelihood hold the ancestors fixed: the dependence of the resampling on the parameters is left
+    out, so that they are **biased**, for the dynamics' parameters and for noise levels too.
+    """
+
+    particles: int = eqx.field(static=True)
+    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    threshold: float = eqx.field(static=True, default=1.0)
+
+    def __check_init__(self):
+        check_particle_settings(self.particles, self.threshold)
+
+    def init(self, model, row, key=None):
+        particles, key = start_particles(self, model, row, need_key(self, key))
+        uniform = jnp.full((self.particles,), 1 / self.particles, particles[0].dtype)
+        return self._weigh(model, row, particles, uniform, key, jnp.int32(0))
+
+    def step(self, model, belief, row):
+        draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
+        ancestors, resampled = choose_ancestors(self, draw, belief.weights)
+        particles = gather(belief.particles, ancestors)
+        uniform = jnp.full_like(belief.weights, 1 / self.particles)
+        weights = uniform if resampled is None else jnp.where(resampled, uniform, belief.weights)
+        u = model.step_inputs(belief.t, row.t, belief.u, row.u)
+        moved = model.transition(belief.t, row.t, particles, u)
+        moved = numerics.barrier(add_noise(model, noise, moved, row.t - belief.t))
+        return self._weigh(model, row, moved, weights, belief.key, belief.count)
+
+    def _weigh(self, model, row, particles, before, key, count):
+        measured, present = presence(model, row)
+        logs, residual = log_prob(model, row, particles, measured, present)
+        weights, log_mean, alive = numerics.normalise(logs + log_of(before))
+        belief = ParticleBelief(particles, weights, key, row.t, row.u, count + 1)
+        # normalise gives the log of the mean over N of what sums to the likelihood.
+        log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
+        return belief, make_info(model, row, log_likelihood, residual, present, (before, weights), alive)
+
+
+def log_of(weights):
+    """Log weights with -inf for zero, and zero instead of infinite gradients there."""
+    alive = weights > 0
+    return jnp.where(alive, jnp.log(jnp.where(alive, weights, 1)), -jnp.inf)
+
+
+def need_key(filter_, key):
+    """The key, or an `InputError` that says who needs one."""
+    if key is None:
+        raise InputError(f"{type(filter_).__name__} draws particles: give it a key, e.g. key=jax.random.key(0).")
+    return key
