@@ -1,4 +1,7 @@
-"""Atoms on plain arrays: elementary functions, random numbers, resampling, small matrices. Safe to jit, batch and differentiate."""
+"""Atoms on plain arrays: elementary functions, random numbers, resampling, small matrices.
+
+All are safe to jit, batch and differentiate.
+"""
 
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
 from jaxveh.numerics.linear_algebra import (
@@ -11,14 +14,15 @@ from jaxveh.numerics.linear_algebra import (
     solve_psd,
     symmetric,
 )
-from jaxveh.numerics.platform import barrier, on_cpu
-from jaxveh.numerics.random import cauchy, exponential, normal, student_t, uniform
+from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu
+from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 
 __all__ = [
     "arctan",
     "arctan2",
     "barrier",
+    "barriers_hold",
     "cauchy",
     "cholesky",
     "cos",
@@ -32,6 +36,7 @@ __all__ = [
     "multinomial",
     "normal",
     "normalise",
+    "normals",
     "on_cpu",
     "residual",
     "sin",

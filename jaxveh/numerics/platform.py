@@ -20,8 +20,16 @@ def on_cpu() -> bool:
     return (device if isinstance(device, str) else device.platform) == "cpu"
 
 
+def barriers_hold() -> bool:
+    """Whether XLA keeps to a `barrier`: on the CPU before jax 0.12 it dissolves them, and fuses across.
+
+    Only speed depends on this: forms that rely on a barrier (a concatenation of long expressions) have another without.
+    """
+    return not on_cpu() or jax.__version_info__ >= (0, 12)
+
+
 def barrier(tree: Tree) -> Tree:
-    """`tree`, which XLA on the CPU computes once and stores; on other platforms `tree` as it is.
+    """`tree`, which XLA on the CPU computes once and stores (from jax 0.12 on); on other platforms `tree` as it is.
 
     Place it on values with several consumers (a new state, weights, random words). It batches and differentiates in both
     modes; tangents and cotangents pass through barriers of their own.

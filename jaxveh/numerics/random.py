@@ -1,8 +1,8 @@
 """Random numbers by transformations of threefry words, without rejection and without long library functions.
 
-The words are those of `jax.random` for the same key, but both halves of each block are used and the rounds are written out,
-which on the CPU is several times faster. Keys of other generators draw their words from `jax.random.bits`; on an accelerator
-normal numbers are `jax.random.normal`. One key, typed or raw, gives one array: batches of keys go through `vmap`.
+The words are those of `jax.random` for the same key, but both halves of each block are used and the rounds are
+written out, which on the CPU is several times faster. Keys are of the generator threefry2x32, jax's default, typed or
+raw, one at a time: batches of keys go through `vmap`. On an accelerator normal numbers are `jax.random.normal`.
 """
 
 import math
@@ -15,7 +15,7 @@ from jax import Array
 from jax.typing import ArrayLike, DTypeLike
 
 from jaxveh.numerics.elementary import log_of_normal, sin_cos_of_word, sqrt
-from jaxveh.numerics.platform import barrier, on_cpu
+from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu
 
 Shape = int | Sequence[int]
 
@@ -32,10 +32,30 @@ def normal(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Arr
     if not on_cpu():
         return jax.random.normal(key, shape, dtype)
     count = math.prod(shape)
-    first, second = barrier(_word_pairs(key, (count + 1) // 2, dtype))
-    radius = sqrt(-2.0 * log_of_normal(_positive_unit(first, dtype)))
-    sine, cosine = sin_cos_of_word(second, dtype)
-    return jnp.concatenate((radius * sine, radius * cosine))[:count].reshape(shape)
+    half = (count + 1) // 2
+    if barriers_hold():
+        sines, cosines = _normal_pairs(key, half, dtype)
+        return barrier(jnp.concatenate((sines, cosines))[:count]).reshape(shape)
+    # The same numbers without a concatenation, into which XLA would draw everything, scalar by scalar.
+    place = jax.lax.iota(jnp.uint32, count)
+    first_half = place < _uint32(half)
+    block = jnp.where(first_half, place, place - _uint32(half))
+    sines, cosines = _box_muller(*_word_pairs(key, block, half, dtype), dtype)
+    return jnp.where(first_half, sines, cosines).reshape(shape)
+
+
+def normals(key: Array, count: int, shape: Shape = (), dtype: DTypeLike | None = None) -> tuple[Array, ...]:
+    """`count` independent arrays of `shape` of standard normal numbers: one for each field of a state.
+
+    Cheaper than rows of one array from `normal`, because nothing is joined; the numbers differ from that one's.
+    """
+    shape, dtype = _shape(shape), _dtype(dtype)
+    size, pairs = math.prod(shape), (count + 1) // 2
+    if not on_cpu():
+        return tuple(jax.random.normal(key, (count, *shape), dtype))
+    sines, cosines = _normal_pairs(key, pairs * size, dtype)
+    rows = [values[i * size : (i + 1) * size] for values in (sines, cosines) for i in range(pairs)]
+    return tuple(row.reshape(shape) for row in rows[:count])
 
 
 def uniform(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
@@ -69,7 +89,8 @@ def student_t(key: Array, df: ArrayLike, shape: Shape = (), dtype: DTypeLike | N
     """
     shape, dtype = _shape(shape), _dtype(dtype)
     df = jnp.asarray(df, dtype)
-    first, second = barrier(_word_pairs(key, math.prod(shape), dtype))
+    count = math.prod(shape)
+    first, second = barrier(_word_pairs(key, jax.lax.iota(jnp.uint32, count), count, dtype))
     surprise = -2.0 * log_of_normal(_positive_unit(first, dtype)).reshape(shape)
     largest = 0.9 * math.log(float(jnp.finfo(dtype).max))  # so that the square root's argument stays finite
     radius = sqrt(df * jnp.expm1(jnp.minimum(surprise / df, largest)))
@@ -99,39 +120,56 @@ def _positive_unit(word: Array, dtype: jnp.dtype) -> Array:
     return word.astype(dtype) * 2.0**-bits + 2.0 ** (-bits - 1)
 
 
+def _box_muller(first: Array, second: Array, dtype: jnp.dtype) -> tuple[Array, Array]:
+    """Two independent standard normal numbers of two random words, elementwise."""
+    radius = jnp.sqrt(-2.0 * log_of_normal(_positive_unit(first, dtype)))
+    sine, cosine = sin_cos_of_word(second, dtype)
+    return radius * sine, radius * cosine
+
+
+def _normal_pairs(key: Array, count: int, dtype: jnp.dtype) -> tuple[Array, Array]:
+    words = barrier(_word_pairs(key, jax.lax.iota(jnp.uint32, count), count, dtype))
+    return barrier(_box_muller(*words, dtype))
+
+
 def _words(key: Array, count: int, dtype: jnp.dtype) -> Array:
     """`count` words as wide as `dtype`."""
     if dtype == jnp.float64:
-        return barrier(_double_words(key, count))
-    return jnp.concatenate(barrier(_blocks(key, (count + 1) // 2)))[:count]
+        return barrier(_double_words(key, jax.lax.iota(jnp.uint32, count)))
+    half = (count + 1) // 2
+    if barriers_hold():
+        return jnp.concatenate(barrier(_blocks(key, jax.lax.iota(jnp.uint32, half))))[:count]
+    place = jax.lax.iota(jnp.uint32, count)
+    first_half = place < _uint32(half)
+    first, second = _blocks(key, jnp.where(first_half, place, place - _uint32(half)))
+    return jnp.where(first_half, first, second)
 
 
-def _word_pairs(key: Array, count: int, dtype: jnp.dtype) -> tuple[Array, Array]:
-    """Two arrays of `count` words as wide as `dtype`."""
+def _word_pairs(key: Array, place: Array, count: int, dtype: jnp.dtype) -> tuple[Array, Array]:
+    """Two words as wide as `dtype` for each place, all below `count`."""
     if dtype == jnp.float32:
-        return _blocks(key, count)
-    words = _double_words(key, 2 * count)
-    return words[:count], words[count:]
+        return _blocks(key, place)
+    return _double_words(key, place), _double_words(key, place + _uint32(count))
 
 
-def _double_words(key: Array, count: int) -> Array:
-    high, low = (word.astype(jnp.uint64) for word in _blocks(key, count))
+def _double_words(key: Array, place: Array) -> Array:
+    high, low = (word.astype(jnp.uint64) for word in _blocks(key, place))
     return (high << jnp.asarray(32, jnp.uint64)) | low
 
 
-def _blocks(key: Array, count: int) -> tuple[Array, Array]:
-    """Both words of `count` blocks of threefry-2x32 with 20 rounds, counted from 0 (Salmon et al., SC 2011)."""
-    if count >= 2**32:
-        raise ValueError(f"{count} blocks of random words asked of one key; at most 2^32 - 1: split the key.")
-    if not on_cpu() or str(jax.random.key_impl(key)) != "threefry2x32":
-        first, second = jax.random.bits(key, (2, count), jnp.uint32)
-        return first, second
+def _blocks(key: Array, place: Array) -> tuple[Array, Array]:
+    """Both words of the blocks numbered `place` of threefry-2x32 with 20 rounds (Salmon et al., SC 2011)."""
+    if str(jax.random.key_impl(key)) != "threefry2x32":
+        raise ValueError(
+            f"key is of the generator {jax.random.key_impl(key)}; numbers are drawn from threefry2x32: "
+            "make it by jax.random.key(seed, impl='threefry2x32')."
+        )
     data = jax.random.key_data(key)
     if data.shape != (2,):
         raise ValueError(f"key has shape {data.shape[:-1]}; it must be one key: use jax.vmap over several.")
     subkeys = (data[0], data[1], data[0] ^ data[1] ^ _uint32(_KEY_PARITY))
-    left = jnp.broadcast_to(subkeys[0], (count,))
-    right = jax.lax.iota(jnp.uint32, count) + subkeys[1]
+    left = jnp.broadcast_to(subkeys[0], place.shape)
+    right = place + subkeys[1]
     for group in range(5):
         for rotation in _ROTATIONS[group % 2]:
             left = left + right
