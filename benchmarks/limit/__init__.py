@@ -1,0 +1,161 @@
+"""A hand-vectorised C++ measuring stick: what one core can do, for comparison with the library.
+
+It solves exactly the problems of ``benchmarks.problems`` and returns what a user would want (means and log-likelihood),
+so that its answers can be checked as well as its time.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..problems import SingleTrack, SpeedAndMass
+from .build import LimitUnavailable, build, library, unavailable
+
+__all__ = [
+    "LimitUnavailable",
+    "ParticleResult",
+    "UnscentedResult",
+    "build",
+    "particle_filter",
+    "unavailable",
+    "unscented",
+]
+
+_Doubles = ctypes.POINTER(ctypes.c_double)
+
+
+class ParticleResult(NamedTuple):
+    """Weighted means (rows, 11) and the log-likelihood of all rows."""
+
+    mean: np.ndarray
+    log_likelihood: float
+
+
+class UnscentedResult(NamedTuple):
+    """Means (rows, 3, runs) and the log-likelihood of each run (runs,)."""
+
+    mean: np.ndarray
+    log_likelihood: np.ndarray
+
+
+class _ParticleProblem(ctypes.Structure):
+    _fields_ = [("particles", ctypes.c_int), ("rows", ctypes.c_int)] + [
+        (name, _Doubles)
+        for name in [
+            "steer",
+            "speed",
+            "yaw_rate",
+            "lateral_acceleration",
+            "car",
+            "prior_mean",
+            "prior_std",
+            "process_std",
+            "sensor_std",
+        ]
+    ]
+
+
+class _UnscentedProblem(ctypes.Structure):
+    _fields_ = [
+        ("runs", ctypes.c_int),
+        ("rows", ctypes.c_int),
+        ("torque", _Doubles),
+        ("speed", ctypes.c_void_p),
+        *((name, _Doubles) for name in ["truck", "prior_mean", "prior_std", "process_std", "sensor_std", "spread"]),
+    ]
+
+
+def _doubles(*values: object) -> np.ndarray:
+    return np.ascontiguousarray(np.concatenate([np.atleast_1d(np.asarray(v, np.float64)) for v in values]))
+
+
+def _pointer(array: np.ndarray) -> object:
+    return array.ctypes.data_as(_Doubles)
+
+
+def _is_single(dtype: np.typing.DTypeLike) -> bool:
+    if np.dtype(dtype) not in (np.dtype(np.float32), np.dtype(np.float64)):
+        raise ValueError(f"dtype is {np.dtype(dtype)}; the C++ limit computes in float32 or float64")
+    return np.dtype(dtype) == np.float32
+
+
+def particle_filter(
+    problem: SingleTrack,
+    particles: int,
+    *,
+    auxiliary: bool,
+    dtype: np.typing.DTypeLike = np.float64,
+    extra_flags: tuple[str, ...] = (),
+) -> Callable[[int], ParticleResult]:
+    """A bootstrap or auxiliary particle filter, ready to run: a function of the seed.
+
+    Systematic resampling before every step; the auxiliary filter looks ahead with the state propagated without noise. The
+    first row weighs draws from the prior. The array of means is overwritten by the next call.
+    """
+    if particles < 2:
+        raise ValueError(f"particles is {particles}; at least 2 are needed")
+    single = _is_single(dtype)
+    function = library(extra_flags).jaxveh_particle_filter
+    function.restype = ctypes.c_double
+    function.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_uint64, ctypes.POINTER(_ParticleProblem), _Doubles]
+    p = problem
+    arrays = [
+        _doubles(a)
+        for a in (
+            p.steer,
+            p.speed,
+            p.yaw_rate,
+            p.lateral_acceleration,
+            (p.mass, p.inertia, p.front, p.rear, p.step),
+            p.prior_mean,
+            p.prior_std,
+            p.process_std,
+            (p.yaw_rate_std, p.lateral_acceleration_std),
+        )
+    ]
+    structure = _ParticleProblem(particles, p.rows, *map(_pointer, arrays))
+    structure.arrays = arrays  # it points into them, so they live as long
+    mean = np.zeros((p.rows, 11))
+
+    def run(seed: int) -> ParticleResult:
+        log_likelihood = function(single, auxiliary, seed, ctypes.byref(structure), _pointer(mean))
+        return ParticleResult(mean, log_likelihood)
+
+    return run
+
+
+def unscented(
+    problem: SpeedAndMass, *, dtype: np.typing.DTypeLike = np.float64, extra_flags: tuple[str, ...] = ()
+) -> Callable[[], UnscentedResult]:
+    """The unscented filter of all runs, ready to run. The result's arrays are overwritten by the next call."""
+    single = _is_single(dtype)
+    function = library(extra_flags).jaxveh_unscented
+    function.restype = None
+    function.argtypes = [ctypes.c_int, ctypes.POINTER(_UnscentedProblem), ctypes.c_void_p, ctypes.c_void_p]
+    p = problem
+    speed = np.ascontiguousarray(p.speed, dtype)
+    arrays = [
+        _doubles(a)
+        for a in (
+            (p.wheel_radius, p.gravity, p.rolling_resistance, p.drag, p.step),
+            p.prior_mean,
+            p.prior_std,
+            p.process_std,
+            p.speed_std,
+            (p.alpha, p.beta, p.kappa),
+        )
+    ]
+    torque = _doubles(p.torque)
+    structure = _UnscentedProblem(p.runs, p.rows, _pointer(torque), speed.ctypes.data, *map(_pointer, arrays))
+    structure.arrays = (arrays, torque, speed)  # it points into them, so they live as long
+    result = UnscentedResult(np.zeros((p.rows, 3, p.runs), dtype), np.zeros(p.runs, dtype))
+
+    def run() -> UnscentedResult:
+        function(single, ctypes.byref(structure), result.mean.ctypes.data, result.log_likelihood.ctypes.data)
+        return result
+
+    return run
