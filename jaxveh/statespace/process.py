@@ -12,9 +12,7 @@ from jaxveh.statespace.noise import AbstractNoise, CauchyGaussianMixture, Indepe
 
 
 class AbstractProcessNoise(eqx.Module):
-    """The noise that a step adds to the propagated state."""
-
-    law: eqx.AbstractVar[AbstractNoise]
+    """The noise that a step adds to the propagated state; `law` names its fields."""
 
     @abc.abstractmethod
     def over(self, dt) -> AbstractNoise:

@@ -1,0 +1,134 @@
+"""What a recording can tell about parameters at all: Fisher information, Cramer-Rao bounds, unobservable directions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+
+import numpy as np
+
+from jaxveh._core.errors import FilterError, InputError, check_positive
+
+UNOBSERVABLE = 1e9
+"""Prior-scaled condition number of the information above which the report speaks of unobservable parameters."""
+
+
+class Observability(NamedTuple):
+    """Fisher information of named parameters, whitened by noise and scaled by the prior's spread.
+
+    `names` (p,); `spread` (p,) the prior's standard deviations; `information` (p, p) in units of the prior (1 on the
+    diagonal: as much as the prior knows); `singular_values` (p,) of the scaled sensitivities, descending;
+    `condition_number`: of the information, the square of the ratio of the extreme singular values;
+    `bounds` (p,): Cramer-Rao bounds of the standard deviations, all parameters unknown, in the parameters' own units on
+    the real line (0.05: five per cent for a positive parameter); `bounds_alone` (p,): each with the others known;
+    `bounds_with_prior` (p,): with the prior's information added; `directions` (p, p): rows are the right singular vectors
+    in units of the prior, the last the least observable.
+    """
+
+    names: tuple[str, ...]
+    spread: np.ndarray
+    information: np.ndarray
+    singular_values: np.ndarray
+    condition_number: float
+    bounds: np.ndarray
+    bounds_alone: np.ndarray
+    bounds_with_prior: np.ndarray
+    directions: np.ndarray
+
+    def observable(self, share: float = 0.1) -> tuple[str, ...]:
+        """The parameters whose Cramer-Rao bound, all others unknown, is at most `share` of the prior's spread."""
+        return tuple(n for n, b, s in zip(self.names, self.bounds, self.spread, strict=True) if b <= share * s)
+
+    def unobservable(self, share: float = 1.0) -> tuple[str, ...]:
+        """The parameters whose bound is no better than `share` of the prior's spread: the recording tells nothing new."""
+        return tuple(n for n, b, s in zip(self.names, self.bounds, self.spread, strict=True) if not b <= share * s)
+
+    def trade(self) -> str:
+        """The least observable direction in words."""
+        direction = self.directions[-1]
+        order = np.argsort(-np.abs(direction))
+        share = np.abs(direction[order]) / np.abs(direction[order[0]])
+        main = [i for i, s in zip(order, share, strict=True) if s >= 0.3][:4]
+        first = self.names[main[0]]
+        if len(main) == 1:
+            return f"{first} alone leaves no trace in the measurements"
+        up = [self.names[i] for i in main[1:] if direction[i] * direction[main[0]] > 0]
+        down = [self.names[i] for i in main[1:] if direction[i] * direction[main[0]] < 0]
+        parts = [f"{_list(up)} rising with it" if up else "", f"{_list(down)} falling" if down else ""]
+        return f"{first} trades against {_list([self.names[i] for i in main[1:]])}: {first} rising, " + " and ".join(
+            part for part in parts if part
+        )
+
+    def report(self) -> str:
+        """The findings in words, a line each."""
+        lines = [f"condition number of the information, scaled by the prior: {self.condition_number:.1e}"]
+        for name, bound, alone, spread in zip(self.names, self.bounds, self.bounds_alone, self.spread, strict=True):
+            verdict = "observable" if bound <= 0.1 * spread else "weakly observable" if bound <= spread else "unobservable"
+            lines.append(f"{name}: bound {bound:.2g} (prior {spread:.2g}; others known {alone:.2g}): {verdict}")
+        if self.condition_number > UNOBSERVABLE:
+            lines.append(f"together these {len(self.names)} parameters are unobservable here: {self.trade()}")
+        else:
+            lines.append(f"least observable: {self.trade()}")
+        return "\n".join(lines)
+
+
+def _list(names) -> str:
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def observability(
+    predict: Callable[[jax.Array], jax.Array], at: jax.Array, names: tuple[str, ...], spread, nuisance: int = 0
+) -> Observability:
+    """The observability of parameters from whitened predictions.
+
+    **Arguments**: `predict(z) -> (R,)`: every predicted measurement over its noise's standard deviation, for
+    parameters `z` (p + nuisance,) on the real line; `at`: where the sensitivities are taken; `names` (p,); `spread`
+    (p + nuisance,): the prior's standard deviations. The last `nuisance` entries of z (start states) are unknown
+    too, known as well as the prior says, and are marginalised.
+
+    **Raises** `InputError` for shapes that do not agree; `FilterError` where the prediction diverges. Use float64:
+    condition numbers above 1e7 mean nothing in float32.
+    """
+    spread, count = np.asarray(spread, dtype=np.float64), len(names)
+    if at.shape != (count + nuisance,) or spread.shape != at.shape:
+        raise InputError(f"at {at.shape}, spread {spread.shape}: must be ({count + nuisance},) for {', '.join(names)}.")
+    check_positive("spread", spread)
+    jacobian = np.asarray(jax.jacfwd(predict)(at), dtype=np.float64) * spread
+    if not np.isfinite(jacobian).all():
+        raise FilterError("observability: a sensitivity is not finite; the simulation diverges for these parameters.")
+    return from_sensitivities(_marginal(jacobian, count), names, spread[:count])
+
+
+def _marginal(jacobian: np.ndarray, count: int) -> np.ndarray:
+    """Sensitivities of the first `count` columns with the others, known as well as the prior says, projected out."""
+    nuisance = jacobian.shape[1] - count
+    if nuisance == 0:
+        return jacobian
+    known = np.hstack([np.zeros((nuisance, count)), np.eye(nuisance)])
+    rows = np.vstack([jacobian, known])
+    root = np.linalg.qr(np.hstack([rows[:, count:], rows[:, :count]]), mode="r")
+    return root[nuisance:, nuisance:]
+
+
+def from_sensitivities(jacobian: np.ndarray, names: tuple[str, ...], spread: np.ndarray) -> Observability:
+    """The report from prior-scaled, whitened sensitivities (R, p)."""
+    # Through the singular values of the sensitivities, never of the information: that would square the condition.
+    _, values, directions = np.linalg.svd(jacobian, full_matrices=False)
+    floor = np.finfo(np.float64).tiny
+    safe = np.maximum(values, floor)
+    alone = np.linalg.norm(jacobian, axis=0)
+    return Observability(
+        names=tuple(names),
+        spread=spread,
+        information=jacobian.T @ jacobian,
+        singular_values=values,
+        condition_number=float(min((safe[0] / safe[-1]) ** 2, np.finfo(np.float64).max)),
+        bounds=spread * np.sqrt(np.sum((directions / safe[:, None]) ** 2, axis=0)),
+        bounds_alone=spread / np.maximum(alone, floor),
+        bounds_with_prior=spread * np.sqrt(np.sum(directions**2 / (1 + values[:, None] ** 2), axis=0)),
+        directions=directions,
+    )
+
+

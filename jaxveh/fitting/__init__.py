@@ -1,0 +1,8 @@
+"""Fits on optimistix: residuals of recordings by multiple shooting, and likelihoods of filters."""
+
+from jaxveh.fitting.likelihood import maximise, maximum_likelihood
+from jaxveh.fitting.multiple_shooting import multiple_shooting, shoot
+from jaxveh.fitting.result import Fit
+from jaxveh.fitting.segments import Segments, cut
+
+__all__ = ["Fit", "Segments", "cut", "maximise", "maximum_likelihood", "multiple_shooting", "shoot"]

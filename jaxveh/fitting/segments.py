@@ -1,0 +1,58 @@
+"""Recordings cut into segments of equal length, so that all of them are simulated as one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.recording import Recording
+from jaxveh.statespace import Row, StateSpace
+
+
+class Segments(NamedTuple):
+    """Rows as (W+1, K) leaves: K segments of W rows, the last row being the next segment's first.
+
+    `linked`: (K,) whether the next segment goes on where this one ends. `first`: (K,) whether a recording starts here.
+    """
+
+    rows: Any
+    linked: Any
+    first: Any
+
+
+def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: float) -> Segments:
+    """Cut recordings into segments of `window` seconds (of the median step); host side.
+
+    Raises `InputError` for a window that is not positive, or shorter than two steps.
+    """
+    recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    if not recordings:
+        raise InputError("recordings: empty; give at least one recording.")
+    time = np.asarray(recordings[0].time)
+    length = round(window / float(np.median(np.diff(time)))) if window > 0 and len(time) > 1 else 0
+    if length < 2:
+        raise InputError(f"window = {window} s: must span at least two steps of the recording.")
+    parts = [_cut_one(model.rows(recording), length) for recording in recordings]
+    return jax.tree.map(lambda *leaves: jnp.concatenate([jnp.asarray(leaf) for leaf in leaves], axis=-1), *parts)
+
+
+def _cut_one(rows: Row, length: int) -> Segments:
+    count = rows.t.shape[0]
+    if count < 3:
+        raise InputError(f"recording has {count} rows: a fit needs at least 3.")
+    segments = -(-count // length)
+    index = np.arange(segments)[None, :] * length + np.arange(length + 1)[:, None]
+    inside = index < count
+    clipped = np.minimum(index, count - 1)
+    take = lambda leaf: np.asarray(leaf)[clipped]  # noqa: E731
+    # Past the log's end: time goes on evenly, inputs are held, nothing is measured.
+    step = float(np.median(np.diff(np.asarray(rows.t))))
+    t = take(rows.t) + np.asarray((index - clipped) * step, rows.t.dtype)
+    y = jax.tree.map(lambda leaf: np.where(inside, take(leaf), np.nan).astype(leaf.dtype), rows.y)
+    linked = np.arange(segments) < segments - 1
+    return Segments(Row(t, jax.tree.map(take, rows.u), y), linked, np.arange(segments) == 0)
