@@ -1,0 +1,34 @@
+"""Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, and the file that describes a car.
+
+pandas, pyarrow, asammdf and pint are the extra `io`, imported where they are used.
+"""
+
+from jaxveh.io.canonical import CANONICAL, CanonicalChannel, canonical_unit
+from jaxveh.io.car import AxleTyre, CarSpecification, read_car, write_car
+from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
+from jaxveh.io.files import replacing, write_text
+from jaxveh.io.frames import to_frame, write_frame
+from jaxveh.io.merge import resample
+from jaxveh.io.recordings import SUFFIXES, read_recording, with_units_in_names, write_recording
+
+__all__ = [
+    "CANONICAL",
+    "SUFFIXES",
+    "AxleTyre",
+    "CanonicalChannel",
+    "CarSpecification",
+    "Channel",
+    "ChannelMap",
+    "canonical_unit",
+    "read_car",
+    "read_channel_map",
+    "read_recording",
+    "replacing",
+    "resample",
+    "to_frame",
+    "with_units_in_names",
+    "write_car",
+    "write_frame",
+    "write_recording",
+    "write_text",
+]

@@ -1,0 +1,67 @@
+"""The channels that the package knows by name, with their SI units and axes (ISO 8855: x forward, y left, z up)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from jaxveh._core.recording import TRUTH
+
+
+class CanonicalChannel(NamedTuple):
+    """`unit` in which the package uses a channel, and what the channel is."""
+
+    unit: str
+    meaning: str
+
+
+CANONICAL: dict[str, CanonicalChannel] = {
+    name: CanonicalChannel(unit, meaning)
+    for name, unit, meaning in (
+        ("time", "s", "time stamp, strictly increasing"),
+        ("v_x", "m/s", "longitudinal speed at the centre of gravity"),
+        ("v_y", "m/s", "lateral speed at the centre of gravity, positive to the left"),
+        ("speed", "m/s", "magnitude of the velocity over ground"),
+        ("sideslip", "rad", "atan2(v_y, v_x)"),
+        ("yaw", "rad", "heading, positive to the left, unwrapped"),
+        ("yaw_rate", "rad/s", "positive to the left"),
+        ("roll", "rad", "positive when the left side rises"),
+        ("roll_rate", "rad/s", "about the x axis"),
+        ("pitch", "rad", "positive when the nose dips"),
+        ("pitch_rate", "rad/s", "about the y axis"),
+        ("x", "m", "position, ground frame"),
+        ("y", "m", "position, ground frame"),
+        ("z", "m", "position, ground frame, upward"),
+        ("a_x", "m/s^2", "longitudinal acceleration as an accelerometer shows it"),
+        ("a_y", "m/s^2", "lateral acceleration as an accelerometer shows it, positive to the left"),
+        ("a_z", "m/s^2", "vertical acceleration as an accelerometer shows it"),
+        ("steer", "rad", "mean angle of the front road wheels, positive to the left"),
+        ("steer_left", "rad", "angle of the front left road wheel"),
+        ("steer_right", "rad", "angle of the front right road wheel"),
+        ("steer_wheel", "rad", "angle of the steering wheel"),
+        ("steer_wheel_rate", "rad/s", "speed of the steering wheel"),
+        ("steer_torque", "N*m", "torque at the steering wheel"),
+        ("wheel_speed_front_left", "rad/s", "rotation of the front left wheel, positive forward"),
+        ("wheel_speed_front_right", "rad/s", "rotation of the front right wheel"),
+        ("wheel_speed_rear_left", "rad/s", "rotation of the rear left wheel"),
+        ("wheel_speed_rear_right", "rad/s", "rotation of the rear right wheel"),
+        ("throttle", "1", "driver's demand, 0 to 1"),
+        ("brake_pressure", "Pa", "brake line pressure"),
+        ("drive_torque", "N*m", "sum of the driving torques at the wheels"),
+        ("brake_torque", "N*m", "sum of the braking torques at the wheels"),
+        ("grade", "rad", "slope of the road, positive uphill"),
+        ("bank", "rad", "cross slope of the road"),
+        ("friction", "1", "friction coefficient of the road"),
+        ("slip_angle_front", "rad", "front axle, positive slip angle gives positive lateral force"),
+        ("slip_angle_rear", "rad", "rear axle, positive slip angle gives positive lateral force"),
+        ("F_y_front", "N", "lateral force of the front axle, wheel axes"),
+        ("F_y_rear", "N", "lateral force of the rear axle, wheel axes"),
+    )
+}
+"""Name to unit and meaning. Other names are allowed everywhere; they keep the unit of their file."""
+
+
+def canonical_unit(name: str) -> str | None:
+    """The SI unit of a channel, of a simulation's `true.` channel or of `<channel>_std`; None for an unknown name."""
+    plain = name.removeprefix(TRUTH)
+    found = CANONICAL.get(plain) or CANONICAL.get(plain.removesuffix("_std"))
+    return found.unit if found else None

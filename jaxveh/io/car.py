@@ -1,0 +1,210 @@
+"""One file that describes a car: TOML in SI units, checked key by key."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import InputError, check
+from jaxveh.io.files import write_text
+from jaxveh.io.toml import check_keys, number, quoted, read_toml, text
+
+SCHEMA = """\
+# A car. SI units; axes x forward, y left, z up; steer positive to the left.
+mass = 1500.0                        # kg
+yaw_inertia = 2500.0                 # kg m^2, about the vertical axis through the centre of gravity
+front_axle_to_cg = 1.2               # m
+rear_axle_to_cg = 1.5                # m
+front_cornering_stiffness = 90000.0  # N/rad, both wheels of the axle; may be left out where [front] is given
+rear_cornering_stiffness = 110000.0  # N/rad, both wheels of the axle; may be left out where [rear] is given
+
+# All that follows is optional.
+name = "passenger car"
+cg_height = 0.55                     # m above ground
+track_front = 1.55                   # m
+track_rear = 1.56                    # m
+steering_ratio = 15.0                # steering wheel angle over road wheel angle
+steer_offset = 0.002                 # rad: what the steer channel shows (at the road wheels) when the car runs straight
+sensor_position = [0.1, 0.0, 0.3]    # m from the centre of gravity: forward, left, up
+low_pass = 20.0                      # Hz, cutoff of the low-pass in the accelerometers and the gyroscope
+
+# The Magic Formula of an axle, F_y = D sin(C atan(B a - E (B a - atan(B a)))) + S_v with a = slip angle + S_h.
+[front]
+B = 10.0                             # 1/rad
+C = 1.3
+D = 8000.0                           # N, both wheels of the axle; times load / nominal_load where that is given
+E = 0.2
+S_h = 0.0                            # rad, optional
+S_v = 0.0                            # N, optional
+nominal_load = 8175.0                # N, both wheels, optional
+
+[rear]
+B = 12.0
+C = 1.3
+D = 6600.0
+E = 0.2
+"""
+"""The file's schema as a commented example that reads, for programs to print."""
+
+
+def _number(low: float, high: float, unit: str = "", **default: Any) -> Any:
+    return field(metadata={"low": low, "high": high, "unit": unit}, **default)
+
+
+@dataclass(frozen=True)
+class AxleTyre:
+    """Magic Formula coefficients of an axle, both wheels together; slip angle in radians, positive with the force.
+
+    `F_y = D sin(C atan(B a - E (B a - atan(B a)))) + S_v`, `a = slip angle + S_h`; B in 1/rad, D and S_v in newton,
+    S_h in radians. With `nominal_load` (newton, both wheels) D is the peak at that load and scales with
+    load / nominal_load.
+    """
+
+    B: float = _number(0.01, 1e3, "1/rad")
+    C: float = _number(0.01, 10.0)
+    D: float = _number(1e-3, 1e8, "N")
+    E: float = _number(-1e3, 1e3)
+    S_h: float = _number(-0.5, 0.5, "rad", default=0.0)
+    S_v: float = _number(-1e8, 1e8, "N", default=0.0)
+    nominal_load: float | None = _number(1e-3, 1e8, "N", default=None)
+
+    def __post_init__(self):
+        _check_numbers(self)
+
+
+@dataclass(frozen=True)
+class CarSpecification:
+    """What a car file says: plain floats in SI units, None where the file is silent. See `car.SCHEMA`.
+
+    Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
+    `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`: x, y, z
+    in metres from the centre of gravity. `low_pass`: cutoff in hertz.
+
+    **Raises** `InputError` with name, value and allowed range for what no car has, such as a negative mass.
+    """
+
+    mass: float = _number(0.1, 1e6, "kg")
+    yaw_inertia: float = _number(1e-4, 1e8, "kg m^2")
+    front_axle_to_cg: float = _number(1e-3, 30.0, "m")
+    rear_axle_to_cg: float = _number(1e-3, 30.0, "m")
+    front_cornering_stiffness: float | None = _number(0.1, 1e8, "N/rad", default=None)
+    rear_cornering_stiffness: float | None = _number(0.1, 1e8, "N/rad", default=None)
+    name: str | None = None
+    cg_height: float | None = _number(0.0, 10.0, "m", default=None)
+    track_front: float | None = _number(1e-3, 10.0, "m", default=None)
+    track_rear: float | None = _number(1e-3, 10.0, "m", default=None)
+    steering_ratio: float | None = _number(0.1, 200.0, default=None)
+    steer_offset: float | None = _number(-0.5, 0.5, "rad", default=None)
+    sensor_position: tuple[float, float, float] | None = _number(-30.0, 30.0, "m", default=None)
+    low_pass: float | None = _number(1e-3, 1e6, "Hz", default=None)
+    front: AxleTyre | None = None
+    rear: AxleTyre | None = None
+
+    def __post_init__(self):
+        if self.sensor_position is not None:
+            object.__setattr__(self, "sensor_position", tuple(map(float, self.sensor_position)))
+            if len(self.sensor_position) != 3:
+                raise InputError(f"sensor_position = {list(self.sensor_position)}: must be [x, y, z].")
+        _check_numbers(self)
+        for axle in ("front", "rear"):
+            key, tyre = f"{axle}_cornering_stiffness", getattr(self, axle)
+            if getattr(self, key) is None:
+                if tyre is None:
+                    raise InputError(f"{key} is missing: give it in N/rad, or tyre coefficients under [{axle}].")
+                object.__setattr__(self, key, tyre.B * tyre.C * tyre.D)
+
+    @property
+    def wheelbase(self) -> float:
+        """Distance of the axles in metres."""
+        return self.front_axle_to_cg + self.rear_axle_to_cg
+
+
+def read_car(path: str | os.PathLike) -> CarSpecification:
+    """Read a car from TOML (`car.SCHEMA`).
+
+    **Raises** `InputError` naming the file and: the line of broken TOML, a key that is missing or unknown (with the
+    near ones), or a value with its allowed range.
+    """
+    path = Path(path)
+    content = read_toml(path)
+    check_keys(str(path), content, [entry.name for entry in fields(CarSpecification)])
+    try:
+        values = {key: _value(key, value) for key, value in content.items()}
+        return _build(CarSpecification, values)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def write_car(car: CarSpecification, path: str | os.PathLike, *, note: str = "", overwrite: bool = False) -> None:
+    """Write a car as TOML that `read_car` reads back bit for bit; `note` becomes comment lines at the top.
+
+    The file appears as a whole or not at all. **Raises** `InputError` where it exists and `overwrite` is False.
+    """
+    lines = [f"# {line}".rstrip() for line in note.splitlines()]
+    lines += _lines(car)
+    for axle in ("front", "rear"):
+        if getattr(car, axle) is not None:
+            lines += ["", f"[{axle}]", *_lines(getattr(car, axle))]
+    write_text("\n".join(lines) + "\n", path, overwrite)
+
+
+def _lines(values: Any) -> list[str]:
+    """`key = value  # unit` for each number and string that is there."""
+    lines = []
+    for entry in fields(values):
+        value, unit = getattr(values, entry.name), entry.metadata.get("unit")
+        if value is None or isinstance(value, AxleTyre):
+            continue
+        shown = quoted(value) if isinstance(value, str) else str(list(value) if isinstance(value, tuple) else value)
+        lines.append(f"{entry.name} = {shown}{f'  # {unit}' if unit else ''}")
+    return lines
+
+
+def _value(key: str, value: Any) -> Any:
+    if key in ("front", "rear"):
+        check_keys(f"[{key}]", value, [entry.name for entry in fields(AxleTyre)])
+        try:
+            return _build(AxleTyre, {name: number(name, item) for name, item in value.items()})
+        except InputError as error:
+            raise InputError(f"[{key}]: {error}") from error
+    if key == "name":
+        return text(key, value)
+    if key == "sensor_position":
+        if not isinstance(value, list) or len(value) != 3:
+            raise InputError(f"{key} = {value!r}: must be [x, y, z] in metres.")
+        return tuple(number(key, item) for item in value)
+    return number(key, value)
+
+
+def _build(kind: type, values: Mapping[str, Any]) -> Any:
+    """The dataclass; names every required key that is missing at once."""
+    missing = [entry.name for entry in fields(kind) if _required(entry) and entry.name not in values]
+    if missing:
+        raise InputError(f"missing key(s): {', '.join(missing)}.")
+    return kind(**values)
+
+
+def _required(entry: Any) -> bool:
+    return entry.default is MISSING
+
+
+def _check_numbers(values: Any) -> None:
+    """Make every number a Python float within its range, which the field's metadata hold."""
+    for entry in fields(values):
+        value = getattr(values, entry.name)
+        if value is None or "low" not in entry.metadata:
+            continue
+        low, high, unit = entry.metadata["low"], entry.metadata["high"], entry.metadata["unit"]
+        allowed = f"between {low:g} and {high:g}{f' {unit}' if unit else ''}"
+        try:
+            array = np.asarray(value, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{entry.name} = {value!r}: must be a number {allowed}.") from error
+        check(entry.name, array, lambda v, low=low, high=high: (v >= low) & (v <= high), allowed)
+        if not isinstance(value, tuple):
+            object.__setattr__(values, entry.name, float(array))

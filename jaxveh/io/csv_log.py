@@ -1,0 +1,114 @@
+"""CSV through pandas: read with the exact decimal value of each cell, written so that reading gives the same floats."""
+
+from __future__ import annotations
+
+import csv
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.canonical import canonical_unit
+from jaxveh.io.channel_map import ChannelMap
+from jaxveh.io.log import TableLog
+from jaxveh.io.optional import require
+from jaxveh.io.units import given
+
+_ENCODING = "utf-8-sig"
+
+
+def open_csv(path: Path, channels: ChannelMap | None) -> TableLog:
+    """A CSV file with one header line; separator and decimal sign as the channel map says.
+
+    Without a map: whichever of `,` `;` and tab the header line has most of, and a decimal point.
+    """
+    headings, separator = _header(path, channels.separator if channels else None)
+    frame = _read(path, headings, separator, channels.decimal if channels else ".")
+    # A separator at the end of every line makes a last column without name and without cells.
+    if headings[-1] == "" and frame.iloc[:, -1].isna().all():
+        headings = headings[:-1]
+    place = {heading: column for column, heading in enumerate(headings)}
+    return TableLog(
+        path, headings, lambda heading: frame.iloc[:, place[heading]].array, {}, "", channels.time if channels else None
+    )
+
+
+def write_csv(
+    path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str], note: str
+) -> None:
+    """One header line, then every float in the shortest form that reads back as the same float64; NaN is an empty cell.
+
+    The format has no place for units and note: they are dropped (see `io.with_units_in_names`). A known channel in
+    another unit than SI would be read back wrongly, so it raises.
+    """
+    for name in columns:
+        wanted = canonical_unit(name)
+        if wanted is not None and given(units.get(name)) and units[name] != wanted:
+            raise InputError(
+                f"{name} is in {units[name]!r}, not in {wanted!r}, and CSV cannot say so. Convert it first, write "
+                "Parquet or MDF4, or put units in the names (io.with_units_in_names)."
+            )
+    pandas = require("pandas", "writing CSV")
+    # float32 in its own shortest form would read back as another float64.
+    wide = {name: np.asarray(values, dtype=np.float64) for name, values in {"time": time, **columns}.items()}
+    pandas.DataFrame(wide).to_csv(path, index=False, lineterminator="\n", encoding="utf-8")
+
+
+def _header(path: Path, separator: str | None) -> tuple[list[str], str]:
+    try:
+        with path.open(encoding=_ENCODING, newline="") as file:
+            line = file.readline()
+            separator = separator or max(",;\t", key=line.count)
+            file.seek(0)
+            headings = [heading.strip() for heading in next(csv.reader(file, delimiter=separator))]
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8.") from error
+    except csv.Error as error:
+        raise InputError(f"{path}: line 1: {error}.") from error
+    twice = sorted({heading for heading in headings if headings.count(heading) > 1})
+    if twice:
+        raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
+    if all(_is_number(heading) for heading in headings):
+        raise InputError(f"{path}: line 1 holds numbers only; the first line must name the columns.")
+    return headings, separator
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _read(path: Path, headings: list[str], separator: str, decimal: str):
+    pandas = require("pandas", "reading CSV")
+    try:
+        with warnings.catch_warnings():
+            # Rows longer than the header would lose cells with a warning only.
+            warnings.simplefilter("error", pandas.errors.ParserWarning)
+            return pandas.read_csv(
+                path,
+                sep=separator,
+                decimal=decimal,
+                header=None,
+                skiprows=1,
+                names=range(len(headings)),
+                index_col=False,
+                skipinitialspace=True,
+                float_precision="round_trip",
+                low_memory=False,
+                encoding=_ENCODING,
+            )
+    except pandas.errors.EmptyDataError as error:
+        raise InputError(f"{path}: the log is empty: it has columns but no row.") from error
+    except pandas.errors.ParserError as error:
+        raise InputError(f"{path}: {str(error).strip()}. Correct the line, or name the separator.") from error
+    except pandas.errors.ParserWarning as error:
+        raise InputError(
+            f"{path}: rows have more cells than the first line has names ({len(headings)}). Correct the first line."
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8.") from error

@@ -1,0 +1,93 @@
+"""MDF4 through asammdf: every channel group has a time base of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.channel_map import ChannelMap
+from jaxveh.io.log import Column, Log, numeric
+from jaxveh.io.naming import check_known
+from jaxveh.io.optional import require
+
+_TIME_SYNC = (0, 1)  # a master without a kind, or one that counts time (others count angle, distance, index)
+
+
+class MdfLog(Log):
+    """An MDF file (version 3 or 4). Samples that the file marks invalid are left out, words stay their raw numbers."""
+
+    def __init__(self, path: Path, mdf: Any):
+        self.path, self._mdf = path, mdf
+        self.note = getattr(mdf.header, "description", "") or ""
+        masters = set(mdf.masters_db.items())
+        places = {name: [place for place in found if place not in masters] for name, found in mdf.channels_db.items()}
+        self._places = {name: found for name, found in places.items() if found}
+        self.names = tuple(self._places)
+
+    def column(self, name: str, group: int | None = None) -> Column:
+        """Load one channel; `group` picks one where several groups have a channel of this name."""
+        check_known(str(self.path), "channel", name, self._places, "Name the file's channel in the channel map.")
+        groups = [place[0] for place in self._places[name]]
+        found = [place for place in self._places[name] if group is None or place[0] == group]
+        what = f"{self.path}: channel {name!r}"
+        if len(found) != 1:
+            asked = "no group is named" if group is None else f"group = {group}"
+            there = ", ".join(map(str, groups))
+            raise InputError(f"{what}: {asked}, and it is in {there}; say which with `group` in the channel map.")
+        self._check_master(found[0][0], what)
+        try:
+            signal = self._mdf.get(name, *found[0])
+            if signal.samples.dtype.kind in "SUO" and signal.conversion is None:
+                raw = self._mdf.get(name, *found[0], raw=True)
+                signal = raw if raw.conversion is not None else signal
+        except Exception as error:  # asammdf raises whatever a damaged block leads to
+            raise InputError(f"{what}: cannot be read ({error}). Is the file damaged?") from error
+        time = np.asarray(signal.timestamps, dtype=np.float64)
+        if np.any(np.diff(time) <= 0):
+            k = int(np.argmax(np.diff(time) <= 0))
+            raise InputError(
+                f"{what}: time[{k + 1}] = {time[k + 1]} after time[{k}] = {time[k]}: must be strictly increasing. "
+                "Correct its group's time channel, or leave the channel out."
+            )
+        return Column(time, numeric(signal.samples, what), str(signal.unit or ""))
+
+    def close(self) -> None:
+        """Give the file back."""
+        self._mdf.close()
+
+    def _check_master(self, group: int, what: str) -> None:
+        master = self._mdf.masters_db.get(group)
+        if master is None:
+            raise InputError(f"{what}: its group {group} has no time channel. Leave the channel out.")
+        if getattr(self._mdf.groups[group].channels[master], "sync_type", 1) not in _TIME_SYNC:
+            raise InputError(f"{what}: its group {group} is not recorded over time. Leave the channel out.")
+
+
+def open_mdf(path: Path, channels: ChannelMap | None) -> MdfLog:
+    """An MDF3 or MDF4 file. Time is each group's own master channel; a time column in the channel map is not used."""
+    asammdf = require("asammdf", "reading MDF4")
+    try:
+        return MdfLog(path, asammdf.MDF(path))
+    except Exception as error:  # asammdf raises whatever a damaged block leads to
+        raise InputError(f"{path}: is not a readable MDF file ({error}).") from error
+
+
+def write_mdf(
+    path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str], note: str
+) -> None:
+    """One channel group of MDF 4.10 over one time base; NaN stays NaN; the note is the header's comment."""
+    asammdf = require("asammdf", "writing MDF4")
+    signals = [
+        asammdf.Signal(samples=np.asarray(values), timestamps=time, name=name, unit=units.get(name, ""))
+        for name, values in columns.items()
+    ]
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append(signals, acq_name="jaxveh", comment="", common_timebase=True)
+        mdf.header.comment = note
+        saved = mdf.save(path.with_suffix(".mf4"), overwrite=True)
+    os.replace(saved, path)

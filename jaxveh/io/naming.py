@@ -1,0 +1,40 @@
+"""Messages about names that are not there: the nearest ones first."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+from jaxveh._core.errors import InputError
+
+_SHOWN = 30
+
+
+def near(name: str, names: Iterable[str]) -> list[str]:
+    """The names that look like `name`, nearest first; case does not count."""
+    folded = {}
+    for candidate in names:
+        folded.setdefault(candidate.casefold(), []).append(candidate)
+    close = difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.6)
+    return [candidate for match in close for candidate in folded[match]]
+
+
+def listing(name: str, names: Iterable[str]) -> str:
+    """All names in words, those that look like `name` first; a long list is cut and counted."""
+    names = list(names)
+    close = near(name, names)
+    ordered = close + [candidate for candidate in names if candidate not in close]
+    if not ordered:
+        return "there are none"
+    more = f", and {len(ordered) - _SHOWN} more" if len(ordered) > _SHOWN else ""
+    return f"there are: {', '.join(ordered[:_SHOWN])}{more}"
+
+
+def check_known(what: str, kind: str, name: str, names: Iterable[str], advice: str = "") -> None:
+    """Raise `InputError` unless `name` is among `names`: "`what`: no `kind` `name`; there are: ..."."""
+    names = list(names)
+    if name in names:
+        return
+    close = near(name, names)
+    guess = f" (did you mean {close[0]!r}?)" if close else ""
+    raise InputError(f"{what}: no {kind} {name!r}{guess}; {listing(name, names)}.{f' {advice}' if advice else ''}")

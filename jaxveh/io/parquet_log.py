@@ -1,0 +1,63 @@
+"""Parquet through pyarrow: units in the fields' metadata, the source note in the table's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.channel_map import ChannelMap
+from jaxveh.io.log import TableLog
+from jaxveh.io.optional import require
+
+_UNIT = b"unit"
+_UNITS = (_UNIT, b"units", b"Unit", b"Units")
+_SOURCE = b"source"
+
+
+def open_parquet(path: Path, channels: ChannelMap | None) -> TableLog:
+    """A Parquet file; a field's metadata `unit` is its unit, the table's `source` its note. Loads only what is used."""
+    arrow = require("pyarrow", "reading Parquet")
+    parquet = require("pyarrow.parquet", "reading Parquet")
+    try:
+        schema = parquet.read_schema(path)
+    except (arrow.ArrowException, OSError) as error:
+        raise InputError(f"{path}: is not a readable Parquet file ({error}).") from error
+    headings = [name for name in schema.names if not name.startswith("__index_level_")]
+    twice = sorted({name for name in headings if headings.count(name) > 1})
+    if twice:
+        raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
+
+    def load(heading: str) -> np.ndarray:
+        try:
+            with parquet.ParquetFile(path) as file:
+                return file.read(columns=[heading]).column(heading).to_numpy()
+        except (arrow.ArrowException, OSError) as error:
+            raise InputError(f"{path}: column {heading!r} cannot be read ({error}).") from error
+
+    units = {name: unit for name in headings if (unit := _unit(schema.field(name)))}
+    note = (schema.metadata or {}).get(_SOURCE, b"").decode()
+    return TableLog(path, headings, load, units, note, channels.time if channels else None)
+
+
+def write_parquet(
+    path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str], note: str
+) -> None:
+    """Columns in their own float precision, units and note as `open_parquet` reads them."""
+    arrow = require("pyarrow", "writing Parquet")
+    parquet = require("pyarrow.parquet", "writing Parquet")
+    arrays = {"time": time, **columns}
+    metadata = {name: {_UNIT: unit} for name, unit in {"time": "s", **units}.items()}
+    fields = [
+        arrow.field(name, arrow.from_numpy_dtype(values.dtype), metadata=metadata.get(name))
+        for name, values in arrays.items()
+    ]
+    schema = arrow.schema(fields, metadata={_SOURCE: note} if note else None)
+    parquet.write_table(arrow.table([arrow.array(values) for values in arrays.values()], schema=schema), path)
+
+
+def _unit(field) -> str:
+    metadata = field.metadata or {}
+    return next((metadata[key].decode() for key in _UNITS if key in metadata), "")

@@ -1,0 +1,123 @@
+"""Recordings in and out: CSV, Parquet, MDF4."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.recording import Recording
+from jaxveh.io.canonical import canonical_unit
+from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
+from jaxveh.io.csv_log import open_csv, write_csv
+from jaxveh.io.files import check_readable, check_suffix, replacing
+from jaxveh.io.log import Column, Log, apply
+from jaxveh.io.mdf_log import open_mdf, write_mdf
+from jaxveh.io.merge import merge, resample
+from jaxveh.io.parquet_log import open_parquet, write_parquet
+from jaxveh.io.units import convert, given
+
+_OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
+    ".csv": open_csv,
+    ".parquet": open_parquet,
+    ".mf4": open_mdf,
+    ".mdf": open_mdf,
+}
+_WRITE = {".csv": write_csv, ".parquet": write_parquet, ".mf4": write_mdf, ".mdf": write_mdf}
+SUFFIXES = tuple(_OPEN)
+"""File name endings that are read and written."""
+
+
+def read_recording(
+    path: str | os.PathLike,
+    channels: ChannelMap | str | os.PathLike | None = None,
+    *,
+    raster: str | None = None,
+    method: str = "linear",
+) -> Recording:
+    """Read a log: `.csv`, `.parquet`, `.mf4` or `.mdf`.
+
+    **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.SCHEMA`); without it every column
+    is a channel of the name it has, and time is the column `time`, `timestamps`, `timestamp` or `t`. `raster`: the name
+    of a channel whose samples become the rows, the others filled there by `method` (`linear`, `hold`; `io.resample`).
+
+    **Units**: the channel map's, else the file's own (Parquet: the field's metadata `unit`; MDF4: the channel's unit;
+    CSV and Parquet: `name [unit]` in the first line), else SI is taken for granted. Channels of `io.CANONICAL` come out
+    in SI; other names keep the unit they have.
+
+    **Time base**: MDF4 groups of different rasters are merged, not resampled: a row for every stamp, NaN where a sensor
+    did not speak. Stamps keep the log's own time, in seconds, on the host in float64; channels have JAX's float type.
+
+    **Raises** `InputError` naming file, column, row, value and what to do: no such file or suffix, a broken file, an
+    empty log, an unknown column, a unit of another dimension, a cell that is not a number, time that does not increase.
+    """
+    path = Path(path)
+    suffix = check_suffix(path, _OPEN, "log")
+    check_readable(path)
+    chosen = channels if isinstance(channels, ChannelMap) or channels is None else read_channel_map(channels)
+    with contextlib.closing(_OPEN[suffix](path, chosen)) as log:
+        wanted = chosen.channels if chosen else {name: Channel(name) for name in log.names}
+        if not wanted:
+            raise InputError(f"{path}: holds no channel beside time.")
+        loaded = {name: _load(log, name, channel) for name, channel in wanted.items()}
+        note = log.note or path.name
+    time, values = merge(loaded)
+    units = {name: column.unit for name, column in loaded.items() if column.unit}
+    try:
+        recording = Recording(time, values, units, note)
+        return recording if raster is None else resample(recording, raster, method)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite: bool = False) -> None:
+    """Write a recording as `.csv`, `.parquet`, `.mf4` or `.mdf`; `read_recording` gives it back.
+
+    Values and time come back bit for bit from every format; units and source note from Parquet and MDF4. CSV has no
+    place for them: where units are not SI, or for other readers, write `with_units_in_names(recording)`.
+
+    The file appears as a whole or not at all. **Raises** `InputError` for another suffix, or where the file exists and
+    `overwrite` is False.
+    """
+    columns = {name: np.asarray(values) for name, values in recording.channels.items()}
+    write_columns(path, np.asarray(recording.time), columns, dict(recording.units), recording.source, overwrite)
+
+
+def with_units_in_names(recording: Recording) -> Recording:
+    """A copy whose channels are named `name [unit]`, for CSV files that other programs read; reading strips them."""
+    units = {name: recording.unit(name) for name in recording.names}
+    names = {name: f"{name} [{unit}]" if given(unit) else name for name, unit in units.items()}
+    channels = {names[name]: values for name, values in recording.channels.items()}
+    known = {names[name]: unit for name, unit in units.items() if given(unit)}
+    return Recording(recording.time, channels, known, recording.source)
+
+
+def write_columns(
+    path: str | os.PathLike,
+    time: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+    units: Mapping[str, str],
+    note: str,
+    overwrite: bool,
+) -> None:
+    """Write columns (T,) over `time` (T,) in the format of the suffix, all or nothing."""
+    path = Path(path)
+    suffix = check_suffix(path, _WRITE, "recording")
+    if "time" in columns:
+        raise InputError(f"{path}: a channel is named `time`, which is the name of the time column; rename it.")
+    with replacing(path, overwrite) as part:
+        _WRITE[suffix](part, np.asarray(time, dtype=np.float64), columns, units, note)
+
+
+def _load(log: Log, name: str, channel: Channel) -> Column:
+    column = log.column(channel.column, channel.group)
+    values, target = apply(channel, column.values), canonical_unit(name)
+    unit = channel.unit if given(channel.unit) else column.unit
+    what = f"{log.path}: {name}" + (f" (column {channel.column!r})" if channel.column != name else "")
+    if target is None:
+        return Column(column.time, values, unit if given(unit) else "")
+    return Column(column.time, convert(values, unit, target, what) if given(unit) else values, target)

@@ -1,0 +1,52 @@
+"""TOML files as dictionaries, with errors that name file, line, key and allowed range."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.files import check_readable
+from jaxveh.io.naming import check_known
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The file's content; raises `InputError` with file and line where it is not TOML."""
+    check_readable(path)
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: broken TOML: {error}.") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: broken TOML: not UTF-8 text (byte {error.start}).") from error
+
+
+def check_keys(where: str, table: object, allowed: Iterable[str]) -> None:
+    """Raise unless `table` is a table whose keys are all allowed."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} = {table!r}: must be a table of keys.")
+    for key in table:
+        check_known(where, "key", key, allowed)
+
+
+def number(where: str, value: object) -> float:
+    """A TOML number as a finite float; raises for anything else (true and false included)."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{where} = {value!r}: must be a finite number.")
+    return float(value)
+
+
+def text(where: str, value: object) -> str:
+    """A TOML string; raises for anything else."""
+    if not isinstance(value, str):
+        raise InputError(f"{where} = {value!r}: must be a string in quotes.")
+    return value
+
+
+def quoted(value: str) -> str:
+    """A string as TOML writes it."""
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
