@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import os
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -71,10 +74,23 @@ class MdfLog(Log):
 def open_mdf(path: Path, channels: ChannelMap | None) -> MdfLog:
     """An MDF3 or MDF4 file. Time is each group's own master channel; a time column in the channel map is not used."""
     asammdf = require("asammdf", "reading MDF4")
+    with _quiet_finalizers():
+        try:
+            return MdfLog(path, asammdf.MDF(path))
+        except Exception as error:  # asammdf raises whatever a damaged block leads to
+            reason = str(error) or type(error).__name__
+        gc.collect()
+    raise InputError(f"{path}: is not a readable MDF file ({reason}).")
+
+
+@contextlib.contextmanager
+def _quiet_finalizers() -> Iterator[None]:
+    """The finalizer of asammdf fails on a file that it could not open, and Python would print that beside our error."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
-        return MdfLog(path, asammdf.MDF(path))
-    except Exception as error:  # asammdf raises whatever a damaged block leads to
-        raise InputError(f"{path}: is not a readable MDF file ({error}).") from error
+        yield
+    finally:
+        sys.unraisablehook = hook
 
 
 def write_mdf(

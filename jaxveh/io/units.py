@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from typing import TypeGuard
 
 import numpy as np
 
@@ -22,7 +23,7 @@ _ALIASES_FOR = {
 }
 
 
-def given(unit: str | None) -> bool:
+def given(unit: str | None) -> TypeGuard[str]:
     """Whether a unit says anything: not empty, `-`, `n/a` and the like."""
     return unit is not None and unit.strip().casefold() not in _NOT_GIVEN
 
