@@ -120,7 +120,7 @@ def test_broken_maps(log, toml, case):
 
 
 def test_missing_map(log, tmp_path):
-    with pytest.raises(InputError, match="no.toml: cannot be read"):
+    with pytest.raises(InputError, match=r"no\.toml: cannot be read"):
         io.read_recording(log, tmp_path / "no.toml")
     (tmp_path / "latin.toml").write_bytes(b'time = "\xe4"')
     with pytest.raises(InputError, match="broken TOML: not UTF-8"):
