@@ -1,9 +1,10 @@
 """Elementary functions that are fast on the CPU and have finite derivatives where physics needs them.
 
-On the CPU, float32 and float64 arrays go through polynomials of our own (`polynomials`), several times faster than the
-library's; elsewhere, and for other types and weakly typed values (Python numbers), the library's functions are used. Every
-function has its own derivative rule, written in the same functions, so that both modes and all orders are as fast. Arrays of
-any shape; arguments of two-argument functions broadcast. NaN gives NaN. Errors stated are for float32 / float64.
+On the CPU, float32 and float64 arrays go through polynomials of our own (`polynomials`), several times faster than
+the library's; elsewhere, and for other types and weakly typed values (Python numbers), the library's functions are
+used. Every function has its own derivative rule, written in the same functions, so that both modes and all orders are
+as fast. Arrays of any shape; arguments of two-argument functions broadcast. NaN gives NaN. Errors stated are for
+float32 / float64.
 """
 
 import math
@@ -27,8 +28,9 @@ _PI_PARTS_64 = (3.1415926218032837, 3.1786509424591713e-08, 1.2246467991473532e-
 def sin(x: ArrayLike) -> Array:
     """Sine of an angle in rad, any shape.
 
-    Absolute error below 2e-7 / 1e-15 for |x| <= 2e4 / 1e8 rad, relative to the result near 0. Beyond, the error grows as if
-    the angle had been rounded once more (|x| times the unit roundoff), and stays in [-1, 1]; infinity gives NaN.
+    Absolute error below 2e-7 / 1e-15 for |x| <= 2e4 / 1e8 rad, relative to the result near 0. Beyond, the error grows
+    as if the angle had been rounded once more (|x| times the unit roundoff), and stays in [-1, 1]; infinity gives
+    NaN.
     """
     return _sin(_floating(x))
 
@@ -39,7 +41,7 @@ def cos(x: ArrayLike) -> Array:
 
 
 def tan(x: ArrayLike) -> Array:
-    """Tangent of an angle in rad, any shape: relative error below 4e-7 / 1e-15 in the range of `sin`."""
+    """Tangent of an angle in rad, any shape: relative error below 4e-7 / 1e-15 for |x| <= pi, then slowly growing."""
     return _tan(_floating(x))
 
 
@@ -49,11 +51,11 @@ def arctan(x: ArrayLike) -> Array:
 
 
 def arctan2(y: ArrayLike, x: ArrayLike) -> Array:
-    """Angle of the point (x, y) in rad, in [-pi, pi]. Absolute error below 3e-7 / 1e-15 in all quadrants and on the axes.
+    """Angle of the point (x, y) in rad, in [-pi, pi]. Absolute error below 3e-7 / 1e-15 in all quadrants.
 
-    At (0, 0) the value is 0 (with the sign of y) and both derivatives are 0, where the library's are NaN. The sign of a zero
-    y chooses between pi and -pi for negative x; the sign of a zero x is ignored. Derivatives hold where x^2 + y^2 neither
-    underflows nor overflows.
+    At (0, 0) the value is 0 (with the sign of y) and both derivatives are 0, where the library's are NaN. The sign of
+    a zero y chooses between pi and -pi for negative x; the sign of a zero x is ignored. Derivatives hold where x^2 +
+    y^2 neither underflows nor overflows.
     """
     return _arctan2(*_same_type(y, x))
 
@@ -80,10 +82,10 @@ def log(x: ArrayLike) -> Array:
 
 
 def sin_cos_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Array]:
-    """Sine and cosine of an angle uniform over the circle, made of a random word (uint32 for float32, uint64 for float64).
+    """Sine and cosine of an angle uniform over the circle, of random words: uint32 for float32, uint64 for float64.
 
-    Two bits choose the signs, one whether the functions swap, the others an angle in (-pi / 4, pi / 4), so that no reduction
-    and no long polynomial is needed.
+    Two bits choose the signs, one whether the functions swap, the others an angle in (-pi / 4, pi / 4), so that no
+    reduction and no long polynomial is needed.
     """
     bits = 8 * word.dtype.itemsize
     signed = jnp.int32 if bits == 32 else jnp.int64

@@ -1,7 +1,8 @@
 """Square-root algebra of small covariance matrices (..., n, n).
 
-Up to `WRITTEN_OUT` rows the formulas are written out in scalars, which XLA fuses into the surrounding step; above, and in
-one call per batch, the library's LAPACK routines do the work. A factor is always lower triangular, and leading axes are a batch.
+Up to `WRITTEN_OUT` rows the formulas are written out in scalars, several times faster on the CPU than a call of
+LAPACK for each matrix; above, the library's routines do the work. A factor is always lower triangular, and leading
+axes are a batch.
 """
 
 from collections.abc import Callable
@@ -11,8 +12,9 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxveh.numerics.elementary import log
+from jaxveh.numerics.platform import barrier
 
-WRITTEN_OUT = 6
+WRITTEN_OUT = 8
 """The largest number of rows whose formulas are written out in scalars."""
 
 Rows = list[list[Array]]
@@ -26,17 +28,7 @@ def cholesky(matrix: Array) -> Array:
     n = _square(matrix, "matrix")
     if n > WRITTEN_OUT:
         return jnp.linalg.cholesky(matrix, symmetrize_input=False)
-    rows: Rows = []
-    inverses: list[Array] = []
-    for i in range(n):
-        row: list[Array] = []
-        for j in range(i):
-            row.append((matrix[..., i, j] - _dot(row[:j], rows[j][:j])) * inverses[j])
-        pivot = matrix[..., i, i] - _dot(row, row)
-        root = jnp.sqrt(jnp.where(pivot > 0.0, pivot, jnp.nan))
-        rows.append([*row, root])
-        inverses.append(1.0 / root)
-    return _from_rows(rows)
+    return _from_rows(_cholesky_rows([[matrix[..., i, j] for j in range(i + 1)] for i in range(n)]))
 
 
 def solve_lower(factor: Array, b: Array) -> Array:
@@ -57,9 +49,13 @@ def solve_psd(factor: Array, b: Array) -> Array:
 def inverse_psd(factor: Array) -> Array:
     """(L L^T)^-1 (..., n, n), symmetric, from the factor L (..., n, n)."""
     n = _square(factor, "factor")
-    identity = jnp.broadcast_to(jnp.eye(n, dtype=factor.dtype), factor.shape)
-    inverse = solve_lower(factor, identity)
-    return jnp.swapaxes(inverse, -1, -2) @ inverse
+    if n > WRITTEN_OUT:
+        identity = jnp.broadcast_to(jnp.eye(n, dtype=factor.dtype), factor.shape)
+        inverse = solve_lower(factor, identity)
+        return jnp.swapaxes(inverse, -1, -2) @ inverse
+    rows = _inverse_rows(factor)
+    upper = [[_dot([row[i] for row in rows[j:]], [row[j] for row in rows[j:]]) for j in range(i, n)] for i in range(n)]
+    return _stacked([[upper[min(i, j)][abs(i - j)] for j in range(n)] for i in range(n)])
 
 
 def log_det(factor: Array) -> Array:
@@ -70,8 +66,14 @@ def log_det(factor: Array) -> Array:
 
 def mahalanobis(factor: Array, residual: Array) -> Array:
     """r^T (L L^T)^-1 r (...,): the squared distance of a residual r (..., n) from 0."""
-    whitened = solve_lower(factor, residual)
-    return jnp.sum(whitened * whitened, axis=-1)
+    n = _square(factor, "factor")
+    if residual.shape[-1:] != (n,):
+        raise ValueError(f"residual has shape {residual.shape}; for a factor {factor.shape} it must be (..., {n}).")
+    if n > WRITTEN_OUT:
+        whitened = _library_solve(factor, residual[..., None], transposed=False)[..., 0]
+        return jnp.sum(whitened * whitened, axis=-1)
+    rows = _forward(factor, [residual[..., i] for i in range(n)])
+    return _dot(rows, rows)
 
 
 def symmetric(matrix: Array) -> Array:
@@ -86,18 +88,49 @@ def _square(matrix: Array, name: str) -> int:
     return matrix.shape[-1]
 
 
-def _dot(a: list[Array], b: list[Array]) -> Array | float:
-    total: Array | float = 0.0
-    for x, y in zip(a, b, strict=True):
+def _dot(a: list[Array], b: list[Array]) -> Array:
+    """Inner product of two lists of scalars (...,), not empty."""
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
         total = total + x * y
     return total
+
+
+def _cholesky_rows(lower: Rows) -> Rows:
+    """The rows of the factor from those of the lower triangle."""
+    rows: Rows = []
+    inverses: list[Array] = []
+    for entries in lower:
+        row: list[Array] = []
+        for j, entry in enumerate(entries[:-1]):
+            rest = entry - _dot(row[:j], rows[j][:j]) if j else entry
+            row.append(rest * inverses[j])
+        pivot = entries[-1] - _dot(row, row) if row else entries[-1]
+        root = jnp.sqrt(jnp.where(pivot > 0.0, pivot, jnp.nan))
+        rows.append([*row, root])
+        inverses.append(1.0 / root)
+    return rows
+
+
+def _inverse_rows(factor: Array) -> Rows:
+    """The rows of the inverse of a lower triangular factor (..., n, n)."""
+    rows: Rows = []
+    for i in range(factor.shape[-1]):
+        diagonal = 1.0 / factor[..., i, i]
+        known = [_dot([factor[..., i, k] for k in range(j, i)], [rows[k][j] for k in range(j, i)]) for j in range(i)]
+        rows.append([*(-diagonal * value for value in known), diagonal])
+    return rows
 
 
 def _from_rows(rows: Rows) -> Array:
     """The lower triangular matrix (..., n, n) of its rows of scalars (...,)."""
     zero = jnp.zeros_like(rows[0][0])
-    n = len(rows)
-    return jnp.stack([jnp.stack([*row, *[zero] * (n - len(row))], -1) for row in rows], -2)
+    rows = barrier(rows)  # or each entry of the stack would be computed from the beginning again
+    return jnp.stack([jnp.stack([*row, *[zero] * (len(rows) - len(row))], -1) for row in rows], -2)
+
+
+def _stacked(rows: Rows) -> Array:
+    return jnp.stack([jnp.stack(row, -1) for row in barrier(rows)], -2)
 
 
 def _by_columns(solve: Callable[[Array, list[Array]], list[Array]], factor: Array, b: Array) -> Array:
@@ -112,7 +145,7 @@ def _by_columns(solve: Callable[[Array, list[Array]], list[Array]], factor: Arra
     # A matrix is solved for all columns at once: a row of it stands where a vector has a scalar.
     entries = factor if vector else factor[..., None, :, :]
     rows = [b[..., i] if vector else b[..., i, :] for i in range(n)]
-    return jnp.stack(solve(entries, rows), -1 if vector else -2)
+    return jnp.stack(barrier(solve(entries, rows)), -1 if vector else -2)
 
 
 def _library_solve(factor: Array, b: Array, *, transposed: bool) -> Array:
@@ -125,8 +158,8 @@ def _library_solve(factor: Array, b: Array, *, transposed: bool) -> Array:
 def _forward(factor: Array, b: list[Array]) -> list[Array]:
     x: list[Array] = []
     for i, entry in enumerate(b):
-        known = _dot([factor[..., i, j] for j in range(i)], x)
-        x.append((entry - known) / factor[..., i, i])
+        rest = entry - _dot([factor[..., i, j] for j in range(i)], x) if i else entry
+        x.append(rest / factor[..., i, i])
     return x
 
 
@@ -134,6 +167,6 @@ def _backward(factor: Array, b: list[Array]) -> list[Array]:
     n = len(b)
     x: list[Array] = []
     for i in reversed(range(n)):
-        known = _dot([factor[..., j, i] for j in reversed(range(i + 1, n))], x)
-        x.append((b[i] - known) / factor[..., i, i])
+        rest = b[i] - _dot([factor[..., j, i] for j in reversed(range(i + 1, n))], x) if x else b[i]
+        x.append(rest / factor[..., i, i])
     return x[::-1]

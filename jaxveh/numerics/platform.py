@@ -1,7 +1,7 @@
 """The one place that decides, at trace time, between forms for the CPU and forms for an accelerator.
 
-On the CPU XLA recomputes an expression in each consumer that it fuses it into, and its trigonometric functions are slow;
-on an accelerator both are handled well. Everything in this package that differs by platform asks here.
+On the CPU XLA recomputes an expression in each consumer that it fuses it into, and its trigonometric functions are
+slow; on an accelerator both are handled well. Everything in this package that differs by platform asks here.
 """
 
 from typing import TypeVar
@@ -31,7 +31,7 @@ def barriers_hold() -> bool:
 def barrier(tree: Tree) -> Tree:
     """`tree`, which XLA on the CPU computes once and stores (from jax 0.12 on); on other platforms `tree` as it is.
 
-    Place it on values with several consumers (a new state, weights, random words). It batches and differentiates in both
-    modes; tangents and cotangents pass through barriers of their own.
+    Place it on values with several consumers (a new state, weights, random words). It batches and differentiates in
+    both modes; tangents and cotangents pass through barriers of their own.
     """
     return lax.optimization_barrier(tree) if on_cpu() else tree

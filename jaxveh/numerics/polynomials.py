@@ -1,7 +1,8 @@
 """Polynomials of the elementary functions, and their evaluation.
 
-An odd function of the reduced argument r is written f(r) = r + r t q(t), with t = r^2: small arguments then keep their
-relative accuracy. Coefficients are those of q, ascending; `tests/numerics/coefficients.py` is the recipe that made them.
+An odd function of the reduced argument r is written f(r) = r + r t q(t), with t = r^2: small arguments then keep
+their relative accuracy. Coefficients are those of q, ascending; `tests/numerics/coefficients.py` is the recipe that
+made them.
 """
 
 import jax.numpy as jnp

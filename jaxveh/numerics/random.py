@@ -26,7 +26,7 @@ _KEY_PARITY = 0x1BD11BDA
 def normal(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
     """Standard normal numbers of `shape` by Box and Muller (1958), float32 or float64 (the default type if None).
 
-    Never infinite; |z| reaches 6.7 in float32 (beyond it lies 2e-11 of the distribution) and 9.4 in float64.
+    Never infinite; |z| reaches 6.7 in float32 (beyond it lies 1.4e-11 of the distribution) and 9.4 in float64.
     """
     shape, dtype = _shape(shape), _dtype(dtype)
     if not on_cpu():
@@ -75,17 +75,20 @@ def exponential(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -
 
 
 def cauchy(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
-    """Standard Cauchy numbers of `shape`, the tangent of a random angle; |z| reaches 3e8 (float32) or 1e18 (float64)."""
+    """Standard Cauchy numbers of `shape`, tangents of random angles; |z| reaches 3e9 (float32) or 1e19 (float64)."""
     shape, dtype = _shape(shape), _dtype(dtype)
     sine, cosine = sin_cos_of_word(_words(key, math.prod(shape), dtype), dtype)
     return (sine / cosine).reshape(shape)
 
 
 def student_t(key: Array, df: ArrayLike, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
-    """Student's t with `df` > 0 degrees of freedom (broadcasts against `shape`; differentiable) by Bailey's polar method.
+    """Student's t numbers of `shape` by Bailey's polar method, with `df` > 0 degrees of freedom.
 
-    sqrt(df (u^(-2 / df) - 1)) cos(theta) is exact for every df (Bailey, Mathematics of Computation 62, 1994). |t| reaches
-    sqrt(df (2^(66 / df) - 1)) in float32, 2^(130 / df) in float64, and at most the root of the largest number.
+    `df` broadcasts against `shape` and is differentiable.
+
+    sqrt(df (u^(-2 / df) - 1)) cos(theta) is exact for every df (Bailey, Mathematics of Computation 62, 1994). |t|
+    reaches sqrt(df (2^(66 / df) - 1)) in float32, 2^(130 / df) in float64, and at most the root of the largest
+    number.
     """
     shape, dtype = _shape(shape), _dtype(dtype)
     df = jnp.asarray(df, dtype)

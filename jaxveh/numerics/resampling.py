@@ -1,11 +1,12 @@
 """Resampling: which particle each of the next generation descends from.
 
-Every scheme takes weights (N,), not negative and finite with a positive sum, normalised or not, and returns ancestors (n,),
-int32 and nondecreasing, with n = N unless asked otherwise. The expected number of children of particle i is n w_i / sum(w).
+Every scheme takes weights (N,), not negative and finite with a positive sum, normalised or not, and returns ancestors
+(n,), int32 and nondecreasing, with n = N unless asked otherwise. The expected number of children of particle i is n
+w_i / sum(w).
 
-Cumulated weights are whole numbers, of 2^30 (float32) or 2^52 (float64) parts of the sum. Their sums are exact in any order,
-so that rounding never loses a particle, goes past the last, breaks the order, or chooses one of zero weight; a weight below
-half a part counts as zero. Ancestors are integers: no gradient passes through them.
+Cumulated weights are whole numbers, of 2^30 (float32) or 2^52 (float64) parts of the sum. Their sums are exact in any
+order, so that rounding never loses a particle, goes past the last, breaks the order, or chooses one of zero weight; a
+weight below half a part counts as zero. Ancestors are integers: no gradient passes through them.
 """
 
 import math
@@ -17,7 +18,7 @@ from jax import Array
 
 from jaxveh.numerics import random
 from jaxveh.numerics.elementary import log
-from jaxveh.numerics.platform import barrier
+from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu
 
 
 def systematic(key: Array, weights: Array, n: int | None = None) -> Array:
@@ -62,21 +63,21 @@ def residual(key: Array, weights: Array, n: int | None = None) -> Array:
     drawn = _search(parts, _sorted_parts(key, n, missing, total, weights.dtype))
     draw = jax.lax.iota(jnp.int32, n)
     children = certain.at[drawn].add((draw < missing).astype(jnp.int32), mode="promise_in_bounds")
-    return _ancestors(jax.lax.cumsum(children), n)
+    return _ancestors(_cumulated(children), n)
 
 
 def ess(weights: Array) -> Array:
-    """Effective sample size (sum w)^2 / sum w^2 of weights (N,), between 1 and N; 0 if all are zero (Kong et al., 1994)."""
+    """Effective sample size (sum w)^2 / sum w^2 of weights (N,), from 1 to N; 0 if all are zero (Kong et al., 1994)."""
     square = jnp.sum(weights * weights)
     total = jnp.sum(weights)
     return jnp.where(square > 0.0, total * total / jnp.where(square > 0.0, square, 1.0), 0.0)
 
 
 def normalise(log_weights: Array) -> tuple[Array, Array, Array]:
-    """Weights (N,) that sum to 1, the logarithm of the mean weight, and whether any particle is alive, of log weights (N,).
+    """Of log weights (N,): weights that sum to 1, the logarithm of the mean weight, whether any particle is alive.
 
-    An entry that is not finite is dead and gets weight 0. If all are, the weights are uniform, the logarithm is -infinity and
-    `alive` is False. Gradients are finite in every case, and zero with respect to dead entries.
+    An entry that is not finite is dead and gets weight 0. If all are, the weights are uniform, the logarithm is
+    -infinity and `alive` is False. Gradients are finite in every case, and zero with respect to dead entries.
     """
     count = log_weights.shape[-1]
     living = jnp.isfinite(log_weights)
@@ -107,8 +108,43 @@ def _size(weights: Array, n: int | None) -> int:
 def _cumulated_parts(weights: Array) -> tuple[Array, Array]:
     """Cumulated weights in whole parts (N,), and their sum: 2^30 or 2^52 but for rounding."""
     parts = _as_parts(weights)
-    cumulated = barrier(jax.lax.cumsum(parts))
+    cumulated = barrier(_cumulated(parts))
     return cumulated, cumulated[-1]
+
+
+def _cumulated(values: Array) -> Array:
+    """Cumulative sum of whole numbers (N,); the library's costs the CPU up to three times as much."""
+    size = values.shape[0]
+    if not on_cpu():
+        return jax.lax.cumsum(values)
+    if barriers_hold() and size <= 2**14:
+        return _cumulated_by_doubling(values)
+    return _cumulated_by_blocks(values)
+
+
+def _cumulated_by_doubling(values: Array) -> Array:
+    """Each pass adds the sums as far back as they already reach (Hillis and Steele, 1986), in whole vectors."""
+    zero = jnp.zeros((), values.dtype)
+    reach = 1
+    while reach < values.shape[0]:
+        values = barrier(values + jax.lax.pad(values[:-reach], zero, [(reach, 0, 0)]))
+        reach *= 2
+    return values
+
+
+def _cumulated_by_blocks(values: Array) -> Array:
+    """Sums within blocks of 16, all blocks at once, and before them the cumulated sums of the blocks."""
+    size, block = values.shape[0], 16
+    count = -(-size // block)
+    blocks = jax.lax.pad(values, jnp.zeros((), values.dtype), [(0, count * block - size, 0)]).reshape(count, block)
+    columns = [blocks[:, 0]]
+    for j in range(1, block):
+        columns.append(columns[-1] + blocks[:, j])
+    sums = barrier(jnp.stack(columns, axis=1))
+    if count > 1:
+        totals = sums[:, -1]
+        sums = sums + (_cumulated_by_blocks(totals) - totals)[:, None]
+    return sums.reshape(-1)[:size]
 
 
 def _as_parts(weights: Array) -> Array:
@@ -122,17 +158,17 @@ def _position(parts: Array, total: Array, n: int, dtype: jnp.dtype) -> Array:
 
 
 def _ancestors(passed: Array, n: int) -> Array:
-    """Ancestors (n,) of the numbers of children `passed` (N,) of the particles up to and with each, nondecreasing, last n."""
+    """Ancestors (n,), where `passed` (N,) counts the children of all particles up to and with each: its last is n."""
     passed = barrier(jnp.clip(passed, 0, n))
     ended = jnp.zeros(n, jnp.int32).at[passed].add(1, mode="drop", indices_are_sorted=True)
-    return barrier(jax.lax.cumsum(barrier(ended)))
+    return barrier(_cumulated(barrier(ended)))
 
 
 def _sorted_parts(key: Array, n: int, count: Array, total: Array, dtype: jnp.dtype) -> Array:
-    """`count` <= n sorted uniform whole numbers in [0, total), then numbers that mean nothing but are in range; (n,)."""
+    """(n,) whole numbers in [0, total): `count` sorted uniform ones, then numbers that mean nothing."""
     spacing = random.exponential(key, (n + 1,), dtype)
     used = jax.lax.iota(jnp.int32, n + 1) <= count
-    cumulated = barrier(jax.lax.cumsum(_as_parts(jnp.where(used, spacing, 0.0))))
+    cumulated = barrier(_cumulated(_as_parts(jnp.where(used, spacing, 0.0))))
     uniform = cumulated[:-1].astype(dtype) * (1.0 / cumulated[-1].astype(dtype))
     drawn = jnp.floor(uniform * total.astype(dtype)).astype(total.dtype)
     return jnp.clip(drawn, 0, total - 1)

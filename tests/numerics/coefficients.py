@@ -1,8 +1,8 @@
 """Recipe of the polynomials in `jaxveh.numerics.polynomials`; `python tests/numerics/coefficients.py` prints them.
 
-Each elementary function is odd in its reduced argument r, f(r) = r + r t q(t) with t = r^2, so that small arguments keep
-their relative accuracy. q is interpolated at Chebyshev nodes of [0, bound], in extended precision, and converted to powers
-of t; at these degrees that is within a small factor of the minimax polynomial.
+Each elementary function is odd in its reduced argument r, f(r) = r + r t q(t) with t = r^2, so that small arguments
+keep their relative accuracy. q is interpolated at Chebyshev nodes of [0, bound], in extended precision, and converted
+to powers of t; at these degrees that is within a small factor of the minimax polynomial.
 """
 
 from collections.abc import Callable
@@ -24,12 +24,12 @@ def sine_remainder(t: Array) -> Array:
 
 def arctangent_remainder(t: Array) -> Array:
     """(arctan r / r - 1) / r^2 by its Taylor series, for r^2 <= 0.18."""
-    return sum((-1) ** n * t ** (n - 1) / np.longdouble(2 * n + 1) for n in range(1, 40))
+    return np.sum([(-1) ** n * t ** (n - 1) / np.longdouble(2 * n + 1) for n in range(1, 40)], axis=0)
 
 
 def hyperbolic_arctangent_remainder(t: Array) -> Array:
     """(artanh r / r - 1) / r^2 by its Taylor series, for r^2 <= 0.18."""
-    return sum(t ** (n - 1) / np.longdouble(2 * n + 1) for n in range(1, 40))
+    return np.sum([t ** (n - 1) / np.longdouble(2 * n + 1) for n in range(1, 40)], axis=0)
 
 
 def cosine_remainder(t: Array) -> Array:
