@@ -144,9 +144,10 @@ class Unscented(AbstractFilter):
         here = jnp.stack([present[name] for name in model.channels])
         batch = _states(belief, belief.mean)
         predicted = _channel_rows(model, model.observation(row.t, batch, row.u), points.directions.shape[1])
+        predicted = jnp.where(here[:, None], predicted, 0)
         mean = predicted @ jnp.asarray(points.mean_weights, dtype)
         weights = jnp.asarray(points.covariance_weights, dtype)
-        deviations = jnp.where(here[:, None], predicted - mean[:, None], 0)
+        deviations = predicted - mean[:, None]
         states = belief.factor @ jnp.asarray(points.directions, dtype)
         noise = covariance_in(model.measurement_noise, model.channels, dtype)
         both = here[:, None] & here[None, :]
@@ -172,7 +173,7 @@ class Unscented(AbstractFilter):
             innovation_std=by_channel(model, jnp.sqrt(jnp.diagonal(spread)), present),
             nis=nis,
             ess=jnp.full((), jnp.nan, dtype),
-            result=_result(model, row, after, factor),
+            result=_result(model, row, (belief, after), predicted, factor),
         )
         return after, info
 
@@ -196,12 +197,21 @@ def _wrap(model, innovation):
     return jnp.where(wraps, wrap_angle(innovation), innovation)
 
 
-def _result(model, row, belief, factor):
+def _result(model, row, beliefs, predicted, factor):
+    """The first thing that went wrong, in the order of the computation: what follows from it is not finite either."""
+    before, after = beliefs
+    diverged, indefinite = Result.non_finite_state, Result.not_positive_definite
     result = input_result(model, row)
-    definite = jnp.all(jnp.isfinite(belief.factor)) & jnp.all(jnp.isfinite(factor))
-    finite = jnp.all(jnp.isfinite(belief.vector))
-    result = jnp.where((result == 0) & ~definite, code(Result.not_positive_definite), result)
-    return jnp.where((result == 0) & ~finite, code(Result.non_finite_state), result)
+    for values, reason in (
+        (before.vector, diverged),
+        (before.matrix, diverged),
+        (before.factor, indefinite),
+        (predicted, diverged),
+        (factor, indefinite),
+        (after.factor, indefinite),
+    ):
+        result = jnp.where((result == 0) & ~jnp.all(jnp.isfinite(values)), code(reason), result)
+    return result
 
 
 class _StaticPoints:

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.bijectors import Interval, Positive
-from jaxveh._core.errors import InputError, check, check_positive, float_array
+from jaxveh._core.errors import InputError, check, check_positive, float_array, is_concrete
 from jaxveh._core.names import as_mapping, record
 from jaxveh._core.parameter import parameter, positive
 
@@ -22,7 +22,7 @@ LOG_2PI = 1.8378770664093453
 class AbstractNoise(eqx.Module):
     """A zero-mean additive noise law over named scalar fields.
 
-    A batch is a mapping from each name to an array of any common shape.
+    A batch is a mapping from each name to an array of any common shape. `has_covariance`: whether the law has one.
     """
 
     has_covariance: eqx.AbstractVar[bool]
@@ -128,24 +128,39 @@ class MultivariateGaussian(AbstractNoise):
         return {name: correlated[i] for i, name in enumerate(self.fields)}
 
     def log_prob(self, residual, present):
-        values, here = zip(*[_masked(residual, present, name) for name in self.fields], strict=True)
-        here = jnp.stack(jnp.broadcast_arrays(*here))
-        values = jnp.stack(jnp.broadcast_arrays(*values))
-        # The marginal of the present fields: absent ones become independent with unit variance and zero residual.
-        if here.ndim > 1:
-            here = here.reshape(here.shape[0], -1)[:, 0]
-        eye = jnp.eye(len(self.fields), dtype=self.matrix.dtype)
-        factor = numerics.cholesky(jnp.where(here[:, None] & here[None, :], self.matrix, eye))
-        white = numerics.solve_lower(factor, values.reshape(len(self.fields), -1))
+        if any(jnp.ndim(present[name]) > 0 for name in self.fields):
+            return self._log_prob_by_element(residual, present)
+        factor, white, here = self._white(residual, present)
         count = jnp.sum(here).astype(self.matrix.dtype)
         log_prob = -0.5 * jnp.sum(white**2, axis=0) - 0.5 * numerics.log_det(factor) - 0.5 * LOG_2PI * count
-        return log_prob.reshape(values.shape[1:])
+        return log_prob.reshape(jnp.broadcast_shapes(*[jnp.shape(residual[name]) for name in self.fields]))
+
+    def _white(self, residual, present):
+        """Factor of the marginal covariance (k, k), whitened residuals (k, batch) and presence (k,), itself no batch."""
+        values, here = zip(*[_masked(residual, present, name) for name in self.fields], strict=True)
+        here, values = jnp.stack(here), jnp.stack(jnp.broadcast_arrays(*values))
+        # The marginal of the present fields: absent ones become independent with unit variance and zero residual.
+        eye = jnp.eye(len(self.fields), dtype=self.matrix.dtype)
+        factor = numerics.cholesky(jnp.where(here[:, None] & here[None, :], self.matrix, eye))
+        return factor, numerics.solve_lower(factor, values.reshape(len(self.fields), -1)), here
+
+    def _log_prob_by_element(self, residual, present):
+        """Where what is present differs within the batch, each element has a covariance of its own."""
+        flat, shape = _flatten_batch(self.fields, residual, present)
+        return jax.vmap(self.log_prob)(*flat).reshape(shape)
 
     def covariance(self):
         return self.matrix
 
     def scaled(self, factor):
         return MultivariateGaussian(self.fields, self.matrix * factor**2)
+
+
+def _flatten_batch(names, *mappings):
+    """The mappings with every array broadcast to the batch and flattened, and the batch's shape."""
+    shape = jnp.broadcast_shapes(*[jnp.shape(values[name]) for values in mappings for name in names])
+    wide = lambda value: jnp.broadcast_to(value, shape).reshape(-1)  # noqa: E731
+    return [{name: wide(values[name]) for name in names} for values in mappings], shape
 
 
 def _eigenvalues(matrix):
@@ -160,7 +175,6 @@ class StudentT(AbstractNoise):
     Its covariance, `scale^2 dof / (dof - 2)`, exists for dof > 2 only.
     """
 
-    has_covariance: ClassVar[bool] = True
     dof: jax.Array = positive("-")
     scale: tuple = _levels()
 
@@ -168,6 +182,11 @@ class StudentT(AbstractNoise):
         self.dof = float_array(dof)
         self.scale = _scales(scale, "scale")
         check_positive("degrees of freedom", self.dof)
+
+    @property
+    def has_covariance(self):
+        """False where the degrees of freedom are known to be 2 or fewer; under jit they are not known."""
+        return not is_concrete(self.dof) or bool(self.dof > 2)
 
     @property
     def names(self):
@@ -190,7 +209,9 @@ class StudentT(AbstractNoise):
     def covariance(self):
         check("degrees of freedom", self.dof, lambda dof: dof > 2, "above 2 for a covariance to exist",
               "Use a particle filter, or more degrees of freedom.")  # fmt: skip
-        return jnp.diag(jnp.stack([scale**2 * self.dof / (self.dof - 2) for scale in self.scale]))
+        # Under jit the check is skipped: NaN then says what a negative variance would hide.
+        factor = jnp.where(self.dof > 2, self.dof / jnp.where(self.dof > 2, self.dof - 2, 1), jnp.nan)
+        return jnp.diag(jnp.stack([scale**2 * factor for scale in self.scale]))
 
     def scaled(self, factor):
         return StudentT(self.dof, jax.tree.map(lambda scale: scale * factor, self.scale))
@@ -280,6 +301,19 @@ class Independent(AbstractNoise):
 
     def scaled(self, factor):
         return Independent(tuple(law.scaled(factor) for law in self.laws))
+
+
+def whiten(law: AbstractNoise, residual: Mapping, present: Mapping) -> dict[str, jax.Array]:
+    """Residuals as independent numbers of unit variance, by the law's covariance; zero where absent (batches broadcast)."""
+    if isinstance(law, Independent):
+        return {name: value for part in law.laws for name, value in whiten(part, residual, present).items()}
+    flat, shape = _flatten_batch(law.names, residual, present)
+    if isinstance(law, MultivariateGaussian):
+        white = jax.vmap(lambda r, p: law._white(r, p)[1][:, 0], out_axes=1)(*flat)
+    else:
+        std = numerics.sqrt(jnp.diagonal(law.covariance()))
+        white = jnp.stack([_masked(*flat, name)[0] / std[i] for i, name in enumerate(law.names)])
+    return {name: white[i].reshape(shape) for i, name in enumerate(law.names)}
 
 
 def combine(*laws: AbstractNoise | None) -> AbstractNoise | None:
