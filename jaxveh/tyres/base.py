@@ -1,0 +1,87 @@
+"""The one contract of a tyre: how it touches the road goes in, forces and moments come out."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+
+
+class Contact(NamedTuple):
+    """How a tyre touches the road at one instant; scalars, or arrays that broadcast against each other.
+
+    - `slip_angle` (rad): positive gives positive lateral force, `-atan2(v_yw, |v_xw|)` in the wheel's axes.
+    - `slip_ratio` (-): positive when driving, `(omega r_e - v_xw) / |v_xw|`.
+    - `load` (N): normal force, positive; None where it is not known (laws that need it raise). A negative load is a
+      wheel off the ground.
+    - `camber` (rad): inclination about the wheel's x axis (x forward, y left, z up).
+    - `friction` (-): the road's friction over that of the road on which the tyre's parameters hold.
+    - `speed` (m/s): forward speed |v_xw| of the contact point; None where it is not known (laws that need it raise).
+    """
+
+    slip_angle: Any = 0.0
+    slip_ratio: Any = 0.0
+    load: Any = None
+    camber: Any = 0.0
+    friction: Any = 1.0
+    speed: Any = None
+
+
+class Forces(NamedTuple):
+    """What the road does to a tyre, in the wheel's axes (x forward, y left, z up): forces in N, moments in N m.
+
+    Fields broadcast against each other; what a law does not have is the Python number 0.0. `M_x` is the overturning,
+    `M_y` the rolling resistance, `M_z` the aligning moment.
+    """
+
+    F_x: Any = 0.0
+    F_y: Any = 0.0
+    M_x: Any = 0.0
+    M_y: Any = 0.0
+    M_z: Any = 0.0
+
+
+class AbstractTyre(eqx.Module):
+    """A tyre (or an axle's tyres together): an elementwise force law, its array leaves are its parameters."""
+
+    @abc.abstractmethod
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """Forces and moments at a contact; `state` is None except for a tyre with states of its own."""
+
+
+class AbstractDynamicTyre(AbstractTyre):
+    """A tyre with states of its own (relaxation, bristles); a vehicle carries them among its states.
+
+    `forces(contact, state)` then needs the state, a NamedTuple of scalars with the fields `state_names`.
+    """
+
+    state_names: eqx.AbstractVar[tuple[str, ...]]
+
+    @abc.abstractmethod
+    def start(self, contact: Contact) -> Any:
+        """The state that has settled at a constant contact."""
+
+    @abc.abstractmethod
+    def derivatives(self, contact: Contact, state: Any) -> Any:
+        """The state's time derivative, the same NamedTuple."""
+
+
+def need_load(contact: Contact, tyre: str):
+    """The load, zero where the wheel is off the ground; raises `InputError` where the contact does not say."""
+    if contact.load is None:
+        raise InputError(f"contact.load = None: {tyre} scales with load; give the wheel's (or axle's) load in N.")
+    return jnp.maximum(contact.load, 0.0)
+
+
+def cornering_stiffness(tyre: AbstractTyre, contact: Contact) -> jax.Array:
+    """Slope of the lateral force over slip angle, N/rad, at a contact of scalars; any tyre without states.
+
+    At zero slip it is the cornering stiffness of the book.
+    """
+    slip = jnp.asarray(contact.slip_angle, jnp.result_type(float if contact.load is None else contact.load))
+    return jax.jvp(lambda a: tyre.forces(contact._replace(slip_angle=a)).F_y, (slip,), (jnp.ones_like(slip),))[1]

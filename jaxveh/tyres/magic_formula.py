@@ -1,0 +1,78 @@
+"""The Magic Formula in its form of four coefficients and two shifts: pure lateral slip."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import check_finite, check_positive
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+
+
+class MagicFormula(AbstractTyre):
+    """`F_y = D sin(C atan(B x - E (B x - atan(B x)))) + S_v` with `x = slip_angle + S_h`.
+
+    H. B. Pacejka, Tire and Vehicle Dynamics, the general form of the Magic Formula (3rd edition, eqs. 4.6 to 4.8).
+    The tyre-parameter paper of Bao, Sabbioni et al. (2015) uses it as its eq. 13, which is missing from the printed
+    text.
+
+    - `B` (1/rad) stiffness factor, `C` (-) shape factor, `D` (N) peak factor: all positive; `E` (-) curvature factor.
+    - `S_h` (rad) horizontal and `S_v` (N) vertical shift, default 0.
+    - `nominal_load` (N): where given, the force scales with `load / nominal_load` and vanishes with the load;
+      without, `D` is the force of the axle (or wheel) at whatever load it has.
+
+    The contact's friction multiplies D and S_v, so that there is no force without friction. Camber, slip ratio and
+    speed do not count. Positive slip angle gives positive force, the sign of this package; files in ISO-W axes have
+    the other.
+
+    **Raises** `InputError` for B, C, D or nominal_load not positive, or a coefficient that is not finite.
+    """
+
+    B: jax.Array = positive("1/rad")
+    C: jax.Array = positive("-")
+    D: jax.Array = positive("N")
+    E: jax.Array = parameter("-", scale=2.0)
+    S_h: jax.Array = parameter("rad", scale=0.02, default=0.0)
+    S_v: jax.Array = parameter("N", scale=500.0, default=0.0)
+    nominal_load: jax.Array | None = positive("N", default=None)
+
+    def __check_init__(self):
+        units = {"B": "1/rad", "C": "-", "D": "N", "nominal_load": "N"}
+        for name, unit in units.items():
+            check_positive(f"MagicFormula.{name}", getattr(self, name), unit)
+        for name in ("E", "S_h", "S_v"):
+            check_finite(f"MagicFormula.{name}", getattr(self, name))
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """Lateral force alone, N, in the shape of slip angle, load and friction together."""
+        x = self.B * (contact.slip_angle + self.S_h)
+        curved = x - self.E * (x - numerics.arctan(x))
+        F_y = self.D * numerics.sin(self.C * numerics.arctan(curved)) + self.S_v
+        return Forces(F_y=self._scale(contact) * F_y)
+
+    def _scale(self, contact: Contact):
+        if self.nominal_load is None:
+            return contact.friction
+        return contact.friction * (need_load(contact, "MagicFormula with a nominal_load") / self.nominal_load)
+
+    @property
+    def cornering_stiffness(self) -> jax.Array:
+        """`B C D`, N/rad: the slope at `x = 0`, at nominal load and full friction."""
+        return self.B * self.C * self.D
+
+    @property
+    def peak(self) -> jax.Array:
+        """The largest force the law can give, less `S_v`, N, at nominal load and full friction.
+
+        It is D where `C atan(.)` reaches a quarter turn: for C >= 1 unless E exceeds 1, where the inner function
+        turns back at `B x = 1 / sqrt(E - 1)`.
+        """
+        root = numerics.sqrt(jnp.maximum(self.E - 1.0, 0.0))
+        turning = self.E * numerics.arctan2(jnp.ones_like(root), root) - root
+        inner = jnp.where(self.E < 1.0, math.pi / 2, numerics.arctan(turning))
+        return self.D * numerics.sin(jnp.minimum(self.C * inner, math.pi / 2))

@@ -1,0 +1,249 @@
+"""The single-track (bicycle) model: lateral velocity, yaw and yaw rate at a given forward speed."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check, check_finite, check_positive
+from jaxveh._core.names import check_names, record_type
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
+from jaxveh.vehicles.base import GRAVITY, AbstractVehicle
+from jaxveh.vehicles.slip import slip_angle
+
+
+class SingleTrackState(NamedTuple):
+    """Lateral velocity of the centre of gravity `v_y` (m/s), `yaw` (rad, unwrapped) and `yaw_rate` (rad/s)."""
+
+    v_y: Any
+    yaw: Any
+    yaw_rate: Any
+
+
+class SingleTrackOutputs(NamedTuple):
+    """What can be said of a single track at one instant, at the centre of gravity, in the body's axes.
+
+    Speeds m/s, angles rad, rates rad/s, accelerations m/s^2 (those of an ideal accelerometer on a level road), axle
+    forces in the wheel's axes and loads N. `sideslip = atan2(v_y, v_x)`, zero at standstill.
+    """
+
+    v_x: Any
+    v_y: Any
+    yaw: Any
+    yaw_rate: Any
+    yaw_acceleration: Any
+    a_x: Any
+    a_y: Any
+    sideslip: Any
+    slip_angle_front: Any
+    slip_angle_rear: Any
+    F_yf: Any
+    F_yr: Any
+    load_front: Any
+    load_rear: Any
+
+
+UNITS = {
+    **dict.fromkeys(("v_x", "v_y"), "m/s"),
+    **dict.fromkeys(("a_x", "a_y", "v_x_rate"), "m/s^2"),
+    **dict.fromkeys(("steer", "yaw", "sideslip", "slip_angle_front", "slip_angle_rear"), "rad"),
+    "yaw_rate": "rad/s",
+    "yaw_acceleration": "rad/s^2",
+    **dict.fromkeys(("F_yf", "F_yr", "load_front", "load_rear"), "N"),
+}
+
+
+class SingleTrack(AbstractVehicle):
+    """A vehicle on one track: two axles, a given forward speed, no roll.
+
+    In the body's axes, with delta the steer at the road wheels, a and b the distances of the axles from the centre of
+    gravity, F the axles' lateral forces (paper of Bao, Sabbioni et al. 2015, in the body frame with v_x given):
+
+        m (dv_y/dt + v_x r) = F_f cos(delta) + F_r
+        J_z dr/dt           = a F_f cos(delta) - b F_r
+        alpha_f = delta - atan2(v_y + a r, v_x),   alpha_r = -atan2(v_y - b r, v_x)
+
+    Longitudinal forces and moments enter where a tyre law gives them. Slip angles are those of `slip_angle`: from
+    `crawl_speed` (m/s, 3 by default) upwards as written, below it regularised, so that standstill is an ordinary
+    point.
+
+    **Parameters**: `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg` and `rear_axle_to_cg` (m), `front` and
+    `rear`: the axles' tyres, `cg_height` (m; None: axle loads stay static), `steer_offset` (rad: the road wheels
+    stand at `u.steer + steer_offset`).
+
+    **Inputs** u: `steer` (rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, the longitudinal
+    acceleration: either `a_x`, what an ideal accelerometer at the centre of gravity says, or `v_x_rate = dv_x/dt`,
+    from which `a_x = v_x_rate - v_y r`. Load moves by `m a_x h / (a + b)` from the front to the rear axle.
+
+    **Raises** `InputError` for a mass, inertia, distance or height that is not positive, and for a tyre that is no
+    tyre.
+    """
+
+    mass: jax.Array = positive("kg")
+    yaw_inertia: jax.Array = positive("kg m^2")
+    front_axle_to_cg: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    front: AbstractTyre
+    rear: AbstractTyre
+    cg_height: jax.Array | None = positive("m", default=None)
+    steer_offset: jax.Array = parameter("rad", scale=0.02, default=0.0)
+    crawl_speed: float = eqx.field(static=True, default=3.0)
+
+    def __check_init__(self):
+        units = {
+            "mass": "kg",
+            "yaw_inertia": "kg m^2",
+            "front_axle_to_cg": "m",
+            "rear_axle_to_cg": "m",
+            "cg_height": "m",
+        }
+        for name, unit in units.items():
+            check_positive(f"SingleTrack.{name}", getattr(self, name), unit)
+        check_positive("SingleTrack.crawl_speed", self.crawl_speed, "m/s")
+        check_finite("SingleTrack.steer_offset", self.steer_offset)
+        check(
+            "SingleTrack.steer_offset", self.steer_offset, lambda v: abs(v) < 1.0, "within 1 rad",
+            "It is an angle at the road wheels in rad, not degrees.",
+        )  # fmt: skip
+        for name in ("front", "rear"):
+            tyre = getattr(self, name)
+            if not isinstance(tyre, AbstractTyre):
+                raise InputError(f"SingleTrack.{name} = {type(tyre).__name__}: must be a tyre of jaxveh.tyres.")
+
+    @property
+    def inputs(self):
+        return ("steer", "v_x") if self.cg_height is None else ("steer", "v_x", "a_x")
+
+    @property
+    def state_type(self):
+        """`SingleTrackState`, followed by the states of dynamic tyres as `front_<name>`, `rear_<name>`."""
+        extra = [f"{axle}_{name}" for axle in ("front", "rear") for name in _state_names(getattr(self, axle))]
+        if not extra:
+            return SingleTrackState
+        return record_type("SingleTrackState", (*SingleTrackState._fields, *extra))
+
+    @property
+    def units(self):
+        return dict(UNITS)
+
+    @property
+    def wheelbase(self) -> jax.Array:
+        """Distance between the axles, m."""
+        return self.front_axle_to_cg + self.rear_axle_to_cg
+
+    def static_loads(self) -> tuple[jax.Array, jax.Array]:
+        """Loads of front and rear axle at rest on a level road, N."""
+        per_length = self.mass * GRAVITY / self.wheelbase
+        return per_length * self.rear_axle_to_cg, per_length * self.front_axle_to_cg
+
+    def start(self, t, u, **values):
+        check_names("start", values, self.state_type._fields)
+        dtype = jnp.result_type(self.mass)
+        given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
+        zero = jnp.zeros(jnp.shape(u.v_x), dtype)
+        body = SingleTrackState(*[given.get(name, zero) for name in SingleTrackState._fields])
+        settled = []
+        for tyre, contact in zip((self.front, self.rear), self._contacts(body, u, *self._steered(u)), strict=True):
+            settled += list(tyre.start(contact)) if isinstance(tyre, AbstractDynamicTyre) else []
+        return self.state_type(*body, *settled)._replace(**given)
+
+    def evaluate(self, t, x, u):
+        del t
+        cosine, sine = self._steered(u)
+        contacts = self._contacts(x, u, cosine, sine)
+        states = self._tyre_states(x)
+        front, rear = (
+            _stored(tyre.forces(*at)) for tyre, *at in zip((self.front, self.rear), contacts, states, strict=True)
+        )
+        F_f = front.F_y * cosine + front.F_x * sine
+        F_r = rear.F_y
+        moment = self.front_axle_to_cg * F_f - self.rear_axle_to_cg * F_r + (front.M_z + rear.M_z)
+        a_y = (F_f + F_r) / self.mass
+        yaw_acceleration = moment / self.yaw_inertia
+        rates = SingleTrackState(v_y=a_y - u.v_x * x.yaw_rate, yaw=x.yaw_rate, yaw_rate=yaw_acceleration)
+        outputs = SingleTrackOutputs(
+            v_x=u.v_x,
+            v_y=x.v_y,
+            yaw=x.yaw,
+            yaw_rate=x.yaw_rate,
+            yaw_acceleration=yaw_acceleration,
+            a_x=_longitudinal_acceleration(x, u),
+            a_y=a_y,
+            sideslip=numerics.arctan2(x.v_y, u.v_x),
+            slip_angle_front=contacts[0].slip_angle,
+            slip_angle_rear=contacts[1].slip_angle,
+            F_yf=front.F_y,
+            F_yr=rear.F_y,
+            load_front=contacts[0].load,
+            load_rear=contacts[1].load,
+        )
+        return self._with_tyre_rates(rates, contacts, states), outputs
+
+    def loads(self, x, u) -> tuple[jax.Array, jax.Array]:
+        """Loads of front and rear axle, N; they may become negative where the car would lift an axle."""
+        front, rear = self.static_loads()
+        if self.cg_height is None:
+            return front, rear
+        if not (hasattr(u, "a_x") or hasattr(u, "v_x_rate")):
+            raise InputError(
+                f"inputs = {', '.join(u._fields)}: a car with a cg_height needs a_x (or v_x_rate) among them."
+            )
+        moved = self.mass * _longitudinal_acceleration(x, u) * self.cg_height / self.wheelbase
+        return front - moved, rear + moved
+
+    def _steered(self, u):
+        steer = u.steer + self.steer_offset
+        return numerics.cos(steer), numerics.sin(steer)
+
+    def _contacts(self, x, u, cosine, sine) -> tuple[Contact, Contact]:
+        front_load, rear_load = self.loads(x, u)
+        across = x.v_y + self.front_axle_to_cg * x.yaw_rate
+        along_wheel = u.v_x * cosine + across * sine
+        across_wheel = across * cosine - u.v_x * sine
+        front = Contact(
+            slip_angle=slip_angle(along_wheel, across_wheel, self.crawl_speed),
+            load=front_load,
+            speed=jnp.abs(along_wheel),
+        )
+        rear = Contact(
+            slip_angle=slip_angle(u.v_x, x.v_y - self.rear_axle_to_cg * x.yaw_rate, self.crawl_speed),
+            load=rear_load,
+            speed=jnp.abs(u.v_x),
+        )
+        return front, rear
+
+    def _tyre_states(self, x):
+        def of(axle, tyre):
+            names = _state_names(tyre)
+            return record_type("TyreState", names)(*[getattr(x, f"{axle}_{name}") for name in names]) if names else None
+
+        return of("front", self.front), of("rear", self.rear)
+
+    def _with_tyre_rates(self, rates, contacts, states):
+        extra = []
+        for tyre, contact, state in zip((self.front, self.rear), contacts, states, strict=True):
+            extra += list(tyre.derivatives(contact, state)) if state is not None else []
+        return self.state_type(*rates, *extra)
+
+
+def _state_names(tyre) -> tuple[str, ...]:
+    return tyre.state_names if isinstance(tyre, AbstractDynamicTyre) else ()
+
+
+def _stored(forces):
+    """Forces that each consumer reads instead of computing them again; numbers known beforehand stay numbers."""
+    arrays, numbers = eqx.partition(forces, eqx.is_array)
+    return eqx.combine(numerics.barrier(arrays), numbers)
+
+
+def _longitudinal_acceleration(x, u):
+    """What an ideal accelerometer at the centre of gravity says along x; the speed is constant if nobody says."""
+    if hasattr(u, "a_x"):
+        return u.a_x
+    turning = x.v_y * x.yaw_rate
+    return u.v_x_rate - turning if hasattr(u, "v_x_rate") else -turning

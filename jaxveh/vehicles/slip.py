@@ -1,0 +1,28 @@
+"""Slip of a wheel from the velocity of its contact point, smooth through standstill."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+
+
+def regularised_speed(v: jax.Array, crawl: float) -> jax.Array:
+    """|v|, exact from the `crawl` speed (m/s) upwards; below, `crawl (3 + 6 s^2 - s^4) / 8` with `s = v / crawl`.
+
+    Twice continuously differentiable, even, and never below `3 crawl / 8`, so that a division by it is safe and the
+    poles of lateral motion, which grow with 1 / |v|, stay within reach of an explicit solver.
+    """
+    # Clipped before the polynomial, so that the branch not taken cannot overflow.
+    square = jnp.square(jnp.clip(v * (1.0 / crawl), -1.0, 1.0))
+    return jnp.where(jnp.abs(v) >= crawl, jnp.abs(v), (crawl / 8.0) * (3.0 + square * (6.0 - square)))
+
+
+def slip_angle(v_x: jax.Array, v_y: jax.Array, crawl: float) -> jax.Array:
+    """Slip angle, rad, of a wheel whose contact point moves with (v_x, v_y) m/s in the wheel's axes.
+
+    `-atan2(v_y, |v_x|)`: a wheel that slides to the left (v_y > 0) has a negative slip angle and is pushed to the
+    right, forwards and backwards alike. |v_x| is regularised below the `crawl` speed.
+    """
+    return -numerics.arctan2(v_y, regularised_speed(v_x, crawl))
