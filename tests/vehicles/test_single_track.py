@@ -43,7 +43,6 @@ def inputs(steer=0.0, v_x=25.0, dtype=float):
 
 CARS = {
     "magic": vehicles.passenger_car,
-    "as printed": vehicles.passenger_car_as_printed,
     "linear": lambda: vehicles.linear(vehicles.passenger_car()),
 }
 
@@ -173,18 +172,21 @@ def test_lateral_sliding_only_loses_energy(car):
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("derivative", [jax.jacfwd, jax.jacrev])
-def test_values_and_gradients_are_finite_at_any_speed(car, dtype, derivative):
+def test_values_and_gradients_are_finite_at_any_speed(car, dtype):
+    """Reverse mode sums over all outputs, forward mode over all arguments: a NaN or an infinity survives either sum."""
     car = cast(car, dtype)
     points = [(v, *pair) for v in (0.0, 1e-3, 1.0, 3.0, -3.0, 25.0) for pair in ((0.0, 0.0), (0.2, -0.1))]
 
     @jax.jit
     @jax.vmap
-    def both(point):
-        x, u = state(point[1], 0.0, point[2], dtype), inputs(0.1, point[0], dtype)
-        return car.evaluate(0.0, x, u), derivative(lambda c, x, u: c.evaluate(0.0, x, u), (0, 1, 2))(car, x, u)
+    def everything(point):
+        arguments = (car, state(point[1], 0.0, point[2], dtype), inputs(0.1, point[0], dtype))
+        evaluate = lambda c, x, u: c.evaluate(0.0, x, u)  # noqa: E731
+        values, tangents = jax.jvp(evaluate, arguments, jax.tree.map(jnp.ones_like, arguments))
+        total = lambda *args: sum(jax.tree.leaves(evaluate(*args)))  # noqa: E731
+        return values, tangents, jax.grad(total, (0, 1, 2))(*arguments)
 
-    for leaf in jax.tree.leaves(both(np.array(points, dtype))):
+    for leaf in jax.tree.leaves(everything(np.array(points, dtype))):
         assert leaf.dtype == dtype
         assert jnp.all(jnp.isfinite(leaf))
 
