@@ -93,7 +93,7 @@ def test_csv_refuses_known_channels_in_other_units(tmp_path):
 def test_separators_and_time_names(tmp_path, header):
     separator = next(c for c in ";\t," if c in header)
     end = separator if header.endswith(separator) else ""
-    rows = [separator.join(row) + end for row in (("0", "1.5"), ("1", ""), ("2", "3.5"))]
+    rows = [separator.join(row) + end for row in (("0", "1.5"), ("1", " "), ("2", "3.5"))]
     (tmp_path / "log.csv").write_text("\n".join([header, *rows]) + "\n\n")
     recording = io.read_recording(tmp_path / "log.csv")
     assert recording.names == ("v_x",)

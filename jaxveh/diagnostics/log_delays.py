@@ -1,0 +1,135 @@
+"""Delays between channels, from the peak of their cross-correlation."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh.diagnostics.log_findings import Finding, LogView
+from jaxveh.diagnostics.log_single_track import a_y_from_yaw_rate, yaw_rate_from_steer
+
+REACH = 0.5
+"""Longest delay that is looked for, in seconds."""
+
+ALIKE = 0.6
+"""Correlation below which two channels are too different to time one by the other."""
+
+AROUND = 0.04
+"""Half the width in seconds of the parabola through the peak."""
+
+ALIKE_ROWS = 0.1
+"""Seconds whose rows count as one independent sample."""
+
+EXACT = 0.02
+"""Seconds of delay that count where physics ties two channels to each other."""
+
+SMOOTH = 0.2
+"""Seconds of the moving average on both channels."""
+
+MODELLED = 0.06
+"""Seconds of delay that count where a linear model of the car stands between them."""
+
+
+class Delay(NamedTuple):
+    """`seconds` by which a signal comes after its reference, the standard `error` of that, the `correlation` there."""
+
+    seconds: float
+    error: float
+    correlation: float
+
+
+def delay(reference: np.ndarray, signal: np.ndarray, step: float, reach: float = REACH) -> Delay:
+    """By how much `signal` comes after `reference`.
+
+    Both (N,) on an even grid of `step` seconds, NaN where missing. The peak of the normalised cross-correlation within
+    +-`reach` is refined by a parabola through its neighbours within `AROUND`; the error follows from its curvature and
+    from what the two do not share, `ALIKE_ROWS` seconds counting as one sample. NaN where there is no inner peak.
+    """
+    most = min(round(reach / step), reference.size // 4)
+    lags = range(-most, most + 1)
+    found = np.array([_correlation(reference, signal, lag) for lag in lags])
+    if not np.isfinite(found).all():
+        return Delay(np.nan, np.inf, 0.0)
+    peak = int(np.argmax(found))
+    width = min(max(round(AROUND / step), 1), peak, found.size - 1 - peak)
+    if width == 0:
+        return Delay(np.nan, np.inf, float(found[peak]))
+    near = np.arange(-width, width + 1)
+    bend, slope, top = np.polyfit(near, found[peak - width : peak + width + 1], 2)
+    if bend >= 0 or not 0 < top <= 1 + 1e-6:
+        return Delay(np.nan, np.inf, float(found[peak]))
+    samples = max(np.isfinite(reference * signal).sum() * step / ALIKE_ROWS, 1.0)
+    error = step * np.sqrt(max(1 - top**2, 0.0) / (2 * top * -bend * samples))
+    seconds = step * (peak - most + np.clip(-slope / (2 * bend), -width, width))
+    return Delay(float(seconds), float(error), float(found[peak]))
+
+
+def check_delays(log: LogView) -> list[Finding]:
+    """Delays of a_y and a_x after the speeds and the gyroscope, and of yaw rate after steer."""
+    findings = []
+    if log.has("v_x", "yaw_rate", "a_y"):
+        findings.append(_lateral(log))
+    if log.has("v_x", "a_x"):
+        change = log.slope(log.even("v_x"))
+        if log.has("v_y", "yaw_rate"):
+            change = change - log.even("v_y") * log.even("yaw_rate")
+        findings.append(_judge(log, "a_x", "dv_x/dt", change, "", EXACT))
+    if log.has("steer", "yaw_rate", "v_x"):
+        findings.append(_steering(log))
+    return findings
+
+
+def _lateral(log: LogView) -> Finding:
+    speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
+    if log.has("v_y"):
+        reference = speed * yaw_rate + log.slope(log.even("v_y"))
+        return _judge(log, "a_y", "v_x yaw_rate + dv_y/dt", reference, "", EXACT)
+    if log.car is not None:
+        known = np.isfinite(speed) & np.isfinite(yaw_rate)
+        filled = [np.where(known, values, 0.0) for values in (speed, yaw_rate)]
+        reference = np.where(known, a_y_from_yaw_rate(log.car, filled[1], filled[0], log.step), np.nan)
+        return _judge(log, "a_y", "what the car's linear model makes of yaw_rate", reference, "", MODELLED)
+    caveat = " Without v_y or a car, the sideslip's own lag of up to 0.2 s at speed is part of it."
+    return _judge(log, "a_y", "v_x yaw_rate", speed * yaw_rate, caveat, np.inf)
+
+
+def _steering(log: LogView) -> Finding:
+    steer = log.even("steer")
+    if log.car is None:
+        caveat = " Without a car, its own response of some 0.1 s is part of it."
+        return _judge(log, "yaw_rate", "steer", log.moving(steer), caveat, np.inf)
+    steer = steer - (log.car.steer_offset or 0.0)
+    expected = yaw_rate_from_steer(log.car, steer, log.even("v_x"), log.step)
+    return _judge(log, "yaw_rate", "what the car's linear model makes of steer", expected, "", MODELLED)
+
+
+def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: str, tolerance: float) -> Finding:
+    # The same symmetric average on both sides takes out noise and delays neither.
+    found = delay(log.smooth(reference, SMOOTH), log.smooth(log.even(name), SMOOTH), log.step)
+    values = found._asdict()
+    if not (found.correlation > ALIKE and np.isfinite(found.seconds)):
+        message = f"cannot be timed against {other}: they are too different (correlation {found.correlation:.2f})."
+        return Finding("note", name, message, values)
+    size, sure = abs(found.seconds), 2 * found.error
+    words = (
+        f"comes {size * 1e3:.0f} ms (+-{sure * 1e3:.0f}) {'after' if found.seconds >= 0 else 'before'} {other}.{caveat}"
+    )
+    if size <= max(tolerance if np.isfinite(tolerance) else 0.0, 0.75 * log.step, sure):
+        return Finding("ok", name, words, values)
+    if np.isinf(tolerance):
+        return Finding("note", name, words, values)
+    return Finding("warning", name, f"{words} Shift the channel by as much before estimating.", values)
+
+
+def _correlation(reference: np.ndarray, signal: np.ndarray, lag: int) -> float:
+    if lag < 0:
+        reference, signal = reference[-lag:], signal[:lag]
+    elif lag > 0:
+        reference, signal = reference[:-lag], signal[lag:]
+    known = np.isfinite(reference) & np.isfinite(signal)
+    if known.sum() < 20:
+        return np.nan
+    first, second = reference[known] - reference[known].mean(), signal[known] - signal[known].mean()
+    size = np.sqrt((first @ first) * (second @ second))
+    return float(first @ second / size) if size > 0 else np.nan

@@ -1,0 +1,59 @@
+"""What a car can do, and whether its file describes a car."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jaxveh.diagnostics.log_findings import GRAVITY, Finding, LogView
+from jaxveh.io.car import CarSpecification
+
+FRICTION = 1.3
+"""Lateral acceleration over gravity that tyres reach without downforce, racing tyres included."""
+
+_STIFFNESS = (4.0, 60.0)  # cornering stiffness of an axle over its load, 1/rad
+_INERTIA = (0.4, 2.0)  # yaw inertia over mass a b
+
+
+def check_plausibility(log: LogView) -> list[Finding]:
+    """Whether accelerations are within what tyres carry, and stiffnesses and inertia within what cars have."""
+    findings = []
+    for name in ("a_y", "a_x"):
+        if log.has(name):
+            findings.append(_grip(log, name))
+    return findings + (check_car(log.car) if log.car is not None else [])
+
+
+def check_car(car: CarSpecification) -> list[Finding]:
+    """Whether stiffnesses over axle loads and the inertia over mass a b are those of a car."""
+    findings = []
+    for axle, stiffness, arm in (
+        ("front", float(car.front_cornering_stiffness or 0), car.rear_axle_to_cg),
+        ("rear", float(car.rear_cornering_stiffness or 0), car.front_axle_to_cg),
+    ):
+        load = car.mass * GRAVITY * arm / car.wheelbase
+        unit = " N/deg instead of N/rad, or one wheel instead of two?"
+        findings.append(
+            _ratio(f"{axle}_cornering_stiffness", stiffness / load, _STIFFNESS, "the axle's load a radian", unit)
+        )
+    inertia = car.yaw_inertia / (car.mass * car.front_axle_to_cg * car.rear_axle_to_cg)
+    findings.append(_ratio("yaw_inertia", inertia, _INERTIA, "mass times both axle distances", ""))
+    return findings
+
+
+def _grip(log: LogView, name: str) -> Finding:
+    smooth = log.smooth(log.even(name), 0.3)
+    known = np.abs(smooth[np.isfinite(smooth)])
+    peak = float(np.quantile(known, 0.999)) / GRAVITY if known.size else 0.0
+    words = f"reaches {peak:.2f} g for a third of a second"
+    if peak > FRICTION:
+        message = f"{words}: more than tyres carry without downforce. A wrong unit or scale?"
+        return Finding("warning", name, message, {"peak": peak})
+    return Finding("ok", name, f"{words}.", {"peak": peak})
+
+
+def _ratio(name: str, ratio: float, allowed: tuple[float, float], other: str, hint: str) -> Finding:
+    low, high = allowed
+    if low <= ratio <= high:
+        return Finding("ok", name, f"is {ratio:.3g} times {other}.", {"ratio": ratio})
+    message = f"is {ratio:.3g} times {other}; cars have {low:g} to {high:g}.{hint}"
+    return Finding("warning", name, message, {"ratio": ratio})

@@ -1,0 +1,144 @@
+"""Signs and units, from what must agree: steer with yaw rate, accelerations with speeds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jaxveh.diagnostics.log_findings import GRAVITY, Finding, LogView, fit
+
+AGREE = 0.5
+"""Correlation above which two channels are said to tell the same story."""
+
+# What a slope other than 1 means, for a_y over v_x yaw_rate and for a_x over dv_x/dt.
+_LATERAL = {
+    1 / 3.6: ("v_x", "km/h"),
+    0.44704: ("v_x", "mph"),
+    np.pi / 180: ("yaw_rate", "deg/s"),
+    1 / GRAVITY: ("a_y", "g"),
+    np.pi / 180 / 3.6: ("v_x and yaw_rate", "km/h and deg/s"),
+}
+_LONGITUDINAL = {1 / 3.6: ("v_x", "km/h"), 0.44704: ("v_x", "mph"), 1 / GRAVITY: ("a_x", "g")}
+_LIMITS = {
+    "steer": (1.2, "rad at the road wheels", "degrees, or the angle of the steering wheel"),
+    "yaw_rate": (4.0, "rad/s", "deg/s"),
+    "v_x": (120.0, "m/s", "km/h"),
+    "a_x": (60.0, "m/s^2", "another unit"),
+    "a_y": (60.0, "m/s^2", "another unit"),
+    "sideslip": (1.6, "rad", "degrees"),
+}
+
+
+def check_units(log: LogView) -> list[Finding]:
+    """Magnitudes that no car reaches in SI units (99.5 % quantile, so that spikes do not count)."""
+    findings = []
+    for name, (limit, unit, likely) in _LIMITS.items():
+        if not log.has(name):
+            continue
+        values = log.channels[name]
+        size = float(np.quantile(np.abs(values[np.isfinite(values)]), 0.995))
+        if size > limit:
+            message = f"reaches {size:.4g}: too much for {unit}; it looks like {likely}. Say so in the channel map."
+            findings.append(Finding("error", name, message, {"size": size, "limit": limit}))
+        else:
+            findings.append(Finding("ok", name, f"reaches {size:.4g} {unit}.", {"size": size, "limit": limit}))
+    return findings
+
+
+def check_signs(log: LogView) -> list[Finding]:
+    """Whether steer, yaw rate and lateral acceleration turn the same way, and the accelerations follow the speeds."""
+    findings = []
+    steering = _correlation(log) if log.has("steer", "yaw_rate", "v_x") else None
+    lateral = _lateral(log) if log.has("v_x", "yaw_rate", "a_y") else None
+    if steering is not None:
+        findings.append(_steering(steering, lateral))
+    if lateral is not None:
+        findings.append(_slope("a_y", "v_x yaw_rate", lateral, _LATERAL, "yaw_rate or a_y"))
+    if log.has("v_x", "v_y", "yaw_rate", "a_y"):
+        findings += _sideways(log)
+    if log.has("v_x", "a_x"):
+        findings.append(_slope("a_x", "dv_x/dt", _longitudinal(log), _LONGITUDINAL, "a_x"))
+    return findings
+
+
+def _correlation(log: LogView) -> float:
+    steer, yaw_rate = log.smooth(log.even("steer"), 0.2), log.smooth(log.even("yaw_rate"), 0.2)
+    coefficients, _, correlation = fit(log.moving(yaw_rate), steer)
+    return correlation * float(np.sign(coefficients[1]))
+
+
+def _lateral(log: LogView) -> tuple[float, float, float]:
+    """Slope, intercept and correlation of a_y over v_x yaw_rate."""
+    speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
+    target = log.moving(log.smooth(log.even("a_y"), 0.2))
+    turning = log.smooth(speed * yaw_rate, 0.2)
+    coefficients, _, correlation = fit(target, turning)
+    return float(coefficients[1]), float(coefficients[0]), correlation
+
+
+def _sideways(log: LogView) -> list[Finding]:
+    """Whether dv_y/dt is what v_x yaw_rate leaves of a_y; silent where the two have little in common."""
+    rest = log.smooth(log.even("a_y") - log.even("v_x") * log.even("yaw_rate"), 0.3)
+    change = log.moving(log.smooth(log.slope(log.even("v_y")), 0.3))
+    coefficients, _, correlation = fit(change, rest)
+    slope = float(coefficients[1])
+    values = {"slope": slope, "correlation": correlation}
+    if correlation < AGREE:
+        return []
+    if slope < 0:
+        message = "moves against a_y - v_x yaw_rate: v_y has the wrong sign. Left is positive; set sign = -1."
+        return [Finding("error", "v_y", message, values)]
+    return [Finding("ok", "v_y", f"moves as a_y - v_x yaw_rate says (correlation {correlation:.2f}).", values)]
+
+
+def _longitudinal(log: LogView) -> tuple[float, float, float]:
+    speed = log.even("v_x")
+    change = log.slope(speed)
+    if log.has("v_y", "yaw_rate"):
+        change = change - log.even("v_y") * log.even("yaw_rate")
+    target = log.smooth(log.even("a_x"), 0.3)
+    coefficients, _, correlation = fit(target, log.smooth(change, 0.3))
+    return float(coefficients[1]), float(coefficients[0]), correlation
+
+
+def _steering(correlation: float, lateral: tuple[float, float, float] | None) -> Finding:
+    values = {"correlation": correlation}
+    if correlation > AGREE:
+        return Finding("ok", "steer", f"turns the car the way yaw_rate says (correlation {correlation:.2f}).", values)
+    if correlation > -AGREE:
+        message = (
+            f"has little to do with yaw_rate (correlation {correlation:.2f}): too little steering, or wrong columns?"
+        )
+        return Finding("note", "steer", message, values)
+    agrees = lateral is not None and lateral[2] > AGREE and lateral[0] > 0
+    opposed = lateral is not None and lateral[2] > AGREE and lateral[0] < 0
+    wrong = "steer" if agrees else "yaw_rate" if opposed else "steer or yaw_rate"
+    message = (
+        f"steer and yaw_rate are opposite (correlation {correlation:.2f}): {wrong} has the wrong sign. Left is "
+        "positive; set sign = -1 in the channel map."
+    )
+    return Finding("error", "steer" if wrong == "steer or yaw_rate" else wrong, message, values)
+
+
+def _slope(name: str, other: str, line: tuple[float, float, float], table: dict, blamed: str) -> Finding:
+    slope, intercept, correlation = line
+    values = {"slope": slope, "intercept": intercept, "correlation": correlation}
+    story = f"is {slope:.3g} times {other} {'+' if intercept >= 0 else '-'} {abs(intercept):.2g} m/s^2"
+    if correlation < AGREE:
+        message = (
+            f"{story}, but hardly follows it (correlation {correlation:.2f}): too little motion to compare, or noise."
+        )
+        return Finding("note", name, message, values)
+    if slope < 0:
+        return Finding(
+            "error", name, f"{story}: {blamed} has the wrong sign. Set sign = -1 in the channel map.", values
+        )
+    if abs(np.log(slope)) < np.log(1.35):
+        if abs(intercept) > 0.5:
+            return Finding("warning", name, f"{story}: a bias of {intercept:.2g} m/s^2, or a banked road.", values)
+        return Finding("ok", name, f"{story} (correlation {correlation:.2f}).", values)
+    factors = {factor: guess for factor, guess in table.items() if abs(np.log(slope / factor)) < np.log(1.25)}
+    if factors:
+        nearest = min(factors, key=lambda factor: abs(np.log(slope / factor)))
+        channel, unit = factors[nearest]
+        return Finding("error", channel, f"{story}: {channel} looks like {unit}. Say so in the channel map.", values)
+    return Finding("warning", name, f"{story}, which should be 1: a wrong unit or scale in one of them?", values)

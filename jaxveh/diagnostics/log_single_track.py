@@ -1,0 +1,63 @@
+"""The linear single track, in NumPy, as what a sound log of a known car should look like."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jaxveh.io.car import CarSpecification
+
+SLOW = 3.0
+"""m/s below which the lateral motion is held at zero."""
+
+
+def yaw_rate_from_steer(car: CarSpecification, steer: np.ndarray, v_x: np.ndarray, step: float) -> np.ndarray:
+    """Yaw rate (N,) in rad/s of the linear single track driven by steer (N,) in rad at v_x (N,) in m/s, every `step` s.
+
+    Implicit Euler, so that no speed makes it unstable. NaN inputs give NaN rows, and the motion starts anew after them.
+    """
+    m, I_z, a, b = car.mass, car.yaw_inertia, car.front_axle_to_cg, car.rear_axle_to_cg
+    C_f, C_r = float(car.front_cornering_stiffness or 0), float(car.rear_cornering_stiffness or 0)
+    yaw_rate = np.full(steer.shape, np.nan)
+    v_y = r = 0.0
+    for k, (angle, speed) in enumerate(zip(steer.tolist(), v_x.tolist(), strict=True)):
+        if not (np.isfinite(angle) and speed > SLOW):
+            v_y = r = 0.0
+            continue
+        # (1 - h A) x+ = x + h B steer, with x = (v_y, r).
+        h = step
+        A_11, A_12 = 1 + h * (C_f + C_r) / (m * speed), h * ((a * C_f - b * C_r) / (m * speed) + speed)
+        A_21, A_22 = h * (a * C_f - b * C_r) / (I_z * speed), 1 + h * (a * a * C_f + b * b * C_r) / (I_z * speed)
+        right_1, right_2 = v_y + h * C_f * angle / m, r + h * a * C_f * angle / I_z
+        det = A_11 * A_22 - A_12 * A_21
+        v_y, r = (right_1 * A_22 - A_12 * right_2) / det, (A_11 * right_2 - A_21 * right_1) / det
+        yaw_rate[k] = r
+    return yaw_rate
+
+
+def a_y_from_yaw_rate(car: CarSpecification, yaw_rate: np.ndarray, v_x: np.ndarray, step: float) -> np.ndarray:
+    """Lateral acceleration (N,) in m/s^2 that belongs to a yaw rate (N,) in rad/s where the rear axle is linear.
+
+    The rear axle carries (a m a_y - I_z dr/dt) / L, which gives its slip angle and so v_y; hence
+    a_y = v_x r + dv_y/dt with v_y = b r - v_x (a m a_y - I_z dr/dt) / (L C_r): v_x r + b dr/dt, delayed by about
+    v_x a m / (L C_r) seconds. Needs finite inputs; the inertial term is small and left out.
+    """
+    delay = v_x * car.front_axle_to_cg * car.mass / (car.wheelbase * float(car.rear_cornering_stiffness or 0))
+    drive = v_x * yaw_rate + car.rear_axle_to_cg * np.gradient(yaw_rate, step)
+    a_y = np.empty_like(drive)
+    value = drive[0]
+    for k, (wanted, seconds) in enumerate(zip(drive.tolist(), np.maximum(delay, 0.0).tolist(), strict=True)):
+        share = step / (step + seconds)
+        value = value + share * (wanted - value)
+        a_y[k] = value
+    return a_y
+
+
+def understeer_gradient(car: CarSpecification) -> float:
+    """Steer at the road wheels over lateral acceleration beyond the geometric part, rad per m/s^2."""
+    a, b, C_f, C_r = (
+        car.front_axle_to_cg,
+        car.rear_axle_to_cg,
+        float(car.front_cornering_stiffness or 0),
+        float(car.rear_cornering_stiffness or 0),
+    )
+    return car.mass / car.wheelbase * (b / C_f - a / C_r)

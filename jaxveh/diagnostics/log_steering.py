@@ -1,0 +1,120 @@
+"""The steer channel against the car: scale, offset, understeer; and biases at standstill."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jaxveh.diagnostics.log_findings import GRAVITY, Finding, LogView, fit
+from jaxveh.diagnostics.log_single_track import understeer_gradient
+
+GENTLE = 3.0
+"""m/s^2 of lateral acceleration up to which tyres count as linear."""
+
+USUAL_WHEELBASE = 2.7
+"""m, where the car is not known."""
+
+OFFSET = np.deg2rad(0.2)
+"""Steering offset worth a warning."""
+
+STANDSTILL = 0.1
+"""m/s below which a car stands."""
+
+_YAW_RATE_BIAS = 0.003
+
+
+def check_steering(log: LogView) -> list[Finding]:
+    """Scale of steer against the geometry, its offset when the car runs straight, and the understeer gradient."""
+    findings = _standstill(log) if log.has("v_x", "yaw_rate") else []
+    if not log.has("steer", "yaw_rate", "v_x"):
+        return findings
+    speed, yaw_rate = log.smooth(log.even("v_x"), 0.2), log.smooth(log.even("yaw_rate"), 0.2)
+    steer = log.moving(log.smooth(log.even("steer"), 0.2))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bend, push = yaw_rate / speed, yaw_rate * speed
+        bend = np.where(np.abs(push) < GENTLE, bend, np.nan)
+    if np.isfinite(bend * steer).sum() * log.step < 3.0:
+        message = f"less than 3 s of driving below {GENTLE:g} m/s^2 laterally: offset and scale cannot be judged."
+        return [*findings, Finding("note", "steer", message, {})]
+    scale = _scale(log, steer, bend, push)
+    findings.append(scale)
+    if scale.severity in ("ok", "note"):
+        findings += _offset(log, steer, bend, push)
+    return findings
+
+
+def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> Finding:
+    car = log.car
+    wheelbase, understeer = (USUAL_WHEELBASE, 0.0) if car is None else (car.wheelbase, understeer_gradient(car))
+    coefficients, errors, correlation = fit(steer, wheelbase * bend, push)
+    if errors[1] > 0.1 * abs(coefficients[1]):
+        # At one speed geometry and understeer look alike: then the car's understeer is taken for granted.
+        coefficients, _, correlation = fit(steer, wheelbase * bend + understeer * push)
+    scale = float(coefficients[1])
+    values = {"scale": scale, "correlation": correlation}
+    low, high = (0.35, 4.0) if car is None else (0.6, 1.7)
+    against = f"a wheelbase of {USUAL_WHEELBASE:g} m, taken for granted," if car is None else "the car"
+    if correlation < 0.5 or scale <= 0:
+        message = f"does not follow what yaw_rate and speed need (correlation {correlation:.2f})."
+        return Finding("note", "steer", message, values)
+    if low <= scale <= high:
+        return Finding("ok", "steer", f"is {scale:.2f} times what {against} needs in gentle turns.", values)
+    guess = "another scale"
+    if 8 <= scale < 30:
+        guess = f"the steering wheel's angle, with a ratio of about {scale:.0f}"
+    elif 30 <= scale < 120:
+        guess = "degrees"
+    elif scale >= 400:
+        guess = "the steering wheel's angle in degrees"
+    message = (
+        f"is {scale:.3g} times what {against} needs in gentle turns: it looks like {guess}. Set unit or scale in the "
+        "channel map so that steer is the angle at the road wheels in rad."
+    )
+    return Finding("error", "steer", message, values)
+
+
+def _offset(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> list[Finding]:
+    """Steer is offset + L yaw_rate / v_x + K v_x yaw_rate; L is the car's, or fitted where the car is not known."""
+    if log.car is None:
+        coefficients, errors, _ = fit(steer, bend, push)
+    else:
+        coefficients, errors, _ = fit(steer - log.car.wheelbase * bend, push)
+    offset, error = float(coefficients[0]), float(errors[0])
+    told = (log.car.steer_offset if log.car else None) or 0.0
+    rest = offset - told
+    values = {"offset": offset, "error": error}
+    words = f"shows {np.rad2deg(offset):+.2f} degrees (+-{np.rad2deg(2 * error):.2f}) when the car runs straight"
+    if told:
+        words += f", the car's file says {np.rad2deg(told):+.2f}"
+    findings = [Finding("ok", "steer", f"{words}.", values)]
+    if abs(rest) > max(OFFSET, 3 * error):
+        advice = "subtract it in the channel map, set steer_offset in the car's file, or let calibration estimate it"
+        findings = [Finding("warning", "steer", f"{words}: {advice} (a yaw-rate bias looks alike).", values)]
+    if log.car is None:
+        return findings
+    measured, expected, spread = float(coefficients[1]), understeer_gradient(log.car), float(errors[1])
+    values = {"measured": measured, "expected": expected, "error": spread}
+    words = (
+        f"understeer gradient of {_degrees_a_g(measured):+.2f} degrees a g (+-{_degrees_a_g(2 * spread):.2f}); the car's "
+        f"stiffnesses make it {_degrees_a_g(expected):+.2f}."
+    )
+    off = abs(measured - expected)
+    far = _degrees_a_g(off) > 1.5 and off > 3 * spread
+    advice = " Are stiffnesses, masses and axle distances right?"
+    return [*findings, Finding("warning" if far else "ok", "steer", words + (advice if far else ""), values)]
+
+
+def _degrees_a_g(gradient: float) -> float:
+    return float(np.rad2deg(gradient) * GRAVITY)
+
+
+def _standstill(log: LogView) -> list[Finding]:
+    speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
+    with np.errstate(invalid="ignore"):
+        rows = (np.abs(speed) < STANDSTILL) & np.isfinite(yaw_rate)
+    if rows.sum() * log.step < 2.0:
+        return []
+    bias = float(np.median(yaw_rate[rows]))
+    words = f"shows {bias:+.2g} rad/s at standstill"
+    if abs(bias) > _YAW_RATE_BIAS:
+        return [Finding("warning", "yaw_rate", f"{words}: subtract this bias in the channel map.", {"bias": bias})]
+    return [Finding("ok", "yaw_rate", f"{words}.", {"bias": bias})]

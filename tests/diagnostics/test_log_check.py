@@ -1,0 +1,277 @@
+"""The check of a log finds each planted fault, and finds nothing in a sound log."""
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+from shared_data import shared
+
+from jaxveh import Recording, io
+from jaxveh.diagnostics.log_check import check_log
+from jaxveh.diagnostics.log_delays import delay
+from jaxveh.diagnostics.log_findings import SEVERITIES
+
+CAR = io.CarSpecification(1500.0, 2600.0, 1.2, 1.5, 90e3, 120e3)
+STEP = 0.01
+
+
+def drive(seconds=60.0, noise=1.0):
+    """A linear single track in fine Euler steps on a wavy course with straights and changing speed, and its sensors."""
+    m, I_z, a, b, C_f, C_r = 1500.0, 2600.0, 1.2, 1.5, 90e3, 120e3
+    fine = 10
+    time = np.arange(round(seconds / STEP) * fine) * STEP / fine
+    v_x = 20 + 6 * np.sin(0.25 * time)
+    steer = 0.025 * np.sin(2 * time) * np.sin(0.3 * time) + 0.02 * np.sin(0.7 * time + 1) * (np.sin(0.1 * time) > 0)
+    states = np.zeros((time.size, 2))
+    v_y = r = 0.0
+    for k, (angle, speed) in enumerate(zip(steer.tolist(), v_x.tolist(), strict=True)):
+        states[k] = v_y, r
+        F_f, F_r = C_f * (angle - (v_y + a * r) / speed), -C_r * (v_y - b * r) / speed
+        v_y += STEP / fine * ((F_f + F_r) / m - speed * r)
+        r += STEP / fine * (a * F_f - b * F_r) / I_z
+    v_y, r = states.T
+    a_y = np.gradient(v_y, time) + v_x * r
+    a_x = np.gradient(v_x, time) - v_y * r
+    rng = np.random.default_rng(11)
+    channels = {}
+    for name, values, spread in (
+        ("steer", steer, 1e-4),
+        ("v_x", v_x, 0.01),
+        ("v_y", v_y, 0.005),
+        ("yaw_rate", r, 0.002),
+        ("a_x", a_x, 0.1),
+        ("a_y", a_y, 0.1),
+    ):
+        channels[name] = values[::fine] + noise * spread * rng.normal(size=values[::fine].size)
+    return time[::fine].copy(), channels
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return drive()
+
+
+def findings(time, channels, car=CAR):
+    return check_log(Recording(time, channels), car)
+
+
+def matching(found, severity, channel, pattern):
+    return [
+        finding
+        for finding in found
+        if finding.severity == severity and finding.channel == channel and re.search(pattern, finding.message)
+    ]
+
+
+def plant(sound, **changes):
+    """The sound log with channels replaced by functions of themselves."""
+    time, channels = sound
+    return time, {**channels, **{name: change(channels[name].copy()) for name, change in changes.items()}}
+
+
+def at(rows, value):
+    def change(values):
+        values[rows] = value
+        return values
+
+    return change
+
+
+def late(seconds):
+    time = np.arange(6000) * STEP
+    return lambda values: np.interp(time - seconds, time, values)
+
+
+FAULTS = {
+    "steer sign": ({"steer": np.negative}, "error", "steer", "opposite .* steer has the wrong sign"),
+    "yaw rate sign": ({"yaw_rate": np.negative}, "error", "yaw_rate", "opposite .* yaw_rate has the wrong sign"),
+    "a_y sign": ({"a_y": np.negative}, "error", "a_y", "has the wrong sign"),
+    "a_x sign": ({"a_x": np.negative}, "error", "a_x", "a_x has the wrong sign"),
+    "v_y sign": ({"v_y": np.negative}, "error", "v_y", "v_y has the wrong sign"),
+    "yaw rate in deg/s, small": ({"yaw_rate": np.rad2deg}, "error", "yaw_rate", "looks like deg/s"),
+    "a_y in g": ({"a_y": lambda v: v / 9.81}, "error", "a_y", "a_y looks like g"),
+    "a_x in g": ({"a_x": lambda v: v / 9.81}, "error", "a_x", "a_x looks like g"),
+    "v_x in km/h": ({"v_x": lambda v: v * 3.6}, "error", "v_x", "v_x looks like km/h"),
+    "v_x in mph": ({"v_x": lambda v: v / 0.44704}, "error", "v_x", "v_x looks like mph"),
+    "a_y of odd scale": ({"a_y": lambda v: v * 1.7}, "warning", "a_y", "wrong unit or scale"),
+    "a_y biased": ({"a_y": lambda v: v + 0.8}, "warning", "a_y", "a bias of 0.8"),
+    "steer in degrees": ({"steer": np.rad2deg}, "error", "steer", "looks like degrees"),
+    "steer of the wheel": (
+        {"steer": lambda v: 15 * v},
+        "error",
+        "steer",
+        "steering wheel's angle, with a ratio of about 1[456]",
+    ),
+    "steer unrelated": (
+        {"steer": lambda v: 0.02 * np.random.default_rng(0).normal(size=v.size)},
+        "note",
+        "steer",
+        "little to do with yaw_rate",
+    ),
+    "infinite": ({"a_x": at([5, 9], np.inf)}, "error", "a_x", r"2 infinite sample\(s\), the first at 0.05 s"),
+    "silent": ({"a_x": at(slice(None), np.nan)}, "error", "a_x", "no finite sample at all"),
+    "dropouts": ({"a_x": at(slice(100, 180), np.nan)}, "warning", "a_x", r"1 gap\(s\), the longest 0.81 s at 0.99 s"),
+    "held samples": ({"a_x": lambda v: np.repeat(v[::4], 4)}, "note", "a_x", "repeats 75% .* about 25 Hz"),
+    "frozen": (
+        {"a_y": at(slice(100, 300), 1.25)},
+        "warning",
+        "a_y",
+        r"stands still 1 time\(s\) .*the longest 1.99 s at 1 s",
+    ),
+    "constant": ({"a_x": at(slice(None), 0.0)}, "note", "a_x", "is 0 throughout"),
+    "coarse": ({"steer": lambda v: np.round(v / 0.002) * 0.002}, "note", "steer", "comes in steps of 0.002"),
+    "spike": ({"yaw_rate": at(2000, 0.9)}, "warning", "yaw_rate", r"1 spike\(s\), the largest 0.9 at 20 s"),
+    "spike to zero": ({"v_x": at([700, 701], 0.0)}, "warning", "v_x", r"2 spike\(s\), the largest 0 at 7 s"),
+    "a_y late": ({"a_y": late(0.05)}, "warning", "a_y", r"comes (49|50|51) ms \(.*\) after"),
+    "a_y early": ({"a_y": late(-0.045)}, "warning", "a_y", r"comes 4[3-7] ms \(.*\) before"),
+    "a_x late": ({"a_x": late(0.06)}, "warning", "a_x", r"comes [5-7]. ms \(\+-[12]?.\) after"),
+    "yaw rate late": ({"yaw_rate": late(0.12)}, "warning", "yaw_rate", r"comes 1[12]. ms \(.*\) after what the car's"),
+    "steering offset": ({"steer": lambda v: v + np.deg2rad(0.5)}, "warning", "steer", r"shows \+0.(49|50|51) degrees"),
+    "too much grip": ({"a_y": lambda v: 5 * v}, "warning", "a_y", "more than tyres carry"),
+}
+
+
+def test_a_sound_log_is_clean(sound):
+    found = findings(*sound)
+    assert [finding for finding in found if finding.severity != "ok"] == []
+    assert len(found) > 20
+    assert {finding.channel for finding in found} >= {"time", "steer", "v_x", "yaw_rate", "a_x", "a_y"}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_each_fault_is_found(sound, fault):
+    changes, severity, channel, pattern = FAULTS[fault]
+    found = findings(*plant(sound, **changes))
+    assert matching(found, severity, channel, pattern), "\n".join(map(str, found))
+    assert not matching(findings(*sound), severity, channel, pattern)
+
+
+def test_severities_and_values(sound):
+    for finding in findings(*plant(sound, steer=np.negative)):
+        assert finding.severity in SEVERITIES
+        assert finding.message.endswith((".", "?"))
+        assert all(np.isscalar(value) for value in finding.values.values())
+
+
+def test_gaps_jitter_and_slow_channels(sound):
+    time, channels = sound
+    keep = np.r_[0:1000, 1100:6000]
+    found = findings(time[keep], {name: values[keep] for name, values in channels.items()})
+    (gap,) = matching(found, "warning", "time", r"1 gap\(s\), the longest 1.01 s at 9.99 s")
+    assert gap.values["longest"] == pytest.approx(1.01)
+    uneven = time + np.random.default_rng(2).uniform(0, 0.004, time.size)
+    assert matching(findings(uneven, channels), "note", "time", "unevenly")
+    slow = channels["v_x"].copy()
+    slow[np.arange(slow.size) % 10 != 0] = np.nan
+    found = findings(time, {**channels, "v_x": slow})
+    assert matching(found, "ok", "v_x", r"speaks every 100 ms, 10 Hz \(silent in 90% of the log's rows\)")
+    assert not [finding for finding in found if finding.severity in ("warning", "error")]
+
+
+def test_rasters_that_never_share_a_row():
+    time, channels = drive(20.0)
+    odd = np.arange(time.size) % 2 == 1
+    merged = {name: np.where(odd == (name in ("v_x", "steer")), values, np.nan) for name, values in channels.items()}
+    found = findings(time, merged)
+    assert not [finding for finding in found if finding.severity in ("warning", "error")]
+    assert matching(found, "ok", "a_y", r"ms \(.*\) (after|before)")
+
+
+def test_without_a_car_and_without_v_y(sound):
+    time, channels = sound
+    few = {name: values for name, values in channels.items() if name != "v_y"}
+    found = findings(time, few, None)
+    assert matching(found, "note", "a_y", "Without v_y or a car")
+    assert matching(found, "note", "yaw_rate", "Without a car, its own response")
+    assert not [finding for finding in found if finding.severity in ("warning", "error")]
+    known = findings(time, few)
+    assert matching(known, "ok", "a_y", "what the car's linear model makes of yaw_rate")
+    late_a_y = {**few, "a_y": late(0.1)(few["a_y"])}
+    assert matching(findings(time, late_a_y), "warning", "a_y", r"comes (9.|10.) ms \(.*\) after what the car")
+    in_degrees = {**few, "steer": np.rad2deg(few["steer"])}
+    assert matching(findings(time, in_degrees, None), "error", "steer", "looks like degrees")
+
+
+def test_an_offset_that_the_car_tells_of(sound):
+    told = dataclasses.replace(CAR, steer_offset=np.deg2rad(0.5))
+    shifted = plant(sound, steer=lambda values: values + np.deg2rad(0.5))
+    assert matching(findings(*shifted, told), "ok", "steer", r"the car's file says \+0.50")
+    assert matching(findings(*sound, told), "warning", "steer", r"the car's file says \+0.50")
+
+
+def test_understeer_of_another_car(sound):
+    other = dataclasses.replace(CAR, front_cornering_stiffness=45e3)
+    assert matching(findings(*sound, other), "warning", "steer", r"understeer gradient .* Are stiffnesses")
+    (right,) = matching(findings(*sound), "ok", "steer", "understeer gradient")
+    assert right.values["measured"] == pytest.approx(right.values["expected"], abs=2e-4)
+
+
+def test_a_car_file_in_wrong_units(sound):
+    per_degree = dataclasses.replace(CAR, front_cornering_stiffness=90e3 * np.pi / 180)
+    found = findings(*sound, per_degree)
+    assert matching(found, "warning", "front_cornering_stiffness", "N/deg instead of N/rad")
+    assert matching(found, "ok", "rear_cornering_stiffness", "times the axle's load")
+    heavy = dataclasses.replace(CAR, yaw_inertia=26000.0)
+    assert matching(findings(*sound, heavy), "warning", "yaw_inertia", "cars have 0.4 to 2")
+
+
+def test_bias_at_standstill(sound):
+    time, channels = sound
+    standing = {name: np.r_[np.random.default_rng(5).normal(size=500) * 1e-4, v] for name, v in channels.items()}
+    longer = np.arange(time.size + 500) * STEP
+    assert matching(findings(longer, standing), "ok", "yaw_rate", "at standstill")
+    standing["yaw_rate"] = standing["yaw_rate"] + 0.02
+    assert matching(findings(longer, standing), "warning", "yaw_rate", r"shows \+0.02 rad/s at standstill")
+
+
+def test_delay_is_finer_than_a_sample():
+    time = np.arange(3000) * STEP
+    wave = sum(np.sin(w * time + w) for w in (0.7, 1.9, 3.1, 5.3))
+    for seconds in (0.0, 0.0337, -0.0712, 0.2):
+        shifted = sum(np.sin(w * (time - seconds) + w) for w in (0.7, 1.9, 3.1, 5.3))
+        found = delay(wave, shifted, STEP)
+        assert found.seconds == pytest.approx(seconds, abs=1e-3)
+        assert found.correlation > 0.999
+        assert found.error < 1e-3
+    assert np.isnan(delay(wave, np.zeros_like(wave), STEP).seconds)
+    assert np.isnan(delay(time, np.zeros_like(wave), STEP).seconds)
+
+
+def test_the_error_of_a_delay_is_honest():
+    time, rng = np.arange(3000) * STEP, np.random.default_rng(1)
+    wave = np.sin(0.5 * time) + 0.3 * np.sin(1.3 * time)
+    blocks = [np.repeat(rng.normal(size=300), 10) for _ in range(200)]  # noise that lasts `ALIKE_ROWS`
+    found = [delay(wave, np.interp(time - 0.05, time, wave) + 0.3 * noise, STEP) for noise in blocks]
+    scores = np.array([(one.seconds - 0.05) / one.error for one in found])
+    assert 0.7 < np.std(scores) < 1.4
+    assert abs(np.mean(scores)) < 0.3
+
+
+def test_short_and_poor_logs_give_findings_not_failures():
+    assert matching(findings([0.0], {"v_x": [1.0]}), "error", "time", "holds only 1 sample")
+    short = {name: values[:30] for name, values in drive(1.0)[1].items()}
+    assert matching(findings(np.arange(30) * STEP, short), "note", "steer", "cannot be judged")
+    assert findings([0.0, 1.0], {"pressure": [1.0, 2.0]})
+    assert findings(np.arange(50.0), {"v_x": np.zeros(50), "yaw_rate": np.zeros(50), "a_y": np.zeros(50)})
+
+
+def test_truth_is_not_looked_at(sound):
+    time, channels = sound
+    channels = {**channels, "true.v_y": np.full(time.size, np.inf)}
+    assert [finding for finding in findings(time, channels) if finding.severity != "ok"] == []
+
+
+def test_the_shared_log():
+    recording = io.read_recording(shared("ferrari_250lm_100hz.csv"))
+    found = check_log(recording, io.read_car(shared("ferrari_250lm.toml")))
+    assert not [finding for finding in found if finding.severity == "error"]
+    assert matching(found, "warning", "steer", r"1 spike\(s\), the largest 0.1356 at 207.27 s")
+    assert matching(found, "note", "yaw_rate", "repeats 12% of its samples")
+    assert matching(found, "ok", "steer", r"shows -0.09 degrees")
+    assert matching(found, "ok", "a_y", r"comes . ms \(.*\) after v_x yaw_rate")
+    assert {finding.channel for finding in found if finding.severity == "warning"} == {
+        "steer",
+        "steer_left",
+        "steer_right",
+    }
