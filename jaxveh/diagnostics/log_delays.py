@@ -47,8 +47,7 @@ def delay(reference: np.ndarray, signal: np.ndarray, step: float, reach: float =
     from what the two do not share, `ALIKE_ROWS` seconds counting as one sample. NaN where there is no inner peak.
     """
     most = min(round(reach / step), reference.size // 4)
-    lags = range(-most, most + 1)
-    found = np.array([_correlation(reference, signal, lag) for lag in lags])
+    found = _correlations(reference, signal, most)
     if not np.isfinite(found).all():
         return Delay(np.nan, np.inf, 0.0)
     peak = int(np.argmax(found))
@@ -122,14 +121,26 @@ def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: s
     return Finding("warning", name, f"{words} Shift the channel by as much before estimating.", values)
 
 
-def _correlation(reference: np.ndarray, signal: np.ndarray, lag: int) -> float:
-    if lag < 0:
-        reference, signal = reference[-lag:], signal[:lag]
-    elif lag > 0:
-        reference, signal = reference[:-lag], signal[lag:]
-    known = np.isfinite(reference) & np.isfinite(signal)
-    if known.sum() < 20:
-        return np.nan
-    first, second = reference[known] - reference[known].mean(), signal[known] - signal[known].mean()
-    size = np.sqrt((first @ first) * (second @ second))
-    return float(first @ second / size) if size > 0 else np.nan
+def _correlations(reference: np.ndarray, signal: np.ndarray, most: int) -> np.ndarray:
+    """Pearson's correlation (2 most + 1,) of reference[k] with signal[k + lag] over the rows known on both sides."""
+    known = np.isfinite(reference), np.isfinite(signal)
+    if min(known[0].sum(), known[1].sum()) < 20:
+        return np.full(2 * most + 1, np.nan)
+    size = int(2 ** np.ceil(np.log2(reference.size + most + 1)))
+    first, second = (
+        np.fft.rfft([mask, filled, filled**2], n=size)
+        for mask, values in zip(known, (reference, signal), strict=True)
+        for filled in [np.where(mask, values - values[mask].mean(), 0.0)]
+    )
+
+    def summed(i: int, j: int) -> np.ndarray:
+        products = np.fft.irfft(np.conj(first[i]) * second[j], n=size)
+        return np.concatenate([products[-most:], products[: most + 1]]) if most else products[:1]
+
+    count = np.where(summed(0, 0) > 19.5, summed(0, 0), np.nan)
+    shared = summed(1, 1) - summed(1, 0) * summed(0, 1) / count
+    spread = summed(2, 0) - summed(1, 0) ** 2 / count, summed(0, 2) - summed(0, 1) ** 2 / count
+    # What is left of a constant after the transforms is rounding.
+    tiny = [1e-12 * abs(terms[2, 0]) for terms in (first, second)]
+    moves = (spread[0] > tiny[0]) & (spread[1] > tiny[1])
+    return np.where(moves, shared / np.sqrt(np.where(moves, spread[0] * spread[1], 1.0)), np.nan)

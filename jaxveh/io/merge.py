@@ -45,7 +45,7 @@ def resample(recording: Recording, raster: str, method: str = "linear", max_gap:
         raise InputError(f"resample: {raster} has no finite sample; choose another raster.")
     filled = recording
     for name in recording.names:
-        if name != raster and np.isfinite(np.asarray(recording[name])).any():
+        if np.isfinite(np.asarray(recording[name])).any():
             filled = filled.fill(name, method, max_gap)
     channels = {name: np.asarray(filled[name])[rows] for name in filled.names}
     return Recording(np.asarray(recording.time)[rows], channels, dict(recording.units), recording.source)

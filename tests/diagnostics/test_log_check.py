@@ -9,7 +9,7 @@ from shared_data import shared
 
 from jaxveh import Recording, io
 from jaxveh.diagnostics.log_check import check_log
-from jaxveh.diagnostics.log_delays import delay
+from jaxveh.diagnostics.log_delays import _correlations, delay
 from jaxveh.diagnostics.log_findings import SEVERITIES
 
 CAR = io.CarSpecification(1500.0, 2600.0, 1.2, 1.5, 90e3, 120e3)
@@ -236,6 +236,17 @@ def test_delay_is_finer_than_a_sample():
         assert found.error < 1e-3
     assert np.isnan(delay(wave, np.zeros_like(wave), STEP).seconds)
     assert np.isnan(delay(time, np.zeros_like(wave), STEP).seconds)
+
+
+def test_correlations_over_what_both_know():
+    rng = np.random.default_rng(4)
+    reference, signal = rng.normal([[5.0], [-3.0]], 1.0, (2, 200))
+    reference[rng.random(200) < 0.2] = signal[rng.random(200) < 0.3] = np.nan
+    found = _correlations(reference, signal, 7)
+    for lag in range(-7, 8):
+        pairs = np.array([(reference[k], signal[k + lag]) for k in range(200) if 0 <= k + lag < 200])
+        pairs = pairs[np.isfinite(pairs).all(axis=1)]
+        assert found[lag + 7] == pytest.approx(np.corrcoef(pairs.T)[0, 1], abs=1e-12)
 
 
 def test_the_error_of_a_delay_is_honest():
