@@ -1,0 +1,45 @@
+"""The one contract of a manoeuvre: time in, the driver's inputs out."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+
+class DriverInputs(NamedTuple):
+    """`steer` (rad at the road wheels, positive to the left), `v_x` (m/s) and its rate `v_x_rate` (m/s^2)."""
+
+    steer: Any
+    v_x: Any
+    v_x_rate: Any
+
+
+class AbstractManoeuvre(eqx.Module):
+    """A function of time: what the driver does from t = 0 to `duration` (s). Array leaves are its parameters."""
+
+    duration: eqx.AbstractVar[float]
+
+    @abc.abstractmethod
+    def inputs(self, t: Any) -> Any:
+        """The inputs at time t (s, a scalar or an array): a NamedTuple of arrays in the shape of t."""
+
+
+def smooth_step(s: jax.Array) -> jax.Array:
+    """From 0 at s <= 0 to 1 at s >= 1, twice continuously differentiable: `10 s^3 - 15 s^4 + 6 s^5` between."""
+    s = jnp.clip(s, 0.0, 1.0)
+    return s * s * s * (10.0 - s * (15.0 - 6.0 * s))
+
+
+def window(t: jax.Array, start: float, end: float, edge: float) -> jax.Array:
+    """1 between `start` and `end` but for smooth edges of length `edge` inside them, 0 outside."""
+    return smooth_step((t - start) / edge) * smooth_step((end - t) / edge)
+
+
+def constant_speed(steer: jax.Array, speed: jax.Array) -> DriverInputs:
+    """Steering at a constant speed."""
+    v_x = jnp.broadcast_to(speed, jnp.shape(steer)).astype(steer.dtype)
+    return DriverInputs(steer=steer, v_x=v_x, v_x_rate=jnp.zeros_like(steer))

@@ -1,0 +1,70 @@
+"""The replay of a recording's inputs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.names import check_names, record_type
+from jaxveh._core.recording import Recording
+from jaxveh.manoeuvres.base import AbstractManoeuvre
+
+
+class Replay(AbstractManoeuvre):
+    """Recorded channels, linear between the rows and held at the ends; t counts from the first row.
+
+    `time` and each of `values` are (T,); `names` are the fields of the inputs.
+    """
+
+    time: jax.Array
+    values: tuple[jax.Array, ...]
+    names: tuple[str, ...] = eqx.field(static=True)
+    duration: float = eqx.field(static=True)
+
+    def inputs(self, t: Any) -> Any:
+        t = jnp.asarray(t, self.time.dtype)
+        after = jnp.clip(jnp.searchsorted(self.time, t, side="right"), 1, self.time.shape[0] - 1)
+        start, end = self.time[after - 1], self.time[after]
+        share = jnp.clip((t - start) / (end - start), 0.0, 1.0)
+        between = [v[after - 1] + share * (v[after] - v[after - 1]) for v in self.values]
+        return record_type("RecordedInputs", self.names)(*between)
+
+
+def replay(recording: Recording, channels: tuple[str, ...] | None = None) -> Replay:
+    """Replay the inputs of a recording: `channels`, by default `steer`, `v_x` and, where there is one, `a_x`.
+
+    **Raises** `InputError` for a missing channel, fewer than two rows, or a channel that is not finite throughout
+    (host side: fill its gaps first).
+    """
+    if channels is None:
+        channels = ("steer", "v_x", "a_x") if "a_x" in recording else ("steer", "v_x")
+    check_names("replay", channels, recording.names)
+    if len(recording) < 2:
+        raise InputError(f"replay: the recording has {len(recording)} row(s); at least 2 are needed.")
+    if not is_concrete(recording.time):
+        raise InputError("replay: the recording's time is traced; make the replay outside jit, it sets the duration.")
+    for name in channels:
+        _check_finite(recording, name)
+    values = tuple(jnp.asarray(recording[name]) for name in channels)
+    stamps = np.asarray(recording.time, dtype=np.float64)
+    # Counted from the first row before rounding, so that float32 keeps the steps of a long log.
+    time = jnp.asarray(stamps - stamps[0], values[0].dtype)
+    return Replay(duration=float(stamps[-1] - stamps[0]), time=time, values=values, names=tuple(channels))
+
+
+def _check_finite(recording: Recording, name: str) -> None:
+    values = recording[name]
+    if not is_concrete(values):
+        return
+    finite = np.isfinite(np.asarray(values))
+    if not finite.all():
+        first = int(np.argmin(finite))
+        raise InputError(
+            f"replay: {name} = {float(values[first])} at t = {recording.time[first]} s (row {first}), and not finite in "
+            f'{int((~finite).sum())} rows: every input must be known. Fill it first: recording.fill("{name}", "linear").'
+        )

@@ -1,0 +1,154 @@
+"""Open-loop steering at constant speed. Every shape is twice continuously differentiable in time."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check, check_at_least, check_finite, check_positive
+from jaxveh._core.parameter import parameter
+from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, constant_speed, smooth_step, window
+
+
+class DoubleLaneChange(AbstractManoeuvre):
+    """One sine period of steer to change lanes, a pause, and the mirrored period to change back.
+
+    Each period is faded in and out over an eighth of it, so that its peaks stay at plus and minus `steer`.
+    """
+
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
+    start: float = eqx.field(static=True)
+    period: float = eqx.field(static=True)
+    pause: float = eqx.field(static=True)
+    duration: float = eqx.field(static=True)
+
+    def inputs(self, t: Any) -> DriverInputs:
+        t = _time(t, self.steer)
+        back = self.start + self.period + self.pause
+        return constant_speed(self.steer * (self._change(t, self.start) - self._change(t, back)), self.speed)
+
+    def _change(self, t, start):
+        # Outside its window the sine is held: far arguments cost accuracy in float32.
+        inside = jnp.clip(t - start, 0.0, self.period)
+        fade = window(t, start, start + self.period, self.period / 8)
+        return numerics.sin(inside * (2 * math.pi / self.period)) * fade
+
+
+class StepSteer(AbstractManoeuvre):
+    """Straight until `start`, then a smooth ramp of length `ramp` to a constant `steer`."""
+
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
+    ramp: float = eqx.field(static=True)
+    start: float = eqx.field(static=True)
+    duration: float = eqx.field(static=True)
+
+    def inputs(self, t: Any) -> DriverInputs:
+        t = _time(t, self.steer)
+        return constant_speed(self.steer * smooth_step((t - self.start) / self.ramp), self.speed)
+
+
+class SweptSine(AbstractManoeuvre):
+    """A sine whose frequency rises linearly over the duration, with smooth edges of length `edge` at both ends."""
+
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
+    from_frequency: float = eqx.field(static=True)
+    to_frequency: float = eqx.field(static=True)
+    edge: float = eqx.field(static=True)
+    duration: float = eqx.field(static=True)
+
+    def inputs(self, t: Any) -> DriverInputs:
+        t = _time(t, self.steer)
+        rise = (self.to_frequency - self.from_frequency) / (2 * self.duration)
+        turns = t * (self.from_frequency + rise * t)
+        wave = numerics.sin((2 * math.pi) * turns) * window(t, 0.0, self.duration, self.edge)
+        return constant_speed(self.steer * wave, self.speed)
+
+
+def double_lane_change(
+    speed, steer, *, start: float = 0.5, period: float = 2.5, pause: float = 0.5, duration: float = 7.0
+) -> DoubleLaneChange:
+    """A double lane change at `speed` (m/s) with steer peaks of plus and minus `steer` (rad at the road wheels).
+
+    Straight until `start`, one sine `period` (left first for positive steer), a `pause`, the mirrored period, and
+    straight until `duration` (all in s). The paper of Bao, Sabbioni et al. (2015) shows no steering trace: the shape
+    is ours.
+
+    **Raises** `InputError` for values out of range, or where the two periods do not fit into the duration.
+    """
+    _check(speed, steer, duration)
+    check_at_least("start", start, 0.0)
+    check_at_least("pause", pause, 0.0)
+    check_positive("period", period, "s")
+    end = start + 2 * period + pause
+    check("duration", duration, lambda d: d >= end, f"at least start + 2 period + pause = {end:g} s")
+    return DoubleLaneChange(
+        duration=float(duration),
+        speed=speed,
+        steer=steer,
+        start=float(start),
+        period=float(period),
+        pause=float(pause),
+    )
+
+
+def step_steer(speed, steer, *, ramp: float = 0.2, start: float = 1.0, duration: float = 7.0) -> StepSteer:
+    """A steer step to `steer` (rad at the road wheels) at `speed` (m/s): straight, a smooth `ramp` (s), then held.
+
+    **Raises** `InputError` for values out of range, or where the ramp does not end within the duration.
+    """
+    _check(speed, steer, duration)
+    check_at_least("start", start, 0.0)
+    check_positive("ramp", ramp, "s", "A step without a ramp has no derivative; 0.01 s is a sharp one.")
+    check("duration", duration, lambda d: d >= start + ramp, f"at least start + ramp = {start + ramp:g} s")
+    return StepSteer(duration=float(duration), speed=speed, steer=steer, ramp=float(ramp), start=float(start))
+
+
+def swept_sine(
+    speed,
+    steer,
+    from_frequency: float = 0.2,
+    to_frequency: float = 2.0,
+    duration: float = 20.0,
+    *,
+    edge: float = 0.5,
+) -> SweptSine:
+    """A steer sine of amplitude `steer` (rad at the road wheels) at `speed` (m/s), its frequency (Hz) rising linearly.
+
+    `edge` (s): length of the smooth fades at both ends.
+
+    **Raises** `InputError` for values out of range, or edges that fill more than the duration.
+    """
+    _check(speed, steer, duration)
+    check_positive("from_frequency", from_frequency, "Hz")
+    check_positive("to_frequency", to_frequency, "Hz")
+    check_positive("edge", edge, "s")
+    check("edge", edge, lambda e: 2 * e <= duration, f"at most half the duration, {duration / 2:g} s")
+    return SweptSine(
+        duration=float(duration),
+        speed=speed,
+        steer=steer,
+        from_frequency=float(from_frequency),
+        to_frequency=float(to_frequency),
+        edge=float(edge),
+    )
+
+
+def _check(speed, steer, duration):
+    check_finite("speed", speed)
+    check_at_least("speed", speed, 0.0)
+    check("steer", steer, lambda v: abs(v) < math.pi / 2, "within a quarter turn", "It is in rad, not degrees.")
+    check_positive("duration", duration, "s")
+    if eqx.is_array(duration):
+        raise InputError("duration is an array: it must be a Python number, because it sets how many rows there are.")
+
+
+def _time(t, like):
+    return jnp.asarray(t, jnp.result_type(like))

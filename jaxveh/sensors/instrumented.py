@@ -1,0 +1,77 @@
+"""A vehicle with its sensors as one differential equation, used by simulations and estimators alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+
+from jaxveh._core.names import check_names, record_type
+from jaxveh.sensors.sensor_set import SensorSet
+from jaxveh.vehicles import AbstractVehicle
+
+
+class Instrumented(eqx.Module):
+    """A vehicle and the sensors on it: the state is the vehicle's, followed by the states of the sensors' low-pass.
+
+    Elementwise like the vehicle. `Propagate(Instrumented.derivatives)` moves it in a filter. Without sensors it is
+    the vehicle alone, and measures nothing.
+    """
+
+    vehicle: AbstractVehicle
+    sensors: SensorSet | None = None
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The fields that `u` must have."""
+        return self.vehicle.inputs
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels' names."""
+        return () if self.sensors is None else self.sensors.channels
+
+    @property
+    def state_type(self) -> Any:
+        """The state's NamedTuple class: the vehicle's own where the sensors have no states."""
+        own = self.vehicle.state_type
+        if not self._filtered:
+            return own
+        return record_type("InstrumentedState", (*own._fields, *self.sensors.filter_names))
+
+    def start(self, t: Any, u: Any, **values: Any) -> Any:
+        """The vehicle's start (fields replaced by keyword) with the low-pass settled at its outputs."""
+        check_names("start", values, self.state_type._fields)
+        own = self.vehicle.state_type._fields
+        vehicle = self.vehicle.start(t, u, **{name: value for name, value in values.items() if name in own})
+        if not self._filtered:
+            return vehicle
+        state = self.state_type(*vehicle, *self.sensors.start(self.vehicle.outputs(t, vehicle, u)))
+        return state._replace(**{name: value for name, value in values.items() if name not in own})
+
+    def derivatives(self, t: Any, x: Any, u: Any) -> Any:
+        """The state's time derivative, the same NamedTuple; forces are computed once."""
+        vehicle, filters = self.split(x)
+        rates, outputs = self.vehicle.evaluate(t, vehicle, u)
+        if not self._filtered:
+            return rates
+        return self.state_type(*rates, *self.sensors.derivatives(filters, outputs))
+
+    def observation(self, t: Any, x: Any, u: Any) -> Any:
+        """What the sensors say without noise: a NamedTuple by channel."""
+        vehicle, filters = self.split(x)
+        return self.sensors.measure(self.vehicle.outputs(t, vehicle, u), filters)
+
+    def outputs(self, t: Any, x: Any, u: Any) -> Any:
+        """The vehicle's outputs."""
+        return self.vehicle.outputs(t, self.split(x)[0], u)
+
+    def split(self, x: Any) -> tuple[Any, Any]:
+        """The vehicle's state and the low-pass' states (None without)."""
+        own = self.vehicle.state_type
+        n = len(own._fields)
+        return own(*x[:n]), self.sensors.filter_type(*x[n:]) if self._filtered else None
+
+    @property
+    def _filtered(self) -> bool:
+        return self.sensors is not None and self.sensors.low_pass is not None

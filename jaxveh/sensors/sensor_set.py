@@ -1,0 +1,131 @@
+"""Sets of sensors: which channels, how noisy, where mounted, low-passed or not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+
+from jaxveh._core.errors import InputError, check_finite
+from jaxveh._core.names import check_names, record_type
+from jaxveh._core.parameter import parameter
+from jaxveh.sensors.low_pass import LowPass
+from jaxveh.statespace import Gaussian
+
+
+class Position(eqx.Module):
+    """Where the accelerometers sit, from the centre of gravity: `x` forward, `y` left, `z` up, in m.
+
+    The height counts only for vehicles that roll or pitch.
+    """
+
+    x: jax.Array = parameter("m", scale=0.5, default=0.0)
+    y: jax.Array = parameter("m", scale=0.5, default=0.0)
+    z: jax.Array = parameter("m", scale=0.5, default=0.0)
+
+    def __check_init__(self):
+        for name in ("x", "y", "z"):
+            check_finite(f"Position.{name}", getattr(self, name))
+
+
+class SensorSet(eqx.Module):
+    """Sensors that speak together: the channels that `noise` names, each a vehicle output.
+
+    - `noise`: standard deviations by channel name, white, of the recorded values (after the low-pass).
+    - `position`: of the accelerometers. On a rigid body that turns in the plane, a sensor at (x, y) feels
+      `a_x - yaw_acceleration y - yaw_rate^2 x` and `a_y + yaw_acceleration x - yaw_rate^2 y`. Speeds are those of the
+      centre of gravity, as loggers convert them.
+    - `low_pass`: a `LowPass` in every channel, or None.
+    """
+
+    noise: Gaussian
+    position: Position = eqx.field(default_factory=Position)
+    low_pass: LowPass | None = None
+
+    def __check_init__(self):
+        if not isinstance(self.noise, Gaussian):
+            raise InputError(f"SensorSet.noise = {type(self.noise).__name__}: must be a Gaussian by channel name.")
+        if not (self.low_pass is None or isinstance(self.low_pass, LowPass)):
+            raise InputError(f"SensorSet.low_pass = {self.low_pass!r}: must be a LowPass(cutoff_hz) or None.")
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels' names."""
+        return self.noise.names
+
+    @property
+    def filter_names(self) -> tuple[str, ...]:
+        """The names of the low-pass' states, none without one."""
+        if self.low_pass is None:
+            return ()
+        return tuple(name for channel in self.channels for name in self.low_pass.state_names(channel))
+
+    @property
+    def filter_type(self) -> Any:
+        """The NamedTuple class of the low-pass' states."""
+        return record_type("FilterState", self.filter_names)
+
+    def feel(self, outputs: Any) -> Any:
+        """What reaches the sensors: a NamedTuple by channel, before low-pass and noise.
+
+        `outputs` has the channels' names as attributes, and yaw_rate and yaw_acceleration where accelerations are
+        measured.
+        """
+        check_names("sensors measure a channel the vehicle does not have", self.channels, outputs._fields)
+        return record_type("Measurements", self.channels)(*[self._at_position(c, outputs) for c in self.channels])
+
+    def start(self, outputs: Any) -> Any:
+        """Low-pass states that have settled at these outputs."""
+        settled = [self.low_pass.start(value) for value in self.feel(outputs)] if self.low_pass else []
+        return self.filter_type(*[state for states in settled for state in states])
+
+    def derivatives(self, filter_state: Any, outputs: Any) -> Any:
+        """Time derivatives of the low-pass states, the same NamedTuple."""
+        if self.low_pass is None:
+            return self.filter_type()
+        felt, n = self.feel(outputs), self.low_pass.order
+        rates = [self.low_pass.derivatives(tuple(filter_state[i * n : (i + 1) * n]), u) for i, u in enumerate(felt)]
+        return self.filter_type(*[rate for of_channel in rates for rate in of_channel])
+
+    def measure(self, outputs: Any, filter_state: Any = None) -> Any:
+        """What the sensors say without noise: a NamedTuple by channel."""
+        if self.low_pass is None:
+            return self.feel(outputs)
+        if filter_state is None:
+            raise InputError("SensorSet.measure: these sensors have a low-pass; give its states (filter_state).")
+        return record_type("Measurements", self.channels)(*filter_state[:: self.low_pass.order])
+
+    def _at_position(self, channel: str, outputs: Any):
+        value = getattr(outputs, channel)
+        if channel == "a_x":
+            return value - outputs.yaw_acceleration * self.position.y - outputs.yaw_rate**2 * self.position.x
+        if channel == "a_y":
+            return value + outputs.yaw_acceleration * self.position.x - outputs.yaw_rate**2 * self.position.y
+        return value
+
+
+def esc(
+    yaw_rate: float | None = 0.005,
+    a_y: float | None = 0.1,
+    a_x: float | None = None,
+    v_x: float | None = None,
+    v_y: float | None = None,
+    *,
+    low_pass: LowPass | None = None,
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> SensorSet:
+    """The sensors of a stability control: yaw rate and lateral acceleration, and more where asked for.
+
+    Each channel has its noise's standard deviation (rad/s, m/s^2, m/s), or None: not fitted. `low_pass`: in every
+    channel, such as `LowPass(20.0)`. `position`: of the accelerometers from the centre of gravity (x, y, z), m.
+
+    **Raises** `InputError` for a standard deviation that is not positive, or where nothing is fitted.
+    """
+    fitted = {"yaw_rate": yaw_rate, "a_y": a_y, "a_x": a_x, "v_x": v_x, "v_y": v_y}
+    fitted = {name: std for name, std in fitted.items() if std is not None}
+    if not fitted:
+        raise InputError("esc: no channel is fitted; give at least one of them a standard deviation.")
+    if len(position) != 3:
+        raise InputError(f"esc: position = {position!r}: must be (x, y, z) in m from the centre of gravity.")
+    return SensorSet(Gaussian(fitted), Position(*position), low_pass)

@@ -1,0 +1,5 @@
+"""A vehicle, a manoeuvre and sensors make a Recording."""
+
+from jaxveh.simulation.simulate import simulate
+
+__all__ = ["simulate"]

@@ -1,0 +1,129 @@
+"""Manoeuvres: shapes, smooth edges, precision, gradients, replay, bad input."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import InputError, Recording, manoeuvres
+from jaxveh.statespace import cast
+
+SHAPES = {
+    "double lane change": lambda: manoeuvres.double_lane_change(25.0, 0.12),
+    "step steer": lambda: manoeuvres.step_steer(25.0, 0.12),
+    "swept sine": lambda: manoeuvres.swept_sine(25.0, 0.12, 0.2, 2.0, 20.0),
+}
+
+
+@pytest.fixture(params=SHAPES, ids=str)
+def manoeuvre(request):
+    return SHAPES[request.param]()
+
+
+def steer(manoeuvre, t):
+    return manoeuvre.inputs(jnp.asarray(t)).steer
+
+
+def test_every_shape_starts_straight_at_its_speed_and_stays_within_its_amplitude(manoeuvre):
+    t = np.linspace(0.0, manoeuvre.duration, 4001)
+    u = manoeuvre.inputs(t)
+    assert u.steer[0] == 0
+    assert 0.99 * 0.12 < np.max(np.abs(u.steer)) <= 0.12 * (1 + 1e-12)
+    np.testing.assert_array_equal(u.v_x, 25.0)
+    np.testing.assert_array_equal(u.v_x_rate, 0.0)
+
+
+def test_every_shape_has_a_continuous_second_derivative(manoeuvre):
+    """Jumps of the curvature would show as differences that do not shrink with the step."""
+    curvature = jax.jit(jax.vmap(jax.grad(jax.grad(lambda t: manoeuvre.inputs(t).steer))))
+    jumps = [
+        float(np.max(np.abs(np.diff(curvature(jnp.linspace(0.0, manoeuvre.duration, n)))))) for n in (20_001, 80_001)
+    ]
+    assert jumps[1] < 0.3 * jumps[0]
+
+
+def test_every_shape_keeps_its_precision(manoeuvre):
+    single = cast(manoeuvre, np.float32)
+    t = np.linspace(0.0, manoeuvre.duration, 1001)
+    u = single.inputs(t.astype(np.float32))
+    assert {leaf.dtype for leaf in u} == {np.dtype(np.float32)}
+    np.testing.assert_allclose(u.steer, steer(manoeuvre, t), atol=0.12 * 5e-5)
+
+
+def test_amplitude_is_a_differentiable_leaf(manoeuvre):
+    slope = jax.jacfwd(lambda m: m.inputs(1.25).steer)(manoeuvre)
+    np.testing.assert_allclose(slope.steer, steer(manoeuvre, 1.25) / 0.12, rtol=1e-12)
+
+
+def test_double_lane_change_is_a_sine_period_and_its_mirror():
+    m = manoeuvres.double_lane_change(25.0, 0.12, start=0.5, period=2.0, pause=1.0, duration=7.0)
+    np.testing.assert_allclose(steer(m, [1.0, 2.0, 4.0, 5.0]), [0.12, -0.12, -0.12, 0.12], rtol=1e-12)
+    np.testing.assert_allclose(steer(m, [0.2, 2.5, 3.0, 3.5, 6.0, 7.0]), 0.0, atol=1e-15)
+    t = np.linspace(0.0, 7.0, 701)
+    np.testing.assert_allclose(np.trapezoid(steer(m, t), t), 0.0, atol=1e-12)
+    centre = 3.0
+    np.testing.assert_allclose(steer(m, centre + t[:300]), steer(m, centre - t[:300]), atol=1e-14)
+
+
+def test_step_steer_ramps_within_its_ramp():
+    m = manoeuvres.step_steer(25.0, 0.2, ramp=0.2, start=1.0, duration=7.0)
+    np.testing.assert_allclose(steer(m, [0.999, 1.1, 1.2, 7.0]), [0.0, 0.1, 0.2, 0.2], rtol=1e-12)
+
+
+def test_swept_sine_sweeps_its_frequencies():
+    m = manoeuvres.swept_sine(25.0, 0.1, from_frequency=0.5, to_frequency=2.5, duration=20.0)
+    crossings = np.count_nonzero(np.diff(np.sign(steer(m, np.linspace(0.003, 19.997, 20_000)))))
+    assert crossings == 2 * 0.5 * (0.5 + 2.5) * 20.0 - 1
+    rates = jax.vmap(jax.grad(lambda t: m.inputs(t).steer))
+    for t, frequency in ((5.0, 1.0), (15.0, 2.0)):
+        near = jnp.linspace(t - 0.6, t + 0.6, 2001)
+        np.testing.assert_allclose(jnp.max(jnp.abs(rates(near))), 0.1 * 2 * np.pi * frequency, rtol=0.07)
+
+
+def recording(**channels):
+    time = np.array([100.0, 100.01, 100.03, 100.04])
+    default = {"steer": np.array([0.0, 0.1, 0.3, 0.2]), "v_x": np.array([20.0, 20.0, 21.0, 22.0])}
+    return Recording(time, {**default, **channels})
+
+
+def test_replay_is_linear_between_rows_and_held_at_the_ends():
+    m = manoeuvres.replay(recording())
+    np.testing.assert_allclose(m.duration, 0.04, rtol=1e-12)
+    t = [0.0, 0.005, 0.02, 0.03, 0.035, 0.04, 9.0, -1.0]
+    u = m.inputs(jnp.asarray(t))
+    np.testing.assert_allclose(u.steer, [0.0, 0.05, 0.2, 0.3, 0.25, 0.2, 0.2, 0.0], atol=1e-12)
+    np.testing.assert_allclose(u.v_x[:3], [20.0, 20.0, 20.5], rtol=1e-12)
+    assert u._fields == ("steer", "v_x")
+
+
+def test_replay_takes_a_recorded_acceleration_along():
+    m = manoeuvres.replay(recording(a_x=np.array([0.0, 1.0, 2.0, 3.0])))
+    np.testing.assert_allclose(m.inputs(0.005).a_x, 0.5, rtol=1e-9)
+
+
+def test_replay_of_a_late_log_keeps_its_steps_in_float32():
+    log = recording()
+    m = manoeuvres.replay(Recording(log.time + 1e6, cast(log.channels, np.float32)))
+    assert m.time.dtype == np.float32
+    np.testing.assert_allclose(m.time, [0.0, 0.01, 0.03, 0.04], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: manoeuvres.double_lane_change(25.0, 7.0), r"steer = 7\.0: must be within a quarter turn.*not degrees"),
+        (lambda: manoeuvres.double_lane_change(-1.0, 0.1), r"speed = -1\.0: must be at least 0\.0"),
+        (lambda: manoeuvres.double_lane_change(25.0, 0.1, duration=5.0), r"duration = 5\.0: must be at least start"),
+        (lambda: manoeuvres.step_steer(25.0, 0.1, ramp=0.0), r"ramp = 0\.0: must be positive"),
+        (lambda: manoeuvres.step_steer(25.0, 0.1, start=6.9), r"duration = 7\.0: must be at least start \+ ramp"),
+        (lambda: manoeuvres.swept_sine(25.0, 0.1, -0.5, 2.0), r"from_frequency = -0\.5"),
+        (lambda: manoeuvres.swept_sine(25.0, 0.1, duration=0.5), r"edge = 0\.5: must be at most half the duration"),
+        (lambda: manoeuvres.step_steer(float("nan"), 0.1), r"speed = nan: must be finite"),
+        (lambda: manoeuvres.replay(recording(steer=np.array([0.0, np.nan, 0, 0]))), r"steer = nan at t = 100\.01 s"),
+        (lambda: manoeuvres.replay(recording().without("v_x")), r"unknown name\(s\) v_x"),
+        (lambda: manoeuvres.replay(recording().rows(slice(0, 1))), r"has 1 row"),
+    ],
+)
+def test_bad_input_raises_by_name_value_and_range(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
