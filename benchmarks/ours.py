@@ -1,0 +1,196 @@
+"""The two problems for the library, written as a user would write them: names, short formulas, the public interface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jaxveh
+from jaxveh import numerics, statespace
+
+from .problems import SingleTrack, SpeedAndMass
+
+__all__ = ["blocked", "precision", "single_track_model", "single_track_recording", "speed_model", "speed_recording"]
+
+
+def precision(dtype: np.typing.DTypeLike):
+    """Where float32 is measured, x64 is off, as it is for a user who works in float32."""
+    return jax.enable_x64(np.dtype(dtype) == np.float64)
+
+
+class Motion(NamedTuple):
+    """Lateral velocity, yaw, yaw rate."""
+
+    v_y: object
+    yaw: object
+    yaw_rate: object
+
+
+class Car(NamedTuple):
+    """Motion and the Magic Formula coefficients of both axles."""
+
+    v_y: object
+    yaw: object
+    yaw_rate: object
+    front_D: object
+    front_C: object
+    front_B: object
+    front_E: object
+    rear_D: object
+    rear_C: object
+    rear_B: object
+    rear_E: object
+
+
+class Chassis(eqx.Module):
+    """What is known of the car."""
+
+    mass: jax.Array
+    inertia: jax.Array
+    front: jax.Array
+    rear: jax.Array
+
+
+class Measured(NamedTuple):
+    """Yaw rate and lateral acceleration."""
+
+    yaw_rate: object
+    a_y: object
+
+
+def _magic_formula(slip, D, C, B, E):
+    x = B * slip
+    return D * numerics.sin(C * numerics.arctan(x - E * (x - numerics.arctan(x))))
+
+
+def _forces(chassis, x, motion, u):
+    front = u.steer - numerics.arctan((motion.v_y + chassis.front * motion.yaw_rate) / u.speed)
+    rear = -numerics.arctan((motion.v_y - chassis.rear * motion.yaw_rate) / u.speed)
+    force_front = _magic_formula(front, x.front_D, x.front_C, x.front_B, x.front_E) * numerics.cos(u.steer)
+    return force_front, _magic_formula(rear, x.rear_D, x.rear_C, x.rear_B, x.rear_E)
+
+
+def _derivatives(system, t, motion, u):
+    chassis, x = system
+    front, rear = _forces(chassis, x, motion, u)
+    return Motion(
+        (front + rear) / chassis.mass - u.speed * motion.yaw_rate,
+        motion.yaw_rate,
+        (chassis.front * front - chassis.rear * rear) / chassis.inertia,
+    )
+
+
+_MOVE = statespace.Propagate(_derivatives)
+
+
+def _transition(chassis, t0, t1, x, u):
+    motion = _MOVE((chassis, x), t0, t1, Motion(x.v_y, x.yaw, x.yaw_rate), u)
+    return x._replace(**motion._asdict())
+
+
+def _observation(chassis, t, x, u):
+    front, rear = _forces(chassis, x, Motion(x.v_y, x.yaw, x.yaw_rate), u)
+    return Measured(x.yaw_rate, (front + rear) / chassis.mass)
+
+
+def single_track_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
+    """The eleven states with noise on each, yaw rate and lateral acceleration measured."""
+    p = problem
+    model = statespace.StateSpace(
+        system=Chassis(*(jnp.asarray(v, dtype) for v in (p.mass, p.inertia, p.front, p.rear))),
+        transition=_transition,
+        observation=_observation,
+        process_noise=statespace.Discrete(statespace.Gaussian(_by_name(Car, p.process_std))),
+        measurement_noise={"yaw_rate": p.yaw_rate_std, "a_y": p.lateral_acceleration_std},
+        prior=statespace.Prior(Car(*map(float, p.prior_mean)), _by_name(Car, p.prior_std)),
+        inputs=("steer", "speed"),
+    )
+    return statespace.cast(model, dtype)
+
+
+def single_track_recording(problem: SingleTrack) -> jaxveh.Recording:
+    """The measurements as a recording."""
+    channels = {
+        "steer": problem.steer,
+        "speed": problem.speed,
+        "yaw_rate": problem.yaw_rate,
+        "a_y": problem.lateral_acceleration,
+    }
+    return jaxveh.Recording(problem.step * np.arange(problem.rows), channels)
+
+
+class Vehicle(NamedTuple):
+    """Speed, mass and road grade."""
+
+    v: object
+    mass: object
+    grade: object
+
+
+class Speed(NamedTuple):
+    """The speed alone: mass and grade stay as they are within a step."""
+
+    v: object
+
+
+class Truck(eqx.Module):
+    """What is known of the vehicle; drag is rho c_d A / 2."""
+
+    wheel_radius: jax.Array
+    gravity: jax.Array
+    rolling_resistance: jax.Array
+    drag: jax.Array
+
+
+def _speed_transition(truck, t0, t1, x, u):
+    pull = u.torque / (truck.wheel_radius * x.mass)
+    resistance = truck.gravity * (truck.rolling_resistance * numerics.cos(x.grade) + numerics.sin(x.grade))
+    drag = truck.drag / x.mass
+    return x._replace(v=_MOVE_SPEED((pull - resistance, drag), t0, t1, Speed(x.v), u).v)
+
+
+def _speed_derivative(system, t, x, u):
+    constant, drag = system
+    return Speed(constant - drag * x.v * x.v)
+
+
+_MOVE_SPEED = statespace.Propagate(_speed_derivative)
+
+
+def _speed_observation(truck, t, x, u):
+    return Speed(x.v)
+
+
+def speed_model(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
+    """Speed, mass and grade with noise on each, the speed measured."""
+    p = problem
+    model = statespace.StateSpace(
+        system=Truck(*(jnp.asarray(v, dtype) for v in (p.wheel_radius, p.gravity, p.rolling_resistance, p.drag))),
+        transition=_speed_transition,
+        observation=_speed_observation,
+        process_noise=statespace.Discrete(statespace.Gaussian(_by_name(Vehicle, p.process_std))),
+        measurement_noise={"v": p.speed_std},
+        prior=statespace.Prior(Vehicle(*map(float, p.prior_mean)), _by_name(Vehicle, p.prior_std)),
+        inputs=("torque",),
+    )
+    return statespace.cast(model, dtype)
+
+
+def speed_recording(problem: SpeedAndMass, run: int = 0) -> jaxveh.Recording:
+    """The measurements of one run."""
+    channels = {"torque": problem.torque, "v": problem.speed[:, run]}
+    return jaxveh.Recording(problem.step * np.arange(problem.rows), channels)
+
+
+def _by_name(state: type, values: np.ndarray) -> dict[str, float]:
+    return dict(zip(state._fields, map(float, values), strict=True))
+
+
+def blocked(function: Callable[[int], object]) -> Callable[[int], object]:
+    """The function, waiting until its arrays are there."""
+    return lambda index: jax.block_until_ready(function(index))
