@@ -1,0 +1,1 @@
+"""One folder a paper: configuration, run, and check against the printed numbers."""

@@ -1,0 +1,22 @@
+"""Bao, Sabbioni et al. (2015): an auxiliary particle filter for Magic Formula parameters and vehicle states."""
+
+from jaxveh.experiments.tyre_apf.printed import Printed, run_printed_seeds
+from jaxveh.experiments.tyre_apf.report import Check, Reproduction, Table, check, run, tables
+from jaxveh.experiments.tyre_apf.settings import CITATION, Study, tyres
+from jaxveh.experiments.tyre_apf.study import run_once, run_seeds
+
+__all__ = [
+    "CITATION",
+    "Check",
+    "Printed",
+    "Reproduction",
+    "Study",
+    "Table",
+    "check",
+    "run",
+    "run_once",
+    "run_printed_seeds",
+    "run_seeds",
+    "tables",
+    "tyres",
+]

@@ -1,0 +1,68 @@
+"""What the paper prints, and what the honest study of it assumes."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+CITATION = """@article{bao2015tyre,
+  author  = {Bao, Ruixin and Sabbioni, Edoardo and Yu, Huilong and Zhang, Tao},
+  title   = {Vehicle Tire Parameter and State Estimation under Driving Situation Based on Auxiliary Particle Filter Method},
+  journal = {Transactions of the Chinese Society for Agricultural Machinery},
+  volume  = {46}, number = {4}, pages = {282--288}, year = {2015},
+  doi     = {10.6041/j.issn.1000-1298.2015.04.042}
+}"""
+
+TABLE_2 = {  # truth -> estimate, as printed
+    "rear_D": (5609.0, 5608.0),
+    "rear_C": (1.6, 1.596),
+    "rear_B": (14.16, 14.13),
+    "rear_E": (1.0073, 1.0126),
+    "front_D": (7872.0, 7871.0),
+    "front_C": (1.6, 1.605),
+    "front_B": (6.9986, 6.9851),
+    "front_E": (-0.054, -0.052),
+}
+
+TABLE_3 = {  # RMSE of the particle filter -> of the auxiliary particle filter, as printed
+    "front_D": (40.6, 28.2),
+    "front_C": (1.11, 0.41),
+    "front_B": (2.41, 1.32),
+    "front_E": (0.21, 0.03),
+    "rear_D": (20.12, 10.23),
+    "rear_C": (0.70, 0.29),
+    "rear_B": (1.41, 1.21),
+    "rear_E": (0.17, 0.05),
+}
+
+STEP_STEER = {10: (0.031, 0.015), 15: (0.052, 0.026)}
+"""Degrees of step steer: RMSE of yaw (rad) and yaw rate (rad/s), as printed."""
+
+
+def tyres(car):
+    """The eight parameters of the paper: B, C, D and E of both axles."""
+    return (car.front.B, car.front.C, car.front.D, car.front.E, car.rear.B, car.rear.C, car.rear.D, car.rear.E)
+
+
+@dataclasses.dataclass(frozen=True)
+class Study:
+    """The honest study: a double lane change, a prior that does not know the truth, four estimators side by side.
+
+    `speed` m/s; `steer` rad at the road wheels; `duration` s; `rate` Hz; `yaw_rate_std` rad/s and `a_y_std` m/s^2 the
+    sensors' noise; `prior` the relative spread of the parameters (E: times 2, so 0.2); `particles`; `walk` the particles'
+    random walk of the parameters, relative, per root second (particle filters need one, the others do not);
+    `process_noise` of the filters' states, per root second; `window` s of the multiple shooting.
+    """
+
+    speed: float = 25.0
+    steer: float = math.radians(7.0)
+    duration: float = 7.0
+    rate: float = 100.0
+    yaw_rate_std: float = 0.005
+    a_y_std: float = 0.1
+    prior: float = 0.1
+    particles: int = 1000
+    walk: float = 0.01
+    v_y_noise: float = 0.02
+    yaw_rate_noise: float = 0.01
+    window: float = 0.5

@@ -1,0 +1,211 @@
+"""The same study, an estimator at a time: for a person who watches, with compile and run times of each."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import filters, vehicles
+from jaxveh._core.parameter import pick, prior_spread, resolve
+from jaxveh._core.progress import Progress, silent
+from jaxveh.experiments.tyre_apf.settings import STEP_STEER, Study, tyres
+from jaxveh.experiments.tyre_apf.study import (
+    ESTIMATORS,
+    FIELDS,
+    Outcome,
+    curve_error,
+    drive_once,
+    guess_once,
+    model_of,
+    open_loop,
+    state_errors,
+    step_steer_errors,
+    with_tyres,
+)
+from jaxveh.fitting.multiple_shooting import shoot
+from jaxveh.fitting.segments import cut
+
+FILTERS = ("PF", "APF", "UKF")
+
+
+class Seconds(NamedTuple):
+    """What a stage cost: compiling, and running once compiled, s, all seeds together."""
+
+    compile: float
+    run: float
+
+
+class Staged(NamedTuple):
+    """The study's result and how it came about. Leaves have the seeds in front.
+
+    `outcome`, `steps`: as `run_seeds` returns them. `estimates`: the filters' `Estimate` by name; `fit`: the MAP's
+    `fitting.Fit`. `open_loop`: mapping from `prior` and `MAP` to the states that those tyres give without any
+    measurement. `seconds`: by stage.
+    """
+
+    outcome: Outcome
+    steps: dict
+    estimates: dict
+    fit: Any
+    open_loop: dict
+    seconds: dict[str, Seconds]
+
+
+def run_staged(study: Study, keys, progress: Progress = silent) -> Staged:
+    """The study over `keys` (seeds,), compiled and run in stages; the same numbers as `run_seeds` but for rounding."""
+    clock = _Clock(keys.shape[0], progress)
+    parts = jax.vmap(lambda key: jax.random.split(key, 4))(keys)
+    drive, guess = clock.one("simulation", lambda a, b: (drive_once(study, a), guess_once(study, b)), parts[:, 0], parts[:, 1])
+    segments = _segments(study, drive, guess)
+    values_like = jnp.zeros((keys.shape[0], len(ESTIMATORS), len(FIELDS)), drive.time.dtype)
+    tasks = {
+        "PF": (_filter(study, filters.ParticleFilter(study.particles), study.walk), guess, drive, parts[:, 2]),
+        "APF": (_filter(study, filters.AuxiliaryParticleFilter(study.particles), study.walk), guess, drive, parts[:, 3]),
+        "UKF": (_filter(study, filters.Unscented(), 0.0), guess, drive, parts[:, 2]),
+        "MAP": (_fit(study), guess, segments),
+        "errors and step steers": (_judge(study), values_like, drive),
+    }
+    done = clock.many(tasks, hold=("errors and step steers",))
+    fit, estimates = done["MAP"], {name: done[name] for name in FILTERS}
+    values, spread = _parameters(study, guess, estimates, fit)
+    stacked = jnp.stack([values[name] for name in ESTIMATORS], axis=1)
+    curves, states, loops, steps = clock.run("errors and step steers", stacked, drive)
+    by_name = lambda array: {name: array[:, i] for i, name in enumerate(ESTIMATORS)}  # noqa: E731
+    filtered = {name: jax.vmap(state_errors)(estimate.mean, drive) for name, estimate in estimates.items()}
+    nothing = jnp.full((keys.shape[0],), jnp.nan)
+    outcome = Outcome(
+        drive=drive,
+        guess=guess,
+        parameters=values,
+        spread=spread,
+        curve_error=by_name(curves),
+        states={**by_name(states), **filtered},
+        log_likelihood={**{n: e.log_likelihood for n, e in estimates.items()}, "prior": nothing, "MAP": -fit.cost},
+        result={**{n: e.result for n, e in estimates.items()}, "MAP": fit.result, "prior": jnp.zeros_like(fit.result)},
+    )
+    loops = {name: {k: v[:, ESTIMATORS.index(name)] for k, v in loops.items()} for name in ("prior", "MAP")}
+    return Staged(outcome, {d: by_name(e) for d, e in steps.items()}, estimates, fit, loops, clock.seconds)
+
+
+def _filter(study: Study, kind, walk: float) -> Callable:
+    def one(guess, drive, key):
+        model = model_of(study, guess, walk)
+        return filters.scan(kind, model, model.rows(drive), key)
+
+    return one
+
+
+def _fit(study: Study) -> Callable:
+    def one(guess, segments):
+        model = model_of(study, guess)
+        return shoot(model, segments, jnp.asarray(0.01, model.prior.mean[0].dtype), True, 100, 1e-8)
+
+    return one
+
+
+def _judge(study: Study) -> Callable:
+    """Errors of all estimators' tyres: curves (5, 2), open-loop states' errors (5, 2), those states, step steers."""
+
+    def each(values, drive):
+        car = with_tyres(values)
+        truth = open_loop(study, car).truth
+        kept = {name: truth[name] for name in ("v_y", "yaw_rate", "sideslip") if name in truth}
+        steps = {degrees: step_steer_errors(values, degrees, study) for degrees in STEP_STEER}
+        return curve_error(car, drive), state_errors(truth.channels, drive), kept, steps
+
+    return lambda values, drive: jax.vmap(each, in_axes=(0, None))(values, drive)
+
+
+def _segments(study: Study, drive, guess):
+    """The fit's segments of every seed, stacked; cutting is host-side work."""
+    count = drive.time.shape[0]
+    each = lambda i: jax.tree.map(lambda leaf: leaf[i], (guess, drive))  # noqa: E731
+    parts = []
+    for i in range(count):
+        car, recording = each(i)
+        parts.append(cut(model_of(study, car), recording, study.window))
+    return jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *parts)
+
+
+def _parameters(study: Study, guess, estimates: dict, fit) -> tuple[dict, dict]:
+    """Values and standard deviations (seeds, 8) by estimator, physical."""
+    chosen = resolve(vehicles.passenger_car(), tyres)
+
+    def prior(car):
+        values = pick(car, chosen)
+        spreads = prior_spread(chosen, values, study.prior)
+        physical = [p.domain.slope(v) * s for p, v, s in zip(chosen, values, spreads, strict=True)]
+        return jnp.stack(values), jnp.stack(physical)
+
+    values, spread = {}, {}
+    values["prior"], spread["prior"] = jax.vmap(prior)(guess)
+    for name, estimate in estimates.items():
+        values[name] = jnp.stack([getattr(estimate.mean, field)[:, -1] for field in FIELDS], axis=1)
+        spread[name] = jnp.stack([getattr(estimate.std, field)[:, -1] for field in FIELDS], axis=1)
+    values["MAP"] = jnp.stack([getattr(fit.mean, field) for field in FIELDS], axis=1)
+    spread["MAP"] = jnp.stack([getattr(fit.std, field) for field in FIELDS], axis=1)
+    return values, spread
+
+
+class _Clock:
+    """Compiles stages, two at a time, runs them one at a time, and keeps what each took."""
+
+    def __init__(self, count: int, progress: Progress):
+        self.count, self.progress = count, progress
+        self.seconds: dict[str, Seconds] = {}
+        self.compiled: dict[str, Any] = {}
+        self.done, self.total = 0.0, 12.0
+
+    def one(self, name: str, function: Callable, *args):
+        self.progress(self.done, self.total, f"compiling: {name}")
+        self._compile(name, function, *args)
+        return self.run(name, *args)
+
+    def many(self, tasks: dict[str, tuple], hold: tuple[str, ...]) -> dict:
+        """Compile all of them, and run those that are not held back."""
+        waiting = list(tasks)
+        self.progress(self.done, self.total, f"compiling: {', '.join(waiting)}")
+
+        def compile_one(name):
+            self._compile(name, *tasks[name])
+            waiting.remove(name)
+            self.progress(self.done, self.total, f"compiling: {', '.join(waiting)}" if waiting else "compiled")
+
+        # The compiler does not hold Python's lock, so that a second core helps.
+        with ThreadPoolExecutor(2) as pool:
+            list(pool.map(compile_one, tasks))
+        return {name: self.run(name, *task[1:]) for name, task in tasks.items() if name not in hold}
+
+    def run(self, name: str, *args):
+        self.progress(self.done, self.total, f"running: {name}")
+        start = time.perf_counter()
+        result = jax.block_until_ready(self.compiled[name](*args))
+        self.seconds[name] = self.seconds[name]._replace(run=time.perf_counter() - start)
+        self.done += 1
+        return result
+
+    def _compile(self, name: str, function: Callable, *args):
+        start = time.perf_counter()
+        self.compiled[name] = eqx.filter_jit(self._batched(function)).lower(*args).compile()
+        self.seconds[name] = Seconds(time.perf_counter() - start, float("nan"))
+        self.done += 1
+
+    def _batched(self, function: Callable) -> Callable:
+        if self.count > 1:
+            return lambda *args: jax.vmap(function)(*args)
+        # One seed runs as a single user's call would, without the cost of a batch.
+        return lambda *args: _grow(function(*_shrink(args)))
+
+
+def _shrink(tree):
+    return jax.tree.map(lambda leaf: leaf[0], tree)
+
+
+def _grow(tree):
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], tree)

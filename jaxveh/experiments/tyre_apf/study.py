@@ -1,0 +1,167 @@
+"""The paper's double lane change done honestly: prior, particle filters, unscented filter and MAP fit side by side."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import estimators, filters, fitting, manoeuvres, numerics, sensors, vehicles
+from jaxveh._core.parameter import pick, prior_spread, put, resolve
+from jaxveh._core.recording import Recording
+from jaxveh.experiments.tyre_apf.settings import Study, tyres
+from jaxveh.simulation import simulate
+
+ESTIMATORS = ("prior", "PF", "APF", "UKF", "MAP")
+FIELDS = tuple(f"{axle}_{name}" for axle in ("front", "rear") for name in "BCDE")
+
+
+class Outcome(NamedTuple):
+    """One seed's result. Every mapping is by estimator name.
+
+    `drive`: the simulated recording; `guess`: the prior's mean, a car; `parameters` (8,) in the order of `FIELDS` and
+    `spread` (8,) their standard deviations, physical; `curve_error`: (2,) RMSE of front and rear force over the visited
+    slips, as a share of the true D; `states`: RMSE of v_y (m/s) and yaw rate (rad/s); `log_likelihood`; `result`.
+    """
+
+    drive: Any
+    guess: Any
+    parameters: dict
+    spread: dict
+    curve_error: dict
+    states: dict
+    log_likelihood: dict
+    result: dict
+
+
+def drive_once(study: Study, key) -> Recording:
+    """The paper's double lane change with the swapped geometry, as sensors saw it."""
+    manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
+    devices = sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std)
+    return simulate(vehicles.passenger_car(), manoeuvre, devices, key=key, dt=1 / study.rate, throw=False)
+
+
+def guess_once(study: Study, key):
+    """A car whose tyres are a draw around the truth: what an honest prior's mean looks like."""
+    car = vehicles.passenger_car()
+    parameters = resolve(car, tyres)
+    values = pick(car, parameters)
+    spreads = prior_spread(parameters, values, study.prior)
+    draws = numerics.normal(key, (len(parameters),), values[0].dtype)
+    moved = [p.domain.forward(p.domain.inverse(v) + s * z) for p, v, s, z in zip(parameters, values, spreads, draws)]
+    return put(car, parameters, moved)
+
+
+def model_of(study: Study, car, walk: float = 0.0):
+    """The state space that every estimator of the study sees."""
+    return estimators.state_space(
+        car,
+        sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std),
+        estimate=tyres,
+        prior=study.prior,
+        walk=walk,
+        process_noise={"v_y": study.v_y_noise, "yaw_rate": study.yaw_rate_noise},
+    )
+
+
+def run_once(study: Study, key) -> Outcome:
+    """One seed: a drive, a guess, and every estimator on them. Pure: `vmap` it over keys."""
+    drive_key, guess_key, pf_key, apf_key = jax.random.split(key, 4)
+    drive, guess = drive_once(study, drive_key), guess_once(study, guess_key)
+    still, walking = model_of(study, guess), model_of(study, guess, study.walk)
+    rows = still.rows(drive)
+    estimates = {
+        "PF": filters.scan(filters.ParticleFilter(study.particles), walking, rows, pf_key),
+        "APF": filters.scan(filters.AuxiliaryParticleFilter(study.particles), walking, rows, apf_key),
+        "UKF": filters.scan(filters.Unscented(), still, rows),
+    }
+    fit = fitting.multiple_shooting(still, drive, window=study.window, throw=False)
+    guessed = resolve(guess, tyres)
+    values = {"prior": jnp.stack(pick(guess, guessed)), "MAP": jnp.stack(fit.mean)}
+    spread = {
+        "prior": jnp.stack([p.domain.slope(v) * s for p, v, s in zip(
+            guessed, pick(guess, guessed), prior_spread(guessed, pick(guess, guessed), study.prior), strict=True)]),
+        "MAP": jnp.stack(fit.std),
+    }  # fmt: skip
+    for name, estimate in estimates.items():
+        values[name] = jnp.stack([getattr(estimate.mean, field)[-1] for field in FIELDS])
+        spread[name] = jnp.stack([getattr(estimate.std, field)[-1] for field in FIELDS])
+    cars = {name: with_tyres(value) for name, value in values.items()}
+    states = {name: state_errors(estimate.mean, drive) for name, estimate in estimates.items()}
+    for name in ("prior", "MAP"):
+        states[name] = state_errors(open_loop(study, cars[name]).truth.channels, drive)
+    nothing = jnp.full((), jnp.nan)
+    return Outcome(
+        drive=drive,
+        guess=guess,
+        parameters=values,
+        spread=spread,
+        curve_error={name: curve_error(car, drive) for name, car in cars.items()},
+        states=states,
+        log_likelihood={**{n: e.log_likelihood for n, e in estimates.items()}, "prior": nothing, "MAP": -fit.cost},
+        result={**{n: e.result for n, e in estimates.items()}, "MAP": fit.result, "prior": jnp.int32(0)},
+    )
+
+
+def with_tyres(values):
+    """The study's car with these eight parameters, in the order of `FIELDS`."""
+    car = vehicles.passenger_car()
+    return put(car, resolve(car, tyres), list(values))
+
+
+def curve_error(car, drive: Recording) -> jax.Array:
+    """(2,) RMSE of each axle's force over the truly visited slips, front and rear, as a share of the true D."""
+    truth = vehicles.passenger_car()
+    errors = []
+    for axle in ("front", "rear"):
+        slip = drive[f"true.slip_angle_{axle}"]
+        here, there = getattr(car, axle), getattr(truth, axle)
+        difference = force(here, slip) - force(there, slip)
+        errors.append(jnp.sqrt(jnp.mean(difference**2)) / there.D)
+    return jnp.stack(errors)
+
+
+def force(tyre, slip):
+    """The lateral force of an axle without load dependence over slip angles, N."""
+    from jaxveh.tyres import Contact
+
+    return tyre.forces(Contact(slip_angle=slip)).F_y
+
+
+def open_loop(study: Study, car) -> Recording:
+    manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
+    return simulate(car, manoeuvre, None, dt=1 / study.rate, throw=False)
+
+
+def state_errors(found, drive):
+    get = found.get if isinstance(found, dict) else lambda name: getattr(found, name)
+    rms = lambda name: jnp.sqrt(jnp.mean((get(name) - drive[f"true.{name}"]) ** 2))  # noqa: E731
+    return jnp.stack([rms("v_y"), rms("yaw_rate")])
+
+
+def step_steer_errors(parameters, degrees: float, study: Study) -> jax.Array:
+    """(2,) RMSE of yaw (rad) and yaw rate (rad/s) in an open-loop step steer with these parameters, against the truth."""
+    manoeuvre = manoeuvres.step_steer(
+        speed=study.speed, steer=math.radians(degrees), ramp=0.2, duration=study.duration
+    )
+    go = lambda car: simulate(car, manoeuvre, None, dt=1 / study.rate, throw=False).truth  # noqa: E731
+    truth, found = go(vehicles.passenger_car()), go(with_tyres(parameters))
+    rms = lambda name: jnp.sqrt(jnp.mean((found[name] - truth[name]) ** 2))  # noqa: E731
+    return jnp.stack([rms("yaw"), rms("yaw_rate")])
+
+
+@eqx.filter_jit
+def run_seeds(study: Study, keys) -> tuple[Outcome, dict]:
+    """All seeds in one batch, and the step-steer errors by angle and estimator: {10: {"UKF": (seeds, 2)}}."""
+    outcomes = jax.vmap(lambda key: run_once(study, key))(keys)
+    steps = {
+        degrees: {
+            name: jax.vmap(lambda values, d=degrees: step_steer_errors(values, d, study))(outcomes.parameters[name])
+            for name in ESTIMATORS
+        }
+        for degrees in (10, 15)
+    }
+    return outcomes, steps
