@@ -106,7 +106,7 @@ def _steering(log: LogView) -> Finding:
 def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: str, tolerance: float) -> Finding:
     # The same symmetric average on both sides takes out noise and delays neither.
     found = delay(log.smooth(reference, SMOOTH), log.smooth(log.even(name), SMOOTH), log.step)
-    values = found._asdict()
+    values = {name: value for name, value in found._asdict().items() if np.isfinite(value)}
     if not (found.correlation > ALIKE and np.isfinite(found.seconds)):
         message = f"cannot be timed against {other}: they are too different (correlation {found.correlation:.2f})."
         return Finding("note", name, message, values)

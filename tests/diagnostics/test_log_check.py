@@ -8,9 +8,8 @@ import pytest
 from shared_data import shared
 
 from jaxveh import Recording, io
-from jaxveh.diagnostics.log_check import check_log
+from jaxveh.diagnostics import SEVERITIES, check_log
 from jaxveh.diagnostics.log_delays import _correlations, delay
-from jaxveh.diagnostics.log_findings import SEVERITIES
 
 CAR = io.CarSpecification(1500.0, 2600.0, 1.2, 1.5, 90e3, 120e3)
 STEP = 0.01
@@ -148,10 +147,11 @@ def test_each_fault_is_found(sound, fault):
 
 
 def test_severities_and_values(sound):
-    for finding in findings(*plant(sound, steer=np.negative)):
+    timeless = plant(sound, a_y=lambda values: np.random.default_rng(3).normal(size=values.size))
+    for finding in findings(*timeless) + findings(*plant(sound, steer=np.negative)):
         assert finding.severity in SEVERITIES
         assert finding.message.endswith((".", "?"))
-        assert all(np.isscalar(value) for value in finding.values.values())
+        assert all(np.isfinite(value) for value in finding.values.values())
 
 
 def test_gaps_jitter_and_slow_channels(sound):
@@ -160,6 +160,8 @@ def test_gaps_jitter_and_slow_channels(sound):
     found = findings(time[keep], {name: values[keep] for name, values in channels.items()})
     (gap,) = matching(found, "warning", "time", r"1 gap\(s\), the longest 1.01 s at 9.99 s")
     assert gap.values["longest"] == pytest.approx(1.01)
+    regular = [finding for finding in found if "speaks" in finding.message]
+    assert [finding.severity for finding in regular] == ["ok"]
     uneven = time + np.random.default_rng(2).uniform(0, 0.004, time.size)
     assert matching(findings(uneven, channels), "note", "time", "unevenly")
     slow = channels["v_x"].copy()
