@@ -1,0 +1,61 @@
+"""The commands and their help."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import jaxveh
+from jaxveh.cli.check import check
+from jaxveh.cli.console import results
+from jaxveh.cli.demo import demo
+from jaxveh.cli.estimate import estimate
+from jaxveh.cli.failure import program
+from jaxveh.cli.fit import fit
+from jaxveh.cli.reproduce import tyre_apf
+from jaxveh.cli.schema import schema
+from jaxveh.cli.simulate import simulate
+
+HELP = """Estimate what a car cannot measure: sideslip and tyre parameters from steer, speed, acceleration and yaw rate.
+
+Units are SI and radians unless an option says otherwise; axes are x forward, y left, z up; steer, yaw and yaw rate are
+positive to the left. Times are the log's own.
+
+--out DIR is the report (figures), -o FILE the product, --json FILE every number shown, with a manifest. Exit codes:
+0 done, 1 a filter or a fit failed, 2 bad input.
+
+Start with: jaxveh demo
+"""
+
+app = typer.Typer(
+    name="jaxveh",
+    help=HELP,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+reproduce = typer.Typer(help="Papers computed again, as printed and honestly.", no_args_is_help=True)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        results().print(f"jaxveh {jaxveh.__version__}", highlight=False)
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")] = False,
+) -> None:
+    """Options before the command."""
+
+
+options.__doc__ = HELP
+
+for command in (demo, check, simulate, estimate, fit, schema):
+    app.command()(program(command))
+reproduce.command("tyre-apf")(program(tyre_apf))
+app.add_typer(reproduce, name="reproduce")

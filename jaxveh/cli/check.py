@@ -1,0 +1,80 @@
+"""`jaxveh check`: what a log says about itself before anyone trusts it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.table import Table
+from rich.text import Text
+
+from jaxveh import Recording, diagnostics, io
+from jaxveh.cli import options
+from jaxveh.cli.console import results
+from jaxveh.cli.output import check_report, make_folder, write_numbers
+
+COLOURS = {"error": "bold red", "warning": "yellow", "note": "cyan", "ok": "green"}
+ORDER = tuple(COLOURS)
+
+
+def check(
+    log: options.Log,
+    vehicle: Annotated[
+        Path | None,
+        typer.Option("--vehicle", metavar="CAR.toml", help="The car: adds the checks that need one (steering offset, signs)."),
+    ] = None,
+    channels: options.Channels = None,
+    out: options.Out = None,
+    numbers: options.Numbers = None,
+) -> None:
+    """Look at a log: signs, units, gaps, delays between channels, steering offset, plausibility, in words.
+
+    Nothing is changed and nothing is fitted. The exit code is 0 whatever is found: read the lines.
+
+    Example: [bold]jaxveh check drive.csv --vehicle car.toml --out check[/]
+    """
+    check_report(out, numbers)
+    recording = io.read_recording(log, channels)
+    car = None if vehicle is None else io.read_car(vehicle)
+    findings = diagnostics.check_log(recording, car)
+    _print(log, recording, findings)
+    if out is not None:
+        from jaxveh import plots
+
+        make_folder(out)
+        path = plots.save(plots.recording(recording), out / "channels.png")
+        results().print(f"figure: {path}", highlight=False)
+    found = [finding._asdict() for finding in findings]
+    configuration = {"log": log, "vehicle": vehicle, "channels": channels}
+    write_numbers(numbers, {"log": _summary(recording), "findings": found}, configuration, None)
+
+
+def _summary(recording: Recording) -> dict:
+    time = np.asarray(recording.time)
+    return {
+        "rows": len(recording),
+        "start_s": time[0],
+        "end_s": time[-1],
+        "median_step_s": np.median(np.diff(time)) if len(recording) > 1 else None,
+        "channels": {name: recording.unit(name) for name in recording.names},
+    }
+
+
+def _print(log: Path, recording: Recording, findings) -> None:
+    console, about = results(), _summary(recording)
+    step = "" if about["median_step_s"] is None else f", every {about['median_step_s']:g} s"
+    console.print(f"[bold]{log.name}[/]: {about['rows']} rows from {about['start_s']:g} to {about['end_s']:g} s{step}",
+                  highlight=False)  # fmt: skip
+    lines = Table.grid(padding=(0, 2))
+    lines.add_column(justify="right")
+    lines.add_column(no_wrap=True)
+    lines.add_column(overflow="fold")
+    for severity in ORDER:
+        for finding in findings:
+            if finding.severity == severity:
+                lines.add_row(Text(severity, COLOURS[severity]), Text(finding.channel), Text(finding.message))
+    console.print(lines)
+    counts = {s: sum(finding.severity == s for finding in findings) for s in ORDER}
+    console.print(", ".join(f"{count} {name}" for name, count in counts.items()), highlight=False)

@@ -1,0 +1,87 @@
+"""What a person sees: tables on stdout, progress and messages on stderr."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from jaxveh._core.progress import Progress as Report
+
+
+def messages() -> Console:
+    """stderr; made anew each time, so that a redirected stream is seen."""
+    return Console(stderr=True)
+
+
+def results() -> Console:
+    """stdout."""
+    return Console()
+
+
+@contextlib.contextmanager
+def progress(title: str) -> Iterator[Report]:
+    """A callable `(done, total, stage)` that moves a bar on a terminal, or prints each new stage as a line elsewhere."""
+    console = messages()
+    if not console.is_terminal:
+        yield _lines(console, title)
+        return
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.fields[title]}"),
+        BarColumn(bar_width=24),
+        TextColumn("{task.description}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=1.0, title=title)
+        yield lambda done, total, stage: bar.update(task, completed=done, total=total, description=stage)
+
+
+def _lines(console: Console, title: str) -> Report:
+    seen: list[str] = []
+
+    def report(done: float, total: float, stage: str) -> None:
+        if stage and (not seen or seen[-1] != stage):
+            seen.append(stage)
+            console.print(f"{title}: {stage}", highlight=False, markup=False, soft_wrap=True)
+
+    return report
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "") -> None:
+    """Print a table: first column to the left, numbers to the right; a cell that is no string is shown by `number`."""
+    shown = Table(title=title, title_justify="left", title_style="bold", caption=note or None, caption_justify="left")
+    for i, column in enumerate(columns):
+        shown.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
+    for row in rows:
+        shown.add_row(*[cell if isinstance(cell, str) else number(cell) for cell in row])
+    console = results()
+    console.print(shown)
+    console.print()
+
+
+def number(value: object, digits: int = 4) -> str:
+    """A number with its significant digits; a dash for what is not there."""
+    if value is None:
+        return "-"
+    value = float(value)  # type: ignore[arg-type]
+    if value != value:
+        return "-"
+    return f"{value:.{digits}g}" if value == 0 or 1e-3 <= abs(value) < 1e5 else f"{value:.{digits - 1}e}"
+
+
+def spread(mean: object, std: object) -> str:
+    """`mean ± std` with as many decimals as the spread calls for."""
+    mean, std = float(mean), float(std)  # type: ignore[arg-type]
+    if not (std > 0 and std < float("inf")):
+        return number(mean)
+    decimals = max(0, 1 - _exponent(std))
+    return f"{mean:.{decimals}f} ± {std:.{decimals}f}"
+
+
+def _exponent(value: float) -> int:
+    return int(f"{value:e}".partition("e")[2])

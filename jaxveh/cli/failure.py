@@ -1,0 +1,84 @@
+"""One line for what went wrong, and the exit code: 2 for what the user can put right, 1 for what did not converge."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import inspect
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Annotated
+
+import typer
+
+from jaxveh import FilterError, InputError, JaxvehWarning
+from jaxveh.cli.console import messages
+
+BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
+
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+
+
+def program(function: Callable) -> Callable:
+    """A command whose errors are one line on stderr and an exit code; adds the option `--debug`, which shows all."""
+
+    @functools.wraps(function)
+    def guarded(*args, debug: bool = False, **kwargs):
+        with _warnings_in_words():
+            if debug:
+                return function(*args, **kwargs)
+            with _errors_in_words():
+                return function(*args, **kwargs)
+
+    signature = inspect.signature(function)
+    option = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Debug)
+    guarded.__signature__ = signature.replace(parameters=[*signature.parameters.values(), option])
+    guarded.__annotations__ = {**function.__annotations__, "debug": Debug}
+    return guarded
+
+
+@contextlib.contextmanager
+def _errors_in_words() -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        _leave("error", error, BAD_INPUT)
+    except FilterError as error:
+        _leave("failed", error, FAILED)
+    except OSError as error:
+        # Reading and writing raise InputError themselves; this is what no one foresaw, such as a full disk.
+        _leave("error", f"{error.filename or 'file'}: {error.strerror or error}", BAD_INPUT)
+    except KeyboardInterrupt:
+        _leave("stopped", "interrupted; nothing was left half written", INTERRUPTED)
+    except typer.Exit:
+        raise
+    except Exception as error:
+        _leave("internal error", f"{type(error).__name__}: {error} (--debug shows where)", FAILED)
+
+
+def _leave(kind: str, error: object, exit_code: int) -> None:
+    say(kind, "red", error)
+    raise typer.Exit(exit_code)
+
+
+@contextlib.contextmanager
+def _warnings_in_words() -> Iterator[None]:
+    """jaxveh's own warnings as a line on stderr instead of Python's two with a path."""
+    with warnings.catch_warnings():
+        usual = warnings.showwarning
+
+        def show(message, category, *rest, **more):
+            if issubclass(category, JaxvehWarning):
+                say("warning", "yellow", message)
+            else:
+                usual(message, category, *rest, **more)
+
+        warnings.showwarning = show
+        yield
+
+
+def say(kind: str, colour: str, message: object) -> None:
+    """One unwrapped line on stderr: `kind: message`."""
+    line = " ".join(str(message).split())
+    messages().print(f"[bold {colour}]{kind}:[/] ", end="", soft_wrap=True)
+    messages().print(line, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,119 @@
+"""What programs write: `-o FILE` the product, `--out DIR` the report's figures, `--json FILE` every number shown."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import jaxveh
+from jaxveh import InputError, io
+
+
+def check_product(path: Path | None, suffixes: tuple[str, ...], force: bool, sources: tuple[Path | None, ...] = ()) -> None:
+    """Raise before any work where `-o` could not be written in the end: suffix, folder, an existing file, an input."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"-o {path}: suffix {path.suffix!r}; it must end in one of {', '.join(suffixes)}.")
+    for source in sources:
+        if source is not None and source.exists() and path.exists() and path.samefile(source):
+            raise InputError(f"-o {path}: is an input of this program; name another file.")
+    if path.is_dir():
+        raise InputError(f"-o {path}: is a folder; name a file.")
+    if path.exists() and not force:
+        raise InputError(f"-o {path}: exists already; name another file, or pass --force to replace it.")
+    _check_folder(path, "-o")
+
+
+def check_report(out: Path | None, numbers: Path | None) -> None:
+    """Raise before any work where `--out` or `--json` could not be written, or matplotlib is missing."""
+    if out is not None:
+        if out.exists() and not out.is_dir():
+            raise InputError(f"--out {out}: is a file; name a folder.")
+        io.optional.require("matplotlib", "drawing figures", "plot")
+    if numbers is not None:
+        # The suffix keeps a slip of the keyboard from replacing a log or a car.
+        if numbers.suffix.lower() != ".json":
+            raise InputError(f"--json {numbers}: suffix {numbers.suffix!r}; it must end in .json.")
+        if numbers.is_dir():
+            raise InputError(f"--json {numbers}: is a folder; name a file.")
+        _check_folder(numbers, "--json")
+
+
+def _check_folder(path: Path, option: str) -> None:
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        raise InputError(f"{option} {path}: there is no folder {folder}; make it first.")
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{option} {path}: the folder {folder} cannot be written to.")
+
+
+def make_folder(out: Path) -> None:
+    """The report's folder, made where it is not there."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {out}: cannot be made ({error.strerror}).") from error
+
+
+def write_numbers(path: Path | None, numbers: Mapping[str, Any], configuration: Mapping[str, Any], seed: int | None) -> None:
+    """Write numbers and the manifest as JSON, replacing what was there; what is not finite becomes null."""
+    if path is None:
+        return
+    content = {"manifest": manifest(configuration, seed), **numbers}
+    text = json.dumps(plain(content), indent=2, allow_nan=False, ensure_ascii=False)
+    io.write_text(text + "\n", path, overwrite=True)
+
+
+def manifest(configuration: Mapping[str, Any], seed: int | None) -> dict[str, Any]:
+    """Where numbers come from: versions, platform, seed, configuration, command line."""
+    import jax
+
+    return {
+        "versions": {
+            "jaxveh": jaxveh.__version__,
+            "jax": jax.__version__,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+        },
+        "platform": {
+            "system": platform.platform(),
+            "machine": platform.machine(),
+            "device": str(jax.devices()[0]),
+            "cpus": os.cpu_count(),
+            "float": "float64" if jax.config.jax_enable_x64 else "float32",
+            "xla_flags": os.environ.get("XLA_FLAGS", ""),
+        },
+        "seed": seed,
+        "configuration": configuration,
+        "command": ["jaxveh", *sys.argv[1:]],
+    }
+
+
+def plain(value: Any) -> Any:
+    """Python numbers, strings, lists and dicts of whatever holds arrays; NaN and infinity become None."""
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, bool | str) or value is None:
+        return value
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    array = np.asarray(value)
+    if array.ndim:
+        return [plain(item) for item in array]
+    if array.dtype.kind in "iub":
+        return array.item()
+    number = float(array)
+    return number if math.isfinite(number) else None

@@ -1,0 +1,33 @@
+"""`jaxveh schema`: the files that programs read, as commented examples."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Annotated
+
+import typer
+
+from jaxveh.io import CANONICAL
+from jaxveh.io import car as car_file
+from jaxveh.io import channel_map as channel_file
+
+
+class File(str, Enum):
+    """Which file to explain."""
+
+    car = "car"
+    channels = "channels"
+
+
+def schema(file: Annotated[File, typer.Argument(help="The car, or the channel map.")] = File.car) -> None:
+    """Print a commented example of the file that describes a car, or of a channel map.
+
+    Both examples can be read as they are: [bold]jaxveh schema car > car.toml[/] is a start.
+    """
+    if file is File.car:
+        typer.echo(car_file.SCHEMA, nl=False)
+        return
+    typer.echo(channel_file.SCHEMA)
+    typer.echo("# Channels that jaxveh knows by name, and their units:")
+    for name, channel in CANONICAL.items():
+        typer.echo(f"#   {name:<26}{channel.unit:<9}{channel.meaning}")

@@ -1,0 +1,13 @@
+"""Figures of recordings, estimates, tyre forces and parameters, in one restrained style; matplotlib is the extra `plot`.
+
+Every function returns a matplotlib `Figure` made without pyplot: no window, no global state, shown by notebooks as it
+is. Give `figure=` (a `Figure` or a `SubFigure`) to draw into one of your own. Angles are shown in degrees.
+"""
+
+from jaxveh.plots.estimates import estimate
+from jaxveh.plots.force_curves import force_curves
+from jaxveh.plots.parameters import parameters
+from jaxveh.plots.recordings import recording
+from jaxveh.plots.style import COLOURS, save, style
+
+__all__ = ["COLOURS", "estimate", "force_curves", "parameters", "recording", "save", "style"]

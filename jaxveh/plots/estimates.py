@@ -1,0 +1,80 @@
+"""Estimates over time: mean, the band that should hold the truth in 95 % of the rows, and the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import as_mapping, check_names
+from jaxveh._core.recording import Recording
+from jaxveh.plots.quantities import quantity
+from jaxveh.plots.style import COLOURS, colour, label_above, legend, new_figure, style
+
+BAND = 1.959963984540054
+"""Standard deviations of a normal law's central 95 %."""
+
+
+def estimate(
+    estimates: Any,
+    truth: Recording | Mapping[str, Any] | None = None,
+    quantities: Iterable[str] | None = None,
+    *,
+    others: Mapping[str, Mapping[str, Any]] | None = None,
+    figure: Any = None,
+) -> Any:
+    """A panel a quantity: mean, 95 % band and, where given, the truth.
+
+    **Arguments**: `estimates`: an `Estimate` of `jaxveh.run` (or anything with `time`, `mean` and `std` by name), or a
+    mapping from labels to several. `truth`: a recording, or a mapping from names to (T,) arrays over the time of
+    the first estimate. `quantities`: names to show (default: all that the first reports). `others`: label to a mapping
+    from names to (T,) without spread, such as an open-loop model's, over the time of the first. `figure`: where to draw.
+
+    **Returns** the figure. **Raises** `InputError` for unknown quantities or a truth of another length.
+    """
+    labelled = dict(estimates) if isinstance(estimates, Mapping) else {"estimate": estimates}
+    if not labelled:
+        raise InputError("plots.estimate: no estimate to show; give at least one.")
+    first = next(iter(labelled.values()))
+    known = as_mapping(first.mean, "mean")
+    names = list(known if quantities is None else quantities)
+    check_names("plots.estimate", names, known)
+    time = np.asarray(first.time)
+    with style():
+        figure = new_figure(0.75 + 1.25 * len(names)) if figure is None else figure
+        axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+        for ax, name in zip(axes, names, strict=True):
+            _truth(ax, time, truth, name)
+            for index, (label, values) in enumerate((others or {}).items()):
+                if name in values:
+                    ax.plot(time, quantity(name).show(values[name]), color=colour(label, index + 2), lw=0.9, label=label)
+            for index, (label, one) in enumerate(labelled.items()):
+                _one(ax, one, name, label, colour(label, index))
+            label_above(ax, quantity(name).label)
+        axes[-1].set_xlabel("time [s]")
+        legend(figure, axes)
+    return figure
+
+
+def _truth(ax: Any, time: np.ndarray, truth: Any, name: str) -> None:
+    if truth is None or name not in truth:
+        return
+    at = np.asarray(truth.time) if isinstance(truth, Recording) else time
+    values = quantity(name).show(truth[name])
+    if values.shape != at.shape:
+        raise InputError(f"plots.estimate: truth {name} has shape {values.shape}, time has {at.shape}; must agree.")
+    ax.plot(at, values, color=COLOURS["truth"], linewidth=0.9, label="truth")
+
+
+def _one(ax: Any, one: Any, name: str, label: str, shade: str) -> None:
+    mean, std = as_mapping(one.mean, "mean"), as_mapping(one.std, "std")
+    if name not in mean:
+        return
+    time, shown = np.asarray(one.time), quantity(name)
+    centre = shown.show(mean[name])
+    if name in std:
+        reach = BAND * shown.show(std[name])
+        ax.fill_between(time, centre - reach, centre + reach, color=shade, alpha=0.2, lw=0, label=f"{label}, 95 % band")
+    ax.plot(time, centre, color=shade, linewidth=1.1, label=label)

@@ -1,0 +1,67 @@
+"""A recording's channels over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import check_names
+from jaxveh._core.recording import TRUTH, Recording
+from jaxveh.plots.quantities import order, quantity
+from jaxveh.plots.style import COLOURS, CYCLE, SHADE, label_above, legend, new_figure, style
+
+MOST = 12
+"""Panels that fit on a page."""
+
+
+def recording(
+    recording: Recording,
+    channels: Iterable[str] | None = None,
+    *,
+    spans: Sequence[tuple[float, float, str]] = (),
+    figure: Any = None,
+) -> Any:
+    """A panel a channel over the log's own time; a simulation's truth as a black line beneath the measurement.
+
+    **Arguments**: `channels`: names to show (default: the first `MOST` that are not `true.`). `spans`: (start, end,
+    label) in seconds to shade, such as a calibration or a finding. `figure`: where to draw. NaN leaves a gap.
+
+    **Returns** the figure. **Raises** `InputError` for unknown channels, or nothing to show.
+    """
+    names = list(channels) if channels is not None else _default(recording)
+    check_names("plots.recording", names, recording.names)
+    if not names:
+        raise InputError("plots.recording: no channel to show; name at least one.")
+    time = np.asarray(recording.time)
+    with style():
+        figure = new_figure(0.6 + 1.05 * len(names)) if figure is None else figure
+        axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+        for ax, name in zip(axes, names, strict=True):
+            shown = quantity(name, recording.unit(name))
+            for start, end, label in spans:
+                ax.axvspan(start, end, color=SHADE, linewidth=0, zorder=0, label=label)
+            ax.plot(time, shown.show(recording[name]), color=CYCLE[0], linewidth=0.9, label="measured")
+            if TRUTH + name in recording:
+                ax.plot(time, shown.show(recording[TRUTH + name]), color=COLOURS["truth"], linewidth=0.9, label="truth")
+            _mark_silence(ax, time, np.asarray(recording[name]))
+            label_above(ax, shown.label)
+        axes[-1].set_xlabel("time [s]")
+        if len({label for ax in axes for label in ax.get_legend_handles_labels()[1]}) > 1:
+            legend(figure, axes)
+    return figure
+
+
+def _default(recording: Recording) -> list[str]:
+    return order(name for name in recording.names if not name.startswith(TRUTH))[:MOST]
+
+
+def _mark_silence(ax: Any, time: np.ndarray, values: np.ndarray) -> None:
+    """A channel that never spoke would be an empty panel: say so."""
+    if not np.isfinite(values).any():
+        ax.set_xlim(time[0], time[-1])
+        ax.set_yticks([])
+        ax.text(0.5, 0.5, "no finite sample", transform=ax.transAxes, ha="center", va="center", color="#888888")
+

@@ -1,0 +1,134 @@
+"""One style for all figures: colours that colour-blind readers tell apart, thin lines, no frame, units on each axis."""
+
+from __future__ import annotations
+
+import contextlib
+import io as streams
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from jaxveh._core.errors import InputError
+from jaxveh.io import replacing
+from jaxveh.io.optional import require
+
+# M. Okabe and K. Ito, Color Universal Design (2008); the truth is black.
+COLOURS = {
+    "truth": "#000000",
+    "prior": "#7f7f7f",
+    "PF": "#cc79a7",
+    "APF": "#009e73",
+    "UKF": "#0072b2",
+    "MAP": "#d55e00",
+}
+"""Colours by role; what has no role takes `CYCLE` in turn."""
+
+CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+SHADE = "#f7f1df"
+"""For series without a role, and the shade of spans of time."""
+
+WIDTH = 7.2
+"""Inches: the width of a page's text."""
+
+DPI = 150
+
+SUFFIXES = (".png", ".svg", ".pdf")
+
+_RC = {
+    "figure.dpi": DPI,
+    "savefig.dpi": DPI,
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": "#444444",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.xmargin": 0.01,
+    "axes.formatter.useoffset": False,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.6,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.3,
+    "lines.solid_capstyle": "round",
+    "svg.fonttype": "none",
+    "svg.hashsalt": "jaxveh",
+    "figure.constrained_layout.use": True,
+}
+
+
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """matplotlib's settings for figures of this package, restored at the end: also for a user's own figures."""
+    matplotlib = require("matplotlib", "drawing figures", "plot")
+    with matplotlib.rc_context(_RC):
+        yield
+
+
+def new_figure(height: float, width: float = WIDTH) -> Any:
+    """An empty figure of our own class, in inches; needs no window and no pyplot."""
+    require("matplotlib", "drawing figures", "plot")
+    from jaxveh.plots.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+
+
+def save(figure: Any, path: str | os.PathLike, *, dpi: int = DPI) -> Path:
+    """Write a figure as `.png`, `.svg` or `.pdf`, all or nothing, replacing an older one; returns the path.
+
+    **Raises** `InputError` for another suffix, or where the file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: suffix {path.suffix!r}; a figure must end in one of {', '.join(SUFFIXES)}.")
+    content = streams.BytesIO()
+    # Without a date the same figure is the same file.
+    metadata = {"Software": None} if path.suffix.lower() == ".png" else {"Date": None}
+    if path.suffix.lower() == ".pdf":
+        metadata = {"CreationDate": None}
+    with style():
+        figure.savefig(content, format=path.suffix[1:].lower(), dpi=dpi, metadata=metadata)
+    with replacing(path, overwrite=True) as part:
+        part.write_bytes(content.getvalue())
+    return path
+
+
+def colour(name: str, index: int = 0) -> str:
+    """The colour of a role, else the cycle's."""
+    return COLOURS.get(name, CYCLE[index % len(CYCLE)])
+
+
+def legend(figure: Any, axes: Any) -> None:
+    """One legend for the whole figure above the data, each label once, in the order of drawing."""
+    entries: dict[str, Any] = {}
+    for ax in _flat(axes):
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    if entries:
+        columns = min(len(entries), 8)
+        figure.legend(
+            entries.values(), entries.keys(), loc="outside upper left", ncols=columns, handlelength=1.6,
+            columnspacing=1.2, borderaxespad=0.2,
+        )  # fmt: skip
+
+
+def label_above(ax: Any, label: str) -> None:
+    """A y label that is read without turning the head, above the panel: low panels have no room beside them."""
+    ax.set_ylabel(label, rotation=0, ha="left", va="bottom")
+    ax.yaxis.set_label_coords(0.0, 1.01)
+
+
+def _flat(axes: Any) -> Iterable[Any]:
+    return axes.flat if hasattr(axes, "flat") else axes if isinstance(axes, list | tuple) else [axes]
