@@ -131,12 +131,12 @@ def _floating(x: ArrayLike) -> Array:
 
 
 def _same_type(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-    dtype = jnp.result_type(x, y)
-    x, y = _floating(x), _floating(y)
-    if x.dtype == y.dtype:
-        return x, y
-    dtype = jnp.result_type(x, y) if jnp.issubdtype(dtype, jnp.inexact) else x.dtype
-    return x.astype(dtype), y.astype(dtype)
+    """Both in their common floating type; a value that has it already stays as it is, weakly typed or not."""
+    common = jnp.result_type(x, y)
+    if not jnp.issubdtype(common, jnp.inexact):
+        common = jnp.result_type(float)
+    x, y = jnp.asarray(x), jnp.asarray(y)
+    return x if x.dtype == common else x.astype(common), y if y.dtype == common else y.astype(common)
 
 
 def _ours(*arguments: Array) -> bool:

@@ -20,6 +20,7 @@ WRITTEN_OUT = 8
 Rows = list[list[Array]]
 
 
+@jax.jit
 def cholesky(matrix: Array) -> Array:
     """Lower factor L (..., n, n) of L L^T = matrix (..., n, n), of which only the lower triangle is read.
 
@@ -31,21 +32,25 @@ def cholesky(matrix: Array) -> Array:
     return _from_rows(_cholesky_rows([[matrix[..., i, j] for j in range(i + 1)] for i in range(n)]))
 
 
+@jax.jit
 def solve_lower(factor: Array, b: Array) -> Array:
     """x of L x = b, for a factor L (..., n, n) and b (..., n), or (..., n, k) with as many axes as L."""
     return _by_columns(_forward, factor, b)
 
 
+@jax.jit
 def solve_lower_transposed(factor: Array, b: Array) -> Array:
     """x of L^T x = b; shapes as for `solve_lower`."""
     return _by_columns(_backward, factor, b)
 
 
+@jax.jit
 def solve_psd(factor: Array, b: Array) -> Array:
     """x of L L^T x = b: the solution for the matrix that was factored; shapes as for `solve_lower`."""
     return solve_lower_transposed(factor, solve_lower(factor, b))
 
 
+@jax.jit
 def inverse_psd(factor: Array) -> Array:
     """(L L^T)^-1 (..., n, n), symmetric, from the factor L (..., n, n)."""
     n = _square(factor, "factor")
@@ -58,12 +63,14 @@ def inverse_psd(factor: Array) -> Array:
     return _stacked([[upper[min(i, j)][abs(i - j)] for j in range(n)] for i in range(n)])
 
 
+@jax.jit
 def log_det(factor: Array) -> Array:
     """Logarithm of the determinant of L L^T (...,), from the factor L (..., n, n)."""
     _square(factor, "factor")
     return 2.0 * jnp.sum(log(jnp.diagonal(factor, axis1=-2, axis2=-1)), axis=-1)
 
 
+@jax.jit
 def mahalanobis(factor: Array, residual: Array) -> Array:
     """r^T (L L^T)^-1 r (...,): the squared distance of a residual r (..., n) from 0."""
     n = _square(factor, "factor")
@@ -76,6 +83,7 @@ def mahalanobis(factor: Array, residual: Array) -> Array:
     return _dot(rows, rows)
 
 
+@jax.jit
 def symmetric(matrix: Array) -> Array:
     """The symmetric part (M + M^T) / 2 of a matrix (..., n, n)."""
     _square(matrix, "matrix")

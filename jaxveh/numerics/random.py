@@ -8,6 +8,7 @@ raw, one at a time: batches of keys go through `vmap`. On an accelerator normal 
 import math
 import operator
 from collections.abc import Sequence
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -28,7 +29,51 @@ def normal(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Arr
 
     Never infinite; |z| reaches 6.7 in float32 (beyond it lies 1.4e-11 of the distribution) and 9.4 in float64.
     """
-    shape, dtype = _shape(shape), _dtype(dtype)
+    return _normal(key, _shape(shape), _dtype(dtype))
+
+
+def normals(key: Array, count: int, shape: Shape = (), dtype: DTypeLike | None = None) -> tuple[Array, ...]:
+    """`count` independent arrays of `shape` of standard normal numbers: one for each field of a state.
+
+    Cheaper than rows of one array from `normal`, because nothing is joined; the numbers differ from that one's.
+    """
+    shape, count = _shape(shape), operator.index(count)
+    if count < 0 or count * math.prod(shape) >= 2**31:
+        raise ValueError(f"{count} arrays of shape {shape} asked of one key; at most 2^31 - 1 numbers: split the key.")
+    return _normals(key, count, shape, _dtype(dtype))
+
+
+def uniform(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
+    """Uniform numbers of `shape` in the open interval (0, 1): odd multiples of 2^-24 (float32) or 2^-53 (float64)."""
+    return _uniform(key, _shape(shape), _dtype(dtype))
+
+
+def exponential(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
+    """Exponential numbers of mean 1 of `shape`, in [0, 22.9] (float32) or [0, 45.1] (float64)."""
+    return _exponential(key, _shape(shape), _dtype(dtype))
+
+
+def cauchy(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
+    """Standard Cauchy numbers of `shape`, tangents of random angles; |z| reaches 3e9 (float32) or 1e19 (float64)."""
+    return _cauchy(key, _shape(shape), _dtype(dtype))
+
+
+def student_t(key: Array, df: ArrayLike, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
+    """Student's t numbers of `shape` by Bailey's polar method, with `df` > 0 degrees of freedom.
+
+    `df` broadcasts against `shape` and is differentiable. sqrt(df (u^(-2 / df) - 1)) cos(theta) is exact for every df
+    (Bailey, Mathematics of Computation 62, 1994). |t| reaches sqrt(df (2^(66 / df) - 1)) in float32, with 130 for 66
+    in float64, and at most the root of the largest number.
+    """
+    dtype = _dtype(dtype)
+    return _student_t(key, jnp.asarray(df, dtype), _shape(shape), dtype)
+
+
+# The computations, compiled each as one: outside of jit they would be dozens of small programs.
+
+
+@partial(jax.jit, static_argnums=(1, 2))
+def _normal(key: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
     if not on_cpu():
         return jax.random.normal(key, shape, dtype)
     count = math.prod(shape)
@@ -37,19 +82,13 @@ def normal(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Arr
         sines, cosines = _normal_pairs(key, half, dtype)
         return barrier(jnp.concatenate((sines, cosines))[:count]).reshape(shape)
     # The same numbers without a concatenation, into which XLA would draw everything, scalar by scalar.
-    place = jax.lax.iota(jnp.uint32, count)
-    first_half = place < _uint32(half)
-    block = jnp.where(first_half, place, place - _uint32(half))
-    sines, cosines = _box_muller(*_word_pairs(key, block, half, dtype), dtype)
+    place, first_half = _places(count)
+    sines, cosines = _box_muller(*_word_pairs(key, place, half, dtype), dtype)
     return jnp.where(first_half, sines, cosines).reshape(shape)
 
 
-def normals(key: Array, count: int, shape: Shape = (), dtype: DTypeLike | None = None) -> tuple[Array, ...]:
-    """`count` independent arrays of `shape` of standard normal numbers: one for each field of a state.
-
-    Cheaper than rows of one array from `normal`, because nothing is joined; the numbers differ from that one's.
-    """
-    shape, dtype = _shape(shape), _dtype(dtype)
+@partial(jax.jit, static_argnums=(1, 2, 3))
+def _normals(key: Array, count: int, shape: tuple[int, ...], dtype: jnp.dtype) -> tuple[Array, ...]:
     size, pairs = math.prod(shape), (count + 1) // 2
     if not on_cpu():
         return tuple(jax.random.normal(key, (count, *shape), dtype))
@@ -58,40 +97,27 @@ def normals(key: Array, count: int, shape: Shape = (), dtype: DTypeLike | None =
     return tuple(row.reshape(shape) for row in rows[:count])
 
 
-def uniform(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
-    """Uniform numbers of `shape` in the open interval (0, 1): odd multiples of 2^-24 (float32) or 2^-53 (float64)."""
-    shape, dtype = _shape(shape), _dtype(dtype)
+@partial(jax.jit, static_argnums=(1, 2))
+def _uniform(key: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
     word = _words(key, math.prod(shape), dtype)
     kept = int(jnp.finfo(dtype).nmant)
     dropped = jnp.asarray(8 * word.dtype.itemsize - kept, word.dtype)
     return (((word >> dropped).astype(dtype) + 0.5) * 2.0**-kept).reshape(shape)
 
 
-def exponential(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
-    """Exponential numbers of mean 1 of `shape`, in [0, 22.9] (float32) or [0, 45.1] (float64)."""
-    shape, dtype = _shape(shape), _dtype(dtype)
-    word = _words(key, math.prod(shape), dtype)
-    return -log_of_normal(_positive_unit(word, dtype)).reshape(shape)
+@partial(jax.jit, static_argnums=(1, 2))
+def _exponential(key: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
+    return -log_of_normal(_positive_unit(_words(key, math.prod(shape), dtype), dtype)).reshape(shape)
 
 
-def cauchy(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
-    """Standard Cauchy numbers of `shape`, tangents of random angles; |z| reaches 3e9 (float32) or 1e19 (float64)."""
-    shape, dtype = _shape(shape), _dtype(dtype)
+@partial(jax.jit, static_argnums=(1, 2))
+def _cauchy(key: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
     sine, cosine = sin_cos_of_word(_words(key, math.prod(shape), dtype), dtype)
     return (sine / cosine).reshape(shape)
 
 
-def student_t(key: Array, df: ArrayLike, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
-    """Student's t numbers of `shape` by Bailey's polar method, with `df` > 0 degrees of freedom.
-
-    `df` broadcasts against `shape` and is differentiable.
-
-    sqrt(df (u^(-2 / df) - 1)) cos(theta) is exact for every df (Bailey, Mathematics of Computation 62, 1994). |t|
-    reaches sqrt(df (2^(66 / df) - 1)) in float32, 2^(130 / df) in float64, and at most the root of the largest
-    number.
-    """
-    shape, dtype = _shape(shape), _dtype(dtype)
-    df = jnp.asarray(df, dtype)
+@partial(jax.jit, static_argnums=(2, 3))
+def _student_t(key: Array, df: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
     count = math.prod(shape)
     first, second = barrier(_word_pairs(key, jax.lax.iota(jnp.uint32, count), count, dtype))
     surprise = -2.0 * log_of_normal(_positive_unit(first, dtype)).reshape(shape)
@@ -102,10 +128,10 @@ def student_t(key: Array, df: ArrayLike, shape: Shape = (), dtype: DTypeLike | N
 
 
 def _shape(shape: Shape) -> tuple[int, ...]:
-    try:
-        return (operator.index(shape),)  # pyright: ignore[reportArgumentType]
-    except TypeError:
-        return tuple(operator.index(size) for size in shape)  # pyright: ignore[reportGeneralTypeIssues]
+    sizes = tuple(map(operator.index, shape)) if isinstance(shape, Sequence) else (operator.index(shape),)
+    if math.prod(sizes) >= 2**31:
+        raise ValueError(f"shape {sizes} asked of one key; at most 2^31 - 1 numbers: split the key.")
+    return sizes
 
 
 def _dtype(dtype: DTypeLike | None) -> jnp.dtype:
@@ -139,13 +165,18 @@ def _words(key: Array, count: int, dtype: jnp.dtype) -> Array:
     """`count` words as wide as `dtype`."""
     if dtype == jnp.float64:
         return barrier(_double_words(key, jax.lax.iota(jnp.uint32, count)))
-    half = (count + 1) // 2
     if barriers_hold():
-        return jnp.concatenate(barrier(_blocks(key, jax.lax.iota(jnp.uint32, half))))[:count]
-    place = jax.lax.iota(jnp.uint32, count)
-    first_half = place < _uint32(half)
-    first, second = _blocks(key, jnp.where(first_half, place, place - _uint32(half)))
-    return jnp.where(first_half, first, second)
+        return jnp.concatenate(barrier(_blocks(key, jax.lax.iota(jnp.uint32, (count + 1) // 2))))[:count]
+    place, first_half = _places(count)
+    return jnp.where(first_half, *_blocks(key, place))
+
+
+def _places(count: int) -> tuple[Array, Array]:
+    """For each of `count` numbers, half of them from the first words of blocks: its block, and whether the first word."""
+    half = _uint32((count + 1) // 2)
+    index = jax.lax.iota(jnp.uint32, count)
+    first_half = index < half
+    return jnp.where(first_half, index, index - half), first_half
 
 
 def _word_pairs(key: Array, place: Array, count: int, dtype: jnp.dtype) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ weight below half a part counts as zero. Ancestors are integers: no gradient pas
 
 import math
 import operator
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +22,7 @@ from jaxveh.numerics.elementary import log
 from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu
 
 
+@partial(jax.jit, static_argnums=2, static_argnames="n")
 def systematic(key: Array, weights: Array, n: int | None = None) -> Array:
     """One uniform offset for all n strata (Kitagawa, 1996): each particle has its expected number of children, +- 1."""
     n = _size(weights, n)
@@ -30,6 +32,7 @@ def systematic(key: Array, weights: Array, n: int | None = None) -> Array:
     return _ancestors(jnp.where(parts == total, n, jnp.ceil(position - offset).astype(jnp.int32)), n)
 
 
+@partial(jax.jit, static_argnums=2, static_argnames="n")
 def stratified(key: Array, weights: Array, n: int | None = None) -> Array:
     """One uniform offset for each of n strata (Kitagawa, 1996)."""
     n = _size(weights, n)
@@ -43,6 +46,7 @@ def stratified(key: Array, weights: Array, n: int | None = None) -> Array:
     return _ancestors(jnp.where(parts == total, n, passed), n)
 
 
+@partial(jax.jit, static_argnums=2, static_argnames="n")
 def multinomial(key: Array, weights: Array, n: int | None = None) -> Array:
     """n independent draws, in order: sorted uniforms by exponential spacings, and a binary search."""
     n = _size(weights, n)
@@ -50,6 +54,7 @@ def multinomial(key: Array, weights: Array, n: int | None = None) -> Array:
     return _search(parts, _sorted_parts(key, n, jnp.asarray(n, jnp.int32), total, weights.dtype))
 
 
+@partial(jax.jit, static_argnums=2, static_argnames="n")
 def residual(key: Array, weights: Array, n: int | None = None) -> Array:
     """floor(n w_i) children each, the rest by multinomial draws from the remainders (Liu and Chen, 1998)."""
     n = _size(weights, n)
@@ -66,6 +71,7 @@ def residual(key: Array, weights: Array, n: int | None = None) -> Array:
     return _ancestors(_cumulated(children), n)
 
 
+@jax.jit
 def ess(weights: Array) -> Array:
     """Effective sample size (sum w)^2 / sum w^2 of weights (N,), from 1 to N; 0 if all are zero (Kong et al., 1994)."""
     square = jnp.sum(weights * weights)
@@ -73,6 +79,7 @@ def ess(weights: Array) -> Array:
     return jnp.where(square > 0.0, total * total / jnp.where(square > 0.0, square, 1.0), 0.0)
 
 
+@jax.jit
 def normalise(log_weights: Array) -> tuple[Array, Array, Array]:
     """Of log weights (N,): weights that sum to 1, the logarithm of the mean weight, whether any particle is alive.
 
