@@ -18,7 +18,7 @@ ALIKE = 0.6
 AROUND = 0.04
 """Half the width in seconds of the parabola through the peak."""
 
-ALIKE_ROWS = 0.1
+ALIKE_ROWS = 0.2
 """Seconds whose rows count as one independent sample."""
 
 EXACT = 0.02
@@ -43,8 +43,9 @@ def delay(reference: np.ndarray, signal: np.ndarray, step: float, reach: float =
     """By how much `signal` comes after `reference`.
 
     Both (N,) on an even grid of `step` seconds, NaN where missing. The peak of the normalised cross-correlation within
-    +-`reach` is refined by a parabola through its neighbours within `AROUND`; the error follows from its curvature and
-    from what the two do not share, `ALIKE_ROWS` seconds counting as one sample. NaN where there is no inner peak.
+    +-`reach` is refined by a parabola through its neighbours within `AROUND`; the error follows from its curvature,
+    and from how far away a lag lies that is less likely by exp(-2) at most (two standard deviations), with
+    `ALIKE_ROWS` seconds counting as one sample. NaN where there is no inner peak.
     """
     most = min(round(reach / step), reference.size // 4)
     found = _correlations(reference, signal, most)
@@ -60,6 +61,10 @@ def delay(reference: np.ndarray, signal: np.ndarray, step: float, reach: float =
         return Delay(np.nan, np.inf, float(found[peak]))
     samples = max(np.isfinite(reference * signal).sum() * step / ALIKE_ROWS, 1.0)
     error = step * np.sqrt(max(1 - top**2, 0.0) / (2 * top * -bend * samples))
+    # The curvature may be that of a bump of noise: other lags that explain the signal nearly as well count too.
+    worse = 0.5 * samples * np.log((1 - found**2 + 1e-12) / (1 - found[peak] ** 2 + 1e-12))
+    rivals = np.flatnonzero((worse < 2.0) & (found > 0))
+    error = max(error, 0.5 * step * np.abs(rivals - peak).max())
     seconds = step * (peak - most + np.clip(-slope / (2 * bend), -width, width))
     return Delay(float(seconds), float(error), float(found[peak]))
 
@@ -98,7 +103,6 @@ def _steering(log: LogView) -> Finding:
     if log.car is None:
         caveat = " Without a car, its own response of some 0.1 s is part of it."
         return _judge(log, "yaw_rate", "steer", log.moving(steer), caveat, np.inf)
-    steer = steer - (log.car.steer_offset or 0.0)
     expected = yaw_rate_from_steer(log.car, steer, log.even("v_x"), log.step)
     return _judge(log, "yaw_rate", "what the car's linear model makes of steer", expected, "", MODELLED)
 
@@ -114,7 +118,7 @@ def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: s
     words = (
         f"comes {size * 1e3:.0f} ms (+-{sure * 1e3:.0f}) {'after' if found.seconds >= 0 else 'before'} {other}.{caveat}"
     )
-    if size <= max(tolerance if np.isfinite(tolerance) else 0.0, 0.75 * log.step, sure):
+    if size <= max(tolerance if np.isfinite(tolerance) else 0.0, 0.75 * log.step, 3 * found.error):
         return Finding("ok", name, words, values)
     if np.isinf(tolerance):
         return Finding("note", name, words, values)
