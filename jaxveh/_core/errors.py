@@ -65,7 +65,7 @@ def float_array(value) -> jax.Array:
     """
     if isinstance(value, (jax.Array, np.ndarray, np.generic)) and np.issubdtype(value.dtype, np.floating):
         weak = getattr(value, "weak_type", False)
-        return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float) if weak else value.dtype)
+        return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float if weak else value.dtype))
     if eqx.is_array_like(value):
         return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float))
     return value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import equinox as eqx
@@ -12,7 +12,8 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxveh._core.bijectors import AbstractBijector, Positive, Real
-from jaxveh._core.errors import InputError, float_array
+from jaxveh._core.errors import InputError, check_positive, float_array
+from jaxveh._core.names import check_names
 
 Where = Callable[..., object]
 
@@ -64,12 +65,16 @@ def resolve(model, where: Where | None, inside: str = "") -> tuple[Parameter, ..
     marks = [_Mark(i) for i in range(len(paths))]
     try:
         picked = where(jtu.tree_unflatten(treedef, marks))
-    except AttributeError as error:
+    except (AttributeError, LookupError, TypeError) as error:
         raise InputError(f"where: {error}; it must pick leaves of {type(model).__name__}.") from None
     indices = []
     for leaf in jtu.tree_leaves(picked, is_leaf=lambda x: isinstance(x, _Mark)):
         if not isinstance(leaf, _Mark):
             raise InputError(f"where picked {leaf!r}: it must pick array leaves of {type(model).__name__}.")
+        value = paths[leaf.index][1]
+        if not eqx.is_inexact_array_like(value):
+            name = _path_name(paths[leaf.index][0])
+            raise InputError(f"where picked {name} = {value!r}: it must pick array leaves of {type(model).__name__}.")
         indices.append(leaf.index)
     if not indices:
         raise InputError(f"where picked nothing from {type(model).__name__}: it must pick at least one leaf.")
@@ -126,20 +131,33 @@ def _get(model, path: str):
     return model
 
 
-def prior_spread(parameters: tuple[Parameter, ...], values, relative) -> list[jax.Array]:
+def share_of(p: Parameter, relative: Mapping):
+    """The entry of a mapping for a parameter, by its name (`front.B`) or else by the last part (`B`); None without."""
+    return relative.get(p.name, relative.get(p.name.split(".")[-1]))
+
+
+def check_shares(what: str, parameters: tuple[Parameter, ...], relative) -> None:
+    """Raise where a mapping of spreads has a name that is no parameter's: a slip of the pen would go unseen."""
+    if isinstance(relative, Mapping):
+        check_names(what, relative, [name for p in parameters for name in dict.fromkeys((p.name, p.name.split(".")[-1]))])
+
+
+def prior_spread(parameters: tuple[Parameter, ...], values, relative, what: str = "prior") -> list[jax.Array]:
     """Standard deviations on the real line for a relative spread, one a parameter.
 
     `relative` is one number, or a mapping from parameter names (`front.B`, or the last part `B`) to numbers; a
     parameter whose domain is the whole line refers to its declared `scale`, else to its absolute value.
-    Raises `InputError` for a spread that is not positive, or an unbounded parameter at zero without a scale.
+    Raises `InputError` for a spread that is not positive, an unbounded parameter at zero without a scale, or a name
+    that is no parameter's. `what` is what the messages call the spreads.
     """
+    check_shares(what, parameters, relative)
     spreads = []
     for p, value in zip(parameters, values, strict=True):
         share = relative
-        if isinstance(relative, dict):
-            if p.name not in relative and p.name.split(".")[-1] not in relative:
-                raise InputError(f"prior: no spread for {p.name}; there are: {', '.join(relative)}.")
-            share = relative.get(p.name, relative.get(p.name.split(".")[-1]))
+        if isinstance(relative, Mapping):
+            share = share_of(p, relative)
+            if share is None:
+                raise InputError(f"{what}: no spread for {p.name}; there are: {', '.join(relative)}.")
         value = jnp.asarray(value)
         share = jnp.asarray(share, value.dtype)
         if isinstance(p.domain, Real):
@@ -149,15 +167,11 @@ def prior_spread(parameters: tuple[Parameter, ...], values, relative) -> list[ja
         else:
             spread = share * jnp.abs(value) / p.domain.slope(value)
         spreads.append(jnp.broadcast_to(spread, value.shape))
-    _check_spreads(parameters, spreads)
+        check_positive(f"{what} spread of {p.name}", spread, advice=_ADVICE[p.scale is None and isinstance(p.domain, Real)])
     return spreads
 
 
-def _check_spreads(parameters, spreads):
-    from jaxveh._core.errors import check
-
-    for p, spread in zip(parameters, spreads, strict=True):
-        check(
-            f"prior spread of {p.name}", spread, lambda s: (s > 0) & (s < float("inf")), "positive and finite",
-            "A parameter that is known exactly should not be estimated: leave it out of `where`.",
-        )  # fmt: skip
+_ADVICE = {
+    False: "A parameter that is known exactly should not be estimated: leave it out of `where`.",
+    True: "It is relative to the value: one at zero needs a `scale`. One that is known exactly is left out of `where`.",
+}

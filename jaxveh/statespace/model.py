@@ -233,6 +233,9 @@ class PerPoint(eqx.Module):
 
 
 def cast(tree, dtype):
-    """The same model, state or recording with every float array in `dtype` (float32 or float64)."""
-    to = lambda leaf: leaf.astype(dtype) if eqx.is_inexact_array(leaf) else leaf  # noqa: E731
+    """The same model, state or recording with every float array in `dtype` (float32 or float64).
+
+    NumPy arrays stay as they are: a recording's stamps need float64 whatever the channels are.
+    """
+    to = lambda leaf: leaf.astype(dtype) if isinstance(leaf, jax.Array) and eqx.is_inexact_array(leaf) else leaf  # noqa: E731
     return jax.tree.map(to, tree)

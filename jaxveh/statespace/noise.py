@@ -9,6 +9,7 @@ from typing import ClassVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.bijectors import Interval, Positive
@@ -106,7 +107,7 @@ class MultivariateGaussian(AbstractNoise):
 
     has_covariance: ClassVar[bool] = True
     fields: tuple[str, ...] = eqx.field(static=True)
-    matrix: jax.Array = eqx.field(converter=float_array)
+    matrix: jax.Array = eqx.field(converter=lambda m: float_array(m if eqx.is_array(m) else np.asarray(m, dtype=float)))
 
     def __check_init__(self):
         k = len(self.fields)
@@ -164,8 +165,6 @@ def _flatten_batch(names, *mappings):
 
 
 def _eigenvalues(matrix):
-    import numpy as np
-
     return np.linalg.eigvalsh(np.asarray(matrix, dtype=np.float64))
 
 

@@ -9,9 +9,9 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.bijectors import AbstractBijector
-from jaxveh._core.errors import InputError
-from jaxveh._core.names import as_mapping, record_type
-from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, put, resolve, view
+from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.names import record_type
+from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_spread, put, resolve, share_of, view
 from jaxveh.statespace.model import Prior, StateSpace
 from jaxveh.statespace.noise import Gaussian, Independent
 from jaxveh.statespace.process import Continuous, join
@@ -92,7 +92,7 @@ class JointReport(eqx.Module):
 def with_parameters(
     model: StateSpace,
     where: Where,
-    prior: float | Mapping[str, float] | Gaussian,
+    prior: float | Mapping[str, float],
     walk: float | Mapping[str, float] = 0.0,
     inside: str = "",
     domain: AbstractBijector | None = None,
@@ -146,23 +146,16 @@ def _part(system, inside: str):
 
 
 def _walk(parameters, values, relative):
-    if isinstance(relative, Mapping):
-        relative = as_mapping(relative)
-        walking = [(p, v) for p, v in zip(parameters, values, strict=True) if _share(p, relative) is not None]
-        relative = {p.name: _share(p, relative) for p, _ in walking}
-    elif isinstance(relative, (int, float)) and relative == 0:
-        walking = []
-    else:
-        walking = list(zip(parameters, values, strict=True))
-    if not walking:
-        return None
-    names, values = zip(*walking, strict=True)
-    spreads = prior_spread(names, values, relative)
-    return Continuous(Gaussian({p.field: s for p, s in zip(names, spreads, strict=True)}))
-
-
-def _share(p: Parameter, relative: dict):
-    return relative.get(p.name, relative.get(p.name.split(".")[-1]))
+    """The walk's noise, or None; zero, or no entry in a mapping, means a constant."""
+    check_shares("walk", parameters, relative)
+    shares = [share_of(p, relative) if isinstance(relative, Mapping) else relative for p in parameters]
+    still = [share is None or (is_concrete(share) and share == 0) for share in shares]
+    walking = [
+        (p, prior_spread((p,), [value], share, "walk")[0])
+        for p, value, share, rests in zip(parameters, values, shares, still, strict=True)
+        if not rests
+    ]
+    return Continuous(Gaussian({p.field: spread for p, spread in walking})) if walking else None
 
 
 def start_from(model: StateSpace, **physical) -> StateSpace:

@@ -1,0 +1,102 @@
+"""Recordings: shapes, times, truth, selections, spans, filling on request, and errors that name the thing."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import InputError, Recording
+
+NAN = np.nan
+
+
+def make(**channels):
+    channels = channels or {"a": [1.0, 2.0, 3.0, 4.0], "true.a": [1, 2, 3, 5]}
+    return Recording([0.0, 0.5, 1.5, 2.0], channels, {"a": "m/s", "true.a": "m/s"}, "here")
+
+
+def test_channels_units_and_source():
+    recording = make()
+    assert recording.names == ("a", "true.a")
+    assert len(recording) == 4
+    assert "a" in recording
+    assert "b" not in recording
+    assert recording.unit("a") == "m/s"
+    assert make(c=[1, 2, 3, 4]).unit("c") == "-"
+    assert recording["true.a"].dtype == jnp.float64
+    assert recording.time.dtype == np.float64
+    assert recording.source == "here"
+
+
+def test_truth_select_without_replace():
+    recording = make()
+    np.testing.assert_array_equal(recording.truth["a"], [1, 2, 3, 5])
+    assert recording.truth.unit("a") == "m/s"
+    assert recording.select(["a"]).names == ("a",)
+    assert recording.without("a").names == ("true.a",)
+    longer = recording.replace(b=np.zeros(4), units={"b": "rad"})
+    assert longer.names == ("a", "true.a", "b")
+    assert (longer.unit("a"), longer.unit("b")) == ("m/s", "rad")
+    assert recording.replace(source="there").source == "there"
+    np.testing.assert_array_equal(recording.replace(a=np.zeros(4))["a"], 0.0)
+
+
+def test_spans_are_half_open_and_in_the_log_s_own_time():
+    recording = make()
+    np.testing.assert_array_equal(recording.between(0.5, 2.0).time, [0.5, 1.5])
+    np.testing.assert_array_equal(recording.rows(slice(1, None, 2))["a"], [2.0, 4.0])
+    with pytest.raises(InputError, match=r"span 5:6: holds no row; the log runs from 0\.0 to 2\.0 s"):
+        recording.between(5, 6)
+
+
+@pytest.mark.parametrize(
+    ("method", "max_gap", "values", "filled"),
+    [
+        ("hold", np.inf, [NAN, 1, NAN, NAN], [NAN, 1, 1, 1]),
+        ("linear", np.inf, [1, NAN, 4, NAN], [1, 2, 4, NAN]),
+        ("hold", 1.0, [1, NAN, 4, NAN], [1, NAN, 4, 4]),
+        ("linear", 1.5, [1, NAN, 4, NAN], [1, 2, 4, NAN]),
+        ("linear", 1.4, [1, NAN, 4, NAN], [1, NAN, 4, NAN]),
+        ("hold", 0.4, [1, 2, 3, NAN], [1, 2, 3, NAN]),
+    ],
+)
+def test_fill(method, max_gap, values, filled):
+    before = make(a=values)
+    np.testing.assert_allclose(before.fill("a", method, max_gap)["a"], filled)
+    np.testing.assert_array_equal(before["a"], values)
+
+
+@pytest.mark.parametrize(
+    ("make_it", "message"),
+    [
+        (lambda: Recording([], {}), r"time has shape \(0,\)"),
+        (lambda: Recording([[0.0, 1.0]], {}), r"time has shape \(1, 2\)"),
+        (lambda: Recording([0.0, 1.0], {"a": [1.0]}), r"a has shape \(1,\), time has \(2,\)"),
+        (lambda: Recording([0.0, NAN], {}), "time is not finite in row 1"),
+        (lambda: Recording([0.0, 2.0, 1.0], {}), r"time\[2\] = 1\.0 after time\[1\] = 2\.0: must be strictly increasing"),
+        (lambda: Recording([0.0, 1.0, 1.0], {}), r"Sort the rows and drop repeated stamps"),
+        (lambda: make()["b"], r"unknown name\(s\) b; there are: a, true\.a"),
+        (lambda: make().select(["x"]), r"select: unknown name\(s\) x"),
+        (lambda: make().without("x"), r"without: unknown name\(s\) x"),
+        (lambda: make(a=[1, 2, 3, 4]).truth, "no `true.` channels"),
+        (lambda: make(a=[NAN] * 4).fill("a"), "a has no finite sample at all"),
+        (lambda: make().fill("a", "cubic"), r"method = 'cubic': must be one of 'hold', 'linear'"),
+    ],
+)
+def test_errors_name_the_thing(make_it, message):
+    with pytest.raises(InputError, match=message):
+        make_it()
+
+
+def test_a_recording_passes_through_jit_and_vmap():
+    recording = make(a=np.arange(4.0))
+    doubled = jax.jit(lambda r: r.replace(a=2 * r["a"]))(recording)
+    np.testing.assert_array_equal(doubled["a"], 2 * np.arange(4.0))
+    many = jax.vmap(lambda a: recording.replace(a=a))(jnp.ones((3, 4)))
+    assert many.channels["a"].shape == (3, 4)
+
+
+def test_times_keep_their_digits_without_x64(float32):
+    recording = Recording(1.7e9 + np.array([0.0, 0.01]), {"a": [1.0, 2.0]})
+    np.testing.assert_allclose(np.diff(recording.time), 0.01, rtol=1e-4)
+    assert recording["a"].dtype == jnp.float32
