@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh.filters.base import presence
+from jaxveh.filters.base import apart, presence
 from jaxveh.filters.particle import (
     AbstractParticleFilter,
     ParticleBelief,
@@ -49,6 +49,9 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         return ParticleFilter(self.particles, self.resampling, self.threshold).init(model, row, need_key(self, key))
 
     def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         measured, present = presence(model, row)

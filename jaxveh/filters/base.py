@@ -61,6 +61,32 @@ class AbstractFilter(eqx.Module):
         """The belief after the next row."""
 
 
+@eqx.filter_jit
+def apart(function, condition, *operands):
+    """`function(*operands)` as a program of its own, so that a step's bits do not depend on what surrounds it.
+
+    XLA fuses a step with its surroundings, differently in a scan, in a live loop and beside other outputs, and rounds
+    differently with it. It never fuses across a conditional: `condition` holds for every input, and XLA must not be able
+    to know that. Called outside jit, this is compiled once as well. Transformations pass through.
+    """
+    traced = eqx.filter_closure_convert(function, *operands)
+    never = lambda *_: jax.tree.map(_zeros, traced.out_struct)  # noqa: E731
+    return jax.lax.cond(condition, lambda *given: traced(*given), never, *operands)
+
+
+def _zeros(like):
+    if jnp.issubdtype(like.dtype, jax.dtypes.prng_key):
+        # The only generator that `numerics` draws from.
+        return jax.random.wrap_key_data(jnp.zeros((*like.shape, 2), jnp.uint32), impl="threefry2x32")
+    return jnp.zeros(like.shape, like.dtype)
+
+
+def always(t):
+    """True for every time, NaN included, as a condition on its bits: all but one of the NaNs that arithmetic never makes."""
+    unsigned, odd = (jnp.uint32, 0x7FA55A5A) if t.dtype == jnp.float32 else (jnp.uint64, 0x7FF55A5A5A5A5A5A)
+    return jax.lax.bitcast_convert_type(t, unsigned) != jnp.asarray(odd, unsigned)
+
+
 def presence(model: StateSpace, row: Row) -> tuple[dict, dict]:
     """Measurements with missing ones replaced by zero, and which are present: two mappings by channel.
 

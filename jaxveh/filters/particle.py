@@ -12,7 +12,17 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
-from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info, by_channel, input_result, presence, wrap_angle
+from jaxveh.filters.base import (
+    AbstractBelief,
+    AbstractFilter,
+    Info,
+    always,
+    apart,
+    by_channel,
+    input_result,
+    presence,
+    wrap_angle,
+)
 from jaxveh.statespace import StateSpace
 
 
@@ -170,11 +180,17 @@ class ParticleFilter(AbstractParticleFilter):
         check_particle_settings(self.particles, self.threshold)
 
     def init(self, model, row, key=None):
-        particles, key = start_particles(self, model, row, need_key(self, key))
+        return apart(self._init, always(row.t), model, row, need_key(self, key))
+
+    def _init(self, model, row, key):
+        particles, key = start_particles(self, model, row, key)
         uniform = jnp.full((self.particles,), 1 / self.particles, particles[0].dtype)
         return self._weigh(model, row, particles, uniform, key, jnp.int32(0))
 
     def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         ancestors, resampled = choose_ancestors(self, draw, belief.weights)
         particles = gather(belief.particles, ancestors)

@@ -11,7 +11,17 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
-from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info, by_channel, input_result, presence, wrap_angle
+from jaxveh.filters.base import (
+    AbstractBelief,
+    AbstractFilter,
+    Info,
+    always,
+    apart,
+    by_channel,
+    input_result,
+    presence,
+    wrap_angle,
+)
 from jaxveh.numerics.sigma_points import SigmaPoints, unscented
 from jaxveh.statespace import AbstractNoise, Gaussian, Row, StateSpace
 from jaxveh.statespace.noise import LOG_2PI
@@ -106,6 +116,9 @@ class Unscented(AbstractFilter):
 
     def init(self, model, row, key=None):
         del key
+        return apart(self._init, always(row.t), model, row)
+
+    def _init(self, model, row):
         covariance = model.prior.covariance()
         belief = GaussianBelief(
             vector=jnp.stack(model.prior.mean),
@@ -178,6 +191,9 @@ class Unscented(AbstractFilter):
         return after, info
 
     def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
         return self.update(model, self._predict(model, belief, row.t, row.u), row)
 
 

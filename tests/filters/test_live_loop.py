@@ -1,0 +1,141 @@
+"""One compilation serves a live loop and the scan, bit for bit; new numbers, keys and recordings never compile anew."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from filter_systems import linear_model, linear_observation, linear_recording, linear_transition
+
+from jaxveh import Recording, filters
+from jaxveh import statespace as ss
+
+FILTERS = [filters.Unscented(), filters.ParticleFilter(64), filters.AuxiliaryParticleFilter(64, threshold=0.5)]
+IDS = ["UKF", "PF", "APF"]
+
+
+def _counted(dtype, seed=2):
+    """The linear model with a transition that counts how often it is traced."""
+    traces = []
+
+    def transition(system, t0, t1, x, u):
+        traces.append(x)
+        return linear_transition(system, t0, t1, x, u)
+
+    base = linear_model(2, 2, seed=seed, dtype=dtype)
+    model = ss.StateSpace(
+        system=base.system,
+        transition=transition,
+        observation=linear_observation,
+        process_noise=base.process_noise,
+        measurement_noise=base.measurement_noise,
+        prior=base.prior,
+        inputs=base.inputs,
+    )
+    return model, traces
+
+
+@pytest.mark.parametrize("dtype", [jnp.float64, jnp.float32], ids=["float64", "float32"])
+@pytest.mark.parametrize("filter_", FILTERS, ids=IDS)
+def test_rows_one_by_one_give_the_scan_bit_for_bit(filter_, dtype):
+    model, traces = _counted(dtype)
+    recording = linear_recording(model, rows=15)
+    key = jax.random.key(8)
+    estimate = filters.run(filter_, model, recording, key=key)
+    assert {leaf.dtype for leaf in jax.tree.leaves((estimate.mean, estimate.std, estimate.info.nis))} == {jnp.dtype(dtype)}
+    init, step = eqx.filter_jit(filter_.init), eqx.filter_jit(filter_.step)
+    # Stamps count from the start in float32, as the scan does it.
+    start = recording.time[0] if dtype == jnp.float32 else 0.0
+    spoken = lambda k: {name: recording[name][k] for name in model.channels if np.isfinite(recording[name][k])}
+    rows = [
+        model.row(recording.time[k] - start, {"force": float(recording["force"][k])}, spoken(k)) for k in range(15)
+    ]
+    del traces[:]
+    belief, info = init(model, rows[0], key)
+    assert not traces
+    infos = [info]
+    for row in rows[1:]:
+        belief, info = step(model, belief, row)
+        infos.append(info)
+    # The program that the scan traced serves the live loop.
+    assert not traces
+    together = jax.tree.map(lambda *leaves: jnp.stack(leaves), *infos)
+    for a, b in zip(jax.tree.leaves(together), jax.tree.leaves(estimate.info), strict=True):
+        np.testing.assert_array_equal(a, b)
+    for a, b in zip(jax.tree.leaves(belief), jax.tree.leaves(estimate.belief), strict=True):
+        assert a.dtype == b.dtype
+        bits = jax.random.key_data if jnp.issubdtype(a.dtype, jax.dtypes.prng_key) else np.asarray
+        np.testing.assert_array_equal(bits(a), bits(b))
+
+
+@pytest.mark.parametrize("filter_", FILTERS[:2], ids=IDS[:2])
+def test_run_compiles_once_for_other_numbers_keys_and_recordings(filter_):
+    model, traces = _counted(None)
+    recording = linear_recording(model, rows=15)
+    first = filters.run(filter_, model, recording, key=jax.random.key(0))
+    count = len(traces)
+    assert count >= 1
+    other = linear_recording(model, rows=15, seed=77).replace(source="another drive", units={"force": "N"})
+    weak = jax.jit(lambda: jnp.exp(1.0))()
+    assert weak.weak_type
+    changed = [
+        eqx.tree_at(lambda m: m.system["B"], model, model.system["B"] * 2.0),
+        eqx.tree_at(lambda m: m.prior.law, model, ss.MultivariateGaussian(model.states, np.diag([0.5, 2.0]))),
+        ss.start_from(model, x0=0.3, x1=np.float32(2)),
+        ss.start_from(model, x0=1, x1=weak),
+        eqx.tree_at(lambda m: m.measurement_noise, model, ss.MultivariateGaussian(model.channels, 2.0 * np.eye(2))),
+    ]
+    results = [filters.run(filter_, m, other, key=jax.random.key(i + 1)).log_likelihood for i, m in enumerate(changed)]
+    assert len(traces) == count
+    assert len({float(value) for value in (first.log_likelihood, *results)}) == 6
+
+
+def test_numbers_of_every_kind_in_constructors_give_one_structure():
+    traces = []
+
+    @eqx.filter_jit
+    def traced(model):
+        traces.append(model)
+        return model.prior.mean[0]
+
+    weak = jax.jit(lambda: jnp.exp(1.0))()
+    assert weak.weak_type
+    for value in (0.3, 1, np.float64(0.4), np.int32(2), jnp.asarray(0.6), jnp.asarray(2), weak):
+        prior = ss.Prior(ss.model.record("X", {"x0": value}), {"x0": value})
+        law = ss.StudentT(value, {"y0": value})
+        mixed = ss.CauchyGaussianMixture(0.5, {"y0": value}, {"y0": value})
+        traced(ss.StateSpace(transition=linear_transition, observation=linear_observation, prior=prior,
+                             process_noise=ss.Discrete(ss.Gaussian({"x0": value})), measurement_noise=law, system=mixed))  # fmt: skip
+    assert len(traces) == 1
+
+
+def test_a_belief_goes_on_where_it_stopped():
+    model, _ = _counted(None)
+    recording = linear_recording(model, rows=12)
+    rows, filter_ = model.rows(recording), filters.ParticleFilter(64)
+    whole = filters.scan(filter_, model, rows, jax.random.key(3))
+    half = filters.scan(filter_, model, jax.tree.map(lambda leaf: leaf[:6], rows), jax.random.key(3))
+    step, belief = eqx.filter_jit(filter_.step), half.belief
+    for k in range(6, 12):
+        belief, _ = step(model, belief, jax.tree.map(lambda leaf, k=k: leaf[k], rows))
+    np.testing.assert_array_equal(belief.weights, whole.belief.weights)
+    np.testing.assert_array_equal(belief.particles.x0, whole.belief.particles.x0)
+
+
+@pytest.mark.parametrize("filter_", FILTERS, ids=IDS)
+def test_without_x64_everything_is_float32(filter_, float32):
+    model, _ = _counted(None, seed=6)
+    recording = linear_recording(model, rows=15)
+    # Stamps of a clock since 1970: float32 alone would not tell them apart.
+    late = Recording(recording.time + 1.7e9, dict(recording.channels))
+    near = filters.run(filter_, model, recording, key=jax.random.key(0))
+    estimate = filters.run(filter_, model, late, key=jax.random.key(0))
+    kinds = {leaf.dtype.name for leaf in jax.tree.leaves(eqx.filter(estimate, eqx.is_inexact_array)) if leaf.ndim < 2}
+    assert "float32" in kinds
+    assert estimate.mean.x0.dtype == estimate.log_likelihood.dtype == jnp.float32
+    assert int(estimate.result) == 0
+    np.testing.assert_allclose(estimate.log_likelihood, near.log_likelihood, rtol=1e-4)
+    np.testing.assert_array_equal(estimate.time, late.time)
+    gradient = jax.grad(lambda m: filters.run(filter_, m, recording, key=jax.random.key(0)).log_likelihood)(model)
+    assert {leaf.dtype.name for leaf in jax.tree.leaves(gradient)} == {"float32"}
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(gradient))

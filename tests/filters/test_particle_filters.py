@@ -1,0 +1,246 @@
+"""Particle filters against exact answers: Kalman on linear models, a dense grid on a nonlinear one, scipy's densities."""
+
+from collections import namedtuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import scipy.special
+import scipy.stats
+from filter_systems import kalman, linear_model, linear_recording, nile_model
+
+from jaxveh import Recording, filters, numerics
+from jaxveh import statespace as ss
+
+RUNS = 300
+
+
+def _halfway(model, t0, t1, x, u):
+    """A poor look-ahead on purpose: the filter must stay unbiased whatever it is."""
+    moved = model.transition(t0, t1, x, u)
+    return type(x)(*[0.5 * (a + b) for a, b in zip(x, moved, strict=True)])
+
+
+def _spread(kind, scheme, threshold, **kwargs):
+    name = f"{kind.__name__.removesuffix('ParticleFilter')}-{scheme}-{threshold}{'-lookahead' if kwargs else ''}"
+    return pytest.param(kind(100, getattr(numerics, scheme), threshold, **kwargs), id=name)
+
+
+FILTERS = [
+    _spread(filters.ParticleFilter, "systematic", 1.0),
+    _spread(filters.ParticleFilter, "multinomial", 1.0),
+    _spread(filters.ParticleFilter, "stratified", 0.5),
+    _spread(filters.ParticleFilter, "residual", 1.0),
+    _spread(filters.AuxiliaryParticleFilter, "systematic", 0.5),
+    _spread(filters.AuxiliaryParticleFilter, "multinomial", 0.5, lookahead=_halfway),
+    _spread(filters.AuxiliaryParticleFilter, "stratified", 1.0),
+    _spread(filters.AuxiliaryParticleFilter, "residual", 1.0, lookahead=_halfway),
+]
+
+
+def _many(filter_, model, rows, runs=RUNS, seed=0):
+    """Log-likelihoods, last means and infos of independent runs."""
+
+    @jax.jit
+    def one(key):
+        estimate = filters.scan(filter_, model, rows, key)
+        return estimate.log_likelihood, jnp.stack(jax.tree.map(lambda m: m[-1], estimate.mean)), estimate.info.ess
+
+    keys = jax.random.split(jax.random.key(seed), runs)
+    return [np.asarray(value) for value in jax.vmap(one)(keys)]
+
+
+def _assert_unbiased(log_likelihoods, exact):
+    """E[exp(ll)] is the exact likelihood: the mean within three standard errors, which must be small themselves."""
+    ratio = np.exp(log_likelihoods - exact)
+    error = ratio.std() / np.sqrt(len(ratio))
+    assert error < 0.06
+    assert abs(ratio.mean() - 1) < 3 * error
+
+
+@pytest.mark.parametrize("filter_", FILTERS)
+def test_likelihood_is_unbiased_and_means_are_consistent(filter_):
+    model = linear_model(2, 2, seed=7)
+    recording = linear_recording(model, rows=12)
+    exact = kalman(model, recording)
+    log_likelihoods, means, ess = _many(filter_, model, model.rows(recording))
+    _assert_unbiased(log_likelihoods, exact["log_likelihood"].sum())
+    # Runs weighted by their likelihood together are one large importance sample of the posterior.
+    weights = np.exp(log_likelihoods - log_likelihoods.max())[:, None]
+    weights /= weights.sum()
+    mean = (weights * means).sum(axis=0)
+    error = np.sqrt((weights**2 * (means - mean) ** 2).sum(axis=0))
+    assert (np.abs(mean - exact["mean"][-1]) < 3.5 * error).all()
+    assert (error < 0.1 * np.sqrt(np.diagonal(exact["covariance"][-1]))).all()
+    assert (ess >= 1).all()
+    assert (ess <= 100 + 1e-9).all()
+
+
+State = namedtuple("State", "x")
+Square = namedtuple("Square", "y")
+
+
+def _growth(system, t0, t1, x, u):
+    """The growth model of Gordon, Salmond & Smith (1993), eq. 29."""
+    return State(x.x / 2 + 25 * x.x / (1 + x.x**2) + 8 * jnp.cos(1.2 * t1))
+
+
+def _grid_filter(measured, points=3001):
+    """Log-likelihood and means of the growth model by Bayes' rule on a dense grid."""
+    grid = np.linspace(-60, 60, points)
+    width = grid[1] - grid[0]
+    density, total, means = scipy.stats.norm.pdf(grid, 0.0, 2.0), 0.0, []
+    for k, y in enumerate(measured):
+        if k:
+            moved = grid / 2 + 25 * grid / (1 + grid**2) + 8 * np.cos(1.2 * k)
+            density = scipy.stats.norm.pdf(grid[:, None], moved[None, :], np.sqrt(10.0)) @ density * width
+        density = density * (1.0 if np.isnan(y) else scipy.stats.norm.pdf(y, grid**2 / 20, 1.0))
+        mass = density.sum() * width
+        total, density = total + np.log(mass), density / mass
+        means.append((grid * density).sum() * width)
+    return total, np.array(means)
+
+
+@pytest.mark.parametrize("kind", [filters.ParticleFilter, filters.AuxiliaryParticleFilter])
+def test_growth_model_equals_a_dense_grid(kind):
+    model = ss.StateSpace(
+        transition=_growth,
+        observation=lambda s, t, x, u: Square(x.x**2 / 20),
+        process_noise=ss.Discrete(ss.Gaussian({"x": 10.0**0.5})),
+        measurement_noise=ss.Gaussian({"y": 1.0}),
+        prior=ss.Prior(State(0.0), {"x": 2.0}),
+    )
+    rng = np.random.default_rng(2)
+    x, measured = 1.0, []
+    for k in range(12):
+        x = x / 2 + 25 * x / (1 + x**2) + 8 * np.cos(1.2 * k) + rng.normal() * 10**0.5 if k else x
+        measured.append(np.nan if k == 4 else x**2 / 20 + rng.normal())
+    exact, means = _grid_filter(measured)
+    rows = model.rows(Recording(np.arange(12.0), {"y": measured}))
+    log_likelihoods, last, _ = _many(kind(1000), model, rows, runs=60)
+    _assert_unbiased(log_likelihoods, exact)
+    error = last[:, 0].std() / np.sqrt(60)
+    assert abs(last[:, 0].mean() - means[-1]) < 4 * error + 0.02
+    assert error < 0.1
+
+
+@pytest.mark.parametrize(
+    ("law", "density"),
+    [
+        (ss.StudentT(2.5, {"flow": 80.0}), lambda r: scipy.stats.t.pdf(r, 2.5, scale=80.0)),
+        (
+            ss.CauchyGaussianMixture(0.3, {"flow": 90.0}, {"flow": 120.0}),
+            lambda r: 0.3 * scipy.stats.cauchy.pdf(r, scale=90.0) + 0.7 * scipy.stats.norm.pdf(r, scale=120.0),
+        ),
+    ],
+    ids=["StudentT", "CauchyGaussianMixture"],
+)
+def test_heavy_tails_weigh_by_scipy_s_densities(law, density):
+    model = eqx.tree_at(lambda m: m.measurement_noise, nile_model(1000.0, 300.0), law)
+    belief, info = filters.ParticleFilter(500).init(model, model.row(0.0, {}, {"flow": 3000.0}), jax.random.key(1))
+    likelihoods = density(3000.0 - np.asarray(belief.particles.level))
+    np.testing.assert_allclose(info.log_likelihood, np.log(likelihoods.mean()), rtol=1e-12)
+    np.testing.assert_allclose(belief.weights, likelihoods / likelihoods.sum(), rtol=1e-10)
+    np.testing.assert_allclose(info.ess, likelihoods.sum() ** 2 / (likelihoods**2).sum(), rtol=1e-9)
+
+
+def test_belief_s_summaries():
+    rng = np.random.default_rng(0)
+    particles, weights = rng.normal(3.0, 2.0, size=(2, 400)), rng.uniform(size=400)
+    weights /= weights.sum()
+    pair = namedtuple("Pair", "a b")(*jnp.asarray(particles))
+    belief = filters.ParticleBelief(pair, jnp.asarray(weights), jax.random.key(0), jnp.asarray(0.0), (), jnp.int32(0))
+    np.testing.assert_allclose(belief.mean, particles @ weights, rtol=1e-12)
+    expected = np.cov(particles, aweights=weights, ddof=0)
+    np.testing.assert_allclose(belief.covariance, expected, rtol=1e-12)
+    np.testing.assert_allclose(belief.std, np.sqrt(np.diag(expected)), rtol=1e-12)
+    low, high = belief.quantile(0.05), belief.quantile(0.95)
+    for field, row in zip("ab", particles, strict=True):
+        at_most = weights[row <= getattr(low, field)].sum()
+        assert 0.05 <= at_most < 0.05 + weights.max() + 1e-12
+        assert weights[row <= getattr(high, field)].sum() >= 0.95
+    shown, spread = belief.moments(nile_model())
+    np.testing.assert_allclose(shown, belief.mean, rtol=1e-12)
+    np.testing.assert_allclose(spread, belief.std, rtol=1e-10)
+
+
+def test_a_report_is_averaged_over_the_particles():
+    shown = namedtuple("Shown", "square constant")
+    base = nile_model(10.0, 3.0)
+    model = ss.StateSpace(
+        transition=base.transition_function,
+        observation=base.observation_function,
+        process_noise=base.process_noise,
+        measurement_noise=base.measurement_noise,
+        prior=base.prior,
+        report=lambda s, t, x, u: shown(x.level**2, t),
+    )
+    belief, _ = filters.ParticleFilter(200).init(model, model.row(7.0, {}, {}), jax.random.key(1))
+    mean, std = belief.moments(model)
+    levels = np.asarray(belief.particles.level)
+    np.testing.assert_allclose(mean, (np.mean(levels**2), 7.0), rtol=1e-12)
+    np.testing.assert_allclose(std, (np.std(levels**2), 0.0), rtol=1e-9)
+    gaussian, _ = filters.Unscented().init(model, model.row(7.0, {}, {}))
+    mean, std = gaussian.moments(model)
+    # The unscented transform is exact to second order: E[x^2] = 10^2 + 3^2; its beta is 2.
+    np.testing.assert_allclose(mean, (109.0, 7.0), rtol=1e-12)
+    np.testing.assert_allclose(std, (np.sqrt(2 * 9.0**2 + (60.0**2)), 0.0), rtol=1e-9)
+
+
+N = 25
+FROZEN = [
+    pytest.param(filters.ParticleFilter, dict(threshold=1.0), id="PF"),
+    pytest.param(filters.AuxiliaryParticleFilter, dict(threshold=0.7), id="APF"),
+]
+
+
+def _given_ancestors(kind, settings, model, rows, key, ancestors=None):
+    """The run with these ancestors (T-1, N), or with those that are drawn: log-likelihood and ancestors."""
+    plain = kind(N, **settings)
+    belief, first = plain.init(model, jax.tree.map(lambda leaf: leaf[0], rows), key)
+    rest = jax.tree.map(lambda leaf: leaf[1:], rows)
+
+    def body(belief, this):
+        row, given = this
+        used = []
+
+        def choose(key, weights, n):
+            used.append(numerics.systematic(key, weights, n) if ancestors is None else given)
+            return used[-1]
+
+        belief, info = kind(N, choose, **settings).step(model, belief, row)
+        return belief, (info.log_likelihood, used[0])
+
+    count = rest.t.shape[0]
+    scanned = (rest, jnp.zeros((count, N), jnp.int32) if ancestors is None else ancestors)
+    _, (increments, drawn) = jax.lax.scan(body, belief, scanned)
+    return first.log_likelihood + increments.sum(), drawn
+
+
+@pytest.mark.parametrize(("kind", "settings"), FROZEN)
+def test_gradient_equals_differences_with_frozen_ancestors(kind, settings):
+    model = linear_model(2, 2, seed=4)
+    model = eqx.tree_at(lambda m: m.prior.law, model, ss.Gaussian({"x0": 0.7, "x1": 1.2}))
+    rows, key = model.rows(linear_recording(model, rows=10)), jax.random.key(5)
+    value, gradient = jax.value_and_grad(lambda m: filters.scan(kind(N, **settings), m, rows, key).log_likelihood)(model)
+    total, ancestors = jax.jit(lambda m: _given_ancestors(kind, settings, m, rows, key))(model)
+    np.testing.assert_allclose(total, value, rtol=1e-12)
+    assert len(np.unique(ancestors)) > 3
+    frozen = jax.jit(lambda m: _given_ancestors(kind, settings, m, rows, key, ancestors)[0])
+    leaves, treedef = jax.tree.flatten(model)
+    slopes = jax.tree.leaves(gradient)
+    rng, step = np.random.default_rng(0), 1e-6
+    moved = 0
+    for i, leaf in enumerate(leaves):
+        direction = rng.normal(size=leaf.shape)
+        direction = direction + direction.T if leaf.ndim == 2 and leaf.shape[0] == leaf.shape[1] else direction
+        ends = [
+            float(frozen(jax.tree.unflatten(treedef, [*leaves[:i], leaf + s * step * direction, *leaves[i + 1 :]])))
+            for s in (1, -1)
+        ]
+        difference = (ends[0] - ends[1]) / (2 * step)
+        np.testing.assert_allclose(np.sum(slopes[i] * direction), difference, rtol=1e-6, atol=1e-6)
+        moved += abs(difference) > 1e-3
+    assert moved == len(leaves)
