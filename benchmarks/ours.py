@@ -11,11 +11,20 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxveh
-from jaxveh import numerics, statespace
+from jaxveh import estimators, numerics, sensors, statespace, tyres, vehicles
+from jaxveh._core.bijectors import Real
 
 from .problems import SingleTrack, SpeedAndMass
 
-__all__ = ["blocked", "precision", "single_track_model", "single_track_recording", "speed_model", "speed_recording"]
+__all__ = [
+    "blocked",
+    "precision",
+    "single_track_model",
+    "single_track_recording",
+    "speed_model",
+    "speed_recording",
+    "vehicle_model",
+]
 
 
 def precision(dtype: np.typing.DTypeLike):
@@ -69,8 +78,8 @@ def _magic_formula(slip, D, C, B, E):
 
 
 def _forces(chassis, x, motion, u):
-    front = u.steer - numerics.arctan((motion.v_y + chassis.front * motion.yaw_rate) / u.speed)
-    rear = -numerics.arctan((motion.v_y - chassis.rear * motion.yaw_rate) / u.speed)
+    front = u.steer - numerics.arctan((motion.v_y + chassis.front * motion.yaw_rate) / u.v_x)
+    rear = -numerics.arctan((motion.v_y - chassis.rear * motion.yaw_rate) / u.v_x)
     force_front = _magic_formula(front, x.front_D, x.front_C, x.front_B, x.front_E) * numerics.cos(u.steer)
     return force_front, _magic_formula(rear, x.rear_D, x.rear_C, x.rear_B, x.rear_E)
 
@@ -79,7 +88,7 @@ def _derivatives(system, t, motion, u):
     chassis, x = system
     front, rear = _forces(chassis, x, motion, u)
     return Motion(
-        (front + rear) / chassis.mass - u.speed * motion.yaw_rate,
+        (front + rear) / chassis.mass - u.v_x * motion.yaw_rate,
         motion.yaw_rate,
         (chassis.front * front - chassis.rear * rear) / chassis.inertia,
     )
@@ -108,16 +117,46 @@ def single_track_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> stat
         process_noise=statespace.Discrete(statespace.Gaussian(_by_name(Car, p.process_std))),
         measurement_noise={"yaw_rate": p.yaw_rate_std, "a_y": p.lateral_acceleration_std},
         prior=statespace.Prior(Car(*map(float, p.prior_mean)), _by_name(Car, p.prior_std)),
-        inputs=("steer", "speed"),
+        inputs=("steer", "v_x"),
     )
     return statespace.cast(model, dtype)
+
+
+def vehicle_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
+    """The same state space from the library's own vehicle, tyres and sensors.
+
+    Its parameters walk additively (`Real`), as the other contestants' do. Its front slip angle is that of the turned
+    wheel's own axes, a rotation more than the paper's formula, which for given v_x is the same angle.
+    """
+    p = problem
+    axles = [tyres.MagicFormula(B=B, C=C, D=D, E=E) for D, C, B, E in p.prior_mean[3:].reshape(2, 4)]
+    car = vehicles.SingleTrack(p.mass, p.inertia, p.front, p.rear, *axles)
+    model = estimators.state_space(
+        car,
+        sensors.SensorSet(statespace.Gaussian({"yaw_rate": p.yaw_rate_std, "a_y": p.lateral_acceleration_std})),
+        estimate=lambda car: [(axle.D, axle.C, axle.B, axle.E) for axle in (car.front, car.rear)],
+        prior=_relative(p, p.prior_std),
+        walk=_relative(p, p.process_std / np.sqrt(p.step)),
+        domain=Real(),
+        process_noise=dict(zip(Motion._fields, (p.process_std[:3] / np.sqrt(p.step)).tolist(), strict=True)),
+        start_spread=dict(zip(Motion._fields, p.prior_std[:3].tolist(), strict=True)),
+        report=(),
+    )
+    return statespace.cast(model, dtype)
+
+
+def _relative(problem: SingleTrack, std: np.ndarray) -> dict[str, float]:
+    """Spreads of the coefficients as the library takes them: shares of the value, for E of its scale, which is 2."""
+    names = [f"{axle}.{letter}" for axle in ("front", "rear") for letter in "DCBE"]
+    values = [2.0 if name.endswith("E") else float(v) for name, v in zip(names, problem.prior_mean[3:], strict=True)]
+    return {name: float(s) / v for name, s, v in zip(names, std[3:], values, strict=True)}
 
 
 def single_track_recording(problem: SingleTrack) -> jaxveh.Recording:
     """The measurements as a recording."""
     channels = {
         "steer": problem.steer,
-        "speed": problem.speed,
+        "v_x": problem.speed,
         "yaw_rate": problem.yaw_rate,
         "a_y": problem.lateral_acceleration,
     }

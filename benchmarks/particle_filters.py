@@ -17,7 +17,7 @@ from .problems import SingleTrack, single_track
 
 __all__ = ["cases"]
 
-OURS, LIMIT = "jaxveh", "C++ limit"
+VEHICLE, OWN_MODEL, LIMIT = "jaxveh", "jaxveh, own model", "C++ limit"
 
 # What a step may cost over the limit, by precision.
 BOUNDS = {"float64": 1.6, "float32": 2.6}
@@ -36,7 +36,7 @@ def cases(smoke: bool) -> list[Case]:
                         unit="ns a particle-step",
                         build=functools.partial(_build, kind == "apf", np.dtype(dtype), count, smoke),
                         base=LIMIT,
-                        bounds=(Bound(OURS, (LIMIT,), BOUNDS[dtype]),),
+                        bounds=tuple(Bound(name, (LIMIT,), BOUNDS[dtype]) for name in (VEHICLE, OWN_MODEL)),
                     )
                 )
     return made
@@ -47,7 +47,11 @@ def _build(auxiliary: bool, dtype: np.dtype, count: int, smoke: bool) -> Sequenc
     rows, few = (20, 10) if smoke else (700, 60)
     problem, short = (single_track(n, dtype=dtype.type) for n in (rows, few))
     work, little = count * (rows - 1), count * (few - 1)
-    made: list[Contestant | Skipped] = [_ours(problem, count, auxiliary, dtype, work)]
+    filter_ = (filters.AuxiliaryParticleFilter if auxiliary else filters.ParticleFilter)(count)
+    made: list[Contestant | Skipped] = [
+        _ours(VEHICLE, ours.vehicle_model, filter_, problem, dtype, work),
+        _ours(OWN_MODEL, ours.single_track_model, filter_, problem, dtype, work),
+    ]
     reason = limit.unavailable()
     if reason:
         made.append(Skipped(LIMIT, reason))
@@ -62,16 +66,22 @@ def _build(auxiliary: bool, dtype: np.dtype, count: int, smoke: bool) -> Sequenc
     return made
 
 
-def _ours(problem: SingleTrack, count: int, auxiliary: bool, dtype: np.dtype, work: float) -> Contestant:
-    filter_ = (filters.AuxiliaryParticleFilter if auxiliary else filters.ParticleFilter)(count)
+def _ours(
+    name: str,
+    build: Callable,
+    filter_: filters.AbstractFilter,
+    problem: SingleTrack,
+    dtype: np.dtype,
+    work: float,
+) -> Contestant:
     with ours.precision(dtype):
-        model, recording = ours.single_track_model(problem, dtype), ours.single_track_recording(problem)
+        model, recording = build(problem, dtype), ours.single_track_recording(problem)
 
     def call(seed: int) -> filters.Estimate:
         with ours.precision(dtype):
             return filters.run(filter_, model, recording, key=jax.random.key(seed))
 
-    return Contestant(OURS, ours.blocked(call), work)
+    return Contestant(name, ours.blocked(call), work)
 
 
 def _particles(

@@ -85,6 +85,29 @@ def test_our_particle_filter_agrees_with_numpy(drive, numpy_logs):
     assert_same_likelihood(logs, numpy_logs)
 
 
+def test_the_librarys_vehicle_is_the_same_model(drive):
+    own, library = ours.single_track_model(drive, np.float64), ours.vehicle_model(drive, np.float64)
+    order = [library.states.index(name) for name in own.states]
+    draws = np.random.default_rng(0).standard_normal((11, 50))
+    x = drive.prior_mean[:, None] + 5 * drive.prior_std[:, None] * draws
+    for k in (0, 40):
+        u = library.rows(ours.single_track_recording(drive)).u
+        u = type(u)(*[leaf[k] for leaf in u])
+        placed = type(library.prior.mean)(*[x[list(own.states).index(name)] for name in library.states])
+        moved = np.stack(library.transition(0.0, drive.step, placed, u))[order]
+        np.testing.assert_allclose(moved, drive.transition(x, drive.steer[k], drive.speed[k]), rtol=1e-9, atol=1e-12)
+        seen = library.observation(0.0, placed, u)
+        front, rear = drive.axle_forces(x, drive.steer[k], drive.speed[k])
+        np.testing.assert_allclose(seen.a_y, (front + rear) / drive.mass, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(np.stack(library.prior.mean)[order], drive.prior_mean, rtol=1e-12)
+    for law, expected in (
+        (library.prior.law, drive.prior_std),
+        (library.process_noise.over(drive.step), drive.process_std),
+    ):
+        std = dict(zip(law.names, np.sqrt(np.diagonal(law.covariance())), strict=True))
+        np.testing.assert_allclose([std[name] for name in own.states], expected, rtol=1e-9)
+
+
 @pytest.mark.peers
 @pytest.mark.parametrize("auxiliary", [False, True], ids=["pf", "apf"])
 @pytest.mark.parametrize("name", ["particles", "smcx"])
