@@ -89,9 +89,11 @@ def sin_cos_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Ar
     """
     bits = 8 * word.dtype.itemsize
     signed = jnp.int32 if bits == 32 else jnp.int64
-    # The low three bits select; of the others, the conversion keeps those that the floating type holds.
+    # The low three bits select, and are set to 7 in the angle: less 3, it is symmetric about 0 and never 0.
     integer = lax.bitcast_convert_type(word | _bits(word, 7), signed)
-    r = integer.astype(dtype) * (math.pi / 4 / 2.0 ** (bits - 1))
+    unit = 2.0 ** (1 - bits)
+    # The sum between the scales also keeps XLA from joining them: the powers of so small a constant underflow.
+    r = (integer.astype(dtype) * unit - 3 * unit) * (math.pi / 4)
     t = r * r
     sine = r + r * t * polynomials.evaluate(
         polynomials.of_dtype(r, polynomials.OCTANT_SINE_32, polynomials.OCTANT_SINE_64), t

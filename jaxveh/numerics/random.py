@@ -54,7 +54,7 @@ def exponential(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -
 
 
 def cauchy(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
-    """Standard Cauchy numbers of `shape`, tangents of random angles; |z| reaches 3e9 (float32) or 1e19 (float64)."""
+    """Standard Cauchy numbers of `shape`, tangents of random angles; |z| reaches 7e8 (float32) or 3e18 (float64)."""
     return _cauchy(key, _shape(shape), _dtype(dtype))
 
 
