@@ -23,10 +23,14 @@ LOG_2PI = 1.8378770664093453
 class AbstractNoise(eqx.Module):
     """A zero-mean additive noise law over named scalar fields.
 
-    A batch is a mapping from each name to an array of any common shape. `has_covariance`: whether the law has one.
+    A batch is a mapping from each name to an array of any common shape.
     """
 
-    has_covariance: eqx.AbstractVar[bool]
+    # Not an `eqx.AbstractVar`: under postponed annotations that would be a field of the dataclass.
+    @property
+    @abc.abstractmethod
+    def has_covariance(self) -> bool:
+        """Whether the law has a covariance."""
 
     @property
     @abc.abstractmethod
