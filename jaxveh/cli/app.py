@@ -11,7 +11,7 @@ from jaxveh.cli.check import check
 from jaxveh.cli.console import results
 from jaxveh.cli.demo import demo
 from jaxveh.cli.estimate import estimate
-from jaxveh.cli.failure import program
+from jaxveh.cli.failure import flowing, program
 from jaxveh.cli.fit import fit
 from jaxveh.cli.reproduce import tyre_apf
 from jaxveh.cli.schema import schema
@@ -30,7 +30,7 @@ Start with: jaxveh demo
 
 app = typer.Typer(
     name="jaxveh",
-    help=HELP,
+    help=flowing(HELP),
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -42,18 +42,20 @@ reproduce = typer.Typer(help="Papers computed again, as printed and honestly.", 
 
 def _version(wanted: bool) -> None:
     if wanted:
-        results().print(f"jaxveh {jaxveh.__version__}", highlight=False)
+        results().print(f"jaxveh {jaxveh.__version__}")
         raise typer.Exit
 
 
 @app.callback()
 def options(
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
 ) -> None:
     """Options before the command."""
 
 
-options.__doc__ = HELP
+options.__doc__ = flowing(HELP)
 
 for command in (demo, check, simulate, estimate, fit, schema):
     app.command()(program(command))

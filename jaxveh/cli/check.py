@@ -23,7 +23,9 @@ def check(
     log: options.Log,
     vehicle: Annotated[
         Path | None,
-        typer.Option("--vehicle", metavar="CAR.toml", help="The car: adds the checks that need one (steering offset, signs)."),
+        typer.Option(
+            "--vehicle", metavar="CAR.toml", help="The car: adds the checks that need one (steering offset, signs)."
+        ),
     ] = None,
     channels: options.Channels = None,
     out: options.Out = None,
@@ -45,7 +47,7 @@ def check(
 
         make_folder(out)
         path = plots.save(plots.recording(recording), out / "channels.png")
-        results().print(f"figure: {path}", highlight=False)
+        results().print(f"figure: {path}")
     found = [finding._asdict() for finding in findings]
     configuration = {"log": log, "vehicle": vehicle, "channels": channels}
     write_numbers(numbers, {"log": _summary(recording), "findings": found}, configuration, None)
@@ -65,8 +67,8 @@ def _summary(recording: Recording) -> dict:
 def _print(log: Path, recording: Recording, findings) -> None:
     console, about = results(), _summary(recording)
     step = "" if about["median_step_s"] is None else f", every {about['median_step_s']:g} s"
-    console.print(f"[bold]{log.name}[/]: {about['rows']} rows from {about['start_s']:g} to {about['end_s']:g} s{step}",
-                  highlight=False)  # fmt: skip
+    rows, start, end = about["rows"], about["start_s"], about["end_s"]
+    console.print(Text(log.name, "bold"), f"{rows} rows from {start:g} to {end:g} s{step}")
     lines = Table.grid(padding=(0, 2))
     lines.add_column(justify="right")
     lines.add_column(no_wrap=True)
@@ -77,4 +79,4 @@ def _print(log: Path, recording: Recording, findings) -> None:
                 lines.add_row(Text(severity, COLOURS[severity]), Text(finding.channel), Text(finding.message))
     console.print(lines)
     counts = {s: sum(finding.severity == s for finding in findings) for s in ORDER}
-    console.print(", ".join(f"{count} {name}" for name, count in counts.items()), highlight=False)
+    console.print(", ".join(f"{count} {name}" for name, count in counts.items()))

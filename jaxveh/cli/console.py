@@ -14,12 +14,12 @@ from jaxveh._core.progress import Progress as Report
 
 def messages() -> Console:
     """stderr; made anew each time, so that a redirected stream is seen."""
-    return Console(stderr=True)
+    return Console(stderr=True, emoji=False, highlight=False)
 
 
 def results() -> Console:
     """stdout."""
-    return Console()
+    return Console(emoji=False, highlight=False)
 
 
 @contextlib.contextmanager
@@ -47,7 +47,7 @@ def _lines(console: Console, title: str) -> Report:
     def report(done: float, total: float, stage: str) -> None:
         if stage and (not seen or seen[-1] != stage):
             seen.append(stage)
-            console.print(f"{title}: {stage}", highlight=False, markup=False, soft_wrap=True)
+            console.print(f"{title}: {stage}", markup=False, soft_wrap=True)
 
     return report
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import inspect
+import typing
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Annotated
@@ -30,11 +31,19 @@ def program(function: Callable) -> Callable:
             with _errors_in_words():
                 return function(*args, **kwargs)
 
-    signature = inspect.signature(function)
+    # typer reads annotations as objects; behind a wrapper it would find their text.
+    hints = typing.get_type_hints(function, include_extras=True)
+    own = [p.replace(annotation=hints[name]) for name, p in inspect.signature(function).parameters.items()]
     option = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Debug)
-    guarded.__signature__ = signature.replace(parameters=[*signature.parameters.values(), option])
-    guarded.__annotations__ = {**function.__annotations__, "debug": Debug}
+    guarded.__signature__ = inspect.Signature([*own, option])
+    guarded.__annotations__ = {**hints, "debug": Debug}
+    guarded.__doc__ = flowing(function.__doc__ or "")
     return guarded
+
+
+def flowing(text: str) -> str:
+    """A docstring whose paragraphs are one line each, for a terminal to break."""
+    return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
 
 
 @contextlib.contextmanager
@@ -81,4 +90,4 @@ def say(kind: str, colour: str, message: object) -> None:
     """One unwrapped line on stderr: `kind: message`."""
     line = " ".join(str(message).split())
     messages().print(f"[bold {colour}]{kind}:[/] ", end="", soft_wrap=True)
-    messages().print(line, markup=False, highlight=False, soft_wrap=True)
+    messages().print(line, markup=False, soft_wrap=True)

@@ -32,7 +32,9 @@ Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write fi
 
 Force = Annotated[bool, typer.Option("--force", help="Let -o replace an existing file.")]
 
-Seed = Annotated[int, typer.Option("--seed", help="Of the random numbers; the same seed gives the same numbers.", min=0)]
+Seed = Annotated[
+    int, typer.Option("--seed", help="Of the random numbers; the same seed gives the same numbers.", min=0)
+]
 
 Calibrate = Annotated[
     str | None,

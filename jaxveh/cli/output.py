@@ -17,7 +17,9 @@ import jaxveh
 from jaxveh import InputError, io
 
 
-def check_product(path: Path | None, suffixes: tuple[str, ...], force: bool, sources: tuple[Path | None, ...] = ()) -> None:
+def check_product(
+    path: Path | None, suffixes: tuple[str, ...], force: bool, sources: tuple[Path | None, ...] = ()
+) -> None:
     """Raise before any work where `-o` could not be written in the end: suffix, folder, an existing file, an input."""
     if path is None:
         return
@@ -64,7 +66,9 @@ def make_folder(out: Path) -> None:
         raise InputError(f"--out {out}: cannot be made ({error.strerror}).") from error
 
 
-def write_numbers(path: Path | None, numbers: Mapping[str, Any], configuration: Mapping[str, Any], seed: int | None) -> None:
+def write_numbers(
+    path: Path | None, numbers: Mapping[str, Any], configuration: Mapping[str, Any], seed: int | None
+) -> None:
     """Write numbers and the manifest as JSON, replacing what was there; what is not finite becomes null."""
     if path is None:
         return

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from jaxveh.cli import options
@@ -41,7 +40,7 @@ def tyre_apf(
     if out is not None:
         make_folder(out)
         for path in _figures(found, out):
-            results().print(f"figure: {path}", highlight=False)
+            results().print(f"figure: {path}")
     shown = {
         "checks": [check._asdict() for check in checks],
         "tables": [one._asdict() for one in tables],
@@ -58,7 +57,7 @@ def tyre_apf(
 def _print_checks(checks) -> None:
     rows = [("yes" if c.holds else "NO", c.name, number(c.value), number(c.bound)) for c in checks]
     table("Checks", ("holds", "criterion", "value", "bound"), rows)
-    results().print(f"{sum(c.holds for c in checks)} of {len(checks)} hold", highlight=False)
+    results().print(f"{sum(c.holds for c in checks)} of {len(checks)} hold")
 
 
 def _bounds(report) -> dict:
@@ -71,9 +70,7 @@ def _bounds(report) -> dict:
 
 def _figures(found, out):
     from jaxveh import plots
-    from jaxveh.cli.study_figures import curves, parameters
+    from jaxveh.experiments.tyre_apf import figures
 
-    first = lambda tree: {name: np.asarray(value)[0] for name, value in tree.items()}  # noqa: E731
-    outcome = found.outcome
-    yield plots.save(curves(outcome, found.study), out / "force_curves.png")
-    yield plots.save(parameters(first(outcome.parameters), first(outcome.spread), found.study), out / "parameters.png")
+    yield plots.save(figures.curves_figure(found.outcome, found.study), out / "force_curves.png")
+    yield plots.save(figures.parameters_figure(found.outcome, found.study), out / "parameters.png")

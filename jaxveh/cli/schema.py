@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -12,7 +12,7 @@ from jaxveh.io import car as car_file
 from jaxveh.io import channel_map as channel_file
 
 
-class File(str, Enum):
+class File(StrEnum):
     """Which file to explain."""
 
     car = "car"

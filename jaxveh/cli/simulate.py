@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -18,7 +18,7 @@ from jaxveh.cli.output import check_product, check_report, make_folder, write_nu
 from jaxveh.cli.vehicle import BUILT_IN, car_of
 
 
-class Manoeuvre(str, Enum):
+class Manoeuvre(StrEnum):
     """What the driver does."""
 
     double_lane_change = "double-lane-change"
@@ -31,12 +31,15 @@ VEHICLE_HELP = f"A car file (jaxveh schema car), or one of {', '.join(BUILT_IN)}
 
 def simulate(
     product: Annotated[
-        Path, typer.Option("-o", metavar="FILE", help="The recording: .csv, .parquet, .mf4 or .mdf.", show_default=False)
+        Path,
+        typer.Option("-o", metavar="FILE", help="The recording: .csv, .parquet, .mf4 or .mdf.", show_default=False),
     ],
     vehicle: Annotated[str, typer.Option("--vehicle", metavar="CAR", help=VEHICLE_HELP)] = "passenger_car",
     manoeuvre: Annotated[Manoeuvre, typer.Option("--manoeuvre")] = Manoeuvre.double_lane_change,
     speed: Annotated[float, typer.Option("--speed", help="m/s, held.")] = 25.0,
-    steer_deg: Annotated[float, typer.Option("--steer-deg", help="Amplitude at the road wheels, degrees, left positive.")] = 7.0,
+    steer_deg: Annotated[
+        float, typer.Option("--steer-deg", help="Amplitude at the road wheels, degrees, left positive.")
+    ] = 7.0,
     duration: Annotated[float, typer.Option("--duration", help="s")] = 7.0,
     rate: Annotated[float, typer.Option("--rate", help="Rows a second, Hz.")] = 100.0,
     yaw_rate_std: Annotated[float, typer.Option("--yaw-rate-std", help="Noise of the yaw rate, rad/s.")] = 0.005,
@@ -60,12 +63,12 @@ def simulate(
         report(0, 1, f"{manoeuvre.value} (compiling)")
         recording = simulation.simulate(car, drive, devices, key=jax.random.key(seed), dt=1 / rate)
     io.write_recording(recording, product, overwrite=force)
-    results().print(f"{product}: {len(recording)} rows, {', '.join(recording.names)}", highlight=False)
+    results().print(f"{product}: {len(recording)} rows, {', '.join(recording.names)}")
     if out is not None:
         from jaxveh import plots
 
         make_folder(out)
-        results().print(f"figure: {plots.save(plots.recording(recording), out / 'channels.png')}", highlight=False)
+        results().print(f"figure: {plots.save(plots.recording(recording), out / 'channels.png')}")
     configuration = {
         "vehicle": vehicle, "manoeuvre": manoeuvre.value, "speed": speed, "steer_deg": steer_deg, "duration": duration,
         "rate": rate, "yaw_rate_std": yaw_rate_std, "a_y_std": a_y_std,

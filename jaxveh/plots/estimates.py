@@ -49,7 +49,9 @@ def estimate(
             _truth(ax, time, truth, name)
             for index, (label, values) in enumerate((others or {}).items()):
                 if name in values:
-                    ax.plot(time, quantity(name).show(values[name]), color=colour(label, index + 2), lw=0.9, label=label)
+                    ax.plot(
+                        time, quantity(name).show(values[name]), color=colour(label, index + 2), lw=0.9, label=label
+                    )
             for index, (label, one) in enumerate(labelled.items()):
                 _one(ax, one, name, label, colour(label, index))
             label_above(ax, quantity(name).label)

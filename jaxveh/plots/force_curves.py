@@ -58,7 +58,9 @@ def _curves(ax: Any, axle: str, cars: Mapping[str, Any], visited: Any, draws: An
     slip, degrees = _grid(visited)
     if draws is not None:
         low, high = _band(draws, axle, slip)
-        ax.fill_between(degrees, low / 1e3, high / 1e3, color=COLOURS["prior"], alpha=0.18, lw=0, label="prior, 95 % band")
+        ax.fill_between(
+            degrees, low / 1e3, high / 1e3, color=COLOURS["prior"], alpha=0.18, lw=0, label="prior, 95 % band"
+        )
     for index, (label, car) in enumerate(cars.items()):
         _line(ax, degrees, lateral_force(car, axle, slip) / 1e3, label, index)
     _rug(ax, np.degrees(np.asarray(visited)))

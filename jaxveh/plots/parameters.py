@@ -30,7 +30,11 @@ def parameters(
     """
     truth, scale = np.asarray(truth, dtype=np.float64), np.asarray(scale, dtype=np.float64)
     count, labels = len(names), list(mean)
-    for what, values in {"truth": truth, "scale": scale, **{f"mean of {k}": np.asarray(v) for k, v in mean.items()}}.items():
+    for what, values in {
+        "truth": truth,
+        "scale": scale,
+        **{f"mean of {k}": np.asarray(v) for k, v in mean.items()},
+    }.items():
         if values.shape != (count,):
             raise InputError(f"plots.parameters: {what} has shape {values.shape}; must be ({count},) for the names.")
     check_positive("scale", scale)

@@ -64,4 +64,3 @@ def _mark_silence(ax: Any, time: np.ndarray, values: np.ndarray) -> None:
         ax.set_xlim(time[0], time[-1])
         ax.set_yticks([])
         ax.text(0.5, 0.5, "no finite sample", transform=ax.transAxes, ha="center", va="center", color="#888888")
-

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -10,10 +11,13 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from jaxveh import filters, vehicles
+from jaxveh import estimators, filters, manoeuvres, vehicles
 from jaxveh._core.parameter import pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, silent
+from jaxveh._core.recording import Recording
+from jaxveh.diagnostics.observability import Observability
 from jaxveh.experiments.tyre_apf.settings import STEP_STEER, Study, tyres
 from jaxveh.experiments.tyre_apf.study import (
     ESTIMATORS,
@@ -25,11 +29,11 @@ from jaxveh.experiments.tyre_apf.study import (
     model_of,
     open_loop,
     state_errors,
-    step_steer_errors,
     with_tyres,
 )
 from jaxveh.fitting.multiple_shooting import shoot
 from jaxveh.fitting.segments import cut
+from jaxveh.simulation import simulate
 
 FILTERS = ("PF", "APF", "UKF")
 
@@ -46,7 +50,7 @@ class Staged(NamedTuple):
 
     `outcome`, `steps`: as `run_seeds` returns them. `estimates`: the filters' `Estimate` by name; `fit`: the MAP's
     `fitting.Fit`. `open_loop`: mapping from `prior` and `MAP` to the states that those tyres give without any
-    measurement. `seconds`: by stage.
+    measurement. `observability`: what the drive can tell of the eight parameters at all, at the truth. `seconds`: by stage.
     """
 
     outcome: Outcome
@@ -54,6 +58,7 @@ class Staged(NamedTuple):
     estimates: dict
     fit: Any
     open_loop: dict
+    observability: Observability
     seconds: dict[str, Seconds]
 
 
@@ -61,22 +66,31 @@ def run_staged(study: Study, keys, progress: Progress = silent) -> Staged:
     """The study over `keys` (seeds,), compiled and run in stages; the same numbers as `run_seeds` but for rounding."""
     clock = _Clock(keys.shape[0], progress)
     parts = jax.vmap(lambda key: jax.random.split(key, 4))(keys)
-    drive, guess = clock.one("simulation", lambda a, b: (drive_once(study, a), guess_once(study, b)), parts[:, 0], parts[:, 1])
+    drive, guess = clock.one(
+        "simulation", lambda a, b: (drive_once(study, a), guess_once(study, b)), parts[:, 0], parts[:, 1]
+    )
     segments = _segments(study, drive, guess)
     values_like = jnp.zeros((keys.shape[0], len(ESTIMATORS), len(FIELDS)), drive.time.dtype)
     tasks = {
-        "PF": (_filter(study, filters.ParticleFilter(study.particles), study.walk), guess, drive, parts[:, 2]),
-        "APF": (_filter(study, filters.AuxiliaryParticleFilter(study.particles), study.walk), guess, drive, parts[:, 3]),
-        "UKF": (_filter(study, filters.Unscented(), 0.0), guess, drive, parts[:, 2]),
         "MAP": (_fit(study), guess, segments),
         "errors and step steers": (_judge(study), values_like, drive),
+        "PF": (_filter(study, filters.ParticleFilter(study.particles), study.walk), guess, drive, parts[:, 2]),
+        "APF": (
+            _filter(study, filters.AuxiliaryParticleFilter(study.particles), study.walk),
+            guess,
+            drive,
+            parts[:, 3],
+        ),
+        "UKF": (_filter(study, filters.Unscented(), 0.0), guess, drive, parts[:, 2]),
     }
-    done = clock.many(tasks, hold=("errors and step steers",))
+    seen = _first(drive)
+    observed = lambda: estimators.observe(model_of(study, vehicles.passenger_car()), seen)
+    done = clock.many(tasks, hold=("errors and step steers",), host={"observability": observed})
     fit, estimates = done["MAP"], {name: done[name] for name in FILTERS}
     values, spread = _parameters(study, guess, estimates, fit)
     stacked = jnp.stack([values[name] for name in ESTIMATORS], axis=1)
     curves, states, loops, steps = clock.run("errors and step steers", stacked, drive)
-    by_name = lambda array: {name: array[:, i] for i, name in enumerate(ESTIMATORS)}  # noqa: E731
+    by_name = lambda array: {name: array[:, i] for i, name in enumerate(ESTIMATORS)}
     filtered = {name: jax.vmap(state_errors)(estimate.mean, drive) for name, estimate in estimates.items()}
     nothing = jnp.full((keys.shape[0],), jnp.nan)
     outcome = Outcome(
@@ -90,7 +104,8 @@ def run_staged(study: Study, keys, progress: Progress = silent) -> Staged:
         result={**{n: e.result for n, e in estimates.items()}, "MAP": fit.result, "prior": jnp.zeros_like(fit.result)},
     )
     loops = {name: {k: v[:, ESTIMATORS.index(name)] for k, v in loops.items()} for name in ("prior", "MAP")}
-    return Staged(outcome, {d: by_name(e) for d, e in steps.items()}, estimates, fit, loops, clock.seconds)
+    by_angle = {degrees: by_name(errors) for degrees, errors in steps.items()}
+    return Staged(outcome, by_angle, estimates, fit, loops, done["observability"], clock.seconds)
 
 
 def _filter(study: Study, kind, walk: float) -> Callable:
@@ -115,17 +130,35 @@ def _judge(study: Study) -> Callable:
     def each(values, drive):
         car = with_tyres(values)
         truth = open_loop(study, car).truth
-        kept = {name: truth[name] for name in ("v_y", "yaw_rate", "sideslip") if name in truth}
-        steps = {degrees: step_steer_errors(values, degrees, study) for degrees in STEP_STEER}
-        return curve_error(car, drive), state_errors(truth.channels, drive), kept, steps
+        shown = {name: truth[name] for name in ("v_y", "yaw_rate", "sideslip")}
+        return curve_error(car, drive), state_errors(truth.channels, drive), shown
 
-    return lambda values, drive: jax.vmap(each, in_axes=(0, None))(values, drive)
+    def judge(values, drive):
+        curves, states, shown = jax.vmap(each, in_axes=(0, None))(values, drive)
+        return curves, states, shown, _step_steers(study, values)
+
+    return judge
+
+
+def _step_steers(study: Study, values) -> dict:
+    """What `step_steer_errors` says of each estimator's tyres (5, 8), by angle; one simulation for all of them."""
+    truth = jnp.stack(pick(vehicles.passenger_car(), resolve(vehicles.passenger_car(), tyres)))
+    steers = jnp.asarray([math.radians(degrees) for degrees in STEP_STEER], values.dtype)
+
+    def go(one, steer):
+        manoeuvre = manoeuvres.step_steer(speed=study.speed, steer=steer, ramp=0.2, duration=study.duration)
+        found = simulate(with_tyres(one), manoeuvre, None, dt=1 / study.rate, throw=False).truth
+        return jnp.stack([found["yaw"], found["yaw_rate"]])
+
+    rows = jax.vmap(lambda one: jax.vmap(lambda steer: go(one, steer))(steers))(jnp.concatenate([truth[None], values]))
+    errors = jnp.sqrt(jnp.mean((rows[1:] - rows[:1]) ** 2, axis=-1))
+    return {degrees: errors[:, i] for i, degrees in enumerate(STEP_STEER)}
 
 
 def _segments(study: Study, drive, guess):
     """The fit's segments of every seed, stacked; cutting is host-side work."""
     count = drive.time.shape[0]
-    each = lambda i: jax.tree.map(lambda leaf: leaf[i], (guess, drive))  # noqa: E731
+    each = lambda i: jax.tree.map(lambda leaf: leaf[i], (guess, drive))
     parts = []
     for i in range(count):
         car, recording = each(i)
@@ -160,27 +193,34 @@ class _Clock:
         self.count, self.progress = count, progress
         self.seconds: dict[str, Seconds] = {}
         self.compiled: dict[str, Any] = {}
-        self.done, self.total = 0.0, 12.0
+        self.done, self.total = 0.0, 13.0
 
     def one(self, name: str, function: Callable, *args):
         self.progress(self.done, self.total, f"compiling: {name}")
         self._compile(name, function, *args)
         return self.run(name, *args)
 
-    def many(self, tasks: dict[str, tuple], hold: tuple[str, ...]) -> dict:
-        """Compile all of them, and run those that are not held back."""
-        waiting = list(tasks)
+    def many(self, tasks: dict[str, tuple], hold: tuple[str, ...], host: dict[str, Callable]) -> dict:
+        """Compile all tasks and run those that are not held back; `host`: functions that compile by themselves."""
+        # The compiler does not hold Python's lock, so that a second core helps; the longest come first.
+        waiting = [*tasks, *host]
         self.progress(self.done, self.total, f"compiling: {', '.join(waiting)}")
 
-        def compile_one(name):
-            self._compile(name, *tasks[name])
+        def finish(name, result=None):
             waiting.remove(name)
             self.progress(self.done, self.total, f"compiling: {', '.join(waiting)}" if waiting else "compiled")
+            return result
 
-        # The compiler does not hold Python's lock, so that a second core helps.
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(compile_one, tasks))
-        return {name: self.run(name, *task[1:]) for name, task in tasks.items() if name not in hold}
+            compiling = [
+                pool.submit(lambda n=name, t=task: finish(n, self._compile(n, *t))) for name, task in tasks.items()
+            ]
+            others = {name: pool.submit(lambda n=name, f=function: finish(n, f())) for name, function in host.items()}
+            for future in compiling:
+                future.result()
+            done = {name: future.result() for name, future in others.items()}
+        self.done += len(host)
+        return done | {name: self.run(name, *task[1:]) for name, task in tasks.items() if name not in hold}
 
     def run(self, name: str, *args):
         self.progress(self.done, self.total, f"running: {name}")
@@ -201,6 +241,13 @@ class _Clock:
             return lambda *args: jax.vmap(function)(*args)
         # One seed runs as a single user's call would, without the cost of a batch.
         return lambda *args: _grow(function(*_shrink(args)))
+
+
+def _first(recording: Recording) -> Recording:
+    """The first seed's drive, stamps on the host as a recording of one's own has them."""
+    return Recording(
+        np.asarray(recording.time[0]), {n: v[0] for n, v in recording.channels.items()}, dict(recording.units)
+    )
 
 
 def _shrink(tree):

@@ -1,0 +1,62 @@
+"""What an estimator may see of a log: cut out before it is handed over, so that nothing else can reach it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh import InputError, Recording
+from jaxveh._core.names import check_names
+
+BLIND = ("steer", "v_x", "a_x", "a_y", "yaw_rate")
+"""The channels that every car with stability control has."""
+
+
+class Parts(NamedTuple):
+    """A log in parts: the `calibration` span (or None), the rows to `estimate`, and all channels of those as `truth`."""
+
+    calibration: Recording | None
+    estimate: Recording
+    truth: Recording
+
+
+def split(
+    recording: Recording, span: tuple[float, float] | None, calibrate_on: Sequence[str] = (), truth: str | None = None
+) -> Parts:
+    """Cut a log: the span with the blind channels and `calibrate_on`; the rows after it with the blind channels alone.
+
+    A channel named as `truth` is NaN wherever an estimator could see it, but for `calibrate_on` inside the span.
+
+    **Raises** `InputError` for unknown channels, channels to calibrate on without a span, or nothing after the span.
+    """
+    check_names("--calibrate-on", calibrate_on, recording.names)
+    if truth is not None:
+        check_names("--truth", [truth], recording.names)
+    if calibrate_on and span is None:
+        raise InputError(f"--calibrate-on {calibrate_on[0]}: needs a span; add --calibrate START:END.")
+    if span is None:
+        return Parts(None, _seen(recording, (), truth), recording)
+    time = np.asarray(recording.time)
+    if not span[1] <= time[-1]:
+        raise InputError(
+            f"--calibrate: the span ends at {min(span[1], time[-1]):g} s and leaves nothing to estimate; the log runs from "
+            f"{time[0]:g} to {time[-1]:g} s."
+        )
+    rest = recording.between(span[1], np.inf)
+    inside = _seen(recording.between(*span), tuple(calibrate_on), None if truth in calibrate_on else truth)
+    return Parts(inside, _seen(rest, (), truth), rest)
+
+
+def calibration_part(recording: Recording, span: tuple[float, float] | None, calibrate_on: Sequence[str]) -> Recording:
+    """The span (or the whole log) with the blind channels and `calibrate_on`."""
+    check_names("--calibrate-on", calibrate_on, recording.names)
+    return _seen(recording if span is None else recording.between(*span), tuple(calibrate_on), None)
+
+
+def _seen(recording: Recording, more: tuple[str, ...], truth: str | None) -> Recording:
+    kept = recording.select([name for name in recording.names if name in BLIND or name in more])
+    if truth is not None and truth in kept and truth not in more:
+        return kept.replace(**{truth: np.full(len(kept), np.nan)})
+    return kept

@@ -1,0 +1,130 @@
+"""`jaxveh estimate`: states of a car along a log, with standard deviations, and a score where there is a truth."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from jaxveh import io
+from jaxveh._core.errors import check_at_least
+from jaxveh.cli import options, sideslip
+from jaxveh.cli.blanking import split
+from jaxveh.cli.console import number, progress, results, spread, table
+from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
+
+
+class Filter(StrEnum):
+    """Which filter."""
+
+    ukf = "ukf"
+    apf = "apf"
+    pf = "pf"
+
+
+PRODUCT = typer.Option(
+    "-o", metavar="FILE", show_default=False, help="Time series with standard deviations: .parquet, .csv, .mf4 or .mdf."
+)
+TRUTH = typer.Option(
+    "--truth",
+    metavar="CHANNEL",
+    help="Score against this channel (v_y or sideslip), which no estimator gets to see (but see --calibrate-on).",
+)
+FILTER = typer.Option("--filter", help="Unscented Kalman, auxiliary particle or bootstrap particle filter.")
+PARTICLES = typer.Option("--particles", help="Of a particle filter, at least 2.")
+
+
+def estimate(
+    log: options.Log,
+    vehicle: options.VehicleFile,
+    product: Annotated[Path, PRODUCT],
+    channels: options.Channels = None,
+    calibrate: options.Calibrate = None,
+    calibrate_on: options.CalibrateOn = None,
+    truth: Annotated[str | None, TRUTH] = None,
+    filter: Annotated[Filter, FILTER] = Filter.ukf,
+    particles: Annotated[int, PARTICLES] = 1000,
+    seed: options.Seed = 0,
+    numbers: options.Numbers = None,
+    out: options.Out = None,
+    force: options.Force = False,
+) -> None:
+    """Estimate sideslip and the other states of a car from steer, v_x, a_x, a_y and yaw_rate.
+
+    With --calibrate the tyres, noises and steering offset are fitted on that span first, and the rows after it are
+    estimated; without it, the car file is taken at its word and the whole log is estimated. The file has a column for
+    each state and, beside it, <name>_std, its standard deviation: m/s, rad, rad/s.
+
+    The car file is TOML in SI units with mass, yaw_inertia, front_axle_to_cg, rear_axle_to_cg and, for each axle, its
+    cornering stiffness or Magic Formula coefficients: see [bold]jaxveh schema car[/].
+
+    Examples:
+
+    [bold]jaxveh estimate drive.csv --vehicle car.toml -o estimate.parquet --calibrate 0:120[/]
+
+    [bold]jaxveh estimate drive.csv --vehicle car.toml -o estimate.csv --calibrate 0:120 --calibrate-on v_y --truth v_y[/]
+    """
+    check_product(product, io.SUFFIXES, force, (log, vehicle, channels))
+    check_report(out, numbers)
+    check_at_least("--particles", particles, 2)
+    car, recording = io.read_car(vehicle), io.read_recording(log, channels)
+    span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
+    uses = tuple(calibrate_on or ())
+    parts = split(recording, span, uses, truth)
+    with progress("estimate") as report:
+        calibration = None if span is None else sideslip.calibrate(parts.calibration, car, uses, report)
+        found = sideslip.estimate(parts.estimate, car, calibration, filter.value, particles, seed, report)
+        score = None if truth is None else sideslip.score(found, parts.truth, truth, car, calibration)
+    io.write_frame(io.to_frame(found), product, overwrite=force)
+    _print(product, found, calibration, score)
+    figures = [] if out is None else _draw(found, recording, parts.truth, truth, span, out)
+    configuration = {
+        "log": log, "vehicle": vehicle, "channels": channels, "calibrate": calibrate, "calibrate_on": uses, "truth": truth,
+        "filter": filter.value, "particles": particles,
+    }  # fmt: skip
+    shown = {
+        "file": product,
+        "rows": len(found.time),
+        "start_s": found.time[0],
+        "end_s": found.time[-1],
+        "figures": figures,
+    }
+    write_numbers(numbers, {**(score or {}), **sideslip.fitted(calibration), **shown}, configuration, seed)
+
+
+def print_fitted(calibration: Any) -> None:
+    """Print the fitted parameters as a table."""
+    rows = [
+        (name, spread(one["value"], one["std"]), one["unit"])
+        for name, one in sideslip.fitted(calibration)["fitted"].items()
+    ]
+    table("Fitted on the calibration span", ("parameter", "value ± std", "unit"), rows)
+
+
+def _print(product: Path, found: Any, calibration: Any, score: dict | None) -> None:
+    if calibration is not None:
+        print_fitted(calibration)
+    if score is not None:
+        rows = [(name.replace("_", " "), number(value)) for name, value in score.items()]
+        table("Score over the rows estimated", ("what", "value"), rows)
+    time = np.asarray(found.time)
+    results().print(f"{product}: {time.size} rows from {time[0]:g} to {time[-1]:g} s")
+
+
+def _draw(found: Any, recording: Any, seen: Any, truth: str | None, span: Any, out: Path) -> list[Path]:
+    from jaxveh import plots
+
+    make_folder(out)
+    true = None if truth is None else sideslip.truth_of(seen, truth)
+    names = [name for name in ("sideslip", "v_y", "yaw_rate") if hasattr(found.mean, name)]
+    spans = [] if span is None else [(max(span[0], float(recording.time[0])), span[1], "calibration")]
+    paths = [
+        plots.save(plots.recording(recording, spans=spans), out / "channels.png"),
+        plots.save(plots.estimate(found, true, names), out / "estimate.png"),
+    ]
+    for path in paths:
+        results().print(f"figure: {path}")
+    return paths

@@ -1,0 +1,57 @@
+"""`jaxveh fit`: a car file with tyres and steering offset fitted to a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from jaxveh import io
+from jaxveh.cli import options, sideslip
+from jaxveh.cli.blanking import calibration_part
+from jaxveh.cli.console import progress, results
+from jaxveh.cli.estimate import print_fitted
+from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
+
+PRODUCT = typer.Option("-o", metavar="FILE", show_default=False, help="The fitted car: .toml.")
+
+
+def fit(
+    log: options.Log,
+    vehicle: options.VehicleFile,
+    product: Annotated[Path, PRODUCT],
+    channels: options.Channels = None,
+    calibrate: options.Calibrate = None,
+    calibrate_on: options.CalibrateOn = None,
+    numbers: options.Numbers = None,
+    out: options.Out = None,
+    force: options.Force = False,
+) -> None:
+    """Fit tyres, noises and steering offset to a log, or to a span of it, and write the car with what was found.
+
+    What is fitted sees steer, v_x, a_x, a_y and yaw_rate, and the channels of --calibrate-on. The car file is TOML in SI
+    units: [bold]jaxveh schema car[/].
+
+    Example: [bold]jaxveh fit drive.csv --vehicle car.toml -o car_fitted.toml --calibrate 0:120[/]
+    """
+    check_product(product, (".toml",), force, (log, vehicle, channels))
+    check_report(out, numbers)
+    car, recording = io.read_car(vehicle), io.read_recording(log, channels)
+    span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
+    uses = tuple(calibrate_on or ())
+    part = calibration_part(recording, span, uses)
+    with progress("fit") as report:
+        calibration = sideslip.calibrate(part, car, uses, report)
+    where = f"{part.time[0]:g} to {part.time[-1]:g} s of {log.name}"
+    io.write_car(sideslip.fitted_car(calibration, car), product, note=f"Fitted to {where}.", overwrite=force)
+    print_fitted(calibration)
+    results().print(f"{product}: fitted to {where}")
+    if out is not None:
+        from jaxveh import plots
+
+        make_folder(out)
+        figure = plots.force_curves(*sideslip.curves(calibration, car, part))
+        results().print(f"figure: {plots.save(figure, out / 'force_curves.png')}")
+    configuration = {"log": log, "vehicle": vehicle, "channels": channels, "calibrate": calibrate, "calibrate_on": uses}
+    write_numbers(numbers, {**sideslip.fitted(calibration), "file": product}, configuration, None)

@@ -1,0 +1,173 @@
+"""Each mistake is one line that says what, which value, what is allowed; exit code 2, nothing half written."""
+
+import json
+
+import numpy as np
+import pytest
+from programs import CAR, columns, error_line, run, write_car, write_log
+
+
+def estimate(folder, *more, log=None, car=None):
+    log = write_log(folder) if log is None else log
+    car = write_car(folder) if car is None else car
+    return run("estimate", log, "--vehicle", car, "-o", folder / "out.csv", *more)
+
+
+def refused(folder, result) -> str:
+    line = error_line(result)
+    assert sorted(path.name for path in folder.iterdir() if path.name.startswith(("out", ".writing"))) == []
+    return line
+
+
+def test_log_that_is_not_there(tmp_path):
+    line = refused(tmp_path, estimate(tmp_path, log=tmp_path / "missing.csv"))
+    assert "missing.csv" in line
+    assert "cannot be read" in line
+
+
+def test_empty_log(tmp_path):
+    log = tmp_path / "drive.csv"
+    log.write_text("time,steer\n")
+    assert "the log is empty" in refused(tmp_path, estimate(tmp_path, log=log))
+
+
+def test_time_that_goes_back(tmp_path):
+    table = columns()
+    table["time"][7] = table["time"][5]
+    line = refused(tmp_path, estimate(tmp_path, log=write_log(tmp_path, table)))
+    assert "time[7] = 0.05" in line
+    assert "strictly increasing" in line
+
+
+def test_unknown_unit_and_unit_of_another_thing(tmp_path):
+    log = write_log(tmp_path, head={"yaw_rate": "yaw_rate [furlongs]"})
+    assert "'furlongs'" in refused(tmp_path, estimate(tmp_path, log=log))
+    log = write_log(tmp_path, head={"yaw_rate": "yaw_rate [kg]"})
+    line = refused(tmp_path, estimate(tmp_path, log=log))
+    assert "'kg'" in line
+    assert "'rad/s'" in line
+
+
+def test_channel_map_with_an_unknown_column(tmp_path):
+    channels = tmp_path / "map.toml"
+    channels.write_text('[channels]\nyaw_rate = "yaw_rat"\n')
+    line = refused(tmp_path, estimate(tmp_path, "--channels", channels))
+    assert "did you mean 'yaw_rate'" in line
+
+
+@pytest.mark.parametrize("option", ["--truth", "--calibrate-on"])
+def test_unknown_channel_in_an_option(tmp_path, option):
+    line = refused(tmp_path, estimate(tmp_path, option, "v_yy", "--calibrate", "0:1"))
+    assert line.startswith(f"error: {option}: unknown name(s) v_yy; there are: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (CAR.replace("1420.0", "-1420.0"), "mass = -1420.0: must be between 0.1 and 1e+06 kg"),
+        (CAR.replace("mass = 1420.0", "mass = "), "broken TOML"),
+        (CAR.replace("mass", "maas"), "did you mean 'mass'"),
+        (CAR.replace("mass = 1420.0\n", ""), "missing key(s): mass"),
+    ],
+)
+def test_car_file(tmp_path, text, words):
+    line = refused(tmp_path, estimate(tmp_path, car=write_car(tmp_path, text)))
+    assert words in line
+    assert "car.toml" in line
+
+
+@pytest.mark.parametrize("span", ["1", "2:1", "a:b", "5:9", "-9:-5"])
+def test_span(tmp_path, span):
+    assert f"--calibrate {span}: " in refused(tmp_path, estimate(tmp_path, f"--calibrate={span}"))
+
+
+def test_span_that_leaves_nothing(tmp_path):
+    assert "leaves nothing to estimate" in refused(tmp_path, estimate(tmp_path, "--calibrate", "0:"))
+
+
+def test_calibrate_on_without_a_span(tmp_path):
+    assert "add --calibrate START:END" in refused(tmp_path, estimate(tmp_path, "--calibrate-on", "v_y"))
+
+
+def test_fewer_than_two_particles(tmp_path):
+    line = refused(tmp_path, estimate(tmp_path, "--filter", "apf", "--particles", "1"))
+    assert line == "error: --particles = 1: must be at least 2."
+
+
+def test_product_that_exists_is_kept(tmp_path):
+    (tmp_path / "out.csv").write_text("mine")
+    line = error_line(estimate(tmp_path))
+    assert "exists already" in line
+    assert "--force" in line
+    assert (tmp_path / "out.csv").read_text() == "mine"
+
+
+def test_product_that_is_the_log_is_kept_even_by_force(tmp_path):
+    log = write_log(tmp_path)
+    before = log.read_bytes()
+    result = run("estimate", log, "--vehicle", write_car(tmp_path), "-o", log, "--force")
+    assert "is an input of this program" in error_line(result)
+    assert log.read_bytes() == before
+
+
+def test_product_suffix_and_folder(tmp_path):
+    log, car = write_log(tmp_path), write_car(tmp_path)
+    assert "'.txt'" in error_line(run("estimate", log, "--vehicle", car, "-o", tmp_path / "out.txt"))
+    assert "there is no folder" in error_line(run("estimate", log, "--vehicle", car, "-o", tmp_path / "a" / "out.csv"))
+
+
+def test_json_must_be_named_so(tmp_path):
+    car = write_car(tmp_path)
+    assert "must end in .json" in error_line(run("check", write_log(tmp_path), "--json", car))
+    assert car.read_text() == CAR
+
+
+def test_report_folder_that_is_a_file(tmp_path):
+    log = write_log(tmp_path)
+    assert "is a file; name a folder" in error_line(run("check", log, "--out", log))
+
+
+def test_unknown_option(tmp_path):
+    result = run("check", write_log(tmp_path), "--quick")
+    assert result.exit_code == 2
+    assert "--quick" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_unknown_vehicle(tmp_path):
+    line = error_line(run("simulate", "--vehicle", "racing_car", "-o", tmp_path / "out.csv"))
+    assert "racing_car" in line
+    assert "passenger_car" in line
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--rate", "0", "--rate = 0.0: must be positive"),
+        ("--duration", "-1", "duration = -1.0"),
+        ("--yaw-rate-std", "0", "yaw_rate"),
+        ("--steer-deg", "200", "steer"),
+    ],
+)
+def test_simulation_out_of_range(tmp_path, option, value, words):
+    line = refused(tmp_path, run("simulate", "-o", tmp_path / "out.csv", option, value))
+    assert words in line
+
+
+def test_debug_shows_the_error_itself(tmp_path):
+    with pytest.raises(ValueError, match="cannot be read"):
+        run("check", tmp_path / "missing.csv", "--debug")
+
+
+def test_numbers_that_are_not_finite_become_null(tmp_path):
+    from jaxveh.cli.output import write_numbers
+
+    path = tmp_path / "numbers.json"
+    write_numbers(path, {"a": np.array([1.0, np.nan]), "b": float("inf"), "c": np.int32(3)}, {"log": tmp_path}, 4)
+    content = json.loads(path.read_text())
+    assert content["a"] == [1.0, None]
+    assert content["b"] is None
+    assert content["c"] == 3
+    assert content["manifest"]["seed"] == 4
+    assert content["manifest"]["configuration"] == {"log": str(tmp_path)}
+    assert set(content["manifest"]["versions"]) == {"jaxveh", "jax", "numpy", "python"}

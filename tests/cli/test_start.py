@@ -1,0 +1,43 @@
+"""How the command starts: flags, precision, missing libraries, as a process of its own."""
+
+import os
+import subprocess
+import sys
+
+PROBE = "from jaxveh.cli import prepare; prepare(); import os, jax; print(os.environ['XLA_FLAGS'], jax.config.jax_enable_x64)"
+
+
+def python(*arguments, **environment):
+    env = {name: value for name, value in os.environ.items() if name not in ("XLA_FLAGS", "JAX_ENABLE_X64")}
+    # The package may be run from its folder, without being installed.
+    path = [entry for entry in sys.path if entry]
+    env = {**env, "PYTHONPATH": os.pathsep.join(path), **environment}
+    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=env, timeout=300)
+
+
+def test_wide_vectors_and_float64():
+    assert python("-c", PROBE).stdout.split() == ["--xla_cpu_prefer_vector_width=512", "True"]
+
+
+def test_the_users_flag_stays():
+    flags = python("-c", PROBE, XLA_FLAGS="--xla_cpu_prefer_vector_width=256").stdout.split()
+    assert flags == ["--xla_cpu_prefer_vector_width=256", "True"]
+
+
+def test_importing_the_package_sets_nothing():
+    probe = "import jaxveh, jaxveh.cli, os, jax; print(os.environ.get('XLA_FLAGS'), jax.config.jax_enable_x64)"
+    assert python("-c", probe).stdout.split() == ["None", "False"]
+
+
+def test_without_the_extra_one_line_says_what_to_install():
+    result = python("-c", "import sys; sys.modules['typer'] = None; from jaxveh.cli import main; main()")
+    assert result.returncode == 2
+    assert result.stderr.splitlines() == ['error: typer is not installed: run `pip install "jaxveh[cli,io,plot]"`.']
+
+
+def test_bad_input_as_a_process(tmp_path):
+    result = python("-m", "jaxveh.cli", "check", str(tmp_path / "missing.csv"))
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert result.stderr.startswith(f"error: {tmp_path / 'missing.csv'}: cannot be read")
+    assert len(result.stderr.splitlines()) == 1
