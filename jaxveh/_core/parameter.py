@@ -72,7 +72,8 @@ def resolve(model, where: Where | None, inside: str = "") -> tuple[Parameter, ..
         if not isinstance(leaf, _Mark):
             raise InputError(f"where picked {leaf!r}: it must pick array leaves of {type(model).__name__}.")
         value = paths[leaf.index][1]
-        if not eqx.is_inexact_array_like(value):
+        # Not `is_inexact_array_like`: it trips over tracers.
+        if not (eqx.is_inexact_array(value) or isinstance(value, float)):
             name = _path_name(paths[leaf.index][0])
             raise InputError(f"where picked {name} = {value!r}: it must pick array leaves of {type(model).__name__}.")
         indices.append(leaf.index)
