@@ -57,14 +57,19 @@ class Instrumented(eqx.Module):
             return rates
         return self.state_type(*rates, *self.sensors.derivatives(filters, outputs))
 
-    def observation(self, t: Any, x: Any, u: Any) -> Any:
-        """What the sensors say without noise: a NamedTuple by channel."""
+    def see(self, t: Any, x: Any, u: Any) -> tuple[Any, Any]:
+        """The vehicle's outputs, and what the sensors say of them without noise (None without sensors)."""
         vehicle, filters = self.split(x)
-        return self.sensors.measure(self.vehicle.outputs(t, vehicle, u), filters)
+        outputs = self.vehicle.outputs(t, vehicle, u)
+        return outputs, None if self.sensors is None else self.sensors.measure(outputs, filters)
+
+    def observation(self, t: Any, x: Any, u: Any) -> Any:
+        """What the sensors say without noise: a NamedTuple by channel (None without sensors)."""
+        return self.see(t, x, u)[1]
 
     def outputs(self, t: Any, x: Any, u: Any) -> Any:
         """The vehicle's outputs."""
-        return self.vehicle.outputs(t, self.split(x)[0], u)
+        return self.see(t, x, u)[0]
 
     def split(self, x: Any) -> tuple[Any, Any]:
         """The vehicle's state and the low-pass' states (None without)."""

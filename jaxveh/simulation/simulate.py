@@ -132,8 +132,7 @@ def _drive(instrumented, manoeuvre, start, fine, substeps, solver, controller, a
         throw=False,
     )
     u = jax.vmap(manoeuvre.inputs)(rows)
-    outputs = jax.vmap(instrumented.outputs)(rows, solution.ys, u)
-    measured = () if instrumented.sensors is None else jax.vmap(instrumented.observation)(rows, solution.ys, u)
+    outputs, measured = jax.vmap(instrumented.see)(rows, solution.ys, u)
     return _Drive(solution.ys, u, outputs, measured, solution.result == diffrax.RESULTS.successful)
 
 
