@@ -114,18 +114,22 @@ def _marginal(jacobian: np.ndarray, count: int) -> np.ndarray:
 
 def from_sensitivities(jacobian: np.ndarray, names: tuple[str, ...], spread: np.ndarray) -> Observability:
     """The report from prior-scaled, whitened sensitivities (R, p)."""
+    # Fewer measurements than parameters: rows of zeros make room for the directions that nothing sees.
+    jacobian = np.vstack([jacobian, np.zeros((max(0, len(names) - len(jacobian)), len(names)))])
     # Through the singular values of the sensitivities, never of the information: that would square the condition.
     _, values, directions = np.linalg.svd(jacobian, full_matrices=False)
     floor = np.finfo(np.float64).tiny
     safe = np.maximum(values, floor)
     alone = np.linalg.norm(jacobian, axis=0)
+    with np.errstate(over="ignore"):  # a direction without any trace has an infinite bound
+        ratio, reach = (safe[0] / safe[-1]) ** 2, np.sum((directions / safe[:, None]) ** 2, axis=0)
     return Observability(
         names=tuple(names),
         spread=spread,
         information=jacobian.T @ jacobian,
         singular_values=values,
-        condition_number=float(min((safe[0] / safe[-1]) ** 2, np.finfo(np.float64).max)),
-        bounds=spread * np.sqrt(np.sum((directions / safe[:, None]) ** 2, axis=0)),
+        condition_number=float(min(ratio, np.finfo(np.float64).max)),
+        bounds=spread * np.sqrt(reach),
         bounds_alone=spread / np.maximum(alone, floor),
         bounds_with_prior=spread * np.sqrt(np.sum(directions**2 / (1 + values[:, None] ** 2), axis=0)),
         directions=directions,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.observability import Observability, observability
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.noise import whiten
 
 
 def predict_measurements(model: StateSpace, rows: Row, start) -> tuple[dict, dict]:
@@ -41,7 +41,6 @@ def observe(model: StateSpace, recording: Recording, known_start: bool = True) -
     if model.chosen is None:
         raise InputError("observability: the model estimates no parameter; give `estimate=` or `with_parameters`.")
     rows, n = model.rows(recording), len(model.chosen.states)
-    std = dict(zip(model.channels, numerics.sqrt(jnp.diagonal(model.measurement_noise.covariance())), strict=True))
     mean, spread = jnp.stack(model.prior.mean), jnp.sqrt(jnp.diagonal(model.prior.covariance()))
     order = jnp.concatenate([jnp.arange(n, mean.size), jnp.arange(n)])
     used = mean.size if not known_start else mean.size - n
@@ -50,8 +49,8 @@ def observe(model: StateSpace, recording: Recording, known_start: bool = True) -
     def predict(z):
         full = mean.at[order[:used]].set(z)
         predicted, present = predict_measurements(model, rows, type(model.prior.mean)(*full))
-        white = [jnp.where(present[name], predicted[name] / std[name], 0) for name in model.channels]
-        return jnp.concatenate(white)
+        white = whiten(model.measurement_noise, predicted, present)
+        return jnp.concatenate([white[name] for name in model.channels])
 
     names = tuple(p.name for p in model.chosen.parameters)
     at, spread = mean[order[:used]], spread[order[:used]]

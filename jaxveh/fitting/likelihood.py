@@ -50,6 +50,9 @@ def maximum_likelihood(
     rows = tuple(model.rows(recording) for recording in recordings)
     parameters = resolve(model, where)
     values = pick(model, parameters)
+    for p, value in zip(parameters, values, strict=True):
+        if jnp.ndim(value) > 0:
+            raise InputError(f"where picked {p.name}, an array of shape {jnp.shape(value)}: a fit takes scalars.")
     spreads = None if prior is None else prior_spread(parameters, values, prior)
     fit = maximise(filter, model, rows, parameters, spreads, key, max_steps, tolerance, standard_errors)
     if throw:

@@ -17,6 +17,7 @@ from jaxveh.filters.base import wrap_angle
 from jaxveh.fitting.result import Fit, make_fit, raise_unfinished
 from jaxveh.fitting.segments import Segments, cut
 from jaxveh.statespace import StateSpace, start_from
+from jaxveh.statespace.noise import whiten
 
 LARGEST_RESIDUAL = 1e6
 """What a residual of a diverged segment is taken as: finite, so that the solver can step back."""
@@ -68,7 +69,7 @@ def shoot(model: StateSpace, segments: Segments, tie, prior: bool, max_steps: in
     mean = model.prior.mean
     start = Unknowns(jnp.stack(mean[n:]), tuple(jnp.broadcast_to(m, (count,)) for m in mean[:n]))
     solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance)
-    residuals = lambda unknowns, args: _residuals(model, segments, tie, prior, unknowns)  # noqa: E731
+    residuals = lambda unknowns, args: _residuals(model, segments, tie, prior, unknowns)
     solution = optx.least_squares(residuals, solver, start, max_steps=max_steps, throw=False)
     found = solution.value
     covariance, cost = _laplace(residuals, found)
@@ -87,32 +88,31 @@ def _residuals(model: StateSpace, segments: Segments, tie, prior: bool, unknowns
         "ties": _ties(model, segments, tie, unknowns, ends),
         "prior": _prior(model, segments, prior, unknowns),
     }
-    finite = lambda r: jnp.clip(jnp.nan_to_num(r, nan=LARGEST_RESIDUAL), -LARGEST_RESIDUAL, LARGEST_RESIDUAL)  # noqa: E731
+    finite = lambda r: jnp.clip(jnp.nan_to_num(r, nan=LARGEST_RESIDUAL), -LARGEST_RESIDUAL, LARGEST_RESIDUAL)
     return jax.tree.map(finite, residuals)
 
 
 def _simulate(model, segments, unknowns):
     """Ends of the segments (tuple of (K,)), and measurement residuals (W, m, K), zero where nothing was measured."""
     noise = model.measurement_noise
-    std = numerics.sqrt(jnp.diagonal(noise.covariance()))
     count = segments.first.shape[0]
-    wide = lambda value: jnp.broadcast_to(value, (count,))  # noqa: E731
+    wide = lambda value: jnp.broadcast_to(value, (count,))
     parameters = [wide(value) for value in unknowns.parameters]
     state = model.chosen.joint_type(*unknowns.starts, *parameters)
 
     def body(state, rows):
         now, then = rows
         observed = model.observation(now.t, state, now.u)
-        out = []
-        for i, name in enumerate(noise.names):
+        residual, present = {}, {}
+        for name in noise.names:
             measured = getattr(now.y, name)
-            here = jnp.isfinite(measured)
-            residual = jnp.where(here, measured, 0) - getattr(observed, name)
-            residual = wrap_angle(residual) if name in model.angles else residual
-            out.append(jnp.where(here, residual / std[i], 0))
+            present[name] = jnp.isfinite(measured)
+            difference = jnp.where(present[name], measured, 0) - getattr(observed, name)
+            residual[name] = wrap_angle(difference) if name in model.angles else difference
+        white = whiten(noise, residual, present)
         u = model.step_inputs(now.t, then.t, now.u, then.u)
         moved = model.transition(now.t, then.t, state, u)
-        return jax.tree.map(wide, moved), jnp.stack(out)
+        return jax.tree.map(wide, moved), jnp.stack([white[name] for name in noise.names])
 
     rows = segments.rows
     pairs = jax.tree.map(lambda leaf: leaf[:-1], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
@@ -122,8 +122,7 @@ def _simulate(model, segments, unknowns):
 
 def _ties(model, segments, tie, unknowns, ends):
     """Mismatch of each end with the next start, in standard deviations; zero where nothing follows."""
-    spans = segments.rows.t[-1] - segments.rows.t[0]
-    spread = _tie_spread(model, tie, spans)
+    spread = _tie_spread(model, tie, jnp.diff(segments.rows.t, axis=0))
     out = []
     for i, (start, end) in enumerate(zip(unknowns.starts, ends, strict=True)):
         gap = jnp.roll(start, -1) - end
@@ -131,36 +130,40 @@ def _ties(model, segments, tie, unknowns, ends):
     return jnp.stack(out)
 
 
-def _tie_spread(model, tie, spans):
-    """What a state may jump between segments, one (K,) array a state."""
+def _tie_spread(model, tie, steps):
+    """What a state may jump between segments whose rows lie `steps` (W, K) seconds apart, one (K,) array a state."""
     states = model.chosen.states
     own = dict(zip(model.states, numerics.sqrt(jnp.diagonal(model.prior.covariance())), strict=True))
-    spread = {name: tie * own[name] * jnp.ones_like(spans) for name in states}
+    spread = {name: tie * own[name] * jnp.ones_like(steps[0]) for name in states}
     if model.process_noise is not None:
         # Over the whole window, as if the noise added up without dynamics: the scale of a jump, not its exact law.
-        step = spans / 1.0
-        law = jax.vmap(lambda dt: jnp.sqrt(jnp.diagonal(model.process_noise.over(dt).covariance())))(step)
+        variances = jax.vmap(jax.vmap(lambda dt: jnp.diagonal(model.process_noise.over(dt).covariance())))(steps)
+        gathered = jnp.sqrt(jnp.sum(variances, axis=0))
         for i, name in enumerate(model.process_noise.law.names):
             if name in states:
-                spread[name] = jnp.maximum(law[:, i], spread[name] * 1e-3)
+                spread[name] = jnp.maximum(gathered[:, i], spread[name] * 1e-3)
     return [spread[name] for name in states]
 
 
 def _prior(model, segments, prior: bool, unknowns):
     """Deviations of the first states, and of the parameters, from the prior, whitened."""
     n = len(model.chosen.states)
-    std = numerics.sqrt(jnp.diagonal(model.prior.covariance()))
-    mean = jnp.stack(model.prior.mean)
-    first = [jnp.where(segments.first, (s - mean[i]) / std[i], 0) for i, s in enumerate(unknowns.starts)]
-    deviation = (unknowns.parameters - mean[n:]) / std[n:]
+    mean, covariance = jnp.stack(model.prior.mean), model.prior.covariance()
+    # States and parameters are independent in the prior that `with_parameters` makes, each among themselves may not be.
+    own, theirs = numerics.cholesky(covariance[:n, :n]), numerics.cholesky(covariance[n:, n:])
+    first = numerics.solve_lower(own, jnp.stack(unknowns.starts) - mean[:n, None])
+    deviation = numerics.solve_lower(theirs, unknowns.parameters - mean[n:])
     # Least squares alone: the parameters are free, but for a hair that keeps the solver's matrix regular.
-    return {"states": jnp.stack(first), "parameters": deviation if prior else 1e-6 * deviation}
+    return {
+        "states": jnp.where(segments.first, first, 0),
+        "parameters": deviation if prior else 1e-6 * deviation,
+    }
 
 
 def _laplace(residuals, found: Unknowns):
     """Covariance (p, p) of the parameters, the starts marginalised, from the Jacobian; and half the sum of squares."""
     flat, unravel = jax.flatten_util.ravel_pytree(found)
-    stacked = lambda z: jax.flatten_util.ravel_pytree(residuals(unravel(z), None))[0]  # noqa: E731
+    stacked = lambda z: jax.flatten_util.ravel_pytree(residuals(unravel(z), None))[0]
     jacobian = jax.jacfwd(stacked)(flat)
     p = found.parameters.shape[0]
     # R of the QR factorisation with the parameters last: its lower right block is the square root of their information.
