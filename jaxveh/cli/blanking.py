@@ -8,10 +8,35 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh import InputError, Recording
+from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
+from jaxveh.estimators.cleaning import BLIND
 
-BLIND = ("steer", "v_x", "a_x", "a_y", "yaw_rate")
-"""The channels that every car with stability control has."""
+INPUTS = ("steer", "v_x", "a_x")
+"""Channels that must be known in every row."""
+
+
+def filled(recording: Recording, max_gap: float | None) -> Recording:
+    """The inputs without gaps: filled along lines over at most `max_gap` seconds where that is given.
+
+    **Raises** `InputError` where an input is NaN still, with the option that fills it.
+    """
+    if max_gap is not None:
+        check_positive("--fill", max_gap, "s")
+    for name in INPUTS:
+        if name not in recording:
+            continue
+        if max_gap is not None and np.isfinite(np.asarray(recording[name])).any():
+            recording = recording.fill(name, "linear", max_gap)
+        gaps = np.isnan(np.asarray(recording[name]))
+        if gaps.any():
+            first = np.asarray(recording.time)[np.argmax(gaps)]
+            advice = "add --fill SECONDS" if max_gap is None else "raise --fill, or take a span without the gap"
+            raise InputError(
+                f"input channel {name} is NaN in {int(gaps.sum())} rows, first at t = {first:g} s: an input must be known; "
+                f"{advice}."
+            )
+    return recording
 
 
 class Parts(NamedTuple):

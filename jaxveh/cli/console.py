@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Sequence
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from jaxveh._core.progress import Progress as Report
 
@@ -54,13 +56,16 @@ def _lines(console: Console, title: str) -> Report:
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "") -> None:
     """Print a table: first column to the left, numbers to the right; a cell that is no string is shown by `number`."""
-    shown = Table(title=title, title_justify="left", title_style="bold", caption=note or None, caption_justify="left")
+    shown = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for i, column in enumerate(columns):
-        shown.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
+        shown.add_column(Text(column), justify="left" if i == 0 else "right")
     for row in rows:
-        shown.add_row(*[cell if isinstance(cell, str) else number(cell) for cell in row])
+        shown.add_row(*[Text(cell if isinstance(cell, str) else number(cell)) for cell in row])
     console = results()
+    console.print(Text(title, "bold"))
     console.print(shown)
+    if note:
+        console.print(Text(note, "dim"))
     console.print()
 
 
@@ -74,14 +79,13 @@ def number(value: object, digits: int = 4) -> str:
     return f"{value:.{digits}g}" if value == 0 or 1e-3 <= abs(value) < 1e5 else f"{value:.{digits - 1}e}"
 
 
-def spread(mean: object, std: object) -> str:
+def spread(mean: object, std: object, between: str = " ") -> str:
     """`mean ± std` with as many decimals as the spread calls for."""
     mean, std = float(mean), float(std)  # type: ignore[arg-type]
-    if not (std > 0 and std < float("inf")):
+    if not 0 < std < float("inf"):
         return number(mean)
-    decimals = max(0, 1 - _exponent(std))
-    return f"{mean:.{decimals}f} ± {std:.{decimals}f}"
-
-
-def _exponent(value: float) -> int:
-    return int(f"{value:e}".partition("e")[2])
+    if std < 1e-4 * abs(mean):
+        # Particles that have all become one: decimals that fit the spread would fill the line.
+        return f"{number(mean)}{between}± {std:.0e}"
+    decimals = max(0, 1 - int(f"{std:e}".partition("e")[2]))
+    return f"{mean:.{decimals}f}{between}± {std:.{decimals}f}"

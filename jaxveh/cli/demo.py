@@ -94,7 +94,7 @@ def _print_parameters(found: Staged, study: Study, seeds: int) -> None:
     spreads = {n: np.asarray(found.outcome.spread[n]) for n in ESTIMATORS}
     rows = []
     for i, name in enumerate(NAMES):
-        cells = [spread(np.median(values[n][:, i]), np.median(spreads[n][:, i])) for n in ESTIMATORS]
+        cells = [spread(np.median(values[n][:, i]), np.median(spreads[n][:, i]), "\n") for n in ESTIMATORS]
         rows.append((name, f"{true[i]:g}", *cells))
     what = "estimate ± standard deviation" if seeds == 1 else "medians of estimate ± standard deviation"
     table(f"Parameters: {what}", ("parameter", "truth", *ESTIMATORS), rows)
@@ -113,9 +113,9 @@ def _print_errors(found: Staged) -> None:
         rows.append(
             (name, f"{100 * curve[0]:.2f}", f"{100 * curve[1]:.2f}", *[number(v, 3) for v in (*states, *steps)])
         )
-    heads = ("front %", "rear %", "v_y m/s", "yaw rate rad/s", *[f"step {d}° rad/s" for d in found.steps])
+    heads = ("front\n%", "rear\n%", "v_y\nm/s", "yaw rate\nrad/s", *[f"step {d}°\nrad/s" for d in found.steps])
     table(
-        "RMSE: axle force over the visited slips in % of D; states; yaw rate in a later step steer",
+        "RMSE: axle force over the visited slips in % of D; states; yaw rate in a step steer",
         ("estimator", *heads),
         rows,
         "prior and MAP states: open loop, from steer and speed alone",

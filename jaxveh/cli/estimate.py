@@ -12,7 +12,7 @@ import typer
 from jaxveh import io
 from jaxveh._core.errors import check_at_least
 from jaxveh.cli import options, sideslip
-from jaxveh.cli.blanking import split
+from jaxveh.cli.blanking import filled, split
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
 
@@ -44,6 +44,7 @@ def estimate(
     channels: options.Channels = None,
     calibrate: options.Calibrate = None,
     calibrate_on: options.CalibrateOn = None,
+    fill: options.Fill = None,
     truth: Annotated[str | None, TRUTH] = None,
     filter: Annotated[Filter, FILTER] = Filter.ukf,
     particles: Annotated[int, PARTICLES] = 1000,
@@ -70,20 +71,22 @@ def estimate(
     check_product(product, io.SUFFIXES, force, (log, vehicle, channels))
     check_report(out, numbers)
     check_at_least("--particles", particles, 2)
-    car, recording = io.read_car(vehicle), io.read_recording(log, channels)
+    car, recording = io.read_car(vehicle), filled(io.read_recording(log, channels), fill)
     span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
     uses = tuple(calibrate_on or ())
     parts = split(recording, span, uses, truth)
     with progress("estimate") as report:
         calibration = None if span is None else sideslip.calibrate(parts.calibration, car, uses, report)
-        found = sideslip.estimate(parts.estimate, car, calibration, filter.value, particles, seed, report)
-        score = None if truth is None else sideslip.score(found, parts.truth, truth, car, calibration)
+        report(0, 1, "estimating (compiling first)")
+        found = sideslip.estimate(parts.estimate, calibration or car, filter.value, particles, seed)
+        report(1, 1, "scoring")
+        score = None if truth is None else sideslip.score(found, parts.truth, truth, car)
     io.write_frame(io.to_frame(found), product, overwrite=force)
     _print(product, found, calibration, score)
-    figures = [] if out is None else _draw(found, recording, parts.truth, truth, span, out)
+    figures = [] if out is None else _draw(found, recording, parts.truth, truth, car, span, out)
     configuration = {
-        "log": log, "vehicle": vehicle, "channels": channels, "calibrate": calibrate, "calibrate_on": uses, "truth": truth,
-        "filter": filter.value, "particles": particles,
+        "log": log, "vehicle": vehicle, "channels": channels, "calibrate": calibrate, "calibrate_on": uses, "fill": fill,
+        "truth": truth, "filter": filter.value, "particles": particles,
     }  # fmt: skip
     shown = {
         "file": product,
@@ -114,16 +117,17 @@ def _print(product: Path, found: Any, calibration: Any, score: dict | None) -> N
     results().print(f"{product}: {time.size} rows from {time[0]:g} to {time[-1]:g} s")
 
 
-def _draw(found: Any, recording: Any, seen: Any, truth: str | None, span: Any, out: Path) -> list[Path]:
+def _draw(found: Any, recording: Any, seen: Any, truth: str | None, car: Any, span: Any, out: Path) -> list[Path]:
     from jaxveh import plots
 
     make_folder(out)
+    names = ("sideslip", "v_y", "yaw_rate")
     true = None if truth is None else sideslip.truth_of(seen, truth)
-    names = [name for name in ("sideslip", "v_y", "yaw_rate") if hasattr(found.mean, name)]
+    others = {} if truth is None else {"open-loop linear model": sideslip.open_loop(seen, car)}
     spans = [] if span is None else [(max(span[0], float(recording.time[0])), span[1], "calibration")]
     paths = [
         plots.save(plots.recording(recording, spans=spans), out / "channels.png"),
-        plots.save(plots.estimate(found, true, names), out / "estimate.png"),
+        plots.save(plots.estimate(found, true, names, others=others), out / "estimate.png"),
     ]
     for path in paths:
         results().print(f"figure: {path}")

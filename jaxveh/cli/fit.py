@@ -9,7 +9,7 @@ import typer
 
 from jaxveh import io
 from jaxveh.cli import options, sideslip
-from jaxveh.cli.blanking import calibration_part
+from jaxveh.cli.blanking import calibration_part, filled
 from jaxveh.cli.console import progress, results
 from jaxveh.cli.estimate import print_fitted
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
@@ -24,6 +24,7 @@ def fit(
     channels: options.Channels = None,
     calibrate: options.Calibrate = None,
     calibrate_on: options.CalibrateOn = None,
+    fill: options.Fill = None,
     numbers: options.Numbers = None,
     out: options.Out = None,
     force: options.Force = False,
@@ -37,7 +38,7 @@ def fit(
     """
     check_product(product, (".toml",), force, (log, vehicle, channels))
     check_report(out, numbers)
-    car, recording = io.read_car(vehicle), io.read_recording(log, channels)
+    car, recording = io.read_car(vehicle), filled(io.read_recording(log, channels), fill)
     span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
     uses = tuple(calibrate_on or ())
     part = calibration_part(recording, span, uses)
@@ -53,5 +54,12 @@ def fit(
         make_folder(out)
         figure = plots.force_curves(*sideslip.curves(calibration, car, part))
         results().print(f"figure: {plots.save(figure, out / 'force_curves.png')}")
-    configuration = {"log": log, "vehicle": vehicle, "channels": channels, "calibrate": calibrate, "calibrate_on": uses}
+    configuration = {
+        "log": log,
+        "vehicle": vehicle,
+        "channels": channels,
+        "calibrate": calibrate,
+        "calibrate_on": uses,
+        "fill": fill,
+    }
     write_numbers(numbers, {**sideslip.fitted(calibration), "file": product}, configuration, None)

@@ -55,6 +55,15 @@ CalibrateOn = Annotated[
     ),
 ]
 
+Fill = Annotated[
+    float | None,
+    typer.Option(
+        "--fill",
+        metavar="SECONDS",
+        help="Fill gaps (NaN) of steer, v_x and a_x along lines, over at most so long; without it a gap there is an error.",
+    ),
+]
+
 
 def span_of(text: str | None, start: float, end: float) -> tuple[float, float] | None:
     """START:END as seconds of a log that runs from `start` to `end`; None where there is none.

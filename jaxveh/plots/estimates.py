@@ -50,10 +50,15 @@ def estimate(
             for index, (label, values) in enumerate((others or {}).items()):
                 if name in values:
                     ax.plot(
-                        time, quantity(name).show(values[name]), color=colour(label, index + 2), lw=0.9, label=label
+                        time,
+                        quantity(name).show(values[name]),
+                        color=colour(label.partition(",")[0], index + 2),
+                        lw=0.9,
+                        label=label,
                     )
             for index, (label, one) in enumerate(labelled.items()):
                 _one(ax, one, name, label, colour(label, index))
+            _keep_truth_readable(ax)
             label_above(ax, quantity(name).label)
         axes[-1].set_xlabel("time [s]")
         legend(figure, axes)
@@ -68,6 +73,18 @@ def _truth(ax: Any, time: np.ndarray, truth: Any, name: str) -> None:
     if values.shape != at.shape:
         raise InputError(f"plots.estimate: truth {name} has shape {values.shape}, time has {at.shape}; must agree.")
     ax.plot(at, values, color=COLOURS["truth"], linewidth=0.9, label="truth")
+
+
+def _keep_truth_readable(ax: Any) -> None:
+    """Where an estimate diverges it leaves the panel: the truth sets the scale, with room for twice its range."""
+    true = [line.get_ydata() for line in ax.get_lines() if line.get_label() == "truth"]
+    if not true or not np.isfinite(true[0]).any():
+        return
+    low, high = float(np.nanmin(true[0])), float(np.nanmax(true[0]))
+    bottom, top = ax.get_ylim()
+    room = high - low
+    if room > 0:
+        ax.set_ylim(max(bottom, low - room), min(top, high + room))
 
 
 def _one(ax: Any, one: Any, name: str, label: str, shade: str) -> None:

@@ -91,9 +91,10 @@ def _errors(ax: Any, axle: str, cars: Mapping[str, Any], visited: Any) -> None:
 
 def _line(ax: Any, degrees: np.ndarray, values: np.ndarray, label: str, index: int) -> None:
     weight = {"truth": 2.2, "prior": 1.1}.get(label, 1.2)
-    dashes = {"prior": "--"}.get(label, "-")
+    # Estimators that agree lie on each other: dashes let the one beneath be seen.
+    dashes = {"prior": "--", "MAP": (0, (4, 2))}.get(label, "-")
     order = {"truth": 2.0, "prior": 2.1}.get(label, 2.5 + 0.01 * index)
-    ax.plot(degrees, values, dashes, color=colour(label, index), lw=weight, zorder=order, label=label)
+    ax.plot(degrees, values, linestyle=dashes, color=colour(label, index), lw=weight, zorder=order, label=label)
 
 
 def _grid(visited: Any) -> tuple[np.ndarray, np.ndarray]:
