@@ -66,13 +66,17 @@ class LogView:
         return float(self.grid[1] - self.grid[0]) if self.grid.size > 1 else np.nan
 
     def even(self, name: str) -> np.ndarray:
-        """A channel on `grid`, linear between its samples; NaN outside them and in gaps over half a second."""
+        """A channel on `grid`, linear between its samples; NaN outside them and in gaps over 0.5 s or 2.5 steps."""
         values = self.channels[name]
         known = np.isfinite(values)
         time = self.time[known]
-        on_grid = np.interp(self.grid, time, values[known], left=np.nan, right=np.nan)
+        on_grid = np.interp(self.grid, time, values[known])
         after = np.clip(np.searchsorted(time, self.grid), 1, time.size - 1)
-        on_grid[time[after] - time[after - 1] > 0.5] = np.nan
+        longest = max(0.5, 2.5 * float(np.median(np.diff(time))))
+        hair = 1e-6 * self.step  # the grid meets stamps but for rounding
+        inside_gap = (self.grid > time[after - 1] + hair) & (self.grid < time[after] - hair)
+        on_grid[inside_gap & (time[after] - time[after - 1] > longest)] = np.nan
+        on_grid[(self.grid < time[0] - hair) | (self.grid > time[-1] + hair)] = np.nan
         return on_grid
 
     def moving(self, values: np.ndarray) -> np.ndarray:

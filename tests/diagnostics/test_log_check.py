@@ -95,7 +95,12 @@ FAULTS = {
     "v_x in mph": ({"v_x": lambda v: v / 0.44704}, "error", "v_x", "v_x looks like mph"),
     "a_y of odd scale": ({"a_y": lambda v: v * 1.7}, "warning", "a_y", "wrong unit or scale"),
     "a_y biased": ({"a_y": lambda v: v + 0.8}, "warning", "a_y", "a bias of 0.8"),
-    "steer in degrees": ({"steer": np.rad2deg}, "error", "steer", "looks like degrees"),
+    "steer in degrees": (
+        {"steer": np.rad2deg},
+        "error",
+        "steer",
+        r"needs in gentle turns: it looks like degrees\. Set",
+    ),
     "steer of the wheel": (
         {"steer": lambda v: 15 * v},
         "error",
@@ -222,7 +227,9 @@ def test_without_a_car_and_without_v_y(sound):
     late_a_y = {**few, "a_y": late(0.1)(few["a_y"])}
     assert matching(findings(time, late_a_y), "warning", "a_y", r"comes (9.|10.) ms \(.*\) after what the car")
     in_degrees = {**few, "steer": np.rad2deg(few["steer"])}
-    assert matching(findings(time, in_degrees, None), "error", "steer", "looks like degrees")
+    found = findings(time, in_degrees, None)
+    assert matching(found, "error", "steer", r"taken for granted, needs in gentle turns: it looks like degrees\.")
+    assert not [finding for finding in found if "runs straight" in finding.message]
 
 
 def test_an_offset_that_the_car_tells_of(sound):
