@@ -181,9 +181,9 @@ def test_values_and_gradients_are_finite_at_any_speed(car, dtype):
     @jax.vmap
     def everything(point):
         arguments = (car, state(point[1], 0.0, point[2], dtype), inputs(0.1, point[0], dtype))
-        evaluate = lambda c, x, u: c.evaluate(0.0, x, u)  # noqa: E731
+        evaluate = lambda c, x, u: c.evaluate(0.0, x, u)
         values, tangents = jax.jvp(evaluate, arguments, jax.tree.map(jnp.ones_like, arguments))
-        total = lambda *args: sum(jax.tree.leaves(evaluate(*args)))  # noqa: E731
+        total = lambda *args: sum(jax.tree.leaves(evaluate(*args)))
         return values, tangents, jax.grad(total, (0, 1, 2))(*arguments)
 
     for leaf in jax.tree.leaves(everything(np.array(points, dtype))):
@@ -210,7 +210,7 @@ def test_reversing_pushes_a_sliding_wheel_back_all_the_same():
 
 def test_regularised_speed_joins_twice_differentiable():
     v = jnp.asarray([0.0, 0.5, 1.9999999, 2.0, 2.0000001, 7.0, -0.5, -7.0])
-    speed = lambda x: vehicles.regularised_speed(x, 2.0)  # noqa: E731
+    speed = lambda x: vehicles.regularised_speed(x, 2.0)
     values = jax.vmap(speed)(v)
     np.testing.assert_allclose(values[:1], 0.75)
     np.testing.assert_allclose(values[3:6], [2.0, 2.0000001, 7.0], rtol=1e-15)
