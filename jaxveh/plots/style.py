@@ -125,9 +125,8 @@ def legend(figure: Any, axes: Any) -> None:
 
 
 def label_above(ax: Any, label: str) -> None:
-    """A y label that is read without turning the head, above the panel: low panels have no room beside them."""
-    ax.set_ylabel(label, rotation=0, ha="left", va="bottom")
-    ax.yaxis.set_label_coords(0.0, 1.01)
+    """What the y axis shows, above the panel: read without turning the head, and low panels have no room beside them."""
+    ax.set_title(label, loc="left", fontweight="normal", pad=3.0)
 
 
 def _flat(axes: Any) -> Iterable[Any]:

@@ -15,9 +15,14 @@ TIME = np.linspace(0.0, 2.0, 21)
 WAVE = np.sin(TIME)
 
 
-def line(ax, label):
-    (found,) = [one for one in ax.get_lines() if one.get_label() == label]
+def line(ax, name):
+    (found,) = [one for one in ax.get_lines() if one.get_label() == name]
     return found
+
+
+def label(ax):
+    """What the y axis shows, above the panel."""
+    return ax.get_title(loc="left")
 
 
 def drive():
@@ -28,18 +33,18 @@ def drive():
 def test_recording_shows_channels_in_readable_units_and_truth_beside():
     figure = plots.recording(drive(), ["yaw_rate", "steer"])
     first, second = figure.axes
-    assert first.get_ylabel() == "yaw rate [°/s]"
+    assert label(first) == "yaw rate [°/s]"
     np.testing.assert_allclose(line(first, "measured").get_ydata(), np.degrees(WAVE))
     np.testing.assert_allclose(line(first, "truth").get_ydata(), np.degrees(0.9 * WAVE))
     # A unit that the file gave is shown as it is.
-    assert second.get_ylabel() == "steer [deg]"
+    assert label(second) == "steer [deg]"
     np.testing.assert_allclose(line(second, "measured").get_ydata(), 0.1 * WAVE)
     assert second.get_xlabel() == "time [s]"
 
 
 def test_recording_by_default_shows_what_was_measured_and_says_what_is_silent():
     figure = plots.recording(drive(), spans=[(0.0, 1.0, "calibration")])
-    assert [ax.get_ylabel() for ax in figure.axes] == [
+    assert [label(ax) for ax in figure.axes] == [
         "yaw rate [°/s]",
         "longitudinal acceleration [m/s²]",
         "steer [deg]",
@@ -67,8 +72,8 @@ def test_estimate_shows_mean_band_and_truth():
     others = {"open-loop linear model": {"sideslip": 0.2 * WAVE}}
     figure = plots.estimate(an_estimate(), truth, others=others)
     first, second = figure.axes
-    assert first.get_ylabel() == "sideslip [°]"
-    assert second.get_ylabel() == "front B"
+    assert label(first) == "sideslip [°]"
+    assert label(second) == "front B"
     np.testing.assert_allclose(line(first, "estimate").get_ydata(), np.degrees(0.1 * WAVE))
     np.testing.assert_allclose(line(first, "truth").get_ydata(), np.degrees(truth["sideslip"]))
     np.testing.assert_allclose(line(first, "open-loop linear model").get_ydata(), np.degrees(0.2 * WAVE))
@@ -191,3 +196,21 @@ def test_figures_can_be_drawn_into_ones_own():
     assert plots.recording(drive(), ["steer"], figure=left) is left
     assert len(left.axes) == 1
     assert right.axes == []
+
+
+def test_an_estimate_that_diverges_leaves_the_truth_readable():
+    one = an_estimate()
+    one = SimpleNamespace(time=TIME, mean=one.mean._replace(sideslip=np.exp(20 * TIME)), std=one.std)
+    figure = plots.estimate(one, {"sideslip": 0.1 * WAVE}, ["sideslip"])
+    bottom, top = figure.axes[0].get_ylim()
+    reach = np.degrees(0.1 * (WAVE.max() - WAVE.min()))
+    assert top <= np.degrees(0.1 * WAVE.max()) + reach + 1e-9
+    assert bottom < 0 < top
+
+
+def test_labels_stay_inside_the_figure():
+    figure = plots.recording(drive().without("true.yaw_rate"), ["yaw_rate", "steer"])
+    figure.draw_without_rendering()
+    height = figure.bbox.height
+    assert all(ax.get_title(loc="left") for ax in figure.axes)
+    assert max(ax.get_tightbbox().y1 for ax in figure.axes) <= height

@@ -51,7 +51,8 @@ class Study:
     `speed` m/s; `steer` rad at the road wheels; `duration` s; `rate` Hz; `yaw_rate_std` rad/s and `a_y_std` m/s^2 the
     sensors' noise; `prior` the relative spread of the parameters (E: times 2, so 0.2); `particles`; `walk` the particles'
     random walk of the parameters, relative, per root second (particle filters need one, the others do not);
-    `process_noise` of the filters' states, per root second; `window` s of the multiple shooting.
+    `v_y_noise` (m/s) and `yaw_rate_noise` (rad/s) of the filters' states, per root second: with less, or a smaller
+    walk, all particles of some seeds collapse into one; `window` s of the multiple shooting.
     """
 
     speed: float = 25.0
@@ -62,7 +63,7 @@ class Study:
     a_y_std: float = 0.1
     prior: float = 0.1
     particles: int = 1000
-    walk: float = 0.01
-    v_y_noise: float = 0.02
-    yaw_rate_noise: float = 0.01
+    walk: float = 0.05
+    v_y_noise: float = 0.05
+    yaw_rate_noise: float = 0.02
     window: float = 0.5

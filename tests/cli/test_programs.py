@@ -1,0 +1,159 @@
+"""Each program once from end to end, at smoke size: what it prints, what it writes, that the numbers agree."""
+
+import json
+
+import numpy as np
+import pytest
+from programs import columns, error_line, run, write_car, write_log
+
+from jaxveh import io
+
+
+def read_json(path):
+    content = json.loads(path.read_text())
+    assert content["manifest"]["command"][0] == "jaxveh"
+    return content
+
+
+def test_version_and_help():
+    assert run("--version").stdout.startswith("jaxveh 0.")
+    text = run("estimate", "--help").stdout
+    for word in ("--calibrate", "--truth", "car.toml", "rad/s"):
+        assert word in text
+
+
+def test_schemas_can_be_read_as_they_are(tmp_path):
+    car = tmp_path / "car.toml"
+    car.write_text(run("schema", "car").stdout)
+    assert io.read_car(car).mass == 1500.0
+    channels = tmp_path / "map.toml"
+    channels.write_text(run("schema", "channels").stdout)
+    assert io.read_channel_map(channels).channels["yaw_rate"].unit == "deg/s"
+
+
+def test_simulate_then_check(tmp_path):
+    drive, numbers = tmp_path / "drive.parquet", tmp_path / "simulate.json"
+    settings = ("--manoeuvre", "step-steer", "--steer-deg", "2", "--duration", "4", "--rate", "50")
+    result = run("simulate", *settings, "-o", drive, "--json", numbers, "--out", tmp_path / "figures")
+    assert result.exit_code == 0, result.output
+    recording = io.read_recording(drive)
+    assert len(recording) == 201
+    assert recording.unit("yaw_rate") == "rad/s"
+    np.testing.assert_allclose(float(recording["steer"][-1]), np.radians(2.0), rtol=1e-9)
+    noise = np.asarray(recording["yaw_rate"]) - np.asarray(recording["true.yaw_rate"])
+    assert 0.004 < np.std(noise) < 0.006
+    assert (tmp_path / "figures" / "channels.png").read_bytes().startswith(b"\x89PNG")
+    content = read_json(numbers)
+    assert content["manifest"]["configuration"]["steer_deg"] == 2.0
+    assert content["rows"] == 201
+
+    numbers = tmp_path / "check.json"
+    result = run("check", drive, "--vehicle", write_car(tmp_path), "--json", numbers)
+    assert result.exit_code == 0, result.output
+    content = read_json(numbers)
+    assert content["log"]["rows"] == 201
+    for finding in content["findings"]:
+        assert finding["severity"] in ("ok", "note", "warning", "error")
+        assert finding["channel"] in result.stdout
+    assert any(finding["channel"] == "steer" for finding in content["findings"])
+
+
+def test_the_same_seed_simulates_the_same_drive(tmp_path):
+    settings = ("--manoeuvre", "step-steer", "--duration", "2", "--rate", "50")
+    files = []
+    for name, seed in (("a", 3), ("b", 3), ("c", 4)):
+        files.append(tmp_path / f"{name}.csv")
+        assert run("simulate", *settings, "--seed", seed, "-o", files[-1]).exit_code == 0
+    first, second, third = (file.read_bytes() for file in files)
+    assert first == second
+    assert first != third
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """Four seconds of a sine of steer, as a simulation of the car's own file would have them, with v_y."""
+    return columns(400)
+
+
+def estimate(folder, table, *more):
+    product = folder / "estimate.csv"
+    arguments = ("estimate", write_log(folder, table), "--vehicle", write_car(folder), "-o", product, *more)
+    return run(*arguments), product
+
+
+def test_estimate_without_calibration(tmp_path, drive):
+    numbers = tmp_path / "numbers.json"
+    result, product = estimate(tmp_path, drive, "--truth", "v_y", "--json", numbers, "--out", tmp_path / "figures")
+    assert result.exit_code == 0, result.output
+    found = io.read_recording(product)
+    np.testing.assert_array_equal(np.asarray(found.time), drive["time"])
+    assert (np.asarray(found["sideslip_std"]) > 0).all()
+    content = read_json(numbers)
+    error = np.asarray(found["sideslip"]) - np.arctan2(drive["v_y"], drive["v_x"])
+    np.testing.assert_allclose(content["sideslip_rmse_deg"], np.degrees(np.sqrt(np.mean(error**2))), rtol=1e-6)
+    assert content["open_loop_sideslip_rmse_deg"] > 0
+    assert 0 <= content["sideslip_coverage_95"] <= 1
+    assert (tmp_path / "figures" / "estimate.png").exists()
+
+
+def test_estimate_never_sees_the_truth(tmp_path, drive):
+    files = []
+    for name, table in (("with", drive), ("other", {**drive, "v_y": 9 + drive["v_y"]})):
+        folder = tmp_path / name
+        folder.mkdir()
+        result, product = estimate(folder, table, "--truth", "v_y")
+        assert result.exit_code == 0, result.output
+        files.append(product.read_bytes())
+    assert files[0] == files[1]
+
+
+def test_gaps_of_an_input_are_filled_on_request_only(tmp_path, drive):
+    table = {**drive, "steer": drive["steer"].copy()}
+    table["steer"][100:104] = np.nan
+    result, product = estimate(tmp_path, table)
+    line = error_line(result)
+    assert "steer is NaN in 4 rows, first at t = 1 s" in line
+    assert "--fill SECONDS" in line
+    assert not product.exists()
+    result, _ = estimate(tmp_path, table, "--fill", "0.02")
+    assert "raise --fill" in error_line(result)
+    result, product = estimate(tmp_path, table, "--fill", "0.1")
+    assert result.exit_code == 0, result.output
+    assert product.exists()
+
+
+def test_a_span_too_short_to_calibrate_on(tmp_path, drive):
+    result, product = estimate(tmp_path, drive, "--calibrate", "0:2")
+    assert "must be at least 20 s" in error_line(result)
+    assert not product.exists()
+
+
+def test_a_log_without_a_channel(tmp_path, drive):
+    table = {name: values for name, values in drive.items() if name != "a_x"}
+    result, product = estimate(tmp_path, table)
+    assert "log lacks a_x" in error_line(result)
+    assert not product.exists()
+
+
+def test_truth_that_says_nothing_of_sideslip(tmp_path, drive):
+    result, product = estimate(tmp_path, drive, "--truth", "a_y")
+    assert "--truth = 'a_y': must be one of 'v_y', 'sideslip'" in error_line(result)
+    assert not product.exists()
+
+
+def test_demo(tmp_path):
+    out, numbers = tmp_path / "demo", tmp_path / "demo.json"
+    result = run("demo", "--particles", "20", "--seeds", "2", "--out", out, "--json", numbers)
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in out.iterdir()) == ["force_curves.png", "parameters.png", "states.png"]
+    content = read_json(numbers)
+    assert content["manifest"]["configuration"]["study"]["particles"] == 20
+    assert set(content["estimators"]) == {"prior", "PF", "APF", "UKF", "MAP"}
+    curve = {name: one["curve_rmse_share_of_D"] for name, one in content["estimators"].items()}
+    for name in ("UKF", "MAP"):
+        for axle in ("front", "rear"):
+            assert max(curve[name][axle]) < 0.02
+            assert len(curve[name][axle]) == 2
+    assert content["observability"]["condition_number"] > 1e9
+    assert "unobservable" in result.stdout
+    assert set(content["seconds"]) == {"simulation", "MAP", "PF", "APF", "UKF", "errors and step steers"}
