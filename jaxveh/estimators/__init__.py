@@ -1,6 +1,25 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
+from jaxveh.estimators.cleaning import clean
+from jaxveh.estimators.handling import Handling, handling_model
 from jaxveh.estimators.observability import observe, predict_measurements
+from jaxveh.estimators.sideslip import Calibration, calibrate, estimate, handling_car, open_loop, score
 from jaxveh.estimators.state_space import PROCESS_NOISE, START_SPREAD, held_rows, state_space
 
-__all__ = ["PROCESS_NOISE", "START_SPREAD", "held_rows", "observe", "predict_measurements", "state_space"]
+__all__ = [
+    "PROCESS_NOISE",
+    "START_SPREAD",
+    "Calibration",
+    "Handling",
+    "calibrate",
+    "clean",
+    "estimate",
+    "handling_car",
+    "handling_model",
+    "held_rows",
+    "observe",
+    "open_loop",
+    "predict_measurements",
+    "score",
+    "state_space",
+]

@@ -2,7 +2,18 @@
 
 from jaxveh.fitting.likelihood import maximise, maximum_likelihood
 from jaxveh.fitting.multiple_shooting import multiple_shooting, shoot
+from jaxveh.fitting.prediction_error import Target, prediction_error
 from jaxveh.fitting.result import Fit
 from jaxveh.fitting.segments import Segments, cut
 
-__all__ = ["Fit", "Segments", "cut", "maximise", "maximum_likelihood", "multiple_shooting", "shoot"]
+__all__ = [
+    "Fit",
+    "Segments",
+    "Target",
+    "cut",
+    "maximise",
+    "maximum_likelihood",
+    "multiple_shooting",
+    "prediction_error",
+    "shoot",
+]

@@ -63,4 +63,6 @@ def raise_unfinished(fit: Fit) -> None:
     if is_concrete(fit.result) and int(fit.result) != 0:
         names = ", ".join(p.name for p in fit.parameters)
         reason = Result(int(fit.result)).message
-        raise FilterError(f"fit of {names} stopped after {int(fit.steps)} steps: {reason}. throw=False returns it as it is.")
+        raise FilterError(
+            f"fit of {names} stopped after {int(fit.steps)} steps: {reason}. throw=False returns it as it is."
+        )

@@ -26,7 +26,7 @@ class Segments(NamedTuple):
 
 
 def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: float) -> Segments:
-    """Cut recordings into segments of `window` seconds (of the median step); host side.
+    """Cut recordings into segments of `window` seconds (of the first recording's median step, which must be concrete).
 
     Raises `InputError` for a window that is not positive, or shorter than two steps.
     """
@@ -38,7 +38,7 @@ def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: 
     if length < 2:
         raise InputError(f"window = {window} s: must span at least two steps of the recording.")
     parts = [_cut_one(model.rows(recording), length) for recording in recordings]
-    return jax.tree.map(lambda *leaves: jnp.concatenate([jnp.asarray(leaf) for leaf in leaves], axis=-1), *parts)
+    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=-1), *parts)
 
 
 def _cut_one(rows: Row, length: int) -> Segments:
@@ -49,10 +49,10 @@ def _cut_one(rows: Row, length: int) -> Segments:
     index = np.arange(segments)[None, :] * length + np.arange(length + 1)[:, None]
     inside = index < count
     clipped = np.minimum(index, count - 1)
-    take = lambda leaf: np.asarray(leaf)[clipped]  # noqa: E731
+    take = lambda leaf: leaf[clipped]
     # Past the log's end: time goes on evenly, inputs are held, nothing is measured.
-    step = float(np.median(np.diff(np.asarray(rows.t))))
-    t = take(rows.t) + np.asarray((index - clipped) * step, rows.t.dtype)
-    y = jax.tree.map(lambda leaf: np.where(inside, take(leaf), np.nan).astype(leaf.dtype), rows.y)
-    linked = np.arange(segments) < segments - 1
-    return Segments(Row(t, jax.tree.map(take, rows.u), y), linked, np.arange(segments) == 0)
+    step = (rows.t[-1] - rows.t[0]) / (count - 1)
+    t = take(rows.t) + jnp.asarray(index - clipped, rows.t.dtype) * step
+    y = jax.tree.map(lambda leaf: jnp.where(inside, take(leaf), jnp.nan), rows.y)
+    order = jnp.arange(segments)
+    return Segments(Row(t, jax.tree.map(take, rows.u), y), order < segments - 1, order == 0)

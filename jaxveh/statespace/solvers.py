@@ -56,8 +56,8 @@ class RK4(diffrax.AbstractSolver):
 class Propagate(eqx.Module):
     """A continuous model as a filter's `transition(system, t0, t1, x, u)`: explicit fixed steps of a diffrax solver.
 
-    `derivatives(system, t, x, u) -> dx/dt` is elementwise in a batch of states, so that a whole batch is one call. `steps` divides
-    the interval between two rows. The solver's `step` is called directly, never `diffeqsolve` per particle.
+    `derivatives(system, t, x, u) -> dx/dt` is elementwise in a batch of states, so that a whole batch is one call. `steps`
+    divides the interval between two rows. The solver's `step` is called directly, never `diffeqsolve` per particle.
     """
 
     derivatives: Callable = eqx.field(static=True)

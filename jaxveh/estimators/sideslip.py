@@ -1,0 +1,294 @@
+"""Sideslip from an ordinary log: calibrate a car on a span, estimate the rest, score against a reference."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.progress import Progress, silent
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.cleaning import clean
+from jaxveh.estimators.handling import Handling, handling_model
+from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
+from jaxveh.fitting import Fit, Target, prediction_error
+from jaxveh.io import AxleTyre, CarSpecification
+from jaxveh.statespace import Propagate, StateSpace
+from jaxveh.tyres import MagicFormula
+from jaxveh.vehicles import SingleTrack, from_specification, linear
+
+GENERIC = {"mu": 1.1, "C": 1.3, "E": 0.0, "cg_height": 0.45}
+"""What an axle and a car are taken to be like where the file is silent: peak friction, shape, m above ground."""
+
+PRIOR = {
+    "B": 0.3, "D": 0.15, "E": 0.25, "cg_height": 0.22, "yaw_inertia": 0.2, "steer_offset": 0.15, "steer_gain": 0.03,
+    "yaw_rate_offset": 1.0, "a_y_gain": 0.03, "brake_share": 1.0, "ellipse": 0.3, "force_offset": 1.0,
+    "front_asymmetry": 1.0, "rear_asymmetry": 1.0, "heading_offset": 1.0, "force_time": 0.7, "bias_time": 0.7,
+    "v_y": 0.7, "yaw_rate": 0.7, "front_error": 0.5, "rear_error": 0.5, "a_y_error": 0.7, "a_y": 0.5,
+}  # fmt: skip
+"""Relative prior spreads by name, on each parameter's own line (unbounded ones in units of their declared scale)."""
+
+SHORTEST = 20.0
+"""s: a span shorter than this holds too few corners to calibrate a car on."""
+
+PIECE = 8.0
+"""s: calibration runs the filter on pieces of about this length side by side,"""
+
+WARM_UP = 2.0
+"""s: which overlap by this, in which each filter finds its state."""
+
+TARGET_WEIGHTS = (0.05, 0.02)
+"""rad: how closely the estimate is asked to follow a sideslip reference; the choice is made inside the span."""
+
+TARGET_BEND = 0.0035
+"""rad: errors beyond it count less than by their square (INS alignment, tyres that warm up)."""
+
+
+def chosen(model: StateSpace):
+    """The parameters and noise levels that a calibration fits."""
+    s, car = model.system, model.system.car
+    axles = [leaf for tyre in (car.front, car.rear) for leaf in (tyre.B, tyre.D, tyre.E)]
+    body = [car.cg_height, car.yaw_inertia, car.steer_offset]
+    sensors = [s.steer_gain, s.yaw_rate_offset, s.a_y_gain, s.heading_offset]
+    forces = [s.brake_share, s.ellipse, s.force_offset, s.front_asymmetry, s.rear_asymmetry, s.force_time, s.bias_time]
+    return (*axles, *body, *sensors, *forces, *model.process_noise.law.std, *model.measurement_noise.std)
+
+
+class Calibration(eqx.Module):
+    """A car fitted to a span of a log.
+
+    `fit`: the `fitting.Fit` (its `model` is the fitted StateSpace); `span`: start and end in the log's own time, s;
+    `weight`: of the sideslip reference (rad), None where the fit is blind, by choice or because validation inside
+    the span said so; `validation`: sideslip RMSE in degrees on the span's second half by weight, fitted on its first.
+    """
+
+    fit: Fit
+    span: tuple[float, float] = eqx.field(static=True)
+    weight: float | None = eqx.field(static=True)
+    validation: tuple = eqx.field(static=True)
+
+    @property
+    def model(self) -> StateSpace:
+        """The fitted state space."""
+        return self.fit.model
+
+    def summary(self) -> dict[str, dict[str, Any]]:
+        """Fitted values by name: `{"value", "std", "unit"}`."""
+        rows = zip(self.fit.parameters, self.fit.mean, self.fit.std, strict=True)
+        short = lambda name: name.removeprefix("system.").replace("process_noise.law.std", "process noise")
+        return {
+            short(p.name).replace("measurement_noise.std", "measurement noise"): {
+                "value": float(value), "std": float(std), "unit": p.unit
+            }
+            for p, value, std in rows
+        }  # fmt: skip
+
+    def specification(self, car: CarSpecification) -> CarSpecification:
+        """The car's file with the fitted values in place, as far as a car file can say them."""
+        fitted = self.model.system.car
+        offset = float(fitted.steer_offset) / float(self.model.system.steer_gain)
+        return dataclasses.replace(
+            car,
+            yaw_inertia=float(fitted.yaw_inertia),
+            cg_height=float(fitted.cg_height),
+            steer_offset=-offset,
+            front=_axle(fitted.front),
+            rear=_axle(fitted.rear),
+            front_cornering_stiffness=float(fitted.front.cornering_stiffness),
+            rear_cornering_stiffness=float(fitted.rear.cornering_stiffness),
+        )
+
+
+def _axle(tyre: MagicFormula) -> AxleTyre:
+    return AxleTyre(**{n: float(getattr(tyre, n)) for n in ("B", "C", "D", "E", "S_h", "S_v", "nominal_load")})
+
+
+def handling_car(car: CarSpecification) -> Handling:
+    """The handling model of a car file: its own tyres where it has them, generic ones of its cornering stiffness else."""
+    known = from_specification(dataclasses.replace(car, cg_height=car.cg_height or GENERIC["cg_height"]))
+    loads = known.static_loads()
+    axles = [
+        tyre if given is not None and given.nominal_load is not None else _generic(tyre, load, given is not None)
+        for tyre, load, given in zip((known.front, known.rear), loads, (car.front, car.rear), strict=True)
+    ]
+    return Handling(eqx.tree_at(lambda c: (c.front, c.rear), known, axles))
+
+
+def _generic(tyre: MagicFormula, load, told: bool) -> MagicFormula:
+    """An axle that scales with load: as told, at its static load, or generic with the tyre's cornering stiffness."""
+    if told:
+        return MagicFormula(tyre.B, tyre.C, tyre.D, tyre.E, tyre.S_h, tyre.S_v, nominal_load=load)
+    D = GENERIC["mu"] * load
+    return MagicFormula(tyre.cornering_stiffness / (GENERIC["C"] * D), GENERIC["C"], D, GENERIC["E"], nominal_load=load)
+
+
+def calibrate(
+    recording: Recording,
+    car: CarSpecification,
+    *,
+    uses: tuple[str, ...] = (),
+    filter: AbstractFilter | None = None,
+    progress: Progress = silent,
+) -> Calibration:
+    """Fit tyres, noise levels and sensor offsets of a car to a span of a log, by maximum posterior of a filter.
+
+    Blind (`uses=()`) it reads steer, v_x, a_x, a_y and yaw_rate alone. With `uses=("v_y",)` the span's v_y supervises the
+    fit as a reference for sideslip; how strongly is chosen by fitting on the span's first half and looking at the second, where
+    "not at all" is among the choices: a reference with slow errors of its own makes a car worse. Start values and priors
+    come from the car's file and `PRIOR`, and nothing outside the recording is looked at.
+
+    **Raises** `InputError` for missing channels, or a span shorter than `SHORTEST`; `FilterError` where the fit fails.
+    """
+    for name in uses:
+        check_one_of("uses", name, ("v_y",))
+    span = (float(recording.time[0]), float(recording.time[-1]))
+    if span[1] - span[0] < SHORTEST:
+        raise InputError(
+            f"calibration span of {span[1] - span[0]:.3g} s ({span[0]:g} to {span[1]:g} s): must be at least {SHORTEST:g} s, "
+            "with corners in it."
+        )
+    filter, log = filter or Unscented(), clean(recording)
+    start = handling_model(handling_car(car))
+    if not uses:
+        return Calibration(_fit(filter, start, log, None, progress), span, None, ())
+    half = len(log) // 2
+    first = _blank(log, slice(half, len(log)))
+    parts = [_part(progress, i, 3 + len(TARGET_WEIGHTS)) for i in range(3 + len(TARGET_WEIGHTS))]
+    blind = _fit(filter, start, first, None, parts[0])
+    validation = [(None, _validate(filter, blind.model, log, half))]
+    for i, weight in enumerate(TARGET_WEIGHTS):
+        fit = _fit(filter, blind.model, first, weight, parts[1 + i], centre=start)
+        validation.append((weight, _validate(filter, fit.model, log, half)))
+    weight = min(validation, key=lambda one: one[1])[0]
+    fit = _fit(filter, blind.model, log, None, parts[-2], centre=start)
+    if weight is not None:
+        fit = _fit(filter, fit.model, log, weight, parts[-1], centre=start)
+    return Calibration(fit, span, weight, tuple(validation))
+
+
+def _part(progress: Progress, index: int, count: int) -> Progress:
+    return lambda done, total, stage: progress(index + done / max(total, 1), count, stage)
+
+
+def _blank(log: Recording, rows: slice) -> Recording:
+    """The log with nothing measured in some rows: the fit of a part is compiled once with that of the whole."""
+    hidden = np.zeros(len(log), bool)
+    hidden[rows] = True
+    return log.replace(
+        **{n: np.where(hidden, np.nan, np.asarray(log[n])) for n in ("yaw_rate", "a_y", "v_y") if n in log}
+    )
+
+
+def _fit(filter, model, log, weight, progress, centre=None) -> Fit:
+    pieces, warm_up = cut_pieces(log, PIECE, WARM_UP)
+    # A blind fit has a reference without values: one compiled function serves all fits.
+    silent_one = lambda piece: jnp.full(len(piece), jnp.nan)
+    values = tuple(map(silent_one if weight is None else reference_sideslip, pieces))
+    target = Target("reference_sideslip", values, 1.0 if weight is None else weight, TARGET_BEND)
+    return prediction_error(
+        filter, model, pieces, chosen, prior=PRIOR, centre=centre, target=target, warm_up=warm_up, progress=progress
+    )
+
+
+def cut_pieces(log: Recording, length: float, overlap: float) -> tuple[list[Recording], int]:
+    """The log in pieces of one number of rows, about `length` seconds beside an overlap, and the overlap's rows."""
+    time = np.asarray(log.time)
+    step = float(np.median(np.diff(time)))
+    warm_up = round(overlap / step)
+    count = max(1, round((time[-1] - time[0] - overlap) / length))
+    new = (len(log) - warm_up) // count
+    return [log.rows(slice(i * new, i * new + new + warm_up)) for i in range(count)], warm_up
+
+
+def reference_sideslip(recording: Recording) -> jax.Array:
+    """atan2(v_y, v_x) of a recording that has v_y, rad, (T,)."""
+    return jnp.arctan2(recording["v_y"], recording["v_x"])
+
+
+def _validate(filter, model, log, start: int) -> float:
+    """Sideslip RMSE in degrees over the rows from `start`, the filter having run from the first row."""
+    found = run(filter, model, log, throw=False)
+    error = np.degrees(np.asarray(found.mean.reference_sideslip) - np.asarray(reference_sideslip(log)))[start:]
+    return float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else float("inf")
+
+
+def estimate(
+    recording: Recording, source: Calibration | CarSpecification, *, filter: AbstractFilter | None = None, key=None
+) -> Estimate:
+    """States of the car along a log from steer, v_x, a_x, a_y and yaw_rate: see `handling.HandlingReport` for the names.
+
+    `source`: a `Calibration`, or a car's specification taken at its word. **Raises** as `run` and `clean` do.
+    """
+    model = source.model if isinstance(source, Calibration) else handling_model(handling_car(source))
+    return run(filter or Unscented(), model, clean(recording), key=key)
+
+
+PROPAGATE_LINEAR = Propagate(lambda car, t, x, u: car.derivatives(t, x, u))
+
+
+def open_loop(recording: Recording, car: SingleTrack) -> dict[str, np.ndarray]:
+    """What a linear single track makes of steer and speed alone, by name (T,): v_y (m/s), yaw_rate, sideslip (rad)."""
+    plain = linear(eqx.tree_at(lambda c: c.cg_height, car, None, is_leaf=lambda leaf: leaf is None))
+    model_rows = StateRows(jnp.asarray(recording.time), jnp.asarray(recording["steer"]), jnp.asarray(recording["v_x"]))
+    v_y, yaw_rate = _drive_linear(plain, model_rows)
+    v_x = np.asarray(recording["v_x"])
+    return {
+        "v_y": np.asarray(v_y), "yaw_rate": np.asarray(yaw_rate), "sideslip": np.arctan2(np.asarray(v_y), v_x)
+    }  # fmt: skip
+
+
+class StateRows(eqx.Module):
+    """Time, steer and speed by row, (T,) each."""
+
+    t: jax.Array
+    steer: jax.Array
+    v_x: jax.Array
+
+
+@eqx.filter_jit
+def _drive_linear(car: SingleTrack, rows: StateRows):
+    from jaxveh._core.names import record_type
+
+    inputs = record_type("Inputs", ("steer", "v_x"))
+    zero = jnp.zeros((), rows.t.dtype)
+
+    def body(state, pair):
+        now, then = pair
+        moved = PROPAGATE_LINEAR(car, now.t, then.t, state, inputs(now.steer, now.v_x))
+        return moved, moved
+
+    first, rest = jax.tree.map(lambda a: a[:-1], rows), jax.tree.map(lambda a: a[1:], rows)
+    _, states = jax.lax.scan(body, car.state_type(zero, zero, zero), (first, rest))
+    return jnp.append(zero, states.v_y), jnp.append(zero, states.yaw_rate)
+
+
+def score(found: Estimate, seen: Recording, car: CarSpecification) -> dict[str, float]:
+    """Errors against a reference recording with `v_y`, over its finite rows, next to the open-loop linear model's.
+
+    Keys: `sideslip_rmse_deg`, `sideslip_coverage_95` (share of rows inside the 95 % band), the same for `v_y`, and
+    `open_loop_sideslip_rmse_deg` for the car's file with linear tyres, steered from rest: the do-nothing baseline.
+    """
+    v_y, v_x = np.asarray(seen["v_y"]), np.asarray(seen["v_x"])
+    truth = {"v_y": v_y, "sideslip": np.arctan2(v_y, v_x)}
+    known = np.isfinite(v_y)
+    if not known.any():
+        raise InputError("score: the reference v_y is NaN in every row; there is nothing to score against.")
+    rms = lambda error: float(np.sqrt(np.mean(error[known] ** 2)))
+    inside = {
+        name: np.abs(np.asarray(getattr(found.mean, name)) - truth[name]) <= 1.96 * np.asarray(getattr(found.std, name))
+        for name in truth
+    }
+    baseline = open_loop(seen, from_specification(car))
+    return {
+        "sideslip_rmse_deg": np.degrees(rms(np.asarray(found.mean.sideslip) - truth["sideslip"])),
+        "open_loop_sideslip_rmse_deg": np.degrees(rms(baseline["sideslip"] - truth["sideslip"])),
+        "sideslip_coverage_95": float(np.mean(inside["sideslip"][known])),
+        "v_y_rmse": rms(np.asarray(found.mean.v_y) - truth["v_y"]),
+        "v_y_coverage_95": float(np.mean(inside["v_y"][known])),
+        "rows": int(known.sum()),
+    }
