@@ -107,8 +107,8 @@ def test_smoke_run_writes_numbers_and_manifest(tmp_path):
     ("arguments", "message"),
     [
         (("--only", "nonsense"), "no case has that in its name"),
-        (("--rounds", "0"), "it must be at least 1"),
-        (("--core", "99999"), "core is 99999"),
+        (("--rounds", "0", "--list"), "it must be at least 1"),
+        (("--core", "99999", "--list"), "core is 99999"),
     ],
 )
 def test_bad_arguments_are_named(arguments, message):
