@@ -21,12 +21,12 @@ class DoubleLaneChange(AbstractManoeuvre):
     Each period is faded in and out over an eighth of it, so that its peaks stay at plus and minus `steer`.
     """
 
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
     start: float = eqx.field(static=True)
     period: float = eqx.field(static=True)
     pause: float = eqx.field(static=True)
     duration: float = eqx.field(static=True)
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
 
     def inputs(self, t: Any) -> DriverInputs:
         t = _time(t, self.steer)
@@ -43,11 +43,11 @@ class DoubleLaneChange(AbstractManoeuvre):
 class StepSteer(AbstractManoeuvre):
     """Straight until `start`, then a smooth ramp of length `ramp` to a constant `steer`."""
 
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
     ramp: float = eqx.field(static=True)
     start: float = eqx.field(static=True)
     duration: float = eqx.field(static=True)
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
 
     def inputs(self, t: Any) -> DriverInputs:
         t = _time(t, self.steer)
@@ -57,12 +57,12 @@ class StepSteer(AbstractManoeuvre):
 class SweptSine(AbstractManoeuvre):
     """A sine whose frequency rises linearly over the duration, with smooth edges of length `edge` at both ends."""
 
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
     from_frequency: float = eqx.field(static=True)
     to_frequency: float = eqx.field(static=True)
     edge: float = eqx.field(static=True)
     duration: float = eqx.field(static=True)
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
 
     def inputs(self, t: Any) -> DriverInputs:
         t = _time(t, self.steer)

@@ -34,28 +34,26 @@ class Instrumented(eqx.Module):
     @property
     def state_type(self) -> Any:
         """The state's NamedTuple class: the vehicle's own where the sensors have no states."""
-        own = self.vehicle.state_type
-        if not self._filtered:
-            return own
-        return record_type("InstrumentedState", (*own._fields, *self.sensors.filter_names))
+        own, filters = self.vehicle.state_type, self._filters
+        return own if filters is None else record_type("InstrumentedState", (*own._fields, *filters.filter_names))
 
     def start(self, t: Any, u: Any, **values: Any) -> Any:
         """The vehicle's start (fields replaced by keyword) with the low-pass settled at its outputs."""
         check_names("start", values, self.state_type._fields)
         own = self.vehicle.state_type._fields
         vehicle = self.vehicle.start(t, u, **{name: value for name, value in values.items() if name in own})
-        if not self._filtered:
+        if self._filters is None:
             return vehicle
-        state = self.state_type(*vehicle, *self.sensors.start(self.vehicle.outputs(t, vehicle, u)))
+        state = self.state_type(*vehicle, *self._filters.start(self.vehicle.outputs(t, vehicle, u)))
         return state._replace(**{name: value for name, value in values.items() if name not in own})
 
     def derivatives(self, t: Any, x: Any, u: Any) -> Any:
         """The state's time derivative, the same NamedTuple; forces are computed once."""
         vehicle, filters = self.split(x)
         rates, outputs = self.vehicle.evaluate(t, vehicle, u)
-        if not self._filtered:
+        if self._filters is None:
             return rates
-        return self.state_type(*rates, *self.sensors.derivatives(filters, outputs))
+        return self.state_type(*rates, *self._filters.derivatives(filters, outputs))
 
     def see(self, t: Any, x: Any, u: Any) -> tuple[Any, Any]:
         """The vehicle's outputs, and what the sensors say of them without noise (None without sensors)."""
@@ -75,8 +73,9 @@ class Instrumented(eqx.Module):
         """The vehicle's state and the low-pass' states (None without)."""
         own = self.vehicle.state_type
         n = len(own._fields)
-        return own(*x[:n]), self.sensors.filter_type(*x[n:]) if self._filtered else None
+        return own(*x[:n]), None if self._filters is None else self._filters.filter_type(*x[n:])
 
     @property
-    def _filtered(self) -> bool:
-        return self.sensors is not None and self.sensors.low_pass is not None
+    def _filters(self) -> SensorSet | None:
+        """The sensors where they have states of their own."""
+        return None if self.sensors is None or self.sensors.low_pass is None else self.sensors

@@ -88,8 +88,8 @@ class SingleTrack(AbstractVehicle):
     yaw_inertia: jax.Array = positive("kg m^2")
     front_axle_to_cg: jax.Array = positive("m")
     rear_axle_to_cg: jax.Array = positive("m")
-    front: AbstractTyre
-    rear: AbstractTyre
+    front: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
+    rear: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
     cg_height: jax.Array | None = positive("m", default=None)
     steer_offset: jax.Array = parameter("rad", scale=0.02, default=0.0)
     crawl_speed: float = eqx.field(static=True, default=3.0)
@@ -195,6 +195,10 @@ class SingleTrack(AbstractVehicle):
             )
         moved = self.mass * _longitudinal_acceleration(x, u) * self.cg_height / self.wheelbase
         return front - moved, rear + moved
+
+    def contacts(self, x, u) -> tuple[Contact, Contact]:
+        """How the front and the rear axle touch the road: slip angles, loads, speeds."""
+        return self._contacts(x, u, *self._steered(u))
 
     def _steered(self, u):
         steer = u.steer + self.steer_offset
