@@ -19,13 +19,17 @@ INPUTS = ("steer", "v_x", "a_x")
 def filled(recording: Recording, max_gap: float | None) -> Recording:
     """The inputs without gaps: filled along lines over at most `max_gap` seconds where that is given.
 
-    **Raises** `InputError` where an input is NaN still, with the option that fills it.
+    **Raises** `InputError` where a channel of `BLIND` is missing, or an input is NaN still, with the option that fills it.
     """
     if max_gap is not None:
         check_positive("--fill", max_gap, "s")
+    missing = [name for name in BLIND if name not in recording]
+    if missing:
+        raise InputError(
+            f"log lacks {', '.join(missing)}, and needs {', '.join(BLIND)}; say which columns they are with --channels "
+            "(jaxveh schema channels)."
+        )
     for name in INPUTS:
-        if name not in recording:
-            continue
         if max_gap is not None and np.isfinite(np.asarray(recording[name])).any():
             recording = recording.fill(name, "linear", max_gap)
         gaps = np.isnan(np.asarray(recording[name]))

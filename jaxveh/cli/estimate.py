@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from jaxveh import io
-from jaxveh._core.errors import check_at_least
+from jaxveh._core.errors import check_at_least, check_one_of
 from jaxveh.cli import options, sideslip
 from jaxveh.cli.blanking import filled, split
 from jaxveh.cli.console import number, progress, results, spread, table
@@ -71,6 +71,8 @@ def estimate(
     check_product(product, io.SUFFIXES, force, (log, vehicle, channels))
     check_report(out, numbers)
     check_at_least("--particles", particles, 2)
+    if truth is not None:
+        check_one_of("--truth", truth, sideslip.SCORED)
     car, recording = io.read_car(vehicle), filled(io.read_recording(log, channels), fill)
     span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
     uses = tuple(calibrate_on or ())

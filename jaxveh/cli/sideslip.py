@@ -8,7 +8,6 @@ import jax
 import numpy as np
 
 from jaxveh import Recording, filters, vehicles
-from jaxveh._core.errors import check_one_of
 from jaxveh._core.progress import Progress
 from jaxveh.estimators import sideslip as library
 from jaxveh.io import CarSpecification
@@ -26,8 +25,6 @@ def filter_of(name: str, particles: int) -> filters.AbstractFilter:
 
 def calibrate(part: Recording, car: CarSpecification, uses: tuple[str, ...], progress: Progress) -> library.Calibration:
     """Tyres, noises and steering offset fitted on a span."""
-    for name in uses:
-        check_one_of("--calibrate-on", name, ("v_y",))
     return library.calibrate(part, car, uses=uses, progress=progress)
 
 
@@ -43,8 +40,7 @@ def estimate(
 
 
 def truth_of(seen: Recording, name: str) -> dict[str, np.ndarray]:
-    """What the truth channel says of the quantities that are shown, by name (T,)."""
-    check_one_of("--truth", name, SCORED)
+    """What the truth channel, one of `SCORED`, says of the quantities that are shown, by name (T,)."""
     v_x, values = np.asarray(seen["v_x"]), np.asarray(seen[name])
     if name == "v_y":
         return {"v_y": values, "sideslip": np.arctan2(values, v_x)}

@@ -137,7 +137,7 @@ def test_a_log_without_a_channel(tmp_path, drive):
 
 def test_truth_that_says_nothing_of_sideslip(tmp_path, drive):
     result, product = estimate(tmp_path, drive, "--truth", "a_y")
-    assert "--truth = 'a_y': must be one of 'v_y', 'sideslip'" in error_line(result)
+    assert "--truth = 'a_y': must be one of 'v_y', 'sideslip'." in error_line(result)
     assert not product.exists()
 
 
