@@ -10,7 +10,7 @@ from jaxveh import numerics
 from jaxveh.numerics.linear_algebra import WRITTEN_OUT
 
 every_type = pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
-every_size = pytest.mark.parametrize("n", [1, 2, 3, WRITTEN_OUT, WRITTEN_OUT + 1])
+every_size = pytest.mark.parametrize("n", [1, 3, WRITTEN_OUT, WRITTEN_OUT + 1])
 
 
 def definite(n, batch=(), dtype=jnp.float64, seed=0):
@@ -27,7 +27,7 @@ def close(value, expected, dtype):
 
 @every_type
 @every_size
-@pytest.mark.parametrize("batch", [(), (5,), (2, 3)])
+@pytest.mark.parametrize("batch", [(), (2, 3)])
 def test_against_the_library(n, batch, dtype):
     matrix = definite(n, batch, dtype)
     exact = np.asarray(matrix, float)
