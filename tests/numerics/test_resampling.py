@@ -92,7 +92,7 @@ def test_numbers_of_children_are_bounded_as_each_scheme_promises(dtype):
 
 
 @every_type
-@pytest.mark.parametrize("size", [7, 99_999])
+@pytest.mark.parametrize("size", [11, 20, 99_999])  # 1 / 11 and 1 / 20 sum to more than 1 when rounded
 def test_residual_keeps_whole_expectations_exactly(dtype, size):
     uniform = jnp.full(size, 1.0 / size, dtype)
     np.testing.assert_array_equal(numerics.residual(jax.random.key(0), uniform), np.arange(size))
@@ -108,6 +108,11 @@ def test_systematic_is_the_textbook_s():
         offset = float(numerics.uniform(key))
         expected = np.searchsorted(np.cumsum(weights) / weights.sum(), (np.arange(200) + offset) / 200)
         np.testing.assert_array_equal(numerics.systematic(key, jnp.asarray(weights)), expected)
+
+
+def test_a_draw_on_a_boundary_belongs_to_the_next_living_particle():
+    found = resampling._search(jnp.asarray([0, 3, 3, 5], jnp.int32), jnp.asarray([0, 2, 3, 4], jnp.int32))
+    np.testing.assert_array_equal(found, [1, 1, 3, 3])
 
 
 @every_scheme
@@ -171,7 +176,7 @@ def test_normalised_weights(dtype):
 
 
 @every_type
-@pytest.mark.parametrize("dead", [-np.inf, np.nan])
+@pytest.mark.parametrize("dead", [-np.inf, np.nan, np.inf])
 def test_all_dead(dtype, dead):
     log_weights = jnp.full(4, dead, dtype)
     weights, log_mean, alive = jax.jit(numerics.normalise)(log_weights)
