@@ -79,7 +79,9 @@ def test_where_s_mistakes(where, message):
         resolve(car(), where)
 
 
-@pytest.mark.parametrize("relative", [0.1, {"B": 0.1, "E": 0.1, "share": 0.1}, {"front.B": 0.1, "E": 0.1, "share": 0.1}])
+@pytest.mark.parametrize(
+    "relative", [0.1, {"B": 0.1, "E": 0.1, "share": 0.1}, {"front.B": 0.1, "E": 0.1, "share": 0.1}]
+)
 def test_prior_spread_by_domain(relative):
     chosen = resolve(car(), lambda c: (c.front.B, c.front.E, c.rear.share))
     spreads = prior_spread(chosen, pick(car(), chosen), relative)
@@ -131,11 +133,17 @@ def test_checks_skip_tracers_and_name_the_value():
     assert jax.jit(lambda v: (check_positive("v", v), v)[1])(-1.0) == -1.0
     assert check_positive("v", None) is None
     for act, message in (
-        (lambda: check_positive("mass", -2.0, "kg", "Look."), r"mass = -2\.0: must be positive and finite \(kg\)\. Look\."),
+        (
+            lambda: check_positive("mass", -2.0, "kg", "Look."),
+            r"mass = -2\.0: must be positive and finite \(kg\)\. Look\.",
+        ),
         (lambda: check_finite("g", np.inf), "g = inf: must be finite"),
         (lambda: check_at_least("N", 1, 2), "N = 1: must be at least 2"),
         (lambda: check_one_of("side", "up", ("left", "right")), "side = 'up': must be one of 'left', 'right'"),
-        (lambda: check("v", np.array([1.0, -1.0]), lambda v: v > 0, "positive"), r"v = \[ 1\. -1\.\]: must be positive"),
+        (
+            lambda: check("v", np.array([1.0, -1.0]), lambda v: v > 0, "positive"),
+            r"v = \[ 1\. -1\.\]: must be positive",
+        ),
     ):
         with pytest.raises(InputError, match=message):
             act()

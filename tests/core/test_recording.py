@@ -73,7 +73,10 @@ def test_fill(method, max_gap, values, filled):
         (lambda: Recording([[0.0, 1.0]], {}), r"time has shape \(1, 2\)"),
         (lambda: Recording([0.0, 1.0], {"a": [1.0]}), r"a has shape \(1,\), time has \(2,\)"),
         (lambda: Recording([0.0, NAN], {}), "time is not finite in row 1"),
-        (lambda: Recording([0.0, 2.0, 1.0], {}), r"time\[2\] = 1\.0 after time\[1\] = 2\.0: must be strictly increasing"),
+        (
+            lambda: Recording([0.0, 2.0, 1.0], {}),
+            r"time\[2\] = 1\.0 after time\[1\] = 2\.0: must be strictly increasing",
+        ),
         (lambda: Recording([0.0, 1.0, 1.0], {}), r"Sort the rows and drop repeated stamps"),
         (lambda: make()["b"], r"unknown name\(s\) b; there are: a, true\.a"),
         (lambda: make().select(["x"]), r"select: unknown name\(s\) x"),

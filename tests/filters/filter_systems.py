@@ -2,22 +2,13 @@
 
 from collections import namedtuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
+from nile import NILE
 
 from jaxveh import Recording
 from jaxveh import statespace as ss
 from jaxveh._core.names import record_type
-
-# Annual flow of the Nile at Aswan 1871-1970, 10^8 m^3 (Cobb 1978; Durbin & Koopman 2012, sec. 2.2.5).
-NILE = np.array(
-    """1120 1160 963 1210 1160 1160 813 1230 1370 1140 995 935 1110 994 1020 960 1180 799 958 1140 1100 1210 1150 1250
-    1260 1220 1030 1100 774 840 874 694 940 833 701 916 692 1020 1050 969 831 726 456 824 702 1120 1100 832 764 821 768
-    845 864 862 698 845 744 796 1040 759 781 865 845 944 984 897 822 1010 771 676 649 846 812 742 801 1040 860 874 848
-    890 744 749 838 1050 918 986 797 923 975 815 1020 906 901 1170 912 746 919 718 714 740""".split(),
-    dtype=float,
-)
 
 Level = namedtuple("Level", "level")
 Flow = namedtuple("Flow", "flow")
@@ -124,14 +115,3 @@ def kalman(model, recording):
         for name, value in zip(out, (ll, x, P, innovation, std, nis), strict=True):
             out[name].append(value)
     return {name: np.array(values) for name, values in out.items()}
-
-
-def step_by_step(filter_, model, rows, key=None):
-    """The filter fed row by row in Python, as a live loop does; the last belief and the infos stacked."""
-    row = lambda k: jax.tree.map(lambda leaf: leaf[k], rows)  # noqa: E731
-    belief, info = filter_.init(model, row(0), key)
-    infos = [info]
-    for k in range(1, rows.t.shape[0]):
-        belief, info = filter_.step(model, belief, row(k))
-        infos.append(info)
-    return belief, jax.tree.map(lambda *leaves: jnp.stack(leaves), *infos)

@@ -35,7 +35,6 @@ FILTERS = [
     _spread(filters.AuxiliaryParticleFilter, "systematic", 0.5),
     _spread(filters.AuxiliaryParticleFilter, "multinomial", 0.5, lookahead=_halfway),
     _spread(filters.AuxiliaryParticleFilter, "stratified", 1.0),
-    _spread(filters.AuxiliaryParticleFilter, "residual", 1.0, lookahead=_halfway),
 ]
 
 
@@ -201,7 +200,6 @@ def _blind(key, weights, n):
     [
         pytest.param(filters.ParticleFilter(25, _blind), id="PF-blind"),
         pytest.param(filters.AuxiliaryParticleFilter(25, threshold=0.7), id="APF-systematic"),
-        pytest.param(filters.AuxiliaryParticleFilter(25, _blind, lookahead=_halfway), id="APF-blind-lookahead"),
     ],
 )
 def test_gradient_equals_differences_with_frozen_ancestors(filter_):

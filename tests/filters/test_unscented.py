@@ -54,7 +54,7 @@ def test_predict_and_update_make_a_step_and_serve_sensors_of_different_rates():
     model = linear_model(2, 2, seed=3)
     recording = linear_recording(model, rows=2)
     rows, filter_ = model.rows(recording), filters.Unscented()
-    first, second = (jax.tree.map(lambda leaf: leaf[k], rows) for k in (0, 1))
+    first, second = (jax.tree.map(lambda leaf, k=k: leaf[k], rows) for k in (0, 1))
 
     @eqx.filter_jit
     def both(model):

@@ -19,8 +19,13 @@ def recordings():
     return [drive(52, seed=1), drive(37, seed=2, start=[0.4, 0.5])]
 
 
-def test_equals_scipy_on_the_same_residuals(recordings):
-    fit = multiple_shooting(model(), recordings, window=1.0, tie=0.1, tolerance=1e-12)
+@pytest.fixture(scope="module")
+def both(recordings):
+    return multiple_shooting(model(), recordings, window=1.0, tie=0.1, tolerance=1e-12)
+
+
+def test_equals_scipy_on_the_same_residuals(recordings, both):
+    fit = both
     centre, spread = np.log([3.0, 0.7]), 0.5
     start = np.concatenate([centre, np.tile(START, 10)])
     exact = scipy.optimize.least_squares(
@@ -71,9 +76,8 @@ def test_standard_errors_cover_the_truth():
     assert 0.88 < covered <= 1.0
 
 
-def test_several_recordings_tell_more_than_one(recordings):
-    one = multiple_shooting(model(), recordings[0], window=1.0)
-    both = multiple_shooting(model(), recordings, window=1.0)
+def test_several_recordings_tell_more_than_one(recordings, both):
+    one = multiple_shooting(model(), recordings[0], window=1.0, tie=0.1, tolerance=1e-12)
     for few, more, truth in zip(one.std, both.std, TRUE, strict=True):
         assert float(more) < float(few)
         assert float(more) < 0.3 * truth
@@ -115,22 +119,21 @@ def test_short_windows_keep_an_unstable_system_from_exploding():
 
 def test_a_fit_that_diverges_everywhere_is_a_code_not_a_crash():
     system, recording = _unstable()
-    system = ss.start_from(system, a=1e4)
-    fit = multiple_shooting(system, recording, window=5.0, max_steps=20, throw=False)
+    system = ss.start_from(system, a=1e6)
+    fit = multiple_shooting(system, recording, window=0.25, throw=False)
     assert Result(int(fit.result)) in (Result.not_converged, Result.non_finite_state)
 
 
-def test_correlated_noise_is_whitened(recordings):
+def test_correlated_noise_is_whitened(recordings, both):
     law = ss.MultivariateGaussian(("rate", "angle"), [[NOISE[1] ** 2, 0.0], [0.0, NOISE[0] ** 2]])
-    plain = multiple_shooting(model(), recordings[1], window=1.0)
-    same = multiple_shooting(model(noise=law), recordings[1], window=1.0)
-    np.testing.assert_allclose(same.unconstrained, plain.unconstrained, rtol=1e-5)
-    np.testing.assert_allclose(same.cost, plain.cost, rtol=1e-9)
+    same = multiple_shooting(model(noise=law), recordings, window=1.0, tie=0.1, tolerance=1e-12)
+    np.testing.assert_allclose(same.unconstrained, both.unconstrained, rtol=1e-6)
+    np.testing.assert_allclose(same.cost, both.cost, rtol=1e-9)
     # With a correlation the cost at the optimum of other residuals differs: it is not the diagonal that counts.
     shared = 0.9 * NOISE[0] * NOISE[1]
     law = ss.MultivariateGaussian(("rate", "angle"), [[NOISE[1] ** 2, shared], [shared, NOISE[0] ** 2]])
-    other = multiple_shooting(model(noise=law), recordings[1], window=1.0)
-    assert float(other.cost) > 1.5 * float(plain.cost)
+    other = multiple_shooting(model(noise=law), recordings, window=1.0, tie=0.1, tolerance=1e-12)
+    assert float(other.cost) > 1.5 * float(both.cost)
 
 
 def test_ties_gather_the_process_noise_of_a_window():
@@ -180,7 +183,9 @@ def test_errors(act, message):
 
 
 def test_a_fit_that_does_not_finish_raises_unless_told(recordings):
-    with pytest.raises(FilterError, match=r"fit of k, d stopped after 2 steps: the solver stopped before its tolerance"):
+    with pytest.raises(
+        FilterError, match=r"fit of k, d stopped after 2 steps: the solver stopped before its tolerance"
+    ):
         multiple_shooting(model(), recordings[1], window=1.0, max_steps=2)
     fit = multiple_shooting(model(), recordings[1], window=1.0, max_steps=2, throw=False)
     assert Result(int(fit.result)) is Result.not_converged

@@ -206,9 +206,11 @@ def test_particle_likelihoods_agree_with_smcx(measured, particle_runs):
 
     with jax.numpy_dtype_promotion("standard"):
         run = jax.jit(
-            lambda key: smcx.bootstrap_filter(
-                key, initial, transition, observe, jnp.asarray(measured)[:, None], N, resampling_threshold=1.1
-            ).marginal_loglik
+            lambda key: (
+                smcx.bootstrap_filter(
+                    key, initial, transition, observe, jnp.asarray(measured)[:, None], N, resampling_threshold=1.1
+                ).marginal_loglik
+            )
         )
         theirs = np.array([run(key) for key in jax.random.split(jax.random.key(1), RUNS)])
     for ours in particle_runs.values():

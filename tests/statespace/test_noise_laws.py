@@ -116,7 +116,9 @@ def test_covariances_and_scaling():
     np.testing.assert_allclose(both.scaled(2.0).covariance(), 4 * scipy.linalg.block_diag(MATRIX, 9.0))
     assert both.names == ("a", "b", "c", "d")
     assert both.has_covariance
-    assert not ss.Independent((ss.CauchyGaussianMixture(0.5, {"a": 1.0}, {"a": 1.0}), ss.Gaussian({"d": 1.0}))).has_covariance
+    assert not ss.Independent(
+        (ss.CauchyGaussianMixture(0.5, {"a": 1.0}, {"a": 1.0}), ss.Gaussian({"d": 1.0}))
+    ).has_covariance
 
 
 def test_a_covariance_that_does_not_exist():
@@ -161,7 +163,10 @@ def test_whiten_decorrelates_what_is_present():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: ss.Gaussian({"a": 0.0}), r"standard deviation of a = 0\.0: must be positive.*without noise is left out"),
+        (
+            lambda: ss.Gaussian({"a": 0.0}),
+            r"standard deviation of a = 0\.0: must be positive.*without noise is left out",
+        ),
         (lambda: ss.Gaussian({"a": -1}), r"standard deviation of a = -1\.0"),
         (lambda: ss.Gaussian({}), "standard deviation is empty"),
         (lambda: ss.Gaussian(0.1), "must be a NamedTuple or a mapping"),
@@ -169,9 +174,15 @@ def test_whiten_decorrelates_what_is_present():
         (lambda: ss.StudentT(3.0, {"a": np.inf}), "scale of a = inf"),
         (lambda: ss.CauchyGaussianMixture(1.5, {"a": 1.0}, {"a": 1.0}), r"weight = 1\.5: must be from 0 to 1"),
         (lambda: ss.CauchyGaussianMixture(0.5, {"a": 1.0}, {"b": 1.0}), "must agree"),
-        (lambda: ss.MultivariateGaussian(("a", "b"), MATRIX), r"covariance has shape \(3, 3\): must be \(2, 2\) for a, b"),
+        (
+            lambda: ss.MultivariateGaussian(("a", "b"), MATRIX),
+            r"covariance has shape \(3, 3\): must be \(2, 2\) for a, b",
+        ),
         (lambda: ss.MultivariateGaussian(("a",), [[-1.0]]), "must be symmetric and positive definite"),
-        (lambda: ss.MultivariateGaussian(("a", "b"), [[1.0, 0.5], [0.0, 1.0]]), "must be symmetric and positive definite"),
+        (
+            lambda: ss.MultivariateGaussian(("a", "b"), [[1.0, 0.5], [0.0, 1.0]]),
+            "must be symmetric and positive definite",
+        ),
         (lambda: ss.Independent((ss.Gaussian({"a": 1.0}), ss.Gaussian({"a": 1.0}))), "noise laws share fields"),
         (lambda: combine(ss.Gaussian({"a": 1.0}), ss.Gaussian({"a": 2.0})), "noise laws share fields"),
         (lambda: ss.Continuous(ss.StudentT(3.0, {"a": 1.0})), "StudentT as process noise is the law of one step"),

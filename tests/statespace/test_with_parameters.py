@@ -48,8 +48,8 @@ def base(law=None, process=True):
 
 TIME = np.linspace(0, 2, 21)
 RECORDING = Recording(TIME, {"force": np.sin(3 * TIME), "v": 1 + 0.7 * (1 - np.cos(3 * TIME))})
-ALL = lambda s: (s["car"].engine.gain, s["car"].engine.offset, s["car"].share)  # noqa: E731
-INSIDE = lambda car: (car.engine.gain, car.engine.offset, car.share)  # noqa: E731
+ALL = lambda s: (s["car"].engine.gain, s["car"].engine.offset, s["car"].share)
+INSIDE = lambda car: (car.engine.gain, car.engine.offset, car.share)
 
 
 def test_chosen_leaves_leave_the_system_and_become_the_prior():
@@ -71,9 +71,7 @@ def test_the_joint_model_is_the_plain_one_with_these_parameters():
     plain, model = base(), with_parameters(base(), ALL, prior=0.1)
     u, x = Push(jnp.asarray(0.7)), type(model.prior.mean)(*[jnp.asarray(v) for v in (1.3, np.log(3.0), 0.4, 1.1)])
     moved = model.transition(0.0, 0.1, x, u)
-    changed = eqx.tree_at(
-        ALL, plain.system, [jnp.asarray(3.0), jnp.asarray(0.4), jnp.asarray(1 / (1 + np.exp(-1.1)))]
-    )
+    changed = eqx.tree_at(ALL, plain.system, [jnp.asarray(3.0), jnp.asarray(0.4), jnp.asarray(1 / (1 + np.exp(-1.1)))])
     np.testing.assert_allclose(moved.v, move(changed, 0.0, 0.1, Speed(1.3), u).v, rtol=1e-14)
     assert moved[1:] == x[1:]
     shown = model.report(0.0, x, u)
@@ -85,7 +83,9 @@ def test_the_joint_model_is_the_plain_one_with_these_parameters():
 
 @pytest.fixture(scope="module")
 def estimated():
-    model = with_parameters(base(), ALL, prior={"gain": 0.3, "car.engine.offset": 1.0, "share": 0.2}, walk={"gain": 0.01})
+    model = with_parameters(
+        base(), ALL, prior={"gain": 0.3, "car.engine.offset": 1.0, "share": 0.2}, walk={"gain": 0.01}
+    )
     return model, filters.run(filters.Unscented(), model, RECORDING)
 
 
@@ -108,9 +108,9 @@ def test_gradients_reach_start_values_through_the_prior(estimated):
     model, _ = estimated
     value = lambda m: filters.run(filters.Unscented(), m, RECORDING).log_likelihood
     gradient = jax.grad(value)(model)
+    physical = model.report(0.0, model.prior.mean, None)
     for field in ("car_engine_gain", "car_engine_offset", "car_share"):
         nudged = lambda step, f=field: start_from(model, **{f: float(getattr(physical, f)) + step})
-        physical = model.report(0.0, model.prior.mean, None)
         difference = (value(nudged(1e-5)) - value(nudged(-1e-5))) / 2e-5
         (p,) = [p for p in model.chosen.parameters if p.field == field]
         through = getattr(gradient.prior.mean, field) / p.domain.slope(getattr(physical, field))
@@ -165,7 +165,10 @@ def test_a_walk_s_spread_is_relative_and_per_root_second():
     [
         (dict(prior=0.0), r"prior spread of car\.engine\.gain = 0\.0: must be positive and finite"),
         (dict(prior={"gain": 0.1}), r"prior: no spread for car\.engine\.offset; there are: gain"),
-        (dict(prior={"gain": 0.1, "offset": 0.1, "share": 0.1, "mass": 1.0}), r"prior: unknown name\(s\) mass; there are:"),
+        (
+            dict(prior={"gain": 0.1, "offset": 0.1, "share": 0.1, "mass": 1.0}),
+            r"prior: unknown name\(s\) mass; there are:",
+        ),
         (dict(prior=0.1, walk=-0.1), r"walk spread of car\.engine\.gain = -0\.1: must be positive"),
         (dict(prior=0.1, walk={"gian": 0.1}), r"walk: unknown name\(s\) gian; there are: car\.engine\.gain, gain"),
         (dict(prior=0.1, where=lambda s: (s["car"].share, s["car"].share)), r"where picked car\.share twice"),
