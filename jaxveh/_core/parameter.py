@@ -95,7 +95,8 @@ def _describe(model, path, inside: str) -> Parameter:
     for key in path:
         if dataclasses.is_dataclass(owner) and isinstance(key, jtu.GetAttrKey):
             metadata = {f.name: f.metadata for f in dataclasses.fields(owner)}.get(key.name, {})
-        owner = getattr(owner, key.name) if isinstance(key, jtu.GetAttrKey) else owner[getattr(key, "key", getattr(key, "idx", None))]
+        by_name = isinstance(key, jtu.GetAttrKey)
+        owner = getattr(owner, key.name) if by_name else owner[getattr(key, "key", getattr(key, "idx", None))]
     name = _path_name(path)
     return Parameter(
         path=f"{inside}.{name}" if inside else name,
