@@ -61,7 +61,7 @@ class Interval(AbstractBijector):
     high: float = eqx.field(static=True)
 
     def __check_init__(self):
-        if is_concrete(self.low, self.high) and not np.isfinite(self.high - self.low) or self.low >= self.high:
+        if (is_concrete(self.low, self.high) and not np.isfinite(self.high - self.low)) or self.low >= self.high:
             raise InputError(f"Interval({self.low}, {self.high}): low must be below high, both finite.")
 
     def forward(self, unconstrained):

@@ -11,7 +11,7 @@ from jaxveh._core.errors import InputError
 
 @functools.cache
 def _record_type(name: str, fields: tuple[str, ...]):
-    return namedtuple(name, fields)  # noqa: PYI024  made at run time, one class a set of fields
+    return namedtuple(name, fields)
 
 
 def record_type(name: str, fields: Iterable[str]):

@@ -129,7 +129,7 @@ def _draw(found: Any, recording: Any, seen: Any, truth: str | None, car: Any, sp
     spans = [] if span is None else [(max(span[0], float(recording.time[0])), span[1], "calibration")]
     paths = [
         plots.save(plots.recording(recording, spans=spans), out / "channels.png"),
-        plots.save(plots.estimate(found, true, names, others=others), out / "estimate.png"),
+        plots.save(plots.estimate(found, true, names, others=others, errors=true is not None), out / "estimate.png"),
     ]
     for path in paths:
         results().print(f"figure: {path}")

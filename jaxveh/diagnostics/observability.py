@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
-
 import numpy as np
 
 from jaxveh._core.errors import FilterError, InputError, check_positive

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.statespace import Continuous, Gaussian, Prior, Propagate, StateSpace
+from jaxveh.statespace import Continuous, Gaussian, Heun, Prior, Propagate, StateSpace
 from jaxveh.vehicles import SingleTrack
 
 BEND = 0.03
@@ -151,7 +151,8 @@ def report(system: Handling, t, x: HandlingState, u) -> HandlingReport:
     )
 
 
-PROPAGATE = Propagate(derivatives)
+PROPAGATE = Propagate(derivatives, Heun())
+"""Heun's method: at 100 Hz its error is far below the noises, at half the work of a fourth-order method."""
 
 
 def handling_model(system: Handling) -> StateSpace:

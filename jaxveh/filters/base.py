@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -20,7 +20,9 @@ class Info(NamedTuple):
     `log_likelihood`: the increment, log p(y_k | y_0..k-1). `innovation`, `innovation_std`: measurement less prediction
     and its predicted spread, NamedTuples by channel, NaN where missing. `nis`: normalised innovation squared over the
     channels present (Gaussian filters; expected value: their number). `ess`: effective sample size after the
-    measurement, (particle filters, else NaN). `result`: code, see `jaxveh.Result`.
+    measurement, (particle filters, else NaN). `result`: code, see `jaxveh.Result`. `whitened`, `log_scale`: innovations
+    decorrelated in the order of the channels and the logarithm of what each was divided by, zero where missing (Gaussian
+    filters, else None): `-0.5 whitened^2 - log_scale - 0.5 log(2 pi)` of the channels present add up to the log-likelihood.
     """
 
     log_likelihood: Any
@@ -29,6 +31,8 @@ class Info(NamedTuple):
     nis: Any
     ess: Any
     result: Any
+    whitened: Any = None
+    log_scale: Any = None
 
 
 class AbstractBelief(eqx.Module):
@@ -45,8 +49,11 @@ class AbstractFilter(eqx.Module):
     `init(model, row, key) -> (belief, info)` takes the prior as the belief at the first row's time and applies its
     measurement, without propagation. `step(model, belief, row) -> (belief, info)` propagates with the inputs of the
     previous row over the time between, then applies the row's measurement with its own inputs. Both return the
-    info of their row, so that the log-likelihoods add up to that of all measurements.
+    info of their row, so that the log-likelihoods add up to that of all measurements. `whitens`: whether its infos carry
+    whitened innovations.
     """
+
+    whitens: ClassVar[bool] = False
 
     @abc.abstractmethod
     def check(self, model: StateSpace) -> None:
@@ -70,7 +77,7 @@ def apart(function, condition, *operands):
     to know that. Called outside jit, this is compiled once as well. Transformations pass through.
     """
     traced = eqx.filter_closure_convert(function, *operands)
-    never = lambda *_: jax.tree.map(_zeros, traced.out_struct)  # noqa: E731
+    never = lambda *_: jax.tree.map(_zeros, traced.out_struct)
     return jax.lax.cond(condition, lambda *given: traced(*given), never, *operands)
 
 

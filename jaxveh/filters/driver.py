@@ -76,7 +76,7 @@ def scan(filter: AbstractFilter, model: StateSpace, rows: Row, key=None) -> Esti
     mean, std, info = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
     result, failed_at = first_failure(info.result)
     chosen = model.chosen
-    show = lambda report: None if chosen is None else parameter_view(model.system, chosen, report)  # noqa: E731
+    show = lambda report: None if chosen is None else parameter_view(model.system, chosen, report)
     total = jnp.sum(info.log_likelihood)
     return Estimate(rows.t, mean, std, total, info, result, failed_at, belief, show(mean), show(std))
 

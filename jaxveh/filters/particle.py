@@ -124,7 +124,7 @@ def add_noise(model: StateSpace, key, particles, dt):
 
 def gather(particles, ancestors):
     """The ancestors' states; the draw is held fixed under differentiation."""
-    take = lambda field: field.at[ancestors].get(mode="promise_in_bounds", indices_are_sorted=True)  # noqa: E731
+    take = lambda field: field.at[ancestors].get(mode="promise_in_bounds", indices_are_sorted=True)
     return jax.tree.map(take, particles)
 
 

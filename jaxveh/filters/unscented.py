@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -10,6 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
+from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.base import (
     AbstractBelief,
@@ -96,6 +97,7 @@ class Unscented(AbstractFilter):
     must have covariances. Differentiable with respect to every array leaf of the model.
     """
 
+    whitens: ClassVar[bool] = True
     alpha: float = eqx.field(static=True, default=1.0)
     beta: float = eqx.field(static=True, default=2.0)
     kappa: float = eqx.field(static=True, default=0.0)
@@ -186,6 +188,8 @@ class Unscented(AbstractFilter):
             innovation_std=by_channel(model, jnp.sqrt(jnp.diagonal(spread)), present),
             nis=nis,
             ess=jnp.full((), jnp.nan, dtype),
+            whitened=record("Measurements", dict(zip(model.channels, white, strict=True))),
+            log_scale=record("Measurements", dict(zip(model.channels, jnp.log(jnp.diagonal(factor)), strict=True))),
             result=_result(model, row, (belief, after), predicted, factor),
         )
         return after, info

@@ -73,6 +73,9 @@ def prediction_error(
     if len({len(recording) for recording in recordings}) != 1:
         raise InputError("recordings: must be one or several of the same number of rows; cut them to one length.")
     check_positive("tolerance", tolerance)
+    if not filter.whitens:
+        name = type(filter).__name__
+        raise InputError(f"prediction_error: {name} has no whitened innovations; use maximum_likelihood with it.")
     filter.check(model)
     parameters = resolve(model, where)
     rows = _stack([model.rows(recording) for recording in recordings])
@@ -83,6 +86,8 @@ def prediction_error(
     )
     problem = _Problem(filter, model, rows, line(means), spread, _target(target, recordings), warm_up, parameters)
     z, cost, information, steps, converged = _score(problem, line(values), max_steps, tolerance, progress)
+    counted = sum(int(np.isfinite(np.asarray(y)[:, warm_up:]).sum()) for y in rows.y)
+    cost += 0.5 * LOG_2PI * counted
     covariance = jnp.asarray(np.linalg.pinv(information))
     fit = make_fit(
         parameters, z, covariance, jnp.asarray(cost), jnp.asarray(steps), jnp.asarray(converged), problem.filled(z)
@@ -137,9 +142,6 @@ class _Problem(eqx.Module):
 
     def _one(self, model, rows, values):
         estimate = scan(self.filter, model, rows)
-        if estimate.info.whitened is None:
-            name = type(self.filter).__name__
-            raise InputError(f"prediction_error: {name} has no whitened innovations; use maximum_likelihood.")
         counts = jnp.arange(rows.t.shape[0]) >= self.warm_up
         present = jnp.stack([jnp.isfinite(getattr(rows.y, n)) & counts for n in model.channels], axis=1)
         white = jnp.where(present, jnp.stack(estimate.info.whitened, axis=1), 0)
@@ -159,7 +161,6 @@ class _Problem(eqx.Module):
 @eqx.filter_jit
 def _linearised(problem: _Problem, z):
     """Cost, gradient (p,) and expected information (p, p) of the negative log-posterior at z."""
-    primal, tangents = None, None
     push = lambda direction: jax.jvp(problem.parts, (z,), (direction,))
     primal, tangents = jax.vmap(push, out_axes=(None, 0))(jnp.eye(z.size, dtype=z.dtype))
     flat = lambda leaf: leaf.reshape(z.size, -1)
@@ -168,8 +169,8 @@ def _linearised(problem: _Problem, z):
     cost = 0.5 * (jnp.sum(white**2) + jnp.sum(supervised**2) + jnp.sum(deviation**2)) + jnp.sum(levels)
     gradient = d_white @ white.reshape(-1) + d_supervised @ supervised.reshape(-1)
     gradient = gradient + jnp.sum(d_levels, axis=1) + deviation / problem.spread
-    # With s = log of the innovation's standard deviation, (dlog S)^2 / 2 is 2 ds^2.
-    information = d_white @ d_white.T + 2 * d_levels @ d_levels.T + d_supervised @ d_supervised.T
+    # With w = e / exp(s), dw = de / exp(s) - w ds, whose square holds one of the two ds^2 that (dlog S)^2 / 2 is made of.
+    information = d_white @ d_white.T + d_levels @ d_levels.T + d_supervised @ d_supervised.T
     return cost, gradient, information + jnp.diag(1 / problem.spread**2)
 
 

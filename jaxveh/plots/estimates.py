@@ -23,6 +23,7 @@ def estimate(
     quantities: Iterable[str] | None = None,
     *,
     others: Mapping[str, Mapping[str, Any]] | None = None,
+    errors: bool = False,
     figure: Any = None,
 ) -> Any:
     """A panel a quantity: mean, 95 % band and, where given, the truth.
@@ -30,7 +31,8 @@ def estimate(
     **Arguments**: `estimates`: an `Estimate` of `jaxveh.run` (or anything with `time`, `mean` and `std` by name), or a
     mapping from labels to several. `truth`: a recording, or a mapping from names to (T,) arrays over the time of
     the first estimate. `quantities`: names to show (default: all that the first reports). `others`: label to a mapping
-    from names to (T,) without spread, such as an open-loop model's, over the time of the first. `figure`: where to draw.
+    from names to (T,) without spread, such as an open-loop model's, over the time of the first. `errors`: beside each
+    panel another with the estimates less the truth (over the same rows), and their bands. `figure`: where to draw.
 
     **Returns** the figure. **Raises** `InputError` for unknown quantities or a truth of another length.
     """
@@ -42,25 +44,29 @@ def estimate(
     names = list(known if quantities is None else quantities)
     check_names("plots.estimate", names, known)
     time = np.asarray(first.time)
+    if errors and truth is None:
+        raise InputError("plots.estimate: errors need a truth; give `truth=`, or leave `errors` out.")
     with style():
         figure = new_figure(0.75 + 1.25 * len(names)) if figure is None else figure
-        axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-        for ax, name in zip(axes, names, strict=True):
-            _truth(ax, time, truth, name)
+        ratios = [3, 2] if errors else [1]
+        axes = figure.subplots(len(names), len(ratios), sharex=True, squeeze=False, width_ratios=ratios)
+        for row, name in zip(axes, names, strict=True):
+            shown = quantity(name)
+            _truth(row[0], time, truth, name)
             for index, (label, values) in enumerate((others or {}).items()):
                 if name in values:
-                    ax.plot(
-                        time,
-                        quantity(name).show(values[name]),
-                        color=colour(label.partition(",")[0], index + 2),
-                        lw=0.9,
-                        label=label,
-                    )
+                    _line(row[0], time, shown.show(values[name]), label, colour(label.partition(",")[0], index + 2))
             for index, (label, one) in enumerate(labelled.items()):
-                _one(ax, one, name, label, colour(label, index))
-            _keep_truth_readable(ax)
-            label_above(ax, quantity(name).label)
-        axes[-1].set_xlabel("time [s]")
+                _one(row[0], one, name, label, colour(label, index))
+                if errors and name in truth:
+                    _one(row[1], one, name, label, colour(label, index), shown.show(truth[name]))
+            _keep_truth_readable(row[0])
+            label_above(row[0], shown.label)
+            if errors:
+                row[1].axhline(0, color=COLOURS["truth"], linewidth=0.9, zorder=1.5)
+                label_above(row[1], f"error [{shown.unit}]" if shown.unit else "error")
+        for ax in axes[-1]:
+            ax.set_xlabel("time [s]")
         legend(figure, axes)
     return figure
 
@@ -72,28 +78,38 @@ def _truth(ax: Any, time: np.ndarray, truth: Any, name: str) -> None:
     values = quantity(name).show(truth[name])
     if values.shape != at.shape:
         raise InputError(f"plots.estimate: truth {name} has shape {values.shape}, time has {at.shape}; must agree.")
-    ax.plot(at, values, color=COLOURS["truth"], linewidth=0.9, label="truth")
+    # Thicker than the estimates, which lie on it when they are good.
+    ax.plot(at, values, color=COLOURS["truth"], linewidth=2.0, label="truth")
 
 
 def _keep_truth_readable(ax: Any) -> None:
-    """Where an estimate diverges it leaves the panel: the truth sets the scale, with room for twice its range."""
+    """Where an estimate diverges it leaves the panel: the truth sets the scale, with room around it."""
     true = [line.get_ydata() for line in ax.get_lines() if line.get_label() == "truth"]
     if not true or not np.isfinite(true[0]).any():
         return
     low, high = float(np.nanmin(true[0])), float(np.nanmax(true[0]))
     bottom, top = ax.get_ylim()
-    room = high - low
+    room = (high - low) / 2
     if room > 0:
         ax.set_ylim(max(bottom, low - room), min(top, high + room))
 
 
-def _one(ax: Any, one: Any, name: str, label: str, shade: str) -> None:
+def _one(ax: Any, one: Any, name: str, label: str, shade: str, against: Any = 0.0) -> None:
+    """Mean and band of one estimate, less the values that it is held against."""
     mean, std = as_mapping(one.mean, "mean"), as_mapping(one.std, "std")
     if name not in mean:
         return
     time, shown = np.asarray(one.time), quantity(name)
-    centre = shown.show(mean[name])
+    if np.shape(against) not in ((), time.shape):
+        raise InputError(
+            f"plots.estimate: truth {name} has shape {np.shape(against)}, {label} {time.shape}; must agree."
+        )
+    centre = shown.show(mean[name]) - against
     if name in std:
         reach = BAND * shown.show(std[name])
         ax.fill_between(time, centre - reach, centre + reach, color=shade, alpha=0.2, lw=0, label=f"{label}, 95 % band")
-    ax.plot(time, centre, color=shade, linewidth=1.1, label=label)
+    _line(ax, time, centre, label, shade)
+
+
+def _line(ax: Any, time: np.ndarray, values: np.ndarray, label: str, shade: str) -> None:
+    ax.plot(time, values, color=shade, linewidth=1.1, label=label)

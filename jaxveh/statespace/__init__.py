@@ -11,7 +11,7 @@ from jaxveh.statespace.noise import (
 )
 from jaxveh.statespace.parameters import parameter_view, put_parameters, start_from, with_parameters
 from jaxveh.statespace.process import AbstractProcessNoise, Continuous, Discrete
-from jaxveh.statespace.solvers import RK4, Propagate
+from jaxveh.statespace.solvers import RK4, Heun, Propagate
 
 __all__ = [
     "RK4",
@@ -21,6 +21,7 @@ __all__ = [
     "Continuous",
     "Discrete",
     "Gaussian",
+    "Heun",
     "Independent",
     "LinearInput",
     "MultivariateGaussian",

@@ -164,7 +164,7 @@ class StateSpace(eqx.Module):
         missing = [name for name in self.inputs if name not in u]
         if missing:
             raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
-        scalar = lambda value: jnp.asarray(value, dtype)  # noqa: E731
+        scalar = lambda value: jnp.asarray(value, dtype)
         inputs = record("Inputs", {name: scalar(u[name]) for name in self.inputs})
         measured = record("Measurements", {name: scalar(y.get(name, jnp.nan)) for name in self.channels})
         return Row(scalar(t), inputs, measured)
@@ -237,5 +237,5 @@ def cast(tree, dtype):
 
     NumPy arrays stay as they are: a recording's stamps need float64 whatever the channels are.
     """
-    to = lambda leaf: leaf.astype(dtype) if isinstance(leaf, jax.Array) and eqx.is_inexact_array(leaf) else leaf  # noqa: E731
+    to = lambda leaf: leaf.astype(dtype) if isinstance(leaf, jax.Array) and eqx.is_inexact_array(leaf) else leaf
     return jax.tree.map(to, tree)

@@ -164,7 +164,7 @@ class MultivariateGaussian(AbstractNoise):
 def _flatten_batch(names, *mappings):
     """The mappings with every array broadcast to the batch and flattened, and the batch's shape."""
     shape = jnp.broadcast_shapes(*[jnp.shape(values[name]) for values in mappings for name in names])
-    wide = lambda value: jnp.broadcast_to(value, shape).reshape(-1)  # noqa: E731
+    wide = lambda value: jnp.broadcast_to(value, shape).reshape(-1)
     return [{name: wide(values[name]) for name in names} for values in mappings], shape
 
 
@@ -268,7 +268,7 @@ class CauchyGaussianMixture(AbstractNoise):
         )
 
     def scaled(self, factor):
-        times = lambda values: jax.tree.map(lambda value: value * factor, values)  # noqa: E731
+        times = lambda values: jax.tree.map(lambda value: value * factor, values)
         return CauchyGaussianMixture(self.weight, times(self.scale), times(self.std))
 
 

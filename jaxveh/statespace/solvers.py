@@ -53,6 +53,33 @@ class RK4(diffrax.AbstractSolver):
         return terms.vf(t0, y0, args)
 
 
+class Heun(diffrax.AbstractSolver):
+    """Heun's method of second order (1900), fixed step, no error estimate: half the work of `RK4`.
+
+    For models whose poles are slow against the step, such as handling at 100 Hz. Written out as `RK4` is.
+    """
+
+    term_structure: ClassVar = diffrax.AbstractTerm
+    interpolation_cls: ClassVar[Callable] = diffrax.LocalLinearInterpolation
+
+    def order(self, terms):
+        return 2
+
+    def init(self, terms, t0, t1, y0, args):
+        return None
+
+    def step(self, terms, t0, t1, y0, args, solver_state, made_jump):
+        del solver_state, made_jump
+        dt = terms.contr(t0, t1)
+        k1 = numerics.barrier(terms.vf_prod(t0, y0, args, dt))
+        k2 = numerics.barrier(terms.vf_prod(t1, jax.tree.map(jnp.add, y0, k1), args, dt))
+        y1 = numerics.barrier(jax.tree.map(lambda y, a, b: y + 0.5 * (a + b), y0, k1, k2))
+        return y1, None, dict(y0=y0, y1=y1), None, diffrax.RESULTS.successful
+
+    def func(self, terms, t0, y0, args):
+        return terms.vf(t0, y0, args)
+
+
 class Propagate(eqx.Module):
     """A continuous model as a filter's `transition(system, t0, t1, x, u)`: explicit fixed steps of a diffrax solver.
 

@@ -3,20 +3,20 @@
 from jaxveh.experiments.tyre_apf.printed import Printed, run_printed_seeds
 from jaxveh.experiments.tyre_apf.report import Check, Reproduction, Table, check, run, tables
 from jaxveh.experiments.tyre_apf.settings import CITATION, Study, tyres
-from jaxveh.experiments.tyre_apf.study import run_once, run_seeds
+from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
 
 __all__ = [
     "CITATION",
     "Check",
     "Printed",
     "Reproduction",
+    "Staged",
     "Study",
     "Table",
     "check",
     "run",
-    "run_once",
     "run_printed_seeds",
-    "run_seeds",
+    "run_staged",
     "tables",
     "tyres",
 ]

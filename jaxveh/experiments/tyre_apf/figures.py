@@ -73,4 +73,4 @@ def states_figure(found: Staged, seed: int = 0, labels: tuple[str, ...] = ("UKF"
     seen = {name: drive[f"true.{name}"][seed] for name in names}
     others = {"prior, open loop": {name: found.open_loop["prior"][name][seed] for name in names}}
     estimates = {label: pick_seed(found.estimates[label]) for label in labels}
-    return plots.estimate(estimates, seen, names, others=others, figure=figure)
+    return plots.estimate(estimates, seen, names, others=others, errors=True, figure=figure)

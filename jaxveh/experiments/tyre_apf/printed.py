@@ -79,9 +79,7 @@ def run_printed(printed: Printed, key) -> PrintedOutcome:
         prior=ones,
         walk={name: value * per_root_second for name, value in ones.items()},
         domain=Real(),
-        process_noise=Continuous(
-            Gaussian(dict.fromkeys(("v_y", "yaw", "yaw_rate"), printed.spread * per_root_second))
-        ),
+        process_noise=Continuous(Gaussian(dict.fromkeys(("v_y", "yaw", "yaw_rate"), printed.spread * per_root_second))),
         start={"yaw": 0.05},
         start_spread=dict.fromkeys(("v_y", "yaw", "yaw_rate"), printed.spread),
         minimum_speed=0.0,

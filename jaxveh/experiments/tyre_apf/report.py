@@ -13,7 +13,8 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh.diagnostics.observability import UNOBSERVABLE, Observability
 from jaxveh.experiments.tyre_apf.printed import Printed, PrintedOutcome, run_printed_seeds
 from jaxveh.experiments.tyre_apf.settings import STEP_STEER, TABLE_2, TABLE_3, Study, tyres
-from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS, Outcome, run_seeds
+from jaxveh.experiments.tyre_apf.staged import run_staged
+from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS, Outcome
 from jaxveh.simulation import simulate
 
 
@@ -59,16 +60,16 @@ def run(
     check_at_least("seeds", seeds, 1)
     study, printed = study or Study(), printed or Printed()
     honest_key, printed_key = jax.random.split(jax.random.key(seed))
-    progress(0, 4, "honest study (compiling, then all seeds at once)")
-    outcome, steps = jax.block_until_ready(run_seeds(study, jax.random.split(honest_key, seeds)))
-    progress(1, 4, "observability in the lane change")
+    keys = jax.random.split(honest_key, seeds)
+    staged = run_staged(study, keys, lambda done, total, stage: progress(0.7 * done / total, 1.0, stage))
+    progress(0.7, 1.0, "observability in the lane change")
     lane_change = lane_change_observability(study)
-    progress(2, 4, "observability in the sweep of 15 degrees")
+    progress(0.75, 1.0, "observability in the sweep of 15 degrees")
     sweep = sweep_observability(study)
-    progress(3, 4, "printed settings")
+    progress(0.8, 1.0, "printed settings")
     as_printed = jax.block_until_ready(run_printed_seeds(printed, jax.random.split(printed_key, seeds)))
-    progress(4, 4, "done")
-    return Reproduction(study, seeds, outcome, steps, lane_change, sweep, as_printed, printed)
+    progress(1.0, 1.0, "done")
+    return Reproduction(study, seeds, staged.outcome, staged.steps, lane_change, sweep, as_printed, printed)
 
 
 def _observed(study: Study, manoeuvre, where=tyres) -> Observability:
@@ -114,8 +115,17 @@ def check(result: Reproduction) -> list[Check]:
             found, before = _median(result.steps[degrees][name]), _median(result.steps[degrees]["prior"])
             for i, what in enumerate(("yaw", "yaw-rate")):
                 add(f"{name} step steer {degrees} degrees, {what} RMSE against the paper's", found[i], printed[i])
-                add(f"{name} step steer {degrees} degrees, {what} RMSE over the prior mean's", found[i] / before[i], 0.35)
-    add("lane change: condition number of eight parameters, above", result.lane_change.condition_number, UNOBSERVABLE, True)
+                add(
+                    f"{name} step steer {degrees} degrees, {what} RMSE over the prior mean's",
+                    found[i] / before[i],
+                    0.35,
+                )
+    add(
+        "lane change: condition number of eight parameters, above",
+        result.lane_change.condition_number,
+        UNOBSERVABLE,
+        True,
+    )
     observable = result.sweep.observable()
     add("sweep of 15 degrees: D and B not observable, number", sum(n not in observable for n in result.sweep.names), 0)
     truth = np.asarray(result.printed.truth)[0]
@@ -123,7 +133,11 @@ def check(result: Reproduction) -> list[Check]:
     worst = {"D": 0.0005, "B": 0.003, "C": 0.003}
     for name, bound in worst.items():
         rows = [i for i, field in enumerate(FIELDS) if field.endswith(name)]
-        add(f"as printed: a walk that filters nothing, by the paper's final rule, relative error of {name}", walk[rows].max(), bound)
+        add(
+            f"as printed: a walk that filters nothing, by the paper's final rule, relative error of {name}",
+            walk[rows].max(),
+            bound,
+        )
     return checks
 
 
@@ -169,7 +183,9 @@ def _step_table(result: Reproduction) -> Table:
         for i, what in enumerate(("yaw, rad", "yaw rate, rad/s")):
             cells = [_spread(np.asarray(result.steps[degrees][n])[:, i]) for n in ESTIMATORS]
             rows.append((f"{degrees} degrees, {what}", f"{printed[i]:g}", *cells))
-    return Table("Step steer with the estimated tyres: RMSE, median [quartiles]", ("step steer", "paper", *ESTIMATORS), rows)
+    return Table(
+        "Step steer with the estimated tyres: RMSE, median [quartiles]", ("step steer", "paper", *ESTIMATORS), rows
+    )
 
 
 def _printed_2(result: Reproduction) -> Table:
@@ -195,7 +211,8 @@ def _printed_3(result: Reproduction) -> Table:
     rows = []
     for i, field in enumerate(FIELDS):
         rms = [
-            np.sqrt(np.mean((np.asarray(result.printed.series[n])[:, i] - truth[i]) ** 2, axis=-1)) for n in ("PF", "APF", "walk")
+            np.sqrt(np.mean((np.asarray(result.printed.series[n])[:, i] - truth[i]) ** 2, axis=-1))
+            for n in ("PF", "APF", "walk")
         ]
         rows.append((field.replace("_", "."), *[f"{v:g}" for v in TABLE_3[field]], *[_spread(r) for r in rms]))
     ess = {name: float(_median(value)) for name, value in result.printed.ess.items()}

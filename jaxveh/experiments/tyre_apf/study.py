@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh import estimators, filters, fitting, manoeuvres, numerics, sensors, vehicles
+from jaxveh import estimators, manoeuvres, numerics, sensors, vehicles
 from jaxveh._core.parameter import pick, prior_spread, put, resolve
 from jaxveh._core.recording import Recording
 from jaxveh.experiments.tyre_apf.settings import Study, tyres
@@ -51,7 +50,7 @@ def guess_once(study: Study, key):
     values = pick(car, parameters)
     spreads = prior_spread(parameters, values, study.prior)
     draws = numerics.normal(key, (len(parameters),), values[0].dtype)
-    moved = [p.domain.forward(p.domain.inverse(v) + s * z) for p, v, s, z in zip(parameters, values, spreads, draws)]
+    moved = [p.domain.forward(p.domain.inverse(v) + s * z) for p, v, s, z in zip(parameters, values, spreads, draws, strict=True)]
     return put(car, parameters, moved)
 
 
@@ -64,45 +63,6 @@ def model_of(study: Study, car, walk: float = 0.0):
         prior=study.prior,
         walk=walk,
         process_noise={"v_y": study.v_y_noise, "yaw_rate": study.yaw_rate_noise},
-    )
-
-
-def run_once(study: Study, key) -> Outcome:
-    """One seed: a drive, a guess, and every estimator on them. Pure: `vmap` it over keys."""
-    drive_key, guess_key, pf_key, apf_key = jax.random.split(key, 4)
-    drive, guess = drive_once(study, drive_key), guess_once(study, guess_key)
-    still, walking = model_of(study, guess), model_of(study, guess, study.walk)
-    rows = still.rows(drive)
-    estimates = {
-        "PF": filters.scan(filters.ParticleFilter(study.particles), walking, rows, pf_key),
-        "APF": filters.scan(filters.AuxiliaryParticleFilter(study.particles), walking, rows, apf_key),
-        "UKF": filters.scan(filters.Unscented(), still, rows),
-    }
-    fit = fitting.multiple_shooting(still, drive, window=study.window, throw=False)
-    guessed = resolve(guess, tyres)
-    values = {"prior": jnp.stack(pick(guess, guessed)), "MAP": jnp.stack(fit.mean)}
-    spread = {
-        "prior": jnp.stack([p.domain.slope(v) * s for p, v, s in zip(
-            guessed, pick(guess, guessed), prior_spread(guessed, pick(guess, guessed), study.prior), strict=True)]),
-        "MAP": jnp.stack(fit.std),
-    }  # fmt: skip
-    for name, estimate in estimates.items():
-        values[name] = jnp.stack([getattr(estimate.mean, field)[-1] for field in FIELDS])
-        spread[name] = jnp.stack([getattr(estimate.std, field)[-1] for field in FIELDS])
-    cars = {name: with_tyres(value) for name, value in values.items()}
-    states = {name: state_errors(estimate.mean, drive) for name, estimate in estimates.items()}
-    for name in ("prior", "MAP"):
-        states[name] = state_errors(open_loop(study, cars[name]).truth.channels, drive)
-    nothing = jnp.full((), jnp.nan)
-    return Outcome(
-        drive=drive,
-        guess=guess,
-        parameters=values,
-        spread=spread,
-        curve_error={name: curve_error(car, drive) for name, car in cars.items()},
-        states=states,
-        log_likelihood={**{n: e.log_likelihood for n, e in estimates.items()}, "prior": nothing, "MAP": -fit.cost},
-        result={**{n: e.result for n, e in estimates.items()}, "MAP": fit.result, "prior": jnp.int32(0)},
     )
 
 
@@ -138,30 +98,14 @@ def open_loop(study: Study, car) -> Recording:
 
 def state_errors(found, drive):
     get = found.get if isinstance(found, dict) else lambda name: getattr(found, name)
-    rms = lambda name: jnp.sqrt(jnp.mean((get(name) - drive[f"true.{name}"]) ** 2))  # noqa: E731
+    rms = lambda name: jnp.sqrt(jnp.mean((get(name) - drive[f"true.{name}"]) ** 2))
     return jnp.stack([rms("v_y"), rms("yaw_rate")])
 
 
 def step_steer_errors(parameters, degrees: float, study: Study) -> jax.Array:
     """(2,) RMSE of yaw (rad) and yaw rate (rad/s) in an open-loop step steer with these parameters, against the truth."""
-    manoeuvre = manoeuvres.step_steer(
-        speed=study.speed, steer=math.radians(degrees), ramp=0.2, duration=study.duration
-    )
-    go = lambda car: simulate(car, manoeuvre, None, dt=1 / study.rate, throw=False).truth  # noqa: E731
+    manoeuvre = manoeuvres.step_steer(speed=study.speed, steer=math.radians(degrees), ramp=0.2, duration=study.duration)
+    go = lambda car: simulate(car, manoeuvre, None, dt=1 / study.rate, throw=False).truth
     truth, found = go(vehicles.passenger_car()), go(with_tyres(parameters))
-    rms = lambda name: jnp.sqrt(jnp.mean((found[name] - truth[name]) ** 2))  # noqa: E731
+    rms = lambda name: jnp.sqrt(jnp.mean((found[name] - truth[name]) ** 2))
     return jnp.stack([rms("yaw"), rms("yaw_rate")])
-
-
-@eqx.filter_jit
-def run_seeds(study: Study, keys) -> tuple[Outcome, dict]:
-    """All seeds in one batch, and the step-steer errors by angle and estimator: {10: {"UKF": (seeds, 2)}}."""
-    outcomes = jax.vmap(lambda key: run_once(study, key))(keys)
-    steps = {
-        degrees: {
-            name: jax.vmap(lambda values, d=degrees: step_steer_errors(values, d, study))(outcomes.parameters[name])
-            for name in ESTIMATORS
-        }
-        for degrees in (10, 15)
-    }
-    return outcomes, steps

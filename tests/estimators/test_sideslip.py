@@ -1,0 +1,127 @@
+"""Sideslip from logs: cleaning, a car with known parameters, the real log."""
+
+import numpy as np
+import pytest
+from shared_data import shared
+
+from jaxveh import InputError, Recording, estimators, io
+
+CAR = io.CarSpecification(
+    mass=1420.0, yaw_inertia=2124.0, front_axle_to_cg=0.96, rear_axle_to_cg=1.59,
+    front_cornering_stiffness=88000.0, rear_cornering_stiffness=127000.0, cg_height=0.5,
+)  # fmt: skip
+
+
+def log(rows=3000, seed=0):
+    """A car on a winding road that follows the linear single track at modest lateral acceleration, 100 Hz."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(rows) * 0.01
+    steer = 0.02 * np.sin(2 * np.pi * 0.4 * time) + 0.01 * np.sin(2 * np.pi * 0.17 * time + 1.0)
+    v_x = np.full(rows, 20.0)
+    recording = Recording(time, {"steer": steer, "v_x": v_x})
+    from jaxveh import vehicles
+
+    truth = estimators.open_loop(recording, vehicles.from_specification(CAR))
+    yaw_rate, v_y = truth["yaw_rate"], truth["v_y"]
+    a_y = np.gradient(v_y, time) + v_x * yaw_rate
+    return recording.replace(
+        a_x=np.zeros(rows), v_y=v_y,
+        yaw_rate=yaw_rate + 0.002 * rng.standard_normal(rows), a_y=a_y + 0.1 * rng.standard_normal(rows),
+    )  # fmt: skip
+
+
+def test_clean_holds_spikes_and_drops_repeats_and_looks_back_only():
+    recording = log(500)
+    steer, yaw_rate, a_y = (np.array(recording[name]) for name in ("steer", "yaw_rate", "a_y"))
+    steer[200] += 0.5
+    yaw_rate[301], a_y[301] = yaw_rate[300], a_y[300]
+    a_y[401] = a_y[400]
+    cleaned = estimators.clean(recording.replace(steer=steer, yaw_rate=yaw_rate, a_y=a_y))
+    assert float(cleaned["steer"][200]) == steer[199]
+    assert float(cleaned["steer"][201]) == steer[201]
+    assert np.flatnonzero(np.isnan(np.asarray(cleaned["yaw_rate"]))).tolist() == [301]
+    assert np.isfinite(float(cleaned["a_y"][401]))
+    longer = estimators.clean(recording)
+    shorter = estimators.clean(recording.rows(slice(0, 100)))
+    for name in ("steer", "a_x", "yaw_rate", "a_y"):
+        np.testing.assert_array_equal(np.asarray(longer[name])[:100], np.asarray(shorter[name]))
+
+
+def test_a_step_of_steer_is_not_held_for_ever():
+    recording = log(100)
+    steer = np.where(np.arange(100) < 50, 0.0, 0.2)
+    cleaned = np.asarray(estimators.clean(recording.replace(steer=steer))["steer"])
+    assert cleaned[50] == 0.0
+    assert cleaned[-1] == 0.2
+
+
+def test_missing_channels_and_gaps_are_named():
+    with pytest.raises(InputError, match="a_y"):
+        estimators.clean(log(100).without("a_y"))
+    with pytest.raises(InputError, match=r"steer is NaN in 1 rows.*fill"):
+        estimators.clean(log(100).replace(steer=np.append(np.zeros(99), np.nan)))
+
+
+def test_a_short_span_and_an_unknown_reference_are_refused():
+    with pytest.raises(InputError, match="at least 20 s"):
+        estimators.calibrate(log(1000), CAR)
+    with pytest.raises(InputError, match="uses"):
+        estimators.calibrate(log(3000), CAR, uses=("course",))
+
+
+def test_estimates_the_sideslip_of_a_car_as_told_and_scores_it():
+    recording = log(3000)
+    found = estimators.estimate(recording.without("v_y"), CAR)
+    numbers = estimators.score(found, recording, CAR)
+    assert numbers["rows"] == 3000
+    assert numbers["open_loop_sideslip_rmse_deg"] < 1e-6
+    assert numbers["sideslip_rmse_deg"] < 0.15
+    assert 0.5 < numbers["sideslip_coverage_95"] <= 1.0
+    # The score counts what it is told: shifting the reference by one degree is one degree of error.
+    off = recording.replace(v_y=np.asarray(recording["v_y"]) - np.radians(1.0) * 20.0)
+    assert estimators.score(found, off, CAR)["sideslip_rmse_deg"] == pytest.approx(1.0, abs=0.15)
+
+
+def test_the_reference_cannot_reach_a_blind_estimate():
+    recording = log(1500)
+    found = estimators.estimate(recording, CAR)
+    blind = estimators.estimate(recording.without("v_y"), CAR)
+    np.testing.assert_array_equal(np.asarray(found.mean.sideslip), np.asarray(blind.mean.sideslip))
+
+
+def real_log():
+    recording = io.read_recording(shared("ferrari_250lm_100hz.csv"))
+    return (
+        recording.rows(slice(0, 13750)),
+        recording.rows(slice(13750, None)),
+        io.read_car(shared("ferrari_250lm.toml")),
+    )
+
+
+def test_real_log_taken_at_its_word_beats_the_open_loop():
+    _, rest, car = real_log()
+    found = estimators.estimate(rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]), car)
+    numbers = estimators.score(found, rest, car)
+    assert numbers["open_loop_sideslip_rmse_deg"] == pytest.approx(0.605, abs=0.005)
+    assert numbers["sideslip_rmse_deg"] < 0.35
+
+
+def test_real_log_calibrated_blind():
+    first, rest, car = real_log()
+    blind = ["steer", "v_x", "a_x", "a_y", "yaw_rate"]
+    calibration = estimators.calibrate(first.select(blind), car)
+    numbers = estimators.score(estimators.estimate(rest.select(blind), calibration), rest, car)
+    assert numbers["sideslip_rmse_deg"] <= 0.40
+    assert set(calibration.summary()) >= {"car.front.B", "car.rear.D", "process noise.v_y", "measurement noise.a_y"}
+    fitted = calibration.specification(car)
+    assert fitted.front.nominal_load == pytest.approx(982 * 9.80665 * 1.07 / 2.40, rel=1e-6)
+
+
+@pytest.mark.full
+def test_real_log_calibrated_with_the_reference():
+    first, rest, car = real_log()
+    calibration = estimators.calibrate(first, car, uses=("v_y",))
+    blind = rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])
+    numbers = estimators.score(estimators.estimate(blind, calibration), rest, car)
+    assert numbers["sideslip_rmse_deg"] <= 0.26
+    assert [weight for weight, _ in calibration.validation] == [None, 0.05, 0.02]

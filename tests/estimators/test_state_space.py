@@ -1,0 +1,111 @@
+"""A vehicle with sensors as a state space: names, checks, the hold at low speed, gradients."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import InputError, Recording, estimators, filters, manoeuvres, sensors, simulate, vehicles
+
+
+def tyres(car):
+    return (car.front.B, car.front.D, car.rear.B, car.rear.D)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    manoeuvre = manoeuvres.double_lane_change(speed=25.0, steer=0.12)
+    return simulate(vehicles.passenger_car(), manoeuvre, sensors.esc(), key=jax.random.key(0), dt=0.05)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return estimators.state_space(
+        vehicles.passenger_car(), sensors.esc(), estimate=tyres, report=("sideslip", "F_yf"), steps=2
+    )
+
+
+def test_names_of_states_channels_and_report(model, drive):
+    assert model.states == ("v_y", "yaw", "yaw_rate", "front_B", "front_D", "rear_B", "rear_D")
+    assert model.channels == ("yaw_rate", "a_y")
+    found = filters.run(filters.Unscented(), model, drive)
+    assert found.mean._fields == (
+        "v_y",
+        "yaw",
+        "yaw_rate",
+        "sideslip",
+        "F_yf",
+        "front_B",
+        "front_D",
+        "rear_B",
+        "rear_D",
+    )
+    assert found.parameters.front.B.shape == (len(drive),)
+    assert found.parameters.mass is None
+    error = np.asarray(found.mean.sideslip - drive["true.sideslip"])
+    assert np.sqrt(np.mean(error**2)) < 0.004
+    force = np.asarray(found.mean.F_yf - drive["true.F_yf"])
+    assert np.sqrt(np.mean(force**2)) < 300.0
+
+
+def test_noise_levels_stand_once(model):
+    assert jax.tree.leaves(model.system.sensors.noise) == []
+    assert float(model.measurement_noise.std.a_y) == 0.1
+
+
+def test_holds_the_state_below_the_minimum_speed():
+    model = estimators.state_space(vehicles.passenger_car(), sensors.esc(), minimum_speed=3.0)
+    n = 6
+    speed = np.array([5.0, 5.0, 1.0, 1.0, 0.0, 5.0])
+    recording = Recording(
+        np.arange(n) * 0.01,
+        {"v_x": speed, "steer": np.full(n, 0.1), "yaw_rate": np.full(n, np.nan), "a_y": np.full(n, np.nan)},
+    )
+    assert np.asarray(estimators.held_rows(model, recording)).tolist() == (speed < 3.0).tolist()
+    v_y = np.asarray(filters.run(filters.Unscented(), model, recording).mean.v_y)
+    assert v_y[3] == pytest.approx(v_y[2], abs=1e-12)
+    assert v_y[5] == pytest.approx(v_y[4], abs=1e-12)
+    assert abs(v_y[1] - v_y[0]) > 1e-6
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"report": ("sidslip",)}, "sidslip"),
+        ({"process_noise": {"v_z": 0.1}}, "v_z"),
+        ({"start": {"speed": 1.0}}, "speed"),
+        ({"steps": 0}, "steps"),
+        ({"estimate": tyres, "prior": 0.0}, "prior"),
+        ({"estimate": lambda car: car.tyre.B}, "tyre"),
+    ],
+)
+def test_bad_settings_are_named(settings, message):
+    with pytest.raises(InputError, match=message):
+        estimators.state_space(vehicles.passenger_car(), sensors.esc(), **settings)
+
+
+def test_observability_tells_what_the_drive_can_teach(model, drive):
+    report = estimators.observe(model, drive)
+    assert report.names == ("front.B", "front.D", "rear.B", "rear.D")
+    assert np.all(report.bounds >= report.bounds_alone)
+    assert "front.D" in report.observable(share=0.5)
+    loose = estimators.observe(model, drive, known_start=False)
+    assert np.all(loose.bounds >= report.bounds * (1 - 1e-9))
+
+
+def test_gradient_reaches_noise_and_start_of_the_parameters(model, drive):
+    rows = model.rows(drive)
+    value = jax.jit(lambda m: filters.scan(filters.Unscented(), m, rows).log_likelihood)
+    slope = jax.jit(jax.grad(value))(model)
+    h = 1e-5
+
+    def shifted(sign):
+        prior = model.prior.mean._replace(front_B=model.prior.mean.front_B + sign * h)
+        import equinox as eqx
+
+        return value(eqx.tree_at(lambda m: m.prior.mean, model, prior))
+
+    finite = (shifted(1) - shifted(-1)) / (2 * h)
+    assert float(slope.prior.mean.front_B) == pytest.approx(float(finite), rel=1e-4)
+    assert jnp.isfinite(slope.measurement_noise.std.a_y)
+    assert float(slope.measurement_noise.std.a_y) != 0.0
