@@ -76,7 +76,9 @@ def shoot(model: StateSpace, segments: Segments, tie, prior: bool, max_steps: in
     physical = model.chosen.physical(list(found.parameters))
     parameters = model.chosen.parameters
     fitted = start_from(model, **{p.field: value for p, value in zip(parameters, physical, strict=True)})
-    converged = solution.result == optx.RESULTS.successful
+    # Residuals at their limit do not move with the unknowns: the solver takes a diverged start for an optimum.
+    bounded = cost < 0.5 * LARGEST_RESIDUAL**2
+    converged = (solution.result == optx.RESULTS.successful) & bounded
     steps = solution.stats["num_steps"]
     return make_fit(parameters, found.parameters, covariance, cost, steps, converged, fitted)
 
