@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,15 +16,15 @@ class AbstractBijector(eqx.Module):
     """A smooth monotone map from the real line to a parameter's domain, elementwise."""
 
     @abc.abstractmethod
-    def forward(self, unconstrained):
+    def forward(self, unconstrained) -> Any:
         """The physical value; same shape."""
 
     @abc.abstractmethod
-    def inverse(self, physical):
+    def inverse(self, physical) -> Any:
         """The unconstrained value; same shape. Raises `InputError` where a concrete value lies outside the domain."""
 
     @abc.abstractmethod
-    def slope(self, physical):
+    def slope(self, physical) -> Any:
         """d physical / d unconstrained at a physical value: turns standard deviations from one to the other."""
 
 

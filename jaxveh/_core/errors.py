@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import numpy as np
@@ -58,7 +60,7 @@ def check_one_of(name: str, value, allowed) -> None:
         raise InputError(f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}.")
 
 
-def float_array(value) -> jax.Array:
+def float_array(value) -> Any:
     """A strong float array of the default precision unless the value carries a float dtype of its own.
 
     A Python float or a weak type would be a new compilation; see `equinox.field(converter=...)`.

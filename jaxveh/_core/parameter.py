@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -89,13 +89,20 @@ def _path_name(path) -> str:
     return ".".join(str(getattr(key, "name", getattr(key, "key", getattr(key, "idx", key)))) for key in path)
 
 
+def _metadata(owner: Any, name: str, otherwise: Any) -> Any:
+    """What the field's declaration says; a NamedTuple inside a field has that field's."""
+    if not dataclasses.is_dataclass(owner):
+        return otherwise
+    return {f.name: f.metadata for f in dataclasses.fields(owner)}.get(name, {})
+
+
 def _describe(model, path, inside: str) -> Parameter:
     """Walk down to the module that owns the leaf and read its field's metadata."""
-    owner, metadata = model, {}
+    owner: Any = model
+    metadata: Any = {}
     for key in path:
-        if dataclasses.is_dataclass(owner) and isinstance(key, jtu.GetAttrKey):
-            metadata = {f.name: f.metadata for f in dataclasses.fields(owner)}.get(key.name, {})
         by_name = isinstance(key, jtu.GetAttrKey)
+        metadata = _metadata(owner, key.name, metadata) if by_name else metadata
         owner = getattr(owner, key.name) if by_name else owner[getattr(key, "key", getattr(key, "idx", None))]
     name = _path_name(path)
     return Parameter(
@@ -129,7 +136,9 @@ def view(model, parameters: tuple[Parameter, ...], values):
 
 def _get(model, path: str):
     for part in path.split("."):
-        model = model[int(part)] if part.isdigit() else (model[part] if isinstance(model, dict) else getattr(model, part))
+        model = (
+            model[int(part)] if part.isdigit() else (model[part] if isinstance(model, dict) else getattr(model, part))
+        )
     return model
 
 
@@ -141,7 +150,9 @@ def share_of(p: Parameter, relative: Mapping):
 def check_shares(what: str, parameters: tuple[Parameter, ...], relative) -> None:
     """Raise where a mapping of spreads has a name that is no parameter's: a slip of the pen would go unseen."""
     if isinstance(relative, Mapping):
-        check_names(what, relative, [name for p in parameters for name in dict.fromkeys((p.name, p.name.split(".")[-1]))])
+        check_names(
+            what, relative, [name for p in parameters for name in dict.fromkeys((p.name, p.name.split(".")[-1]))]
+        )
 
 
 def prior_spread(parameters: tuple[Parameter, ...], values, relative, what: str = "prior") -> list[jax.Array]:
@@ -169,7 +180,9 @@ def prior_spread(parameters: tuple[Parameter, ...], values, relative, what: str 
         else:
             spread = share * jnp.abs(value) / p.domain.slope(value)
         spreads.append(jnp.broadcast_to(spread, value.shape))
-        check_positive(f"{what} spread of {p.name}", spread, advice=_ADVICE[p.scale is None and isinstance(p.domain, Real)])
+        check_positive(
+            f"{what} spread of {p.name}", spread, advice=_ADVICE[p.scale is None and isinstance(p.domain, Real)]
+        )
     return spreads
 
 

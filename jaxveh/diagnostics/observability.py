@@ -64,7 +64,9 @@ class Observability(NamedTuple):
         """The findings in words, a line each."""
         lines = [f"condition number of the information, scaled by the prior: {self.condition_number:.1e}"]
         for name, bound, alone, spread in zip(self.names, self.bounds, self.bounds_alone, self.spread, strict=True):
-            verdict = "observable" if bound <= 0.1 * spread else "weakly observable" if bound <= spread else "unobservable"
+            verdict = (
+                "observable" if bound <= 0.1 * spread else "weakly observable" if bound <= spread else "unobservable"
+            )
             lines.append(f"{name}: bound {bound:.2g} (prior {spread:.2g}; others known {alone:.2g}): {verdict}")
         if self.condition_number > UNOBSERVABLE:
             lines.append(f"together these {len(self.names)} parameters are unobservable here: {self.trade()}")
@@ -107,7 +109,7 @@ def _marginal(jacobian: np.ndarray, count: int) -> np.ndarray:
         return jacobian
     known = np.hstack([np.zeros((nuisance, count)), np.eye(nuisance)])
     rows = np.vstack([jacobian, known])
-    root = np.linalg.qr(np.hstack([rows[:, count:], rows[:, :count]]), mode="r")
+    root = np.asarray(np.linalg.qr(np.hstack([rows[:, count:], rows[:, :count]]), mode="r"))
     return root[nuisance:, nuisance:]
 
 
@@ -133,5 +135,3 @@ def from_sensitivities(jacobian: np.ndarray, names: tuple[str, ...], spread: np.
         bounds_with_prior=spread * np.sqrt(np.sum(directions**2 / (1 + values[:, None] ** 2), axis=0)),
         directions=directions,
     )
-
-

@@ -49,7 +49,7 @@ TARGET_BEND = 0.0035
 """rad: errors beyond it count less than by their square (INS alignment, tyres that warm up)."""
 
 
-def chosen(model: StateSpace):
+def chosen(model: Any):
     """The parameters and noise levels that a calibration fits."""
     s, car = model.system, model.system.car
     axles = [leaf for tyre in (car.front, car.rear) for leaf in (tyre.B, tyre.D, tyre.E)]

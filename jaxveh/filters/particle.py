@@ -150,7 +150,9 @@ def make_info(model, row, log_likelihood, residual, present, weights, alive):
     mean = {name: jnp.sum(before * residual[name]) for name in model.channels}
     spread = {name: jnp.sum(before * (residual[name] - mean[name]) ** 2) for name in model.channels}
     law = model.measurement_noise
-    noise = jnp.diagonal(law.covariance()) if law.has_covariance else jnp.full((len(model.channels),), jnp.nan, after.dtype)
+    noise = (
+        jnp.diagonal(law.covariance()) if law.has_covariance else jnp.full((len(model.channels),), jnp.nan, after.dtype)
+    )
     std = [numerics.sqrt(spread[name] + noise[i]) for i, name in enumerate(law.names)]
     result = input_result(model, row)
     result = jnp.where((result == 0) & ~alive, code(Result.all_particles_dead), result)

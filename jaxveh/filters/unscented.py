@@ -23,7 +23,7 @@ from jaxveh.filters.base import (
     presence,
     wrap_angle,
 )
-from jaxveh.numerics.sigma_points import SigmaPoints, unscented
+from jaxveh.numerics.sigma_points import unscented
 from jaxveh.statespace import AbstractNoise, Gaussian, Row, StateSpace
 from jaxveh.statespace.noise import LOG_2PI
 
@@ -113,7 +113,7 @@ class Unscented(AbstractFilter):
                     "Use a particle filter, or a Gaussian or Student-t law."
                 )
 
-    def _points(self, n: int) -> SigmaPoints:
+    def _points(self, n: int) -> Any:
         return _static_points(n, self.alpha, self.beta, self.kappa)
 
     def init(self, model, row, key=None):

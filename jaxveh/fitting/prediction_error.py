@@ -125,7 +125,7 @@ class _Problem(eqx.Module):
     rows: Any
     centre: jax.Array
     spread: jax.Array
-    target: Target | None
+    target: Any
     warm_up: int = eqx.field(static=True)
     parameters: tuple = eqx.field(static=True)
 

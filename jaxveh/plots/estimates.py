@@ -58,7 +58,7 @@ def estimate(
                     _line(row[0], time, shown.show(values[name]), label, colour(label.partition(",")[0], index + 2))
             for index, (label, one) in enumerate(labelled.items()):
                 _one(row[0], one, name, label, colour(label, index))
-                if errors and name in truth:
+                if errors and truth is not None and name in truth:
                     _one(row[1], one, name, label, colour(label, index), shown.show(truth[name]))
             _keep_truth_readable(row[0])
             label_above(row[0], shown.label)

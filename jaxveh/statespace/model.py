@@ -198,7 +198,9 @@ def _channel(recording: Recording, name: str, dtype, is_input: bool):
             )
         if np.isinf(array).any():
             k = int(np.argmax(np.isinf(array)))
-            raise InputError(f"channel {name} is {array[k]} at t = {recording.time[k]} s: must be finite, or NaN if missing.")
+            raise InputError(
+                f"channel {name} is {array[k]} at t = {recording.time[k]} s: must be finite, or NaN if missing."
+            )
     return values.astype(dtype)
 
 

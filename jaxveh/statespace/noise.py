@@ -116,7 +116,9 @@ class MultivariateGaussian(AbstractNoise):
     def __check_init__(self):
         k = len(self.fields)
         if self.matrix.shape != (k, k):
-            raise InputError(f"covariance has shape {self.matrix.shape}: must be ({k}, {k}) for {', '.join(self.fields)}.")
+            raise InputError(
+                f"covariance has shape {self.matrix.shape}: must be ({k}, {k}) for {', '.join(self.fields)}."
+            )
         check(
             "covariance", self.matrix,
             lambda m: abs(m - m.T).max() <= 1e-6 * abs(m).max() and bool((_eigenvalues(m) > 0).all()),
@@ -315,18 +317,19 @@ def whiten(law: AbstractNoise, residual: Mapping, present: Mapping) -> dict[str,
         white = jax.vmap(lambda r, p: law._white(r, p)[1][:, 0], out_axes=1)(*flat)
     else:
         std = numerics.sqrt(jnp.diagonal(law.covariance()))
-        white = jnp.stack([_masked(*flat, name)[0] / std[i] for i, name in enumerate(law.names)])
+        values, here = flat
+        white = jnp.stack([_masked(values, here, name)[0] / std[i] for i, name in enumerate(law.names)])
     return {name: white[i].reshape(shape) for i, name in enumerate(law.names)}
 
 
 def combine(*laws: AbstractNoise | None) -> AbstractNoise | None:
     """One law of several over disjoint fields; independent Gaussians merge into one, so that one draw serves all."""
-    laws = [law for law in laws if law is not None]
-    if not laws:
+    given = [law for law in laws if law is not None]
+    if not given:
         return None
-    gaussian = [law for law in laws if isinstance(law, Gaussian)]
+    gaussian = [law for law in given if isinstance(law, Gaussian)]
     merged = {name: std for law in gaussian for name, std in law.std._asdict().items()}
-    others = [law for law in laws if not isinstance(law, Gaussian)]
+    others = [law for law in given if not isinstance(law, Gaussian)]
     if gaussian and len(merged) < sum(len(law.names) for law in gaussian):
         raise InputError("noise laws share fields: each field has one law.")
     parts = ([Gaussian(merged)] if gaussian else []) + others

@@ -123,7 +123,11 @@ def with_parameters(
     starts = [p.domain.inverse(value) for p, value in zip(parameters, values, strict=True)]
     spreads = dict(zip([p.field for p in parameters], prior_spread(parameters, values, prior), strict=True))
     own = model.prior.law
-    law = Gaussian({**own.std._asdict(), **spreads}) if isinstance(own, Gaussian) else Independent((own, Gaussian(spreads)))
+    law = (
+        Gaussian({**own.std._asdict(), **spreads})
+        if isinstance(own, Gaussian)
+        else Independent((own, Gaussian(spreads)))
+    )
     return StateSpace(
         system=put(model.system, parameters, [None] * len(parameters)),
         transition=JointTransition(model.transition_function, chosen),
@@ -182,5 +186,3 @@ def put_parameters(model: StateSpace, report) -> Any:
     if model.chosen is None:
         return model.system
     return put(model.system, model.chosen.parameters, model.chosen.reported_parameters(report))
-
-

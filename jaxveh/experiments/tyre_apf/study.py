@@ -50,7 +50,10 @@ def guess_once(study: Study, key):
     values = pick(car, parameters)
     spreads = prior_spread(parameters, values, study.prior)
     draws = numerics.normal(key, (len(parameters),), values[0].dtype)
-    moved = [p.domain.forward(p.domain.inverse(v) + s * z) for p, v, s, z in zip(parameters, values, spreads, draws, strict=True)]
+    moved = [
+        p.domain.forward(p.domain.inverse(v) + s * z)
+        for p, v, s, z in zip(parameters, values, spreads, draws, strict=True)
+    ]
     return put(car, parameters, moved)
 
 
