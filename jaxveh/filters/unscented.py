@@ -61,8 +61,8 @@ class GaussianBelief(AbstractBelief):
         dtype = self.vector.dtype
         shown = model.report(self.t, _states(self, self.state_type(*self.vector)), self.u)
         rows = _rows(shown, self.points.directions.shape[1])
-        mean = rows @ jnp.asarray(self.points.mean_weights, dtype)
-        spread = (rows - mean[:, None]) ** 2 @ jnp.asarray(self.points.covariance_weights, dtype)
+        mean = _product(rows, jnp.asarray(self.points.mean_weights, dtype))
+        spread = _product((rows - mean[:, None]) ** 2, jnp.asarray(self.points.covariance_weights, dtype))
         kind = type(shown)
         # A weight may be negative, so that rounding can leave a spread a little below zero.
         return kind(*mean), kind(*numerics.sqrt(jnp.maximum(spread, 0.0)))
@@ -71,12 +71,21 @@ class GaussianBelief(AbstractBelief):
 def _states(belief: GaussianBelief, like):
     """The sigma points of a belief as a batch of states, (2n+1,) in each field."""
     directions = jnp.asarray(belief.points.directions, belief.vector.dtype)
-    return type(like)(*(belief.vector[:, None] + belief.factor @ directions))
+    return type(like)(*(belief.vector[:, None] + _product(belief.factor, directions)))
 
 
 def _rows(batch, count: int):
     """The fields of a batch as rows of a matrix; a field that does not depend on the state is repeated."""
     return jnp.stack([jnp.broadcast_to(field, (count,)) for field in batch])
+
+
+def _product(a, b):
+    """The matrix product (n, k) (k, m) or (n, k) (k,) as a sum that XLA fuses.
+
+    Its library's products round differently with the place of the operands in memory, so that a live loop would not give
+    the scan's bits; for few states they are slower, too.
+    """
+    return jnp.sum(a * b, axis=-1) if b.ndim == 1 else jnp.sum(a[:, None, :] * b.T[None], axis=-1)
 
 
 def covariance_in(law: AbstractNoise, fields: tuple[str, ...], dtype):
@@ -86,7 +95,7 @@ def covariance_in(law: AbstractNoise, fields: tuple[str, ...], dtype):
         variances = jnp.stack([std[name] ** 2 if name in std else jnp.zeros((), dtype) for name in fields])
         return jnp.where(jnp.eye(len(fields), dtype=bool), variances[:, None], jnp.zeros((), dtype))
     embed = jnp.asarray([[name == other for other in law.names] for name in fields], dtype)
-    return embed @ law.covariance() @ embed.T
+    return _product(_product(embed, law.covariance()), embed.T)
 
 
 class Unscented(AbstractFilter):
@@ -143,9 +152,9 @@ class Unscented(AbstractFilter):
         u = model.step_inputs(belief.t, t, belief.u, u_next)
         moved = model.transition(belief.t, t, _states(belief, belief.mean), u)
         rows = _rows(moved, points.directions.shape[1])
-        mean = rows @ jnp.asarray(points.mean_weights, dtype)
+        mean = _product(rows, jnp.asarray(points.mean_weights, dtype))
         deviations = rows - mean[:, None]
-        covariance = (deviations * jnp.asarray(points.covariance_weights, dtype)) @ deviations.T
+        covariance = _product(deviations * jnp.asarray(points.covariance_weights, dtype), deviations.T)
         if model.process_noise is not None:
             covariance = covariance + covariance_in(model.process_noise.over(t - belief.t), model.states, dtype)
         return GaussianBelief(
@@ -160,22 +169,23 @@ class Unscented(AbstractFilter):
         batch = _states(belief, belief.mean)
         predicted = _channel_rows(model, model.observation(row.t, batch, row.u), points.directions.shape[1])
         predicted = jnp.where(here[:, None], predicted, 0)
-        mean = predicted @ jnp.asarray(points.mean_weights, dtype)
+        mean = _product(predicted, jnp.asarray(points.mean_weights, dtype))
         weights = jnp.asarray(points.covariance_weights, dtype)
         deviations = predicted - mean[:, None]
-        states = belief.factor @ jnp.asarray(points.directions, dtype)
+        states = _product(belief.factor, jnp.asarray(points.directions, dtype))
         noise = covariance_in(model.measurement_noise, model.channels, dtype)
         both = here[:, None] & here[None, :]
         # A missing channel becomes independent with unit variance and zero innovation: it changes nothing.
-        spread = (deviations * weights) @ deviations.T + jnp.where(both, noise, jnp.eye(len(here), dtype=dtype))
-        cross = (states * weights) @ deviations.T
+        spread = _product(deviations * weights, deviations.T)
+        spread = spread + jnp.where(both, noise, jnp.eye(len(here), dtype=dtype))
+        cross = _product(states * weights, deviations.T)
         innovation = jnp.stack([measured[name] for name in model.channels]) - mean
         innovation = jnp.where(here, _wrap(model, innovation), 0)
         factor = numerics.cholesky(spread)
         white = numerics.solve_lower(factor, innovation)
         gain = numerics.solve_lower(factor, cross.T)
-        vector = belief.vector + gain.T @ white
-        covariance = belief.matrix - gain.T @ gain
+        vector = belief.vector + _product(gain.T, white)
+        covariance = belief.matrix - _product(gain.T, gain)
         nis = jnp.sum(white**2)
         count = jnp.sum(here.astype(dtype))
         log_likelihood = -0.5 * (nis + numerics.log_det(factor) + count * LOG_2PI)

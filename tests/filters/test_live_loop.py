@@ -14,7 +14,7 @@ FILTERS = [filters.Unscented(), filters.ParticleFilter(64), filters.AuxiliaryPar
 IDS = ["UKF", "PF", "APF"]
 
 
-def _counted(dtype, seed=2):
+def _counted(dtype, seed=2, n=2):
     """The linear model with a transition that counts how often it is traced."""
     traces = []
 
@@ -22,7 +22,7 @@ def _counted(dtype, seed=2):
         traces.append(x)
         return linear_transition(system, t0, t1, x, u)
 
-    base = linear_model(2, 2, seed=seed, dtype=dtype)
+    base = linear_model(n, 2, seed=seed, dtype=dtype)
     model = ss.StateSpace(
         system=base.system,
         transition=transition,
@@ -35,10 +35,16 @@ def _counted(dtype, seed=2):
     return model, traces
 
 
-@pytest.mark.parametrize("dtype", [jnp.float64, jnp.float32], ids=["float64", "float32"])
-@pytest.mark.parametrize("filter_", FILTERS, ids=IDS)
-def test_rows_one_by_one_give_the_scan_bit_for_bit(filter_, dtype):
-    model, traces = _counted(dtype)
+@pytest.mark.parametrize(
+    ("filter_", "dtype", "n"),
+    [
+        *[pytest.param(f, jnp.float64, 2, id=f"{name}-float64") for f, name in zip(FILTERS, IDS, strict=True)],
+        *[pytest.param(f, jnp.float32, 2, id=f"{name}-float32") for f, name in zip(FILTERS, IDS, strict=True)],
+        pytest.param(FILTERS[0], jnp.float64, 5, id="UKF-5-states"),
+    ],
+)
+def test_rows_one_by_one_give_the_scan_bit_for_bit(filter_, dtype, n):
+    model, traces = _counted(dtype, n=n)
     recording = linear_recording(model, rows=15)
     key = jax.random.key(8)
     estimate = filters.run(filter_, model, recording, key=key)

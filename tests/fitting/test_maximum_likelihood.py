@@ -166,8 +166,7 @@ def test_a_fit_that_does_not_finish_raises_unless_told():
 
 
 def test_float32_without_x64(float32):
-    found = maximum_likelihood(
-        filters.Unscented(), model(), RECORDING, LEVELS, tolerance=1e-4, standard_errors=False, throw=False
-    )
+    settings = dict(tolerance=1e-4, standard_errors=False, throw=False)
+    found = maximum_likelihood(filters.Unscented(), model(), RECORDING, LEVELS, **settings)
     assert found.mean[0].dtype == jnp.float32
     np.testing.assert_allclose([found.mean[0] ** 2, found.mean[1] ** 2], [1469.1, 15099.0], rtol=0.1)
