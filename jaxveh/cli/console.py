@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Iterator, Sequence
 
 from rich.box import SIMPLE_HEAD
@@ -47,8 +48,10 @@ def _lines(console: Console, title: str) -> Report:
     seen: list[str] = []
 
     def report(done: float, total: float, stage: str) -> None:
-        if stage and (not seen or seen[-1] != stage):
-            seen.append(stage)
+        # Steps that only count up would fill a log file.
+        kind = re.sub(r"[\d.]+", "#", stage)
+        if stage and kind not in seen:
+            seen.append(kind)
             console.print(f"{title}: {stage}", markup=False, soft_wrap=True)
 
     return report

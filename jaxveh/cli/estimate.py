@@ -113,8 +113,8 @@ def _print(product: Path, found: Any, calibration: Any, score: dict | None) -> N
     if calibration is not None:
         print_fitted(calibration)
     if score is not None:
-        rows = [(name.replace("_", " "), number(value)) for name, value in score.items()]
-        table("Score over the rows estimated", ("what", "value"), rows)
+        rows = [(name, f"{value}" if isinstance(value, int) else number(value)) for name, value in score.items()]
+        table("Score over the rows estimated, by the names of the JSON file", ("what", "value"), rows)
     time = np.asarray(found.time)
     results().print(f"{product}: {time.size} rows from {time[0]:g} to {time[-1]:g} s")
 
@@ -123,7 +123,7 @@ def _draw(found: Any, recording: Any, seen: Any, truth: str | None, car: Any, sp
     from jaxveh import plots
 
     make_folder(out)
-    names = ("sideslip", "v_y", "yaw_rate")
+    names = ("sideslip", "v_y", "yaw_rate") if truth is None else ("sideslip", "v_y")
     true = None if truth is None else sideslip.truth_of(seen, truth)
     others = {} if truth is None else {"open-loop linear model": sideslip.open_loop(seen, car)}
     spans = [] if span is None else [(max(span[0], float(recording.time[0])), span[1], "calibration")]

@@ -62,7 +62,9 @@ def estimate(
                     _one(row[1], one, name, label, colour(label, index), shown.show(truth[name]))
             _keep_truth_readable(row[0])
             label_above(row[0], shown.label)
-            if errors:
+            if errors and name not in truth:
+                row[1].set_visible(False)
+            elif errors:
                 row[1].axhline(0, color=COLOURS["truth"], linewidth=0.9, zorder=1.5)
                 label_above(row[1], f"error [{shown.unit}]" if shown.unit else "error")
         for ax in axes[-1]:
@@ -79,7 +81,7 @@ def _truth(ax: Any, time: np.ndarray, truth: Any, name: str) -> None:
     if values.shape != at.shape:
         raise InputError(f"plots.estimate: truth {name} has shape {values.shape}, time has {at.shape}; must agree.")
     # Thicker than the estimates, which lie on it when they are good.
-    ax.plot(at, values, color=COLOURS["truth"], linewidth=2.0, label="truth")
+    ax.plot(at, values, color=COLOURS["truth"], linewidth=1.7, label="truth")
 
 
 def _keep_truth_readable(ax: Any) -> None:

@@ -108,14 +108,14 @@ def _grid(visited: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def lateral_force(car: Any, axle: str, slip: np.ndarray) -> np.ndarray:
     """The axle's lateral force over slip angles (S,) at its static load, N: (S,)."""
-    load = dict(zip(AXLES, car.static_loads(), strict=True))[axle]
+    load = car.static_loads()[AXLES.index(axle)]
     contact = Contact(slip_angle=jax.numpy.asarray(slip, load.dtype), load=load)
     return np.asarray(getattr(car, axle).forces(contact).F_y, dtype=np.float64)
 
 
 def _band(draws: Any, axle: str, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The central 95 % of the draws' forces at each slip angle, N."""
-    load = dict(zip(AXLES, draws.static_loads(), strict=True))[axle]
+    load = draws.static_loads()[AXLES.index(axle)]
     at = Contact(slip_angle=jax.numpy.asarray(slip, load.dtype), load=load)
     forces = jax.vmap(lambda tyre: tyre.forces(at).F_y)(getattr(draws, axle))
     low, high = np.quantile(np.asarray(forces, dtype=np.float64), (0.025, 0.975), axis=0)
