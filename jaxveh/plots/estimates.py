@@ -62,7 +62,7 @@ def estimate(
                     _one(row[1], one, name, label, colour(label, index), shown.show(truth[name]))
             _keep_truth_readable(row[0])
             label_above(row[0], shown.label)
-            if errors and name not in truth:
+            if errors and (truth is None or name not in truth):
                 row[1].set_visible(False)
             elif errors:
                 row[1].axhline(0, color=COLOURS["truth"], linewidth=0.9, zorder=1.5)
