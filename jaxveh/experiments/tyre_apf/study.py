@@ -95,11 +95,13 @@ def force(tyre, slip):
 
 
 def open_loop(study: Study, car) -> Recording:
+    """The lane change driven by `car` without any measurement: a recording that holds inputs and truth alone."""
     manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
     return simulate(car, manoeuvre, None, dt=1 / study.rate, throw=False)
 
 
-def state_errors(found, drive):
+def state_errors(found, drive: Recording) -> jax.Array:
+    """(2,) RMSE of v_y (m/s) and yaw rate (rad/s) against the drive's truth; `found`: (T,) by name, mapping or NamedTuple."""
     get = found.get if isinstance(found, dict) else lambda name: getattr(found, name)
     rms = lambda name: jnp.sqrt(jnp.mean((get(name) - drive[f"true.{name}"]) ** 2))
     return jnp.stack([rms("v_y"), rms("yaw_rate")])
