@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxveh import Recording, filters, vehicles
 from jaxveh._core.progress import Progress
+from jaxveh.estimators import open_loop as drive_open_loop
 from jaxveh.estimators import sideslip as library
 from jaxveh.io import CarSpecification
 
@@ -54,7 +55,7 @@ def score(found: filters.Estimate, seen: Recording, name: str, car: CarSpecifica
 
 def open_loop(seen: Recording, car: CarSpecification) -> dict[str, np.ndarray]:
     """What a linear single track makes of steer and speed alone, by name (T,)."""
-    return library.open_loop(seen, vehicles.from_specification(car))
+    return drive_open_loop(seen, vehicles.from_specification(car))
 
 
 def fitted(calibration: library.Calibration | None) -> dict[str, Any]:

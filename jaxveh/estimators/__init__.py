@@ -2,8 +2,9 @@
 
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.handling import Handling, handling_model
+from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.observability import observe, predict_measurements
-from jaxveh.estimators.sideslip import Calibration, calibrate, estimate, handling_car, open_loop, score
+from jaxveh.estimators.sideslip import Calibration, calibrate, estimate, handling_car, score
 from jaxveh.estimators.state_space import PROCESS_NOISE, START_SPREAD, held_rows, state_space
 
 __all__ = [

@@ -15,12 +15,13 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.handling import Handling, handling_model
+from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
 from jaxveh.fitting import Fit, Target, prediction_error
 from jaxveh.io import AxleTyre, CarSpecification
-from jaxveh.statespace import Propagate, StateSpace
+from jaxveh.statespace import StateSpace
 from jaxveh.tyres import MagicFormula
-from jaxveh.vehicles import SingleTrack, from_specification, linear
+from jaxveh.vehicles import from_specification
 
 GENERIC = {"mu": 1.1, "C": 1.3, "E": 0.0, "cg_height": 0.45}
 """What an axle and a car are taken to be like where the file is silent: peak friction, shape, m above ground."""
@@ -226,45 +227,6 @@ def estimate(
     """
     model = source.model if isinstance(source, Calibration) else handling_model(handling_car(source))
     return run(filter or Unscented(), model, clean(recording), key=key)
-
-
-PROPAGATE_LINEAR = Propagate(lambda car, t, x, u: car.derivatives(t, x, u))
-
-
-def open_loop(recording: Recording, car: SingleTrack) -> dict[str, np.ndarray]:
-    """What a linear single track makes of steer and speed alone, by name (T,): v_y (m/s), yaw_rate, sideslip (rad)."""
-    plain = linear(eqx.tree_at(lambda c: c.cg_height, car, None, is_leaf=lambda leaf: leaf is None))
-    model_rows = StateRows(jnp.asarray(recording.time), jnp.asarray(recording["steer"]), jnp.asarray(recording["v_x"]))
-    v_y, yaw_rate = _drive_linear(plain, model_rows)
-    v_x = np.asarray(recording["v_x"])
-    return {
-        "v_y": np.asarray(v_y), "yaw_rate": np.asarray(yaw_rate), "sideslip": np.arctan2(np.asarray(v_y), v_x)
-    }  # fmt: skip
-
-
-class StateRows(eqx.Module):
-    """Time, steer and speed by row, (T,) each."""
-
-    t: jax.Array
-    steer: jax.Array
-    v_x: jax.Array
-
-
-@eqx.filter_jit
-def _drive_linear(car: SingleTrack, rows: StateRows):
-    from jaxveh._core.names import record_type
-
-    inputs = record_type("Inputs", ("steer", "v_x"))
-    zero = jnp.zeros((), rows.t.dtype)
-
-    def body(state, pair):
-        now, then = pair
-        moved = PROPAGATE_LINEAR(car, now.t, then.t, state, inputs(now.steer, now.v_x))
-        return moved, moved
-
-    first, rest = jax.tree.map(lambda a: a[:-1], rows), jax.tree.map(lambda a: a[1:], rows)
-    _, states = jax.lax.scan(body, car.state_type(zero, zero, zero), (first, rest))
-    return jnp.append(zero, states.v_y), jnp.append(zero, states.yaw_rate)
 
 
 def score(found: Estimate, seen: Recording, car: CarSpecification) -> dict[str, float]:
