@@ -102,8 +102,8 @@ def open_loop(study: Study, car) -> Recording:
 
 def state_errors(found, drive: Recording) -> jax.Array:
     """(2,) RMSE of v_y (m/s) and yaw rate (rad/s) against the drive's truth; `found`: (T,) by name, mapping or NamedTuple."""
-    get = found.get if isinstance(found, dict) else lambda name: getattr(found, name)
-    rms = lambda name: jnp.sqrt(jnp.mean((get(name) - drive[f"true.{name}"]) ** 2))
+    estimate = lambda name: found[name] if isinstance(found, dict) else getattr(found, name)
+    rms = lambda name: jnp.sqrt(jnp.mean((estimate(name) - drive[f"true.{name}"]) ** 2))
     return jnp.stack([rms("v_y"), rms("yaw_rate")])
 
 
