@@ -39,7 +39,7 @@ class ParticleBelief(AbstractBelief):
     @property
     def mean(self):
         """Weighted mean of each field (parameters on the real line)."""
-        return jax.tree.map(lambda field: jnp.sum(self.weights * field), self.particles)
+        return jax.tree.map(lambda field: numerics.total(self.weights * field), self.particles)
 
     @property
     def std(self):
@@ -68,15 +68,15 @@ class ParticleBelief(AbstractBelief):
         shown = jax.tree.map(lambda field: jnp.broadcast_to(field, (n,)), shown)
         # Deviations from the first particle keep the digits of E[x^2] - E[x]^2, and one pass serves both moments.
         base = jax.tree.map(lambda field: jax.lax.stop_gradient(field[0]), shown)
-        first = jax.tree.map(lambda field, b: jnp.sum(self.weights * (field - b)), shown, base)
-        second = jax.tree.map(lambda field, b: jnp.sum(self.weights * (field - b) ** 2), shown, base)
+        first = jax.tree.map(lambda field, b: numerics.total(self.weights * (field - b)), shown, base)
+        second = jax.tree.map(lambda field, b: numerics.total(self.weights * (field - b) ** 2), shown, base)
         mean = jax.tree.map(lambda b, m: b + m, base, first)
         std = jax.tree.map(lambda m, s: numerics.sqrt(jnp.maximum(s - m**2, 0)), first, second)
         return mean, std
 
 
 def _std(weights, deviation):
-    return numerics.sqrt(jnp.sum(weights * deviation**2))
+    return numerics.sqrt(numerics.total(weights * deviation**2))
 
 
 class AbstractParticleFilter(AbstractFilter):
@@ -147,8 +147,8 @@ def start_particles(filter_, model, row, key):
 def make_info(model, row, log_likelihood, residual, present, weights, alive):
     """The info of one step; `weights`: those of the prediction, whose residuals are given, and those after the row."""
     before, after = weights
-    mean = {name: jnp.sum(before * residual[name]) for name in model.channels}
-    spread = {name: jnp.sum(before * (residual[name] - mean[name]) ** 2) for name in model.channels}
+    mean = {name: numerics.total(before * residual[name]) for name in model.channels}
+    spread = {name: numerics.total(before * (residual[name] - mean[name]) ** 2) for name in model.channels}
     law = model.measurement_noise
     noise = (
         jnp.diagonal(law.covariance()) if law.has_covariance else jnp.full((len(model.channels),), jnp.nan, after.dtype)

@@ -16,9 +16,13 @@ from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jaxveh.numerics import polynomials
-from jaxveh.numerics.platform import on_cpu
+from jaxveh.numerics.platform import Tree, barrier, on_cpu
 
 _TANGENT_OF_PI_8 = math.sqrt(2) - 1
+_TANGENT_OF_3_PI_8 = math.sqrt(2) + 1
+
+_MANY = 128
+"""From this size on computing a number twice costs more than storing it."""
 
 # Multiples of these parts are exact up to 2^13 (float32) and 2^26 (float64) half turns: Cody and Waite's reduction.
 _PI_PARTS_32 = (3.140625, 0.0009670257568359375, 6.278329573009626e-07)
@@ -82,7 +86,7 @@ def log(x: ArrayLike) -> Array:
 
 
 def sin_cos_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Array]:
-    """Sine and cosine of an angle uniform over the circle, of random words: uint32 for float32, uint64 for float64.
+    """Sine and cosine of an angle uniform over the circle, of random words: uint32, or uint64 for float64.
 
     Two bits choose the signs, one whether the functions swap, the others an angle in (-pi / 4, pi / 4), so that no
     reduction and no long polynomial is needed.
@@ -103,7 +107,24 @@ def sin_cos_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Ar
     )
     swap = (word & _bits(word, 1)) != _bits(word, 0)
     first, second = jnp.where(swap, cosine, sine), jnp.where(swap, sine, cosine)
-    return _flip(first, word & _bits(word, 2), bits - 2), _flip(second, word & _bits(word, 4), bits - 3)
+    return _flip(first, word >> _bits(word, 1)), _flip(second, word >> _bits(word, 2))
+
+
+def half_turn_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Array]:
+    """Sine and cosine of an angle uniform over the circle, of random words uint32.
+
+    The lowest bit chooses the half turn, the others an angle in (-pi / 2, pi / 2): each function is one polynomial, so that
+    computing them apart costs nothing twice. Absolute errors as of `sin`; where the relative error of a cosine near 0
+    counts, use `sin_cos_of_word`.
+    """
+    # With the lowest bit set, which is what the sum does, the integers are symmetric about 0. The sum between the scales also
+    # keeps XLA from joining them: the powers of so small a constant underflow.
+    integer = lax.bitcast_convert_type(word & _bits(word, 2**32 - 2), jnp.int32)
+    r = (integer.astype(dtype) * 2.0**-32 + 2.0**-32) * math.pi
+    t = r * r
+    sine = r + r * t * polynomials.evaluate(polynomials.of_dtype(r, polynomials.SINE_32, polynomials.SINE_64), t)
+    cosine = 1.0 + t * polynomials.evaluate(polynomials.of_dtype(r, polynomials.COSINE_32, polynomials.COSINE_64), t)
+    return sine, _flip(cosine, word)
 
 
 def log_of_normal(x: Array) -> Array:
@@ -146,6 +167,11 @@ def _ours(*arguments: Array) -> bool:
     return on_cpu() and all(x.dtype in (jnp.float32, jnp.float64) and not x.weak_type for x in arguments)
 
 
+def _stored(values: Tree) -> Tree:
+    """Arguments as arrays in memory, where they are many: else XLA computes what they are made of once for each use."""
+    return barrier(values) if jax.tree.leaves(values)[0].size >= _MANY else values
+
+
 def _layout(x: Array) -> tuple[type, int]:
     return (jnp.uint32, 23) if x.dtype == jnp.float32 else (jnp.uint64, 52)
 
@@ -154,10 +180,11 @@ def _bits(word: Array, value: int) -> Array:
     return jnp.asarray(value, word.dtype)
 
 
-def _flip(x: Array, sign: Array, shift: int) -> Array:
-    """`x` with its sign flipped where the single bit left in `sign`, `shift` below the sign bit, is set."""
-    word = lax.bitcast_convert_type(x, sign.dtype)
-    return lax.bitcast_convert_type(word ^ (sign << _bits(sign, shift)), x.dtype)
+def _flip(x: Array, word: Array) -> Array:
+    """`x` with its sign flipped where the lowest bit of `word` is set."""
+    unsigned, _ = _layout(x)
+    sign = word.astype(unsigned) << jnp.asarray(8 * x.dtype.itemsize - 1, unsigned)
+    return lax.bitcast_convert_type(lax.bitcast_convert_type(x, unsigned) ^ sign, x.dtype)
 
 
 def _with_sign(magnitude: Array, sign: Array) -> Array:
@@ -192,6 +219,7 @@ def _alternating(count: Array) -> Array:
 def _sin(x: Array) -> Array:
     if not _ours(x):
         return jnp.sin(x)
+    x = _stored(x)
     count = jnp.round(x * (1 / math.pi))
     return _reduced_sine(x, count, _alternating(count))
 
@@ -200,6 +228,7 @@ def _sin(x: Array) -> Array:
 def _cos(x: Array) -> Array:
     if not _ours(x):
         return jnp.cos(x)
+    x = _stored(x)
     # cos(r + pi / 2 + n pi) = -(-1)^n sin(r): the reduction subtracts n + 1/2 half turns.
     count = jnp.round(x * (1 / math.pi) - 0.5)
     return _reduced_sine(x, count + 0.5, -_alternating(count))
@@ -234,48 +263,43 @@ def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
 # Arctangent
 
 
-def _first_octant(numerator: Array, denominator: Array) -> Array:
-    """arctan(numerator / denominator) for 0 <= numerator <= denominator, one division; 0 / 0 counts as 0.
+def _three_ranges(height: Array, width: Array) -> tuple[Array, Array]:
+    """arctan(height / width), both not negative, as turned + arctan(r) with |r| <= tan(pi / 8), by one division.
 
-    Above pi / 8 it is pi / 4 + arctan((n - d) / (n + d)), which halves the degree of the polynomial.
+    Above tan(pi / 8) it is pi / 4 + arctan((h - w) / (h + w)), above tan(3 pi / 8) it is pi / 2 + arctan(-w / h), so that
+    half the terms of the polynomial suffice. 0 / 0 counts as 0.
     """
-    above = numerator > _TANGENT_OF_PI_8 * denominator
-    top = jnp.where(above, numerator - denominator, numerator)
-    bottom = jnp.where(above, numerator + denominator, denominator)
-    r = top / jnp.where(bottom == 0.0, 1.0, bottom)
+    middle, steep = height > _TANGENT_OF_PI_8 * width, height > _TANGENT_OF_3_PI_8 * width
+    top = jnp.where(steep, -width, jnp.where(middle, height - width, height))
+    bottom = jnp.where(steep, height, jnp.where(middle, height + width, width))
+    turned = jnp.where(steep, math.pi / 2, jnp.where(middle, math.pi / 4, 0.0))
+    return turned, top / jnp.where(bottom == 0.0, 1.0, bottom)
+
+
+def _arctan_polynomial(turned: Array, r: Array) -> Array:
     t = r * r
     q = polynomials.evaluate(polynomials.of_dtype(r, polynomials.ARCTANGENT_32, polynomials.ARCTANGENT_64), t)
-    angle = r + r * t * q
-    return jnp.where(above, math.pi / 4 + angle, angle)
-
-
-def _from_constant(constant: float, angle: Array) -> Array:
-    """constant - angle, with what the type's rounding of the constant lost."""
-    high = float(np.asarray(constant, angle.dtype))
-    return high - (angle - (constant - high))
+    return turned + (r + r * t * q)
 
 
 @jax.custom_jvp
 def _arctan(x: Array) -> Array:
     if not _ours(x):
         return jnp.arctan(x)
-    size = jnp.abs(x)
-    steep = size > 1.0
-    angle = _first_octant(jnp.where(steep, 1.0, size), jnp.where(steep, size, 1.0))
-    return _with_sign(jnp.where(steep, _from_constant(math.pi / 2, angle), angle), x)
+    x = _stored(x)
+    angle = _arctan_polynomial(*_three_ranges(jnp.abs(x), jnp.ones_like(x)))
+    return _with_sign(angle, x)
 
 
 @jax.custom_jvp
 def _arctan2(y: Array, x: Array) -> Array:
     if not _ours(x, y):
         return jnp.arctan2(y, jnp.where(x == 0.0, jnp.abs(x), x))
-    x, y = jnp.broadcast_arrays(x, y)
+    x, y = _stored(jnp.broadcast_arrays(x, y))
     largest = float(jnp.finfo(x.dtype).max) / 4  # so that infinities and sums of the two stay finite
     width, height = (jnp.where(jnp.abs(z) > largest, largest, jnp.abs(z)) for z in (x, y))
-    steep = height > width
-    angle = _first_octant(jnp.where(steep, width, height), jnp.where(steep, height, width))
-    angle = jnp.where(steep, _from_constant(math.pi / 2, angle), angle)
-    return _with_sign(jnp.where(x < 0.0, _from_constant(math.pi, angle), angle), y)
+    angle = _arctan_polynomial(*_three_ranges(height, width))
+    return _with_sign(jnp.where(x < 0.0, math.pi - angle, angle), y)
 
 
 @_arctan.defjvp

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike, DTypeLike
 
-from jaxveh.numerics.elementary import log_of_normal, sin_cos_of_word, sqrt
+from jaxveh.numerics.elementary import half_turn_of_word, log_of_normal, sin_cos_of_word, sqrt
 from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu
 
 Shape = int | Sequence[int]
@@ -27,7 +27,8 @@ _KEY_PARITY = 0x1BD11BDA
 def normal(key: Array, shape: Shape = (), dtype: DTypeLike | None = None) -> Array:
     """Standard normal numbers of `shape` by Box and Muller (1958), float32 or float64 (the default type if None).
 
-    Never infinite; |z| reaches 6.7 in float32 (beyond it lies 1.4e-11 of the distribution) and 9.4 in float64.
+    Never infinite; two words of 32 bits make two numbers, whatever the type, so that |z| reaches 6.7: beyond it lies
+    1.4e-11 of the distribution.
     """
     return _normal(key, _shape(shape), _dtype(dtype))
 
@@ -83,7 +84,7 @@ def _normal(key: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
         return barrier(jnp.concatenate((sines, cosines))[:count]).reshape(shape)
     # The same numbers without a concatenation, into which XLA would draw everything, scalar by scalar.
     place, first_half = _places(count)
-    sines, cosines = _box_muller(*_word_pairs(key, place, half, dtype), dtype)
+    sines, cosines = _box_muller(*_blocks(key, place), dtype)
     return jnp.where(first_half, sines, cosines).reshape(shape)
 
 
@@ -152,13 +153,12 @@ def _positive_unit(word: Array, dtype: jnp.dtype) -> Array:
 def _box_muller(first: Array, second: Array, dtype: jnp.dtype) -> tuple[Array, Array]:
     """Two independent standard normal numbers of two random words, elementwise."""
     radius = jnp.sqrt(-2.0 * log_of_normal(_positive_unit(first, dtype)))
-    sine, cosine = sin_cos_of_word(second, dtype)
+    sine, cosine = half_turn_of_word(second, dtype)
     return radius * sine, radius * cosine
 
 
 def _normal_pairs(key: Array, count: int, dtype: jnp.dtype) -> tuple[Array, Array]:
-    words = barrier(_word_pairs(key, jax.lax.iota(jnp.uint32, count), count, dtype))
-    return barrier(_box_muller(*words, dtype))
+    return barrier(_box_muller(*_stored_blocks(key, count), dtype))
 
 
 def _words(key: Array, count: int, dtype: jnp.dtype) -> Array:
@@ -211,6 +211,15 @@ def _blocks(key: Array, place: Array) -> tuple[Array, Array]:
         left = left + subkeys[(group + 1) % 3]
         right = right + subkeys[(group + 2) % 3] + _uint32(group + 1)
     return left, right
+
+
+def _stored_blocks(key: Array, count: int) -> tuple[Array, Array]:
+    """Both words of the first `count` blocks, computed once: XLA would compute a block for each of its two words."""
+    place = jax.lax.iota(jnp.uint32, count)
+    if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
+        return barrier(_blocks(key, place))
+    both = barrier(_double_words(key, place))
+    return (both >> jnp.asarray(32, jnp.uint64)).astype(jnp.uint32), both.astype(jnp.uint32)
 
 
 def _uint32(value: int) -> Array:

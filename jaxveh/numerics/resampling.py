@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from jaxveh.numerics import random
+from jaxveh.numerics import random, sums
 from jaxveh.numerics.elementary import log
 from jaxveh.numerics.platform import barrier, on_cpu
 
@@ -74,8 +74,8 @@ def residual(key: Array, weights: Array, n: int | None = None) -> Array:
 @jax.jit
 def ess(weights: Array) -> Array:
     """Effective sample size (sum w)^2 / sum w^2 of weights (N,), from 1 to N; 0 if all are zero (Kong et al., 1994)."""
-    square = jnp.sum(weights * weights)
-    total = jnp.sum(weights)
+    square = sums.total(weights * weights)
+    total = sums.total(weights)
     return jnp.where(square > 0.0, total * total / jnp.where(square > 0.0, square, 1.0), 0.0)
 
 
@@ -93,7 +93,7 @@ def normalise(log_weights: Array) -> tuple[Array, Array, Array]:
     largest = jnp.where(alive, largest, 0.0)
     shifted = jnp.where(living, log_weights, largest) - largest
     raw = barrier(jnp.where(living, jnp.exp(shifted), 0.0))
-    total = jnp.where(alive, jnp.sum(raw), 1.0)
+    total = jnp.where(alive, sums.total(raw), 1.0)
     weights = jnp.where(alive, raw * (1.0 / total), 1.0 / count)
     log_mean = jnp.where(alive, largest + log(total) - math.log(count), -jnp.inf)
     return weights, log_mean, alive
@@ -141,7 +141,7 @@ def _cumulated_by_blocks(values: Array) -> Array:
 
 def _as_parts(weights: Array) -> Array:
     bits, integer = (30, jnp.int32) if weights.dtype == jnp.float32 else (52, jnp.int64)
-    return barrier(jnp.round(weights * (2.0**bits / jnp.sum(weights))).astype(integer))
+    return barrier(jnp.round(weights * (2.0**bits / sums.total(weights))).astype(integer))
 
 
 def _position(parts: Array, total: Array, n: int, dtype: jnp.dtype) -> Array:

@@ -88,8 +88,8 @@ class Gaussian(AbstractNoise):
         return self.std._fields
 
     def sample(self, key, shape=()):
-        draws = numerics.normal(key, (len(self.names), *shape), self.std[0].dtype)
-        return {name: std * draws[i] for i, (name, std) in enumerate(self.std._asdict().items())}
+        draws = numerics.normals(key, len(self.names), shape, self.std[0].dtype)
+        return {name: std * draw for (name, std), draw in zip(self.std._asdict().items(), draws, strict=True)}
 
     def log_prob(self, residual, present):
         terms = []

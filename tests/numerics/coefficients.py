@@ -70,6 +70,8 @@ LOGARITHM_BOUND = (3 - 2 * np.sqrt(2)) ** 2  # of s = (m - 1) / (m + 1) for m be
 RECIPES = {
     "SINE_32": (sine_remainder, SINE_BOUND, 3),
     "SINE_64": (sine_remainder, SINE_BOUND, 7),
+    "COSINE_32": (cosine_remainder, SINE_BOUND, 4),
+    "COSINE_64": (cosine_remainder, SINE_BOUND, 7),
     "ARCTANGENT_32": (arctangent_remainder, TANGENT_BOUND, 3),
     "ARCTANGENT_64": (arctangent_remainder, TANGENT_BOUND, 9),
     "LOGARITHM_32": (hyperbolic_arctangent_remainder, LOGARITHM_BOUND, 2),

@@ -45,18 +45,25 @@ def tyres(car):
 
 
 @dataclasses.dataclass(frozen=True)
+class Noise:
+    """What a filter's model adds to a drive that has none: `v_y` m/s, `yaw_rate` rad/s, `walk` of the parameters (relative).
+
+    All per root second. They pay for what the filter does approximately: its sigma points, or its finite cloud.
+    """
+
+    v_y: float
+    yaw_rate: float
+    walk: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Study:
     """The honest study: a double lane change, a prior that does not know the truth, four estimators side by side.
 
     `speed` m/s; `steer` rad at the road wheels; `duration` s; `rate` Hz; `yaw_rate_std` rad/s and `a_y_std` m/s^2 the
-    sensors' noise; `prior` the relative spread of the parameters (E: times 2, so 0.2); `particles`; `walk` the particles'
-    random walk of the parameters, relative, per root second (particle filters need one, the others do not);
-    `v_y_noise` (m/s) and `yaw_rate_noise` (rad/s) of the filters' states, per root second: with less, or a smaller
-    walk, all particles of some seeds collapse into one; `window` s of the multiple shooting.
-
-    **Knowledge of the truth**: `walk`, `v_y_noise` and `yaw_rate_noise` were chosen among seven settings by the true errors
-    of three seeds. They serve every filter, so that results at these values are tuned in that sense; a choice by the
-    filters' own likelihood is still to be made.
+    sensors' noise; `prior` the relative spread of the parameters (E: times 2, so 0.2); `particles`; `window` s of the
+    multiple shooting. `gaussian`: the noise of UKF and MAP, `particle`: that of PF and APF, both chosen by the filters'
+    own likelihood on drives of other seeds (`noise.choose`), so that the truth has no part in them.
     """
 
     speed: float = 25.0
@@ -67,7 +74,6 @@ class Study:
     a_y_std: float = 0.1
     prior: float = 0.1
     particles: int = 1000
-    walk: float = 0.05
-    v_y_noise: float = 0.05
-    yaw_rate_noise: float = 0.02
+    gaussian: Noise = Noise(v_y=0.02, yaw_rate=0.01, walk=0.0)
+    particle: Noise = Noise(v_y=0.02, yaw_rate=0.005, walk=0.05)
     window: float = 0.5

@@ -25,6 +25,7 @@ from jaxveh.experiments.tyre_apf.study import (
     Outcome,
     curve_error,
     drive_once,
+    filter_of,
     guess_once,
     model_of,
     open_loop,
@@ -74,17 +75,12 @@ def run_staged(study: Study, keys, progress: Progress = silent) -> Staged:
     tasks = {
         "MAP": (_fit(study), guess, segments),
         "errors and step steers": (_judge(study), values_like, drive),
-        "PF": (_filter(study, filters.ParticleFilter(study.particles), study.walk), guess, drive, parts[:, 2]),
-        "APF": (
-            _filter(study, filters.AuxiliaryParticleFilter(study.particles), study.walk),
-            guess,
-            drive,
-            parts[:, 3],
-        ),
-        "UKF": (_filter(study, filters.Unscented(), 0.0), guess, drive, parts[:, 2]),
+        "PF": (_filter(study, "PF"), guess, drive, parts[:, 2]),
+        "APF": (_filter(study, "APF"), guess, drive, parts[:, 3]),
+        "UKF": (_filter(study, "UKF"), guess, drive, parts[:, 2]),
     }
     seen = _first(drive)
-    observed = lambda: estimators.observe(model_of(study, vehicles.passenger_car()), seen)
+    observed = lambda: estimators.observe(model_of(study, vehicles.passenger_car(), study.gaussian), seen)
     done = clock.many(tasks, hold=("errors and step steers",), host={"observability": observed})
     fit, estimates = done["MAP"], {name: done[name] for name in FILTERS}
     values, spread = _parameters(study, guess, estimates, fit)
@@ -108,9 +104,11 @@ def run_staged(study: Study, keys, progress: Progress = silent) -> Staged:
     return Staged(outcome, by_angle, estimates, fit, loops, done["observability"], clock.seconds)
 
 
-def _filter(study: Study, kind, walk: float) -> Callable:
+def _filter(study: Study, name: str) -> Callable:
+    kind, noise = filter_of(study, name)
+
     def one(guess, drive, key):
-        model = model_of(study, guess, walk)
+        model = model_of(study, guess, noise)
         return filters.scan(kind, model, model.rows(drive), key)
 
     return one
@@ -118,7 +116,7 @@ def _filter(study: Study, kind, walk: float) -> Callable:
 
 def _fit(study: Study) -> Callable:
     def one(guess, segments):
-        model = model_of(study, guess)
+        model = model_of(study, guess, study.gaussian)
         return shoot(model, segments, jnp.asarray(0.01, model.prior.mean[0].dtype), True, 100, 1e-8)
 
     return one
@@ -162,7 +160,7 @@ def _segments(study: Study, drive, guess):
     parts = []
     for i in range(count):
         car, recording = each(i)
-        parts.append(cut(model_of(study, car), recording, study.window))
+        parts.append(cut(model_of(study, car, study.gaussian), recording, study.window))
     return jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *parts)
 
 

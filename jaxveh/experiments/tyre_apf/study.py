@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxveh import estimators, manoeuvres, numerics, sensors, vehicles
+from jaxveh import estimators, filters, manoeuvres, numerics, sensors, vehicles
 from jaxveh._core.parameter import pick, prior_spread, put, resolve
 from jaxveh._core.recording import Recording
-from jaxveh.experiments.tyre_apf.settings import Study, tyres
+from jaxveh.experiments.tyre_apf.settings import Noise, Study, tyres
 from jaxveh.simulation import simulate
 
 ESTIMATORS = ("prior", "PF", "APF", "UKF", "MAP")
@@ -57,16 +57,24 @@ def guess_once(study: Study, key):
     return put(car, parameters, moved)
 
 
-def model_of(study: Study, car, walk: float = 0.0):
-    """The state space that every estimator of the study sees."""
+def model_of(study: Study, car, noise: Noise):
+    """The state space that an estimator of the study sees, with its noise."""
     return estimators.state_space(
         car,
         sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std),
         estimate=tyres,
         prior=study.prior,
-        walk=walk,
-        process_noise={"v_y": study.v_y_noise, "yaw_rate": study.yaw_rate_noise},
+        walk=noise.walk,
+        process_noise={"v_y": noise.v_y, "yaw_rate": noise.yaw_rate},
     )
+
+
+def filter_of(study: Study, name: str):
+    """The filter called `PF`, `APF` or `UKF`, and the noise that its model assumes."""
+    if name == "UKF":
+        return filters.Unscented(), study.gaussian
+    kind = filters.ParticleFilter if name == "PF" else filters.AuxiliaryParticleFilter
+    return kind(study.particles), study.particle
 
 
 def with_tyres(values):

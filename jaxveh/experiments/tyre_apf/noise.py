@@ -1,0 +1,99 @@
+"""The noise that the study's filters assume, chosen by their own likelihood on drives that no table shows.
+
+    python -m jaxveh.experiments.tyre_apf.noise
+
+prints what `settings.Study` holds: for each filter the candidate whose log-likelihood, summed over the drives, is largest.
+The truth has no part in it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import filters
+from jaxveh._core.progress import Progress, silent
+from jaxveh.experiments.tyre_apf.settings import Noise, Study
+from jaxveh.experiments.tyre_apf.study import drive_once, filter_of, guess_once, model_of
+
+V_Y = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
+"""Candidates: m/s,"""
+
+YAW_RATE = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
+"""rad/s,"""
+
+WALK = (0.01, 0.02, 0.05, 0.1, 0.2)
+"""and relative, all per root second."""
+
+
+class Choice(NamedTuple):
+    """`noise`: the best of `candidates` (m, 3: v_y, yaw_rate, walk) by the mean over drives of `log_likelihood` (m, drives)."""
+
+    noise: Noise
+    candidates: np.ndarray
+    log_likelihood: np.ndarray
+
+
+def choose(study: Study, name: str, *, drives: int = 8, seed: int = 1000, progress: Progress = silent) -> Choice:
+    """Choose the noise of the filter `PF`, `APF` or `UKF` on drives of their own seeds, by its likelihood alone.
+
+    `seed` differs from the report's, so that no drive is used twice. A parameter that walks is for particles only: the
+    unscented filter's parameters are constants. A candidate for which the filter fails on any drive is out.
+    """
+    walks = (0.0,) if name == "UKF" else WALK
+    candidates = np.array(list(itertools.product(V_Y, YAW_RATE, walks)))
+    keys = jax.random.split(jax.random.key(seed), drives)
+    likelihood = _drives(study, name, keys)
+    found = []
+    for i, candidate in enumerate(candidates):
+        progress(i, len(candidates), f"{name}: v_y {candidate[0]:g}, yaw rate {candidate[1]:g}, walk {candidate[2]:g}")
+        found.append(likelihood(jnp.asarray(candidate)))
+    log_likelihood = np.array(found)
+    mean = np.where(np.isfinite(log_likelihood), log_likelihood, -np.inf).mean(axis=1)
+    return Choice(Noise(*map(float, candidates[mean.argmax()])), candidates, log_likelihood)
+
+
+def _drives(study: Study, name: str, keys):
+    """The likelihood of every drive as a function of the noise's levels, compiled once."""
+
+    @eqx.filter_jit
+    def simulate(keys):
+        each = lambda key: (lambda a, b, c: (drive_once(study, a), guess_once(study, b), c))(*jax.random.split(key, 3))
+        return jax.vmap(each)(keys)
+
+    kind, _ = filter_of(study, name)
+
+    @eqx.filter_jit
+    def likelihood(seen: Any, levels):
+        def one(drive, guess, key):
+            noise = Noise(levels[0], levels[1], 0.0 if name == "UKF" else levels[2])
+            model = model_of(study, guess, noise)
+            found = filters.scan(kind, model, model.rows(drive), key)
+            return jnp.where(found.result == 0, found.log_likelihood, -jnp.inf)
+
+        return jax.vmap(one)(*seen)
+
+    seen = simulate(keys)
+    return lambda levels: np.asarray(likelihood(seen, levels))
+
+
+def main() -> None:
+    """Print the choice for each filter, and the runners-up."""
+    jax.config.update("jax_enable_x64", True)
+    study = Study()
+    for name in ("UKF", "PF", "APF"):
+        choice = choose(study, name)
+        mean = choice.log_likelihood.mean(axis=1)
+        print(f"{name}: {choice.noise}")
+        for i in np.argsort(-mean)[:8]:
+            spread = (choice.log_likelihood[i] - choice.log_likelihood[mean.argmax()]).std() / np.sqrt(len(mean))
+            print("   v_y {:g}, yaw rate {:g}, walk {:g}".format(*choice.candidates[i]), f"{mean[i]:.2f}, +- {spread:.2f}")
+
+
+if __name__ == "__main__":
+    main()
