@@ -92,7 +92,9 @@ def main() -> None:
         print(f"{name}: {choice.noise}")
         for i in np.argsort(-mean)[:8]:
             spread = (choice.log_likelihood[i] - choice.log_likelihood[mean.argmax()]).std() / np.sqrt(len(mean))
-            print("   v_y {:g}, yaw rate {:g}, walk {:g}".format(*choice.candidates[i]), f"{mean[i]:.2f}, +- {spread:.2f}")
+            print(
+                "   v_y {:g}, yaw rate {:g}, walk {:g}".format(*choice.candidates[i]), f"{mean[i]:.2f}, +- {spread:.2f}"
+            )
 
 
 if __name__ == "__main__":
