@@ -20,9 +20,14 @@ def messages() -> Console:
     return Console(stderr=True, emoji=False, highlight=False)
 
 
+WIDE = 160
+"""Columns of a file or a pipe, which nobody can widen: tables keep their numbers on one line there."""
+
+
 def results() -> Console:
     """stdout."""
-    return Console(emoji=False, highlight=False)
+    console = Console(emoji=False, highlight=False)
+    return console if console.is_terminal else Console(emoji=False, highlight=False, width=WIDE)
 
 
 @contextlib.contextmanager

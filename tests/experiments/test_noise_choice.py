@@ -1,0 +1,45 @@
+"""The choice of the study's noise: by likelihood alone, on drives of its own."""
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+from jaxveh.experiments.tyre_apf import Study, noise
+
+SMALL = dataclasses.replace(Study(), rate=25.0, particles=40)
+
+
+@pytest.fixture(scope="module")
+def choice():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(noise, "V_Y", (1e-3, 0.02, 3.0))
+        patch.setattr(noise, "YAW_RATE", (0.01, 2.0))
+        yield noise.choose(SMALL, "UKF", drives=3, seed=7)
+
+
+def test_the_candidate_of_the_largest_likelihood_is_chosen(choice):
+    assert choice.candidates.shape == (6, 3)
+    assert choice.log_likelihood.shape == (6, 3)
+    assert np.isfinite(choice.log_likelihood).all()
+    best = choice.candidates[choice.log_likelihood.mean(axis=1).argmax()]
+    assert dataclasses.astuple(choice.noise) == tuple(best)
+    # The drives have no process noise at all: levels that drown the sensors explain them worse.
+    assert choice.noise.v_y < 3.0 and choice.noise.yaw_rate < 2.0
+    assert choice.noise.walk == 0.0
+
+
+def test_a_candidate_that_fails_on_one_drive_is_out(monkeypatch):
+    def likelihood(study, name, keys):
+        return lambda levels: np.array([9.0, -np.inf if levels[2] > 0.05 else float(levels[2])])
+
+    monkeypatch.setattr(noise, "_drives", likelihood)
+    assert noise.choose(SMALL, "PF", drives=2).noise.walk == 0.05
+
+
+def test_its_drives_are_not_those_of_the_report(choice):
+    keys = jax.random.key_data(jax.random.split(jax.random.key(1000), 8))
+    honest, _ = jax.random.split(jax.random.key(0))
+    shown = jax.random.key_data(jax.random.split(honest, 50))
+    assert not (np.asarray(keys)[:, None] == np.asarray(shown)[None]).all(axis=-1).any()
