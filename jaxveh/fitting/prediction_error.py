@@ -23,6 +23,9 @@ LOG_2PI = float(np.log(2 * np.pi))
 FIRST_DAMPING, RAISED, LOWERED = 1e-2, 5.0, 0.2
 """Levenberg's damping at the start, and its factors after a step that raised and one that lowered the cost."""
 
+SECANTS = 10
+"""How many of the last steps correct the curvature."""
+
 LONGEST_STEP = 2.0
 """In the prior's standard deviations (without a prior: on the real line): how far one step may move a parameter."""
 
@@ -174,19 +177,36 @@ def _linearised(problem: _Problem, z):
     return cost, gradient, information + jnp.diag(1 / problem.spread**2)
 
 
+def _with_secants(information, pairs):
+    """The information corrected to the changes of the gradient (step, change) that were seen, oldest first (BFGS).
+
+    The expected information is the curvature only on average; where they differ, plain scoring creeps.
+    """
+    curvature = information
+    for step, change in pairs:
+        along = curvature @ step
+        if change @ step > 1e-2 * step @ along:
+            curvature = curvature + np.outer(change, change) / (change @ step) - np.outer(along, along) / (step @ along)
+    return curvature
+
+
 def _score(problem: _Problem, z, max_steps: int, tolerance: float, progress: Progress):
-    """Damped Fisher scoring: the optimum, its cost and information, the steps taken, whether it converged."""
+    """Damped Fisher scoring with secant corrections: the optimum, its cost and information, the steps taken, whether it converged."""
     unit = np.asarray(jnp.where(jnp.isfinite(problem.spread), problem.spread, 1.0))
     damping, small = FIRST_DAMPING, 0
+    pairs: list[tuple[np.ndarray, np.ndarray]] = []
     progress(0, max_steps, "fit (compiling first)")
     cost, gradient, information = map(np.asarray, _linearised(problem, z))
     for step in range(1, max_steps + 1):
-        damped = information + damping * np.diag(np.diag(information))
+        curvature = _with_secants(information, pairs[-SECANTS:])
+        damped = curvature + damping * np.diag(np.diag(curvature))
         move = -np.linalg.lstsq(damped, gradient, rcond=None)[0]
         move *= min(1.0, LONGEST_STEP / max(np.max(np.abs(move / unit)), 1e-12))
         trial = z + jnp.asarray(move, z.dtype)
         found = tuple(map(np.asarray, _linearised(problem, trial)))
         progress(step, max_steps, f"fit: step {step}, log-posterior {-float(min(cost, found[0])):.1f}")
+        if np.isfinite(found[1]).all():
+            pairs.append((np.asarray(trial - z), found[1] - gradient))
         if all(np.isfinite(part).all() for part in found) and found[0] < cost:
             small = small + 1 if cost - found[0] < tolerance else 0
             z, (cost, gradient, information), damping = trial, found, damping * LOWERED
