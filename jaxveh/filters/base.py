@@ -13,6 +13,9 @@ from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.statespace import Row, StateSpace
 
+KEPT = "kept for the backward pass"
+"""Name (`jax.ad_checkpoint.checkpoint_name`) of what a step keeps for its gradient: small, and long to compute again."""
+
 
 class Info(NamedTuple):
     """What a person wants to know of one step.
@@ -74,11 +77,29 @@ def apart(function, condition, *operands):
 
     XLA fuses a step with its surroundings, differently in a scan, in a live loop and beside other outputs, and rounds
     differently with it. It never fuses across a conditional: `condition` holds for every input, and XLA must not be able
-    to know that. Called outside jit, this is compiled once as well. Transformations pass through.
+    to know that. Called outside jit, this is compiled once as well. Transformations pass through; under differentiation
+    there is no conditional, which would cost a copy of all that the backward pass needs.
     """
-    traced = eqx.filter_closure_convert(function, *operands)
-    never = lambda *_: jax.tree.map(_zeros, traced.out_struct)
-    return jax.lax.cond(condition, lambda *given: traced(*given), never, *operands)
+    arrays, rest = eqx.partition((function, operands), eqx.is_array)
+    leaves, structure = jax.tree.flatten(arrays)
+
+    def together(*leaves):
+        function, operands = eqx.combine(jax.tree.unflatten(structure, leaves), rest)
+        return function(*operands)
+
+    @jax.custom_jvp
+    def alone(condition, *leaves):
+        never = lambda *_: jax.tree.map(_zeros, jax.eval_shape(together, *leaves))
+        return jax.lax.cond(condition, together, never, *leaves)
+
+    @alone.defjvp
+    def _(primals, tangents):
+        condition, *leaves = primals
+        # In a batch the condition makes every result a batch. The selection does so here, where jax counts on the same.
+        selected = lambda *leaves: jax.tree.map(lambda x: jnp.where(condition, x, _zeros(x)), together(*leaves))
+        return jax.jvp(selected, tuple(leaves), tuple(tangents[1:]))
+
+    return alone(condition, *leaves)
 
 
 def _zeros(like):

@@ -12,7 +12,7 @@ import numpy as np
 from jaxveh._core.errors import FilterError, is_concrete
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
-from jaxveh.filters.base import AbstractFilter, Info
+from jaxveh.filters.base import KEPT, AbstractFilter, Info
 from jaxveh.statespace import Row, StateSpace, parameter_view
 
 
@@ -72,7 +72,8 @@ def scan(filter: AbstractFilter, model: StateSpace, rows: Row, key=None) -> Esti
         belief, info = filter.step(model, belief, row)
         return belief, (*belief.moments(model), info)
 
-    belief, rest = jax.lax.scan(jax.checkpoint(body, prevent_cse=False), belief, rest)
+    body = jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(KEPT))
+    belief, rest = jax.lax.scan(body, belief, rest)
     mean, std, info = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
     result, failed_at = first_failure(info.result)
     chosen = model.chosen

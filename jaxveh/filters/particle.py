@@ -8,11 +8,13 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.ad_checkpoint import checkpoint_name
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
 from jaxveh.filters.base import (
+    KEPT,
     AbstractBelief,
     AbstractFilter,
     Info,
@@ -130,7 +132,7 @@ def gather(particles, ancestors):
 
 def choose_ancestors(filter_, key, weights):
     """Ancestors (N,) int32 and whether resampling took place (None: always, known when compiling)."""
-    drawn = filter_.resampling(key, jax.lax.stop_gradient(weights), filter_.particles)
+    drawn = checkpoint_name(filter_.resampling(key, jax.lax.stop_gradient(weights), filter_.particles), KEPT)
     if filter_.threshold >= 1:
         return drawn, None
     resampled = numerics.ess(weights) < filter_.threshold * filter_.particles

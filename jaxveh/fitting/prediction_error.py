@@ -191,7 +191,7 @@ def _with_secants(information, pairs):
 
 
 def _score(problem: _Problem, z, max_steps: int, tolerance: float, progress: Progress):
-    """Damped Fisher scoring with secant corrections: the optimum, its cost and information, the steps taken, whether it converged."""
+    """Damped Fisher scoring with secant corrections: optimum, cost and information there, steps, whether it converged."""
     unit = np.asarray(jnp.where(jnp.isfinite(problem.spread), problem.spread, 1.0))
     damping, small = FIRST_DAMPING, 0
     pairs: list[tuple[np.ndarray, np.ndarray]] = []
