@@ -3,6 +3,8 @@
 from jaxveh.tyres.base import AbstractDynamicTyre, AbstractTyre, Contact, Forces, cornering_stiffness
 from jaxveh.tyres.linear import Linear
 from jaxveh.tyres.magic_formula import MagicFormula
+from jaxveh.tyres.mf_tyre import MFOutputs, MFTyre
+from jaxveh.tyres.property_file import from_property_file
 
 __all__ = [
     "AbstractDynamicTyre",
@@ -10,6 +12,9 @@ __all__ = [
     "Contact",
     "Forces",
     "Linear",
+    "MFOutputs",
+    "MFTyre",
     "MagicFormula",
     "cornering_stiffness",
+    "from_property_file",
 ]

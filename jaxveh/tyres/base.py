@@ -21,7 +21,9 @@ class Contact(NamedTuple):
       wheel off the ground.
     - `camber` (rad): inclination about the wheel's x axis (x forward, y left, z up).
     - `friction` (-): the road's friction over that of the road on which the tyre's parameters hold.
-    - `speed` (m/s): forward speed |v_xw| of the contact point; None where it is not known (laws that need it raise).
+    - `speed` (m/s): forward speed |v_xw| of the contact point; None where it is not known (laws that need it raise, or take
+      their nominal one, as they say).
+    - `pressure` (Pa): inflation pressure; None means the tyre's own.
     """
 
     slip_angle: Any = 0.0
@@ -30,6 +32,7 @@ class Contact(NamedTuple):
     camber: Any = 0.0
     friction: Any = 1.0
     speed: Any = None
+    pressure: Any = None
 
 
 class Forces(NamedTuple):

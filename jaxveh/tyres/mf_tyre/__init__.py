@@ -1,0 +1,31 @@
+"""MF-Tyre: the Magic Formula in full, versions 5.2 and 6.1, for pure and combined slip; one file a force or moment.
+
+The equations are those of H. B. Pacejka, Tire and Vehicle Dynamics, 3rd edition (2012), section 4.3.2 ("4.E" numbers), with
+the corrections of Besselink, Schmeitz & Pacejka, An improved Magic Formula/Swift tyre model that can handle inflation
+pressure changes, Vehicle System Dynamics 48 (2010) ("A" numbers), where the reference evaluator MFeval follows them.
+Coefficients keep the names of property files. Inside this folder axes and signs are ISO-W's, where a positive slip angle
+gives a negative force; `MFTyre` is the boundary.
+"""
+
+from jaxveh.tyres.mf_tyre.aligning import Aligning
+from jaxveh.tyres.mf_tyre.lateral import Lateral
+from jaxveh.tyres.mf_tyre.longitudinal import Longitudinal
+from jaxveh.tyres.mf_tyre.overturning import Overturning
+from jaxveh.tyres.mf_tyre.ranges import Ranges
+from jaxveh.tyres.mf_tyre.rolling import Rolling
+from jaxveh.tyres.mf_tyre.scaling import Scaling
+from jaxveh.tyres.mf_tyre.structure import Structure
+from jaxveh.tyres.mf_tyre.tyre import MFOutputs, MFTyre
+
+__all__ = [
+    "Aligning",
+    "Lateral",
+    "Longitudinal",
+    "MFOutputs",
+    "MFTyre",
+    "Overturning",
+    "Ranges",
+    "Rolling",
+    "Scaling",
+    "Structure",
+]

@@ -1,0 +1,59 @@
+"""The sine and cosine curves that all of MF-Tyre is made of, and the declaration of a coefficient."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import parameter
+
+EPSILON = 1e-6
+"""What the book adds to denominators (4.E6a)."""
+
+
+def coefficient(default: float = 0.0, scale: float = 1.0, unit: str = "-"):
+    """Declare a coefficient of a property file: any real number, `default` where a file is silent.
+
+    `scale` is a typical size, to which relative prior spreads refer.
+    """
+    return parameter(unit, scale=scale, default=default)
+
+
+def factor():
+    """Declare a scaling factor: 1 where a file is silent."""
+    return coefficient(1.0)
+
+
+def bent(x, E):
+    """`x - E (x - arctan x)`: the argument of both curves."""
+    return x - E * (x - numerics.arctan(x))
+
+
+def sine_curve(x, B, C, D, E):
+    """`D sin(C arctan(B x - E (B x - arctan(B x))))`: forces."""
+    return D * numerics.sin(C * numerics.arctan(bent(B * x, E)))
+
+
+def cosine_curve(x, B, C, E):
+    """`cos(C arctan(B x - E (B x - arctan(B x))))`: trail, and weights of combined slip."""
+    return numerics.cos(C * numerics.arctan(bent(B * x, E)))
+
+
+def weight(x, shift, B, C, E):
+    """A weight of combined slip, 1 at `x = 0`: the cosine curve at `x + shift` over that at `shift`."""
+    return cosine_curve(x + shift, B, C, E) / cosine_curve(shift, B, C, E)
+
+
+def sign(x):
+    """1 for x >= 0, else -1."""
+    return jnp.where(x >= 0, jnp.ones_like(x), -jnp.ones_like(x))
+
+
+def not_zero(x):
+    """The book's guard of a denominator: `x + epsilon sign(x)`."""
+    return x + EPSILON * sign(x)
+
+
+def cosine_of_arctan(x):
+    """`cos(arctan x)`, which needs neither."""
+    return 1 / jnp.sqrt(1 + x * x)

@@ -1,0 +1,81 @@
+"""Longitudinal force: pure slip (4.E9 to 4.E18) and its weight in combined slip (4.E50 to 4.E57)."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh.tyres.mf_tyre.formula import coefficient, cosine_of_arctan, not_zero, sign, sine_curve, weight
+
+
+class PureLongitudinal(NamedTuple):
+    """`force` (N) at zero slip angle, `stiffness` K_xk (N), friction `mu` (-)."""
+
+    force: Any
+    stiffness: Any
+    mu: Any
+
+
+class Longitudinal(eqx.Module):
+    """The section [LONGITUDINAL_COEFFICIENTS].
+
+    Pure slip: shape `PCX1`; friction `PDX1` at nominal load, with load (`2`) and camber squared (`3`); curvature `PEX1`, with
+    load (`2`, `3`), when driving (`4`); stiffness `PKX1`, with load (`2`, `3`); shifts `PHX1`, `PHX2`, `PVX1`, `PVX2`; pressure
+    `PPX1` to `PPX4`. Combined slip: `RBX1` to `RBX3`, `RCX1`, `REX1`, `REX2`, `RHX1`. Relaxation in 5.2: `PTX1` to `PTX3`.
+    """
+
+    PCX1: jax.Array = coefficient(scale=1.5)
+    PDX1: jax.Array = coefficient()
+    PDX2: jax.Array = coefficient(scale=0.1)
+    PDX3: jax.Array = coefficient()
+    PEX1: jax.Array = coefficient()
+    PEX2: jax.Array = coefficient()
+    PEX3: jax.Array = coefficient()
+    PEX4: jax.Array = coefficient()
+    PKX1: jax.Array = coefficient(scale=20.0)
+    PKX2: jax.Array = coefficient(scale=10.0)
+    PKX3: jax.Array = coefficient()
+    PHX1: jax.Array = coefficient(scale=0.002)
+    PHX2: jax.Array = coefficient(scale=0.002)
+    PVX1: jax.Array = coefficient(scale=0.05)
+    PVX2: jax.Array = coefficient(scale=0.05)
+    PPX1: jax.Array = coefficient()
+    PPX2: jax.Array = coefficient()
+    PPX3: jax.Array = coefficient()
+    PPX4: jax.Array = coefficient()
+    RBX1: jax.Array = coefficient(scale=10.0)
+    RBX2: jax.Array = coefficient(scale=10.0)
+    RBX3: jax.Array = coefficient(scale=100.0)
+    RCX1: jax.Array = coefficient()
+    REX1: jax.Array = coefficient()
+    REX2: jax.Array = coefficient()
+    RHX1: jax.Array = coefficient(scale=0.01)
+    PTX1: jax.Array = coefficient()
+    PTX2: jax.Array = coefficient()
+    PTX3: jax.Array = coefficient()
+
+    def pure(self, at, scaling) -> PureLongitudinal:
+        """F_x0 and what it is made of."""
+        c, s = self, scaling
+        S_Hx = (c.PHX1 + c.PHX2 * at.df_z) * s.LHX * at.smooth
+        S_Vx = at.load * (c.PVX1 + c.PVX2 * at.df_z) * s.LVX * at.mu_x * at.smooth
+        kappa = at.slip_ratio + S_Hx
+        C_x = c.PCX1 * s.LCX
+        pressure = 1 + c.PPX3 * at.dp_i + c.PPX4 * at.dp_i**2
+        mu_x = (c.PDX1 + c.PDX2 * at.df_z) * pressure * (1 - c.PDX3 * at.camber**2) * at.mu_x
+        D_x = mu_x * at.load
+        bend = c.PEX1 + c.PEX2 * at.df_z + c.PEX3 * at.df_z**2
+        E_x = jnp.minimum(bend * (1 - c.PEX4 * sign(kappa)) * s.LEX, 1)
+        K_xk = at.load * (c.PKX1 + c.PKX2 * at.df_z) * jnp.exp(c.PKX3 * at.df_z)
+        K_xk = K_xk * (1 + c.PPX1 * at.dp_i + c.PPX2 * at.dp_i**2) * s.LKX
+        B_x = K_xk / not_zero(C_x * D_x)
+        return PureLongitudinal(sine_curve(kappa, B_x, C_x, D_x, E_x) + S_Vx, K_xk, mu_x)
+
+    def weight(self, at, scaling):
+        """G_xa: the share of F_x0 that is left at a slip angle."""
+        c = self
+        B = (c.RBX1 + c.RBX3 * at.sine**2) * cosine_of_arctan(c.RBX2 * at.slip_ratio) * scaling.LXAL
+        return weight(at.tangent, c.RHX1, B, c.RCX1, jnp.minimum(c.REX1 + c.REX2 * at.df_z, 1))

@@ -1,0 +1,36 @@
+"""Where a tyre was measured: slip, camber, load and pressure beyond it are held at its edge."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh.tyres.mf_tyre.formula import coefficient
+
+UNLIMITED = 1e10
+
+
+class Ranges(eqx.Module):
+    """The ranges of a property file: slip ratio `KPUMIN`, `KPUMAX` (-), slip angle `ALPMIN`, `ALPMAX` and camber `CAMMIN`,
+    `CAMMAX` (rad), load `FZMIN`, `FZMAX` (N), pressure `PRESMIN`, `PRESMAX` (Pa), and the speed `VXLOW` (m/s) below which slip
+    and shifts fade."""
+
+    KPUMIN: jax.Array = coefficient(-UNLIMITED)
+    KPUMAX: jax.Array = coefficient(UNLIMITED)
+    ALPMIN: jax.Array = coefficient(-1.5, unit="rad")
+    ALPMAX: jax.Array = coefficient(1.5, unit="rad")
+    CAMMIN: jax.Array = coefficient(-1.5, unit="rad")
+    CAMMAX: jax.Array = coefficient(1.5, unit="rad")
+    FZMIN: jax.Array = coefficient(0.0, unit="N")
+    FZMAX: jax.Array = coefficient(UNLIMITED, unit="N")
+    PRESMIN: jax.Array = coefficient(1.0, unit="Pa")
+    PRESMAX: jax.Array = coefficient(UNLIMITED, unit="Pa")
+    VXLOW: jax.Array = coefficient(1.0, unit="m/s")
+
+    def fading(self, slip_angle, speed):
+        """Factors of slip ratio and slip angle, and the smooth one of shifts, that fade below `VXLOW`."""
+        share = jnp.minimum(jnp.abs(speed) / self.VXLOW, 1.0)
+        smooth = 0.5 * (1 - jnp.cos(jnp.pi * share))
+        both = jnp.minimum(jnp.abs(speed) * (1 + jnp.abs(jnp.tan(slip_angle))) / self.VXLOW, 1.0)
+        return share, both, smooth

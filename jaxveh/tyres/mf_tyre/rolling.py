@@ -1,0 +1,56 @@
+"""Rolling resistance moment (A48 for 6.1, the MF-Tyre manual for 5.2; the book's 4.E70 has another sign and load)."""
+
+from __future__ import annotations
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh.tyres.mf_tyre.formula import coefficient
+
+
+class Rolling(eqx.Module):
+    """The section [ROLLING_COEFFICIENTS]: `QSY1` constant, with F_x (`2`), speed (`3`, `4`), camber (`5`, `6`), exponents of load
+    (`7`) and pressure (`8`)."""
+
+    QSY1: jax.Array = coefficient(scale=0.01)
+    QSY2: jax.Array = coefficient(scale=0.01)
+    QSY3: jax.Array = coefficient(scale=0.001)
+    QSY4: jax.Array = coefficient(scale=1e-4)
+    QSY5: jax.Array = coefficient()
+    QSY6: jax.Array = coefficient()
+    QSY7: jax.Array = coefficient(1.0)
+    QSY8: jax.Array = coefficient()
+
+    def moment(self, at, scaling, structure, ranges, version: int, F_x, slip_ratio):
+        """M_y, N m, negative when rolling forward; `slip_ratio`: as given, not limited."""
+        c = self
+        least = ranges.FZMIN
+        load = jnp.where(at.load < least, at.load**2 / jnp.where(least > 0, least, 1), at.load)
+        share, speed = load / structure.FNOMIN, at.speed / structure.LONGVL
+        sum_ = c.QSY1 + c.QSY2 * F_x / structure.FNOMIN + c.QSY3 * jnp.abs(speed) + c.QSY4 * speed**4
+        if version == 52:
+            moment = -structure.UNLOADED_RADIUS * load * scaling.LMY * sum_
+        else:
+            sum_ = sum_ + (c.QSY5 + c.QSY6 * share) * at.camber**2
+            powers = _power(share, c.QSY7) * _power(at.pressure / structure.NOMPRES, c.QSY8)
+            moment = -structure.UNLOADED_RADIUS * structure.FNOMIN * scaling.LMY * sum_ * powers
+        return moment * self._rolls(at, ranges, slip_ratio)
+
+    def _rolls(self, at, ranges, slip_ratio):
+        """1 for a wheel that rolls forward, -1 backward, smooth between: about the locked wheel, and zero at standstill."""
+        moves = at.speed > 0
+        high = ranges.VXLOW / jnp.where(moves, at.speed, 1) - 1
+        low = -1 - ranges.VXLOW - high
+        between = numerics.sin((math.pi / 2) * (slip_ratio + 1) / jnp.where(high + 1 == 0, 1, high + 1))
+        turns = jnp.where(slip_ratio > high, 1.0, jnp.where(slip_ratio < low, -1.0, between))
+        return jnp.where(moves, turns, 0.0)
+
+
+def _power(base, exponent):
+    """`base^exponent` of a base that may be zero, where it and its derivatives are zero."""
+    some = base > 0
+    return jnp.where(some, jnp.where(some, base, 1.0) ** exponent, 0.0)

@@ -1,0 +1,45 @@
+"""User scaling factors: 1 leaves the tyre as it was measured."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+
+from jaxveh.tyres.mf_tyre.formula import factor
+
+
+class Scaling(eqx.Module):
+    """The section [SCALING_COEFFICIENTS].
+
+    Of nominal load (`LFZO`); shape, friction, curvature, stiffness and shifts of F_x (`LCX` to `LVX`) and F_y (`LCY` to `LVY`);
+    camber stiffness of F_y and M_z (`LKYC`, `LKZC`); pneumatic trail and residual torque (`LTR`, `LRES`); combined slip (`LXAL`,
+    `LYKA`, `LVYKA`, moment arm `LS`); overturning (`LMX`, `LVMX`) and rolling resistance (`LMY`); relaxation lengths of
+    version 5.2 (`LSGKP`, `LSGAL`).
+    """
+
+    LFZO: jax.Array = factor()
+    LCX: jax.Array = factor()
+    LMUX: jax.Array = factor()
+    LEX: jax.Array = factor()
+    LKX: jax.Array = factor()
+    LHX: jax.Array = factor()
+    LVX: jax.Array = factor()
+    LCY: jax.Array = factor()
+    LMUY: jax.Array = factor()
+    LEY: jax.Array = factor()
+    LKY: jax.Array = factor()
+    LHY: jax.Array = factor()
+    LVY: jax.Array = factor()
+    LKYC: jax.Array = factor()
+    LKZC: jax.Array = factor()
+    LTR: jax.Array = factor()
+    LRES: jax.Array = factor()
+    LXAL: jax.Array = factor()
+    LYKA: jax.Array = factor()
+    LVYKA: jax.Array = factor()
+    LS: jax.Array = factor()
+    LMX: jax.Array = factor()
+    LVMX: jax.Array = factor()
+    LMY: jax.Array = factor()
+    LSGKP: jax.Array = factor()
+    LSGAL: jax.Array = factor()

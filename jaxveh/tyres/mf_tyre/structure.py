@@ -1,0 +1,120 @@
+"""The tyre as a body: dimensions, vertical stiffness, rolling radius, contact patch, carcass stiffness and relaxation."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import positive
+from jaxveh.tyres.mf_tyre.formula import coefficient
+
+RADIUS_ITERATIONS = 12
+"""The rolling radius depends on the wheel's speed, and that on the radius, weakly: a dozen rounds reach the last digit."""
+
+
+class Wheel(NamedTuple):
+    """`effective_radius`, `free_radius` (m) and `speed` (rad/s) of the wheel."""
+
+    effective_radius: Any
+    free_radius: Any
+    speed: Any
+
+
+class Structure(eqx.Module):
+    """The sections [DIMENSION], [OPERATING_CONDITIONS], [VERTICAL], [STRUCTURAL] and [CONTACT_PATCH], as far as steady forces
+    and relaxation need them: radii, `WIDTH`, nominal load `FNOMIN` (N), pressure `NOMPRES` (Pa) and speed `LONGVL` (m/s),
+    stiffnesses (N/m) and their dependence on load, speed, forces and pressure.
+    """
+
+    UNLOADED_RADIUS: jax.Array = positive("m")
+    FNOMIN: jax.Array = positive("N")
+    LONGVL: jax.Array = positive("m/s", default=16.7)
+    NOMPRES: jax.Array = positive("Pa", default=220000.0)
+    INFLPRES: jax.Array = positive("Pa", default=220000.0)
+    WIDTH: jax.Array = positive("m", default=0.2)
+    RIM_RADIUS: jax.Array = coefficient(0.0, unit="m")
+    BOTTOM_OFFST: jax.Array = coefficient(0.0, unit="m")
+    VERTICAL_STIFFNESS: jax.Array = positive("N/m", default=200000.0)
+    BREFF: jax.Array = coefficient()
+    DREFF: jax.Array = coefficient()
+    FREFF: jax.Array = coefficient()
+    Q_RE0: jax.Array = coefficient(1.0)
+    Q_V1: jax.Array = coefficient(scale=1e-3)
+    Q_V2: jax.Array = coefficient(scale=0.05)
+    Q_FZ2: jax.Array = coefficient(1e-6, scale=10.0)
+    Q_FCX: jax.Array = coefficient()
+    Q_FCY: jax.Array = coefficient()
+    PFZ1: jax.Array = coefficient()
+    Q_RA1: jax.Array = coefficient()
+    Q_RA2: jax.Array = coefficient()
+    Q_RB1: jax.Array = coefficient()
+    Q_RB2: jax.Array = coefficient()
+    Q_A1: jax.Array = coefficient()
+    Q_A2: jax.Array = coefficient()
+    LONGITUDINAL_STIFFNESS: jax.Array = positive("N/m", default=300000.0)
+    LATERAL_STIFFNESS: jax.Array = positive("N/m", default=100000.0)
+    PCFX1: jax.Array = coefficient()
+    PCFX2: jax.Array = coefficient()
+    PCFX3: jax.Array = coefficient()
+    PCFY1: jax.Array = coefficient()
+    PCFY2: jax.Array = coefficient()
+    PCFY3: jax.Array = coefficient()
+
+    def vertical_stiffness(self, dp_i):
+        """Vertical stiffness at a pressure (A5), N/m."""
+        return self.VERTICAL_STIFFNESS * (1 + self.PFZ1 * dp_i)
+
+    def wheel(self, load, slip_ratio, speed, dp_i) -> Wheel:
+        """Effective rolling radius (A7), free radius (A1) and speed of a wheel with this slip ratio (book 2.5)."""
+        share = load / self.FNOMIN
+        sinks = self.FNOMIN / self.vertical_stiffness(dp_i)
+        sinks = sinks * (self.DREFF * numerics.arctan(self.BREFF * share) + self.FREFF * share)
+        radius = self.UNLOADED_RADIUS * 0.965 * jnp.ones_like(sinks)
+        for _ in range(RADIUS_ITERATIONS):
+            omega = (1 + slip_ratio) * speed / radius
+            grown = self.Q_RE0 + self.Q_V1 * (omega * self.UNLOADED_RADIUS / self.LONGVL) ** 2
+            free = self.UNLOADED_RADIUS * grown
+            radius = free - sinks
+        return Wheel(radius, free, omega)
+
+    def deflection(self, load, omega, dp_i, F_x, F_y):
+        """Vertical deflection rho of a loaded, rolling tyre (A2 to A4 solved for it), m."""
+        stiff = self.VERTICAL_STIFFNESS * self.UNLOADED_RADIUS / self.FNOMIN
+        q_1 = numerics.sqrt(jnp.maximum(stiff**2 - 4 * self.Q_FZ2, 0.0))
+        carries = 1 + self.Q_V2 * self.UNLOADED_RADIUS / self.LONGVL * jnp.abs(omega)
+        carries = carries - (self.Q_FCX * F_x / self.FNOMIN) ** 2 - (self.Q_FCY * F_y / self.FNOMIN) ** 2
+        carries = jnp.maximum(carries * (1 + self.PFZ1 * dp_i), 1e-12)
+        # q_2 x^2 + q_1 x = load, by the root's form that holds for q_2 = 0 as well.
+        target = load / (carries * self.FNOMIN)
+        x = 2 * target / (q_1 + numerics.sqrt(q_1**2 + 4 * self.Q_FZ2 * target))
+        return jnp.maximum(x * self.UNLOADED_RADIUS, 0.0)
+
+    def contact_patch(self, load, dp_i, version: int):
+        """Half length a and half width b of the contact patch (A9, A10; 5.2: the MF-Tyre manual), m."""
+        stiffness = self.vertical_stiffness(dp_i)
+        lowest = self.UNLOADED_RADIUS - self.RIM_RADIUS - self.BOTTOM_OFFST
+        load = jnp.minimum(load, lowest * stiffness)
+        if version == 52:
+            share = load / self.FNOMIN
+            y = jnp.log10(self.UNLOADED_RADIUS * self.VERTICAL_STIFFNESS / self.FNOMIN)
+            told = (self.Q_A1 != 0) | (self.Q_A2 != 0)
+            guess = -0.0388 * y**3 + 0.2509 * y**2 - 0.6283 * y + 0.6279
+            root = jnp.where(told, self.Q_A1, guess)
+            linear = jnp.where(told, self.Q_A2, 1.693 * guess**2)
+            a = self.UNLOADED_RADIUS * (linear * share + root * numerics.sqrt(share))
+            return a, self.WIDTH / 2 * jnp.ones_like(a)
+        share = load / (stiffness * self.UNLOADED_RADIUS)
+        a = self.UNLOADED_RADIUS * (self.Q_RA2 * share + self.Q_RA1 * numerics.sqrt(share))
+        some = share > 0
+        third = jnp.where(some, jnp.cbrt(jnp.where(some, share, 1.0)), 0.0)
+        return a, self.WIDTH * (self.Q_RB2 * share + self.Q_RB1 * third)
+
+    def carcass(self, df_z, dp_i):
+        """Longitudinal and lateral stiffness of the carcass (A17, A18), N/m."""
+        along = (1 + self.PCFX1 * df_z + self.PCFX2 * df_z**2) * (1 + self.PCFX3 * dp_i)
+        across = (1 + self.PCFY1 * df_z + self.PCFY2 * df_z**2) * (1 + self.PCFY3 * dp_i)
+        return self.LONGITUDINAL_STIFFNESS * along, self.LATERAL_STIFFNESS * across

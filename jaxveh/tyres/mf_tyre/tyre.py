@@ -1,0 +1,174 @@
+"""MF-Tyre as a tyre of this package: contact in, forces, moments and internals out."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check_one_of
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh.tyres.mf_tyre.aligning import Aligning
+from jaxveh.tyres.mf_tyre.lateral import Lateral
+from jaxveh.tyres.mf_tyre.longitudinal import Longitudinal
+from jaxveh.tyres.mf_tyre.operating import Operating
+from jaxveh.tyres.mf_tyre.overturning import Overturning
+from jaxveh.tyres.mf_tyre.ranges import Ranges
+from jaxveh.tyres.mf_tyre.rolling import Rolling
+from jaxveh.tyres.mf_tyre.scaling import Scaling
+from jaxveh.tyres.mf_tyre.structure import Structure
+
+VERSIONS = (52, 61)
+
+
+class MFOutputs(NamedTuple):
+    """All that MF-Tyre says of a contact, in the wheel's axes (x forward, y left, z up) and SI units.
+
+    Forces and moments; `trail` and residual torque `M_zr`; friction `mu_x`, `mu_y`; slip stiffness `K_xk` (N) and cornering
+    stiffness `K_ya` (N/rad, positive here); wheel speed `omega`, effective radius `R_e`, loaded radius `R_l`, deflection `rho`,
+    half length `a` and half width `b` of the patch (m); stiffnesses `C_x`, `C_y`, `C_z` (N/m); relaxation lengths `sigma_x`,
+    `sigma_y` (m).
+    """
+
+    F_x: Any
+    F_y: Any
+    M_x: Any
+    M_y: Any
+    M_z: Any
+    trail: Any
+    M_zr: Any
+    mu_x: Any
+    mu_y: Any
+    K_xk: Any
+    K_ya: Any
+    omega: Any
+    R_e: Any
+    R_l: Any
+    rho: Any
+    a: Any
+    b: Any
+    C_x: Any
+    C_y: Any
+    C_z: Any
+    sigma_x: Any
+    sigma_y: Any
+
+
+class MFTyre(AbstractTyre):
+    """MF-Tyre 5.2 or 6.1: the Magic Formula in full, pure and combined slip, camber, load and inflation pressure.
+
+    `version` 52 or 61 chooses the equations. `limits`: hold slip, camber, load and pressure within `ranges` and let slip fade
+    below `ranges.VXLOW`, as the reference evaluator does; `angles`: work with tan(slip angle) and sin(camber) as the book does
+    (False: with the angles). Every coefficient is a leaf (`lambda tyre: tyre.lateral.PKY1`).
+
+    The contact's load is needed; a speed or pressure that it does not tell is the nominal one. Its friction multiplies
+    LMUX and LMUY. Turn slip is not in yet.
+
+    **Raises** `InputError` for an unknown version, or a contact without a load.
+    """
+
+    structure: Structure
+    longitudinal: Longitudinal
+    lateral: Lateral
+    aligning: Aligning
+    overturning: Overturning
+    rolling: Rolling
+    scaling: Scaling
+    ranges: Ranges
+    version: int = eqx.field(static=True, default=61)
+    limits: bool = eqx.field(static=True, default=True)
+    angles: bool = eqx.field(static=True, default=True)
+
+    def __check_init__(self):
+        check_one_of("MFTyre.version", self.version, VERSIONS)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """Forces (N) and moments (N m) at a contact."""
+        found = self.outputs(contact)
+        return Forces(found.F_x, found.F_y, found.M_x, found.M_y, found.M_z)
+
+    def outputs(self, contact: Contact) -> MFOutputs:
+        """Forces, moments and internals at a contact."""
+        if contact.load is None:
+            raise InputError("contact.load = None: MFTyre scales with load; give the wheel's load in N.")
+        at, s = self._operating(contact), self.scaling
+        nominal = s.LFZO * self.structure.FNOMIN
+        along = self.longitudinal.pure(at, s)
+        across = self.lateral.pure(at, s, nominal, self.version)
+        weight_y = self.lateral.weight(at, s)
+        added = self.lateral.added(at, s, across.mu)
+        F_x = self.longitudinal.weight(at, s) * along.force
+        F_y = weight_y * across.force + added
+        if self.version == 52:
+            on_trail = F_y - added
+        else:
+            upright = at._replace(camber=jnp.zeros_like(at.camber), sine=jnp.zeros_like(at.sine))
+            on_trail = weight_y * self.lateral.pure(upright, s, nominal, self.version).force
+        turning = self.aligning.parts(at, s, self.structure, across, along.stiffness, (F_x, F_y, on_trail))
+        M_x = self.overturning.moment(at, s, self.structure, self.ranges.FZMIN, F_y)
+        M_y = self.rolling.moment(at, s, self.structure, self.ranges, self.version, F_x, contact.slip_ratio)
+        body = self._body(contact, at, along, across, F_x, F_y)
+        return MFOutputs(
+            F_x, F_y, M_x, M_y, turning.moment, turning.trail, turning.residual,
+            along.mu, across.mu, along.stiffness, -across.stiffness, *body,
+        )  # fmt: skip
+
+    def _operating(self, contact: Contact) -> Operating:
+        """The contact within the ranges, in the signs of ISO-W."""
+        structure, r = self.structure, self.ranges
+        load = need_load(contact, "MFTyre")
+        speed = structure.LONGVL if contact.speed is None else jnp.abs(contact.speed)
+        pressure = structure.INFLPRES if contact.pressure is None else contact.pressure
+        kappa, alpha, camber, smooth = contact.slip_ratio, -contact.slip_angle, contact.camber, jnp.ones_like(speed)
+        if self.limits:
+            along, across, smooth = r.fading(alpha, speed)
+            kappa = jnp.clip(kappa * along, r.KPUMIN, r.KPUMAX)
+            alpha = jnp.clip(alpha * across, r.ALPMIN, r.ALPMAX)
+            camber = jnp.clip(camber, r.CAMMIN, r.CAMMAX)
+            load, pressure = jnp.minimum(load, r.FZMAX), jnp.clip(pressure, r.PRESMIN, r.PRESMAX)
+        moment_load = jnp.where(load > 0, jnp.maximum(load, r.FZMIN), 0.0) if self.limits else load
+        nominal = self.scaling.LFZO * structure.FNOMIN
+        return Operating(
+            load=load,
+            moment_load=moment_load,
+            slip_ratio=kappa,
+            slip_angle=alpha,
+            camber=camber,
+            speed=speed,
+            pressure=pressure,
+            df_z=load / nominal - 1,
+            dp_i=pressure / structure.NOMPRES - 1,
+            tangent=numerics.tan(alpha) if self.angles else alpha,
+            sine=numerics.sin(camber) if self.angles else camber,
+            mu_x=self.scaling.LMUX * contact.friction,
+            mu_y=self.scaling.LMUY * contact.friction,
+            smooth=smooth,
+        )
+
+    def _body(self, contact: Contact, at: Operating, along, across, F_x, F_y) -> tuple:
+        """From omega to sigma_y of `MFOutputs`."""
+        s, structure = self.scaling, self.structure
+        load = need_load(contact, "MFTyre")
+        wheel = structure.wheel(load, contact.slip_ratio, at.speed, at.dp_i)
+        rho = structure.deflection(at.moment_load, wheel.speed, at.dp_i, F_x, F_y)
+        R_l = jnp.maximum(wheel.free_radius - rho, 0.0)
+        a, b = structure.contact_patch(load, at.dp_i, self.version)
+        C_x, C_y = structure.carcass(at.df_z, at.dp_i)
+        C_z = at.moment_load / jnp.where(rho > 0, rho, 1.0)
+        if self.version == 61:
+            sigma = jnp.abs(along.stiffness / C_x), jnp.abs(across.stiffness / C_y)
+        else:
+            sigma = self._manual_relaxation(at, s)
+        return wheel.speed, wheel.effective_radius, R_l, rho, a, b, C_x, C_y, C_z, *sigma
+
+    def _manual_relaxation(self, at: Operating, s) -> tuple:
+        """Relaxation lengths of version 5.2, m."""
+        x, y, R_0 = self.longitudinal, self.lateral, self.structure.UNLOADED_RADIUS
+        nominal = s.LFZO * self.structure.FNOMIN
+        sigma_x = (x.PTX1 + x.PTX2 * at.df_z) * jnp.exp(-x.PTX3 * at.df_z) * s.LSGKP
+        sigma_x = sigma_x * R_0 * at.load / self.structure.FNOMIN
+        angle = 2 * numerics.arctan(at.load / (y.PTY2 * nominal))
+        sigma_y = y.PTY1 * numerics.sin(angle) * (1 - y.PKY3 * jnp.abs(at.camber)) * R_0 * s.LFZO * s.LSGAL
+        return sigma_x, sigma_y

@@ -1,0 +1,95 @@
+"""From a tyre property file to a tyre."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.property_file import PropertyFile, read_property_file
+from jaxveh.tyres.mf_tyre import (
+    Aligning,
+    Lateral,
+    Longitudinal,
+    MFTyre,
+    Overturning,
+    Ranges,
+    Rolling,
+    Scaling,
+    Structure,
+)
+
+VERSION_OF_FITTYP = {5: 52, 6: 52, 21: 52, 52: 52, 60: 61, 61: 61}
+"""What the key FITTYP says; 62 has a loaded radius of its own and is not in yet."""
+
+OLD_FORMATS = ("PAC2002", "MF_05", "MF-TYRE", "MF_TYRE")
+"""PROPERTY_FILE_FORMAT of files that need no FITTYP: their equations are those of version 5.2."""
+
+NEEDED = ("FNOMIN", "UNLOADED_RADIUS", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
+"""What no tyre can do without; all else is zero, or a scale of one, where a file is silent."""
+
+DIMENSIONS = {
+    "UNLOADED_RADIUS": (1, 0, 0), "WIDTH": (1, 0, 0), "RIM_RADIUS": (1, 0, 0), "BOTTOM_OFFST": (1, 0, 0),
+    "LONGVL": (1, 0, -1), "VXLOW": (1, 0, -1), "FNOMIN": (0, 1, 0), "FZMIN": (0, 1, 0), "FZMAX": (0, 1, 0),
+    "VERTICAL_STIFFNESS": (-1, 1, 0), "LONGITUDINAL_STIFFNESS": (-1, 1, 0), "LATERAL_STIFFNESS": (-1, 1, 0),
+    "NOMPRES": (-2, 1, 0), "INFLPRES": (-2, 1, 0), "PRESMIN": (-2, 1, 0), "PRESMAX": (-2, 1, 0),
+}  # fmt: skip
+"""Powers of the file's units of length, force and time in what has a dimension."""
+
+
+def from_property_file(source: str | Path | PropertyFile, *, limits: bool = True, angles: bool = True) -> MFTyre:
+    """The tyre of a .tir file of MF-Tyre 5.2 (PAC2002, MF_05) or 6.1, in SI units.
+
+    The version comes from FITTYP or PROPERTY_FILE_FORMAT; `limits` and `angles` as in `MFTyre`. **Raises** `InputError` for a
+    version that is not in, a coefficient that is needed and missing, or one that is no number.
+    """
+    file = source if isinstance(source, PropertyFile) else read_property_file(source)
+    for key in NEEDED:
+        file.number(key)
+    size = {key: _size(file, powers) for key, powers in DIMENSIONS.items()}
+    section = lambda kind: kind(**_numbers(file, kind, size))
+    return MFTyre(
+        section(Structure),
+        section(Longitudinal),
+        section(Lateral),
+        section(Aligning),
+        section(Overturning),
+        section(Rolling),
+        section(Scaling),
+        section(Ranges),
+        version=version_of(file),
+        limits=limits,
+        angles=angles,
+    )
+
+
+def version_of(file: PropertyFile) -> int:
+    """52 or 61. **Raises** `InputError` for others, and where the file does not say."""
+    entry = file.find("FITTYP")
+    if entry is not None:
+        number = int(file.number("FITTYP"))
+        if number not in VERSION_OF_FITTYP:
+            known = ", ".join(map(str, VERSION_OF_FITTYP))
+            raise InputError(f"{file.source}, line {entry.line}: FITTYP = {number}: must be one of {known}.")
+        return VERSION_OF_FITTYP[number]
+    kind = file.text("PROPERTY_FILE_FORMAT").upper()
+    if kind not in OLD_FORMATS:
+        raise InputError(
+            f"{file.source}: neither FITTYP nor a PROPERTY_FILE_FORMAT of {', '.join(OLD_FORMATS)} (it is {kind!r}); "
+            "add FITTYP = 61 or 52 to [MODEL]."
+        )
+    return 52
+
+
+def _size(file: PropertyFile, powers: tuple[int, int, int]) -> float:
+    length, force, time = powers
+    return file.unit("LENGTH") ** length * file.unit("FORCE") ** force * file.unit("TIME") ** time
+
+
+def _numbers(file: PropertyFile, kind: type, size: dict[str, float]) -> dict[str, float]:
+    """The coefficients of one section that the file holds."""
+    names = [field.name for field in dataclasses.fields(kind)]
+    found = {name: file.number(name) * size.get(name, 1.0) for name in names if file.find(name) is not None}
+    if kind is Structure and "INFLPRES" not in found and "NOMPRES" in found:
+        found["INFLPRES"] = found["NOMPRES"]
+    return found
