@@ -16,6 +16,7 @@ from jaxveh.cli.fit import fit
 from jaxveh.cli.reproduce import tyre_apf
 from jaxveh.cli.schema import schema
 from jaxveh.cli.simulate import simulate
+from jaxveh.cli.tyre import evaluate_table, show
 
 HELP = """Estimate what a car cannot measure: sideslip and tyre parameters from steer, speed, acceleration and yaw rate.
 
@@ -39,6 +40,8 @@ app = typer.Typer(
 
 reproduce = typer.Typer(help="Papers computed again, as printed and honestly.", no_args_is_help=True)
 
+tyre = typer.Typer(help="Tyre property files (.tir).", no_args_is_help=True)
+
 
 def _version(wanted: bool) -> None:
     if wanted:
@@ -61,3 +64,6 @@ for command in (demo, check, simulate, estimate, fit, schema):
     app.command()(program(command))
 reproduce.command("tyre-apf")(program(tyre_apf))
 app.add_typer(reproduce, name="reproduce")
+tyre.command("show")(program(show))
+tyre.command("evaluate")(program(evaluate_table))
+app.add_typer(tyre, name="tyre")

@@ -1,4 +1,5 @@
-"""Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, and the file that describes a car.
+"""Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, the file that describes a car, and tyre
+property files.
 
 pandas, pyarrow, asammdf and pint are the extra `io`, imported where they are used.
 """
@@ -6,9 +7,10 @@ pandas, pyarrow, asammdf and pint are the extra `io`, imported where they are us
 from jaxveh.io.canonical import CANONICAL, CanonicalChannel, canonical_unit
 from jaxveh.io.car import AxleTyre, CarSpecification, read_car, write_car
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
-from jaxveh.io.files import replacing, write_text
+from jaxveh.io.files import check_readable, replacing, write_text
 from jaxveh.io.frames import to_frame, write_frame
 from jaxveh.io.merge import resample
+from jaxveh.io.property_file import PropertyFile, read_property_file, write_property_file
 from jaxveh.io.recordings import SUFFIXES, read_recording, with_units_in_names, write_recording
 
 __all__ = [
@@ -19,9 +21,12 @@ __all__ = [
     "CarSpecification",
     "Channel",
     "ChannelMap",
+    "PropertyFile",
     "canonical_unit",
+    "check_readable",
     "read_car",
     "read_channel_map",
+    "read_property_file",
     "read_recording",
     "replacing",
     "resample",
@@ -29,6 +34,7 @@ __all__ = [
     "with_units_in_names",
     "write_car",
     "write_frame",
+    "write_property_file",
     "write_recording",
     "write_text",
 ]

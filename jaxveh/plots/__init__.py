@@ -9,5 +9,6 @@ from jaxveh.plots.force_curves import force_curves
 from jaxveh.plots.parameters import parameters
 from jaxveh.plots.recordings import recording
 from jaxveh.plots.style import COLOURS, save, style
+from jaxveh.plots.tyres import tyre
 
-__all__ = ["COLOURS", "estimate", "force_curves", "parameters", "recording", "save", "style"]
+__all__ = ["COLOURS", "estimate", "force_curves", "parameters", "recording", "save", "style", "tyre"]

@@ -1,0 +1,133 @@
+"""`jaxveh tyre`: tyre property files: what is in one, and tables of inputs through it."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from jaxveh import InputError, io, tyres
+from jaxveh.cli import options
+from jaxveh.cli.console import messages, number, results, table
+from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
+from jaxveh.tyres.evaluation import INPUTS, evaluate
+
+TYRE = typer.Argument(metavar="FILE", help="A tyre property file (.tir).", show_default=False)
+PRODUCT = typer.Option("-o", metavar="FILE", help="The outputs: .csv.", show_default=False)
+LOADS = (0.5, 1.0, 1.5)
+"""Shares of the nominal load that `show` tells of."""
+
+
+class Axes(StrEnum):
+    """Signs of slip angle and cornering stiffness."""
+
+    iso_w = "iso-w"
+    ours = "ours"
+
+
+def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.Numbers = None) -> None:
+    """Show what a tyre property file says: version, ranges, and what the tyre does at half, nominal and 1.5 times load.
+
+    Example: [bold]jaxveh tyre show tyre.tir --out figures[/]
+    """
+    check_report(out, numbers)
+    source = io.read_property_file(file)
+    tyre = tyres.from_property_file(source)
+    s, r = tyre.structure, tyre.ranges
+    results().print(
+        f"{file}: MF-Tyre {tyre.version / 10:g}, side {source.text('TYRESIDE', 'not told')}, "
+        f"radius {float(s.UNLOADED_RADIUS):g} m, "
+        f"nominal load {float(s.FNOMIN):g} N, pressure {float(s.NOMPRES) / 1e5:g} bar, measured at {float(s.LONGVL):g} m/s"
+    )
+    ranges = {
+        "slip ratio, -": (r.KPUMIN, r.KPUMAX, 1.0),
+        "slip angle, degrees": (r.ALPMIN, r.ALPMAX, 180 / np.pi),
+        "camber, degrees": (r.CAMMIN, r.CAMMAX, 180 / np.pi),
+        "load, N": (r.FZMIN, r.FZMAX, 1.0),
+    }
+    rows = [(name, number(float(low) * unit), number(float(high) * unit)) for name, (low, high, unit) in ranges.items()]
+    table("Measured from .. to", ("quantity", "from", "to"), rows)
+    found = [tyre.outputs(tyres.Contact(load=share * s.FNOMIN)) for share in LOADS]
+    quantities = {
+        "friction along, -": "mu_x", "friction across, -": "mu_y", "slip stiffness, N": "K_xk",
+        "cornering stiffness, N/rad": "K_ya", "relaxation along, m": "sigma_x", "relaxation across, m": "sigma_y",
+        "trail, m": "trail", "effective radius, m": "R_e", "deflection, m": "rho",
+    }  # fmt: skip
+    rows = [(name, *[number(float(getattr(one, field))) for one in found]) for name, field in quantities.items()]
+    table("Free rolling, at loads in N", ("quantity", *[f"{share * float(s.FNOMIN):g}" for share in LOADS]), rows)
+    shown: dict[str, Any] = {
+        "version": tyre.version,
+        "loads": [share * float(s.FNOMIN) for share in LOADS],
+        **{field: [float(getattr(one, field)) for one in found] for field in quantities.values()},
+    }
+    if out is not None:
+        from jaxveh import plots
+
+        make_folder(out)
+        path = plots.save(plots.tyre(tyre, [share * float(s.FNOMIN) for share in LOADS]), out / "tyre.png")
+        results().print(f"figure: {path}")
+    write_numbers(numbers, shown, {"file": file}, 0)
+
+
+def evaluate_table(
+    file: Annotated[Path, TYRE],
+    inputs: Annotated[Path, typer.Argument(metavar="INPUTS", help="A table of inputs: .csv.", show_default=False)],
+    product: Annotated[Path, PRODUCT],
+    axes: Annotated[Axes, typer.Option("--axes", help="Signs of slip angle and cornering stiffness.")] = Axes.iso_w,
+    force: options.Force = False,
+) -> None:
+    """Evaluate a tyre for each row of a table, by column name.
+
+    Columns: in_Fz, in_kappa, in_alpha, in_gamma, in_Vx, in_P (or without in_) in N, -, rad, rad, m/s, Pa; useMode where the
+    table has it (111, 121, 211, 221). With --axes iso-w a positive slip angle gives a negative force, with --axes ours a
+    positive one. Outputs have the reference evaluator's names.
+
+    Example: [bold]jaxveh tyre evaluate tyre.tir inputs.csv -o outputs.csv --axes iso-w[/]
+    """
+    check_product(product, (".csv",), force, (file, inputs))
+    tyre = tyres.from_property_file(io.read_property_file(file))
+    frame = _read(inputs)
+    found = evaluate(tyre, {name: frame[name].to_numpy() for name in frame if _wanted(name)}, axes=axes.value)
+    _say_what_is_beyond(tyre, found)
+    import pandas as pd
+
+    with io.replacing(product, overwrite=force) as part:
+        pd.DataFrame(found).to_csv(part, index=False)
+    results().print(f"{product}: {len(frame)} rows, {', '.join(found)}")
+
+
+def _wanted(name: str) -> bool:
+    return name == "useMode" or any(name in names for names in INPUTS.values())
+
+
+def _read(path: Path) -> Any:
+    import pandas as pd
+
+    io.check_readable(path)
+    try:
+        frame = pd.read_csv(path)
+    except (pd.errors.ParserError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is no table in CSV ({error}).") from None
+    for name in filter(_wanted, frame):
+        if not pd.api.types.is_numeric_dtype(frame[name]):
+            bad = pd.to_numeric(frame[name], errors="coerce").isna().to_numpy().argmax()
+            raise InputError(f"{path}: {name} = {frame[name].iloc[bad]!r} in row {bad}: must be a number.")
+    return frame
+
+
+def _say_what_is_beyond(tyre: tyres.MFTyre, found: dict[str, np.ndarray]) -> None:
+    """Tell of rows beyond the range in which the tyre was measured; there the reference, and we, hold its edge."""
+    r = tyre.ranges
+    for name, low, high in (
+        ("kappa", r.KPUMIN, r.KPUMAX), ("alpha", r.ALPMIN, r.ALPMAX), ("gamma", r.CAMMIN, r.CAMMAX), ("Fz", r.FZMIN, r.FZMAX),
+        ("P", r.PRESMIN, r.PRESMAX),
+    ):  # fmt: skip
+        beyond = int(np.sum((found[name] < float(low)) | (found[name] > float(high))))
+        if beyond:
+            messages().print(
+                f"warning: {name} is beyond the tyre's range, {float(low):g} to {float(high):g}, in {beyond} rows",
+                soft_wrap=True,
+            )

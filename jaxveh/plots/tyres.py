@@ -1,0 +1,67 @@
+"""What a tyre does: forces over slip at several loads, aligning moment, and forces of combined slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh.plots.style import CYCLE, legend, new_figure, style
+from jaxveh.tyres import AbstractTyre, Contact
+
+POINTS = 181
+SLIP_ANGLE = np.radians(18.0)
+SLIP_RATIO = 0.3
+COMBINED = (1.0, 2.0, 4.0, 10.0)
+"""Degrees of slip angle whose forces of combined slip are drawn."""
+
+
+def tyre(law: AbstractTyre, loads: Sequence[float], *, figure: Any = None) -> Any:
+    """Lateral force and aligning moment over slip angle, longitudinal force over slip ratio, at `loads` (N); lateral over
+    longitudinal force at several slip angles, at the middle load. **Returns** the figure; `figure`: where to draw."""
+    angle, ratio = np.linspace(-SLIP_ANGLE, SLIP_ANGLE, POINTS), np.linspace(-SLIP_RATIO, SLIP_RATIO, POINTS)
+    with style():
+        figure = new_figure(5.2) if figure is None else figure
+        axes = figure.subplots(2, 2)
+        for i, load in enumerate(loads):
+            settings = {"color": CYCLE[i % len(CYCLE)], "label": f"{load / 1e3:g} kN"}
+            across, along = _forces(law, load, angle, 0.0), _forces(law, load, 0.0, ratio)
+            axes[0, 0].plot(np.degrees(angle), across.F_y / 1e3, **settings)
+            axes[0, 1].plot(100 * ratio, along.F_x / 1e3, **settings)
+            axes[1, 0].plot(np.degrees(angle), across.M_z, **settings)
+        middle = loads[len(loads) // 2]
+        wide = np.linspace(-1.0, 1.0, 4 * POINTS)
+        for i, degrees in enumerate(COMBINED):
+            found = _forces(law, middle, np.radians(degrees), wide)
+            shade = str(0.75 - 0.75 * i / len(COMBINED))
+            axes[1, 1].plot(found.F_x / 1e3, found.F_y / 1e3, color=shade, label=f"{degrees:g}°")
+        axes[1, 1].legend(title="slip angle", loc="lower center", ncols=2, handlelength=1.4)
+        for ax, x, y in (
+            (axes[0, 0], "slip angle [°]", "lateral force [kN]"),
+            (axes[0, 1], "slip ratio [%]", "longitudinal force [kN]"),
+            (axes[1, 0], "slip angle [°]", "aligning moment [N m]"),
+            (axes[1, 1], "longitudinal force [kN]", f"lateral force [kN] at {middle / 1e3:g} kN"),
+        ):
+            ax.set_xlabel(x)
+            ax.set_ylabel(y)
+        legend(figure, axes[:1])
+    return figure
+
+
+def _forces(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any) -> Any:
+    """Forces of a row of slips as NumPy arrays of one shape."""
+    shape = np.broadcast_shapes(np.shape(slip_angle), np.shape(slip_ratio))
+    wide = lambda value: jnp.asarray(np.broadcast_to(value, shape), float)
+    found = _evaluate(
+        law, Contact(slip_angle=wide(slip_angle), slip_ratio=wide(slip_ratio), load=jnp.asarray(load, float))
+    )
+    return jax.tree.map(lambda value: np.broadcast_to(np.asarray(value), shape), found)
+
+
+@eqx.filter_jit
+def _evaluate(law: AbstractTyre, contact: Contact) -> Any:
+    return law.forces(contact)
