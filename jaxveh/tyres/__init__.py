@@ -1,6 +1,9 @@
 """Force laws of one wheel (or one axle) at one instant: contact in, forces out."""
 
 from jaxveh.tyres.base import AbstractDynamicTyre, AbstractTyre, Contact, Forces, cornering_stiffness
+from jaxveh.tyres.brush import Brush
+from jaxveh.tyres.dugoff import Dugoff
+from jaxveh.tyres.fiala import Fiala
 from jaxveh.tyres.linear import Linear
 from jaxveh.tyres.magic_formula import MagicFormula
 from jaxveh.tyres.mf_tyre import MFOutputs, MFTyre
@@ -9,7 +12,10 @@ from jaxveh.tyres.property_file import from_property_file
 __all__ = [
     "AbstractDynamicTyre",
     "AbstractTyre",
+    "Brush",
     "Contact",
+    "Dugoff",
+    "Fiala",
     "Forces",
     "Linear",
     "MFOutputs",

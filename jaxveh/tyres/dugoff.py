@@ -1,0 +1,52 @@
+"""Dugoff's tyre: constant pressure, one friction coefficient, forces of both directions in a few lines."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import check_at_least, check_positive
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh.tyres.slip import theoretical
+
+
+class Dugoff(AbstractTyre):
+    """The model of Dugoff, Fancher & Segel (SAE 700377, 1970), in slip ratios that are positive when driving.
+
+    `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `fading` (s/m; default 0) by which friction falls with
+    sliding speed, `mu (1 - fading V |slip|)`. With theoretical slips sigma and `l = mu F_z / (2 |C sigma|)` forces are
+    `C sigma l (2 - l)` where l < 1, else `C sigma`.
+
+    **Raises** `InputError` for parameters out of range, or a contact without a load (with `fading`: without a speed).
+    """
+
+    slip_stiffness: jax.Array = positive("N")
+    cornering_stiffness: jax.Array = positive("N/rad")
+    friction: jax.Array = positive("-", default=1.0)
+    fading: jax.Array | None = parameter("s/m", scale=0.01, default=None)
+
+    def __check_init__(self):
+        for name, unit in (("slip_stiffness", "N"), ("cornering_stiffness", "N/rad"), ("friction", "-")):
+            check_positive(f"Dugoff.{name}", getattr(self, name), unit)
+        if self.fading is not None:
+            check_at_least("Dugoff.fading", self.fading, 0.0)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """F_x and F_y, N."""
+        limit = self.friction * contact.friction * need_load(contact, "Dugoff")
+        sigma_x, sigma_y = theoretical(contact)
+        if self.fading is not None and contact.speed is not None:
+            slides = numerics.hypot(
+                contact.slip_ratio * jnp.ones_like(sigma_y), numerics.tan(contact.slip_angle * jnp.ones_like(sigma_y))
+            )
+            limit = limit * jnp.maximum(1 - self.fading * contact.speed * slides, 0.0)
+        wish_x, wish_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
+        wish = numerics.hypot(wish_x, wish_y)
+        slips = 2 * wish > limit
+        part = jnp.where(slips, limit / jnp.where(slips, 2 * wish, 1.0), 1.0)
+        share = part * (2 - part)
+        return Forces(F_x=share * wish_x, F_y=share * wish_y)

@@ -1,0 +1,57 @@
+"""Fiala's tyre: lateral force as a cubic of the slip angle's tangent, longitudinal force taking its share of friction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import check_positive
+from jaxveh._core.parameter import positive
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+
+LEAST_SHARE = 0.01
+"""The square of the share of friction that is left sideways however large the longitudinal force."""
+
+
+class Fiala(AbstractTyre):
+    """Fiala (1954) with longitudinal coupling (Hindiyeh & Gerdes, J. Dyn. Sys. Meas. Control 136, 2014, eqs 3 to 6).
+
+    `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `half_length` (m). `F_x = C_x kappa` within
+    `+- mu F_z`; what is left, `f = sqrt((mu F_z)^2 - F_x^2)`, bounds `F_y = f (q - q^2 / 3 + q^3 / 27)`, with
+    `q = C tan(alpha) / f` up to q = 3, f beyond. Without F_x this is the form of ADAMS (erratum: the model-adaptive
+    paper prints coefficients of an interpolation instead). `M_z` is the brush model's.
+
+    **Raises** `InputError` for parameters that are not positive, or a contact without a load.
+    """
+
+    slip_stiffness: jax.Array = positive("N")
+    cornering_stiffness: jax.Array = positive("N/rad")
+    friction: jax.Array = positive("-", default=1.0)
+    half_length: jax.Array = positive("m", default=0.06)
+
+    def __check_init__(self):
+        for name, unit in (
+            ("slip_stiffness", "N"),
+            ("cornering_stiffness", "N/rad"),
+            ("friction", "-"),
+            ("half_length", "m"),
+        ):
+            check_positive(f"Fiala.{name}", getattr(self, name), unit)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """F_x, F_y (N) and M_z (N m)."""
+        limit = self.friction * contact.friction * need_load(contact, "Fiala")
+        F_x = jnp.clip(self.slip_stiffness * contact.slip_ratio, -limit, limit)
+        held = limit > 0
+        share = F_x / jnp.where(held, limit, 1.0)
+        left = limit * numerics.sqrt(jnp.maximum(1 - share**2, LEAST_SHARE))
+        wish = self.cornering_stiffness * numerics.tan(contact.slip_angle * jnp.ones_like(left))
+        q = jnp.abs(wish) / jnp.where(held, left, 1.0)
+        sticks = (q < 3) & held
+        q = jnp.where(sticks, q, 3.0)
+        F_y = jnp.where(sticks, wish * (1 - q / 3 + q**2 / 27), jnp.sign(wish) * left)
+        M_z = -self.half_length * wish / 3 * jnp.where(sticks, (1 - q / 3) ** 3, 0.0)
+        return Forces(F_x=F_x, F_y=F_y, M_z=M_z)
