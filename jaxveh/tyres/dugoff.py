@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import check_at_least, check_positive
+from jaxveh._core.errors import InputError, check_at_least, check_positive
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 from jaxveh.tyres.slip import theoretical
@@ -39,14 +39,19 @@ class Dugoff(AbstractTyre):
         """F_x and F_y, N."""
         limit = self.friction * contact.friction * need_load(contact, "Dugoff")
         sigma_x, sigma_y = theoretical(contact)
-        if self.fading is not None and contact.speed is not None:
-            slides = numerics.hypot(
-                contact.slip_ratio * jnp.ones_like(sigma_y), numerics.tan(contact.slip_angle * jnp.ones_like(sigma_y))
-            )
-            limit = limit * jnp.maximum(1 - self.fading * contact.speed * slides, 0.0)
+        if self.fading is not None:
+            limit = limit * self._left(contact, sigma_y)
         wish_x, wish_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
         wish = numerics.hypot(wish_x, wish_y)
         slips = 2 * wish > limit
         part = jnp.where(slips, limit / jnp.where(slips, 2 * wish, 1.0), 1.0)
         share = part * (2 - part)
         return Forces(F_x=share * wish_x, F_y=share * wish_y)
+
+    def _left(self, contact: Contact, like):
+        """The share of friction that is left at the sliding speed."""
+        if contact.speed is None:
+            raise InputError("contact.speed = None: Dugoff with fading needs the wheel's speed in m/s.")
+        tangent = numerics.tan(contact.slip_angle * jnp.ones_like(like))
+        slides = numerics.hypot(contact.slip_ratio * jnp.ones_like(like), tangent)
+        return jnp.maximum(1 - self.fading * contact.speed * slides, 0.0)

@@ -128,3 +128,12 @@ def test_bad_parameters_are_named(name):
         kind(80000.0, -1.0)
     with pytest.raises(InputError, match="contact.load = None"):
         kind(80000.0, 60000.0).forces(Contact(slip_angle=0.1))
+
+
+def test_fading_lowers_the_friction_and_needs_a_speed():
+    steady, fading = TYRES["Dugoff"](), TYRES["Dugoff, fading"]()
+    # 20 m/s times tan(0.5) of sliding, a hundredth a m/s.
+    share = fading.forces(contact(0.5)).F_y / steady.forces(contact(0.5)).F_y
+    assert 1 - 0.01 * 20 * np.tan(0.5) < share < 0.92
+    with pytest.raises(InputError, match="contact.speed = None"):
+        fading.forces(Contact(slip_angle=0.1, load=LOAD))
