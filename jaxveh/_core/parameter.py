@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxveh._core.bijectors import AbstractBijector, Positive, Real
-from jaxveh._core.errors import InputError, check_positive, float_array
+from jaxveh._core.errors import InputError, check_finite, check_positive, float_array
 from jaxveh._core.names import check_names
 
 Where = Callable[..., object]
@@ -32,6 +32,22 @@ def parameter(unit: str = "-", domain: AbstractBijector | None = None, scale: fl
 def positive(unit: str = "-", **kwargs):
     """Declare a positive parameter (its random walk and its prior live on the logarithm)."""
     return parameter(unit, Positive(), **kwargs)
+
+
+def check_parameters(module: eqx.Module) -> None:
+    """Raise `InputError` unless every declared parameter of a module is finite, and positive where it says so.
+
+    For `__check_init__`; a parameter that is None (an option that is off) passes, and so do tracers.
+    """
+    for field in dataclasses.fields(module):
+        value, domain = getattr(module, field.name), field.metadata.get("domain")
+        if domain is None or value is None:
+            continue
+        name = f"{type(module).__name__}.{field.name}"
+        if isinstance(domain, Positive):
+            check_positive(name, value, field.metadata["unit"])
+        else:
+            check_finite(name, value)
 
 
 class Parameter(NamedTuple):

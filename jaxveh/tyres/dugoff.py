@@ -8,8 +8,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_at_least, check_positive
-from jaxveh._core.parameter import parameter, positive
+from jaxveh._core.errors import InputError, check_at_least
+from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 from jaxveh.tyres.slip import theoretical
 
@@ -30,8 +30,7 @@ class Dugoff(AbstractTyre):
     fading: jax.Array | None = parameter("s/m", scale=0.01, default=None)
 
     def __check_init__(self):
-        for name, unit in (("slip_stiffness", "N"), ("cornering_stiffness", "N/rad"), ("friction", "-")):
-            check_positive(f"Dugoff.{name}", getattr(self, name), unit)
+        check_parameters(self)
         if self.fading is not None:
             check_at_least("Dugoff.fading", self.fading, 0.0)
 

@@ -8,8 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import check_positive
-from jaxveh._core.parameter import positive
+from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 
 LEAST_SHARE = 0.01
@@ -33,13 +32,7 @@ class Fiala(AbstractTyre):
     half_length: jax.Array = positive("m", default=0.06)
 
     def __check_init__(self):
-        for name, unit in (
-            ("slip_stiffness", "N"),
-            ("cornering_stiffness", "N/rad"),
-            ("friction", "-"),
-            ("half_length", "m"),
-        ):
-            check_positive(f"Fiala.{name}", getattr(self, name), unit)
+        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x, F_y (N) and M_z (N m)."""

@@ -6,8 +6,7 @@ from typing import Any
 
 import jax
 
-from jaxveh._core.errors import check_positive
-from jaxveh._core.parameter import positive
+from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces
 
 
@@ -17,7 +16,7 @@ class Linear(AbstractTyre):
     cornering_stiffness: jax.Array = positive("N/rad")
 
     def __check_init__(self):
-        check_positive("Linear.cornering_stiffness", self.cornering_stiffness, "N/rad")
+        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """Lateral force alone, N, in the shape of the slip angle."""

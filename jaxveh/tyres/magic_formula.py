@@ -9,8 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import check_finite, check_positive
-from jaxveh._core.parameter import parameter, positive
+from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 
 
@@ -42,11 +41,7 @@ class MagicFormula(AbstractTyre):
     nominal_load: jax.Array | None = positive("N", default=None)
 
     def __check_init__(self):
-        units = {"B": "1/rad", "C": "-", "D": "N", "nominal_load": "N"}
-        for name, unit in units.items():
-            check_positive(f"MagicFormula.{name}", getattr(self, name), unit)
-        for name in ("E", "S_h", "S_v"):
-            check_finite(f"MagicFormula.{name}", getattr(self, name))
+        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """Lateral force alone, N, in the shape of slip angle, load and friction together."""

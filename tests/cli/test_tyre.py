@@ -46,7 +46,6 @@ def test_axes_turn_the_slip_angle(tyre_file, table, tmp_path):
         assert run("tyre", "evaluate", tyre_file, table, "-o", outs[axes], "--axes", axes).exit_code == 0
     iso, ours = (pd.read_csv(outs[axes]) for axes in ("iso-w", "ours"))
     assert iso.Fy[0] < 0 < ours.Fy[0] and iso.Kya[0] < 0 < ours.Kya[0]
-    # The second row is the first's mirror in slip angle, so that each axes' rows meet the other's where kappa is none.
     tyre = tyres.from_property_file(tyre_file)
     expected = tyre.forces(tyres.Contact(slip_angle=0.05, load=4000.0)).F_y
     np.testing.assert_allclose(ours.Fy[0], float(expected), rtol=1e-9)

@@ -52,9 +52,9 @@ def compared(request):
 def test_forces_and_moments_are_the_reference_s(compared, name):
     _, rows, found = compared
     expected = rows[name].to_numpy()
-    # One row of F_y is 4e-12 N off where the force passes through zero: 1e-6 of the load is the scale there.
-    scale = np.maximum(np.abs(expected), 1e-5 * rows.in_Fz.to_numpy())
-    np.testing.assert_array_less(np.abs(np.asarray(getattr(found, FORCES[name])) - expected) / scale, 1e-9)
+    # Beside 1e-9 of the value, what sums of terms of the load's size lose: it shows where a force passes through zero.
+    allowed = 1e-9 * np.abs(expected) + 1e-15 * rows.in_Fz.to_numpy()
+    np.testing.assert_array_less(np.abs(np.asarray(getattr(found, FORCES[name])) - expected), allowed)
 
 
 @pytest.mark.parametrize("name", INTERNALS)
@@ -66,8 +66,13 @@ def test_internals_are_the_reference_s(compared, name):
         if name in ("rho", "Rl", "Cz"):
             # The file has Q_FZ2 = 0, for which the reference divides by zero and says that the tyre does not sink at all.
             assert (rows.rho == 0).all()
-            at = tyre_of(FILES[table]).structure
-            np.testing.assert_allclose(ours[0], at.FNOMIN / 2 / 200000 if name == "rho" else ours[0], rtol=0.05)
+            # Ours sinks by what its force then is: load = stiffness * rho, softened by speed and forces (A2).
+            rho, load = np.asarray(found.rho), rows.in_Fz.to_numpy()
+            stiffness = float(tyre_of(FILES[table]).structure.VERTICAL_STIFFNESS)
+            assert (rho > 0).all()
+            np.testing.assert_allclose(rho * stiffness, load, rtol=0.35)
+            np.testing.assert_allclose(np.asarray(found.C_z) * rho, load, rtol=1e-12)
+            np.testing.assert_allclose(np.asarray(found.R_l) + rho, rows.Rl, rtol=1e-12)
             return
         if name == "t":
             # At exactly zero slip angle and shift the reference takes sign(0) = 0 and forgets the slip ratio: one point, beside
@@ -100,7 +105,7 @@ def test_stiffnesses_are_slopes_and_forces_vanish_with_load():
     load = tyre.structure.FNOMIN
     slope = tyres.cornering_stiffness(tyre, Contact(load=load))
     np.testing.assert_allclose(slope, tyre.outputs(Contact(load=load)).K_ya, rtol=1e-6)
-    # A fall of a tenth of a newton in the nominal load of a wheel off the ground leaves nothing, with a finite gradient.
+    # A wheel off the ground.
     off = tyre.forces(Contact(slip_angle=jnp.asarray(0.1), slip_ratio=jnp.asarray(0.1), load=jnp.asarray(-100.0)))
     assert all(float(value) == 0.0 for value in off)
 

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import positive
+from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.tyres.mf_tyre.formula import coefficient
 
 RADIUS_ITERATIONS = 12
@@ -28,6 +28,8 @@ class Structure(eqx.Module):
     """The sections [DIMENSION], [OPERATING_CONDITIONS], [VERTICAL], [STRUCTURAL] and [CONTACT_PATCH], as far as steady forces
     and relaxation need them: radii, `WIDTH`, nominal load `FNOMIN` (N), pressure `NOMPRES` (Pa) and speed `LONGVL` (m/s),
     stiffnesses (N/m) and their dependence on load, speed, forces and pressure.
+
+    **Raises** `InputError` for a radius, load, speed, pressure, width or stiffness that is not positive.
     """
 
     UNLOADED_RADIUS: jax.Array = positive("m")
@@ -63,6 +65,9 @@ class Structure(eqx.Module):
     PCFY1: jax.Array = coefficient()
     PCFY2: jax.Array = coefficient()
     PCFY3: jax.Array = coefficient()
+
+    def __check_init__(self):
+        check_parameters(self)
 
     def vertical_stiffness(self, dp_i):
         """Vertical stiffness at a pressure (A5), N/m."""
