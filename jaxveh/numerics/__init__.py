@@ -17,6 +17,7 @@ from jaxveh.numerics.linear_algebra import (
 from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
+from jaxveh.numerics.roots import secant
 from jaxveh.numerics.sums import total
 
 __all__ = [
@@ -40,6 +41,7 @@ __all__ = [
     "normals",
     "on_cpu",
     "residual",
+    "secant",
     "sin",
     "solve_lower",
     "solve_lower_transposed",

@@ -24,6 +24,8 @@ class Contact(NamedTuple):
     - `speed` (m/s): forward speed |v_xw| of the contact point; None where it is not known (laws that need it raise, or take
       their nominal one, as they say).
     - `pressure` (Pa): inflation pressure; None means the tyre's own.
+    - `turn_slip` (1/m): curvature of the contact point's path as far as the wheel turns with it, phi_t of the book (4.75) in
+      ISO-W's sign; laws without it ignore it.
     """
 
     slip_angle: Any = 0.0
@@ -33,6 +35,7 @@ class Contact(NamedTuple):
     friction: Any = 1.0
     speed: Any = None
     pressure: Any = None
+    turn_slip: Any = 0.0
 
 
 class Forces(NamedTuple):

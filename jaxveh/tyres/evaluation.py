@@ -41,14 +41,13 @@ def evaluate(tyre: MFTyre, columns: Mapping[str, np.ndarray], *, axes: str = "is
     limits, 2 none; tens 1 angles, 2 their tangent and sine; units 1 without, 2 with turn slip. `axes`: `iso-w`, where a
     positive slip angle gives a negative force, or `ours`, where it gives a positive one (then K_ya is positive, too).
 
-    **Raises** `InputError` for a table without a load, an unknown mode, negative speeds or turn slip.
+    **Raises** `InputError` for a table without a load, an unknown mode or negative speeds.
     """
     check_one_of("axes", axes, AXES)
     given = {name: _column(columns, names) for name, names in INPUTS.items()}
     if given["Fz"] is None:
         raise InputError(f"no load among the columns {', '.join(columns)}: one of {', '.join(INPUTS['Fz'])} is needed.")
     rows = len(given["Fz"])
-    _refuse(given["phit"], lambda x: x != 0, "turn slip", "must be 0: turn slip is not in yet")
     _refuse(given["Vx"], lambda x: x < 0, "speed", "must be at least 0: turn the wheel's axes instead")
     filled = {name: np.zeros(rows) if value is None else value for name, value in given.items()}
     if given["Vx"] is None:
@@ -72,7 +71,7 @@ def _evaluate(tyre: MFTyre, given: dict[str, np.ndarray], axes: str) -> dict[str
     value = {name: jnp.asarray(array) for name, array in given.items()}
     contact = Contact(
         slip_angle=sign * value["alpha"], slip_ratio=value["kappa"], load=value["Fz"], camber=value["gamma"],
-        speed=value["Vx"], pressure=value["P"],
+        speed=value["Vx"], pressure=value["P"], turn_slip=value["phit"],
     )  # fmt: skip
     out = _outputs(tyre, contact)
     forces = {name: getattr(out, f"{name[0]}_{name[1]}") for name in ("Fx", "Fy", "Mx", "My", "Mz")}
@@ -107,14 +106,12 @@ def _refuse(values: np.ndarray | None, bad, name: str, allowed: str) -> None:
 
 
 def _mode(tyre: MFTyre) -> int:
-    return (100 if tyre.limits else 200) + (20 if tyre.angles else 10) + 1
+    return (100 if tyre.limits else 200) + (20 if tyre.angles else 10) + (2 if tyre.spins else 1)
 
 
 def _in_mode(tyre: MFTyre, mode: int) -> MFTyre:
     """The tyre with the settings of a `useMode`."""
     hundreds, tens, units = mode // 100, mode // 10 % 10, mode % 10
-    if hundreds not in (1, 2) or tens not in (1, 2) or units != 1:
-        raise InputError(
-            f"useMode = {mode}: must be 111, 121, 211 or 221 (turn slip, a last digit of 2, is not in yet)."
-        )
-    return dataclasses.replace(tyre, limits=hundreds == 1, angles=tens == 2)
+    if hundreds not in (1, 2) or tens not in (1, 2) or units not in (1, 2):
+        raise InputError(f"useMode = {mode}: its digits must be 1 or 2, such as 111 or 121.")
+    return dataclasses.replace(tyre, limits=hundreds == 1, angles=tens == 2, spins=units == 2)

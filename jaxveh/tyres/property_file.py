@@ -17,16 +17,18 @@ from jaxveh.tyres.mf_tyre import (
     Rolling,
     Scaling,
     Structure,
+    TurnSlip,
 )
+from jaxveh.tyres.mf_tyre.typical import TYPICAL
 
-VERSION_OF_FITTYP = {5: 52, 6: 52, 21: 52, 52: 52, 60: 61, 61: 61}
-"""What the key FITTYP says; 62 has a loaded radius of its own and is not in yet."""
+VERSION_OF_FITTYP = {5: 52, 6: 52, 21: 52, 52: 52, 60: 61, 61: 61, 62: 62}
+"""What the key FITTYP says."""
 
 OLD_FORMATS = ("PAC2002", "MF_05", "MF-TYRE", "MF_TYRE")
 """PROPERTY_FILE_FORMAT of files that need no FITTYP: their equations are those of version 5.2."""
 
 NEEDED = ("FNOMIN", "UNLOADED_RADIUS", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
-"""What no tyre can do without; all else is zero, or a scale of one, where a file is silent."""
+"""What no tyre can do without; for all else see `TYPICAL`."""
 
 DIMENSIONS = {
     "UNLOADED_RADIUS": (1, 0, 0), "WIDTH": (1, 0, 0), "RIM_RADIUS": (1, 0, 0), "BOTTOM_OFFST": (1, 0, 0),
@@ -37,11 +39,14 @@ DIMENSIONS = {
 """Powers of the file's units of length, force and time in what has a dimension."""
 
 
-def from_property_file(source: str | Path | PropertyFile, *, limits: bool = True, angles: bool = True) -> MFTyre:
-    """The tyre of a .tir file of MF-Tyre 5.2 (PAC2002, MF_05) or 6.1, in SI units.
+def from_property_file(
+    source: str | Path | PropertyFile, *, limits: bool = True, angles: bool = True, spins: bool = False
+) -> MFTyre:
+    """The tyre of a .tir file of MF-Tyre 5.2 (PAC2002, MF_05), 6.1 or 6.2, in SI units.
 
-    The version comes from FITTYP or PROPERTY_FILE_FORMAT; `limits` and `angles` as in `MFTyre`. **Raises** `InputError` for a
-    version that is not in, a coefficient that is needed and missing, or one that is no number.
+    The version comes from FITTYP or PROPERTY_FILE_FORMAT; `limits`, `angles` and `spins` as in `MFTyre`. Where
+    the file is silent coefficients are `TYPICAL`, or zero. **Raises** `InputError` for a version that is
+    not in, a coefficient that is needed and missing, or one that is no number.
     """
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
     for key in NEEDED:
@@ -57,14 +62,16 @@ def from_property_file(source: str | Path | PropertyFile, *, limits: bool = True
         section(Rolling),
         section(Scaling),
         section(Ranges),
+        section(TurnSlip),
         version=version_of(file),
         limits=limits,
         angles=angles,
+        spins=spins,
     )
 
 
 def version_of(file: PropertyFile) -> int:
-    """52 or 61. **Raises** `InputError` for others, and where the file does not say."""
+    """52, 61 or 62. **Raises** `InputError` for others, and where the file does not say."""
     entry = file.find("FITTYP")
     if entry is not None:
         number = int(file.number("FITTYP"))
@@ -76,7 +83,7 @@ def version_of(file: PropertyFile) -> int:
     if kind not in OLD_FORMATS:
         raise InputError(
             f"{file.source}: neither FITTYP nor a PROPERTY_FILE_FORMAT of {', '.join(OLD_FORMATS)} (it is {kind!r}); "
-            "add FITTYP = 61 or 52 to [MODEL]."
+            "add FITTYP = 61 (or 52, 62) to [MODEL]."
         )
     return 52
 
@@ -87,9 +94,10 @@ def _size(file: PropertyFile, powers: tuple[int, int, int]) -> float:
 
 
 def _numbers(file: PropertyFile, kind: type, size: dict[str, float]) -> dict[str, float]:
-    """The coefficients of one section that the file holds."""
+    """The coefficients of one section: the file's, typical ones where it is silent."""
     names = [field.name for field in dataclasses.fields(kind)]
-    found = {name: file.number(name) * size.get(name, 1.0) for name in names if file.find(name) is not None}
+    found = {name: TYPICAL[name] for name in names if name in TYPICAL}
+    found |= {name: file.number(name) * size.get(name, 1.0) for name in names if file.find(name) is not None}
     if kind is Structure and "INFLPRES" not in found and "NOMPRES" in found:
         found["INFLPRES"] = found["NOMPRES"]
     return found

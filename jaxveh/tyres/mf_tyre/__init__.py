@@ -1,4 +1,4 @@
-"""MF-Tyre: the Magic Formula in full, versions 5.2 and 6.1, for pure and combined slip; one file a force or moment.
+"""MF-Tyre: the Magic Formula in full, versions 5.2, 6.1 and 6.2, for pure and combined slip; one file a force or moment.
 
 The equations are those of H. B. Pacejka, Tire and Vehicle Dynamics, 3rd edition (2012), section 4.3.2 ("4.E" numbers), with
 the corrections of Besselink, Schmeitz & Pacejka, An improved Magic Formula/Swift tyre model that can handle inflation
@@ -15,6 +15,7 @@ from jaxveh.tyres.mf_tyre.ranges import Ranges
 from jaxveh.tyres.mf_tyre.rolling import Rolling
 from jaxveh.tyres.mf_tyre.scaling import Scaling
 from jaxveh.tyres.mf_tyre.structure import Structure
+from jaxveh.tyres.mf_tyre.turn_slip import TurnSlip
 from jaxveh.tyres.mf_tyre.tyre import MFOutputs, MFTyre
 
 __all__ = [
@@ -28,4 +29,5 @@ __all__ = [
     "Rolling",
     "Scaling",
     "Structure",
+    "TurnSlip",
 ]

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh.tyres.mf_tyre.formula import EPSILON, coefficient, cosine_curve, cosine_of_arctan, not_zero, sign
+from jaxveh.tyres.mf_tyre.formula import EPSILON, coefficient, cosine_curve, cosine_of_arctan, curvature, not_zero, sign
 
 
 class AligningParts(NamedTuple):
@@ -62,16 +62,16 @@ class Aligning(eqx.Module):
     SSZ3: jax.Array = coefficient()
     SSZ4: jax.Array = coefficient()
 
-    def parts(self, at, scaling, structure, pure, K_xk, forces) -> AligningParts:
+    def parts(self, at, scaling, structure, pure, K_xk, weight_y, forces) -> AligningParts:
         """M_z of combined slip.
 
-        `pure`: the `PureLateral` at the point's camber; `forces`: F_x and F_y of combined slip, and the lateral force that
-        acts on the trail: F_y without camber, weighted (4.E74), in version 5.2 F_y less what slip ratio adds.
+        `pure`: the `PureLateral` at the point's camber; `weight_y`: G_yk; `forces`: F_x and F_y of combined slip, and the
+        lateral force that acts on the trail: F_y without camber, weighted (4.E74), in version 5.2 F_y less what slip ratio adds.
         """
         F_x, F_y, on_trail = forces
         slip = (K_xk / not_zero(pure.stiffness)) ** 2 * at.slip_ratio**2
         trail = self._trail(at, scaling, structure, slip)
-        residual = self._residual(at, scaling, structure, pure, slip)
+        residual = self._residual(at, scaling, structure, pure, slip, weight_y)
         arm = self.SSZ1 + self.SSZ2 * F_y / structure.FNOMIN + (self.SSZ3 + self.SSZ4 * at.df_z) * at.camber
         arm = structure.UNLOADED_RADIUS * arm * scaling.LS
         return AligningParts(-trail * on_trail + residual + arm * F_x, trail, residual)
@@ -85,22 +85,29 @@ class Aligning(eqx.Module):
         B = B * scaling.LKY / at.mu_y
         peak = (c.QDZ1 + c.QDZ2 * at.df_z) * (1 - c.PPZ1 * at.dp_i) * (1 + c.QDZ3 * camber + c.QDZ4 * camber**2)
         D = peak * at.moment_load * structure.UNLOADED_RADIUS / (structure.FNOMIN * scaling.LFZO) * scaling.LTR
+        D = D * at.spin.zeta_5
         bend = c.QEZ1 + c.QEZ2 * at.df_z + c.QEZ3 * at.df_z**2
         side = 1 + (c.QEZ4 + c.QEZ5 * at.sine) * (2 / math.pi) * numerics.arctan(B * c.QCZ1 * alpha)
-        E = jnp.minimum(bend * side, 1)
+        E = curvature(bend * side, at)
         # The factor LFZO is not in the book; the reference evaluator has it, after TNO's own solver.
         curve = cosine_curve(_equivalent(alpha, slip), B, c.QCZ1, E) * _cosine_of_course(at)
         return D * curve * at.smooth * scaling.LFZO
 
-    def _residual(self, at, scaling, structure, pure, slip):
+    def _residual(self, at, scaling, structure, pure, slip, weight_y):
         """Residual torque M_zr (4.E75 with A54), N m."""
         c = self
         alpha = at.tangent + pure.S_H + pure.S_V / not_zero(pure.stiffness)
         B = c.QBZ9 * scaling.LKY / at.mu_y + c.QBZ10 * pure.B * pure.C
+        B = B * at.spin.zeta_6
         camber = (c.QDZ8 + c.QDZ9 * at.df_z) * (1 + c.PPZ2 * at.dp_i) + (c.QDZ10 + c.QDZ11 * at.df_z) * jnp.abs(at.sine)
-        peak = (c.QDZ6 + c.QDZ7 * at.df_z) * scaling.LRES + camber * at.sine * scaling.LKZC
+        spins = at.spin.coefficients is not None
+        peak = (c.QDZ6 + c.QDZ7 * at.df_z) * scaling.LRES * at.spin.zeta_2
+        peak = peak if spins else peak + camber * at.sine * scaling.LKZC
         D = at.moment_load * structure.UNLOADED_RADIUS * peak * at.mu_y * numerics.cos(at.tangent)
-        return D * cosine_of_arctan(B * _equivalent(alpha, slip)) * at.smooth
+        if not spins:
+            return D * cosine_of_arctan(B * _equivalent(alpha, slip)) * at.smooth
+        turning, shape = at.spin.parking(at, scaling, self, structure, pure.mu, weight_y)
+        return (D + turning) * numerics.cos(shape * numerics.arctan(B * _equivalent(alpha, slip))) * at.smooth
 
 
 def _equivalent(alpha, slip):

@@ -44,6 +44,11 @@ def weight(x, shift, B, C, E):
     return cosine_curve(x + shift, B, C, E) / cosine_curve(shift, B, C, E)
 
 
+def curvature(E, at):
+    """E, at most 1 as the book demands, unless the point goes without limits (as in the reference evaluator)."""
+    return jnp.minimum(E, 1) if at.bounded else E
+
+
 def sign(x):
     """1 for x >= 0, else -1."""
     return jnp.where(x >= 0, jnp.ones_like(x), -jnp.ones_like(x))

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh.tyres.mf_tyre.formula import coefficient, cosine_of_arctan, not_zero, sign, sine_curve, weight
+from jaxveh.tyres.mf_tyre.formula import coefficient, cosine_of_arctan, curvature, not_zero, sign, sine_curve, weight
 
 
 class PureLateral(NamedTuple):
@@ -82,37 +82,47 @@ class Lateral(eqx.Module):
     def pure(self, at, scaling, nominal_load, version: int) -> PureLateral:
         """F_y0 and what it is made of, at the point's camber; `nominal_load` is F_z0 with its scale."""
         c, s, sine = self, scaling, at.sine
-        reach = (c.PKY2 + c.PKY5 * sine**2) * (1 + c.PPY2 * at.dp_i)
-        K_ya = c.PKY1 * nominal_load * (1 + c.PPY1 * at.dp_i) * (1 - c.PKY3 * jnp.abs(sine)) * s.LKY
-        K_ya = K_ya * numerics.sin(c.PKY4 * numerics.arctan(at.load / nominal_load / reach))
-        S_Vg = at.load * (c.PVY3 + c.PVY4 * at.df_z) * sine * s.LKYC * at.mu_y
+        K_ya = self._stiffness(at, s, nominal_load, sine)
+        S_Vg = at.load * (c.PVY3 + c.PVY4 * at.df_z) * sine * s.LKYC * at.mu_y * at.spin.zeta_2
         S_H = (c.PHY1 + c.PHY2 * at.df_z) * s.LHY
         if version == 52:
             S_H = S_H + c.PHY3 * sine * s.LKYC
         else:
             K_yg = at.load * (c.PKY6 + c.PKY7 * at.df_z) * (1 + c.PPY5 * at.dp_i) * s.LKYC
-            S_H = S_H + (K_yg * sine - S_Vg) / not_zero(K_ya)
-        S_V = at.load * (c.PVY1 + c.PVY2 * at.df_z) * s.LVY * at.mu_y + S_Vg
+            if at.spin.coefficients is None:
+                S_H = S_H + (K_yg * sine - S_Vg) / not_zero(K_ya)
+            else:
+                upright = self._stiffness(at, s, nominal_load, jnp.zeros_like(sine))
+                S_H = S_H + at.spin.shift(at, K_yg, upright) - S_Vg / not_zero(K_ya)
+        S_V = at.load * (c.PVY1 + c.PVY2 * at.df_z) * s.LVY * at.mu_y * at.spin.zeta_2 + S_Vg
         S_H, S_V = S_H * at.smooth, S_V * at.smooth
         alpha = at.tangent + S_H
         C_y = c.PCY1 * s.LCY
         pressure = 1 + c.PPY3 * at.dp_i + c.PPY4 * at.dp_i**2
         mu_y = (c.PDY1 + c.PDY2 * at.df_z) * pressure * (1 - c.PDY3 * sine**2) * at.mu_y
-        D_y = mu_y * at.load
+        D_y = mu_y * at.load * at.spin.zeta_2
         side = 1 + c.PEY5 * sine**2 - (c.PEY3 + c.PEY4 * sine) * sign(alpha)
-        E_y = jnp.minimum((c.PEY1 + c.PEY2 * at.df_z) * side * s.LEY, 1)
+        E_y = curvature((c.PEY1 + c.PEY2 * at.df_z) * side * s.LEY, at)
         B_y = K_ya / not_zero(C_y * D_y)
         return PureLateral(sine_curve(alpha, B_y, C_y, D_y, E_y) + S_V, K_ya, mu_y, B_y, C_y, S_H, S_V)
+
+    def _stiffness(self, at, scaling, nominal_load, sine):
+        """K_ya (4.E25) at a camber's sine, N/rad, negative in ISO-W."""
+        c = self
+        reach = (c.PKY2 + c.PKY5 * sine**2) * (1 + c.PPY2 * at.dp_i)
+        K_ya = c.PKY1 * nominal_load * (1 + c.PPY1 * at.dp_i) * (1 - c.PKY3 * jnp.abs(sine)) * scaling.LKY
+        return K_ya * numerics.sin(c.PKY4 * numerics.arctan(at.load / nominal_load / reach)) * at.spin.zeta_3
 
     def weight(self, at, scaling):
         """G_yk: the share of F_y0 that is left at a slip ratio."""
         c = self
         B = (c.RBY1 + c.RBY4 * at.sine**2) * cosine_of_arctan(c.RBY2 * (at.tangent - c.RBY3)) * scaling.LYKA
-        E = jnp.minimum(c.REY1 + c.REY2 * at.df_z, 1)
+        E = curvature(c.REY1 + c.REY2 * at.df_z, at)
         return weight(at.slip_ratio, c.RHY1 + c.RHY2 * at.df_z, B, c.RCY1, E)
 
     def added(self, at, scaling, mu_y):
         """S_Vyk: the lateral force that slip ratio adds ("ply-steer"), N."""
         c = self
         D = mu_y * at.load * (c.RVY1 + c.RVY2 * at.df_z + c.RVY3 * at.sine) * cosine_of_arctan(c.RVY4 * at.tangent)
+        D = D * at.spin.zeta_2
         return D * numerics.sin(c.RVY5 * numerics.arctan(c.RVY6 * at.slip_ratio)) * scaling.LVYKA * at.smooth

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh.tyres.mf_tyre.formula import coefficient, cosine_of_arctan, not_zero, sign, sine_curve, weight
+from jaxveh.tyres.mf_tyre.formula import coefficient, cosine_of_arctan, curvature, not_zero, sign, sine_curve, weight
 
 
 class PureLongitudinal(NamedTuple):
@@ -61,14 +61,14 @@ class Longitudinal(eqx.Module):
         """F_x0 and what it is made of."""
         c, s = self, scaling
         S_Hx = (c.PHX1 + c.PHX2 * at.df_z) * s.LHX * at.smooth
-        S_Vx = at.load * (c.PVX1 + c.PVX2 * at.df_z) * s.LVX * at.mu_x * at.smooth
+        S_Vx = at.load * (c.PVX1 + c.PVX2 * at.df_z) * s.LVX * at.mu_x * at.spin.zeta_1 * at.smooth
         kappa = at.slip_ratio + S_Hx
         C_x = c.PCX1 * s.LCX
         pressure = 1 + c.PPX3 * at.dp_i + c.PPX4 * at.dp_i**2
         mu_x = (c.PDX1 + c.PDX2 * at.df_z) * pressure * (1 - c.PDX3 * at.camber**2) * at.mu_x
-        D_x = mu_x * at.load
+        D_x = mu_x * at.load * at.spin.zeta_1
         bend = c.PEX1 + c.PEX2 * at.df_z + c.PEX3 * at.df_z**2
-        E_x = jnp.minimum(bend * (1 - c.PEX4 * sign(kappa)) * s.LEX, 1)
+        E_x = curvature(bend * (1 - c.PEX4 * sign(kappa)) * s.LEX, at)
         K_xk = at.load * (c.PKX1 + c.PKX2 * at.df_z) * jnp.exp(c.PKX3 * at.df_z)
         K_xk = K_xk * (1 + c.PPX1 * at.dp_i + c.PPX2 * at.dp_i**2) * s.LKX
         B_x = K_xk / not_zero(C_x * D_x)
@@ -78,4 +78,4 @@ class Longitudinal(eqx.Module):
         """G_xa: the share of F_x0 that is left at a slip angle."""
         c = self
         B = (c.RBX1 + c.RBX3 * at.sine**2) * cosine_of_arctan(c.RBX2 * at.slip_ratio) * scaling.LXAL
-        return weight(at.tangent, c.RHX1, B, c.RCX1, jnp.minimum(c.REX1 + c.REX2 * at.df_z, 1))
+        return weight(at.tangent, c.RHX1, B, c.RCX1, curvature(c.REX1 + c.REX2 * at.df_z, at))

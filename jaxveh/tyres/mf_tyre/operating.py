@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from jaxveh.tyres.mf_tyre.turn_slip import NO_SPIN, Spin
+
 
 class Operating(NamedTuple):
     """One instant of one wheel, in the signs of ISO-W; arrays that broadcast against each other.
@@ -11,7 +13,8 @@ class Operating(NamedTuple):
     `load` (N), `moment_load` (N; not below the range's least load, for moments), `slip_ratio` (-), `slip_angle`, `camber`
     (rad), `speed` (m/s), `pressure` (Pa), all within the tyre's ranges; `df_z`, `dp_i` (-) the increments of load and pressure
     (4.E2); `tangent`, `sine` the slip angle's tangent and the camber's sine, or the angles themselves in mode 1 (4.E3, 4.E4);
-    `mu_x`, `mu_y` (-) the friction scales with the road's in them; `smooth` (-) what is left of shifts at low speed.
+    `mu_x`, `mu_y` (-) the friction scales with the road's in them; `smooth` (-) what is left of shifts at low speed; `spin`
+    what turn slip does; `bounded`: curvatures are held at 1.
     """
 
     load: Any
@@ -28,3 +31,5 @@ class Operating(NamedTuple):
     mu_x: Any
     mu_y: Any
     smooth: Any
+    spin: Spin = NO_SPIN
+    bounded: bool = True

@@ -25,11 +25,11 @@ class Rolling(eqx.Module):
     QSY7: jax.Array = coefficient(1.0)
     QSY8: jax.Array = coefficient()
 
-    def moment(self, at, scaling, structure, ranges, version: int, F_x, slip_ratio):
-        """M_y, N m, negative when rolling forward; `slip_ratio`: as given, not limited."""
+    def moment(self, at, scaling, structure, ranges, version: int, F_x, load, slip_ratio):
+        """M_y, N m, negative when rolling forward; `load`, `slip_ratio`: as given, not limited."""
         c = self
         least = ranges.FZMIN
-        load = jnp.where(at.load < least, at.load**2 / jnp.where(least > 0, least, 1), at.load)
+        load = jnp.where(load < least, load**2 / jnp.where(least > 0, least, 1), load)
         share, speed = load / structure.FNOMIN, at.speed / structure.LONGVL
         sum_ = c.QSY1 + c.QSY2 * F_x / structure.FNOMIN + c.QSY3 * jnp.abs(speed) + c.QSY4 * speed**4
         if version == 52:

@@ -27,7 +27,7 @@ class Wheel(NamedTuple):
 class Structure(eqx.Module):
     """The sections [DIMENSION], [OPERATING_CONDITIONS], [VERTICAL], [STRUCTURAL] and [CONTACT_PATCH], as far as steady forces
     and relaxation need them: radii, `WIDTH`, nominal load `FNOMIN` (N), pressure `NOMPRES` (Pa) and speed `LONGVL` (m/s),
-    stiffnesses (N/m) and their dependence on load, speed, forces and pressure.
+    stiffnesses (N/m) and their dependence on load, speed, forces, pressure and, in 6.2, camber.
 
     **Raises** `InputError` for a radius, load, speed, pressure, width or stiffness that is not positive.
     """
@@ -37,9 +37,10 @@ class Structure(eqx.Module):
     LONGVL: jax.Array = positive("m/s", default=16.7)
     NOMPRES: jax.Array = positive("Pa", default=220000.0)
     INFLPRES: jax.Array = positive("Pa", default=220000.0)
-    WIDTH: jax.Array = positive("m", default=0.2)
+    WIDTH: jax.Array = positive("m", default=0.205)
+    ASPECT_RATIO: jax.Array = coefficient(0.6)
     RIM_RADIUS: jax.Array = coefficient(0.0, unit="m")
-    BOTTOM_OFFST: jax.Array = coefficient(0.0, unit="m")
+    BOTTOM_OFFST: jax.Array = coefficient(0.01, unit="m")
     VERTICAL_STIFFNESS: jax.Array = positive("N/m", default=200000.0)
     BREFF: jax.Array = coefficient()
     DREFF: jax.Array = coefficient()
@@ -47,9 +48,16 @@ class Structure(eqx.Module):
     Q_RE0: jax.Array = coefficient(1.0)
     Q_V1: jax.Array = coefficient(scale=1e-3)
     Q_V2: jax.Array = coefficient(scale=0.05)
-    Q_FZ2: jax.Array = coefficient(1e-6, scale=10.0)
+    Q_FZ2: jax.Array = coefficient(1e-4, scale=10.0)
     Q_FCX: jax.Array = coefficient()
     Q_FCY: jax.Array = coefficient()
+    Q_FCY2: jax.Array = coefficient()
+    Q_CAM1: jax.Array = coefficient(scale=100.0, unit="1/m")
+    Q_CAM2: jax.Array = coefficient(scale=100.0, unit="1/m^2")
+    Q_CAM3: jax.Array = coefficient()
+    Q_FYS1: jax.Array = coefficient(scale=1e4, unit="N/rad")
+    Q_FYS2: jax.Array = coefficient(scale=1e4, unit="N/rad")
+    Q_FYS3: jax.Array = coefficient(scale=1e4, unit="N/rad")
     PFZ1: jax.Array = coefficient()
     Q_RA1: jax.Array = coefficient()
     Q_RA2: jax.Array = coefficient()
@@ -97,6 +105,40 @@ class Structure(eqx.Module):
         target = load / (carries * self.FNOMIN)
         x = 2 * target / (q_1 + numerics.sqrt(q_1**2 + 4 * self.Q_FZ2 * target))
         return jnp.maximum(x * self.UNLOADED_RADIUS, 0.0)
+
+    def loaded_radius(self, load, camber, wheel: Wheel, dp_i, F_x, F_y):
+        """Loaded radius and vertical deflection of version 6.2, m: the radius at which `carried` is the load."""
+        like = wheel.speed * 0 + load * 0 + F_x * 0 + F_y * 0 + camber * 0
+        first = self.UNLOADED_RADIUS + like
+
+        def missing(radius, given):
+            structure, load, *rest = given
+            return structure.carried(radius, *rest)[0] - load
+
+        rest = (camber, wheel, dp_i, F_x, F_y)
+        # Guesses and tolerance are those of the reference evaluator, whose stop within 1e-6 of the nominal load shows.
+        radius = numerics.secant(missing, (self, load + like, *rest), 0.95 * first, first, 1e-6 * self.FNOMIN)
+        return radius, self.carried(radius, *rest)[1]
+
+    def carried(self, radius, camber, wheel: Wheel, dp_i, F_x, F_y):
+        """Load at a loaded radius in version 6.2, N, and the deflection, m (MF-Tyre/MF-Swift 6.2 equation manual, 2013)."""
+        s = self
+        free = wheel.free_radius
+        share = radius / free
+        asymmetric = (s.Q_FYS1 + s.Q_FYS2 * share + s.Q_FYS3 * share**2) * camber
+        sinks = jnp.maximum(free - radius, 0.0)
+        tread = (1.075 - 0.5 * s.ASPECT_RATIO) * s.WIDTH
+        grown = s.Q_CAM1 * free + s.Q_CAM2 * free**2
+        leans = (grown != 0) & (camber != 0)
+        ratio = (s.Q_CAM1 * radius + s.Q_CAM2 * radius**2) / jnp.where(leans, grown, 1.0)
+        by_camber = ratio**2 * tread / 8 * jnp.abs(numerics.tan(camber)) - s.Q_CAM3 * sinks * jnp.abs(camber)
+        rho = jnp.maximum(sinks + jnp.where(leans, by_camber, 0.0), 1e-12)
+        x = rho / s.UNLOADED_RADIUS
+        across = x**s.Q_FCY2 * s.Q_FCY * (F_y - asymmetric) / s.FNOMIN
+        carries = 1 + s.Q_V2 * s.UNLOADED_RADIUS / s.LONGVL * jnp.abs(wheel.speed)
+        carries = (carries - (s.Q_FCX * F_x / s.FNOMIN) ** 2 - across**2) * (1 + s.PFZ1 * dp_i)
+        q_1 = numerics.sqrt(jnp.maximum((s.VERTICAL_STIFFNESS * s.UNLOADED_RADIUS / s.FNOMIN) ** 2 - 4 * s.Q_FZ2, 0.0))
+        return carries * (q_1 * x + s.Q_FZ2 * x**2) * s.FNOMIN, rho
 
     def contact_patch(self, load, dp_i, version: int):
         """Half length a and half width b of the contact patch (A9, A10; 5.2: the MF-Tyre manual), m."""

@@ -19,8 +19,9 @@ from jaxveh.tyres.mf_tyre.ranges import Ranges
 from jaxveh.tyres.mf_tyre.rolling import Rolling
 from jaxveh.tyres.mf_tyre.scaling import Scaling
 from jaxveh.tyres.mf_tyre.structure import Structure
+from jaxveh.tyres.mf_tyre.turn_slip import NO_SPIN, Spin, TurnSlip
 
-VERSIONS = (52, 61)
+VERSIONS = (52, 61, 62)
 
 
 class MFOutputs(NamedTuple):
@@ -57,16 +58,18 @@ class MFOutputs(NamedTuple):
 
 
 class MFTyre(AbstractTyre):
-    """MF-Tyre 5.2 or 6.1: the Magic Formula in full, pure and combined slip, camber, load and inflation pressure.
+    """MF-Tyre 5.2, 6.1 or 6.2: the Magic Formula in full, pure and combined slip, camber, load and inflation pressure.
 
-    `version` 52 or 61 chooses the equations. `limits`: hold slip, camber, load and pressure within `ranges` and let slip fade
-    below `ranges.VXLOW`, as the reference evaluator does; `angles`: work with tan(slip angle) and sin(camber) as the book does
-    (False: with the angles). Every coefficient is a leaf (`lambda tyre: tyre.lateral.PKY1`).
+    `version` 52, 61 or 62 chooses the equations (62 differs from 61 in the loaded radius alone). `limits`: hold slip,
+    camber, load and pressure within `ranges`, curvatures at 1, and let slip fade below `ranges.VXLOW`, as the reference
+    evaluator does; `angles`: work with tan(slip angle) and sin(camber) as the book does (False: with the angles); `spins`: the
+    contact's turn slip counts, and camber's share of it, by `turn_slip`. Every coefficient is a leaf, such as
+    `lambda tyre: tyre.lateral.PKY1`.
 
     The contact's load is needed; a speed or pressure that it does not tell is the nominal one. Its friction multiplies
-    LMUX and LMUY. Turn slip is not in yet.
+    LMUX and LMUY.
 
-    **Raises** `InputError` for an unknown version, or a contact without a load.
+    **Raises** `InputError` for an unknown version, turn slip in version 5.2, which has none, or a contact without a load.
     """
 
     structure: Structure
@@ -77,12 +80,18 @@ class MFTyre(AbstractTyre):
     rolling: Rolling
     scaling: Scaling
     ranges: Ranges
+    turn_slip: TurnSlip | None = None
     version: int = eqx.field(static=True, default=61)
     limits: bool = eqx.field(static=True, default=True)
     angles: bool = eqx.field(static=True, default=True)
+    spins: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
         check_one_of("MFTyre.version", self.version, VERSIONS)
+        if self.spins and self.version == 52:
+            raise InputError("MFTyre.spins = True: version 5.2 has no turn slip; it needs version 61 or 62.")
+        if self.spins and self.turn_slip is None:
+            raise InputError("MFTyre.spins = True: needs the coefficients `turn_slip`, a TurnSlip.")
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """Forces (N) and moments (N m) at a contact."""
@@ -93,7 +102,7 @@ class MFTyre(AbstractTyre):
         """Forces, moments and internals at a contact."""
         if contact.load is None:
             raise InputError("contact.load = None: MFTyre scales with load; give the wheel's load in N.")
-        at, s = self._operating(contact), self.scaling
+        at, s, load = self._operating(contact), self.scaling, need_load(contact, "MFTyre")
         nominal = s.LFZO * self.structure.FNOMIN
         along = self.longitudinal.pure(at, s)
         across = self.lateral.pure(at, s, nominal, self.version)
@@ -104,16 +113,21 @@ class MFTyre(AbstractTyre):
         if self.version == 52:
             on_trail = F_y - added
         else:
-            upright = at._replace(camber=jnp.zeros_like(at.camber), sine=jnp.zeros_like(at.sine))
+            upright = at._replace(camber=jnp.zeros_like(at.camber), sine=jnp.zeros_like(at.sine), spin=NO_SPIN)
             on_trail = weight_y * self.lateral.pure(upright, s, nominal, self.version).force
-        turning = self.aligning.parts(at, s, self.structure, across, along.stiffness, (F_x, F_y, on_trail))
+        turning = self.aligning.parts(at, s, self.structure, across, along.stiffness, weight_y, (F_x, F_y, on_trail))
         M_x = self.overturning.moment(at, s, self.structure, self.ranges.FZMIN, F_y)
-        M_y = self.rolling.moment(at, s, self.structure, self.ranges, self.version, F_x, contact.slip_ratio)
+        M_y = self.rolling.moment(at, s, self.structure, self.ranges, self.version, F_x, load, contact.slip_ratio)
         body = self._body(contact, at, along, across, F_x, F_y)
         return MFOutputs(
             F_x, F_y, M_x, M_y, turning.moment, turning.trail, turning.residual,
-            along.mu, across.mu, along.stiffness, -across.stiffness, *body,
+            *self._frictions(at, along, across), along.stiffness, -across.stiffness, *body,
         )  # fmt: skip
+
+    def _frictions(self, at: Operating, along, across) -> tuple:
+        """mu_x and mu_y as the reference evaluator reports them: none off the ground; without the sign of odd files."""
+        mu_y = jnp.abs(across.mu) if self.limits else across.mu
+        return jnp.where(at.load > 0, along.mu, 0.0), jnp.where(at.load > 0, mu_y, 0.0)
 
     def _operating(self, contact: Contact) -> Operating:
         """The contact within the ranges, in the signs of ISO-W."""
@@ -130,7 +144,7 @@ class MFTyre(AbstractTyre):
             load, pressure = jnp.minimum(load, r.FZMAX), jnp.clip(pressure, r.PRESMIN, r.PRESMAX)
         moment_load = jnp.where(load > 0, jnp.maximum(load, r.FZMIN), 0.0) if self.limits else load
         nominal = self.scaling.LFZO * structure.FNOMIN
-        return Operating(
+        at = Operating(
             load=load,
             moment_load=moment_load,
             slip_ratio=kappa,
@@ -145,19 +159,35 @@ class MFTyre(AbstractTyre):
             mu_x=self.scaling.LMUX * contact.friction,
             mu_y=self.scaling.LMUY * contact.friction,
             smooth=smooth,
+            bounded=self.limits,
         )
+        return at._replace(spin=self._spin(contact, at)) if self.spins else at
+
+    def _spin(self, contact: Contact, at: Operating) -> Spin:
+        """Turn slip: it fades with the slip ratio, and turns with the wheel's course."""
+        phi_t = contact.turn_slip
+        if self.limits:
+            phi_t = phi_t * numerics.cos(contact.slip_angle) * self.ranges.fading(at.slip_angle, at.speed)[0]
+        wheel = self.structure.wheel(need_load(contact, "MFTyre"), contact.slip_ratio, at.speed, at.dp_i)
+        assert self.turn_slip is not None
+        return self.turn_slip.spin(at, phi_t, wheel.speed, self.structure.UNLOADED_RADIUS, self.ranges.VXLOW)
 
     def _body(self, contact: Contact, at: Operating, along, across, F_x, F_y) -> tuple:
         """From omega to sigma_y of `MFOutputs`."""
         s, structure = self.scaling, self.structure
         load = need_load(contact, "MFTyre")
         wheel = structure.wheel(load, contact.slip_ratio, at.speed, at.dp_i)
-        rho = structure.deflection(at.moment_load, wheel.speed, at.dp_i, F_x, F_y)
-        R_l = jnp.maximum(wheel.free_radius - rho, 0.0)
+        if self.version == 62:
+            R_l, rho = structure.loaded_radius(load, at.camber, wheel, at.dp_i, F_x, F_y)
+            carries = at.load
+        else:
+            rho = structure.deflection(at.moment_load, wheel.speed, at.dp_i, F_x, F_y)
+            R_l = jnp.maximum(wheel.free_radius - rho, 0.0)
+            carries = at.moment_load
         a, b = structure.contact_patch(load, at.dp_i, self.version)
         C_x, C_y = structure.carcass(at.df_z, at.dp_i)
-        C_z = at.moment_load / jnp.where(rho > 0, rho, 1.0)
-        if self.version == 61:
+        C_z = carries / jnp.where(rho > 0, rho, 1.0)
+        if self.version != 52:
             sigma = jnp.abs(along.stiffness / C_x), jnp.abs(across.stiffness / C_y)
         else:
             sigma = self._manual_relaxation(at, s)

@@ -1,0 +1,33 @@
+"""Roots: known ones, each element by itself, and their derivatives."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import numerics
+
+
+def square(x, a):
+    return x**2 - a
+
+
+def test_roots_are_found_elementwise_and_stay_where_they_are():
+    a = jnp.asarray([0.5, 2.0, 9.0])
+    found = jax.jit(lambda a: numerics.secant(square, a, jnp.ones(3), 2 * jnp.ones(3), 1e-12))(a)
+    np.testing.assert_allclose(found, np.sqrt(a), rtol=1e-12)
+    alone = [numerics.secant(square, a[i], jnp.asarray(1.0), jnp.asarray(2.0), 1e-12) for i in range(3)]
+    np.testing.assert_array_equal(found, jnp.stack(alone))
+
+
+def test_derivatives_are_those_of_the_root():
+    root = lambda a: numerics.secant(square, a, jnp.asarray(1.0), jnp.asarray(2.0), 1e-13)
+    a = jnp.asarray(3.0)
+    np.testing.assert_allclose(jax.grad(root)(a), 0.5 / np.sqrt(3.0), rtol=1e-12)
+    np.testing.assert_allclose(jax.jvp(root, (a,), (jnp.ones(()),))[1], 0.5 / np.sqrt(3.0), rtol=1e-12)
+
+
+def test_steps_bound_the_work():
+    flat = lambda x, a: a + 0 * x
+    assert np.isfinite(numerics.secant(flat, jnp.asarray(1.0), jnp.asarray(1.0), jnp.asarray(2.0), 1e-9))
+    far = numerics.secant(square, jnp.asarray(1e6), jnp.asarray(1.0), jnp.asarray(2.0), 1e-12, steps=2)
+    assert abs(float(far) - 1e3) > 1.0
