@@ -62,11 +62,12 @@ def _lines(console: Console, title: str) -> Report:
     return report
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "") -> None:
-    """Print a table: first column to the left, numbers to the right; a cell that is no string is shown by `number`."""
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "", left: int = 1) -> None:
+    """Print a table: the first `left` columns to the left, numbers to the right; a cell that is no string is shown by
+    `number`."""
     shown = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for i, column in enumerate(columns):
-        shown.add_column(Text(column), justify="left" if i == 0 else "right")
+        shown.add_column(Text(column), justify="left" if i < left else "right")
     for row in rows:
         shown.add_row(*[Text(cell if isinstance(cell, str) else number(cell)) for cell in row])
     console = results()

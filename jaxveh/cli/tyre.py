@@ -29,7 +29,8 @@ class Axes(StrEnum):
 
 
 def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.Numbers = None) -> None:
-    """Show what a tyre property file says: version, ranges, and what the tyre does at half, nominal and 1.5 times load.
+    """Show what a tyre property file says: version, ranges, what the tyre does at half, nominal and 1.5 times load, and what
+    is odd about the file.
 
     Example: [bold]jaxveh tyre show tyre.tir --out figures[/]
     """
@@ -58,10 +59,14 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
     }  # fmt: skip
     rows = [(name, *[number(float(getattr(one, field))) for one in found]) for name, field in quantities.items()]
     table("Free rolling, at loads in N", ("quantity", *[f"{share * float(s.FNOMIN):g}" for share in LOADS]), rows)
+    findings = tyres.check_property_file(source)
+    if findings:
+        table("Worth a look", ("about", "what"), findings, left=2)
     shown: dict[str, Any] = {
         "version": tyre.version,
         "loads": [share * float(s.FNOMIN) for share in LOADS],
         **{field: [float(getattr(one, field)) for one in found] for field in quantities.values()},
+        "findings": [finding._asdict() for finding in findings],
     }
     if out is not None:
         from jaxveh import plots

@@ -1,5 +1,5 @@
-"""Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, the file that describes a car, and tyre
-property files.
+"""Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, the file that describes a car, tyre property
+files, and tables of tyre test rigs (CSV, TYDEX).
 
 pandas, pyarrow, asammdf and pint are the extra `io`, imported where they are used.
 """
@@ -12,6 +12,8 @@ from jaxveh.io.frames import to_frame, write_frame
 from jaxveh.io.merge import resample
 from jaxveh.io.property_file import PropertyFile, read_property_file, write_property_file
 from jaxveh.io.recordings import SUFFIXES, read_recording, with_units_in_names, write_recording
+from jaxveh.io.rig_table import RigTable, read_rig_table
+from jaxveh.io.tydex import TydexFile, read_tydex
 
 __all__ = [
     "CANONICAL",
@@ -22,12 +24,16 @@ __all__ = [
     "Channel",
     "ChannelMap",
     "PropertyFile",
+    "RigTable",
+    "TydexFile",
     "canonical_unit",
     "check_readable",
     "read_car",
     "read_channel_map",
     "read_property_file",
     "read_recording",
+    "read_rig_table",
+    "read_tydex",
     "replacing",
     "resample",
     "to_frame",

@@ -6,6 +6,7 @@ import csv
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,14 +26,22 @@ def open_csv(path: Path, channels: ChannelMap | None) -> TableLog:
     Without a map: whichever of `,` `;` and tab the header line has most of, and a decimal point.
     """
     headings, separator = _header(path, channels.separator if channels else None)
-    frame = _read(path, headings, separator, channels.decimal if channels else ".")
+    columns = _columns(path, headings, separator, channels.decimal if channels else ".")
+    return TableLog(path, tuple(columns), columns.__getitem__, {}, "", channels.time if channels else None)
+
+
+def read_columns(path: Path) -> dict[str, Any]:
+    """The cells of each column by heading, of a CSV file with one header line that need not have a time column."""
+    headings, separator = _header(path, None)
+    return _columns(path, headings, separator, ".")
+
+
+def _columns(path: Path, headings: list[str], separator: str, decimal: str) -> dict[str, Any]:
+    frame = _read(path, headings, separator, decimal)
     # A separator at the end of every line makes a last column without name and without cells.
     if headings[-1] == "" and frame.iloc[:, -1].isna().all():
         headings = headings[:-1]
-    place = {heading: column for column, heading in enumerate(headings)}
-    return TableLog(
-        path, headings, lambda heading: frame.iloc[:, place[heading]].array, {}, "", channels.time if channels else None
-    )
+    return {heading: frame.iloc[:, column].array for column, heading in enumerate(headings)}
 
 
 def write_csv(

@@ -7,6 +7,8 @@ from jaxveh.tyres.fiala import Fiala
 from jaxveh.tyres.linear import Linear
 from jaxveh.tyres.magic_formula import MagicFormula
 from jaxveh.tyres.mf_tyre import MFOutputs, MFTyre
+from jaxveh.tyres.mirrored import Mirrored
+from jaxveh.tyres.property_check import Finding, check_property_file
 from jaxveh.tyres.property_file import from_property_file
 
 __all__ = [
@@ -16,11 +18,14 @@ __all__ = [
     "Contact",
     "Dugoff",
     "Fiala",
+    "Finding",
     "Forces",
     "Linear",
     "MFOutputs",
     "MFTyre",
     "MagicFormula",
+    "Mirrored",
+    "check_property_file",
     "cornering_stiffness",
     "from_property_file",
 ]

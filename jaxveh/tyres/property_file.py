@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Literal, overload
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_one_of
 from jaxveh.io.property_file import PropertyFile, read_property_file
 from jaxveh.tyres.mf_tyre import (
     Aligning,
@@ -20,6 +21,10 @@ from jaxveh.tyres.mf_tyre import (
     TurnSlip,
 )
 from jaxveh.tyres.mf_tyre.typical import TYPICAL
+from jaxveh.tyres.mirrored import Mirrored
+
+SIDES = ("left", "right")
+"""What TYRESIDE may say, capitals or not."""
 
 VERSION_OF_FITTYP = {5: 52, 6: 52, 21: 52, 52: 52, 60: 61, 61: 61, 62: 62}
 """What the key FITTYP says."""
@@ -39,16 +44,66 @@ DIMENSIONS = {
 """Powers of the file's units of length, force and time in what has a dimension."""
 
 
+@overload
 def from_property_file(
-    source: str | Path | PropertyFile, *, limits: bool = True, angles: bool = True, spins: bool = False
-) -> MFTyre:
+    source: str | Path | PropertyFile,
+    *,
+    side: None = None,
+    limits: bool = True,
+    angles: bool = True,
+    spins: bool = False,
+) -> MFTyre: ...
+
+
+@overload
+def from_property_file(
+    source: str | Path | PropertyFile,
+    *,
+    side: Literal["left", "right"],
+    limits: bool = True,
+    angles: bool = True,
+    spins: bool = False,
+) -> MFTyre | Mirrored: ...
+
+
+def from_property_file(
+    source: str | Path | PropertyFile,
+    *,
+    side: Literal["left", "right"] | None = None,
+    limits: bool = True,
+    angles: bool = True,
+    spins: bool = False,
+) -> MFTyre | Mirrored:
     """The tyre of a .tir file of MF-Tyre 5.2 (PAC2002, MF_05), 6.1 or 6.2, in SI units.
 
-    The version comes from FITTYP or PROPERTY_FILE_FORMAT; `limits`, `angles` and `spins` as in `MFTyre`. Where
-    the file is silent coefficients are `TYPICAL`, or zero. **Raises** `InputError` for a version that is
-    not in, a coefficient that is needed and missing, or one that is no number.
+    `side`, `left` or `right`: the side of the car on which the tyre is mounted; it comes mirrored where TYRESIDE, for which
+    the file's coefficients hold, is the other one. None takes it as it is. The version comes from FITTYP or
+    PROPERTY_FILE_FORMAT; `limits`, `angles` and `spins` as in `MFTyre`. Where the file is silent coefficients are `TYPICAL`,
+    or zero.
+
+    **Raises** `InputError` for a version that is not in, a coefficient that is needed and missing or no number, and a `side`
+    where the file does not tell its own.
     """
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
+    tyre = _as_it_is(file, limits, angles, spins)
+    if side is None:
+        return tyre
+    check_one_of("side", side, SIDES)
+    return tyre if side == side_of(file) else Mirrored(tyre)
+
+
+def side_of(file: PropertyFile) -> str:
+    """`left` or `right`, the side for which the coefficients hold. **Raises** `InputError` where the file does not say."""
+    said = file.text("TYRESIDE").strip().lower()
+    if said not in SIDES:
+        raise InputError(
+            f"{file.source}: TYRESIDE = {file.text('TYRESIDE', 'nothing')!r}: must be 'LEFT' or 'RIGHT' (in [MODEL]) before the "
+            "tyre can be mounted on a side; without `side` it is taken as it is."
+        )
+    return said
+
+
+def _as_it_is(file: PropertyFile, limits: bool, angles: bool, spins: bool) -> MFTyre:
     for key in NEEDED:
         file.number(key)
     size = {key: _size(file, powers) for key, powers in DIMENSIONS.items()}

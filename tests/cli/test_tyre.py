@@ -61,6 +61,17 @@ def test_show_prints_and_draws(tyre_file, tmp_path):
     assert (tmp_path / "tyre.png").stat().st_size > 20_000
 
 
+def test_show_says_what_is_worth_a_look(tmp_path):
+    odd = shared("tyres") / "chrono__hmmwv__tire__HMMWV_pacejka.tir"
+    result = run("tyre", "show", odd, "--json", tmp_path / "tyre.json")
+    assert result.exit_code == 0, result.output
+    assert "Worth a look" in result.stdout and "0.00501 at nominal load" in result.stdout
+    findings = json.loads((tmp_path / "tyre.json").read_text())["findings"]
+    assert findings[0]["about"] == "deflection over radius" and "0.01 to 0.2" in findings[0]["says"]
+    quiet = run("tyre", "show", shared("tyres") / "chrono__VW_microbus__json__mf_185_80R14.tir")
+    assert quiet.exit_code == 0 and "Worth a look" not in quiet.stdout
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

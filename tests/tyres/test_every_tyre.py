@@ -25,8 +25,9 @@ TYRES = {
     "Dugoff, fading": lambda: tyres.Dugoff(80000.0, 60000.0, 0.9, 0.01),
     "Fiala": lambda: tyres.Fiala(80000.0, 60000.0, 0.9),
     "MF-Tyre": mf_tyre,
+    "MF-Tyre, mirrored": lambda: tyres.Mirrored(mf_tyre()),
 }
-SYMMETRIC = [name for name in TYRES if name != "MF-Tyre"]
+SYMMETRIC = [name for name in TYRES if not name.startswith("MF-Tyre")]
 
 
 @pytest.fixture(params=TYRES)

@@ -1,0 +1,166 @@
+"""TYDEX files: what tyre test rigs write.
+
+The format is that of H.-J. Unrau and J. Zamow, TYDEX-Format, Description and Reference Manual, release 1.3 (1997): sections
+that begin with `**NAME`, comment lines that begin with `!`, fixed columns of a name (10 characters), a description (30), a
+unit (10) and values (10 each).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.files import check_readable
+
+MISSING = ("NOTAVAIL", "NAN")
+"""What stands in place of a number that was not measured."""
+
+_NAME, _UNIT, _VALUES, _WIDTH = slice(0, 10), slice(40, 50), 50, 10
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One quantity of a TYDEX file: physical `values` (n,), or a float for a constant, in `unit`; its `line` from 1.
+
+    A constant that is no number (the name of a road) is a text.
+    """
+
+    name: str
+    unit: str
+    values: np.ndarray | float | str
+    line: int
+
+
+@dataclass(frozen=True, eq=False)
+class TydexFile:
+    """A TYDEX file: `header` and `comments` as they stand, `constants` and measured `channels` by name."""
+
+    source: str
+    header: dict[str, str]
+    comments: tuple[str, ...]
+    constants: dict[str, Channel]
+    channels: dict[str, Channel]
+
+    def find(self, name: str) -> Channel | None:
+        """The channel of that name, else the constant; None where there is neither."""
+        return self.channels.get(name, self.constants.get(name))
+
+
+@dataclass(frozen=True)
+class _Conversion:
+    """`factor * (raw + before) + after`."""
+
+    name: str
+    unit: str
+    factor: float
+    before: float
+    after: float
+    line: int
+
+
+def read_tydex(path: str | Path) -> TydexFile:
+    """Read a TYDEX file; each channel comes as `factor (raw + offset of the raw value) + offset of the physical value`.
+
+    **Raises** `InputError`, with the line, for a file without **MEASURCHANNELS or **MEASURDATA, a channel that stands twice, a
+    row with another number of columns than there are channels, and a cell that is no number (`NOTAVAIL` is a missing one).
+    """
+    path = Path(path)
+    check_readable(path)
+    # Descriptions and comments may hold bytes that are no UTF-8 (a degree sign).
+    return parse_tydex(path.read_text(encoding="utf-8", errors="replace"), str(path))
+
+
+def parse_tydex(text: str, source: str = "TYDEX file") -> TydexFile:
+    """Parse the text of a TYDEX file; see `read_tydex`."""
+    sections = _sections(text)
+    for needed in ("MEASURCHANNELS", "MEASURDATA"):
+        if not sections.get(needed):
+            raise InputError(f"{source}: no section **{needed} with lines: this holds no measurement in TYDEX format.")
+    conversions = [_conversion(line, number, source) for number, line in sections["MEASURCHANNELS"]]
+    _check_unique(conversions, source)
+    rows = [_row(line, number, len(conversions), source) for number, line in sections["MEASURDATA"]]
+    raw = np.array(rows)
+    channels = {
+        c.name: Channel(c.name, c.unit, c.factor * (raw[:, k] + c.before) + c.after, c.line)
+        for k, c in enumerate(conversions)
+    }
+    constants = {c.name: c for c in (_constant(line, number) for number, line in sections.get("CONSTANTS", []))}
+    header = {line[_NAME].strip(): line[40:].strip() for _, line in sections.get("HEADER", [])}
+    return TydexFile(source, header, tuple(line for _, line in sections.get("COMMENTS", [])), constants, channels)
+
+
+def _sections(text: str) -> dict[str, list[tuple[int, str]]]:
+    """Lines with their numbers by section; blank and comment lines are left out, and what follows **END."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    section = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.startswith("**"):
+            section = line[2:].split(maxsplit=1)[0].upper() if line[2:].strip() else ""
+            if section == "END":
+                break
+        elif section and line.strip() and not line.startswith("!"):
+            found.setdefault(section, []).append((number, line.rstrip()))
+    return found
+
+
+def _conversion(line: str, number: int, source: str) -> _Conversion:
+    name, unit = line[_NAME].strip(), line[_UNIT].strip()
+    try:
+        factors = [float(cell) for cell in _cells(line[_VALUES:], 3)]
+    except ValueError:
+        factors = [np.nan]
+    if len(factors) > 3 or not np.isfinite(factors).all():
+        raise InputError(
+            f"{source}, line {number}: {name}: conversion {line[_VALUES:].strip()!r}: must be a factor and two offsets "
+            "in columns 51, 61 and 71 (the name stands in column 1, the unit in column 41)."
+        )
+    factor, before, after = [*factors, *(1.0, 0.0, 0.0)[len(factors) :]]
+    if factor == 0:
+        raise InputError(f"{source}, line {number}: {name}: conversion factor 0: must be another number.")
+    return _Conversion(name, unit, factor, before, after, number)
+
+
+def _check_unique(conversions: list[_Conversion], source: str) -> None:
+    first: dict[str, int] = {}
+    for c in conversions:
+        if c.name in first:
+            raise InputError(f"{source}: channel {c.name} stands twice, lines {first[c.name]} and {c.line}: leave one.")
+        first[c.name] = c.line
+
+
+def _row(line: str, number: int, channels: int, source: str) -> list[float]:
+    cells = _cells(line, channels)
+    if len(cells) != channels:
+        raise InputError(
+            f"{source}, line {number}: {len(cells)} columns, but **MEASURCHANNELS names {channels} channels."
+        )
+    return [_number(cell, number, source) for cell in cells]
+
+
+def _cells(text: str, wanted: int) -> list[str]:
+    """Cells between blanks; where they touch each other (`-1234.5678-1234.5678`), those of ten characters."""
+    cells = text.split()
+    if len(cells) >= wanted or len(text) <= _WIDTH * (wanted - 1):
+        return cells
+    return [text[k * _WIDTH : (k + 1) * _WIDTH].strip() for k in range(wanted)]
+
+
+def _number(cell: str, line: int, source: str) -> float:
+    if cell.upper() in MISSING:
+        return np.nan
+    try:
+        return float(cell)
+    except ValueError:
+        raise InputError(f"{source}, line {line}: {cell!r} is not a number ({MISSING[0]} is a missing one).") from None
+
+
+def _constant(line: str, number: int) -> Channel:
+    text = line[_VALUES:].strip()
+    try:
+        value: float | str = float(text)
+    except ValueError:
+        value = text
+    return Channel(line[_NAME].strip(), line[_UNIT].strip(), value, number)

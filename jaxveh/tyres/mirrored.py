@@ -1,0 +1,36 @@
+"""The tyre of the car's other side: the same tyre, seen in a mirror."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh._core.errors import InputError
+from jaxveh.tyres.base import AbstractDynamicTyre, AbstractTyre, Contact, Forces
+
+ODD_INPUTS = ("slip_angle", "camber", "turn_slip")
+"""What of a contact changes sign in the mirror of the wheel's x-z plane; all else stays."""
+
+
+class Mirrored(AbstractTyre):
+    """A tyre mounted on the other side than the one it was measured on.
+
+    In a mirror slip angle, camber, turn slip, F_y, M_x and M_z change sign. A tyre is hardly ever its own mirror image: ply-steer and
+    conicity push both tyres of an axle towards the same side of the car where one law serves both wheels, and against each
+    other where one of them is mirrored. The parameters are those of `tyre`, one set however many wheels it serves.
+
+    **Raises** `InputError` for a tyre with states, whose mirror image is made before it gets them: `Relaxed(Mirrored(tyre))`.
+    """
+
+    tyre: AbstractTyre
+
+    def __check_init__(self):
+        if isinstance(self.tyre, AbstractDynamicTyre):
+            raise InputError(
+                f"Mirrored.tyre = {type(self.tyre).__name__}: must be a tyre without states; mirror the tyre within it."
+            )
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """Forces (N) and moments (N m) at a contact, in the axes of the wheel as it is mounted."""
+        turned = contact._replace(**{name: -getattr(contact, name) for name in ODD_INPUTS})
+        found = self.tyre.forces(turned, state)
+        return found._replace(F_y=-found.F_y, M_x=-found.M_x, M_z=-found.M_z)

@@ -1,0 +1,331 @@
+"""What is odd about a tyre property file: a list to read before the tyre is believed.
+
+That C > 0, D > 0, E <= 1, B_t > 0 and that the weights of combined slip stay positive over the file's own ranges are the
+restrictions of H. B. Pacejka, Tire and Vehicle Dynamics, 3rd edition (2012), section 4.3.2. The other limits are wide ones of
+road tyres, from a racing car's to a truck's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh.io.property_file import UNITS, PropertyFile, read_property_file
+from jaxveh.tyres.base import Contact
+from jaxveh.tyres.mf_tyre import MFTyre
+from jaxveh.tyres.property_file import SIDES, from_property_file
+
+USUAL = {
+    "mu_x": ("friction along", 0.2, 3.0, ""),
+    "mu_y": ("friction across", 0.2, 3.0, ""),
+    "K_xk": ("slip stiffness over load", 5.0, 80.0, ""),
+    "K_ya": ("cornering stiffness over load", 3.0, 60.0, " 1/rad"),
+    "rho": ("deflection over radius", 0.01, 0.2, ""),
+    "trail": ("pneumatic trail over radius", 0.0, 0.3, ""),
+    "F_y": ("lateral force without slip angle over load", -0.1, 0.1, ""),
+    "sigma_x": ("relaxation length along", 0.01, 3.0, " m"),
+    "sigma_y": ("relaxation length across", 0.01, 3.0, " m"),
+}
+"""Of a tyre that rolls freely at its nominal load: what to call it, the usual least and largest value, and the unit."""
+
+PER_LOAD, PER_RADIUS = ("K_xk", "K_ya", "F_y"), ("rho", "trail")
+
+GRID = 11
+"""Points over a range of the file."""
+
+NEUTRAL = {"LMUV": 0.0}
+"""Scaling factors that do nothing at another value than 1."""
+
+DYNAMIC = ("QTZ1", "MBELT")
+"""Coefficients of the gyroscopic moment, of which a steady law has no use."""
+
+DEFLECTIONS = "[DEFLECTION_LOAD_CURVE]"
+"""A table that stands in place of VERTICAL_STIFFNESS."""
+
+
+class Finding(NamedTuple):
+    """One thing worth a look: the key or quantity that it is `about`, and what there is to say."""
+
+    about: str
+    says: str
+
+
+def check_property_file(source: str | Path | PropertyFile) -> list[Finding]:
+    """What is worth a look in a .tir file; an empty list where nothing is.
+
+    It tells of what is missing, of ranges and units that are odd, of scaling factors other than 1, of coefficients that are not
+    read, and of a tyre that behaves as hardly any does. **Raises** `InputError` where `from_property_file` does.
+    """
+    file = source if isinstance(source, PropertyFile) else read_property_file(source)
+    tyre = from_property_file(file)
+    return [
+        *_model(file, tyre.version),
+        *_missing(file, tyre),
+        *_ranges(file, tyre),
+        *_pressure(file, tyre),
+        *_scaling(tyre),
+        *_body(tyre),
+        *_shapes(tyre),
+        *_usual(tyre),
+        *_friction_over_range(tyre),
+        *_curvature(tyre),
+        *_aligning(tyre),
+        *_combined(tyre),
+        *_moments(tyre),
+        *_unread(file, tyre),
+    ]
+
+
+def _model(file: PropertyFile, version: int) -> Iterator[Finding]:
+    side = file.text("TYRESIDE")
+    if not side:
+        yield Finding("TYRESIDE", "is missing: the side for which the coefficients hold is not known")
+    elif side.strip().lower() not in SIDES:
+        yield Finding("TYRESIDE", f"is {side!r}, neither LEFT nor RIGHT: the tyre cannot be mirrored")
+    kind = file.text("PROPERTY_FILE_FORMAT").upper()
+    if file.find("FITTYP") is None and kind.startswith("MF"):
+        yield Finding("FITTYP", f"is missing: {version / 10:g} is taken because of PROPERTY_FILE_FORMAT = {kind!r}")
+    elif file.text("FITTYP") == "60":
+        yield Finding("FITTYP", "is 60: the equations of 6.1 are taken")
+    mode = file.find("USE_MODE")
+    if mode is not None and not isinstance(mode.value, str):
+        if mode.value < 0:
+            yield Finding(
+                "USE_MODE", f"is {mode.value:g}: asks for a mirrored tyre; the tyre comes as it is (see `side`)"
+            )
+        elif abs(mode.value) % 10 < 4:
+            yield Finding(
+                "USE_MODE", f"is {mode.value:g}: fitted without combined slip, which is computed all the same"
+            )
+    if "UNITS" not in file.sections:
+        yield Finding("[UNITS]", "is missing: SI units and radians are taken")
+    angle = str(file.sections.get("UNITS", {}).get("ANGLE", "radian")).strip().lower()
+    if angle not in UNITS["ANGLE"]:
+        yield Finding("ANGLE", f"is {angle!r}: ranges and coefficients are taken in radians all the same")
+
+
+def _missing(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
+    """Values of which a default is taken that no one should rely on."""
+    wanted = ["LONGVL", "VERTICAL_STIFFNESS"]
+    if tyre.version == 61:
+        wanted += ["NOMPRES", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS"]
+    for key in wanted:
+        if file.find(key) is None:
+            yield Finding(key, f"is missing: {float(getattr(tyre.structure, key)):g} is taken")
+    speed = float(tyre.structure.LONGVL)
+    if not 5 <= speed <= 50:
+        yield Finding("LONGVL", f"is {speed:g} m/s: tyres are measured at 5 to 50 m/s, mostly 16.7; is it in km/h?")
+
+
+def _ranges(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
+    r, load = tyre.ranges, float(tyre.scaling.LFZO * tyre.structure.FNOMIN)
+    for low, high in (
+        ("KPUMIN", "KPUMAX"), ("ALPMIN", "ALPMAX"), ("CAMMIN", "CAMMAX"), ("FZMIN", "FZMAX"), ("PRESMIN", "PRESMAX"),
+    ):  # fmt: skip
+        least, most = float(getattr(r, low)), float(getattr(r, high))
+        if least >= most:
+            yield Finding(f"{low}, {high}", f"are {least:g} and {most:g}: the range is empty")
+        elif low in ("KPUMIN", "ALPMIN", "CAMMIN") and not least < 0 < most:
+            yield Finding(
+                f"{low}, {high}", f"are {least:g} and {most:g}: one side only was measured, the other is held at 0"
+            )
+    for key, largest in (("ALPMIN", 3.2), ("ALPMAX", 3.2), ("CAMMIN", 3.2), ("CAMMAX", 3.2)):
+        if abs(float(getattr(r, key))) > largest:
+            yield Finding(key, f"is {float(getattr(r, key)):g}: must be in radians; is it in degrees?")
+    for key in ("KPUMIN", "KPUMAX"):
+        if file.find(key) is not None and abs(float(getattr(r, key))) > 5:
+            yield Finding(key, f"is {float(getattr(r, key)):g}: a slip ratio of 1 is 100 %; is it in per cent?")
+    if not float(r.FZMIN) <= load <= float(r.FZMAX):
+        yield Finding(
+            "FNOMIN", f"times LFZO is {load:g} N, outside FZMIN to FZMAX, {float(r.FZMIN):g} to {float(r.FZMAX):g} N"
+        )
+
+
+def _pressure(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
+    r = tyre.ranges
+    for key in ("NOMPRES", "INFLPRES"):
+        if file.find(key) is None:
+            continue
+        value = float(getattr(tyre.structure, key))
+        if not 2e4 <= value <= 2e6:
+            yield Finding(key, f"is {value:g} Pa: tyres have 20 to 2000 kPa; are [UNITS] those of the pressure?")
+        elif not float(r.PRESMIN) <= value <= float(r.PRESMAX):
+            yield Finding(
+                key, f"is {value:g} Pa, outside PRESMIN to PRESMAX, {float(r.PRESMIN):g} to {float(r.PRESMAX):g} Pa"
+            )
+
+
+def _scaling(tyre: MFTyre) -> Iterator[Finding]:
+    factors = {name: float(value) for name, value in vars(tyre.scaling).items()}
+    changed = [f"{name} = {value:g}" for name, value in factors.items() if value != 1]
+    if changed:
+        yield Finding("scaling", f"{', '.join(changed)}: not 1, so the tyre differs from what was measured")
+
+
+def _body(tyre: MFTyre) -> Iterator[Finding]:
+    s = tyre.structure
+    radius, rim, load = float(s.UNLOADED_RADIUS), float(s.RIM_RADIUS), float(s.FNOMIN)
+    if not 0.05 <= radius <= 1.5:
+        yield Finding("UNLOADED_RADIUS", f"is {radius:g} m: wheels have 0.05 to 1.5 m; does [UNITS] hold?")
+    if rim >= radius:
+        yield Finding("RIM_RADIUS", f"is {rim:g} m, not less than UNLOADED_RADIUS, {radius:g} m")
+    if not 100 <= load <= 1e5:
+        yield Finding("FNOMIN", f"is {load:g} N: wheels carry 100 to 100000 N; does [UNITS] hold?")
+
+
+def _shapes(tyre: MFTyre) -> Iterator[Finding]:
+    for key, shape in (
+        ("PCX1", tyre.longitudinal.PCX1 * tyre.scaling.LCX),
+        ("PCY1", tyre.lateral.PCY1 * tyre.scaling.LCY),
+    ):
+        if float(shape) <= 0:
+            yield Finding(key, f"gives a shape factor C of {float(shape):g}: must be positive")
+        elif not 1 <= float(shape) <= 2:
+            what = "the force never peaks" if float(shape) < 1 else "the force turns round at large slip"
+            yield Finding(key, f"gives a shape factor C of {float(shape):g}: usual are 1 to 2; {what}")
+
+
+def _usual(tyre: MFTyre) -> Iterator[Finding]:
+    """The tyre that rolls freely at its nominal load, against what tyres do."""
+    s = tyre.structure
+    found = _outputs(tyre, Contact(load=s.FNOMIN * tyre.scaling.LFZO))
+    for field, (what, least, most, unit) in USUAL.items():
+        value = float(getattr(found, field))
+        if field in PER_LOAD:
+            value /= float(s.FNOMIN * tyre.scaling.LFZO)
+        elif field in PER_RADIUS:
+            value /= float(s.UNLOADED_RADIUS)
+        if not least <= value <= most:
+            advice = "; is PKY1 meant for other axes than ISO-W?" if field == "K_ya" and value < 0 else ""
+            yield Finding(what, f"is {value:.3g}{unit} at nominal load; usual are {least:g} to {most:g}{advice}")
+
+
+def _friction_over_range(tyre: MFTyre) -> Iterator[Finding]:
+    """D > 0 at every load, camber and pressure of the ranges, where it is so at nominal load."""
+    r, s = tyre.ranges, tyre.structure
+    own = float(s.INFLPRES)
+    pressures = [max(float(r.PRESMIN), own / 2), own, min(float(r.PRESMAX), own * 2)]
+    load, camber, pressure = np.meshgrid(_loads(tyre), [float(r.CAMMIN), 0.0, float(r.CAMMAX)], pressures)
+    at = Contact(load=jnp.asarray(load), camber=jnp.asarray(camber), pressure=jnp.asarray(pressure))
+    nominal, found = _outputs(tyre, Contact(load=s.FNOMIN * tyre.scaling.LFZO)), _outputs(tyre, at)
+    for field, what in (("mu_x", "friction along"), ("mu_y", "friction across")):
+        mu = np.asarray(getattr(found, field))
+        if float(getattr(nominal, field)) > 0 >= mu.min():
+            worst = np.unravel_index(mu.argmin(), mu.shape)
+            place = (
+                f"{load[worst]:g} N, camber {math.degrees(camber[worst]):.3g} degrees, {pressure[worst] / 1e5:.3g} bar"
+            )
+            yield Finding(what, f"is {mu.min():.3g} at {place}, within the file's ranges: must be positive")
+
+
+def _curvature(tyre: MFTyre) -> Iterator[Finding]:
+    """E <= 1 at every load, without camber (with it E is far off in most files); the equations hold it at 1."""
+    x, y, z, s, df_z = tyre.longitudinal, tyre.lateral, tyre.aligning, tyre.scaling, _df_z(tyre)
+    along = (x.PEX1 + x.PEX2 * df_z + x.PEX3 * df_z**2) * s.LEX
+    across = (y.PEY1 + y.PEY2 * df_z) * s.LEY
+    trail = z.QEZ1 + z.QEZ2 * df_z + z.QEZ3 * df_z**2
+    curvatures = {
+        "PEX1 to PEX4": along + jnp.abs(along * x.PEX4),
+        "PEY1 to PEY3": across + jnp.abs(across * y.PEY3),
+        "QEZ1 to QEZ4": trail + jnp.abs(trail * z.QEZ4),
+        "REX1, REX2": x.REX1 + x.REX2 * df_z,
+        "REY1, REY2": y.REY1 + y.REY2 * df_z,
+    }
+    for about, curvature in curvatures.items():
+        worst = int(jnp.argmax(curvature))
+        if curvature[worst] > 1:
+            says = f"give a curvature factor E of {float(curvature[worst]):.3g} at {_loads(tyre)[worst]:.0f} N: it is held at 1"
+            yield Finding(about, says)
+
+
+def _aligning(tyre: MFTyre) -> Iterator[Finding]:
+    z, df_z = tyre.aligning, _df_z(tyre)
+    if float(z.QDZ1) == 0 and float(z.QDZ2) == 0:
+        return  # no trail was fitted
+    if float(z.QCZ1) <= 0:
+        yield Finding("QCZ1", f"is {float(z.QCZ1):g}: the shape factor of the trail must be positive")
+    slope = np.asarray(z.QBZ1 + z.QBZ2 * df_z + z.QBZ3 * df_z**2)
+    if slope.min() <= 0:
+        load = _loads(tyre)[slope.argmin()]
+        yield Finding("QBZ1 to QBZ3", f"give a slope of the trail of {slope.min():.3g} at {load:g} N: must be positive")
+
+
+def _combined(tyre: MFTyre) -> Iterator[Finding]:
+    """The weights of combined slip are positive: a force fades with the other slip, and never turns round."""
+    r = tyre.ranges
+    slip_ratio, slip_angle = min(-float(r.KPUMIN), 0.5), min(float(r.ALPMAX), 0.5)
+    if slip_ratio <= 0 or slip_angle <= 0:
+        return
+    load, ratio, angle = np.meshgrid(
+        _loads(tyre)[1:], np.linspace(0.05, 1, 2 * GRID) * slip_ratio, np.linspace(0.05, 1, 2 * GRID) * slip_angle
+    )
+    force = lambda a, k: _outputs(
+        tyre, Contact(slip_angle=jnp.asarray(a), slip_ratio=jnp.asarray(k), load=jnp.asarray(load))
+    )
+    brakes, turns = force(angle, -ratio), force(-angle, -ratio)
+    alone_x, alone_y = force(0 * angle, -ratio).F_x, force(angle, 0 * ratio).F_y - force(-angle, 0 * ratio).F_y
+    # What slip ratio adds to F_y is the same for both slip angles, so that it is not in their difference.
+    for about, name, weight, slip in (
+        ("RBX1 to RHX1", "F_x", np.asarray(brakes.F_x / alone_x), np.degrees(angle)),
+        ("RBY1 to RHY2", "F_y", np.asarray((brakes.F_y - turns.F_y) / alone_y), -ratio),
+    ):
+        if weight.min() < 0:
+            worst, unit = np.unravel_index(weight.argmin(), weight.shape), " degrees" if name == "F_x" else ""
+            what = "slip angle" if name == "F_x" else "slip ratio"
+            says = f"turn {name} round: {weight.min():.3g} of it is left at {load[worst]:.0f} N and a {what} of"
+            yield Finding(about, f"{says} {slip[worst]:.3g}{unit}; must be positive")
+
+
+def _moments(tyre: MFTyre) -> Iterator[Finding]:
+    c = vars(tyre.overturning)
+    told = lambda numbers: [f"QSX{k}" for k in numbers if float(c[f"QSX{k}"]) != 0]
+    first, second = told(range(1, 12)), told(range(12, 15))
+    if tyre.version == 61 and first and second:
+        yield Finding(
+            ", ".join(second), "are not 0, nor are QSX1 to QSX11: two forms of M_x that MF-Tyre does not take together"
+        )
+    rolling = float(tyre.rolling.QSY1)
+    if not 0 <= rolling <= 0.05:
+        yield Finding("QSY1", f"is {rolling:g}: rolling resistance over load is usually 0 to 0.05")
+
+
+def _unread(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
+    """Coefficients of forces and moments that do something, and that are not read; names in small letters; tables."""
+    known = {name for part in vars(tyre).values() if isinstance(part, eqx.Module) for name in vars(part)}
+    unread: dict[str, list[str]] = {}
+    for entry in file.entries:
+        if entry.key in known or entry.key in DYNAMIC or isinstance(entry.value, str):
+            continue
+        if entry.key.upper() in known:
+            yield Finding(entry.key, f"in [{entry.section}], line {entry.line}, is not read: write {entry.key.upper()}")
+        elif entry.section.endswith("COEFFICIENTS") or entry.section.startswith("TURNSLIP"):
+            neutral = NEUTRAL.get(entry.key, 1.0 if entry.section.startswith("SCALING") else 0.0)
+            if entry.value != neutral:
+                unread.setdefault(entry.section, []).append(entry.key)
+    for section, keys in unread.items():
+        listed = ", ".join(keys) if len(keys) <= 6 else f"{', '.join(keys[:3])} and {len(keys) - 3} more"
+        yield Finding(f"[{section}]", f"{listed}: not read, and not neutral")
+    if DEFLECTIONS in (line.strip().upper() for line in file.lines):
+        yield Finding(DEFLECTIONS, "is not read: the deflection follows VERTICAL_STIFFNESS")
+
+
+@eqx.filter_jit
+def _outputs(tyre: MFTyre, contact: Contact) -> Any:
+    return tyre.outputs(contact)
+
+
+def _loads(tyre: MFTyre) -> np.ndarray:
+    """Loads over the file's range, but from a tenth to three times the nominal one."""
+    r, nominal = tyre.ranges, float(tyre.structure.FNOMIN * tyre.scaling.LFZO)
+    return np.linspace(max(float(r.FZMIN), 0.1 * nominal), min(float(r.FZMAX), 3 * nominal), GRID)
+
+
+def _df_z(tyre: MFTyre) -> jax.Array:
+    return jnp.asarray(_loads(tyre)) / (tyre.scaling.LFZO * tyre.structure.FNOMIN) - 1

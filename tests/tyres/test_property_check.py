@@ -1,0 +1,199 @@
+"""What is worth a look in a property file: each finding once, and no alarm for good files."""
+
+import pytest
+from shared_data import shared, shared_names
+
+from jaxveh import tyres
+from jaxveh.io.property_file import parse_property_file
+
+GOOD = """\
+[UNITS]
+LENGTH = 'meter'
+FORCE = 'newton'
+ANGLE = 'radians'
+[MODEL]
+FITTYP = 61
+TYRESIDE = 'LEFT'
+USE_MODE = 124
+LONGVL = 16.7
+[DIMENSION]
+UNLOADED_RADIUS = 0.3135
+WIDTH = 0.205
+RIM_RADIUS = 0.1905
+[OPERATING_CONDITIONS]
+INFLPRES = 220000
+NOMPRES = 220000
+[VERTICAL]
+FNOMIN = 4000
+VERTICAL_STIFFNESS = 200000
+[STRUCTURAL]
+LONGITUDINAL_STIFFNESS = 400000
+LATERAL_STIFFNESS = 100000
+[INFLATION_PRESSURE_RANGE]
+PRESMIN = 150000
+PRESMAX = 350000
+[VERTICAL_FORCE_RANGE]
+FZMIN = 100
+FZMAX = 10000
+[LONG_SLIP_RANGE]
+KPUMIN = -1
+KPUMAX = 1
+[SLIP_ANGLE_RANGE]
+ALPMIN = -0.6
+ALPMAX = 0.6
+[INCLINATION_ANGLE_RANGE]
+CAMMIN = -0.1
+CAMMAX = 0.1
+[SCALING_COEFFICIENTS]
+LMUX = 1
+LMUV = 0
+[LONGITUDINAL_COEFFICIENTS]
+PCX1 = 1.6
+PDX1 = 1.1
+PDX2 = -0.1
+PDX3 = 0
+PEX1 = -0.5
+PKX1 = 20
+RBX1 = 9
+RBX2 = 5
+RCX1 = 0.9
+REX1 = -1
+[OVERTURNING_COEFFICIENTS]
+QSX3 = 0.05
+QSX13 = 0
+[LATERAL_COEFFICIENTS]
+PCY1 = 1.3
+PDY1 = 1.0
+PDY2 = -0.1
+PEY1 = -0.5
+PHY1 = 0
+PKY1 = -20
+PKY2 = 2
+RBY1 = 9
+RBY2 = 5
+RCY1 = 1
+REY1 = -1
+[ROLLING_COEFFICIENTS]
+QSY1 = 0.01
+[ALIGNING_COEFFICIENTS]
+QBZ1 = 10
+QBZ2 = -1
+QCZ1 = 1.1
+QDZ1 = 0.1
+QEZ1 = -1
+"""
+
+OLD = GOOD.replace("FITTYP = 61", "PROPERTY_FILE_FORMAT = 'PAC2002'").replace(
+    "[ROLLING", "PTY1 = 2\nPTY2 = 2\n[ROLLING"
+).replace("[OVERTURNING", "PTX1 = 2\n[OVERTURNING")  # fmt: skip
+
+
+def found(text):
+    return [f"{finding.about} {finding.says}" for finding in tyres.check_property_file(parse_property_file(text))]
+
+
+@pytest.mark.parametrize("text", [GOOD, OLD])
+def test_a_good_file_gives_no_alarm(text):
+    assert found(text) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("TYRESIDE = 'LEFT'\n", "", "TYRESIDE is missing"),
+        ("'LEFT'", "'UNKNOWN'", "TYRESIDE is 'UNKNOWN', neither LEFT nor RIGHT"),
+        ("FITTYP = 61", "PROPERTY_FILE_FORMAT = 'MF-TYRE'\nPTX1 = 2\nPTY1 = 2", "FITTYP is missing: 5.2 is taken"),
+        ("FITTYP = 61", "FITTYP = 60", "FITTYP is 60: the equations of 6.1"),
+        ("USE_MODE = 124", "USE_MODE = -14", "USE_MODE is -14: asks for a mirrored tyre"),
+        ("USE_MODE = 124", "USE_MODE = 13", "USE_MODE is 13: fitted without combined slip"),
+        (GOOD[: GOOD.index("[MODEL]")], "", "[UNITS] is missing"),
+        ("'radians'", "'degrees'", "ANGLE is 'degrees'"),
+        ("LONGVL = 16.7\n", "", "LONGVL is missing: 16.7 is taken"),
+        ("LONGVL = 16.7", "LONGVL = 60", "LONGVL is 60 m/s: tyres are measured at 5 to 50 m/s"),
+        ("VERTICAL_STIFFNESS = 200000\n", "", "VERTICAL_STIFFNESS is missing: 200000 is taken"),
+        ("NOMPRES = 220000\n", "", "NOMPRES is missing: 220000 is taken"),
+        ("LATERAL_STIFFNESS = 100000\n", "", "LATERAL_STIFFNESS is missing: 100000 is taken"),
+        ("LONGITUDINAL_STIFFNESS = 400000\n", "", "LONGITUDINAL_STIFFNESS is missing: 300000 is taken"),
+        ("ALPMIN = -0.6", "ALPMIN = 0.7", "ALPMIN, ALPMAX are 0.7 and 0.6: the range is empty"),
+        ("FZMIN = 100\n", "FZMIN = 10000\n", "FZMIN, FZMAX are 10000 and 10000: the range is empty"),
+        ("KPUMAX = 1", "KPUMAX = 0", "KPUMIN, KPUMAX are -1 and 0: one side only"),
+        ("ALPMAX = 0.6", "ALPMAX = 15", "ALPMAX is 15: must be in radians"),
+        ("CAMMIN = -0.1", "CAMMIN = -5", "CAMMIN is -5: must be in radians"),
+        ("KPUMIN = -1", "KPUMIN = -100", "KPUMIN is -100: a slip ratio of 1 is 100 %"),
+        ("FZMAX = 10000", "FZMAX = 3000", "FNOMIN times LFZO is 4000 N, outside FZMIN to FZMAX, 100 to 3000 N"),
+        ("NOMPRES = 220000", "NOMPRES = 2.2", "NOMPRES is 2.2 Pa: tyres have 20 to 2000 kPa"),
+        ("INFLPRES = 220000", "INFLPRES = 400000", "INFLPRES is 400000 Pa, outside PRESMIN to PRESMAX"),
+        ("LMUX = 1", "LMUX = 0.8", "scaling LMUX = 0.8: not 1"),
+        ("UNLOADED_RADIUS = 0.3135", "UNLOADED_RADIUS = 313.5", "UNLOADED_RADIUS is 313.5 m: wheels have"),
+        ("RIM_RADIUS = 0.1905", "RIM_RADIUS = 0.381", "RIM_RADIUS is 0.381 m, not less than UNLOADED_RADIUS"),
+        ("FNOMIN = 4000", "FNOMIN = 4", "FNOMIN is 4 N: wheels carry"),
+        ("PCX1 = 1.6", "PCX1 = -1.6", "PCX1 gives a shape factor C of -1.6: must be positive"),
+        ("PCY1 = 1.3", "PCY1 = 2.3", "PCY1 gives a shape factor C of 2.3: usual are 1 to 2; the force turns round"),
+        ("PCY1 = 1.3", "PCY1 = 0.9", "PCY1 gives a shape factor C of 0.9: usual are 1 to 2; the force never peaks"),
+        ("PDX1 = 1.1", "PDX1 = 11", "friction along is 11 at nominal load; usual are 0.2 to 3"),
+        ("PDY1 = 1.0", "PDY1 = -0.7", "friction across is -0.7 at nominal load"),
+        ("PKX1 = 20", "PKX1 = 2", "slip stiffness over load is 2 at nominal load; usual are 5 to 80"),
+        (
+            "PKY1 = -20",
+            "PKY1 = 20",
+            "cornering stiffness over load is -16 1/rad at nominal load; usual are 3 to 60; is PKY1",
+        ),
+        ("VERTICAL_STIFFNESS = 200000", "VERTICAL_STIFFNESS = 2e6", "deflection over radius is 0.00638"),
+        ("QDZ1 = 0.1", "QDZ1 = -0.1", "pneumatic trail over radius is -0.1 at nominal load"),
+        ("PHY1 = 0", "PHY1 = 0.02", "lateral force without slip angle over load is -0.311"),
+        ("PDX2 = -0.1", "PDX2 = -1.1", "friction along is -0.55 at 10000 N, camber -5.73 degrees, 1.5 bar"),
+        ("PDX3 = 0", "PDX3 = 150", "friction along is -0.595 at 400 N, camber -5.73 degrees"),
+        ("PDY2 = -0.1", "PDY2 = -1", "friction across is -0.5 at 10000 N"),
+        ("PEX1 = -0.5", "PEX1 = 1.2", "PEX1 to PEX4 give a curvature factor E of 1.2 at"),
+        ("PEY1 = -0.5", "PEY1 = -0.5\nPEY2 = 2", "PEY1 to PEY3 give a curvature factor E of 2.5 at 10000 N"),
+        ("QEZ1 = -1", "QEZ1 = 0.8\nQEZ4 = 0.5", "QEZ1 to QEZ4 give a curvature factor E of 1.2 at"),
+        ("REX1 = -1", "REX1 = 1.1", "REX1, REX2 give a curvature factor E of 1.1 at"),
+        ("REY1 = -1", "REY1 = 1.1", "REY1, REY2 give a curvature factor E of 1.1 at"),
+        ("QCZ1 = 1.1", "QCZ1 = 0", "QCZ1 is 0: the shape factor of the trail must be positive"),
+        ("QBZ2 = -1", "QBZ2 = -8", "QBZ1 to QBZ3 give a slope of the trail of -2 at 10000 N"),
+        ("RCX1 = 0.9", "RCX1 = 1.6", "RBX1 to RHX1 turn F_x round: "),
+        ("RCY1 = 1\n", "RCY1 = 1.6\n", "RBY1 to RHY2 turn F_y round: "),
+        ("QSX13 = 0", "QSX13 = 0.1", "QSX13 are not 0, nor are QSX1 to QSX11"),
+        ("QSY1 = 0.01", "QSY1 = 0.1", "QSY1 is 0.1: rolling resistance over load is usually 0 to 0.05"),
+        ("PKX1 = 20", "PKX1 = 20\nPXX9 = 0.3", "[LONGITUDINAL_COEFFICIENTS] PXX9: not read, and not neutral"),
+        ("LMUX = 1", "LMUX = 1\nLGAY = 0.5", "[SCALING_COEFFICIENTS] LGAY: not read, and not neutral"),
+        ("LMUV = 0", "LMUV = 1", "[SCALING_COEFFICIENTS] LMUV: not read"),
+        ("QSX3 = 0.05", "qsx3 = 0.05", "qsx3 in [OVERTURNING_COEFFICIENTS], line 53, is not read: write QSX3"),
+        ("[STRUCTURAL]", "[DEFLECTION_LOAD_CURVE]\n{pen fz}\n[STRUCTURAL]", "[DEFLECTION_LOAD_CURVE] is not read"),
+    ],
+)
+def test_each_finding(old, new, expected):
+    assert old in GOOD
+    assert any(line.startswith(expected) for line in found(GOOD.replace(old, new, 1))), found(GOOD.replace(old, new, 1))
+
+
+def test_neutral_coefficients_that_are_not_read_are_no_alarm():
+    assert found(GOOD.replace("LMUX = 1", "LMUX = 1\nLGAY = 1").replace("QSX13 = 0", "QSX13 = 0\nQTZ1 = 0.2")) == []
+
+
+def test_relaxation_of_the_old_version():
+    assert [
+        line.partition(" at")[0] for line in found(OLD.replace("PTX1 = 2", "PTX1 = 0").replace("PTY1 = 2", "PTY1 = 0"))
+    ] == [
+        "relaxation length along is 0 m",
+        "relaxation length across is 0 m",
+    ]
+
+
+def test_many_coefficients_are_not_listed_in_full():
+    many = "".join(f"PXX{k} = 1\n" for k in range(1, 10))
+    assert "[ROLLING_COEFFICIENTS] PXX1, PXX2, PXX3 and 6 more: not read, and not neutral" in found(
+        GOOD.replace("QSY1 = 0.01\n", f"QSY1 = 0.01\n{many}")
+    )
+
+
+@pytest.mark.parametrize("name", shared_names("tyres", "*.tir"))
+def test_real_files_do_not_drown_in_alarms(name):
+    findings = tyres.check_property_file(shared("tyres") / name)
+    assert len(findings) <= 6, findings
+    odd = {
+        "chrono__feda__tires__335_65R22_5_G275MSA_40psi.tir": {"TYRESIDE", "friction across", "KPUMIN, KPUMAX"},
+        "chrono__hmmwv__tire__HMMWV_pacejka.tir": {"deflection over radius"},
+        "chrono__Polaris__Polaris_Pac02Tire.tir": {"scaling", "REX1, REX2"},
+    }
+    assert odd.get(name, set()) <= {finding.about for finding in findings}
