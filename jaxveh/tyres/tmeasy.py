@@ -18,6 +18,9 @@ from jaxveh.tyres.slip import theoretical
 MOST_LOAD = 3.0
 """The load over the nominal one up to which the interpolation is followed."""
 
+LEAST_GRIP = 1e-6
+"""The least friction by which slips are divided: below it only the forces scale."""
+
 NO_SLIP = 1e-12
 """Below this normalised slip the direction is not resolved: its square would underflow in float32."""
 
@@ -123,8 +126,8 @@ class TMeasy(AbstractTyre):
         y = _at_load(self.lateral, self.twice_lateral, ratio)
         # Friction m scales slips and forces of the curves alike: F(s) = m F_1(s / m).
         limit = contact.friction * (load / self.nominal_load)
-        grip = jnp.asarray(contact.friction * jnp.ones_like(load))
-        slip_x, slip_y = (slip / jnp.where(grip > 0, grip, 1.0) for slip in theoretical(contact))
+        grip = jnp.maximum(contact.friction * jnp.ones_like(load), LEAST_GRIP)
+        slip_x, slip_y = (slip / grip for slip in theoretical(contact))
         F_x, F_y = (limit * force for force in _combined(x, y, slip_x, slip_y))
         if self.trail is None:
             return Forces(F_x=F_x, F_y=F_y)
