@@ -1,30 +1,50 @@
 """Force laws of one wheel (or one axle) at one instant: contact in, forces out."""
 
+from jaxveh.tyres.arctangent import Arctangent
 from jaxveh.tyres.base import AbstractDynamicTyre, AbstractTyre, Contact, Forces, cornering_stiffness
 from jaxveh.tyres.brush import Brush
 from jaxveh.tyres.dugoff import Dugoff
+from jaxveh.tyres.exponential import Exponential
 from jaxveh.tyres.fiala import Fiala
+from jaxveh.tyres.fiala_adams import FialaADAMS
+from jaxveh.tyres.fiala_polynomial import FialaPolynomial
+from jaxveh.tyres.hsri import HSRI
 from jaxveh.tyres.linear import Linear
+from jaxveh.tyres.linear_with_load import LinearWithLoad
 from jaxveh.tyres.magic_formula import MagicFormula
 from jaxveh.tyres.mf_tyre import MFOutputs, MFTyre
 from jaxveh.tyres.mirrored import Mirrored
+from jaxveh.tyres.parabolic import Parabolic
 from jaxveh.tyres.property_check import Finding, check_property_file
 from jaxveh.tyres.property_file import from_property_file
+from jaxveh.tyres.tmeasy import TMeasy, TMeasyCurve, TMeasyTrail
+from jaxveh.tyres.unitire import UniTire
 
 __all__ = [
+    "HSRI",
     "AbstractDynamicTyre",
     "AbstractTyre",
+    "Arctangent",
     "Brush",
     "Contact",
     "Dugoff",
+    "Exponential",
     "Fiala",
+    "FialaADAMS",
+    "FialaPolynomial",
     "Finding",
     "Forces",
     "Linear",
+    "LinearWithLoad",
     "MFOutputs",
     "MFTyre",
     "MagicFormula",
     "Mirrored",
+    "Parabolic",
+    "TMeasy",
+    "TMeasyCurve",
+    "TMeasyTrail",
+    "UniTire",
     "check_property_file",
     "cornering_stiffness",
     "from_property_file",

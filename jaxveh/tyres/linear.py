@@ -11,13 +11,22 @@ from jaxveh.tyres.base import AbstractTyre, Contact, Forces
 
 
 class Linear(AbstractTyre):
-    """`F_y = cornering_stiffness * slip_angle` (N/rad), without limit: load, friction and camber do not count."""
+    """`F_y = cornering_stiffness * slip_angle` (N/rad), `F_x = slip_stiffness * slip_ratio` (N), both without limit.
+
+    Load, friction and camber do not count. Without a slip stiffness (None) there is no longitudinal force.
+
+    **Raises** `InputError` for stiffnesses that are not positive.
+    """
 
     cornering_stiffness: jax.Array = positive("N/rad")
+    slip_stiffness: jax.Array | None = positive("N", default=None)
 
     def __check_init__(self):
         check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
-        """Lateral force alone, N, in the shape of the slip angle."""
-        return Forces(F_y=self.cornering_stiffness * contact.slip_angle)
+        """F_y, N, in the shape of the slip angle; with a slip stiffness F_x, N, in the shape of the slip ratio."""
+        F_y = self.cornering_stiffness * contact.slip_angle
+        if self.slip_stiffness is None:
+            return Forces(F_y=F_y)
+        return Forces(F_x=self.slip_stiffness * contact.slip_ratio, F_y=F_y)

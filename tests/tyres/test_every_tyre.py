@@ -1,4 +1,8 @@
-"""What holds for every tyre of combined slip, each in turn."""
+"""What holds for every tyre without states, each in turn: a new one is a line in `LAWS` that says what it can do."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -9,6 +13,7 @@ from hypothesis import strategies as st
 from shared_data import shared
 
 from jaxveh import statespace, tyres
+from jaxveh._core.bijectors import Positive
 from jaxveh._core.errors import InputError
 from jaxveh.tyres import Contact
 
@@ -19,25 +24,75 @@ def mf_tyre():
     return tyres.from_property_file(shared("tyres") / "mfeval__PacejkaBook_Defaults.tir")
 
 
-TYRES = {
-    "Brush": lambda: tyres.Brush(80000.0, 60000.0, 0.9),
-    "Dugoff": lambda: tyres.Dugoff(80000.0, 60000.0, 0.9),
-    "Dugoff, fading": lambda: tyres.Dugoff(80000.0, 60000.0, 0.9, 0.01),
-    "Fiala": lambda: tyres.Fiala(80000.0, 60000.0, 0.9),
-    "MF-Tyre": mf_tyre,
-    "MF-Tyre, mirrored": lambda: tyres.Mirrored(mf_tyre()),
+def tmeasy(twice=True):
+    curve = tyres.TMeasyCurve
+    one = curve(90000.0, 0.11, 3300.0, 0.40, 3200.0), curve(75000.0, 0.16, 3100.0, 0.60, 3000.0)
+    two = curve(160000.0, 0.12, 6000.0, 0.45, 5700.0), curve(120000.0, 0.18, 5500.0, 0.70, 5400.0)
+    return tyres.TMeasy(*one, 3000.0, *(two if twice else ()), trail=tyres.TMeasyTrail(0.035, 0.20, 0.45))
+
+
+class Law(NamedTuple):
+    """A tyre and what it can do.
+
+    `bound` is the most force over load (None: no bound), `combined` whether it has longitudinal forces, `symmetric` whether a
+    mirror turns it, `load` whether it needs a load, `friction` whether the road's friction counts.
+    """
+
+    make: Callable[[], tyres.AbstractTyre]
+    bound: float | None = 0.9
+    combined: bool = True
+    symmetric: bool = True
+    load: bool = True
+    friction: bool = True
+
+
+LAWS = {
+    "Arctangent": Law(lambda: tyres.Arctangent(20000.0, 12.0, 0.9), bound=0.9 * np.pi / 2, combined=False),
+    "Brush": Law(lambda: tyres.Brush(80000.0, 60000.0, 0.9)),
+    "Dugoff": Law(lambda: tyres.Dugoff(80000.0, 60000.0, 0.9)),
+    "Dugoff, fading": Law(lambda: tyres.Dugoff(80000.0, 60000.0, 0.9, 0.01)),
+    "Exponential": Law(lambda: tyres.Exponential(15.0, 0.9, 20.0)),
+    "Exponential, lateral": Law(lambda: tyres.Exponential(15.0, 0.9), combined=False),
+    # What Fiala leaves sideways at full braking.
+    "Fiala": Law(lambda: tyres.Fiala(80000.0, 60000.0, 0.9), bound=0.9 * np.sqrt(1.01)),
+    "FialaADAMS": Law(lambda: tyres.FialaADAMS(80000.0, 60000.0, 0.9, 0.7), bound=0.9 * np.sqrt(2)),
+    "FialaPolynomial": Law(lambda: tyres.FialaPolynomial(80000.0, 60000.0, 0.9), bound=0.9 * np.hypot(1, 1.00631)),
+    "HSRI": Law(lambda: tyres.HSRI(80000.0, 60000.0, 0.9)),
+    "Linear": Law(lambda: tyres.Linear(60000.0, 80000.0), bound=None, load=False, friction=False),
+    "LinearWithLoad": Law(lambda: tyres.LinearWithLoad(60000.0, 5000.0, 20.0), bound=None, friction=False),
+    "MF-Tyre": Law(mf_tyre, bound=None, symmetric=False),
+    "MagicFormula": Law(lambda: tyres.MagicFormula(10.0, 1.4, 3600.0, -0.8, nominal_load=LOAD), combined=False),
+    "Mirrored": Law(lambda: tyres.Mirrored(tyres.Brush(80000.0, 60000.0, 0.9))),
+    "Parabolic": Law(lambda: tyres.Parabolic(60000.0, 0.9, 80000.0)),
+    "Parabolic, lateral": Law(lambda: tyres.Parabolic(60000.0, 0.9), combined=False),
+    # Its friction is greatest without load.
+    "TMeasy": Law(tmeasy, bound=(2 * 3300 - 6000 / 2) / 3000),
+    "TMeasy, one load": Law(lambda: tmeasy(twice=False), bound=3300 / 3000),
+    "UniTire": Law(lambda: tyres.UniTire(80000.0, 60000.0, 0.9, 0.4)),
 }
-SYMMETRIC = [name for name in TYRES if not name.startswith("MF-Tyre")]
 
 
-@pytest.fixture(params=TYRES)
-def tyre(request):
-    return TYRES[request.param]()
+def those(**able):
+    """The names of the tyres that can do all of this."""
+    return [name for name, law in LAWS.items() if all(getattr(law, what) == value for what, value in able.items())]
 
 
-def contact(slip_angle=0.0, slip_ratio=0.0, load=LOAD, dtype=jnp.float64):
+BOUNDED = [name for name, law in LAWS.items() if law.bound is not None]
+
+
+@pytest.fixture(params=LAWS)
+def law(request):
+    return LAWS[request.param]
+
+
+@pytest.fixture
+def tyre(law):
+    return law.make()
+
+
+def contact(slip_angle=0.0, slip_ratio=0.0, load=LOAD, dtype=jnp.float64, friction=1.0):
     number = lambda value: jnp.asarray(value, dtype)
-    return Contact(number(slip_angle), number(slip_ratio), number(load), number(0.0), number(1.0), number(20.0))
+    return Contact(number(slip_angle), number(slip_ratio), number(load), number(0.0), number(friction), number(20.0))
 
 
 @jax.jit
@@ -69,34 +124,79 @@ def test_values_and_gradients_are_finite(tyre, point, load, dtype):
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(backward(tyre, at)))
 
 
-def test_forces_vanish_with_the_load(tyre):
-    assert np.all(np.abs(vector(tyre, contact(0.2, 0.1, 0.0))[:2]) == 0.0)
+@pytest.mark.parametrize("name", those(load=True))
+def test_forces_vanish_with_the_load(name):
+    tyre = LAWS[name].make()
+    for slips in ((0.2, 0.1), (1e-5, -1e-5)):
+        for none in (0.0, -100.0):
+            assert np.all(np.abs(vector(tyre, contact(*slips, none))) == 0.0)
     small, whole = vector(tyre, contact(0.2, 0.1, 1.0)), vector(tyre, contact(0.2, 0.1))
     assert np.hypot(*small[:2]) < 1e-3 * np.hypot(*whole[:2])
 
 
-def test_signs_are_those_of_the_package(tyre):
+@pytest.mark.parametrize("name", those(load=True))
+def test_a_load_that_is_needed_and_not_given_raises(name):
+    with pytest.raises(InputError, match=r"contact\.load = None"):
+        LAWS[name].make().forces(Contact(slip_angle=0.1, slip_ratio=0.1, speed=20.0))
+
+
+def test_signs_are_those_of_the_package(law, tyre):
     assert tyre.forces(contact(0.03)).F_y > 0 > tyre.forces(contact(-0.03)).F_y
-    assert tyre.forces(contact(0.0, 0.03)).F_x > 0 > tyre.forces(contact(0.0, -0.03)).F_x
     # The trail turns the wheel towards its course.
     assert float(tyre.forces(contact(0.03)).M_z) <= 0
+    if law.combined:
+        assert tyre.forces(contact(0.0, 0.03)).F_x > 0 > tyre.forces(contact(0.0, -0.03)).F_x
+    else:
+        assert tyre.forces(contact(0.1, 0.2)) == tyre.forces(contact(0.1, 0.0))
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
-@given(st.floats(-1.2, 1.2), st.floats(-1.0, 1.0), st.floats(0.0, 9000.0), st.sampled_from(SYMMETRIC))
-def test_friction_bounds_the_force_and_a_mirror_turns_it(angle, ratio, load, name):
-    tyre = TYRES[name]()
-    F_x, F_y, _, _, M_z = vector(tyre, contact(angle, ratio, load))
-    room = np.sqrt(1.0 + 0.01) if name == "Fiala" else 1.0  # what Fiala leaves sideways at full braking
-    assert np.hypot(F_x, F_y) <= 0.9 * load * room * (1 + 1e-12)
-    mirrored = vector(tyre, contact(-angle, ratio, load))
-    np.testing.assert_allclose(mirrored, [F_x, -F_y, 0, 0, -M_z], atol=1e-9)
+ANGLES, RATIOS, LOADS = st.floats(-1.2, 1.2), st.floats(-1.0, 1.0), st.floats(0.0, 9000.0)
 
 
+@pytest.mark.parametrize("name", BOUNDED)
 @settings(max_examples=40, deadline=None, derandomize=True)
-@given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(500.0, 9000.0), st.sampled_from(sorted(TYRES)))
-def test_gradients_equal_differences(angle, ratio, load, name):
-    tyre = TYRES[name]()
+@given(ANGLES, RATIOS, LOADS, st.floats(0.0, 1.0))
+def test_friction_bounds_the_force(name, angle, ratio, load, friction):
+    F_x, F_y, *_ = vector(LAWS[name].make(), contact(angle, ratio, load, friction=friction))
+    # Forces and slips whose squares underflow have no direction.
+    assert np.hypot(F_x, F_y) <= LAWS[name].bound * friction * load * (1 + 1e-12) + 1e-100
+
+
+@pytest.mark.parametrize("name", those(symmetric=True))
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(ANGLES, RATIOS, LOADS)
+def test_a_mirror_turns_the_force(name, angle, ratio, load):
+    tyre = LAWS[name].make()
+    F_x, F_y, M_x, M_y, M_z = vector(tyre, contact(angle, ratio, load))
+    mirrored = vector(tyre, contact(-angle, ratio, load))
+    np.testing.assert_allclose(mirrored, [F_x, -F_y, -M_x, M_y, -M_z], atol=1e-9)
+
+
+def test_friction_counts_where_it_should(law, tyre):
+    far, icy = vector(tyre, contact(0.3, 0.2)), vector(tyre, contact(0.3, 0.2, friction=0.4))
+    share = np.hypot(*icy[:2]) / np.hypot(*far[:2])
+    if law.friction:
+        assert 0.3 < share < 0.7
+    else:
+        assert share == 1.0
+
+
+@pytest.mark.parametrize("name", [name for name in those(friction=True) if name != "MF-Tyre"])
+def test_without_friction_there_is_no_force_and_gradients_are_finite(name):
+    tyre, at = LAWS[name].make(), contact(0.3, 0.2, friction=0.0)
+    assert np.all(np.abs(vector(tyre, at)) == 0.0)
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(backward(tyre, at)))
+
+
+# Zero, or far from it for the step of a difference: slopes may turn within that step of zero slip (they are one-sided there).
+SLIPS = st.floats(-0.5, 0.5).filter(lambda slip: slip == 0 or abs(slip) > 1e-4)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(SLIPS, SLIPS, st.floats(500.0, 9000.0))
+def test_gradients_equal_differences(name, angle, ratio, load):
+    tyre = LAWS[name].make()
     x, steps, scale = np.array([angle, ratio, load]), np.array([1e-7, 1e-7, 1e-3]), np.array([1e5, 1e5, 1.0])
     here = vector(tyre, contact(*x))
     ahead = np.stack([vector(tyre, contact(*(x + h))) for h in np.diag(steps)], axis=1)
@@ -108,31 +208,37 @@ def test_gradients_equal_differences(angle, ratio, load, name):
     assert np.max(error) < 2e-5
 
 
-@pytest.mark.parametrize("name", ["Brush", "Dugoff", "Fiala"])
+@pytest.mark.parametrize("name", [name for name in LAWS if name != "MF-Tyre"])
+def test_bad_parameters_are_named(name):
+    tyre = LAWS[name].make()
+    positive = [field for field in dataclasses.fields(tyre) if isinstance(field.metadata.get("domain"), Positive)]
+    assert positive
+    for field in positive:
+        for bad in (-1.0, 0.0, np.inf):
+            if getattr(tyre, field.name) is None:
+                continue
+            with pytest.raises(InputError, match=rf"{type(tyre).__name__}\.{field.name} = {bad}: must be positive"):
+                dataclasses.replace(tyre, **{field.name: bad})
+
+
+@pytest.mark.parametrize(
+    "name", ["Brush", "Dugoff", "Fiala", "FialaADAMS", "FialaPolynomial", "HSRI", "Linear", "Parabolic", "UniTire"]
+)
 def test_stiffnesses_are_the_slopes_at_zero(name):
-    tyre = TYRES[name]()
+    tyre = LAWS[name].make()
     np.testing.assert_allclose(tyres.cornering_stiffness(tyre, contact()), 60000.0)
     slope = jax.grad(lambda k: tyre.forces(contact()._replace(slip_ratio=k)).F_x)(jnp.asarray(0.0))
     np.testing.assert_allclose(slope, 80000.0)
 
 
 def test_fiala_without_longitudinal_force_is_the_brush():
-    brush, fiala = TYRES["Brush"](), TYRES["Fiala"]()
+    brush, fiala = LAWS["Brush"].make(), LAWS["Fiala"].make()
     for angle in (0.01, 0.1, 0.17, 0.3):
         np.testing.assert_allclose(vector(fiala, contact(angle)), vector(brush, contact(angle)), rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["Brush", "Dugoff", "Fiala"])
-def test_bad_parameters_are_named(name):
-    kind = getattr(tyres, name)
-    with pytest.raises(InputError, match=f"{name}.cornering_stiffness = -1"):
-        kind(80000.0, -1.0)
-    with pytest.raises(InputError, match="contact.load = None"):
-        kind(80000.0, 60000.0).forces(Contact(slip_angle=0.1))
-
-
 def test_fading_lowers_the_friction_and_needs_a_speed():
-    steady, fading = TYRES["Dugoff"](), TYRES["Dugoff, fading"]()
+    steady, fading = LAWS["Dugoff"].make(), LAWS["Dugoff, fading"].make()
     # 20 m/s times tan(0.5) of sliding, a hundredth a m/s.
     share = fading.forces(contact(0.5)).F_y / steady.forces(contact(0.5)).F_y
     assert 1 - 0.01 * 20 * np.tan(0.5) < share < 0.92

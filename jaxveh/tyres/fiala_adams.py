@@ -1,0 +1,69 @@
+"""Fiala's tyre as ADAMS computes it: each direction by itself, under a friction that falls with the slip of both."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+
+
+class FialaADAMS(AbstractTyre):
+    """The Fiala model of MSC ADAMS (Adams Tire, Using the Fiala Handling Force Model), in this package's signs.
+
+    `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-; UMAX) at rest, `sliding_friction` (-; UMIN) at the slip 1,
+    None for a friction that stays; `half_width` (m; R_2 of the carcass), which scales the aligning moment.
+
+    With `S = sqrt(kappa^2 + tan(alpha)^2)`, at most 1, `mu = UMAX - (UMAX - UMIN) S`:
+
+    - `F_x = C_x kappa` up to `|kappa| = mu F_z / (2 C_x)`, then `mu F_z - (mu F_z)^2 / (4 |kappa| C_x)` with kappa's sign.
+    - With `H = 1 - C |tan(alpha)| / (3 mu F_z)`, up to H = 0: `F_y = mu F_z (1 - H^3)`, `M_z = -2 R_2 mu F_z (1 - H) H^3`, with
+      alpha's sign; beyond, `mu F_z` and 0.
+
+    The directions do not take friction from each other: the total reaches `sqrt(2) mu F_z`. `Fiala` couples them.
+
+    **Raises** `InputError` for parameters that are not positive, or a contact without a load.
+    """
+
+    slip_stiffness: jax.Array = positive("N")
+    cornering_stiffness: jax.Array = positive("N/rad")
+    friction: jax.Array = positive("-", default=1.0)
+    sliding_friction: jax.Array | None = positive("-", default=None)
+    half_width: jax.Array = positive("m", default=0.1)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """F_x, F_y (N) and M_z (N m)."""
+        load = need_load(contact, "FialaADAMS")
+        kappa = contact.slip_ratio + 0.0 * load
+        tangent = numerics.tan(contact.slip_angle + 0.0 * load)
+        limit = self._friction(kappa, tangent) * contact.friction * load
+        F_x = self._longitudinal(kappa, limit)
+
+        wish = self.cornering_stiffness * tangent
+        held = limit > 0
+        q = jnp.abs(wish) / jnp.where(held, 3 * limit, 1.0)
+        sticks = (q < 1) & held
+        H = jnp.where(sticks, 1 - q, 0.0)
+        # mu F_z (1 - H^3) and mu F_z (1 - H), where `wish` is 3 mu F_z (1 - H).
+        F_y = jnp.where(sticks, wish * (1 + H + H**2) / 3, jnp.sign(wish) * limit)
+        M_z = -2 * self.half_width * wish / 3 * H**3
+        return Forces(F_x=F_x, F_y=F_y, M_z=M_z)
+
+    def _friction(self, kappa, tangent):
+        if self.sliding_friction is None:
+            return self.friction
+        slip = jnp.minimum(numerics.hypot(kappa, tangent), 1.0)
+        return self.friction - (self.friction - self.sliding_friction) * slip
+
+    def _longitudinal(self, kappa, limit):
+        wish = self.slip_stiffness * kappa
+        slips = 2 * jnp.abs(wish) > limit
+        part = jnp.where(slips, limit / jnp.where(slips, 2 * jnp.abs(wish), 1.0), 1.0)
+        return wish * part * (2 - part)

@@ -1,0 +1,54 @@
+"""The parabolic tyre: a parabola up to friction, and the friction circle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+
+
+class Parabolic(AbstractTyre):
+    """`F_y = (C alpha - C^2 alpha |alpha| / (4 mu F_z)) sqrt(1 - (F_x / (mu F_z))^2)` up to `|alpha| = 2 mu F_z / C`, its peak.
+
+    R. Chumsamutr, T. Fujioka & M. Abe, Vehicle System Dynamics 44(7), 2006; eq. 5 of the sideslip review (Chen, Gao & Xu,
+    2013; erratum: it has the opposite sign of the review's eqs. 6 and 7).
+
+    - `cornering_stiffness` (N/rad), `friction` (-).
+    - `slip_stiffness` (N): of the same parabola in slip ratio, which gives F_x; None for no longitudinal force. The source takes
+      F_x as known: this is our choice, with which the total stays within `mu F_z`. Where F_x takes all (a locked wheel)
+      the friction circle leaves nothing sideways.
+
+    **Raises** `InputError` for parameters that are not positive, or a contact without a load.
+    """
+
+    cornering_stiffness: jax.Array = positive("N/rad")
+    friction: jax.Array = positive("-", default=1.0)
+    slip_stiffness: jax.Array | None = positive("N", default=None)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """F_y (N), and F_x (N) where a slip stiffness is given."""
+        limit = self.friction * contact.friction * need_load(contact, "Parabolic")
+        F_y, _ = _parabola(self.cornering_stiffness * contact.slip_angle, limit)
+        if self.slip_stiffness is None:
+            return Forces(F_y=F_y)
+        F_x, q = _parabola(self.slip_stiffness * contact.slip_ratio, limit)
+        # sqrt(1 - (F_x / limit)^2), in a form without infinite slope where F_x takes all.
+        left = (1 - q) * numerics.sqrt(1 + q * (2 - q))
+        return Forces(F_x=F_x, F_y=left * F_y)
+
+
+def _parabola(wish, limit):
+    """The force of a wish `C slip` within a limit, and the slip over that of the peak, at most 1."""
+    held = limit > 0
+    q = jnp.abs(wish) / jnp.where(held, 2 * limit, 1.0)
+    sticks = (q < 1) & held
+    q = jnp.where(sticks, q, 1.0)
+    return jnp.where(sticks, wish * (1 - q / 2), jnp.sign(wish) * limit), q

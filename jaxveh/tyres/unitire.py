@@ -1,0 +1,55 @@
+"""UniTire: one exponential of the normalised slip for every load, friction and direction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh.tyres.slip import theoretical
+
+SATURATED = 40.0
+"""The normalised slip from which on the exponential is zero in float64, whatever E."""
+
+
+class UniTire(AbstractTyre):
+    """UniTire in combined slip (K. Guo & D. Lu, UniTire: unified tire model, Vehicle System Dynamics 45 S1, 2007, 79-99).
+
+    `slip_stiffness` K_x (N), `cornering_stiffness` K_y (N/rad), `friction` (-), `E` (-; default 0) the curvature factor.
+    With theoretical slips sigma and the normalised slip `phi = |K sigma| / (mu F_z)` the force is
+    `mu F_z (1 - exp(-phi - E phi^2 - (E^2 + 1/12) phi^3))` along `K sigma`; it rises with phi for every E.
+
+    The steady, speed-independent form: friction is one number for both directions (the source lets it fall with sliding
+    speed), K and E do not follow the load, and the direction is that of the normalised slips at every slip.
+
+    **Raises** `InputError` for stiffnesses or friction that are not positive, or a contact without a load.
+    """
+
+    slip_stiffness: jax.Array = positive("N")
+    cornering_stiffness: jax.Array = positive("N/rad")
+    friction: jax.Array = positive("-", default=1.0)
+    E: jax.Array = parameter("-", scale=0.5, default=0.0)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """F_x and F_y, N."""
+        limit = self.friction * contact.friction * need_load(contact, "UniTire")
+        sigma_x, sigma_y = theoretical(contact)
+        wish_x, wish_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
+        wish = numerics.hypot(wish_x, wish_y)
+        held = limit > 0
+        phi = wish / jnp.where(held, limit, 1.0)
+        rises = (phi < SATURATED) & held
+        phi = jnp.where(rises, phi, SATURATED)
+        exponent = 1 + self.E * phi + (self.E**2 + 1 / 12) * phi**2
+        slides = phi > 0
+        force = -jnp.expm1(-phi * exponent) / jnp.where(slides, phi, 1.0)
+        share = jnp.where(slides, force, 1.0)
+        share = jnp.where(rises, share, limit / jnp.where(wish > 0, wish, 1.0))
+        return Forces(F_x=share * wish_x, F_y=share * wish_y)
