@@ -8,15 +8,21 @@ from jaxveh.tyres.exponential import Exponential
 from jaxveh.tyres.fiala import Fiala
 from jaxveh.tyres.fiala_adams import FialaADAMS
 from jaxveh.tyres.fiala_polynomial import FialaPolynomial
+from jaxveh.tyres.friction_ellipse import FrictionEllipse
 from jaxveh.tyres.hsri import HSRI
 from jaxveh.tyres.linear import Linear
 from jaxveh.tyres.linear_with_load import LinearWithLoad
+from jaxveh.tyres.longitudinal import Longitudinal
+from jaxveh.tyres.lugre import LuGre
 from jaxveh.tyres.magic_formula import MagicFormula
 from jaxveh.tyres.mf_tyre import MFOutputs, MFTyre
 from jaxveh.tyres.mirrored import Mirrored
+from jaxveh.tyres.on_road import OnRoad
 from jaxveh.tyres.parabolic import Parabolic
 from jaxveh.tyres.property_check import Finding, check_property_file
 from jaxveh.tyres.property_file import from_property_file
+from jaxveh.tyres.relaxed import Relaxed
+from jaxveh.tyres.similarity import Similarity
 from jaxveh.tyres.tmeasy import TMeasy, TMeasyCurve, TMeasyTrail
 from jaxveh.tyres.unitire import UniTire
 
@@ -34,13 +40,19 @@ __all__ = [
     "FialaPolynomial",
     "Finding",
     "Forces",
+    "FrictionEllipse",
     "Linear",
     "LinearWithLoad",
+    "Longitudinal",
+    "LuGre",
     "MFOutputs",
     "MFTyre",
     "MagicFormula",
     "Mirrored",
+    "OnRoad",
     "Parabolic",
+    "Relaxed",
+    "Similarity",
     "TMeasy",
     "TMeasyCurve",
     "TMeasyTrail",

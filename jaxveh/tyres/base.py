@@ -84,6 +84,21 @@ def need_load(contact: Contact, tyre: str):
     return jnp.maximum(contact.load, 0.0)
 
 
+def need_speed(contact: Contact, tyre: str):
+    """The speed; raises `InputError` where the contact does not say."""
+    if contact.speed is None:
+        raise InputError(f"contact.speed = None: {tyre} needs the wheel's forward speed in m/s.")
+    return contact.speed
+
+
+def need_static(name: str, tyre) -> None:
+    """Raise `InputError` unless `tyre` is a tyre without states, which is what a wrapper can wrap."""
+    if not isinstance(tyre, AbstractTyre):
+        raise InputError(f"{name} = {type(tyre).__name__}: must be a tyre of jaxveh.tyres.")
+    if isinstance(tyre, AbstractDynamicTyre):
+        raise InputError(f"{name} = {type(tyre).__name__}: must be a tyre without states of its own.")
+
+
 def cornering_stiffness(tyre: AbstractTyre, contact: Contact) -> jax.Array:
     """Slope of the lateral force over slip angle, N/rad, at a contact of scalars; any tyre without states.
 

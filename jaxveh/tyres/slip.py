@@ -1,4 +1,4 @@
-"""Slips in their theoretical form: sliding speed over rolling speed."""
+"""Slips as vectors, and the part of a curve of pure slip that falls on one of their directions."""
 
 from __future__ import annotations
 
@@ -10,9 +10,32 @@ from jaxveh.tyres.base import Contact
 LOCKED = 1e-3
 """The least rolling speed over forward speed: a locked wheel slides a thousand times faster than it rolls."""
 
+SMALLEST = 1e-5
+"""The least length of a slip vector: less than any curve of force over slip can tell from zero."""
+
 
 def theoretical(contact: Contact):
     """`kappa / (1 + kappa)` and `tan(alpha) / (1 + kappa)`, positive like their forces; finite for a locked wheel."""
     angle = contact.slip_angle + 0.0 * contact.slip_ratio
     rolls = jnp.maximum(1.0 + contact.slip_ratio + 0.0 * angle, LOCKED)
     return contact.slip_ratio / rolls, numerics.tan(jnp.asarray(angle)) / rolls
+
+
+def practical(contact: Contact):
+    """`kappa` and `tan(alpha)`: sliding speed over forward speed, positive like their forces."""
+    angle = contact.slip_angle + 0.0 * contact.slip_ratio
+    return contact.slip_ratio + 0.0 * angle, numerics.tan(jnp.asarray(angle))
+
+
+def length(x, y):
+    """`sqrt(x^2 + y^2)`, smooth at zero, where it is `SMALLEST` instead: a division by it is safe."""
+    return jnp.sqrt(x * x + y * y + SMALLEST**2)
+
+
+def share(curve, part, whole):
+    """What a curve of pure slip gives in a direction in which `part` of the slip `whole` points; zero for no part.
+
+    `part / whole * (curve(whole) - curve(0))`, of the curve's other side (`-whole`) where the part is negative.
+    """
+    signed = jnp.where(part < 0, -whole, whole)
+    return part / signed * (curve(signed) - curve(jnp.zeros_like(signed)))

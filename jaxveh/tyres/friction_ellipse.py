@@ -1,0 +1,49 @@
+"""Two laws of pure slip combined: forces on an ellipse whose axes they are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh import numerics
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_static
+from jaxveh.tyres.slip import length, practical, share
+
+
+class FrictionEllipse(AbstractTyre):
+    """Combined slip from `along`, a law of F_x over slip ratio, and `across`, a law of F_y over slip angle.
+
+    Both laws see the whole slip `s = |(kappa, tan(alpha))|`, the sliding speed over the forward speed, and each force is its
+    direction's part, after Bakker, Nyborg & Pacejka (SAE 870421, 1987), here in practical slips:
+
+        F_x = kappa / s F_x0(s),    F_y = tan(alpha) / s F_y0(arctan(s))
+
+    so that `(F_x / F_x0)^2 + (F_y / F_y0)^2 = 1`: an ellipse that never leaves the one of the laws' peaks, slopes at zero slip
+    as in pure slip, and a locked wheel (kappa = -1) is pushed against its sliding, where `sqrt(1 - (F_x / F_max)^2)` is not.
+    With one slip zero the other law is left as it is. Where a slip is negative the law's negative side is taken; a force at
+    zero slip (shifts, camber) is kept whatever the slip, and may leave the ellipse by as much.
+
+    A law that has F_y alone stands along the wheel as `Longitudinal(law)`. The contact's load, camber, friction, speed and
+    pressure reach both laws; moments are left out.
+
+    **Raises** `InputError` for a law that is no tyre, or has states.
+    """
+
+    along: AbstractTyre
+    across: AbstractTyre
+
+    def __check_init__(self):
+        need_static("FrictionEllipse.along", self.along)
+        need_static("FrictionEllipse.across", self.across)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """F_x and F_y, N."""
+        s_x, s_y = practical(contact)
+        s = length(s_x, s_y)
+
+        def along(slip):
+            return self.along.forces(contact._replace(slip_ratio=slip, slip_angle=0.0 * slip)).F_x
+
+        def across(slip):
+            return self.across.forces(contact._replace(slip_ratio=0.0 * slip, slip_angle=numerics.arctan(slip))).F_y
+
+        return Forces(F_x=along(0.0 * s) + share(along, s_x, s), F_y=across(0.0 * s) + share(across, s_y, s))

@@ -1,0 +1,27 @@
+"""A lateral law turned by a quarter: the force along the wheel from the slip ratio."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_static
+
+
+class Longitudinal(AbstractTyre):
+    """`F_x` (N) is the `F_y` of a lateral `law` at `slip_angle = slip_ratio`: its coefficients "per rad" are per unit slip.
+
+    `Longitudinal(MagicFormula(...))` is the Magic Formula of longitudinal slip. Slip angle and camber do not count; load,
+    friction, speed and pressure reach the law.
+
+    **Raises** `InputError` for a law that is no tyre, or has states.
+    """
+
+    law: AbstractTyre
+
+    def __check_init__(self):
+        need_static("Longitudinal.law", self.law)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """Longitudinal force alone, N."""
+        turned = contact._replace(slip_angle=contact.slip_ratio, slip_ratio=0.0, camber=0.0)
+        return Forces(F_x=self.law.forces(turned).F_y)

@@ -1,0 +1,75 @@
+"""Similarity: one measured curve of pure slip stands for all loads, roads and directions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load, need_static
+from jaxveh.tyres.slip import length, share, theoretical
+
+LEAST_FRICTION = 1e-3
+"""The least friction by which the equivalent slip is divided; the force itself vanishes with the road's."""
+
+
+class Similarity(AbstractTyre):
+    """Pacejka's similarity method (H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., sec. 4.2): the lateral curve of `tyre`
+    at `reference_load` F_z0 (N) and friction 1, normalised and stretched.
+
+        F_y = f F_z / F_z0 F_y0(alpha_eq),    tan(alpha_eq) = C(F_z) / C(F_z0) F_z0 / (f F_z) tan(alpha)
+
+    with f the contact's friction: less friction or load shrinks the whole curve towards zero, while the slope at zero slip is
+    the cornering stiffness C(F_z), which friction does not change. (The book scales alpha; its tangent keeps the equivalent
+    slip below a quarter turn on slippery roads.)
+
+    `stiffness_load` (N; default None) is the load of the largest cornering stiffness, `C = C_max sin(2 arctan(F_z /
+    stiffness_load))`; None: C is proportional to the load. `slip_stiffness_ratio` (-; default None) is the slip stiffness over
+    the cornering stiffness: with it the same curve serves combined slip, at the length of the vector (ratio sigma_x, sigma_y)
+    of theoretical slips and along it. With a ratio far from one that direction is not the sliding one when all slides. None: no
+    F_x, and the slip ratio does not count.
+
+    The curve's force at zero slip (shifts, camber) is scaled, and kept whatever the slip. Camber, speed and pressure reach the
+    wrapped tyre; moments are left out.
+
+    **Raises** `InputError` for parameters that are not positive, a tyre with states, or a contact without a load.
+    """
+
+    tyre: AbstractTyre
+    reference_load: jax.Array = positive("N")
+    stiffness_load: jax.Array | None = positive("N", default=None)
+    slip_stiffness_ratio: jax.Array | None = positive("-", default=None)
+
+    def __check_init__(self):
+        need_static("Similarity.tyre", self.tyre)
+        check_parameters(self)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """F_y and, with a `slip_stiffness_ratio`, F_x, N."""
+        load = need_load(contact, "Similarity")
+        scale = contact.friction * (load / self.reference_load)
+        stretch = self._stiffness_per_load(load) / jnp.maximum(contact.friction, LEAST_FRICTION)
+
+        def curve(slip):
+            angle = numerics.arctan(slip)
+            at = contact._replace(slip_angle=angle, slip_ratio=0.0 * slip, load=self.reference_load, friction=1.0)
+            return self.tyre.forces(at).F_y
+
+        if self.slip_stiffness_ratio is None:
+            _, s_y = theoretical(contact._replace(slip_ratio=0.0))
+            return Forces(F_y=scale * curve(stretch * s_y))
+        sigma_x, sigma_y = theoretical(contact)
+        s_x, s_y = stretch * self.slip_stiffness_ratio * sigma_x, stretch * sigma_y
+        s = length(s_x, s_y)
+        return Forces(F_x=scale * share(curve, s_x, s), F_y=scale * (curve(jnp.zeros_like(s)) + share(curve, s_y, s)))
+
+    def _stiffness_per_load(self, load):
+        """Cornering stiffness over load, relative to its value at the reference load."""
+        if self.stiffness_load is None:
+            return 1.0
+        # sin(2 arctan(x)) = 2 x / (1 + x^2): the load cancels, so that none at all is an ordinary point.
+        x, x_0 = load / self.stiffness_load, self.reference_load / self.stiffness_load
+        return (1 + x_0**2) / (1 + x**2)
