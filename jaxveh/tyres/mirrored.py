@@ -14,7 +14,7 @@ ODD_INPUTS = ("slip_angle", "camber", "turn_slip")
 class Mirrored(AbstractTyre):
     """A tyre mounted on the other side than the one it was measured on.
 
-    In a mirror slip angle, camber, turn slip, F_y, M_x and M_z change sign. A tyre is hardly ever symmetric: ply-steer and
+    In a mirror slip angle, camber, turn slip, F_y, M_x and M_z change sign. Tyres are hardly ever symmetric: ply-steer and
     conicity push both tyres of an axle towards the same side of the car where one law serves both wheels, and against each
     other where one of them is mirrored. The parameters are those of `tyre`, one set however many wheels it serves.
 

@@ -181,7 +181,7 @@ def test_friction_counts_where_it_should(law, tyre):
         assert share == 1.0
 
 
-@pytest.mark.parametrize("name", [name for name in those(friction=True) if name != "MF-Tyre"])
+@pytest.mark.parametrize("name", [name for name in those(friction=True)])
 def test_without_friction_there_is_no_force_and_gradients_are_finite(name):
     tyre, at = LAWS[name].make(), contact(0.3, 0.2, friction=0.0)
     assert np.all(np.abs(vector(tyre, at)) == 0.0)

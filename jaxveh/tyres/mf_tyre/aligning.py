@@ -82,7 +82,7 @@ class Aligning(eqx.Module):
         S_Ht = c.QHZ1 + c.QHZ2 * at.df_z + (c.QHZ3 + c.QHZ4 * at.df_z) * at.sine
         alpha = at.tangent + S_Ht
         B = (c.QBZ1 + c.QBZ2 * at.df_z + c.QBZ3 * at.df_z**2) * (1 + c.QBZ4 * camber + c.QBZ5 * jnp.abs(camber))
-        B = B * scaling.LKY / at.mu_y
+        B = B * _per_friction(scaling.LKY, at.mu_y)
         peak = (c.QDZ1 + c.QDZ2 * at.df_z) * (1 - c.PPZ1 * at.dp_i) * (1 + c.QDZ3 * camber + c.QDZ4 * camber**2)
         D = peak * at.moment_load * structure.UNLOADED_RADIUS / (structure.FNOMIN * scaling.LFZO) * scaling.LTR
         D = D * at.spin.zeta_5
@@ -97,7 +97,7 @@ class Aligning(eqx.Module):
         """Residual torque M_zr (4.E75 with A54), N m."""
         c = self
         alpha = at.tangent + pure.S_H + pure.S_V / not_zero(pure.stiffness)
-        B = c.QBZ9 * scaling.LKY / at.mu_y + c.QBZ10 * pure.B * pure.C
+        B = c.QBZ9 * _per_friction(scaling.LKY, at.mu_y) + c.QBZ10 * pure.B * pure.C
         B = B * at.spin.zeta_6
         camber = (c.QDZ8 + c.QDZ9 * at.df_z) * (1 + c.PPZ2 * at.dp_i) + (c.QDZ10 + c.QDZ11 * at.df_z) * jnp.abs(at.sine)
         spins = at.spin.coefficients is not None
@@ -108,6 +108,12 @@ class Aligning(eqx.Module):
             return D * cosine_of_arctan(B * _equivalent(alpha, slip)) * at.smooth
         turning, shape = at.spin.parking(at, scaling, self, structure, pure.mu, weight_y)
         return (D + turning) * numerics.cos(shape * numerics.arctan(B * _equivalent(alpha, slip))) * at.smooth
+
+
+def _per_friction(scale, mu):
+    """`scale / mu`; without friction there is no force that the result could act on."""
+    slippery = mu == 0
+    return jnp.where(slippery, 0.0, scale / jnp.where(slippery, 1.0, mu))
 
 
 def _equivalent(alpha, slip):

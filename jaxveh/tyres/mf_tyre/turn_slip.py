@@ -83,7 +83,7 @@ class Spin(NamedTuple):
     turns: Any = 0.0
     path: Any = 0.0
     reduction: Any = 0.0
-    coefficients: TurnSlip | None = None
+    coefficients: Any = None
 
     def shift(self, at, K_yg, K_ya0):
         """S_Hyp: the slip angle by which spin shifts F_y (4.80, 4.85 to 4.89), camber's thrust included."""

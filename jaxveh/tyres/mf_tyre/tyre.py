@@ -118,13 +118,14 @@ class MFTyre(AbstractTyre):
         turning = self.aligning.parts(at, s, self.structure, across, along.stiffness, weight_y, (F_x, F_y, on_trail))
         M_x = self.overturning.moment(at, s, self.structure, self.ranges.FZMIN, F_y)
         M_y = self.rolling.moment(at, s, self.structure, self.ranges, self.version, F_x, load, contact.slip_ratio)
+        mu_x, mu_y = self._frictions(at, along, across)
         body = self._body(contact, at, along, across, F_x, F_y)
         return MFOutputs(
             F_x, F_y, M_x, M_y, turning.moment, turning.trail, turning.residual,
-            *self._frictions(at, along, across), along.stiffness, -across.stiffness, *body,
+            mu_x, mu_y, along.stiffness, -across.stiffness, *body,
         )  # fmt: skip
 
-    def _frictions(self, at: Operating, along, across) -> tuple:
+    def _frictions(self, at: Operating, along, across) -> tuple[Any, Any]:
         """mu_x and mu_y as the reference evaluator reports them: none off the ground; without the sign of odd files."""
         mu_y = jnp.abs(across.mu) if self.limits else across.mu
         return jnp.where(at.load > 0, along.mu, 0.0), jnp.where(at.load > 0, mu_y, 0.0)
