@@ -181,10 +181,11 @@ def test_friction_counts_where_it_should(law, tyre):
         assert share == 1.0
 
 
-@pytest.mark.parametrize("name", [name for name in those(friction=True)])
+@pytest.mark.parametrize("name", those(friction=True))
 def test_without_friction_there_is_no_force_and_gradients_are_finite(name):
     tyre, at = LAWS[name].make(), contact(0.3, 0.2, friction=0.0)
-    assert np.all(np.abs(vector(tyre, at)) == 0.0)
+    # Rolling resistance (M_y) is the tyre's, not the road's.
+    assert np.all(np.delete(vector(tyre, at), 3) == 0.0)
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(backward(tyre, at)))
 
 
