@@ -12,14 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..mf_tyre_problem import COEFFICIENTS, Contacts
 from ..problems import SingleTrack, SpeedAndMass
 from .build import LimitUnavailable, build, library, unavailable
 
 __all__ = [
     "LimitUnavailable",
     "ParticleResult",
+    "TyreForces",
     "UnscentedResult",
     "build",
+    "mf_tyre",
     "particle_filter",
     "unavailable",
     "unscented",
@@ -40,6 +43,16 @@ class UnscentedResult(NamedTuple):
 
     mean: np.ndarray
     log_likelihood: np.ndarray
+
+
+class TyreForces(NamedTuple):
+    """Forces (N) and moments (N m) of all contacts, (n,) each."""
+
+    F_x: np.ndarray
+    F_y: np.ndarray
+    M_x: np.ndarray
+    M_y: np.ndarray
+    M_z: np.ndarray
 
 
 class _ParticleProblem(ctypes.Structure):
@@ -157,5 +170,28 @@ def unscented(
     def run() -> UnscentedResult:
         function(single, ctypes.byref(structure), result.mean.ctypes.data, result.log_likelihood.ctypes.data)
         return result
+
+    return run
+
+
+def mf_tyre(
+    contacts: Contacts, *, dtype: np.typing.DTypeLike = np.float64, extra_flags: tuple[str, ...] = ()
+) -> Callable[[], TyreForces]:
+    """MF-Tyre 6.1 with `COEFFICIENTS` at all contacts, ready to run. The result's arrays are overwritten by the next call."""
+    single = _is_single(dtype)
+    compiled = library(extra_flags)
+    compiled.jaxveh_mf_tyre_names.restype = ctypes.c_char_p
+    names = compiled.jaxveh_mf_tyre_names().decode().split()
+    coefficients = _doubles([COEFFICIENTS[name] for name in names])
+    given = [np.ascontiguousarray(array, dtype) for array in contacts]
+    found = TyreForces(*[np.empty_like(given[0]) for _ in TyreForces._fields])
+    function = compiled.jaxveh_mf_tyre
+    function.restype = None
+    pointers = [(ctypes.c_void_p * len(arrays))(*[a.ctypes.data for a in arrays]) for arrays in (given, found)]
+
+    def run() -> TyreForces:
+        assert given  # the pointers lead into these arrays, so they live as long
+        function(single, len(given[0]), _pointer(coefficients), *pointers)
+        return found
 
     return run

@@ -56,6 +56,13 @@ template <class P> INLINE P sine_near(P x, P turns) {
   return s;
 }
 template <class P> INLINE P sine(P x) { return sine_near(x, x * P(0.3183098861837907)); }
+template <class P> INLINE P cosine(P x) { return sine(x + P(1.5707963267948966)); }
+
+// sin of an angle within a quarter turn of 0, without range reduction.
+template <class P> INLINE P half_turn_sine(P x) {
+  if constexpr (is_single<P>) return x * polynomial(x * x, coefficients::sine_single);
+  else return x * polynomial(x * x, coefficients::sine_double);
+}
 
 // sin and cos of a small angle, |x| <= pi/4, without range reduction.
 template <class P> INLINE void small_sine_cosine(P x, P &s, P &c) {
@@ -85,6 +92,21 @@ template <class P> INLINE void sine_cosine(P x, P &s, P &c) {
     s.v[i] = (typename P::Vector)(sine_bits ^ ((bits << (sign_shift<P> - 1)) & top));
     c.v[i] = (typename P::Vector)(cosine_bits ^ (((bits + 1) << (sign_shift<P> - 1)) & top));
   }
+}
+
+// tan of any angle: a quarter turn is taken off k times, and odd k gives -cot of the rest.
+template <class P> INLINE P tangent(P x) {
+  P shifted = x * P(0.6366197723675814) + rounding_shift<P>(), k = shifted - rounding_shift<P>();
+  P r = x - k * P(is_single<P> ? 1.5703125 : 1.5707963267341256);
+  r = r - k * P(is_single<P> ? 4.838267948966396e-04 : 6.077100506506192e-11);
+  P s, c, top, bottom;
+  small_sine_cosine(r, s, c);
+  for (int i = 0; i < P::parts; i++) {
+    auto odd = ((unsigned_of<P>)shifted.v[i] & 1) != 0;
+    top.v[i] = odd ? -c.v[i] : s.v[i];
+    bottom.v[i] = odd ? s.v[i] : c.v[i];
+  }
+  return quotient(top, bottom);
 }
 
 // exp(x) for x <= 0 or moderately positive; below about -80 (-700) it stays at the tiny value there.

@@ -89,6 +89,7 @@ template <class P> inline constexpr int sign_shift = is_single<P> ? 31 : 63;
 template <class P> inline constexpr int mantissa_bits = is_single<P> ? 23 : 52;
 
 template <class P> INLINE P maximum(P a, P b) { return select(a > b, a, b); }
+template <class P> INLINE P minimum(P a, P b) { return select(a > b, b, a); }
 
 // |x|, and x with its sign flipped where the bit of `signs` is set.
 template <class P> INLINE P absolute(P x) {
@@ -130,6 +131,21 @@ template <class P> INLINE P quotient(P a, P b) {
   }
 #endif
   return a / b;
+}
+
+// 1 / sqrt(x) of normal numbers: a 14-bit guess and one or two Newton steps, a third of the time of root and divider.
+template <class P> INLINE P inverse_root(P x) {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  P r, half = P(scalar_of<P>(0.5)) * x;
+  for (int k = 0; k < P::parts; k++) {
+    if constexpr (is_single<P>) r.v[k] = (typename P::Vector)_mm512_rsqrt14_ps((__m512)x.v[k]);
+    else r.v[k] = (typename P::Vector)_mm512_rsqrt14_pd((__m512d)x.v[k]);
+  }
+  for (int step = 0; step < (is_single<P> ? 1 : 2); step++) r = r * (P(1.5) - half * r * r);
+  return r;
+#else
+  return P(1) / square_root(x);
+#endif
 }
 
 template <class P> INLINE double sum_of_lanes(P x) {

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh.tyres.mf_tyre.formula import coefficient
 
 UNLIMITED = 1e10
@@ -31,6 +34,6 @@ class Ranges(eqx.Module):
     def fading(self, slip_angle, speed):
         """Factors of slip ratio and slip angle, and the smooth one of shifts, that fade below `VXLOW`."""
         share = jnp.minimum(jnp.abs(speed) / self.VXLOW, 1.0)
-        smooth = 0.5 * (1 - jnp.cos(jnp.pi * share))
-        both = jnp.minimum(jnp.abs(speed) * (1 + jnp.abs(jnp.tan(slip_angle))) / self.VXLOW, 1.0)
+        smooth = 0.5 * (1 - numerics.cos(math.pi * share))
+        both = jnp.minimum(jnp.abs(speed) * (1 + jnp.abs(numerics.tan(slip_angle))) / self.VXLOW, 1.0)
         return share, both, smooth

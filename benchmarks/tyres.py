@@ -1,0 +1,121 @@
+"""MF-Tyre 6.1 in combined slip, forces and moments of many contacts, and the gradient with respect to everything."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import tyres
+from jaxveh.tyres import mf_tyre
+
+from . import limit, ours
+from .measure import Bound, Case, Contestant, Skipped
+from .mf_tyre_problem import COEFFICIENTS, Contacts, contacts
+from .peers import numpy_mf_tyre
+
+__all__ = ["cases", "contact", "tyre", "weighted_sum"]
+
+OURS, LIMIT, VALUE, GRADIENT = "jaxveh", "C++ limit", "value", "value and gradient"
+
+
+def cases(smoke: bool) -> list[Case]:
+    """Forces and moments in both precisions; the gradient in reverse mode."""
+    count = 50 if smoke else 100_000
+    made = []
+    for dtype in ("float64", "float32"):
+        made.append(
+            Case(
+                name=f"tyres/mf-{dtype}",
+                title=f"MF-Tyre 6.1, combined slip, forces and moments of {count} contacts, {dtype}",
+                unit="ns a contact",
+                build=functools.partial(_build, np.dtype(dtype), count),
+                base=LIMIT,
+                bounds=(Bound(OURS, (LIMIT,), 2.0),) if dtype == "float64" else (),
+            )
+        )
+    for dtype in ("float64", "float32"):
+        made.append(
+            Case(
+                name=f"tyres/gradient-{dtype}",
+                title=f"Gradient: MF-Tyre 6.1 with respect to coefficients and {count} contacts, {dtype}",
+                unit="ns a contact",
+                build=functools.partial(_pair, np.dtype(dtype), count),
+                base=VALUE,
+                bounds=(Bound(GRADIENT, (VALUE,), 6.0),) if dtype == "float64" else (),
+            )
+        )
+    return made
+
+
+def tyre(dtype: np.typing.DTypeLike) -> mf_tyre.MFTyre:
+    """The tyre of `COEFFICIENTS`, as a property file of them would give it."""
+    sections = (
+        mf_tyre.Structure,
+        mf_tyre.Longitudinal,
+        mf_tyre.Lateral,
+        mf_tyre.Aligning,
+        mf_tyre.Overturning,
+        mf_tyre.Rolling,
+        mf_tyre.Scaling,
+        mf_tyre.Ranges,
+    )
+    made = mf_tyre.MFTyre(*[section(**_coefficients(section)) for section in sections])
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), made)
+
+
+def _coefficients(section: type) -> dict[str, float]:
+    names = [field.name for field in dataclasses.fields(section)]
+    return {name: COEFFICIENTS[name] for name in names if name in COEFFICIENTS}
+
+
+def contact(given: Contacts) -> tyres.Contact:
+    """The contacts as the library takes them."""
+    return tyres.Contact(**{name: jnp.asarray(array) for name, array in given._asdict().items()})
+
+
+def _build(dtype: np.dtype, count: int) -> Sequence[Contestant | Skipped]:
+    given = contacts(count, dtype=dtype.type)
+    with ours.precision(dtype):
+        arguments = tyre(dtype), contact(given)
+    run = jax.jit(lambda tyre, contact: tyre.forces(contact))
+
+    def call(index: int) -> object:
+        with ours.precision(dtype):
+            return run(*arguments)
+
+    made: list[Contestant | Skipped] = [Contestant(OURS, ours.blocked(call), count)]
+    reason = limit.unavailable()
+    if reason:
+        made.append(Skipped(LIMIT, reason))
+    else:
+        compiled = limit.mf_tyre(given, dtype=dtype)
+        made.append(Contestant(LIMIT, lambda index: compiled(), count))
+    made.append(Contestant("NumPy", lambda index: numpy_mf_tyre.forces(COEFFICIENTS, given), count))
+    return made
+
+
+def weighted_sum(tyre: mf_tyre.MFTyre, contact: tyres.Contact, weights: Sequence[jax.Array]) -> jax.Array:
+    """All forces and moments, weighted at random, in one number: its gradient pulls every output back."""
+    return sum(jnp.sum(weight * force) for weight, force in zip(weights, tyre.forces(contact), strict=True))
+
+
+def _pair(dtype: np.dtype, count: int) -> Sequence[Contestant]:
+    with ours.precision(dtype):
+        weights = [jnp.asarray(w, dtype) for w in np.random.default_rng(1).standard_normal((5, count))]
+        arguments = tyre(dtype), contact(contacts(count, dtype=dtype.type)), weights
+    value = jax.jit(lambda tyre, contact, weights: tyre.forces(contact))
+    gradient = jax.jit(jax.value_and_grad(weighted_sum, argnums=(0, 1)))
+
+    def calling(function: Callable) -> Callable[[int], object]:
+        def call(index: int) -> object:
+            with ours.precision(dtype):
+                return function(*arguments)
+
+        return ours.blocked(call)
+
+    return [Contestant(VALUE, calling(value), count), Contestant(GRADIENT, calling(gradient), count)]
