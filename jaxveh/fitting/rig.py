@@ -23,6 +23,9 @@ from jaxveh.tyres import AbstractTyre
 
 JOINT = "joint"
 
+CURVATURES = (-1.0, 0.5)
+"""Where else a stage starts its curvature."""
+
 LEAST_NOISE = 1e-4
 """The least noise over peak that weighs a channel: one that fits perfectly would outweigh all others."""
 
@@ -44,11 +47,12 @@ class RigFit(eqx.Module):
     """A tyre fitted to rig data.
 
     `tyre`: the law with its coefficients. `names` (p,), `values`, `std` (p,): the coefficients that were fitted, in the law's
-    units; standard errors by the Gauss-Newton matrix of the joint stage with the noise estimated from residuals, nan where data do
-    not identify a coefficient; `identified`: how many directions they do. `unconstrained`, `covariance` (p, p): on the line
-    of each one's bijector. By channel (`F_x`, ...): `rmse` of residuals, `peak` (the 99.5th percentile of what was measured),
-    `start_rmse` before the fit, `noise` (standard deviation), and `cross_validation`, the RMSE at rows that a fold's fit did not see
-    (nan without). `residuals` (n,): fitted less measured, nan without a measurement. `stages`: a report each.
+    units; standard errors by the Gauss-Newton matrix of the joint stage with the noise estimated from residuals, nan where
+    one is larger than the coefficient's own size: data do not identify it; `identified`: how many directions they do.
+    `unconstrained`, `covariance` (p, p): on the line of each one's bijector. By channel (`F_x`, ...): `rmse` of residuals,
+    `peak` (the 99.5th percentile of what was measured), `start_rmse` before the fit, `noise` (standard deviation), and
+    `cross_validation`, the RMSE at rows that a fold's fit did not see (nan without). `residuals` (n,): fitted less measured, nan
+    without a measurement. `stages`: a report each.
     """
 
     tyre: AbstractTyre
@@ -163,7 +167,7 @@ class _Data:
         self.measured = np.where(self.present, measured, 0.0)
         sizes = [
             np.percentile(np.abs(row[here]), 99.5) if here.any() else np.nan
-            for row, here in zip(measured, self.present)
+            for row, here in zip(measured, self.present, strict=True)
         ]
         self.peak = dict(zip(channels, (float(size) for size in sizes), strict=True))
         for name, size in self.peak.items():
@@ -225,20 +229,25 @@ class _Data:
         return float(np.sqrt(np.nanmean(rows**2)))
 
     def fit(self, law, stage: Stage) -> tuple[AbstractTyre, StageReport, Solved]:
-        """One stage: twice where the noise, which weighs channels and says what is an outlier, has to be found first."""
-        before, steps = self.share(law, stage), 0
-        again = self.robust or len(stage.channels) > 1
+        """One stage, from each of its starts; the best end counts."""
+        before = self.share(law, stage)
+        ends = [self._descend(one, stage) for one in starts_of(law, stage)]
+        law, steps, solved = min(ends, key=lambda end: self.share(end[0], stage))
+        counts = int(
+            np.sum(stage.rows & self.present[[self.channels.index(name) for name in stage.channels]].any(axis=0))
+        )
+        after = self.share(law, stage)
+        names = len(stage.coefficients)
+        return law, StageReport(stage.name, counts, names, before, after, steps, bool(solved.converged)), solved
+
+    def _descend(self, law, stage: Stage) -> tuple[AbstractTyre, int, Solved]:
+        """From one start: twice where the noise, which weighs channels and says what is an outlier, has to be found first."""
+        steps, again = 0, self.robust or len(stage.channels) > 1
         for _ in range(1 + again):
             problem = self.problem(law, stage, self.noise(law))
             solved = solve(problem, jnp.zeros(problem.origin.shape), self.max_steps, self.tolerance)
             law, steps = problem.filled(solved.z), steps + int(solved.steps)
-        counts = int(
-            np.sum(stage.rows & self.present[[self.channels.index(name) for name in stage.channels]].any(axis=0))
-        )
-        report = StageReport(
-            stage.name, counts, len(stage.coefficients), before, self.share(law, stage), steps, bool(solved.converged)
-        )
-        return law, report, solved
+        return law, steps, solved
 
     def cross_validate(self, law, joint: Stage, folds: int, tell: Callable[[int], None]) -> dict[str, float]:
         """RMSE of each channel at rows that the fold's fit, from the fit to all, did not see."""
@@ -254,6 +263,15 @@ class _Data:
             missed[:, part == k] = (found - self.measured)[:, part == k]
         missed = np.where(self.present, missed, np.nan)
         return dict(zip(self.channels, np.sqrt(np.nanmean(missed**2, axis=1)).tolist(), strict=True))
+
+
+def starts_of(law: AbstractTyre, stage: Stage) -> list[AbstractTyre]:
+    """The law as it is, and with other values of the stage's curvature."""
+    if stage.curvature is None:
+        return [law]
+    leaf = lambda law: _leaf(law, stage.curvature)
+    like = jnp.asarray(leaf(law))
+    return [law] + [eqx.tree_at(leaf, law, jnp.asarray(value, like.dtype)) for value in CURVATURES]
 
 
 def fold_of(rig: RigTable, folds: int) -> np.ndarray:
@@ -278,13 +296,14 @@ def _result(data: _Data, law, joint: Stage, solved: Solved, reports, start_rmse,
     free = count / (count - len(parameters))
     spread, known = covariance(at.information)
     line = np.asarray(spread * problem.scale * problem.scale[:, None]) * free
+    unseen = np.asarray(jnp.diagonal(spread)) > 1.0
     slopes = np.array([float(p.domain.slope(value)) for p, value in zip(parameters, values, strict=True)])
     residual = data.residuals(law)
     return RigFit(
         tyre=law,
         names=joint.coefficients,
         values=values,
-        std=np.sqrt(np.diag(line)) * np.abs(slopes),
+        std=np.where(unseen, np.nan, np.sqrt(np.diag(line)) * np.abs(slopes)),
         unconstrained=np.asarray(problem.origin),
         covariance=line,
         identified=int(known),

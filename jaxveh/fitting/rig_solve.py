@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import lineax as lx
 import optimistix as optx
 
-from jaxveh.fitting.rig_problem import RigProblem, residuals, with_jacobian
+from jaxveh.fitting.rig_problem import PULL, RigProblem, residuals, with_jacobian
 
 
 class Solved(NamedTuple):
@@ -39,17 +39,11 @@ def predicted(problem: RigProblem, z):
     return problem.forces(problem.filled(z))
 
 
-def covariance(information, least: float = 1e-10) -> tuple[jax.Array, jax.Array]:
-    """The inverse of an information matrix over its identified directions, and how many these are.
+def covariance(information) -> tuple[jax.Array, jax.Array]:
+    """The covariance (p, p) in z of an information matrix and the pull, and how many directions the data identify.
 
-    Directions along which the data say less than `least` of what they say along the best one, each coefficient on its own
-    scale, are not identified; a coefficient with a share in them of more than a tenth has the variance nan.
+    A direction is identified where its standard error is below one step, a coefficient's own size: beyond, it is the pull's.
     """
-    size = jnp.sqrt(jnp.diagonal(information))
-    size = jnp.where(size > 0, size, 1.0)
-    values, vectors = jnp.linalg.eigh(information / size / size[:, None])
-    known = values > least * values[-1]
-    inverse = (vectors * jnp.where(known, 1 / jnp.where(known, values, 1.0), 0.0)) @ vectors.T
-    lost = jnp.sum(jnp.where(known, 0.0, vectors**2), axis=1) > 0.01
-    spoiled = lost[:, None] | lost[None, :]
-    return jnp.where(spoiled, jnp.nan, inverse / size / size[:, None]), jnp.sum(known)
+    values, vectors = jnp.linalg.eigh(information)
+    values = jnp.maximum(values, 0.0)
+    return (vectors / (values + PULL**2)) @ vectors.T, jnp.sum(values > 1.0)
