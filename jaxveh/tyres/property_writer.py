@@ -76,14 +76,18 @@ class _Coefficient(NamedTuple):
 
 
 def to_property_file(
-    tyre: MFTyre, like: PropertyFile | None = None, *, side: Literal["left", "right"] | None = None
+    tyre: MFTyre,
+    like: PropertyFile | None = None,
+    *,
+    side: Literal["left", "right"] | None = None,
+    note: str = "",
 ) -> PropertyFile:
     """The .tir file of a tyre: `io.write_property_file` writes it, `from_property_file` reads the same tyre from it.
 
     Without `like` a new file in SI units with every coefficient in its usual section; `side` is its TYRESIDE. With `like`, a
     file that was read, the same file with other numbers: comments, columns, units and unknown sections stay, and coefficients
     that it lacks are added to their sections where silence would mean something else. In units other than SI, numbers may
-    come back different in the last digit.
+    come back different in the last digit. `note` becomes comment lines under the file's first heading.
 
     A file does not hold `limits`, `angles` and `spins`; coefficients of turn slip that the tyre lacks are left out.
 
@@ -96,13 +100,13 @@ def to_property_file(
         )
     coefficients = list(_coefficients(tyre))
     if like is None:
-        return _new(tyre, coefficients, side)
+        return _noted(_new(tyre, coefficients, side), note)
     if side is not None:
         raise InputError(f"to_property_file: side = {side!r}: {like.source} tells its own side; leave `side` out.")
     file = _with_version(like, tyre.version)
     for _ in range(ROUNDS):
         file = _changed(file, coefficients)
-    return file
+    return _noted(file, note)
 
 
 def _coefficients(tyre: MFTyre) -> Iterable[_Coefficient]:
@@ -191,3 +195,14 @@ def _added(file: PropertyFile, section: str, lines: list[str]) -> PropertyFile:
     if not before[-1].endswith(("\n", "\r")):
         before[-1] += end
     return parse_property_file("".join([*before, *(line + end for line in lines), *file.lines[last:]]), file.source)
+
+
+def _noted(file: PropertyFile, note: str) -> PropertyFile:
+    """The file with comment lines under its first heading, which readers may want to be the first line."""
+    if not note:
+        return file
+    end = "\r\n" if file.lines[0].endswith("\r\n") else "\n"
+    heading = next(i for i, line in enumerate(file.lines) if line.lstrip().startswith("["))
+    comments = [f"$ {line}".rstrip() + end for line in note.splitlines()]
+    lines = [*file.lines[: heading + 1], *comments, *file.lines[heading + 1 :]]
+    return parse_property_file("".join(lines), file.source)
