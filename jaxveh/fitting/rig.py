@@ -113,7 +113,7 @@ def fit_rig(
     plan = stages_of(law, rig, channels, chosen)
     names = _names(law, plan, chosen)
     data = _Data(rig, contact, channels, extra, dict(bounds or {}), robust, max_steps, tolerance)
-    data.check(names)
+    data.check(law, names)
     if folds:
         fold_of(rig, folds)  # raises now, not after the fit
     joint = Stage(JOINT, channels, names, np.ones(rig.load.shape, bool))
@@ -180,9 +180,10 @@ class _Data:
         for name, size in self.peak.items():
             check_positive(f"{rig.source}: largest {name}", size, advice="Leave this channel out: measured=...")
 
-    def check(self, names: tuple[str, ...]) -> None:
-        """Raise for bounds without a coefficient, and for fewer measurements than coefficients."""
+    def check(self, law, names: tuple[str, ...]) -> None:
+        """Raise for bounds without a coefficient or its start, and for fewer measurements than coefficients."""
         check_names("bounds", self.bounds, names)
+        self.parameters(law, names)
         count = int(self.present.sum())
         check_at_least(f"{self.rig.source}: measurements for {len(names)} coefficients", count, len(names) + 1)
 

@@ -98,7 +98,7 @@ def _channel(block: Any, name: str, fit: RigFit, rig: RigTable) -> None:
     dots = {"c": load[rows] / 1e3, "cmap": COLOUR_MAP, "s": 7, "lw": 0, "rasterized": True}
     axes[0, 0].scatter(x[rows], measured[rows] / quantity.size, label="measured", **dots)
     axes[0, 0].plot(
-        x[rows], (measured + residual)[rows] / quantity.size, ".", color="#000000", ms=1.6, mew=0, label="fitted", rasterized=True
+        x[rows], (measured + residual)[rows] / quantity.size, ".", color="#000000", ms=2.0, mew=0, label="fitted", rasterized=True
     )  # fmt: skip
     axes[0, 0].legend(loc="best", handletextpad=0.2, markerscale=2.0)
     shade = axes[0, 1].scatter(x[rows], residual[rows], **dots)
@@ -127,7 +127,10 @@ def grouped(x: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray
     x, residual = x[order], residual[order]
     edges = np.flatnonzero(np.diff(x)) + 1
     if len(edges) >= GROUPS:
-        edges = np.linspace(0, len(x), GROUPS + 1).astype(int)[1:-1]
+        # An edge between equal values goes before all of them; many of pure slip are a group of their own.
+        middle = np.linspace(0, len(x), GROUPS + 1).astype(int)[1:-1]
+        first, last = (np.searchsorted(x, x[middle], side) for side in ("left", "right"))
+        edges = np.unique(np.concatenate([first, last[last - first > len(x) / GROUPS]]))
     parts = [
         (np.mean(a), np.mean(b)) for a, b in zip(np.split(x, edges), np.split(residual, edges), strict=True) if a.size
     ]

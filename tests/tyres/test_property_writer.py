@@ -115,6 +115,16 @@ def test_what_is_missing_is_added_where_silence_means_something_else():
     assert len(file.lines) == len(like.lines) + 6
 
 
+def test_notes_stand_under_the_first_heading():
+    like = parse_property_file(SHORT)
+    tyre = tyres.from_property_file(like)
+    file = tyres.to_property_file(tyre, like=like, note="Fitted.\nTwice.")
+    assert file.lines[:3] == ("[MODEL]\n", "$ Fitted.\n", "$ Twice.\n") and file.lines[3:] == like.lines[1:]
+    new = tyres.to_property_file(tyre, note="Fitted.")
+    assert new.lines[:2] == ("[MDI_HEADER]\n", "$ Fitted.\n")
+    same(tyres.from_property_file(new), tyre)
+
+
 def test_versions_change_the_file():
     like = parse_property_file(SHORT)
     tyre = dataclasses.replace(tyres.from_property_file(like), version=61)
