@@ -17,6 +17,7 @@ from jaxveh.cli.reproduce import tyre_apf
 from jaxveh.cli.schema import schema
 from jaxveh.cli.simulate import simulate
 from jaxveh.cli.tyre import evaluate_table, show
+from jaxveh.cli.tyre_fit import fit_table
 
 HELP = """Estimate what a car cannot measure: sideslip and tyre parameters from steer, speed, acceleration and yaw rate.
 
@@ -40,7 +41,7 @@ app = typer.Typer(
 
 reproduce = typer.Typer(help="Papers computed again, as printed and honestly.", no_args_is_help=True)
 
-tyre = typer.Typer(help="Tyre property files (.tir).", no_args_is_help=True)
+tyre = typer.Typer(help="Tyres: property files (.tir), and fits to rig data.", no_args_is_help=True)
 
 
 def _version(wanted: bool) -> None:
@@ -66,4 +67,5 @@ reproduce.command("tyre-apf")(program(tyre_apf))
 app.add_typer(reproduce, name="reproduce")
 tyre.command("show")(program(show))
 tyre.command("evaluate")(program(evaluate_table))
+tyre.command("fit")(program(fit_table))
 app.add_typer(tyre, name="tyre")

@@ -5,6 +5,7 @@ from jaxveh.fitting.multiple_shooting import multiple_shooting, shoot
 from jaxveh.fitting.prediction_error import Target, prediction_error
 from jaxveh.fitting.result import Fit
 from jaxveh.fitting.rig import RigFit, StageReport, fit_rig
+from jaxveh.fitting.rig_start import starting_tyre
 from jaxveh.fitting.segments import Segments, cut
 
 __all__ = [
@@ -20,4 +21,5 @@ __all__ = [
     "multiple_shooting",
     "prediction_error",
     "shoot",
+    "starting_tyre",
 ]

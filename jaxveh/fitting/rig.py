@@ -16,23 +16,28 @@ from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, Where, pick, resolve
 from jaxveh._core.progress import Progress, silent
 from jaxveh.fitting.rig_problem import RigProblem, contact_of, offered, start_of
-from jaxveh.fitting.rig_solve import Solved, covariance, predicted, solve
+from jaxveh.fitting.rig_solve import covariance, information, predicted, solve
 from jaxveh.fitting.rig_stages import Stage, stages_of
 from jaxveh.io.rig_table import MEASURED, RigTable
 from jaxveh.tyres import AbstractTyre
 
 JOINT = "joint"
 
-CURVATURES = (-1.0, 0.5)
+CURVATURES = (-3.0, -1.0, 0.5, 0.7, 0.9)
 """Where else a stage starts its curvature."""
 
 LEAST_NOISE = 1e-4
 """The least noise over peak that weighs a channel: one that fits perfectly would outweigh all others."""
 
+SETTLED = 1e-5
+"""Where a stage's second round moves the RMS of residuals by a smaller share, it has converged: coefficients that data do not
+tell apart may drift on without end."""
+
 
 class StageReport(NamedTuple):
     """What one stage did: its `name`, `rows` and `coefficients` that counted, the RMS of its channels' residuals over their
-    peak `before` and `after`, `steps` taken, and whether the solver `converged`."""
+    peak `before` and `after`, `steps` taken, and whether it `converged`: by the solver's word, or because
+    the RMS has settled."""
 
     name: str
     rows: int
@@ -82,7 +87,7 @@ def fit_rig(
     robust: bool = False,
     folds: int = 0,
     staged: bool = True,
-    max_steps: int = 200,
+    max_steps: int = 500,
     tolerance: float = 1e-6,
     progress: Progress = silent,
     throw: bool = True,
@@ -110,7 +115,9 @@ def fit_rig(
     plan = stages_of(law, rig, channels, chosen)
     names = _names(law, plan, chosen)
     data = _Data(rig, contact, channels, names, extra, dict(bounds or {}), robust, max_steps, tolerance)
-    data.check()
+    data.check(law)
+    if folds:
+        fold_of(rig, folds)  # raises now, not after the fit
     joint = Stage(JOINT, channels, names, np.ones(rig.load.shape, bool))
     plan = plan if staged else []
     total = len(plan) + 1 + folds
@@ -176,9 +183,10 @@ class _Data:
         for name, size in self.peak.items():
             check_positive(f"{rig.source}: largest {name}", size, advice="Leave this channel out: measured=...")
 
-    def check(self) -> None:
-        """Raise for bounds without a coefficient, and for fewer measurements than coefficients."""
+    def check(self, law) -> None:
+        """Raise for bounds without a coefficient or its start, and for fewer measurements than coefficients."""
         check_names("bounds", self.bounds, self.names)
+        self.parameters(law)
         count, coefficients = int(self.present.sum()), len(self.names)
         check_at_least(f"{self.rig.source}: measurements for {coefficients} coefficients", count, coefficients + 1)
 
@@ -240,23 +248,25 @@ class _Data:
     def fit(self, law, stage: Stage) -> tuple[AbstractTyre, StageReport]:
         """One stage, from each of its starts; the best end counts."""
         before = self.share(law, stage)
-        ends = [self._descend(one, stage) for one in starts_of(law, stage)]
-        law, steps, solved = min(ends, key=lambda end: self.share(end[0], stage))
+        ends = [self._descend(one, stage) for one in starts_of(law, stage, self.bounds)]
+        law, steps, converged = min(ends, key=lambda end: self.share(end[0], stage))
         counts = int(
             np.sum(stage.rows & self.present[[self.channels.index(name) for name in stage.channels]].any(axis=0))
         )
         after = self.share(law, stage)
         names = len(stage.coefficients)
-        return law, StageReport(stage.name, counts, names, before, after, steps, bool(solved.converged))
+        return law, StageReport(stage.name, counts, names, before, after, steps, converged)
 
-    def _descend(self, law, stage: Stage) -> tuple[AbstractTyre, int, Solved]:
+    def _descend(self, law, stage: Stage) -> tuple[AbstractTyre, int, bool]:
         """From one start: twice where the noise, which weighs channels and says what is an outlier, has to be found first."""
         steps, again = 0, self.robust or len(stage.channels) > 1
         for _ in range(1 + again):
+            before = self.share(law, stage)
             problem = self.problem(law, stage, self.noise(law))
             solved = solve(problem, jnp.zeros(problem.origin.shape), self.max_steps, self.tolerance)
             law, steps = problem.filled(solved.z), steps + int(solved.steps)
-        return law, steps, solved
+        settled = again and abs(self.share(law, stage) - before) <= SETTLED * before
+        return law, steps, bool(solved.converged) or settled
 
     def cross_validate(self, law, joint: Stage, folds: int, tell: Callable[[int], None]) -> dict[str, float]:
         """RMSE of each channel at rows that the fold's fit, from the fit to all, did not see."""
@@ -274,13 +284,15 @@ class _Data:
         return dict(zip(self.channels, np.sqrt(np.nanmean(missed**2, axis=1)).tolist(), strict=True))
 
 
-def starts_of(law: AbstractTyre, stage: Stage) -> list[AbstractTyre]:
-    """The law as it is, and with other values of the stage's curvature."""
+def starts_of(law: AbstractTyre, stage: Stage, bounds: Mapping[str, tuple[float, float]]) -> list[AbstractTyre]:
+    """The law as it is, and with other values of the stage's curvature, within its bounds."""
     if stage.curvature is None:
         return [law]
     leaf = lambda law: _leaf(law, stage.curvature)
     like = jnp.asarray(leaf(law))
-    return [law] + [eqx.tree_at(leaf, law, jnp.asarray(value, like.dtype)) for value in CURVATURES]
+    low, high = bounds.get(stage.curvature, (-np.inf, np.inf))
+    inside = [value for value in CURVATURES if low < value < high]
+    return [law] + [eqx.tree_at(leaf, law, jnp.asarray(value, like.dtype)) for value in inside]
 
 
 def fold_of(rig: RigTable, folds: int) -> np.ndarray:
@@ -299,12 +311,10 @@ def _result(data: _Data, law, joint: Stage, reports, start_rmse, validation) -> 
     parameters = data.parameters(law)
     values = np.array([float(value) for value in pick(law, parameters)])
     problem = data.problem(law, joint, data.noise(law))
-    # From where it ended, with the noise that it left: a step or two, and the information there.
-    at = solve(problem, jnp.zeros(problem.origin.shape), data.max_steps, data.tolerance)
     # The noise is that of the fit, with the degrees of freedom that coefficients take.
     count = int(data.present.sum())
     free = count / (count - len(parameters))
-    spread, known = covariance(at.information)
+    spread, known = covariance(information(problem, jnp.zeros(problem.origin.shape)))
     line = np.asarray(spread * problem.scale * problem.scale[:, None]) * free
     unseen = np.asarray(jnp.diagonal(spread)) > 1.0
     slopes = np.array([float(p.domain.slope(value)) for p, value in zip(parameters, values, strict=True)])

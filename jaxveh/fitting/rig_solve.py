@@ -14,12 +14,11 @@ from jaxveh.fitting.rig_problem import PULL, RigProblem, residuals, with_jacobia
 
 
 class Solved(NamedTuple):
-    """Coordinates `z` (p,), `steps`, whether the solver `converged`, the Gauss-Newton matrix `information` (p, p) in z."""
+    """Coordinates `z` (p,), `steps`, and whether the solver `converged`."""
 
     z: Any
     steps: Any
     converged: Any
-    information: Any
 
 
 @eqx.filter_jit
@@ -28,9 +27,14 @@ def solve(problem: RigProblem, z, max_steps: int, tolerance: float) -> Solved:
     # The pull to the start keeps the normal equations definite; QR of a Jacobian this tall takes six times as long.
     solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance, linear_solver=lx.Normal(lx.Cholesky()))
     solution = optx.least_squares(residuals, solver, z, problem, max_steps=max_steps, throw=False)
-    _, jacobian = with_jacobian(solution.value, problem)
-    converged = solution.result == optx.RESULTS.successful
-    return Solved(solution.value, solution.stats["num_steps"], converged, jacobian.T @ jacobian)
+    return Solved(solution.value, solution.stats["num_steps"], solution.result == optx.RESULTS.successful)
+
+
+@eqx.filter_jit
+def information(problem: RigProblem, z):
+    """The Gauss-Newton matrix (p, p) at the coordinates z."""
+    _, jacobian = with_jacobian(z, problem)
+    return jacobian.T @ jacobian
 
 
 @eqx.filter_jit

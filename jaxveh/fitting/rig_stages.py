@@ -73,7 +73,7 @@ ALIGNING = Group(
     "QBZ4 QBZ5 QDZ3 QDZ4 QDZ8 QDZ9 QDZ10 QDZ11 QEZ5 QHZ3 QHZ4", "PPZ1 PPZ2",
 )  # fmt: skip
 ALIGNING_COMBINED = Group("aligning", "M_z", "SSZ1 SSZ2", "", "SSZ3 SSZ4")
-OVERTURNING = Group("overturning", "M_x", "QSX1 QSX3 QSX4 QSX8", "QSX5 QSX6", "QSX2 QSX7 QSX10 QSX11", "PPMX1")
+OVERTURNING = Group("overturning", "M_x", "QSX1 QSX3 QSX4 QSX8 QSX9", "QSX5 QSX6", "QSX2 QSX7 QSX10 QSX11", "PPMX1")
 ROLLING = Group("rolling", "M_y", "QSY1", "QSY7", "QSY5 QSY6", "QSY8", "QSY3 QSY4")
 ROLLING_52 = Group("rolling", "M_y", "QSY1", "", "", "", "QSY3 QSY4")
 

@@ -1,4 +1,5 @@
-"""Figures of recordings, estimates, tyre forces and parameters, in one restrained style; matplotlib is the extra `plot`.
+"""Figures of recordings, estimates, tyre forces, parameters and rig fits, in one restrained style; matplotlib is the extra
+`plot`.
 
 Every function returns a matplotlib `Figure` made without pyplot: no window, no global state, shown by notebooks as it
 is. Give `figure=` (a `Figure` or a `SubFigure`) to draw into one of your own. Angles are shown in degrees.
@@ -10,6 +11,7 @@ from jaxveh.plots.friction_ellipse import friction_ellipse
 from jaxveh.plots.gradient_map import gradient_map
 from jaxveh.plots.parameters import parameters
 from jaxveh.plots.recordings import recording
+from jaxveh.plots.rig_fit import rig_fit
 from jaxveh.plots.style import COLOURS, save, style
 from jaxveh.plots.tyres import tyre
 
@@ -21,6 +23,7 @@ __all__ = [
     "gradient_map",
     "parameters",
     "recording",
+    "rig_fit",
     "save",
     "style",
     "tyre",

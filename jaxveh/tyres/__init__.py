@@ -19,11 +19,14 @@ from jaxveh.tyres.mf_tyre import MFOutputs, MFTyre
 from jaxveh.tyres.mirrored import Mirrored
 from jaxveh.tyres.on_road import OnRoad
 from jaxveh.tyres.parabolic import Parabolic
+from jaxveh.tyres.parameters_file import read_parameters, write_parameters
 from jaxveh.tyres.property_check import Finding, check_property_file
 from jaxveh.tyres.property_file import from_property_file
+from jaxveh.tyres.property_writer import to_property_file
 from jaxveh.tyres.relaxed import Relaxed
 from jaxveh.tyres.similarity import Similarity
 from jaxveh.tyres.tmeasy import TMeasy, TMeasyCurve, TMeasyTrail
+from jaxveh.tyres.typical import typical_mf_tyre
 from jaxveh.tyres.unitire import UniTire
 
 __all__ = [
@@ -60,4 +63,8 @@ __all__ = [
     "check_property_file",
     "cornering_stiffness",
     "from_property_file",
+    "read_parameters",
+    "to_property_file",
+    "typical_mf_tyre",
+    "write_parameters",
 ]

@@ -106,7 +106,7 @@ def side_of(file: PropertyFile) -> str:
 def _as_it_is(file: PropertyFile, limits: bool, angles: bool, spins: bool) -> MFTyre:
     for key in NEEDED:
         file.number(key)
-    size = {key: _size(file, powers) for key, powers in DIMENSIONS.items()}
+    size = {key: size_of(file, powers) for key, powers in DIMENSIONS.items()}
     section = lambda kind: kind(**_numbers(file, kind, size))
     return MFTyre(
         section(Structure),
@@ -143,7 +143,8 @@ def version_of(file: PropertyFile) -> int:
     return 52
 
 
-def _size(file: PropertyFile, powers: tuple[int, int, int]) -> float:
+def size_of(file: PropertyFile, powers: tuple[int, int, int]) -> float:
+    """The size in SI of these powers (see `DIMENSIONS`) of a file's units."""
     length, force, time = powers
     return file.unit("LENGTH") ** length * file.unit("FORCE") ** force * file.unit("TIME") ** time
 

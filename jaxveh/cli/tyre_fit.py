@@ -1,0 +1,243 @@
+"""`jaxveh tyre fit`: a tyre fitted to rig data."""
+
+from __future__ import annotations
+
+import dataclasses
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import equinox as eqx
+import typer
+
+from jaxveh import InputError, fitting, io, tyres
+from jaxveh._core.errors import check_one_of
+from jaxveh.cli import options, tyre_fit_report
+from jaxveh.cli.console import progress, results
+from jaxveh.cli.failure import say
+from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
+from jaxveh.cli.tyre import Axes
+from jaxveh.fitting.rig_ranges import measured_ranges, widened_ranges
+from jaxveh.fitting.rig_start import STARTS, fitted_leaves
+from jaxveh.io.rig_table import MEASURED
+
+DEFAULT = "mf61"
+SHAPE_OF_BOUNDS, SHAPE_OF_WEIGHT = "NAME=LOW:HIGH, such as PCY1=1:2", "CHANNEL=NUMBER, such as F_x=2"
+
+
+class Side(StrEnum):
+    """On which side of a car the tyre was measured."""
+
+    left = "left"
+    right = "right"
+
+
+DATA = typer.Argument(
+    metavar="DATA", show_default=False, help="Rig data: .csv, or TYDEX (.tdx, .tyd, .tydex); each file is a run."
+)
+PRODUCT = typer.Option("-o", metavar="FILE", show_default=False, help="The tyre: .tir for MF-Tyre, .toml for others.")
+MODEL = typer.Option(
+    "--model",
+    metavar="LAW",
+    help=f"The law, started from what the data show: {', '.join(STARTS)} ({DEFAULT} by default).",
+)
+START = typer.Option(
+    "--start",
+    metavar="FILE",
+    help="Start from this tyre instead of --model: a property file (.tir), of which -o keeps comments, units and all that is "
+    "not fitted, or a parameter file (.toml) that this program wrote.",
+)
+AXES = typer.Option(
+    "--axes", help="Of slip angles in CSV: a positive one gives a negative force (iso-w), or a positive one."
+)
+CHANNELS = typer.Option(
+    "--measured",
+    metavar="F_x,F_y,...",
+    help=f"Compare these alone, of {', '.join(MEASURED)}; by default all there are.",
+)
+BOUNDS = typer.Option("--bounds", metavar="NAME=LOW:HIGH", help="Keep a coefficient inside; repeatable.")
+WEIGHT = typer.Option(
+    "--weight", metavar="CHANNEL=NUMBER", help="Count a channel so many times what its noise says; repeatable."
+)
+ROBUST = typer.Option("--robust", help="Outliers, beyond two standard deviations, count by their size, not its square.")
+FOLDS = typer.Option(
+    "--folds", metavar="N", min=0, help="Cross-validate: fit N times without a part, and score it on that part."
+)
+SIDE = typer.Option("--side", help="TYRESIDE of a new .tir file; --start has its own.")
+
+
+@dataclasses.dataclass(frozen=True)
+class Origin:
+    """Where a fit starts: the name of a `model`, or the `tyre` of --start, and the property `file` that it came from."""
+
+    model: str | None = None
+    tyre: tyres.AbstractTyre | None = None
+    file: io.PropertyFile | None = None
+
+    @property
+    def is_mf_tyre(self) -> bool:
+        """Whether the product is a property file."""
+        return isinstance(self.tyre, tyres.MFTyre) if self.model is None else self.model in ("mf61", "mf52", "mf62")
+
+
+def fit_table(
+    data: Annotated[list[Path], DATA],
+    product: Annotated[Path, PRODUCT],
+    model: Annotated[str | None, MODEL] = None,
+    start: Annotated[Path | None, START] = None,
+    axes: Annotated[Axes, AXES] = Axes.iso_w,
+    measured: Annotated[str | None, CHANNELS] = None,
+    bounds: Annotated[list[str] | None, BOUNDS] = None,
+    weight: Annotated[list[str] | None, WEIGHT] = None,
+    robust: Annotated[bool, ROBUST] = False,
+    folds: Annotated[int, FOLDS] = 0,
+    side: Annotated[Side | None, SIDE] = None,
+    numbers: options.Numbers = None,
+    out: options.Out = None,
+    force: options.Force = False,
+) -> None:
+    """Fit a tyre to rig data, and write it as a property file (MF-Tyre) or a parameter file (other laws).
+
+    CSV: columns Fz, alpha, kappa, gamma, Vx, P and what was measured, Fx, Fy, Mx, My, Mz, in SI units and radians, or with the
+    unit in the name, such as alpha \\[deg]; Fz, a slip and a measurement are needed. A column run numbers sweeps for --folds.
+
+    MF-Tyre is fitted in stages over the coefficients that the data show, then in all; standard errors tell how far each can be
+    believed. --out draws residuals over slip and load.
+
+    Example: [bold]jaxveh tyre fit lateral.csv braking.csv --model mf61 --side left --folds 5 --out figures -o tyre.tir[/]
+    """
+    origin = _origin(model, start)
+    check_product(product, (".tir",) if origin.is_mf_tyre else (".toml",), force, (*data, start))
+    check_report(out, numbers)
+    _check_side(side, origin)
+    chosen = _channels(measured)
+    limits, weights = _bounds(bounds), _weights(weight)
+    rig = io.read_rig_table(data, axes.value, measured=chosen or MEASURED)
+    law = _law(origin, rig)
+    with progress("fit") as report:
+        fit = fitting.fit_rig(
+            law, rig, where=None if origin.is_mf_tyre else fitted_leaves, measured=chosen, weights=weights,
+            bounds={_full_name(law, name): ends for name, ends in limits.items()},
+            robust=robust, folds=folds, progress=report, throw=False,
+        )  # fmt: skip
+    note = f"Fitted to {', '.join(path.name for path in data)} by jaxveh tyre fit: {', '.join(fit.rmse)}."
+    findings = _write(fit, rig, origin, side, note, product, force)
+    shown = tyre_fit_report.show(fit, law, findings)
+    if out is not None:
+        _draw(fit, rig, out)
+    results().print(f"{product}: {type(fit.tyre).__name__} fitted to {len(rig.load)} rows of {rig.source}")
+    configuration = {
+        "data": data, "model": origin.model, "start": start, "axes": axes.value, "measured": chosen, "bounds": limits,
+        "weights": weights, "robust": robust, "folds": folds, "side": side,
+    }  # fmt: skip
+    write_numbers(numbers, {**shown, "file": product}, configuration, None)
+
+
+def _origin(model: str | None, start: Path | None) -> Origin:
+    if start is None:
+        model = DEFAULT if model is None else model
+        check_one_of("--model", model, tuple(STARTS))
+        return Origin(model)
+    if model is not None:
+        raise InputError(f"--model {model}: --start {start} tells the law; leave one of the two out.")
+    if start.suffix.lower() == ".tir":
+        file = io.read_property_file(start)
+        return Origin(tyre=tyres.from_property_file(file), file=file)
+    if start.suffix.lower() != ".toml":
+        raise InputError(f"--start {start}: suffix {start.suffix!r}; it must end in one of .tir, .toml.")
+    return Origin(tyre=tyres.read_parameters(start))
+
+
+def _check_side(side: Side | None, origin: Origin) -> None:
+    if side is not None and origin.file is not None:
+        raise InputError(f"--side {side.value}: {origin.file.source} tells its own side; leave --side out.")
+    if side is not None and not origin.is_mf_tyre:
+        raise InputError(f"--side {side.value}: only a property file (.tir) tells a side; leave --side out.")
+
+
+def _law(origin: Origin, rig: io.RigTable) -> tyres.AbstractTyre:
+    """The tyre to start from; of a property file with ranges that hold the data, and a word about it."""
+    if origin.model is not None:
+        return fitting.starting_tyre(origin.model, rig)
+    law = origin.tyre
+    assert law is not None
+    if isinstance(law, tyres.MFTyre):
+        law, widened = widened_ranges(law, rig)
+        if widened:
+            listed = ", ".join(f"{one.name} from {one.before:g} to {one.after:g}" for one in widened)
+            say("warning", "yellow", f"ranges of --start are widened, to hold the data: {listed}")
+    return law
+
+
+def _write(
+    fit: fitting.RigFit, rig: io.RigTable, origin: Origin, side: Side | None, note: str, product: Path, force: bool
+) -> list[tyres.Finding]:
+    """Write the tyre; what is worth a look in a property file."""
+    tyre = fit.tyre
+    if not isinstance(tyre, tyres.MFTyre):
+        tyres.write_parameters(tyre, product, note=note, overwrite=force)
+        return []
+    if origin.file is None:
+        tyre = measured_ranges(tyre, rig)
+        note += "\nAn ordinary tyre's, not from these data: radius, stiffness, contact patch, coefficients that do not show."
+    file = tyres.to_property_file(tyre, like=origin.file, side=None if side is None else side.value, note=note)
+    io.write_property_file(file, product, overwrite=force)
+    return tyres.check_property_file(file)
+
+
+def _draw(fit: fitting.RigFit, rig: io.RigTable, out: Path) -> None:
+    from jaxveh import plots
+
+    make_folder(out)
+    for name in fit.rmse:
+        path = plots.save(plots.rig_fit(fit, rig, [name]), out / f"rig_fit_{name}.png")
+        results().print(f"figure: {path}")
+
+
+def _channels(text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    found = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not found:
+        raise InputError(f"--measured {text!r}: must name one of {', '.join(MEASURED)}.")
+    for name in found:
+        check_one_of("--measured", name, MEASURED)
+    return tuple(dict.fromkeys(found))
+
+
+def _bounds(texts: list[str] | None) -> dict[str, tuple[float, float]]:
+    found = {}
+    for text in texts or ():
+        name, _, ends = text.partition("=")
+        low, _, high = ends.partition(":")
+        bounds = tuple(_number(end, "--bounds", text, SHAPE_OF_BOUNDS) for end in (low, high))
+        if not bounds[0] < bounds[1]:
+            raise InputError(f"--bounds {text}: {low} must lie below {high}.")
+        found[name.strip()] = bounds
+    return found
+
+
+def _weights(texts: list[str] | None) -> dict[str, float]:
+    found = {}
+    for text in texts or ():
+        name, _, value = text.partition("=")
+        found[name.strip()] = _number(value, "--weight", text, SHAPE_OF_WEIGHT)
+    return found
+
+
+def _number(value: str, option: str, text: str, shape: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = float("nan")
+    if not abs(number) < float("inf"):
+        raise InputError(f"{option} {text}: must be {shape}.")
+    return number
+
+
+def _full_name(law: tyres.AbstractTyre, name: str) -> str:
+    """`lateral.PCY1` for `PCY1`, as property files call it; other names as they are."""
+    for section, part in vars(law).items():
+        if isinstance(part, eqx.Module) and name in vars(part):
+            return f"{section}.{name}"
+    return name

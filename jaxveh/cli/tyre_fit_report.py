@@ -1,0 +1,125 @@
+"""What `jaxveh tyre fit` says of a fit: stages, channels, coefficients, and what to be careful with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jaxveh import tyres
+from jaxveh._core.parameter import Parameter, resolve
+from jaxveh.cli.console import number, table
+from jaxveh.cli.failure import say
+from jaxveh.fitting import RigFit
+
+UNCERTAIN = 0.2
+"""Standard error over a coefficient's own size above which it is marked."""
+
+UNITS = {"F_x": "N", "F_y": "N", "M_x": "N m", "M_y": "N m", "M_z": "N m"}
+
+UNSEEN, WEAK = "not identified", "uncertain"
+
+
+def show(fit: RigFit, start: tyres.AbstractTyre, findings: list[tyres.Finding]) -> dict[str, Any]:
+    """Print tables and warnings; returns every number for the JSON file. `start`: the tyre before the fit."""
+    parameters, size = _parameters(fit), _sizes(fit)
+    share = fit.std / size
+    marks = [UNSEEN if np.isnan(one) else WEAK if one > UNCERTAIN else "" for one in share]
+    _stages(fit)
+    _channels(fit)
+    _coefficients(fit, start, parameters, share, marks)
+    if findings:
+        table("Worth a look in the fitted file", ("about", "what"), findings, left=2)
+    warnings = warnings_of(fit)
+    for warning in warnings:
+        say("warning", "yellow", warning)
+    return {
+        "stages": [stage._asdict() for stage in fit.stages],
+        "channels": {
+            name: {
+                "peak": fit.peak[name], "start_rmse": fit.start_rmse[name], "rmse": fit.rmse[name],
+                "cross_validation": fit.cross_validation[name],
+            }
+            for name in fit.rmse
+        },
+        "coefficients": {
+            p.name: {"value": value, "std": std, "std_over_size": one, "unit": p.unit, "mark": mark}
+            for p, value, std, one, mark in zip(parameters, fit.values, fit.std, share, marks, strict=True)
+        },
+        "identified_directions": fit.identified,
+        "findings": [finding._asdict() for finding in findings],
+        "warnings": warnings,
+    }  # fmt: skip
+
+
+def _stages(fit: RigFit) -> None:
+    rows = [
+        (s.name, str(s.rows), str(s.coefficients), number(100 * s.before), number(100 * s.after), str(s.steps),
+         "converged" if s.converged else "stopped")
+        for s in fit.stages
+    ]  # fmt: skip
+    heads = ("stage", "rows", "coefficients", "before, % of peak", "after, % of peak", "steps", "end")
+    table("Stages: RMS of residuals over the peaks of what is measured", heads, rows)
+
+
+def _channels(fit: RigFit) -> None:
+    """The start's RMSE is what doing nothing gives."""
+    validated = any(np.isfinite(value) for value in fit.cross_validation.values())
+    heads = ["channel", "unit", "peak", "RMSE at the start", "fitted", "% of peak"]
+    rows = [
+        [name, UNITS[name], fit.peak[name], fit.start_rmse[name], fit.rmse[name], 100 * fit.rmse[name] / fit.peak[name]]
+        + ([fit.cross_validation[name]] if validated else [])
+        for name in fit.rmse
+    ]
+    table("Channels", heads + (["cross-validated"] if validated else []), rows, left=2)
+
+
+def _coefficients(fit: RigFit, start, parameters, share: np.ndarray, marks: list[str]) -> None:
+    before = [_leaf(start, name) for name in fit.names]
+    rows = [
+        (p.name, "" if p.unit == "-" else p.unit, was, value, std, 100 * one, mark)
+        for p, was, value, std, one, mark in zip(parameters, before, fit.values, fit.std, share, marks, strict=True)
+    ]
+    heads = ("coefficient", "unit", "start", "fitted", "standard error", "% of its size", "")
+    note = f"The size of a coefficient that may be zero is its usual one; above {UNCERTAIN:.0%} of it: {WEAK}."
+    table("Coefficients", heads, rows, note, left=2)
+
+
+def warnings_of(fit: RigFit) -> list[str]:
+    """What whoever uses the tyre should know."""
+    found = []
+    stopped = [stage.name for stage in fit.stages[:-1] if not stage.converged]
+    if not fit.stages[-1].converged:
+        found.append(
+            f"the fit has not converged in {fit.stages[-1].steps} steps: the tyre is the best so far, standard errors are rough"
+        )
+    elif stopped:
+        found.append(f"stages that stopped before they converged: {', '.join(stopped)}")
+    unseen = [name for name, std in zip(fit.names, fit.std, strict=True) if np.isnan(std)]
+    if fit.identified < len(fit.names):
+        found.append(
+            f"the data tell {fit.identified} of {len(fit.names)} directions of the coefficients apart"
+            + (f"; not one by one: {', '.join(unseen)}" if unseen else "")
+        )
+    worse = [name for name in fit.rmse if fit.rmse[name] > fit.start_rmse[name]]
+    if worse:
+        found.append(f"residuals larger than at the start: {', '.join(worse)}")
+    missed = [name for name in fit.rmse if fit.cross_validation[name] > 2 * fit.rmse[name]]
+    if missed:
+        found.append(f"rows that a fold did not see are missed by more than twice the fit's RMSE: {', '.join(missed)}")
+    return found
+
+
+def _parameters(fit: RigFit) -> tuple[Parameter, ...]:
+    return resolve(fit.tyre, lambda law: [_leaf(law, name) for name in fit.names])
+
+
+def _sizes(fit: RigFit) -> np.ndarray:
+    scales = [abs(p.scale) if p.scale else 0.0 for p in _parameters(fit)]
+    return np.maximum(np.maximum(np.abs(fit.values), scales), 1e-300)
+
+
+def _leaf(law: Any, name: str) -> Any:
+    for part in name.split("."):
+        law = getattr(law, part)
+    return law

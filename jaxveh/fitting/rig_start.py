@@ -1,0 +1,163 @@
+"""Where a fit to rig data starts: a law by its name, its coefficients guessed from the data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_one_of
+from jaxveh.io.rig_table import RigTable
+from jaxveh.tyres import (
+    HSRI,
+    AbstractTyre,
+    Brush,
+    Dugoff,
+    Fiala,
+    LinearWithLoad,
+    MagicFormula,
+    UniTire,
+    typical_mf_tyre,
+)
+
+SMALL = {"slip_angle": np.radians(2.0), "slip_ratio": 0.02}
+"""Slips below which a force follows its slip, to the precision of a start."""
+
+LEAST_ROWS = 5
+"""Rows that a slope needs; where fewer have a small slip, that many of the smallest count."""
+
+LEAST_LOAD = 0.2
+"""Share of the median load below which a row says nothing of friction: there it is noise over little."""
+
+NEAR_LOAD = 1.4
+"""Loads within this factor of the median give the slope there; other loads where none is so near."""
+
+GENERIC = {"C": 1.3, "E": -0.5, "stiffness": 15.0, "friction": 1.0, "speed": 16.7, "pressure": 220000.0}
+"""An ordinary tyre's, where the data are silent; `stiffness` over load, 1/rad or per slip ratio."""
+
+
+class RigFacts(NamedTuple):
+    """What rig data say at a glance: the median `load` (N), `pressure` (Pa) and `speed` (m/s); `cornering_stiffness` (N/rad)
+    and `slip_stiffness` (N) at that load; `friction`, the largest force over load."""
+
+    load: float
+    pressure: float
+    speed: float
+    cornering_stiffness: float
+    slip_stiffness: float
+    friction: float
+
+
+def rig_facts(rig: RigTable) -> RigFacts:
+    """What rig data say at a glance; an ordinary tyre's numbers where they say nothing.
+
+    A direction without measurements takes the other one's stiffness.
+    """
+    load = float(np.median(rig.load))
+    median = lambda name: float(np.median(getattr(rig, name)) if getattr(rig, name) is not None else GENERIC[name])
+    across, along = _slope(rig, "F_y", load), _slope(rig, "F_x", load)
+    generic = GENERIC["stiffness"] * load
+    # `speed` of a table may be zero where the rig did not tell it.
+    return RigFacts(
+        load=load,
+        pressure=median("pressure"),
+        speed=median("speed") or GENERIC["speed"],
+        cornering_stiffness=across or along or generic,
+        slip_stiffness=along or across or generic,
+        friction=_friction(rig, load),
+    )
+
+
+def _slope(rig: RigTable, channel: str, load: float) -> float | None:
+    """The slope of a force over its slip at the median load, where it is small; None where nothing was measured there."""
+    force, share = getattr(rig, channel), rig.load / load
+    name, other = ("slip_angle", "slip_ratio") if channel == "F_y" else ("slip_ratio", "slip_angle")
+    slip = getattr(rig, name)
+    if force is None:
+        return None
+    rows = np.isfinite(force) & (np.abs(getattr(rig, other)) <= SMALL[other]) & (slip != 0) & (share > LEAST_LOAD)
+    near = rows & (share > 1 / NEAR_LOAD) & (share < NEAR_LOAD)
+    rows = near if np.sum(near & (np.abs(slip) <= SMALL[name])) >= LEAST_ROWS else rows
+    if rows.sum() < LEAST_ROWS:
+        return None
+    rows &= np.abs(slip) <= max(SMALL[name], np.sort(np.abs(slip[rows]))[LEAST_ROWS - 1])
+    # A line with an offset (conicity, ply steer); the share of the load brings other loads near the median one.
+    columns = np.stack([slip[rows], np.ones(rows.sum())], axis=1)
+    slope = float(np.linalg.lstsq(columns, force[rows] / share[rows], rcond=None)[0][0])
+    if slope <= 0:
+        raise InputError(
+            f"{rig.source}: {channel} falls with {name} ({slope:.3g} N per unit): a positive slip must give a positive force; "
+            "are the axes of the data those that were told (iso-w or ours)?"
+        )
+    return slope
+
+
+def _friction(rig: RigTable, load: float) -> float:
+    parts = [np.nan_to_num(force) for force in (rig.F_x, rig.F_y) if force is not None]
+    rows = rig.load > LEAST_LOAD * load
+    if not parts or not np.any(rows):
+        return GENERIC["friction"]
+    share = np.hypot(parts[0], parts[-1] if len(parts) > 1 else 0.0)[rows] / rig.load[rows]
+    # The very largest is an outlier's.
+    return float(np.percentile(share, 99.5)) or GENERIC["friction"]
+
+
+def _mf(version: int) -> Callable[[RigFacts], AbstractTyre]:
+    def typical(facts: RigFacts) -> AbstractTyre:
+        return typical_mf_tyre(facts.load, version=version, pressure=facts.pressure, speed=facts.speed)
+
+    return typical
+
+
+def _magic_formula(facts: RigFacts) -> MagicFormula:
+    C, D = GENERIC["C"], facts.friction * facts.load
+    return MagicFormula(B=facts.cornering_stiffness / (C * D), C=C, D=D, E=GENERIC["E"], nominal_load=facts.load)
+
+
+def _linear_with_load(facts: RigFacts) -> LinearWithLoad:
+    # Its stiffness is greatest at twice the median load: at the median it is 4/5 of that.
+    return LinearWithLoad(1.25 * facts.cornering_stiffness, 2 * facts.load, facts.slip_stiffness / facts.load)
+
+
+def _of_stiffness(law: type) -> Callable[[RigFacts], AbstractTyre]:
+    return lambda facts: law(facts.slip_stiffness, facts.cornering_stiffness, facts.friction)
+
+
+STARTS: dict[str, Callable[[RigFacts], AbstractTyre]] = {
+    "mf61": _mf(61),
+    "mf52": _mf(52),
+    "mf62": _mf(62),
+    "mf": _magic_formula,
+    "brush": _of_stiffness(Brush),
+    "dugoff": _of_stiffness(Dugoff),
+    "fiala": _of_stiffness(Fiala),
+    "unitire": _of_stiffness(UniTire),
+    "linear-with-load": _linear_with_load,
+    "hsri": _of_stiffness(HSRI),
+}
+"""Laws by the names that programs know them by."""
+
+KNOWN = {"nominal_load"}
+"""Parameters that say where others hold: known, not fitted."""
+
+
+def starting_tyre(model: str, rig: RigTable) -> AbstractTyre:
+    """A law to start a fit from, by its name (`STARTS`).
+
+    MF-Tyre (`mf61`, `mf52`, `mf62`) is `tyres.typical_mf_tyre` with the median load, pressure and speed of the data as nominal
+    ones. Others take their stiffnesses from the slope of forces at small slip, and their friction from the largest force
+    over load.
+
+    **Raises** `InputError` for an unknown name, and for forces that fall with their slip, as in other axes.
+    """
+    check_one_of("model", model, tuple(STARTS))
+    return STARTS[model](rig_facts(rig))
+
+
+def fitted_leaves(law: AbstractTyre) -> list:
+    """What a fit may move in a law other than MF-Tyre, for `where`: all parameters but those of `KNOWN`."""
+    names = [name for name, value in vars(law).items() if value is not None and name not in KNOWN]
+    if not names:
+        raise InputError(f"{type(law).__name__} has no parameter to be fitted.")
+    return [getattr(law, name) for name in names]

@@ -1,0 +1,92 @@
+"""Tyres of few parameters as a short TOML file that a person can read and edit."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh.io import write_text
+from jaxveh.io.naming import check_known
+from jaxveh.io.toml import check_keys, number, quoted, read_toml, text
+from jaxveh.tyres.arctangent import Arctangent
+from jaxveh.tyres.base import AbstractTyre
+from jaxveh.tyres.brush import Brush
+from jaxveh.tyres.dugoff import Dugoff
+from jaxveh.tyres.exponential import Exponential
+from jaxveh.tyres.fiala import Fiala
+from jaxveh.tyres.fiala_adams import FialaADAMS
+from jaxveh.tyres.hsri import HSRI
+from jaxveh.tyres.linear import Linear
+from jaxveh.tyres.linear_with_load import LinearWithLoad
+from jaxveh.tyres.magic_formula import MagicFormula
+from jaxveh.tyres.parabolic import Parabolic
+from jaxveh.tyres.unitire import UniTire
+
+MODELS: dict[str, type[AbstractTyre]] = {
+    law.__name__: law
+    for law in (
+        Arctangent, Brush, Dugoff, Exponential, Fiala, FialaADAMS, HSRI, Linear, LinearWithLoad, MagicFormula, Parabolic, UniTire,
+    )
+}  # fmt: skip
+"""The laws whose parameters are one number each."""
+
+
+def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", overwrite: bool = False) -> None:
+    """Write a tyre's parameters as TOML, SI units and radians; `note` is a comment at its top.
+
+    The file is a table `[tyre]`: `model`, the law's name, and a number for each parameter; one that is None is left out.
+
+    **Raises** `InputError` for a law that is not in `MODELS`, parameters that are no finite scalars, and where the file exists
+    and `overwrite` is not set.
+    """
+    name = type(tyre).__name__
+    if MODELS.get(name) is not type(tyre):
+        raise InputError(
+            f"write_parameters: tyre = {name}: must be one of {', '.join(MODELS)}; for MFTyre there is to_property_file."
+        )
+    lines = [f"# {line}".rstrip() for line in note.splitlines()]
+    lines += ["# SI units and radians.", "[tyre]", f"model = {quoted(name)}"]
+    entries = [(field, getattr(tyre, field.name)) for field in dataclasses.fields(tyre)]
+    entries = [(field, value) for field, value in entries if value is not None]
+    width = max(len(field.name) for field, _ in entries)
+    for field, value in entries:
+        value = np.asarray(value)
+        if value.shape != () or not np.isfinite(value):
+            raise InputError(f"{name}.{field.name} = {value}: must be one finite number to be written.")
+        # The fewest digits that are this value in its own precision.
+        shown, unit = repr(float(str(value[()]))), field.metadata["unit"]
+        lines.append(f"{field.name:<{width}} = {shown}" + ("" if unit == "-" else f"  # {unit}"))
+    write_text("\n".join(lines) + "\n", path, overwrite=overwrite)
+
+
+def read_parameters(path: str | Path) -> AbstractTyre:
+    """The tyre of a file as `write_parameters` writes it; parameters that have a default may be left out.
+
+    **Raises** `InputError` for a file that is no TOML, an unknown model or parameter, one that is missing, no number, or out of
+    range.
+    """
+    path = Path(path)
+    content = read_toml(path)
+    if "tyre" not in content:
+        raise InputError(f"{path}: has no table [tyre]; it needs one with `model = ...` and the parameters.")
+    check_keys(str(path), content, ("tyre",))
+    table = content["tyre"]
+    where = f"{path}: [tyre]"
+    if not isinstance(table, dict) or "model" not in table:
+        raise InputError(f"{where}: has no `model`; it must be one of {', '.join(MODELS)}.")
+    name = text(f"{where} model", table["model"])
+    check_known(where, "model", name, MODELS)
+    fields = {field.name: field for field in dataclasses.fields(MODELS[name])}
+    check_keys(f"{where} of {name}", table, ("model", *fields))
+    for field in fields.values():
+        if field.default is dataclasses.MISSING and field.name not in table:
+            raise InputError(f"{where}: {field.name} is missing; {name} needs it ({field.metadata['unit']}).")
+    values: dict[str, Any] = {key: number(f"{where} {key}", value) for key, value in table.items() if key != "model"}
+    try:
+        return MODELS[name](**values)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None

@@ -1,0 +1,208 @@
+"""From a tyre to a tyre property file: a new one, or one that was read with other numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_one_of
+from jaxveh.io.property_file import PropertyFile, parse_property_file
+from jaxveh.tyres.mf_tyre import MFTyre
+from jaxveh.tyres.property_file import DIMENSIONS, SIDES, from_property_file, size_of, version_of
+
+FITTYP = {52: 6, 61: 61, 62: 62}
+"""What FITTYP says of each version."""
+
+HEADER = """\
+[MDI_HEADER]
+FILE_TYPE                = 'tir'
+FILE_VERSION             = 3.0
+FILE_FORMAT              = 'ASCII'
+$ Signs of coefficients are ISO-W's; units are SI and radians.
+[UNITS]
+LENGTH                   = 'meter'
+FORCE                    = 'newton'
+ANGLE                    = 'radian'
+MASS                     = 'kg'
+TIME                     = 'second'
+"""
+
+SECTIONS = {
+    "MODEL": ("LONGVL", "VXLOW"),
+    "DIMENSION": ("UNLOADED_RADIUS", "WIDTH", "ASPECT_RATIO", "RIM_RADIUS"),
+    "OPERATING_CONDITIONS": ("INFLPRES", "NOMPRES"),
+    "VERTICAL": (
+        "FNOMIN", "VERTICAL_STIFFNESS", "BREFF", "DREFF", "FREFF", "Q_RE0", "Q_V1", "Q_V2", "Q_FZ2", "Q_FCX", "Q_FCY",
+        "Q_FCY2", "Q_CAM1", "Q_CAM2", "Q_CAM3", "Q_FYS1", "Q_FYS2", "Q_FYS3", "PFZ1", "BOTTOM_OFFST",
+    ),
+    "STRUCTURAL": (
+        "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS", "PCFX1", "PCFX2", "PCFX3", "PCFY1", "PCFY2", "PCFY3",
+    ),
+    "CONTACT_PATCH": ("Q_RA1", "Q_RA2", "Q_RB1", "Q_RB2", "Q_A1", "Q_A2"),
+    "INFLATION_PRESSURE_RANGE": ("PRESMIN", "PRESMAX"),
+    "VERTICAL_FORCE_RANGE": ("FZMIN", "FZMAX"),
+    "LONG_SLIP_RANGE": ("KPUMIN", "KPUMAX"),
+    "SLIP_ANGLE_RANGE": ("ALPMIN", "ALPMAX"),
+    "INCLINATION_ANGLE_RANGE": ("CAMMIN", "CAMMAX"),
+}  # fmt: skip
+"""The sections of the tyre's body and ranges."""
+
+WHOLE = {
+    "scaling": "SCALING_COEFFICIENTS",
+    "longitudinal": "LONGITUDINAL_COEFFICIENTS",
+    "overturning": "OVERTURNING_COEFFICIENTS",
+    "lateral": "LATERAL_COEFFICIENTS",
+    "rolling": "ROLLING_COEFFICIENTS",
+    "aligning": "ALIGNING_COEFFICIENTS",
+    "turn_slip": "TURNSLIP_COEFFICIENTS",
+}
+"""The parts of a tyre that are a section each."""
+
+ROUNDS = 2
+"""A nominal pressure that is written can change what a silent INFLPRES means: that shows in a second round."""
+
+
+class _Coefficient(NamedTuple):
+    """A coefficient's `section`, `name`, `unit`, and its `value`: an array scalar of the tyre's dtype, SI units."""
+
+    section: str
+    name: str
+    unit: str
+    value: np.ndarray
+
+
+def to_property_file(
+    tyre: MFTyre,
+    like: PropertyFile | None = None,
+    *,
+    side: Literal["left", "right"] | None = None,
+    note: str = "",
+) -> PropertyFile:
+    """The .tir file of a tyre: `io.write_property_file` writes it, `from_property_file` reads the same tyre from it.
+
+    Without `like` a new file in SI units with every coefficient in its usual section; `side` is its TYRESIDE. With `like`, a
+    file that was read, the same file with other numbers: comments, columns, units and unknown sections stay, and coefficients
+    that it lacks are added to their sections where silence would mean something else. In units other than SI, numbers may
+    come back different in the last digit. `note` becomes comment lines under the file's first heading.
+
+    A file does not hold `limits`, `angles` and `spins`; coefficients of turn slip that the tyre lacks are left out.
+
+    **Raises** `InputError` for another kind of tyre, coefficients that are no finite scalars, and a `side` beside `like`,
+    which has its own.
+    """
+    if not isinstance(tyre, MFTyre):
+        raise InputError(
+            f"to_property_file: tyre = {type(tyre).__name__}: must be an MFTyre; other laws: tyres.write_parameters."
+        )
+    coefficients = list(_coefficients(tyre))
+    if like is None:
+        return _noted(_new(tyre, coefficients, side), note)
+    if side is not None:
+        raise InputError(f"to_property_file: side = {side!r}: {like.source} tells its own side; leave `side` out.")
+    file = _with_version(like, tyre.version)
+    for _ in range(ROUNDS):
+        file = _changed(file, coefficients)
+    return _noted(file, note)
+
+
+def _coefficients(tyre: MFTyre) -> Iterable[_Coefficient]:
+    section_of = {name: section for section, names in SECTIONS.items() for name in names}
+    for part in ("structure", "ranges", *WHOLE):
+        module = getattr(tyre, part)
+        for field in () if module is None else dataclasses.fields(module):
+            section = WHOLE[part] if part in WHOLE else section_of[field.name]
+            value = np.asarray(getattr(module, field.name))
+            if value.shape != () or not np.isfinite(value):
+                raise InputError(f"MFTyre.{part}.{field.name} = {value}: must be one finite number to be written.")
+            yield _Coefficient(section, field.name, field.metadata["unit"], value)
+
+
+def _new(tyre: MFTyre, coefficients: list[_Coefficient], side: str | None) -> PropertyFile:
+    lines = [HEADER + "[MODEL]", f"{'FITTYP':<24} = {FITTYP[tyre.version]}"]
+    if side is not None:
+        check_one_of("side", side, SIDES)
+        lines.append(f"{'TYRESIDE':<24} = '{side.upper()}'")
+    for section in (*SECTIONS, *WHOLE.values()):
+        inside = {one.name: one for one in coefficients if one.section == section}
+        # In the order of this table, not of the tyre's fields, which have another.
+        names = SECTIONS.get(section, tuple(inside))
+        if section != "MODEL" and inside:
+            lines.append(f"[{section}]")
+        lines += [_line(inside[name], _number(inside[name].value)) for name in names]
+    return parse_property_file("\n".join(lines) + "\n", f"MF-Tyre {tyre.version / 10:g}")
+
+
+def _line(one: _Coefficient, number: float) -> str:
+    unit = "" if one.unit == "-" else f"${one.unit}"
+    return f"{one.name:<24} = {number!r:<24}{unit}".rstrip()
+
+
+def _with_version(file: PropertyFile, version: int) -> PropertyFile:
+    if file.find("FITTYP") is not None:
+        return file if version_of(file) == version else file.replace({"FITTYP": FITTYP[version]})
+    try:
+        if version_of(file) == version:
+            return file
+    except InputError:
+        pass  # the file does not say: now it does
+    return _added(file, "MODEL", [f"{'FITTYP':<24} = {FITTYP[version]}"])
+
+
+def _changed(file: PropertyFile, coefficients: list[_Coefficient]) -> PropertyFile:
+    """The file with those numbers replaced or added that it would not read as the tyre's."""
+    said = {one.name: one.value for one in _coefficients(from_property_file(file))}
+    replaced: dict[str, float] = {}
+    added: dict[str, list[str]] = {}
+    for one in coefficients:
+        if said[one.name].astype(one.value.dtype) == one.value:
+            continue
+        size = size_of(file, DIMENSIONS[one.name]) if one.name in DIMENSIONS else 1.0
+        number = _in_units(_number(one.value), size)
+        if file.find(one.name) is not None:
+            replaced[one.name] = number
+        else:
+            added.setdefault(one.section, []).append(_line(one._replace(unit="-"), number))
+    file = file.replace(replaced)
+    for section, lines in added.items():
+        file = _added(file, section, lines)
+    return file
+
+
+def _number(value: np.ndarray) -> float:
+    """The number with the fewest digits that is this value in its own precision."""
+    return float(str(value[()]))
+
+
+def _in_units(value: float, size: float) -> float:
+    """The number that becomes `value` when it is read, or the nearest one; of several the shortest."""
+    near = value / size
+    candidates = [float(f"{near:.{digits}g}") for digits in (12, 15)]
+    candidates += [near, math.nextafter(near, math.inf), math.nextafter(near, -math.inf)]
+    return min(candidates, key=lambda one: abs(one * size - value))
+
+
+def _added(file: PropertyFile, section: str, lines: list[str]) -> PropertyFile:
+    """The file with lines after the last entry of a section, or with that section at its end."""
+    end = "\r\n" if file.lines[0].endswith("\r\n") else "\n"
+    last = max((entry.line for entry in file.entries if entry.section == section), default=None)
+    if last is None:
+        last, lines = len(file.lines), [f"[{section}]", *lines]
+    before = list(file.lines[:last])
+    if not before[-1].endswith(("\n", "\r")):
+        before[-1] += end
+    return parse_property_file("".join([*before, *(line + end for line in lines), *file.lines[last:]]), file.source)
+
+
+def _noted(file: PropertyFile, note: str) -> PropertyFile:
+    """The file with comment lines under its first heading, which readers may want to be the first line."""
+    if not note:
+        return file
+    end = "\r\n" if file.lines[0].endswith("\r\n") else "\n"
+    heading = next(i for i, line in enumerate(file.lines) if line.lstrip().startswith("["))
+    comments = [f"$ {line}".rstrip() + end for line in note.splitlines()]
+    lines = [*file.lines[: heading + 1], *comments, *file.lines[heading + 1 :]]
+    return parse_property_file("".join(lines), file.source)

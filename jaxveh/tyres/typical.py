@@ -1,0 +1,48 @@
+"""Tyres to start from where nothing but size and load is known."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from jaxveh._core.errors import check_positive
+from jaxveh.tyres.mf_tyre import (
+    Aligning,
+    Lateral,
+    Longitudinal,
+    MFTyre,
+    Overturning,
+    Ranges,
+    Rolling,
+    Scaling,
+    Structure,
+    TurnSlip,
+)
+from jaxveh.tyres.mf_tyre.typical import TYPICAL
+
+SLIP_RATIO = 1.5
+"""Beyond it slip ratios are held, as in most property files."""
+
+
+def typical_mf_tyre(
+    load, *, version: int = 61, pressure=220000.0, radius=0.32, speed=16.7, limits: bool = True
+) -> MFTyre:
+    """A typical car tyre as MF-Tyre `version` (52, 61 or 62): a start for fits, no tyre that anybody measured.
+
+    `load` (N) is its nominal load, `pressure` (Pa) its nominal and inflation pressure, `radius` (m) the unloaded one, `speed`
+    (m/s) that at which it counts as measured; `limits` as in `MFTyre`. Coefficients are those which a property file means
+    where it is silent (`mf_tyre.typical.TYPICAL`); forces scale with the load.
+
+    **Raises** `InputError` for numbers that are not positive, and for another version.
+    """
+    for name, value, unit in (
+        ("load", load, "N"), ("pressure", pressure, "Pa"), ("radius", radius, "m"), ("speed", speed, "m/s"),
+    ):  # fmt: skip
+        check_positive(f"typical_mf_tyre: {name}", value, unit)
+    own = {"FNOMIN": load, "NOMPRES": pressure, "INFLPRES": pressure, "UNLOADED_RADIUS": radius, "LONGVL": speed}
+    known = {**TYPICAL, **own, "KPUMIN": -SLIP_RATIO, "KPUMAX": SLIP_RATIO}
+
+    def section(kind):
+        return kind(**{field.name: known[field.name] for field in dataclasses.fields(kind) if field.name in known})
+
+    parts = (Structure, Longitudinal, Lateral, Aligning, Overturning, Rolling, Scaling, Ranges, TurnSlip)
+    return MFTyre(*map(section, parts), version=version, limits=limits)

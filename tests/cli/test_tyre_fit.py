@@ -1,0 +1,170 @@
+"""`jaxveh tyre fit`: files of tyres from rig data, numbers with their errors, and each mistake in a line."""
+
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from programs import error_line, run
+
+from jaxveh import io, tyres
+
+TRUTH = tyres.Brush(slip_stiffness=9e4, cornering_stiffness=7e4, friction=0.95)
+ANGLES, LOADS = np.linspace(-0.2, 0.2, 15), (2000.0, 4000.0, 6000.0)
+NOISE = 30.0
+
+
+def write(path, head, rows):
+    path.write_text("\n".join([head, *(",".join(f"{value:.9g}" for value in row) for row in rows)]) + "\n")
+    return path
+
+
+def lateral(folder, name="lateral.csv", sign=-1.0, scale=1.0):
+    """Slip angles in degrees, of ISO-W's sign, at three loads, with noise; a run a load."""
+    random = np.random.default_rng(4)
+    angle, load = (grid.ravel() for grid in np.meshgrid(ANGLES, LOADS, indexing="ij"))
+    force = TRUTH.forces(tyres.Contact(slip_angle=jnp.asarray(angle), load=jnp.asarray(load))).F_y
+    force = scale * (np.asarray(force) + NOISE * random.standard_normal(angle.size))
+    rows = np.stack([sign * np.degrees(angle), load, force, np.searchsorted(LOADS, load)], axis=1)
+    return write(folder / name, "alpha [deg],Fz,Fy,run", rows)
+
+
+@pytest.fixture(scope="module")
+def brush(tmp_path_factory):
+    """The folder of one fit with everything that it writes, and the program's result."""
+    folder = tmp_path_factory.mktemp("brush")
+    result = run(
+        "tyre", "fit", lateral(folder), "--model", "brush", "--folds", "3", "--out", folder / "figures",
+        "--json", folder / "fit.json", "-o", folder / "brush.toml",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    return folder, result
+
+
+def test_the_parameter_file_is_the_truth_within_its_errors(brush):
+    folder, _ = brush
+    numbers = json.loads((folder / "fit.json").read_text())
+    tyre = tyres.read_parameters(folder / "brush.toml")
+    assert isinstance(tyre, tyres.Brush)
+    for name in ("cornering_stiffness", "friction"):
+        found = numbers["coefficients"][name]
+        assert found["value"] == float(getattr(tyre, name)) and found["mark"] == ""
+        assert abs(found["value"] - float(getattr(TRUTH, name))) < 4 * found["std"]
+        assert 0 < found["std_over_size"] < 0.02
+    assert (folder / "brush.toml").read_text().startswith("# Fitted to lateral.csv by jaxveh tyre fit: F_y.\n")
+
+
+def test_tables_show_baseline_fit_and_unseen_rows(brush):
+    folder, result = brush
+    numbers = json.loads((folder / "fit.json").read_text())
+    channel = numbers["channels"]["F_y"]
+    assert channel["start_rmse"] > 2 * channel["rmse"]
+    assert 0.7 * NOISE < channel["rmse"] < 1.3 * NOISE and channel["rmse"] < channel["cross_validation"] < 2 * NOISE
+    assert numbers["stages"][0] | {"steps": 0, "before": 0, "after": 0} == {
+        "name": "joint", "rows": 45, "coefficients": 4, "before": 0, "after": 0, "steps": 0, "converged": True,
+    }  # fmt: skip
+    for text in ("converged", "RMSE at the start", "cross-validated", "cornering_stiffness", "N/rad", "brush.toml"):
+        assert text in result.stdout
+    assert numbers["manifest"]["configuration"]["folds"] == 3
+
+
+def test_what_the_data_do_not_show_is_said(brush):
+    folder, result = brush
+    numbers = json.loads((folder / "fit.json").read_text())
+    unseen = [name for name, one in numbers["coefficients"].items() if one["mark"] == "not identified"]
+    assert unseen == ["slip_stiffness", "half_length"] and numbers["identified_directions"] == 2
+    assert numbers["coefficients"]["half_length"]["std"] is None
+    assert "warning: the data tell 2 of 4 directions" in result.stderr
+    assert "not one by one: slip_stiffness, half_length" in result.stderr
+    assert result.stdout.count("not identified") == 2
+
+
+def test_residuals_are_drawn(brush):
+    folder, result = brush
+    assert [path.name for path in (folder / "figures").iterdir()] == ["rig_fit_F_y.png"]
+    assert (folder / "figures" / "rig_fit_F_y.png").stat().st_size > 20_000
+    assert "figure: " in result.stdout
+
+
+def test_a_fit_goes_on_from_a_file_with_bounds(brush, tmp_path):
+    folder, _ = brush
+    product = tmp_path / "again.toml"
+    result = run(
+        "tyre", "fit", folder / "lateral.csv", "--start", folder / "brush.toml", "-o", product, "--json", tmp_path / "a.json",
+        "--bounds", "friction=0.9:0.97", "--bounds", "half_length=0.05:0.07", "--weight", "F_y=2", "--measured", "F_y",
+        "--robust",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    numbers = json.loads((tmp_path / "a.json").read_text())
+    # It starts where the other one ended.
+    assert numbers["channels"]["F_y"]["start_rmse"] == pytest.approx(numbers["channels"]["F_y"]["rmse"], rel=0.02)
+    assert 0.9 < float(tyres.read_parameters(product).friction) < 0.97
+    assert numbers["manifest"]["configuration"]["bounds"]["friction"] == [0.9, 0.97]
+    assert numbers["manifest"]["configuration"]["weights"] == {"F_y": 2.0}
+
+
+def test_a_property_file_of_lateral_data(tmp_path):
+    product = tmp_path / "tyre.tir"
+    result = run(
+        "tyre", "fit", lateral(tmp_path), "-o", product, "--side", "left", "--json", tmp_path / "fit.json", "--bounds", "PCY1=1:2"
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    numbers = json.loads((tmp_path / "fit.json").read_text())
+    assert [stage["name"] for stage in numbers["stages"]] == ["F_y, pure", "joint"]
+    assert numbers["channels"]["F_y"]["rmse"] < 1.5 * NOISE
+    file = io.read_property_file(product)
+    assert "$ Fitted to lateral.csv by jaxveh tyre fit: F_y." in "".join(file.lines)
+    assert file.text("TYRESIDE") == "LEFT" and file.number("FZMAX") == 6000.0 and file.number("FNOMIN") == 4000.0
+    assert file.number("ALPMAX") == pytest.approx(0.2) and 1 < file.number("PCY1") < 2
+    assert file.number("PCY1") == numbers["coefficients"]["lateral.PCY1"]["value"]
+    assert numbers["findings"] == [f._asdict() for f in tyres.check_property_file(file)]
+
+
+def refused(folder, *arguments, data=None, product="out.toml"):
+    data = lateral(folder) if data is None else data
+    line = error_line(run("tyre", "fit", data, "-o", folder / product, *arguments))
+    assert not (folder / product).exists()
+    return line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--model", "brsh"], "--model = 'brsh': must be one of 'mf61'"),
+        (["--model", "mf52"], "suffix '.toml'; it must end in one of .tir"),
+        (["--model", "brush", "--start", "a.tir"], "--start a.tir tells the law; leave one of the two out"),
+        (["--start", "a.txt"], "--start a.txt: suffix '.txt'; it must end in one of .tir, .toml"),
+        (["--model", "brush", "--side", "left"], "--side left: only a property file (.tir) tells a side"),
+        (["--model", "brush", "--measured", "F_q"], "--measured = 'F_q': must be one of 'F_x'"),
+        (["--model", "brush", "--measured", ","], "--measured ',': must name one of F_x"),
+        (["--model", "brush", "--measured", "F_y,F_x"], "measured: F_x is not in"),
+        (["--model", "brush", "--bounds", "friction=1"], "--bounds friction=1: must be NAME=LOW:HIGH, such as"),
+        (["--model", "brush", "--bounds", "friction=2:1"], "--bounds friction=2:1: 2 must lie below 1"),
+        (["--model", "brush", "--bounds", "mu=0:1"], "bounds: unknown name(s) mu; there are: slip_stiffness"),
+        (["--model", "brush", "--bounds", "friction=2:3"], "(2, 3): the start 0.9646"),
+        (["--model", "brush", "--weight", "F_y"], "--weight F_y: must be CHANNEL=NUMBER, such as"),
+        (["--model", "brush", "--weight", "F_y=-1"], "weights['F_y'] = -1.0: must be positive"),
+        (["--model", "brush", "--folds", "1"], "folds = 1: must be at least 2"),
+        (["--model", "brush", "--axes", "ours"], "F_y falls with slip_angle"),
+    ],
+)
+def test_mistakes_are_named_before_the_fit(tmp_path, arguments, message):
+    assert message in refused(tmp_path, *arguments)
+
+
+def test_files_that_are_there_are_kept(tmp_path):
+    (tmp_path / "out.toml").write_text("mine")
+    arguments = ("tyre", "fit", lateral(tmp_path), "--model", "brush", "-o", tmp_path / "out.toml")
+    assert "exists already; name another file, or pass --force" in error_line(run(*arguments))
+    assert (tmp_path / "out.toml").read_text() == "mine"
+    start = tmp_path / "start.toml"
+    tyres.write_parameters(TRUTH, start)
+    result = run("tyre", "fit", lateral(tmp_path), "--start", start, "-o", start, "--force")
+    assert "is an input of this program" in error_line(result)
+    assert float(tyres.read_parameters(start).friction) == 0.95
+
+
+def test_data_that_cannot_be_read_are_named(tmp_path):
+    assert "cannot be read" in refused(tmp_path, "--model", "brush", data=tmp_path / "absent.csv")
+    bare = write(tmp_path / "bare.csv", "alpha,Fy", [(0.1, 1.0)])
+    assert "no load among the columns alpha, Fy" in refused(tmp_path, "--model", "brush", data=bare)

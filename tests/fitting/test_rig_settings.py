@@ -1,0 +1,30 @@
+"""Settings of rig fits that are told before the work, and starts that keep to their bounds."""
+
+import numpy as np
+import pytest
+
+from jaxveh import InputError, tyres
+from jaxveh.fitting import fit_rig
+from jaxveh.fitting.rig import CURVATURES, starts_of
+from jaxveh.fitting.rig_stages import Stage
+from jaxveh.io import RigTable
+
+STAGE = Stage("F_y, pure", ("F_y",), ("lateral.PEY1",), np.ones(1, bool), "lateral.PEY1")
+
+
+def test_starts_stay_within_bounds():
+    law = tyres.typical_mf_tyre(4000.0)
+    curvatures = lambda bounds: [float(one.lateral.PEY1) for one in starts_of(law, STAGE, bounds)]
+    own = float(law.lateral.PEY1)
+    assert curvatures({}) == [own, *CURVATURES]
+    assert curvatures({"lateral.PEY1": (-2.0, 0.8)}) == [own, *(one for one in CURVATURES if -2 < one < 0.8)]
+
+
+def test_bad_folds_are_told_before_the_fit():
+    told = []
+    slip = np.linspace(-0.1, 0.1, 30)
+    rig = RigTable(slip_angle=slip, slip_ratio=0 * slip, load=0 * slip + 4e3, F_y=6e4 * slip)
+    for folds, message in ((1, "folds = 1: must be at least 2"), (9, "rows for 9 folds = 30: must be at least 36")):
+        with pytest.raises(InputError, match=message):
+            fit_rig(tyres.Brush(8e4, 6e4), rig, folds=folds, progress=lambda *stage: told.append(stage))
+    assert told == []
