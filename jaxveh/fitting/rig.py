@@ -29,7 +29,7 @@ CURVATURES = (-3.0, -1.0, 0.5, 0.7, 0.9)
 LEAST_NOISE = 1e-4
 """The least noise over peak that weighs a channel: one that fits perfectly would outweigh all others."""
 
-SETTLED = 1e-3
+SETTLED = 1e-5
 """Where a stage's second round moves the RMS of residuals by a smaller share, it has converged: coefficients that data do not
 tell apart may drift on without end."""
 
@@ -86,8 +86,9 @@ def fit_rig(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     robust: bool = False,
     folds: int = 0,
+    staged: bool = True,
     max_steps: int = 500,
-    tolerance: float = 1e-7,
+    tolerance: float = 1e-6,
     progress: Progress = silent,
     throw: bool = True,
 ) -> RigFit:
@@ -98,7 +99,8 @@ def fit_rig(
     `measured`: the forces and moments to be compared; by default those that both data and law have. `weights`: by channel, on
     top of one over the noise, which is estimated. `bounds`: by name, an interval that a coefficient stays in. `robust`:
     residuals beyond two standard deviations count by their size. `folds`: parts for cross-validation, whole runs
-    where the data number them, blocks of rows where not; 0 for none.
+    where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law that
+    is near the data already.
 
     **Raises** `InputError` for a channel, weight or bound that has no match, a start outside its bounds, too few rows;
     `FilterError` where the joint fit does not converge, unless `throw=False`.
@@ -112,11 +114,12 @@ def fit_rig(
     chosen = None if where is None else tuple(p.name for p in resolve(law, where))
     plan = stages_of(law, rig, channels, chosen)
     names = _names(law, plan, chosen)
-    data = _Data(rig, contact, channels, extra, dict(bounds or {}), robust, max_steps, tolerance)
-    data.check(law, names)
+    data = _Data(rig, contact, channels, names, extra, dict(bounds or {}), robust, max_steps, tolerance)
+    data.check(law)
     if folds:
         fold_of(rig, folds)  # raises now, not after the fit
     joint = Stage(JOINT, channels, names, np.ones(rig.load.shape, bool))
+    plan = plan if staged else []
     total = len(plan) + 1 + folds
     start_rmse, reports = data.rmse(law), []
     for k, stage in enumerate(plan):
@@ -166,8 +169,8 @@ def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None)
 class _Data:
     """Rig data and settings that all stages share."""
 
-    def __init__(self, rig, contact, channels, weights, bounds, robust, max_steps, tolerance):
-        self.rig, self.contact, self.channels, self.bounds = rig, contact, channels, bounds
+    def __init__(self, rig, contact, channels, names, weights, bounds, robust, max_steps, tolerance):
+        self.rig, self.contact, self.channels, self.names, self.bounds = rig, contact, channels, names, bounds
         self.robust, self.max_steps, self.tolerance, self.weights = robust, max_steps, tolerance, weights
         measured = np.stack([getattr(rig, name) for name in channels])
         self.present = np.isfinite(measured)
@@ -180,15 +183,15 @@ class _Data:
         for name, size in self.peak.items():
             check_positive(f"{rig.source}: largest {name}", size, advice="Leave this channel out: measured=...")
 
-    def check(self, law, names: tuple[str, ...]) -> None:
+    def check(self, law) -> None:
         """Raise for bounds without a coefficient or its start, and for fewer measurements than coefficients."""
-        check_names("bounds", self.bounds, names)
-        self.parameters(law, names)
-        count = int(self.present.sum())
-        check_at_least(f"{self.rig.source}: measurements for {len(names)} coefficients", count, len(names) + 1)
+        check_names("bounds", self.bounds, self.names)
+        self.parameters(law)
+        count, coefficients = int(self.present.sum()), len(self.names)
+        check_at_least(f"{self.rig.source}: measurements for {coefficients} coefficients", count, coefficients + 1)
 
-    def parameters(self, law, names) -> tuple[Parameter, ...]:
-        found = resolve(law, lambda law: [_leaf(law, name) for name in names])
+    def parameters(self, law) -> tuple[Parameter, ...]:
+        found = resolve(law, lambda law: [_leaf(law, name) for name in self.names])
         return tuple(self._bounded(law, p) for p in found)
 
     def _bounded(self, law, p: Parameter) -> Parameter:
@@ -201,15 +204,21 @@ class _Data:
         return p._replace(domain=Interval(float(low), float(high)))
 
     def problem(self, law, stage: Stage, noise: Mapping[str, float], rows: np.ndarray | None = None) -> RigProblem:
-        """The stage's problem, weighted by one over the noise of each channel."""
-        parameters = self.parameters(law, stage.coefficients)
+        """The stage's problem, weighted by one over the noise of each channel.
+
+        All stages have the same shapes, what a stage does not compare weighing nothing and what it does not fit being held:
+        one compilation, which takes longer than all steps, serves them all.
+        """
+        parameters = self.parameters(law)
         origin, scale = start_of(law, parameters)
-        index = [self.channels.index(name) for name in stage.channels]
-        counts = self.present[index] & (stage.rows if rows is None else rows)
-        size = np.array([np.sqrt(self.weights.get(name, 1.0)) / noise[name] for name in stage.channels])
+        moves = np.array([name in stage.coefficients for name in self.names])
+        size = [
+            np.sqrt(self.weights.get(name, 1.0)) / noise[name] if name in stage.channels else 0.0 for name in self.channels
+        ]
+        counts = self.present & (stage.rows if rows is None else rows)
         return RigProblem(
-            law, self.contact, jnp.asarray(self.measured[index]), jnp.asarray(counts * size[:, None]), origin, scale,
-            parameters, stage.channels, self.robust,
+            law, self.contact, jnp.asarray(self.measured), jnp.asarray(counts * np.array(size)[:, None]), origin,
+            jnp.where(moves, scale, 0.0), parameters, self.channels, self.robust,
         )  # fmt: skip
 
     def residuals(self, law) -> np.ndarray:
@@ -299,7 +308,7 @@ def fold_of(rig: RigTable, folds: int) -> np.ndarray:
 
 
 def _result(data: _Data, law, joint: Stage, reports, start_rmse, validation) -> RigFit:
-    parameters = data.parameters(law, joint.coefficients)
+    parameters = data.parameters(law)
     values = np.array([float(value) for value in pick(law, parameters)])
     problem = data.problem(law, joint, data.noise(law))
     # The noise is that of the fit, with the degrees of freedom that coefficients take.

@@ -11,9 +11,9 @@ import jax.numpy as jnp
 from jaxveh._core.parameter import Parameter, pick, put
 from jaxveh.tyres import AbstractTyre, Contact
 
-PULL = 0.01
-"""How hard a coefficient is pulled to its start, in standard deviations a step: nothing against what data show, but what they do
-not show stays where it was."""
+PULL = 0.1
+"""How hard a coefficient is pulled to its start, in standard deviations a step: 1 % of what a direction is pulled that data
+identify, but what they do not show stays where it was, where it would creep for hundreds of steps."""
 
 KINK = 2.0
 """Residuals above this many standard deviations count by their size, not by their square, where a fit is robust."""
@@ -24,7 +24,7 @@ class RigProblem(eqx.Module):
 
     `contact` (n,) arrays; `measured` (m, n), the forces and moments `channels`, zero where there is no measurement; `weight`
     (m, n), one over the standard deviation, zero where a row does not count. `scale` (p,): the step of each coefficient that
-    counts as one, on its bijector's line, from `origin` (p,).
+    counts as one, on its bijector's line, from `origin` (p,); zero where it is held.
     """
 
     law: AbstractTyre

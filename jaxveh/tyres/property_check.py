@@ -7,6 +7,7 @@ road tyres, from a racing car's to a truck's.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -195,7 +196,7 @@ def _shapes(tyre: MFTyre) -> Iterator[Finding]:
 def _usual(tyre: MFTyre) -> Iterator[Finding]:
     """The tyre that rolls freely at its nominal load, against what tyres do."""
     s = tyre.structure
-    found = _outputs(tyre, Contact(load=s.FNOMIN * tyre.scaling.LFZO))
+    found = _outputs(_signed(tyre), Contact(load=s.FNOMIN * tyre.scaling.LFZO))
     for field, (what, least, most, unit) in USUAL.items():
         value = float(getattr(found, field))
         if field in PER_LOAD:
@@ -214,6 +215,7 @@ def _friction_over_range(tyre: MFTyre) -> Iterator[Finding]:
     pressures = [max(float(r.PRESMIN), own / 2), own, min(float(r.PRESMAX), own * 2)]
     load, camber, pressure = np.meshgrid(_loads(tyre), [float(r.CAMMIN), 0.0, float(r.CAMMAX)], pressures)
     at = Contact(load=jnp.asarray(load), camber=jnp.asarray(camber), pressure=jnp.asarray(pressure))
+    tyre = _signed(tyre)
     nominal, found = _outputs(tyre, Contact(load=s.FNOMIN * tyre.scaling.LFZO)), _outputs(tyre, at)
     for field, what in (("mu_x", "friction along"), ("mu_y", "friction across")):
         mu = np.asarray(getattr(found, field))
@@ -314,6 +316,11 @@ def _unread(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
         yield Finding(f"[{section}]", f"{listed}: not read, and not neutral")
     if DEFLECTIONS in (line.strip().upper() for line in file.lines):
         yield Finding(DEFLECTIONS, "is not read: the deflection follows VERTICAL_STIFFNESS")
+
+
+def _signed(tyre: MFTyre) -> MFTyre:
+    """Without limits, which make friction positive in the outputs whatever the coefficients say."""
+    return dataclasses.replace(tyre, limits=False)
 
 
 @eqx.filter_jit

@@ -97,18 +97,23 @@ def test_internals_are_the_reference_s(compared, name):
     np.testing.assert_allclose(ours, expected, rtol=1e-8)
 
 
+@jax.jit
+def total(tyre, contact):
+    return sum(tyre.forces(contact))
+
+
+gradients = jax.jit(jax.value_and_grad(total, argnums=(0, 1)))
+"""Compiled once a version: eager, every tyre's gradient takes as long."""
+
+
 @pytest.mark.parametrize("name", shared_names("tyres", "*.tir"))
 def test_every_file_evaluates_with_finite_gradients(name):
     tyre = tyre_of(name)
     load = tyre.structure.FNOMIN
-
-    def total(tyre, slips):
-        return sum(tyre.forces(Contact(slip_angle=slips[0], slip_ratio=slips[1], camber=slips[2], load=slips[3])))
-
     for slips in ([0.0, 0.0, 0.0, 1.0], [0.1, -0.05, 0.02, 0.7], [0.0, 0.1, 0.0, 1.0], [0.1, 0.0, 0.0, 0.0]):
-        point = jnp.asarray(slips) * jnp.asarray([1.0, 1.0, 1.0, load])
-        gradients = jax.grad(total, argnums=(0, 1))(tyre, point)
-        assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves((total(tyre, point), gradients)))
+        angle, ratio, camber, share = (jnp.asarray(value) for value in slips)
+        point = Contact(slip_angle=angle, slip_ratio=ratio, camber=camber, load=share * load, friction=jnp.asarray(1.0))
+        assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(gradients(tyre, point)))
     # Signs of this package: a positive slip angle pushes left, a positive slip ratio forward.
     found = tyre.forces(Contact(slip_angle=jnp.asarray(0.05), slip_ratio=jnp.asarray(0.05), load=load))
     assert found.F_y > 0 and found.F_x >= 0
@@ -210,11 +215,10 @@ def test_turn_slip_is_the_reference_s():
 
 def test_turn_slip_is_smooth_at_zero_and_refused_in_52():
     tyre = dataclasses.replace(version_62(), spins=True)
-    contact = Contact(load=jnp.asarray(4000.0), speed=jnp.asarray(20.0))
-    total = lambda tyre, phi, camber: sum(tyre.forces(contact._replace(turn_slip=phi, camber=camber)))
+    contact = Contact(*(jnp.asarray(value) for value in (0.0, 0.0, 4000.0, 0.0, 1.0, 20.0)))
     for phi, camber in ((0.0, 0.0), (0.0, 0.02), (1e-3, 0.0), (30.0, 0.0)):
-        gradients = jax.grad(total, argnums=(0, 1, 2))(tyre, jnp.asarray(phi), jnp.asarray(camber))
-        assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(gradients)), (phi, camber)
+        found = gradients(tyre, contact._replace(turn_slip=jnp.asarray(phi), camber=jnp.asarray(camber)))
+        assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found)), (phi, camber)
     # Turning on the spot needs a moment against the turn, and leaves less force sideways.
     slides = contact._replace(slip_angle=jnp.asarray(0.1))
     assert abs(tyre.forces(slides._replace(turn_slip=jnp.asarray(2.0))).F_y) < abs(tyre.forces(slides).F_y)
