@@ -11,6 +11,7 @@ from jaxveh._core.parameter import Parameter, resolve
 from jaxveh.cli.console import number, table
 from jaxveh.cli.failure import say
 from jaxveh.fitting import RigFit
+from jaxveh.fitting.rig import LEAST_NOISE
 
 UNCERTAIN = 0.2
 """Standard error over a coefficient's own size above which it is marked."""
@@ -104,6 +105,12 @@ def warnings_of(fit: RigFit) -> list[str]:
     worse = [name for name in fit.rmse if fit.rmse[name] > fit.start_rmse[name]]
     if worse:
         found.append(f"residuals larger than at the start: {', '.join(worse)}")
+    exact = [name for name in fit.rmse if fit.rmse[name] < LEAST_NOISE * fit.peak[name]]
+    if exact:
+        found.append(
+            f"met to the last digits: {', '.join(exact)}: computed data, or as few distinct values as coefficients; "
+            "no measure of how well the law predicts"
+        )
     missed = [name for name in fit.rmse if fit.cross_validation[name] > 2 * fit.rmse[name]]
     if missed:
         found.append(f"rows that a fold did not see are missed by more than twice the fit's RMSE: {', '.join(missed)}")

@@ -99,8 +99,8 @@ def fit_rig(
     `measured`: the forces and moments to be compared; by default those that both data and law have. `weights`: by channel, on
     top of one over the noise, which is estimated. `bounds`: by name, an interval that a coefficient stays in. `robust`:
     residuals beyond two standard deviations count by their size. `folds`: parts for cross-validation, whole runs
-    where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law that
-    is near the data already.
+    where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law
+    that is near the data already.
 
     **Raises** `InputError` for a channel, weight or bound that has no match, a start outside its bounds, too few rows;
     `FilterError` where the joint fit does not converge, unless `throw=False`.
@@ -213,7 +213,8 @@ class _Data:
         origin, scale = start_of(law, parameters)
         moves = np.array([name in stage.coefficients for name in self.names])
         size = [
-            np.sqrt(self.weights.get(name, 1.0)) / noise[name] if name in stage.channels else 0.0 for name in self.channels
+            np.sqrt(self.weights.get(name, 1.0)) / noise[name] if name in stage.channels else 0.0
+            for name in self.channels
         ]
         counts = self.present & (stage.rows if rows is None else rows)
         return RigProblem(

@@ -8,6 +8,8 @@ import pytest
 from programs import error_line, run
 
 from jaxveh import io, tyres
+from jaxveh.cli.tyre_fit_report import warnings_of
+from jaxveh.fitting import RigFit, StageReport
 
 TRUTH = tyres.Brush(slip_stiffness=9e4, cornering_stiffness=7e4, friction=0.95)
 ANGLES, LOADS = np.linspace(-0.2, 0.2, 15), (2000.0, 4000.0, 6000.0)
@@ -118,6 +120,42 @@ def test_a_property_file_of_lateral_data(tmp_path):
     assert file.number("ALPMAX") == pytest.approx(0.2) and 1 < file.number("PCY1") < 2
     assert file.number("PCY1") == numbers["coefficients"]["lateral.PCY1"]["value"]
     assert numbers["findings"] == [f._asdict() for f in tyres.check_property_file(file)]
+
+
+def fit_of(*converged, rmse=10.0, validated=11.0, std=0.1, identified=1):
+    """A fit with stages that converged or not, so that no fit has to be made."""
+    stages = tuple(StageReport(f"stage {i}", 9, 1, 1.0, 0.1, 7, one) for i, one in enumerate(converged))
+    one, matrix = np.ones(1), np.eye(1)
+    by_channel = [{"F_y": value} for value in (rmse, 50.0, validated, 1e3, rmse)]
+    return RigFit(TRUTH, ("friction",), one, std * one, one, matrix, identified, *by_channel, {}, stages)
+
+
+@pytest.mark.parametrize(
+    ("fit", "words"),
+    [
+        (fit_of(True, True), None),
+        (fit_of(True, False), "has not converged in 7 steps: the tyre is the best so far"),
+        (fit_of(False, True), "stages that stopped before they converged: stage 0"),
+        (
+            fit_of(True, std=np.nan, identified=0),
+            "0 of 1 directions of the coefficients apart; not one by one: friction",
+        ),
+        (fit_of(True, rmse=60.0, validated=60.0), "residuals larger than at the start: F_y"),
+        (fit_of(True, validated=21.0), "missed by more than twice the fit's RMSE: F_y"),
+        (fit_of(True, rmse=0.0, validated=0.0), "met to the last digits: F_y"),
+    ],
+)
+def test_warnings_are_honest(fit, words):
+    found = warnings_of(fit)
+    assert len(found) == (words is not None)
+    assert words is None or words in found[0]
+
+
+def test_a_property_file_tells_its_own_side(tmp_path):
+    start = tmp_path / "start.tir"
+    io.write_property_file(tyres.to_property_file(tyres.typical_mf_tyre(4e3), side="left"), start)
+    line = refused(tmp_path, "--start", start, "--side", "right", product="out.tir")
+    assert "start.tir tells its own side; leave --side out" in line
 
 
 def refused(folder, *arguments, data=None, product="out.toml"):

@@ -1,9 +1,10 @@
 """Settings of rig fits that are told before the work, and starts that keep to their bounds."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, tyres
+from jaxveh import FilterError, InputError, tyres
 from jaxveh.fitting import fit_rig
 from jaxveh.fitting.rig import CURVATURES, starts_of
 from jaxveh.fitting.rig_stages import Stage
@@ -28,3 +29,21 @@ def test_bad_folds_are_told_before_the_fit():
         with pytest.raises(InputError, match=message):
             fit_rig(tyres.Brush(8e4, 6e4), rig, folds=folds, progress=lambda *stage: told.append(stage))
     assert told == []
+
+
+def test_a_fit_has_converged_where_its_residuals_have_settled():
+    truth = tyres.Brush(8e4, 6e4, 0.9)
+    slip, load = np.linspace(-0.15, 0.15, 30), np.full(30, 4e3)
+    forces = truth.forces(
+        tyres.Contact(slip_angle=jnp.asarray(slip), slip_ratio=jnp.asarray(slip), load=jnp.asarray(load))
+    )
+    noise = 20 * np.random.default_rng(0).standard_normal((2, 30))
+    rig = RigTable(
+        slip_angle=slip, slip_ratio=slip, load=load, F_x=np.asarray(forces.F_x) + noise[0], F_y=np.asarray(forces.F_y) + noise[1]
+    )  # fmt: skip
+    # A step that cannot meet its tolerance: at the best tyre nothing is left to gain, at another one much.
+    hasty = {"max_steps": 2, "tolerance": 1e-30}
+    best = fit_rig(truth, rig)
+    assert fit_rig(best.tyre, rig, **hasty).stages[-1].converged
+    with pytest.raises(FilterError, match="stopped after 4 steps"):
+        fit_rig(tyres.Brush(2e4, 2e4, 0.4), rig, **hasty)
