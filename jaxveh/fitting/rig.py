@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -22,9 +23,6 @@ from jaxveh.io.rig_table import MEASURED, RigTable
 from jaxveh.tyres import AbstractTyre
 
 JOINT = "joint"
-
-CURVATURES = (-3.0, -1.0, 0.5, 0.7, 0.9)
-"""Where else a stage starts its curvature."""
 
 LEAST_NOISE = 1e-4
 """The least noise over peak that weighs a channel: one that fits perfectly would outweigh all others."""
@@ -247,9 +245,11 @@ class _Data:
         return float(np.sqrt(np.nanmean(rows**2)))
 
     def fit(self, law, stage: Stage) -> tuple[AbstractTyre, StageReport]:
-        """One stage, from each of its starts; the best end counts."""
+        """One stage: from where the law is, then from its other starts; the best end counts."""
         before = self.share(law, stage)
-        ends = [self._descend(one, stage) for one in starts_of(law, stage, self.bounds)]
+        # The others start from the first one's end: near the data in all else, they part from what they would run back to.
+        ends = [self._descend(law, stage)]
+        ends += [self._descend(one, stage) for one in starts_of(ends[0][0], stage, self.bounds)]
         law, steps, converged = min(ends, key=lambda end: self.share(end[0], stage))
         counts = int(
             np.sum(stage.rows & self.present[[self.channels.index(name) for name in stage.channels]].any(axis=0))
@@ -286,14 +286,20 @@ class _Data:
 
 
 def starts_of(law: AbstractTyre, stage: Stage, bounds: Mapping[str, tuple[float, float]]) -> list[AbstractTyre]:
-    """The law as it is, and with other values of the stage's curvature, within its bounds."""
-    if stage.curvature is None:
-        return [law]
-    leaf = lambda law: _leaf(law, stage.curvature)
-    like = jnp.asarray(leaf(law))
-    low, high = bounds.get(stage.curvature, (-np.inf, np.inf))
-    inside = [value for value in CURVATURES if low < value < high]
-    return [law] + [eqx.tree_at(leaf, law, jnp.asarray(value, like.dtype)) for value in inside]
+    """The law with every combination of the stage's other starts, within their bounds."""
+    choices = []
+    for name, values in stage.starts:
+        low, high = bounds.get(name, (-np.inf, np.inf))
+        choices.append([(name, value) for value in (None, *values) if value is None or low < value < high])
+    return [_started(law, one) for one in itertools.product(*choices)][1:]
+
+
+def _started(law: AbstractTyre, start: Sequence[tuple[str, float | None]]) -> AbstractTyre:
+    for name, value in start:
+        if value is not None:
+            like = jnp.asarray(_leaf(law, name))
+            law = eqx.tree_at(lambda law, name=name: _leaf(law, name), law, jnp.asarray(value, like.dtype))
+    return law
 
 
 def fold_of(rig: RigTable, folds: int) -> np.ndarray:

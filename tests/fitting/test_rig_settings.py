@@ -6,19 +6,26 @@ import pytest
 
 from jaxveh import FilterError, InputError, tyres
 from jaxveh.fitting import fit_rig
-from jaxveh.fitting.rig import CURVATURES, starts_of
-from jaxveh.fitting.rig_stages import Stage
+from jaxveh.fitting.rig import starts_of
+from jaxveh.fitting.rig_stages import CURVATURES, Stage
 from jaxveh.io import RigTable
 
-STAGE = Stage("F_y, pure", ("F_y",), ("lateral.PEY1",), np.ones(1, bool), "lateral.PEY1")
+STAGE = Stage("F_y, pure", ("F_y",), ("lateral.PEY1",), np.ones(1, bool), (("lateral.PEY1", CURVATURES),))
 
 
 def test_starts_stay_within_bounds():
     law = tyres.typical_mf_tyre(4000.0)
     curvatures = lambda bounds: [float(one.lateral.PEY1) for one in starts_of(law, STAGE, bounds)]
-    own = float(law.lateral.PEY1)
-    assert curvatures({}) == [own, *CURVATURES]
-    assert curvatures({"lateral.PEY1": (-2.0, 0.8)}) == [own, *(one for one in CURVATURES if -2 < one < 0.8)]
+    assert curvatures({}) == list(CURVATURES)
+    assert curvatures({"lateral.PEY1": (-2.0, 0.8)}) == [one for one in CURVATURES if -2 < one < 0.8]
+
+
+def test_starts_are_every_combination():
+    law = tyres.typical_mf_tyre(4000.0)
+    stage = STAGE._replace(starts=(("lateral.REY1", (-1.0, 0.5)), ("lateral.RCY1", (0.9,))))
+    found = {(float(one.lateral.REY1), float(one.lateral.RCY1)) for one in starts_of(law, stage, {})}
+    own = float(law.lateral.REY1), float(law.lateral.RCY1)
+    assert found == {(-1.0, own[1]), (0.5, own[1]), (own[0], 0.9), (-1.0, 0.9), (0.5, 0.9)}
 
 
 def test_bad_folds_are_told_before_the_fit():
