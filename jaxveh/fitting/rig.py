@@ -27,15 +27,19 @@ JOINT = "joint"
 LEAST_NOISE = 1e-4
 """The least noise over peak that weighs a channel: one that fits perfectly would outweigh all others."""
 
-SETTLED = 1e-5
-"""Where a stage's second round moves the RMS of residuals by a smaller share, it has converged: coefficients that data do not
-tell apart may drift on without end."""
+ROUND = 100
+"""Steps between which the noise is estimated anew and the pull starts afresh: along valleys that data hardly show, several such
+rounds come further than one long one."""
+
+SETTLED = 0.5
+"""A fit has converged where a round lowers the sum of squares, in units of the noise's variance, by less than this: no
+combination of coefficients would move by more than a standard error. What data do not tell apart may drift on without end."""
 
 
 class StageReport(NamedTuple):
     """What one stage did: its `name`, `rows` and `coefficients` that counted, the RMS of its channels' residuals over their
     peak `before` and `after`, `steps` taken, and whether it `converged`: by the solver's word, or because
-    the RMS has settled."""
+    a round of steps gained nothing that the noise would let one see."""
 
     name: str
     rows: int
@@ -247,10 +251,13 @@ class _Data:
     def fit(self, law, stage: Stage) -> tuple[AbstractTyre, StageReport]:
         """One stage: from where the law is, then from its other starts; the best end counts."""
         before = self.share(law, stage)
-        # The others start from the first one's end: near the data in all else, they part from what they would run back to.
-        ends = [self._descend(law, stage)]
-        ends += [self._descend(one, stage) for one in starts_of(ends[0][0], stage, self.bounds)]
-        law, steps, converged = min(ends, key=lambda end: self.share(end[0], stage))
+        law, steps, converged = self._descend(law, stage)
+        # The others start from there: near the data in all else, they part from what they would run back to.
+        ends = [self._descend(one, stage, ROUND)[0] for one in starts_of(law, stage, self.bounds)]
+        best = min([law, *ends], key=lambda end: self.share(end, stage))
+        if best is not law:
+            law, more, converged = self._descend(best, stage)
+            steps += more
         counts = int(
             np.sum(stage.rows & self.present[[self.channels.index(name) for name in stage.channels]].any(axis=0))
         )
@@ -258,16 +265,19 @@ class _Data:
         names = len(stage.coefficients)
         return law, StageReport(stage.name, counts, names, before, after, steps, converged)
 
-    def _descend(self, law, stage: Stage) -> tuple[AbstractTyre, int, bool]:
-        """From one start: twice where the noise, which weighs channels and says what is an outlier, has to be found first."""
-        steps, again = 0, self.robust or len(stage.channels) > 1
-        for _ in range(1 + again):
-            before = self.share(law, stage)
-            problem = self.problem(law, stage, self.noise(law))
-            solved = solve(problem, jnp.zeros(problem.origin.shape), self.max_steps, self.tolerance)
+    def _descend(self, law, stage: Stage, max_steps: int | None = None) -> tuple[AbstractTyre, int, bool]:
+        """From one start, in rounds: the noise, which weighs channels and says what is an outlier, has to be found first."""
+        most, steps, alone = max_steps or self.max_steps, 0, not self.robust and len(stage.channels) == 1
+        count = int(np.sum(stage.rows & self.present[[self.channels.index(name) for name in stage.channels]]))
+        while steps < most:
+            before, problem = self.share(law, stage), self.problem(law, stage, self.noise(law))
+            solved = solve(problem, jnp.zeros(problem.origin.shape), min(ROUND, self.max_steps), self.tolerance)
             law, steps = problem.filled(solved.z), steps + int(solved.steps)
-        settled = again and abs(self.share(law, stage) - before) <= SETTLED * before
-        return law, steps, bool(solved.converged) or settled
+            after = self.share(law, stage)
+            gain = 2 * count * abs(before - after) / max(after, LEAST_NOISE)
+            if gain < SETTLED or (alone and bool(solved.converged)):
+                return law, steps, True
+        return law, steps, False
 
     def cross_validate(self, law, joint: Stage, folds: int, tell: Callable[[int], None]) -> dict[str, float]:
         """RMSE of each channel at rows that the fold's fit, from the fit to all, did not see."""

@@ -210,7 +210,7 @@ def test_too_few_rows_and_empty_channels_are_named(clean):
 
 
 def test_a_fit_that_stops_short_says_so(clean):
-    with pytest.raises(FilterError, match="stopped after 4 steps; throw=False"):
+    with pytest.raises(FilterError, match="stopped after 2 steps; throw=False"):
         fitting.fit_rig(start(), rig(clean), max_steps=2)
     fit = fitting.fit_rig(start(), rig(clean), max_steps=2, throw=False)
     assert not fit.stages[-1].converged
