@@ -7,9 +7,16 @@ slow; on an accelerator both are handled well. Everything in this package that d
 from typing import TypeVar
 
 import jax
+import numpy as np
 from jax import lax
 
 Tree = TypeVar("Tree")
+
+_MANY = 128
+"""From this size on computing a number twice costs more than storing it."""
+
+_CACHED = 2**15
+"""Bytes of an array of which a few dozen fit into a processor's own cache."""
 
 
 def on_cpu() -> bool:
@@ -35,3 +42,17 @@ def barrier(tree: Tree) -> Tree:
     both modes; tangents and cotangents pass through barriers of their own.
     """
     return lax.optimization_barrier(tree) if on_cpu() else tree
+
+
+def stored(tree: Tree) -> Tree:
+    """`tree` with a `barrier` on each of its arrays that is long enough to be worth it and short enough for the cache.
+
+    For values with several consumers in an elementwise law of many terms: blocks of a batch are computed once, as are their
+    cotangents, and a whole batch, which would have to go to memory and back, is still fused.
+    """
+    return jax.tree.map(_stored, tree)
+
+
+def _stored(leaf):
+    size = np.size(leaf)
+    return barrier(leaf) if size >= _MANY and size * leaf.dtype.itemsize <= _CACHED else leaf
