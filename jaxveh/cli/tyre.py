@@ -30,7 +30,7 @@ class Axes(StrEnum):
 
 def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.Numbers = None) -> None:
     """Show what a tyre property file says: version, ranges, what the tyre does at half, nominal and 1.5 times load, and what
-    is odd about the file.
+    is odd about the file. --out draws forces over slip, the friction ellipse, and where each coefficient is seen.
 
     Example: [bold]jaxveh tyre show tyre.tir --out figures[/]
     """
@@ -69,12 +69,28 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
         "findings": [finding._asdict() for finding in findings],
     }
     if out is not None:
-        from jaxveh import plots
-
-        make_folder(out)
-        path = plots.save(plots.tyre(tyre, [share * float(s.FNOMIN) for share in LOADS]), out / "tyre.png")
-        results().print(f"figure: {path}")
+        _draw(tyre, out)
     write_numbers(numbers, shown, {"file": file}, 0)
+
+
+def _draw(tyre: tyres.MFTyre, out: Path) -> None:
+    from jaxveh import plots
+
+    make_folder(out)
+    nominal = float(tyre.structure.FNOMIN)
+    figures = {
+        "tyre": plots.tyre(tyre, [share * nominal for share in LOADS]),
+        "friction_ellipse": plots.friction_ellipse(tyre, nominal),
+        "gradients": plots.gradient_map(tyre, nominal, _coefficients),
+    }
+    for name, figure in figures.items():
+        results().print(f"figure: {plots.save(figure, out / f'{name}.png')}")
+
+
+def _coefficients(tyre: tyres.MFTyre) -> tuple:
+    """What carries stiffness, friction and combined slip, of either force."""
+    along, across = tyre.longitudinal, tyre.lateral
+    return along.PKX1, across.PKY1, along.PDX1, across.PDY1, along.RBX1, across.RBY1
 
 
 def evaluate_table(

@@ -1,16 +1,20 @@
-"""Fits on optimistix: residuals of recordings by multiple shooting, and likelihoods of filters."""
+"""Fits on optimistix: rig data of tyres, residuals of recordings by multiple shooting, likelihoods of filters."""
 
 from jaxveh.fitting.likelihood import maximise, maximum_likelihood
 from jaxveh.fitting.multiple_shooting import multiple_shooting, shoot
 from jaxveh.fitting.prediction_error import Target, prediction_error
 from jaxveh.fitting.result import Fit
+from jaxveh.fitting.rig import RigFit, StageReport, fit_rig
 from jaxveh.fitting.segments import Segments, cut
 
 __all__ = [
     "Fit",
+    "RigFit",
     "Segments",
+    "StageReport",
     "Target",
     "cut",
+    "fit_rig",
     "maximise",
     "maximum_likelihood",
     "multiple_shooting",

@@ -11,6 +11,10 @@ import jax.numpy as jnp
 from jaxveh._core.parameter import Parameter, pick, put
 from jaxveh.tyres import AbstractTyre, Contact
 
+PULL = 0.01
+"""How hard a coefficient is pulled to its start, in standard deviations a step: nothing against what data show, but what they do
+not show stays where it was."""
+
 KINK = 2.0
 """Residuals above this many standard deviations count by their size, not by their square, where a fit is robust."""
 
@@ -20,7 +24,7 @@ class RigProblem(eqx.Module):
 
     `contact` (n,) arrays; `measured` (m, n), the forces and moments `channels`, zero where there is no measurement; `weight`
     (m, n), one over the standard deviation, zero where a row does not count. `scale` (p,): the step of each coefficient that
-    counts as one, on its bijector's line, from `origin` (p,). `prior` (p,): a weak pull to the origin, in steps.
+    counts as one, on its bijector's line, from `origin` (p,).
     """
 
     law: AbstractTyre
@@ -60,16 +64,17 @@ class RigProblem(eqx.Module):
 
 @eqx.filter_custom_jvp
 def residuals(z, problem: RigProblem):
-    """Residuals (m n,) at the coordinates z."""
+    """Residuals (m n + p,) at the coordinates z; the last ones are the pull to the start."""
     difference = problem.weight * (problem.forces(problem.filled(z)) - problem.measured)
-    return problem.bent(difference)[0].reshape(-1)
+    return jnp.concatenate([problem.bent(difference)[0].reshape(-1), PULL * z])
 
 
 @residuals.def_jvp
 def _residuals_jvp(primals, tangents):
     z, problem = primals
     value, jacobian = with_jacobian(z, problem)
-    return value, jacobian @ tangents[0]
+    move = tangents[0]
+    return jnp.concatenate([value, PULL * z]), jnp.concatenate([jacobian @ move, PULL * move])
 
 
 def with_jacobian(z, problem: RigProblem) -> tuple[Any, Any]:

@@ -6,9 +6,22 @@ is. Give `figure=` (a `Figure` or a `SubFigure`) to draw into one of your own. A
 
 from jaxveh.plots.estimates import estimate
 from jaxveh.plots.force_curves import force_curves
+from jaxveh.plots.friction_ellipse import friction_ellipse
+from jaxveh.plots.gradient_map import gradient_map
 from jaxveh.plots.parameters import parameters
 from jaxveh.plots.recordings import recording
 from jaxveh.plots.style import COLOURS, save, style
 from jaxveh.plots.tyres import tyre
 
-__all__ = ["COLOURS", "estimate", "force_curves", "parameters", "recording", "save", "style", "tyre"]
+__all__ = [
+    "COLOURS",
+    "estimate",
+    "force_curves",
+    "friction_ellipse",
+    "gradient_map",
+    "parameters",
+    "recording",
+    "save",
+    "style",
+    "tyre",
+]

@@ -29,14 +29,14 @@ def tyre(law: AbstractTyre, loads: Sequence[float], *, figure: Any = None) -> An
         axes = figure.subplots(2, 2)
         for i, load in enumerate(loads):
             settings = {"color": CYCLE[i % len(CYCLE)], "label": f"{load / 1e3:g} kN"}
-            across, along = _forces(law, load, angle, 0.0), _forces(law, load, 0.0, ratio)
+            across, along = forces_at(law, load, angle, 0.0), forces_at(law, load, 0.0, ratio)
             axes[0, 0].plot(np.degrees(angle), across.F_y / 1e3, **settings)
             axes[0, 1].plot(100 * ratio, along.F_x / 1e3, **settings)
             axes[1, 0].plot(np.degrees(angle), across.M_z, **settings)
         middle = loads[len(loads) // 2]
         wide = np.linspace(-1.0, 1.0, 4 * POINTS)
         for i, degrees in enumerate(COMBINED):
-            found = _forces(law, middle, np.radians(degrees), wide)
+            found = forces_at(law, middle, np.radians(degrees), wide)
             shade = str(0.75 - 0.75 * i / len(COMBINED))
             axes[1, 1].plot(found.F_x / 1e3, found.F_y / 1e3, color=shade, label=f"{degrees:g}°")
         axes[1, 1].legend(title="slip angle", loc="lower center", ncols=2, handlelength=1.4)
@@ -52,8 +52,8 @@ def tyre(law: AbstractTyre, loads: Sequence[float], *, figure: Any = None) -> An
     return figure
 
 
-def _forces(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any) -> Any:
-    """Forces of a row of slips as NumPy arrays of one shape."""
+def forces_at(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any) -> Any:
+    """Forces at a load (N) as NumPy arrays of the shape to which slip angles (rad) and slip ratios broadcast."""
     shape = np.broadcast_shapes(np.shape(slip_angle), np.shape(slip_ratio))
     wide = lambda value: jnp.asarray(np.broadcast_to(value, shape), float)
     found = _evaluate(

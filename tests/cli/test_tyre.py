@@ -58,7 +58,9 @@ def test_show_prints_and_draws(tyre_file, tmp_path):
     numbers = json.loads((tmp_path / "tyre.json").read_text())
     assert numbers["loads"] == [3376.0, 6752.0, 10128.0]
     assert numbers["mu_y"][0] > numbers["mu_y"][2] > 0.8
-    assert (tmp_path / "tyre.png").stat().st_size > 20_000
+    for name in ("tyre", "friction_ellipse", "gradients"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 20_000
+        assert f"{name}.png" in result.stdout.replace("\n", "")
 
 
 def test_show_says_what_is_worth_a_look(tmp_path):

@@ -1,0 +1,128 @@
+"""In which order a tyre is fitted to rig data: pure slip first, then what combined slip adds, then moments."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh.io.rig_table import RigTable
+from jaxveh.tyres import AbstractTyre, MFTyre
+
+PURE_ANGLE, PURE_RATIO = np.radians(0.5), 0.01
+"""Slip angle (rad) and slip ratio below which a row counts as pure slip of the other kind."""
+
+LEAST_SPREAD = {
+    "slip_angle": np.radians(1.0), "slip_ratio": 0.02, "camber": np.radians(0.5), "load": 0.15, "pressure": 0.05, "speed": 0.1,
+}  # fmt: skip
+"""How far an input must vary (from its 2nd to its 98th percentile) to show its coefficients; of the last three relative to
+their median."""
+
+
+class Stage(NamedTuple):
+    """One fit: its `name`, the `channels` that it compares, the names of its coefficients, and which rows count (n,).
+
+    `curvature`: a coefficient from several values of which the stage starts, the best end counts. Curvatures end at 1, beyond
+    which no data pull them back, and a fit from one start may stop there.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    coefficients: tuple[str, ...]
+    rows: np.ndarray
+    curvature: str | None = None
+
+
+class Group(NamedTuple):
+    """Coefficients that show in one force or moment: always, and where load, camber or pressure vary (names split at blanks)."""
+
+    section: str
+    channel: str
+    always: str
+    load: str = ""
+    camber: str = ""
+    pressure: str = ""
+    speed: str = ""
+
+    def shown(self, varies: set[str]) -> tuple[str, ...]:
+        """Those that data show in which these inputs vary."""
+        found = self.always.split()
+        for name in ("load", "camber", "pressure", "speed"):
+            found += getattr(self, name).split() if name in varies else []
+        # Together, "camber & load" need both.
+        return tuple(f"{self.section}.{name}" for name in found)
+
+
+ALONG = Group(
+    "longitudinal", "F_x", "PCX1 PDX1 PEX1 PEX4 PKX1 PHX1 PVX1", "PDX2 PEX2 PEX3 PKX2 PKX3 PHX2 PVX2", "PDX3",
+    "PPX1 PPX2 PPX3 PPX4",
+)  # fmt: skip
+ALONG_COMBINED = Group("longitudinal", "F_x", "RBX1 RBX2 RCX1 REX1 RHX1", "REX2", "RBX3")
+ACROSS = Group(
+    "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PKY4 PHY2 PVY2",
+    "PDY3 PEY4 PEY5 PKY3 PKY5 PKY6 PKY7 PVY3 PVY4", "PPY1 PPY2 PPY3 PPY4 PPY5",
+)  # fmt: skip
+ACROSS_52 = Group(
+    "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PHY2 PVY2", "PDY3 PEY4 PKY3 PHY3 PVY3 PVY4"
+)  # fmt: skip
+ACROSS_COMBINED = Group(
+    "lateral", "F_y", "RBY1 RBY2 RBY3 RCY1 REY1 RHY1 RVY1 RVY4 RVY5 RVY6", "REY2 RHY2 RVY2", "RBY4 RVY3"
+)
+ALIGNING = Group(
+    "aligning", "M_z", "QBZ1 QBZ9 QCZ1 QDZ1 QDZ6 QEZ1 QEZ4 QHZ1", "QBZ2 QBZ3 QDZ2 QDZ7 QEZ2 QEZ3 QHZ2",
+    "QBZ4 QBZ5 QDZ3 QDZ4 QDZ8 QDZ9 QDZ10 QDZ11 QEZ5 QHZ3 QHZ4", "PPZ1 PPZ2",
+)  # fmt: skip
+ALIGNING_COMBINED = Group("aligning", "M_z", "SSZ1 SSZ2", "", "SSZ3 SSZ4")
+OVERTURNING = Group("overturning", "M_x", "QSX1 QSX3 QSX4 QSX8", "QSX5 QSX6", "QSX2 QSX7 QSX10 QSX11", "PPMX1")
+ROLLING = Group("rolling", "M_y", "QSY1", "QSY7", "QSY5 QSY6", "QSY8", "QSY3 QSY4")
+ROLLING_52 = Group("rolling", "M_y", "QSY1", "", "", "", "QSY3 QSY4")
+
+
+def varying(rig: RigTable) -> set[str]:
+    """The inputs that vary enough to show their coefficients."""
+    found = set()
+    for name, least in LEAST_SPREAD.items():
+        values = getattr(rig, name)
+        if values is None:
+            continue
+        low, high = np.percentile(values, [2, 98])
+        size = abs(np.median(values)) if name in ("load", "pressure", "speed") else 1.0
+        if high - low > least * max(size, 1e-12):
+            found.add(name)
+    return found
+
+
+def stages_of(
+    law: AbstractTyre, rig: RigTable, measured: tuple[str, ...], chosen: tuple[str, ...] | None
+) -> list[Stage]:
+    """The stages for a law and data; the coefficients `chosen` by the user, where given, instead of those that data show.
+
+    A law other than MF-Tyre is fitted at once, all its parameters to all its forces.
+    """
+    if not isinstance(law, MFTyre):
+        return []
+    varies = varying(rig)
+    every = np.ones(rig.load.shape, bool)
+    across, along = np.abs(rig.slip_angle) <= PURE_ANGLE, np.abs(rig.slip_ratio) <= PURE_RATIO
+    old = law.version == 52
+    plan = [
+        ("F_x, pure", ALONG, across, "slip_ratio", "longitudinal.PEX1"),
+        ("F_y, pure", ACROSS_52 if old else ACROSS, along, "slip_angle", "lateral.PEY1"),
+        ("F_x, combined", ALONG_COMBINED, every, "both", "longitudinal.REX1"),
+        ("F_y, combined", ACROSS_COMBINED, every, "both", "lateral.REY1"),
+        ("M_z", ALIGNING, every, "slip_angle", "aligning.QEZ1"),
+        ("M_z, combined", ALIGNING_COMBINED, every, "both", None),
+        ("M_x", OVERTURNING, every, "slip_angle", None),
+        ("M_y", ROLLING_52 if old else ROLLING, every, "", None),
+    ]
+    combined = bool(np.any(~across & ~along)) and {"slip_angle", "slip_ratio"} <= varies
+    found = []
+    for name, group, rows, needs, curvature in plan:
+        shown = combined if needs == "both" else (not needs or needs in varies)
+        if group.channel not in measured or not shown or not np.any(rows):
+            continue
+        names = group.shown(varies)
+        names = names if chosen is None else tuple(name for name in names if name in chosen)
+        if names:
+            found.append(Stage(name, (group.channel,), names, rows, curvature if curvature in names else None))
+    return found
