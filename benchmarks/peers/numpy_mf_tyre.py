@@ -47,7 +47,7 @@ def forces(coefficients: Mapping[str, float], contacts: Contacts) -> tuple[np.nd
     F_y = G_yk * F_y0 + D * sin(c.RVY5 * arctan(c.RVY6 * at.kappa)) * c.LVYKA * at.smooth
     upright = G_yk * _pure_lateral(c, at, np.zeros_like(at.sine))[0]
     M_z = _aligning(c, at, K_xk, (K_ya, B_y, S_Hy, S_Vy), F_x, F_y, upright)
-    return F_x, F_y, _overturning(c, at, F_y), _rolling(c, at, F_x, contacts.slip_ratio), M_z
+    return F_x, F_y, _overturning(c, at, F_y), _rolling(c, at, F_x, contacts), M_z
 
 
 def _operating(c, contacts):
@@ -139,8 +139,10 @@ def _overturning(c, at, F_y):
     return c.UNLOADED_RADIUS * c.LMX * (load * part + rest)
 
 
-def _rolling(c, at, F_x, slip_ratio):
-    load = np.where(at.load < c.FZMIN, at.load**2 / c.FZMIN, at.load)
+def _rolling(c, at, F_x, contacts):
+    # Load and slip ratio as they are given, not within the ranges.
+    load, slip_ratio = np.maximum(contacts.load, 0), contacts.slip_ratio
+    load = np.where(load < c.FZMIN, load**2 / c.FZMIN, load)
     share, speed = load / c.FNOMIN, at.speed / c.LONGVL
     part = (
         c.QSY1 + c.QSY2 * F_x / c.FNOMIN + c.QSY3 * speed + c.QSY4 * speed**4 + (c.QSY5 + c.QSY6 * share) * at.camber**2
