@@ -15,7 +15,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.numerics.platform import on_cpu
 
 
-def sum_in_blocks(function: Callable[[Any, Any], Array], parameters: Any, rows: Any, *, block: int = 500) -> Array:
+def sum_in_blocks(function: Callable[[Any, Any], Array], parameters: Any, rows: Any, *, block: int = 1000) -> Array:
     """The sum of `function(parameters, rows)` over all rows, whose gradient is made block by block.
 
     For fits to long tables, such as `sum_in_blocks(lambda tyre, rig: (tyre.forces(rig.contact).F_y - rig.F_y) ** 2, tyre, rig)`:

@@ -103,9 +103,3 @@ def test_rows_of_several_lengths_and_no_block_raise():
         numerics.sum_in_blocks(loss, law, Rows(jnp.ones((5, 2)), 2.0))
     with pytest.raises(InputError, match="block = 0: must be at least 1"):
         numerics.sum_in_blocks(loss, law, rows, block=0)
-
-
-def test_stored_holds_what_fits_the_cache_alone():
-    barriers = lambda size: str(jax.make_jaxpr(lambda x: numerics.stored((x, 1.0)))(jnp.ones(size))).count("barrier")
-    assert [barriers(size) for size in (127, 128, 4096, 4097)] == [0, 1, 1, 0]
-    assert numerics.stored((2.0, None)) == (2.0, None)
