@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import jax
 import jax.numpy as jnp
@@ -52,8 +52,8 @@ def cases(smoke: bool) -> list[Case]:
     return made
 
 
-def tyre(dtype: np.typing.DTypeLike) -> mf_tyre.MFTyre:
-    """The tyre of `COEFFICIENTS`, as a property file of them would give it."""
+def tyre(dtype: np.typing.DTypeLike, coefficients: Mapping[str, float] = COEFFICIENTS) -> mf_tyre.MFTyre:
+    """The tyre of these coefficients, as a property file of them would give it."""
     sections = (
         mf_tyre.Structure,
         mf_tyre.Longitudinal,
@@ -64,13 +64,13 @@ def tyre(dtype: np.typing.DTypeLike) -> mf_tyre.MFTyre:
         mf_tyre.Scaling,
         mf_tyre.Ranges,
     )
-    made = mf_tyre.MFTyre(*[section(**_coefficients(section)) for section in sections])
+    made = mf_tyre.MFTyre(*[section(**_coefficients(section, coefficients)) for section in sections])
     return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), made)
 
 
-def _coefficients(section: type) -> dict[str, float]:
+def _coefficients(section: type, given: Mapping[str, float]) -> dict[str, float]:
     names = [field.name for field in dataclasses.fields(section)]
-    return {name: COEFFICIENTS[name] for name in names if name in COEFFICIENTS}
+    return {name: given[name] for name in names if name in given}
 
 
 def contact(given: Contacts) -> tyres.Contact:

@@ -16,7 +16,7 @@ from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, Where, pick, resolve
 from jaxveh._core.progress import Progress, silent
 from jaxveh.fitting.rig_problem import RigProblem, contact_of, offered, start_of
-from jaxveh.fitting.rig_solve import Solved, covariance, predicted, solve
+from jaxveh.fitting.rig_solve import Solved, covariance, information, predicted, solve
 from jaxveh.fitting.rig_stages import Stage, stages_of
 from jaxveh.io.rig_table import MEASURED, RigTable
 from jaxveh.tyres import AbstractTyre
@@ -290,11 +290,10 @@ def _result(data: _Data, law, joint: Stage, solved: Solved, reports, start_rmse,
     parameters = data.parameters(law, joint.coefficients)
     values = np.array([float(value) for value in pick(law, parameters)])
     problem = data.problem(law, joint, data.noise(law))
-    at = solve(problem, jnp.zeros(problem.origin.shape), 1, 1.0)
     # The noise is that of the fit, with the degrees of freedom that coefficients take.
     count = int(data.present.sum())
     free = count / (count - len(parameters))
-    spread, known = covariance(at.information)
+    spread, known = covariance(information(problem, jnp.zeros(problem.origin.shape)))
     line = np.asarray(spread * problem.scale * problem.scale[:, None]) * free
     unseen = np.asarray(jnp.diagonal(spread)) > 1.0
     slopes = np.array([float(p.domain.slope(value)) for p, value in zip(parameters, values, strict=True)])

