@@ -12,7 +12,19 @@ from pathlib import Path
 __all__ = ["describe", "prepare"]
 
 VECTOR_WIDTH_FLAG = "--xla_cpu_prefer_vector_width=512"
-PACKAGES = ("jaxveh", "jax", "jaxlib", "numpy", "equinox", "diffrax", "dynamax", "smcx", "filterpy", "particles")
+PACKAGES = (
+    "jaxveh",
+    "jax",
+    "jaxlib",
+    "numpy",
+    "scipy",
+    "equinox",
+    "diffrax",
+    "dynamax",
+    "smcx",
+    "filterpy",
+    "particles",
+)
 
 
 def prepare(core: int | None) -> int | None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import tyres
+from jaxveh import numerics, tyres
 from jaxveh.tyres import mf_tyre
 
 from . import limit, ours
@@ -18,13 +18,13 @@ from .measure import Bound, Case, Contestant, Skipped
 from .mf_tyre_problem import COEFFICIENTS, Contacts, contacts
 from .peers import numpy_mf_tyre
 
-__all__ = ["cases", "contact", "tyre", "weighted_sum"]
+__all__ = ["cases", "contact", "tyre", "weighted_sum", "weighted_sum_in_blocks"]
 
-OURS, LIMIT, VALUE, GRADIENT = "jaxveh", "C++ limit", "value", "value and gradient"
+OURS, LIMIT, VALUE, GRADIENT, PLAIN = "jaxveh", "C++ limit", "value", "value and gradient", "the same, not in blocks"
 
 
 def cases(smoke: bool) -> list[Case]:
-    """Forces and moments in both precisions; the gradient in reverse mode."""
+    """Forces and moments in both precisions; the gradient in reverse mode, in blocks and plain."""
     count = 50 if smoke else 100_000
     made = []
     for dtype in ("float64", "float32"):
@@ -52,8 +52,8 @@ def cases(smoke: bool) -> list[Case]:
     return made
 
 
-def tyre(dtype: np.typing.DTypeLike) -> mf_tyre.MFTyre:
-    """The tyre of `COEFFICIENTS`, as a property file of them would give it."""
+def tyre(dtype: np.typing.DTypeLike, coefficients: Mapping[str, float] = COEFFICIENTS) -> mf_tyre.MFTyre:
+    """The tyre of these coefficients, as a property file of them would give it."""
     sections = (
         mf_tyre.Structure,
         mf_tyre.Longitudinal,
@@ -64,13 +64,13 @@ def tyre(dtype: np.typing.DTypeLike) -> mf_tyre.MFTyre:
         mf_tyre.Scaling,
         mf_tyre.Ranges,
     )
-    made = mf_tyre.MFTyre(*[section(**_coefficients(section)) for section in sections])
+    made = mf_tyre.MFTyre(*[section(**_coefficients(section, coefficients)) for section in sections])
     return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), made)
 
 
-def _coefficients(section: type) -> dict[str, float]:
+def _coefficients(section: type, given: Mapping[str, float]) -> dict[str, float]:
     names = [field.name for field in dataclasses.fields(section)]
-    return {name: COEFFICIENTS[name] for name in names if name in COEFFICIENTS}
+    return {name: given[name] for name in names if name in given}
 
 
 def contact(given: Contacts) -> tyres.Contact:
@@ -101,7 +101,18 @@ def _build(dtype: np.dtype, count: int) -> Sequence[Contestant | Skipped]:
 
 def weighted_sum(tyre: mf_tyre.MFTyre, contact: tyres.Contact, weights: Sequence[jax.Array]) -> jax.Array:
     """All forces and moments, weighted at random, in one number: its gradient pulls every output back."""
-    return sum(jnp.sum(weight * force) for weight, force in zip(weights, tyre.forces(contact), strict=True))
+    return jnp.sum(_weighted(tyre, (contact, weights)))
+
+
+def weighted_sum_in_blocks(tyre: mf_tyre.MFTyre, contact: tyres.Contact, weights: Sequence[jax.Array]) -> jax.Array:
+    """The same number; its gradient is made block by block."""
+    return numerics.sum_in_blocks(_weighted, tyre, (contact, weights))
+
+
+def _weighted(tyre: mf_tyre.MFTyre, rows: tuple[tyres.Contact, Sequence[jax.Array]]) -> jax.Array:
+    contact, weights = rows
+    products = [weight * force for weight, force in zip(weights, tyre.forces(contact), strict=True)]
+    return functools.reduce(jnp.add, products)
 
 
 def _pair(dtype: np.dtype, count: int) -> Sequence[Contestant]:
@@ -109,7 +120,8 @@ def _pair(dtype: np.dtype, count: int) -> Sequence[Contestant]:
         weights = [jnp.asarray(w, dtype) for w in np.random.default_rng(1).standard_normal((5, count))]
         arguments = tyre(dtype), contact(contacts(count, dtype=dtype.type)), weights
     value = jax.jit(lambda tyre, contact, weights: tyre.forces(contact))
-    gradient = jax.jit(jax.value_and_grad(weighted_sum, argnums=(0, 1)))
+    gradient = jax.jit(jax.value_and_grad(weighted_sum_in_blocks, argnums=(0, 1)))
+    plain = jax.jit(jax.value_and_grad(weighted_sum, argnums=(0, 1)))
 
     def calling(function: Callable) -> Callable[[int], object]:
         def call(index: int) -> object:
@@ -118,4 +130,8 @@ def _pair(dtype: np.dtype, count: int) -> Sequence[Contestant]:
 
         return ours.blocked(call)
 
-    return [Contestant(VALUE, calling(value), count), Contestant(GRADIENT, calling(gradient), count)]
+    return [
+        Contestant(VALUE, calling(value), count),
+        Contestant(GRADIENT, calling(gradient), count),
+        Contestant(PLAIN, calling(plain), count),
+    ]

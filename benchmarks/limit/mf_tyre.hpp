@@ -164,10 +164,12 @@ template <class P> INLINE P overturning_moment(const MFTyre<scalar_of<P>> &c, co
   return P(c.UNLOADED_RADIUS * c.LMX) * (load * with_load + rest);
 }
 
-template <class P> INLINE P rolling_moment(const MFTyre<scalar_of<P>> &c, const Operating<P> &at, P F_x, P slip_ratio) {
+template <class P> INLINE P rolling_moment(const MFTyre<scalar_of<P>> &c, const Operating<P> &at, P F_x, P given, P slip_ratio) {
   using S = scalar_of<P>;
   const S least = c.FZMIN > 0 ? c.FZMIN : S(1);
-  P load = select(P(c.FZMIN) > at.load, square(at.load) * P(1 / least), at.load);
+  // The load as it is given, beyond FZMAX too.
+  given = maximum(given, P(0));
+  P load = select(P(c.FZMIN) > given, square(given) * P(1 / least), given);
   P share = load * P(1 / c.FNOMIN), speed = at.speed * P(1 / c.LONGVL);
   P sum = P(c.QSY1) + P(c.QSY2 / c.FNOMIN) * F_x + P(c.QSY3) * speed + P(c.QSY4) * square(square(speed));
   sum += (P(c.QSY5) + P(c.QSY6) * share) * square(at.camber);
@@ -191,7 +193,7 @@ template <class P> INLINE Forces<P> forces(const MFTyre<scalar_of<P>> &c, const 
   f.F_x = along.force;
   f.F_y = kept * across.force + added_lateral(c, at, across.mu);
   f.M_x = overturning_moment(c, at, f.F_y);
-  f.M_y = rolling_moment(c, at, f.F_x, contact.slip_ratio);
+  f.M_y = rolling_moment(c, at, f.F_x, contact.load, contact.slip_ratio);
   f.M_z = aligning_moment(c, at, along, across, f.F_y, kept * pure_lateral(c, at, P(0)).force);
   return f;
 }

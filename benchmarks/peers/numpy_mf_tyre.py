@@ -10,7 +10,7 @@ from numpy import abs, arctan, cos, sin, sqrt, tan
 
 from ..mf_tyre_problem import Contacts
 
-__all__ = ["forces"]
+__all__ = ["forces", "of_type", "operating", "slip_forces"]
 
 EPSILON = 1e-6
 
@@ -33,24 +33,42 @@ def _weight(x, shift, B, C, E):
 
 def forces(coefficients: Mapping[str, float], contacts: Contacts) -> tuple[np.ndarray, ...]:
     """F_x, F_y (N), M_x, M_y, M_z (N m), in the contacts' type and in the library's signs; limits on."""
-    kind = contacts.load.dtype.type
-    c = types.SimpleNamespace(**{name: kind(value) for name, value in coefficients.items()})
-    at = _operating(c, contacts)
+    c = of_type(contacts.load.dtype, coefficients)
+    at = operating(c, contacts)
+    F_x, K_xk = _longitudinal(c, at)
+    F_y, G_yk, (K_ya, _, B_y, S_Hy, S_Vy) = _lateral(c, at)
+    upright = G_yk * _pure_lateral(c, at, np.zeros_like(at.sine))[0]
+    M_z = _aligning(c, at, K_xk, (K_ya, B_y, S_Hy, S_Vy), F_x, F_y, upright)
+    return F_x, F_y, _overturning(c, at, F_y), _rolling(c, at, F_x, contacts), M_z
+
+
+def slip_forces(c: types.SimpleNamespace, at: types.SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
+    """F_x and F_y (N) alone, of coefficients `of_type` at points `operating`."""
+    return _longitudinal(c, at)[0], _lateral(c, at)[0]
+
+
+def of_type(dtype: np.dtype, coefficients: Mapping[str, float]) -> types.SimpleNamespace:
+    """The coefficients as numbers of a type."""
+    return types.SimpleNamespace(**{name: dtype.type(value) for name, value in coefficients.items()})
+
+
+def _longitudinal(c, at):
     F_x0, K_xk = _pure_longitudinal(c, at)
     B = (c.RBX1 + c.RBX3 * at.sine**2) * cos(arctan(c.RBX2 * at.kappa)) * c.LXAL
-    F_x = F_x0 * _weight(at.tangent, c.RHX1, B, c.RCX1, np.minimum(c.REX1 + c.REX2 * at.df_z, 1))
-    F_y0, K_ya, mu, B_y, S_Hy, S_Vy = _pure_lateral(c, at, at.sine)
+    return F_x0 * _weight(at.tangent, c.RHX1, B, c.RCX1, np.minimum(c.REX1 + c.REX2 * at.df_z, 1)), K_xk
+
+
+def _lateral(c, at):
+    F_y0, *parts = _pure_lateral(c, at, at.sine)
     B = (c.RBY1 + c.RBY4 * at.sine**2) * cos(arctan(c.RBY2 * (at.tangent - c.RBY3))) * c.LYKA
     E = np.minimum(c.REY1 + c.REY2 * at.df_z, 1)
     G_yk = _weight(at.kappa, c.RHY1 + c.RHY2 * at.df_z, B, c.RCY1, E)
-    D = mu * at.load * (c.RVY1 + c.RVY2 * at.df_z + c.RVY3 * at.sine) * cos(arctan(c.RVY4 * at.tangent))
-    F_y = G_yk * F_y0 + D * sin(c.RVY5 * arctan(c.RVY6 * at.kappa)) * c.LVYKA * at.smooth
-    upright = G_yk * _pure_lateral(c, at, np.zeros_like(at.sine))[0]
-    M_z = _aligning(c, at, K_xk, (K_ya, B_y, S_Hy, S_Vy), F_x, F_y, upright)
-    return F_x, F_y, _overturning(c, at, F_y), _rolling(c, at, F_x, contacts.slip_ratio), M_z
+    D = parts[1] * at.load * (c.RVY1 + c.RVY2 * at.df_z + c.RVY3 * at.sine) * cos(arctan(c.RVY4 * at.tangent))
+    return G_yk * F_y0 + D * sin(c.RVY5 * arctan(c.RVY6 * at.kappa)) * c.LVYKA * at.smooth, G_yk, parts
 
 
-def _operating(c, contacts):
+def operating(c: types.SimpleNamespace, contacts: Contacts) -> types.SimpleNamespace:
+    """Contacts within the tyre's ranges, and what all equations look at; no slip coefficient is in it."""
     speed, alpha = abs(contacts.speed), -contacts.slip_angle
     share = np.minimum(speed / c.VXLOW, 1)
     alpha = np.clip(alpha * np.minimum(speed * (1 + abs(tan(alpha))) / c.VXLOW, 1), c.ALPMIN, c.ALPMAX)
@@ -139,8 +157,10 @@ def _overturning(c, at, F_y):
     return c.UNLOADED_RADIUS * c.LMX * (load * part + rest)
 
 
-def _rolling(c, at, F_x, slip_ratio):
-    load = np.where(at.load < c.FZMIN, at.load**2 / c.FZMIN, at.load)
+def _rolling(c, at, F_x, contacts):
+    # Load and slip ratio as they are given, not within the ranges.
+    load, slip_ratio = np.maximum(contacts.load, 0), contacts.slip_ratio
+    load = np.where(load < c.FZMIN, load**2 / c.FZMIN, load)
     share, speed = load / c.FNOMIN, at.speed / c.LONGVL
     part = (
         c.QSY1 + c.QSY2 * F_x / c.FNOMIN + c.QSY3 * speed + c.QSY4 * speed**4 + (c.QSY5 + c.QSY6 * share) * at.camber**2

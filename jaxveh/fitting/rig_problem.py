@@ -1,14 +1,18 @@
-"""Residuals of rig data: rows, weights, chosen coefficients, and their Jacobian row by row."""
+"""Residuals of rig data: rows, weights, chosen coefficients, and their normal equations."""
 
 from __future__ import annotations
 
-from typing import Any
+import dataclasses
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from jaxveh._core.parameter import Parameter, pick, put
+from jaxveh.numerics import on_cpu
 from jaxveh.tyres import AbstractTyre, Contact
 
 PULL = 0.1
@@ -17,6 +21,9 @@ identify, but what they do not show stays where it was, where it would creep for
 
 KINK = 2.0
 """Residuals above this many standard deviations count by their size, not by their square, where a fit is robust."""
+
+BLOCK = 2000
+"""Rows at a time on a CPU; an accelerator takes all at once."""
 
 
 class RigProblem(eqx.Module):
@@ -62,27 +69,39 @@ class RigProblem(eqx.Module):
         return residual * shrink, shrink * (1 - 0.5 * (root - 1) / root)
 
 
-@eqx.filter_custom_jvp
-def residuals(z, problem: RigProblem):
-    """Residuals (m n + p,) at the coordinates z; the last ones are the pull to the start."""
+class Normal(NamedTuple):
+    """Half the sum of squares `loss`, its `gradient` (p,) and its Gauss-Newton `matrix` (p, p) at a point."""
+
+    loss: Any
+    gradient: Any
+    matrix: Any
+
+
+def loss(z, problem: RigProblem):
+    """Half the sum of squared residuals at the coordinates z (p,), in standard deviations, with the pull to the start."""
     difference = problem.weight * (problem.forces(problem.filled(z)) - problem.measured)
-    return jnp.concatenate([problem.bent(difference)[0].reshape(-1), PULL * z])
+    return 0.5 * jnp.sum(problem.bent(difference)[0] ** 2) + 0.5 * PULL**2 * jnp.sum(z**2)
 
 
-@residuals.def_jvp
-def _residuals_jvp(primals, tangents):
-    z, problem = primals
-    value, jacobian = with_jacobian(z, problem)
-    move = tangents[0]
-    return jnp.concatenate([value, PULL * z]), jnp.concatenate([jacobian @ move, PULL * move])
-
-
-def with_jacobian(z, problem: RigProblem) -> tuple[Any, Any]:
-    """Residuals (m n,) and their Jacobian (m n, p).
+def normal_equations(z, problem: RigProblem) -> Normal:
+    """The loss at z (p,) with its gradient and Gauss-Newton matrix.
 
     A row of data sees its own force alone, so that with coefficients as wide as the rows one pass backward a channel gives
     every derivative of every row: the cost does not grow with the number of coefficients, as that of passes forward does.
+    The rows go in blocks that the processor's cache holds: 0.7 us a row and two channels of MF-Tyre with 68 coefficients, where
+    100,000 rows at once took 1.8 us.
     """
+    table, block = _in_blocks(problem)
+
+    def add(sums: Normal, some) -> tuple[Normal, None]:
+        return jax.tree.map(jnp.add, sums, _of_data(z, block(some))), None
+
+    pull = Normal(0.5 * PULL**2 * jnp.sum(z**2), PULL**2 * z, PULL**2 * jnp.eye(z.size, dtype=z.dtype))
+    return lax.scan(add, pull, table)[0]
+
+
+def _of_data(z, problem: RigProblem) -> Normal:
+    """The data's part of the normal equations."""
     line = problem.origin + problem.scale * z
     rows = problem.measured.shape[1]
 
@@ -92,11 +111,35 @@ def with_jacobian(z, problem: RigProblem) -> tuple[Any, Any]:
 
     found, pull = jax.vjp(channels, *(jnp.broadcast_to(line[i], (rows,)) for i in range(line.size)))
     value, slope = problem.bent(problem.weight * (found - problem.measured))
-    blocks = []
+    gradient, matrix = jnp.zeros_like(z), jnp.zeros((z.size, z.size), z.dtype)
     for k in range(len(problem.channels)):
-        seed = jnp.zeros_like(found).at[k].set(problem.weight[k] * slope[k])
-        blocks.append(jnp.stack(pull(seed), axis=1))
-    return value.reshape(-1), jnp.concatenate(blocks) * problem.scale
+        # A row a coefficient: a Jacobian with its rows the other way round would be copied number by number.
+        slopes = jnp.stack(pull(jnp.zeros_like(found).at[k].set(problem.weight[k] * slope[k])))
+        slopes = slopes * problem.scale[:, None]
+        gradient, matrix = gradient + slopes @ value[k], matrix + slopes @ slopes.T
+    return Normal(0.5 * jnp.sum(value**2), gradient, matrix)
+
+
+def _in_blocks(problem: RigProblem) -> tuple[Any, Callable[[Any], RigProblem]]:
+    """What has a number a row, cut into blocks (b, ..., size), and the problem of one block of it.
+
+    Rows that fill the last block repeat the last one, without weight.
+    """
+    rows = problem.measured.shape[1]
+    blocks = -(-rows // BLOCK) if on_cpu() else 1
+    size = -(-rows // blocks)
+
+    def cut(leaf, mode: str = "edge"):
+        filled = jnp.pad(leaf, [(0, 0)] * (leaf.ndim - 1) + [(0, blocks * size - rows)], mode=mode)
+        return jnp.moveaxis(filled.reshape(*leaf.shape[:-1], blocks, size), -2, 0)
+
+    by_row, alike = eqx.partition(problem.contact, lambda leaf: jnp.shape(leaf) == (rows,))
+
+    def block(some) -> RigProblem:
+        contact, measured, weight = some
+        return dataclasses.replace(problem, contact=eqx.combine(contact, alike), measured=measured, weight=weight)
+
+    return (jax.tree.map(cut, by_row), cut(problem.measured), cut(problem.weight, "constant")), block
 
 
 def contact_of(rig) -> Contact:

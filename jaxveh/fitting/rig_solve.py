@@ -1,4 +1,4 @@
-"""The compiled part of a fit to rig data: Levenberg-Marquardt on the coefficients' own scales."""
+"""The compiled part of a fit to rig data: Levenberg-Marquardt on the normal equations."""
 
 from __future__ import annotations
 
@@ -7,10 +7,16 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import lineax as lx
-import optimistix as optx
+from jax import lax
 
-from jaxveh.fitting.rig_problem import PULL, RigProblem, residuals, with_jacobian
+from jaxveh.fitting.rig_problem import PULL, Normal, RigProblem, loss, normal_equations
+
+FIRST, LESS, MORE = 1.0, 0.1, 4.0
+"""Damping at the start, and its factors after a step that went as foretold and after one that did not.
+
+A first damping of 0.001 saves two steps from a near start, but from starts up to a half off it ended in a worse minimum in
+eight of 28 fits, this one in one.
+"""
 
 
 class Solved(NamedTuple):
@@ -21,20 +27,60 @@ class Solved(NamedTuple):
     converged: Any
 
 
+class _Search(NamedTuple):
+    z: Any
+    at: Normal
+    diagonal: Any
+    damping: Any
+    steps: Any
+    done: Any
+
+
 @eqx.filter_jit
 def solve(problem: RigProblem, z, max_steps: int, tolerance: float) -> Solved:
-    """Least squares from the coordinates z (p,)."""
-    # The pull to the start keeps the normal equations definite; QR of a Jacobian this tall takes six times as long.
-    solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance, linear_solver=lx.Normal(lx.Cholesky()))
-    solution = optx.least_squares(residuals, solver, z, problem, max_steps=max_steps, throw=False)
-    return Solved(solution.value, solution.stats["num_steps"], solution.result == optx.RESULTS.successful)
+    """Least squares from the coordinates z (p,), by Levenberg-Marquardt in the form of J. J. Moré, The Levenberg-Marquardt
+    algorithm: implementation and theory, Numerical Analysis, Lecture Notes in Mathematics 630 (1978): each coordinate
+    is damped by the largest curvature that it has shown.
+
+    It ends where a step lowered the loss, and was to lower it, by no more than `tolerance` of itself, or where no
+    coordinate moves by more than `tolerance`. A step counts even if it is refused.
+    """
+
+    def going(search: _Search):
+        return ~search.done & (search.steps < max_steps)
+
+    def step(search: _Search) -> _Search:
+        return _step(problem, search, tolerance)
+
+    at = normal_equations(z, problem)
+    start = _Search(z, at, jnp.diagonal(at.matrix), jnp.asarray(FIRST, z.dtype), jnp.asarray(0), jnp.asarray(False))
+    found = lax.while_loop(going, step, start)
+    return Solved(found.z, found.steps, found.done)
+
+
+def _step(problem: RigProblem, search: _Search, tolerance: float) -> _Search:
+    z, at, diagonal, damping, steps, _ = search
+    factor = jnp.linalg.cholesky(at.matrix + jnp.diag(damping * diagonal))
+    move = -jax.scipy.linalg.cho_solve((factor, True), at.gradient)
+    # What the step is to lower the loss by, by the linear model: -g m - m H m / 2, with (H + damping D) m = -g.
+    foretold = 0.5 * (damping * jnp.sum(diagonal * move**2) - at.gradient @ move)
+    lowered = at.loss - loss(z + move, problem)
+    # NaN where the step left the law's domain; then it is refused.
+    better = lowered > 0
+    share = jnp.where(jnp.isfinite(lowered), lowered, -1.0) / jnp.where(foretold > 0, foretold, 1.0)
+    little = (foretold <= tolerance * at.loss) & (jnp.abs(lowered) <= tolerance * at.loss)
+    done = little | (jnp.max(jnp.abs(move)) <= tolerance)
+    damping = damping * jnp.where(share > 0.75, LESS, jnp.where(share < 0.25, MORE, 1.0))
+    z = jnp.where(better, z + move, z)
+    at = lax.cond(better & ~done, lambda: normal_equations(z, problem), lambda: at)
+    return _Search(z, at, jnp.maximum(diagonal, jnp.diagonal(at.matrix)), damping, steps + 1, done)
 
 
 @eqx.filter_jit
 def information(problem: RigProblem, z):
-    """The Gauss-Newton matrix (p, p) at the coordinates z."""
-    _, jacobian = with_jacobian(z, problem)
-    return jacobian.T @ jacobian
+    """The Gauss-Newton matrix (p, p) of the data at the coordinates z."""
+    matrix = normal_equations(z, problem).matrix
+    return matrix - PULL**2 * jnp.eye(z.size, dtype=z.dtype)
 
 
 @eqx.filter_jit

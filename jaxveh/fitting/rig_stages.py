@@ -20,14 +20,28 @@ their median."""
 
 
 CURVATURES, SHAPES = (-3.0, -1.0, 0.5, 0.7, 0.9), (0.9,)
-"""Where else a stage starts its curvature E, and its shape C in combined slip, which has a good end on either side of 1."""
+
+STARTS = {
+    "longitudinal.PEX1": CURVATURES,
+    "longitudinal.REX1": CURVATURES,
+    "longitudinal.RCX1": SHAPES,
+    "lateral.PEY1": CURVATURES,
+    "lateral.REY1": CURVATURES,
+    "lateral.RCY1": SHAPES,
+    "aligning.QEZ1": CURVATURES,
+    "overturning.QSX5": (0.3,),
+    "overturning.QSX6": (1.0,),
+    "overturning.QSX8": (-1.0, 1.0),
+}
+"""Where else a coefficient starts. Curvatures E end at 1, beyond which no data pull them back, and a fit from one start may stop
+there; in combined slip the shape C has a good end on either side of 1; a typical tyre's M_x has factors of zero, which hide
+what they multiply."""
 
 
 class Stage(NamedTuple):
     """One fit: its `name`, the `channels` that it compares, the names of its coefficients, and which rows count (n,).
 
-    `starts`: coefficients and other values from which the stage starts, in every combination; the best end counts. Curvatures end
-    at 1, beyond which no data pull them back, and a fit from one start may stop there.
+    `starts`: coefficients and other values from which the stage starts, in every combination; the best end counts.
     """
 
     name: str
@@ -110,25 +124,24 @@ def stages_of(
     across, along = np.abs(rig.slip_angle) <= PURE_ANGLE, np.abs(rig.slip_ratio) <= PURE_RATIO
     old = law.version == 52
     plan = [
-        ("F_x, pure", ALONG, across, "slip_ratio", ("longitudinal.PEX1",)),
-        ("F_y, pure", ACROSS_52 if old else ACROSS, along, "slip_angle", ("lateral.PEY1",)),
-        ("F_x, combined", ALONG_COMBINED, every, "both", ("longitudinal.REX1", "longitudinal.RCX1")),
-        ("F_y, combined", ACROSS_COMBINED, every, "both", ("lateral.REY1", "lateral.RCY1")),
-        ("M_z", ALIGNING, every, "slip_angle", ("aligning.QEZ1",)),
-        ("M_z, combined", ALIGNING_COMBINED, every, "both", ()),
-        ("M_x", OVERTURNING, every, "slip_angle", ()),
-        ("M_y", ROLLING_52 if old else ROLLING, every, "", ()),
+        ("F_x, pure", ALONG, across, "slip_ratio"),
+        ("F_y, pure", ACROSS_52 if old else ACROSS, along, "slip_angle"),
+        ("F_x, combined", ALONG_COMBINED, every, "both"),
+        ("F_y, combined", ACROSS_COMBINED, every, "both"),
+        ("M_z", ALIGNING, every, "slip_angle"),
+        ("M_z, combined", ALIGNING_COMBINED, every, "both"),
+        ("M_x", OVERTURNING, every, "slip_angle"),
+        ("M_y", ROLLING_52 if old else ROLLING, every, ""),
     ]
     combined = bool(np.any(~across & ~along)) and {"slip_angle", "slip_ratio"} <= varies
     found = []
-    for name, group, rows, needs, turns in plan:
+    for name, group, rows, needs in plan:
         shown = combined if needs == "both" else (not needs or needs in varies)
         if group.channel not in measured or not shown or not np.any(rows):
             continue
         names = group.shown(varies)
         names = names if chosen is None else tuple(name for name in names if name in chosen)
         if names:
-            starts = tuple(zip(turns, (CURVATURES, SHAPES), strict=False))
-            starts = tuple(one for one in starts if one[0] in names)
+            starts = tuple((one, STARTS[one]) for one in names if one in STARTS)
             found.append(Stage(name, (group.channel,), names, rows, starts))
     return found

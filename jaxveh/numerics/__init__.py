@@ -3,6 +3,7 @@
 All are safe to jit, batch and differentiate.
 """
 
+from jaxveh.numerics.blocks import sum_in_blocks
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
 from jaxveh.numerics.linear_algebra import (
     cholesky,
@@ -14,7 +15,7 @@ from jaxveh.numerics.linear_algebra import (
     solve_psd,
     symmetric,
 )
-from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu
+from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu, stored
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 from jaxveh.numerics.roots import secant
@@ -47,8 +48,10 @@ __all__ = [
     "solve_lower_transposed",
     "solve_psd",
     "sqrt",
+    "stored",
     "stratified",
     "student_t",
+    "sum_in_blocks",
     "symmetric",
     "systematic",
     "tan",

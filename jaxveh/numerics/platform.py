@@ -7,9 +7,17 @@ slow; on an accelerator both are handled well. Everything in this package that d
 from typing import TypeVar
 
 import jax
+import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 Tree = TypeVar("Tree")
+
+_MANY = 128
+"""From this size on computing a number twice costs more than storing it."""
+
+_CACHED = 2**15
+"""Bytes of an array of which a few dozen fit into a processor's own cache."""
 
 
 def on_cpu() -> bool:
@@ -35,3 +43,43 @@ def barrier(tree: Tree) -> Tree:
     both modes; tangents and cotangents pass through barriers of their own.
     """
     return lax.optimization_barrier(tree) if on_cpu() else tree
+
+
+def stored(tree: Tree) -> Tree:
+    """`tree` with its arrays held in memory as by a `barrier`, those long enough to be worth it and short enough for the cache.
+
+    For values with several consumers in an elementwise law of many terms: blocks of a batch are computed once, as are their
+    cotangents, and a whole batch, which would have to go to memory and back, is still fused. Unlike a `barrier`, it holds in
+    every version of jax.
+    """
+    leaves, structure = jax.tree.flatten(tree)
+    some = [i for i, leaf in enumerate(leaves) if _worth_storing(leaf)]
+    if some and on_cpu():
+        hold = lax.optimization_barrier if barriers_hold() else _hold_by_branch
+        for i, leaf in zip(some, hold([leaves[i] for i in some]), strict=True):
+            leaves[i] = leaf
+    return jax.tree.unflatten(structure, leaves)
+
+
+def _worth_storing(leaf) -> bool:
+    size = np.size(leaf)
+    return size >= _MANY and size * leaf.dtype.itemsize <= _CACHED
+
+
+_UNUSED_NAN = {"float32": (np.uint32, 0x7FDA_57ED), "float64": (np.uint64, 0x7FFA_57ED_57ED_57ED)}
+"""Words of numbers that no calculation gives."""
+
+
+def _hold_by_branch(leaves: list) -> list:
+    """The same arrays, through a branch that is always taken but cannot be known to be: XLA fuses nothing across it.
+
+    On jax 0.10 the gradient of MF-Tyre in blocks takes 610 instead of 1130 ns a contact, and 9 instead of 15 s to compile; an
+    array that passes through costs 0.4 ns a number.
+    """
+    kinds = {str(leaf.dtype) for leaf in leaves}
+    if len(kinds) > 1 or not kinds <= set(_UNUSED_NAN):
+        return leaves
+    kind, unused = _UNUSED_NAN[kinds.pop()]
+    first = lax.bitcast_convert_type(lax.stop_gradient(leaves[0]).reshape(-1)[0], kind)
+    keep, never = (lambda leaves: leaves), (lambda leaves: [jnp.full_like(leaf, jnp.nan) for leaf in leaves])
+    return lax.cond(first != kind(unused), keep, never, leaves)

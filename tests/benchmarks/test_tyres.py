@@ -70,6 +70,17 @@ def test_limits_hold_a_few_contacts_and_every_coefficient_counts(given):
         assert (slope != 0) == (name in COEFFICIENTS), name
 
 
+def test_gradient_in_blocks_is_the_plain_one(given):
+    weights = [jax.numpy.asarray(w) for w in np.random.default_rng(1).standard_normal((5, len(given.load)))]
+    arguments = tyres.tyre(np.float64), tyres.contact(given), weights
+    found = jax.jit(jax.value_and_grad(tyres.weighted_sum_in_blocks, argnums=(0, 1)))(*arguments)
+    expected = jax.jit(jax.value_and_grad(tyres.weighted_sum, argnums=(0, 1)))(*arguments)
+    assert jax.tree.structure(found) == jax.tree.structure(expected)
+    for ours, theirs in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
+        # A coefficient's slope is a sum of signed terms: rounding is theirs.
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12 * max(1.0, np.abs(theirs).max()))
+
+
 def test_numpy_in_single_precision_stays_there(given):
     found = numpy_mf_tyre.forces(COEFFICIENTS, contacts(50, dtype=np.float32))
     assert all(force.dtype == np.float32 for force in found)

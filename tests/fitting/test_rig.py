@@ -2,18 +2,14 @@
 
 import dataclasses
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from rig_sweeps import brush, measured_of, peak, small_plan, table
 
 from jaxveh import fitting, tyres
-from jaxveh._core.bijectors import Interval
 from jaxveh._core.errors import FilterError, InputError
 from jaxveh.fitting.rig import fold_of
-from jaxveh.fitting.rig_problem import RigProblem, contact_of, residuals, start_of, with_jacobian
 
 CHANNELS = ("F_x", "F_y", "M_z")
 COLUMNS, RUN = small_plan()
@@ -151,34 +147,6 @@ def test_a_second_fit_compiles_nothing(clean):
     fitting.fit_rig(law, rig(clean, seed=2), folds=2)
     # What the law offers is asked anew, without compiling.
     assert len(TRACES) <= once + 1
-
-
-@pytest.mark.parametrize("robust", [False, True])
-def test_the_jacobian_by_rows_is_jax_s(clean, robust):
-    law, data = start(), rig(clean)
-    names = (lambda law: law.slip_stiffness, lambda law: law.friction)
-    from jaxveh._core.parameter import resolve
-
-    first, second = resolve(law, lambda law: [name(law) for name in names])
-    parameters = (first, second._replace(domain=Interval(0.3, 1.5)))
-    measured = jnp.stack([jnp.asarray(getattr(data, name)) for name in CHANNELS])
-    weight = jnp.where(jnp.arange(RUN.size) % 7 == 0, 0.0, jnp.asarray([[0.01], [0.02], [1.0]]))
-    origin, scale = start_of(law, parameters)
-    problem = RigProblem(law, contact_of(data), measured, weight, origin, scale, parameters, CHANNELS, robust)
-
-    def plain(z):
-        difference = problem.weight * (problem.forces(problem.filled(z)) - problem.measured)
-        return problem.bent(difference)[0].reshape(-1)
-
-    z = jnp.asarray([0.3, -0.2])
-    value, jacobian = eqx.filter_jit(with_jacobian)(z, problem)
-    np.testing.assert_allclose(value, plain(z), rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(jacobian, jax.jacfwd(plain)(z), rtol=1e-9, atol=1e-9)
-    whole = jax.jacfwd(lambda z: residuals(z, problem))(z)
-    np.testing.assert_allclose(whole[:-2], jacobian, rtol=1e-12, atol=1e-12)
-    if robust:
-        # Twice the loss far out: linear.
-        assert problem.bent(jnp.asarray(100.0))[0] ** 2 == pytest.approx(2 * 4 * (np.sqrt(1 + 2500) - 1), rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jaxveh import numerics
+from jaxveh.numerics import platform
 
 
 def _with_barrier(x):
@@ -60,3 +61,52 @@ def test_elsewhere_there_is_no_barrier(monkeypatch):
     assert not numerics.on_cpu()
     assert numerics.barriers_hold()
     assert "optimization_barrier" not in str(jax.make_jaxpr(lambda x: numerics.barrier(x))(X))
+
+
+@pytest.mark.parametrize("barriers", [True, False])
+def test_stored_holds_what_fits_the_cache_alone(barriers, monkeypatch):
+    monkeypatch.setattr(platform, "barriers_hold", lambda: barriers)
+
+    def held(size):
+        shown = str(jax.make_jaxpr(lambda x: numerics.stored((x, 1.0)))(jnp.ones(size)))
+        return shown.count("optimization_barrier" if barriers else "cond[")
+
+    assert [held(size) for size in (127, 128, 4096, 4097)] == [0, 1, 1, 0]
+    assert numerics.stored((2.0, None)) == (2.0, None)
+
+
+@pytest.mark.parametrize("barriers", [True, False])
+@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
+def test_stored_changes_no_number_and_no_derivative(barriers, dtype, monkeypatch):
+    monkeypatch.setattr(platform, "barriers_hold", lambda: barriers)
+    x = jnp.linspace(-2, 2, 200, dtype=dtype).at[0].set(jnp.nan)
+
+    def curve(x, between):
+        a, b, c = between((jnp.sin(x), x * x, 3))
+        return jnp.exp(a) * b + c * a
+
+    ours, theirs = (lambda x, between=between: curve(x, between) for between in (numerics.stored, lambda tree: tree))
+    for derivative in (
+        lambda f: jax.jit(f)(x),
+        lambda f: jax.vjp(f, x)[1](x[::-1]),
+        lambda f: jax.jvp(f, (x,), (x[::-1],)),
+        lambda f: jax.vmap(f)(jnp.stack([x, x[::-1]])),
+        lambda f: jax.jvp(jax.grad(lambda x: jnp.nansum(f(x))), (x,), (x[::-1],)),
+    ):
+        found, expected = derivative(ours), derivative(theirs)
+        for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-5 if dtype == jnp.float32 else 1e-13)
+
+
+def test_stored_by_a_branch_is_left_by_xla(monkeypatch):
+    monkeypatch.setattr(platform, "barriers_hold", lambda: False)
+    compiled = jax.jit(lambda x: numerics.stored((jnp.sin(x),))).lower(jnp.ones(500)).compile().as_text()
+    assert "conditional(" in compiled
+
+
+def test_stored_of_several_types_at_once(monkeypatch):
+    monkeypatch.setattr(platform, "barriers_hold", lambda: False)
+    given = jnp.ones(200), jnp.ones(200, jnp.float32), jnp.ones(200, jnp.int32)
+    for one, other in zip(numerics.stored(given), given, strict=True):
+        assert one.dtype == other.dtype
+        np.testing.assert_array_equal(one, other)

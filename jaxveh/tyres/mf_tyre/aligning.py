@@ -69,9 +69,9 @@ class Aligning(eqx.Module):
         lateral force that acts on the trail: F_y without camber, weighted (4.E74), in version 5.2 F_y less what slip ratio adds.
         """
         F_x, F_y, on_trail = forces
-        slip = (K_xk / not_zero(pure.stiffness)) ** 2 * at.slip_ratio**2
-        trail = self._trail(at, scaling, structure, slip)
-        residual = self._residual(at, scaling, structure, pure, slip, weight_y)
+        slip = numerics.stored((K_xk / not_zero(pure.stiffness)) ** 2 * at.slip_ratio**2)
+        trail = numerics.stored(self._trail(at, scaling, structure, slip))
+        residual = numerics.stored(self._residual(at, scaling, structure, pure, slip, weight_y))
         arm = self.SSZ1 + self.SSZ2 * F_y / structure.FNOMIN + (self.SSZ3 + self.SSZ4 * at.df_z) * at.camber
         arm = structure.UNLOADED_RADIUS * arm * scaling.LS
         return AligningParts(-trail * on_trail + residual + arm * F_x, trail, residual)
@@ -90,7 +90,7 @@ class Aligning(eqx.Module):
         side = 1 + (c.QEZ4 + c.QEZ5 * at.sine) * (2 / math.pi) * numerics.arctan(B * c.QCZ1 * alpha)
         E = curvature(bend * side, at)
         # The factor LFZO is not in the book; the reference evaluator has it, after TNO's own solver.
-        curve = cosine_curve(_equivalent(alpha, slip), B, c.QCZ1, E) * _cosine_of_course(at)
+        curve = cosine_curve(_equivalent(alpha, slip), B, c.QCZ1, E) * numerics.stored(_cosine_of_course(at))
         return D * curve * at.smooth * scaling.LFZO
 
     def _residual(self, at, scaling, structure, pure, slip, weight_y):

@@ -31,11 +31,13 @@ def bent(x, E):
 
 def sine_curve(x, B, C, D, E):
     """`D sin(C arctan(B x - E (B x - arctan(B x))))`: forces."""
+    x, B, C, D, E = numerics.stored((x, B, C, D, E))
     return D * numerics.sin(C * numerics.arctan(bent(B * x, E)))
 
 
 def cosine_curve(x, B, C, E):
     """`cos(C arctan(B x - E (B x - arctan(B x))))`: trail, and weights of combined slip."""
+    x, B, C, E = numerics.stored((x, B, C, E))
     return numerics.cos(C * numerics.arctan(bent(B * x, E)))
 
 

@@ -36,9 +36,9 @@ class Rolling(eqx.Module):
             moment = -structure.UNLOADED_RADIUS * load * scaling.LMY * sum_
         else:
             sum_ = sum_ + (c.QSY5 + c.QSY6 * share) * at.camber**2
-            powers = _power(share, c.QSY7) * _power(at.pressure / structure.NOMPRES, c.QSY8)
+            powers = numerics.stored(_power(share, c.QSY7) * _power(at.pressure / structure.NOMPRES, c.QSY8))
             moment = -structure.UNLOADED_RADIUS * structure.FNOMIN * scaling.LMY * sum_ * powers
-        return moment * self._rolls(at, ranges, slip_ratio)
+        return moment * numerics.stored(self._rolls(at, ranges, slip_ratio))
 
     def _rolls(self, at, ranges, slip_ratio):
         """1 for a wheel that rolls forward, -1 backward, smooth between: about the locked wheel, and zero at standstill."""

@@ -102,14 +102,14 @@ class MFTyre(AbstractTyre):
         """Forces, moments and internals at a contact."""
         if contact.load is None:
             raise InputError("contact.load = None: MFTyre scales with load; give the wheel's load in N.")
-        at, s, load = self._operating(contact), self.scaling, need_load(contact, "MFTyre")
+        at, s, load = numerics.stored(self._operating(contact)), self.scaling, need_load(contact, "MFTyre")
         nominal = s.LFZO * self.structure.FNOMIN
-        along = self.longitudinal.pure(at, s)
-        across = self.lateral.pure(at, s, nominal, self.version)
-        weight_y = self.lateral.weight(at, s)
+        along = numerics.stored(self.longitudinal.pure(at, s))
+        across = numerics.stored(self.lateral.pure(at, s, nominal, self.version))
+        weight_y = numerics.stored(self.lateral.weight(at, s))
         added = self.lateral.added(at, s, across.mu)
-        F_x = self.longitudinal.weight(at, s) * along.force
-        F_y = weight_y * across.force + added
+        F_x = numerics.stored(self.longitudinal.weight(at, s) * along.force)
+        F_y = numerics.stored(weight_y * across.force + added)
         if self.version == 52:
             on_trail = F_y - added
         else:
@@ -138,7 +138,7 @@ class MFTyre(AbstractTyre):
         pressure = structure.INFLPRES if contact.pressure is None else contact.pressure
         kappa, alpha, camber, smooth = contact.slip_ratio, -contact.slip_angle, contact.camber, jnp.ones_like(speed)
         if self.limits:
-            along, across, smooth = r.fading(alpha, speed)
+            along, across, smooth = numerics.stored(r.fading(alpha, speed))
             kappa = jnp.clip(kappa * along, r.KPUMIN, r.KPUMAX)
             alpha = jnp.clip(alpha * across, r.ALPMIN, r.ALPMAX)
             camber = jnp.clip(camber, r.CAMMIN, r.CAMMAX)
