@@ -18,7 +18,7 @@ from jaxveh.cli.failure import say
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
 from jaxveh.cli.tyre import Axes
 from jaxveh.fitting.rig_ranges import measured_ranges, widened_ranges
-from jaxveh.fitting.rig_start import STARTS, fitted_leaves
+from jaxveh.fitting.rig_start import STARTS
 from jaxveh.io.rig_table import MEASURED
 
 DEFAULT = "mf61"
@@ -116,7 +116,7 @@ def fit_table(
     law = _law(origin, rig)
     with progress("fit") as report:
         fit = fitting.fit_rig(
-            law, rig, where=None if origin.is_mf_tyre else fitted_leaves, measured=chosen, weights=weights,
+            law, rig, measured=chosen, weights=weights,
             bounds={_full_name(law, name): ends for name, ends in limits.items()},
             robust=robust, folds=folds, progress=report, throw=False,
         )  # fmt: skip
@@ -125,7 +125,7 @@ def fit_table(
     shown = tyre_fit_report.show(fit, law, findings)
     if out is not None:
         _draw(fit, rig, out)
-    results().print(f"{product}: {type(fit.tyre).__name__} fitted to {len(rig.load)} rows of {rig.source}")
+    results().print(f"{product}: {type(fit.tyre).__name__} fitted to {fit.stages[-1].rows} rows of {rig.source}")
     configuration = {
         "data": data, "model": origin.model, "start": start, "axes": axes.value, "measured": chosen, "bounds": limits,
         "weights": weights, "robust": robust, "folds": folds, "side": side,

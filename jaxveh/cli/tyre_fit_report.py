@@ -11,7 +11,7 @@ from jaxveh._core.parameter import Parameter, resolve
 from jaxveh.cli.console import number, table
 from jaxveh.cli.failure import say
 from jaxveh.fitting import RigFit
-from jaxveh.fitting.rig import LEAST_NOISE
+from jaxveh.fitting.rig_data import LEAST_NOISE
 
 UNCERTAIN = 0.2
 """Standard error over a coefficient's own size above which it is marked."""

@@ -2,52 +2,29 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.bijectors import Interval
 from jaxveh._core.errors import FilterError, InputError, check_at_least, check_one_of, check_positive
 from jaxveh._core.names import check_names
-from jaxveh._core.parameter import Parameter, Where, pick, resolve
+from jaxveh._core.parameter import Where, pick, resolve
 from jaxveh._core.progress import Progress, silent
-from jaxveh.fitting.rig_problem import RigProblem, contact_of, offered, start_of
-from jaxveh.fitting.rig_solve import covariance, information, predicted, solve
+from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
+from jaxveh.fitting.rig_problem import RigProblem, contact_of, offered
+from jaxveh.fitting.rig_solve import covariance, information
 from jaxveh.fitting.rig_stages import Stage, stages_of
 from jaxveh.io.rig_table import MEASURED, RigTable
 from jaxveh.tyres import AbstractTyre
 
 JOINT = "joint"
 
-LEAST_NOISE = 1e-4
-"""The least noise over peak that weighs a channel: one that fits perfectly would outweigh all others."""
-
-ROUND = 100
-"""Steps between which the noise is estimated anew and the pull starts afresh: along valleys that data hardly show, several such
-rounds come further than one long one."""
-
-SETTLED = 0.5
-"""A fit has converged where a round lowers the sum of squares, in units of the noise's variance, by less than this: no
-combination of coefficients would move by more than a standard error. What data do not tell apart may drift on without end."""
-
-
-class StageReport(NamedTuple):
-    """What one stage did: its `name`, `rows` and `coefficients` that counted, the RMS of its channels' residuals over their
-    peak `before` and `after`, `steps` taken, and whether it `converged`: by the solver's word, or because
-    a round of steps gained nothing that the noise would let one see."""
-
-    name: str
-    rows: int
-    coefficients: int
-    before: float
-    after: float
-    steps: int
-    converged: bool
+KNOWN = ("nominal_load", "reference_load")
+"""Parameters that say where others hold: known, not fitted unless `where` picks them."""
 
 
 class RigFit(eqx.Module):
@@ -99,7 +76,7 @@ def fit_rig(
     MF-Tyre goes in stages (pure slip, combined slip, moments) over the coefficients that the data show (those of load where
     the load varies, and so on), then all of them together; other laws at once. `where` picks coefficients instead.
     `measured`: the forces and moments to be compared; by default those that both data and law have. `weights`: by channel, on
-    top of one over the noise, which is estimated. `bounds`: by name, an interval that a coefficient stays in. `robust`:
+    top of one over the noise squared, which is estimated. `bounds`: by name, an interval that a coefficient stays in. `robust`:
     residuals beyond two standard deviations count by their size. `folds`: parts for cross-validation, whole runs
     where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law
     that is near the data already.
@@ -113,32 +90,42 @@ def fit_rig(
     check_names("weights", extra, channels)
     for name, weight in extra.items():
         check_positive(f"weights[{name!r}]", weight)
+    check_at_least("max_steps", max_steps, 1)
     chosen = None if where is None else tuple(p.name for p in resolve(law, where))
     plan = stages_of(law, rig, channels, chosen)
     names = _names(law, plan, chosen)
-    data = _Data(rig, contact, channels, names, extra, dict(bounds or {}), robust, max_steps, tolerance)
+    settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance)
+    data = RigData(rig, contact, channels, names, settings)
     data.check(law)
-    if folds:
-        fold_of(rig, folds)  # raises now, not after the fit
+    parts = fold_of(rig, folds) if folds else np.zeros(rig.load.shape)
     joint = Stage(JOINT, channels, names, np.ones(rig.load.shape, bool))
-    plan = plan if staged else []
-    total = len(plan) + 1 + folds
-    start_rmse, reports = data.rmse(law), []
+    plan = [*(plan if staged else ()), joint]
+    total = len(plan) + folds
+    tyre, reports = law, []
     for k, stage in enumerate(plan):
         progress(k, total, stage.name)
-        law, report = data.fit(law, stage)
+        tyre, report = data.fit(tyre, stage)
         reports.append(report)
-    progress(len(plan), total, JOINT)
-    law, report = data.fit(law, joint)
-    reports.append(report)
-    validation = data.cross_validate(
-        law, joint, folds, lambda k: progress(len(plan) + 1 + k, total, "cross-validation")
-    )
+    missed = np.full(data.measured.shape, np.nan)
+    for k in range(folds):
+        progress(len(plan) + k, total, "cross-validation")
+        missed[:, parts == k] = _unseen(data, law, plan, parts == k)[:, parts == k]
     progress(total, total, JOINT)
-    fit = _result(data, law, joint, tuple(reports), start_rmse, validation)
-    if throw and not report.converged:
-        raise FilterError(f"fit to {rig.source} stopped after {report.steps} steps; throw=False returns it as it is.")
+    validation = rms(channels, missed) if folds else dict.fromkeys(channels, float("nan"))
+    fit = _result(data, tyre, joint, tuple(reports), data.rmse(law), validation)
+    if throw and not reports[-1].converged:
+        steps = reports[-1].steps
+        raise FilterError(f"fit to {rig.source} stopped after {steps} steps; throw=False returns it as it is.")
     return fit
+
+
+def _unseen(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarray) -> np.ndarray:
+    """Residuals (m, n) of a fit from the same start that did not see some rows."""
+    rest = data.without(rows)
+    for stage in plan:
+        if (rest.present[[data.channels.index(name) for name in stage.channels]] & stage.rows).any():
+            law, _ = rest.fit(law, stage)
+    return data.residuals(law)
 
 
 def _channels(law: AbstractTyre, rig: RigTable, contact: Any, measured: Sequence[str] | None) -> tuple[str, ...]:
@@ -165,173 +152,21 @@ def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None)
         return chosen
     if plan:
         return tuple(dict.fromkeys(name for stage in plan for name in stage.coefficients))
-    return tuple(p.name for p in resolve(law, lambda law: jax.tree.leaves(law)))
+    every = resolve(law, lambda law: jax.tree.leaves(law))
+    found = tuple(p.name for p in every if p.name.rpartition(".")[2] not in KNOWN)
+    if not found:
+        raise InputError(f"{type(law).__name__} has no coefficient to be fitted.")
+    return found
 
 
-class _Data:
-    """Rig data and settings that all stages share."""
-
-    def __init__(self, rig, contact, channels, names, weights, bounds, robust, max_steps, tolerance):
-        self.rig, self.contact, self.channels, self.names, self.bounds = rig, contact, channels, names, bounds
-        self.robust, self.max_steps, self.tolerance, self.weights = robust, max_steps, tolerance, weights
-        measured = np.stack([getattr(rig, name) for name in channels])
-        self.present = np.isfinite(measured)
-        self.measured = np.where(self.present, measured, 0.0)
-        sizes = [
-            np.percentile(np.abs(row[here]), 99.5) if here.any() else np.nan
-            for row, here in zip(measured, self.present, strict=True)
-        ]
-        self.peak = dict(zip(channels, (float(size) for size in sizes), strict=True))
-        for name, size in self.peak.items():
-            check_positive(f"{rig.source}: largest {name}", size, advice="Leave this channel out: measured=...")
-
-    def check(self, law) -> None:
-        """Raise for bounds without a coefficient or its start, and for fewer measurements than coefficients."""
-        check_names("bounds", self.bounds, self.names)
-        self.parameters(law)
-        count, coefficients = int(self.present.sum()), len(self.names)
-        check_at_least(f"{self.rig.source}: measurements for {coefficients} coefficients", count, coefficients + 1)
-
-    def parameters(self, law) -> tuple[Parameter, ...]:
-        found = resolve(law, lambda law: [_leaf(law, name) for name in self.names])
-        return tuple(self._bounded(law, p) for p in found)
-
-    def _bounded(self, law, p: Parameter) -> Parameter:
-        if p.name not in self.bounds:
-            return p
-        low, high = self.bounds[p.name]
-        value = float(_leaf(law, p.name))
-        if not low < value < high:
-            raise InputError(f"bounds[{p.name!r}] = ({low:g}, {high:g}): the start {value:g} must lie inside.")
-        return p._replace(domain=Interval(float(low), float(high)))
-
-    def problem(self, law, stage: Stage, noise: Mapping[str, float], rows: np.ndarray | None = None) -> RigProblem:
-        """The stage's problem, weighted by one over the noise of each channel.
-
-        All stages have the same shapes, what a stage does not compare weighing nothing and what it does not fit being held:
-        one compilation, which takes longer than all steps, serves them all.
-        """
-        parameters = self.parameters(law)
-        origin, scale = start_of(law, parameters)
-        moves = np.array([name in stage.coefficients for name in self.names])
-        size = [
-            np.sqrt(self.weights.get(name, 1.0)) / noise[name] if name in stage.channels else 0.0
-            for name in self.channels
-        ]
-        counts = self.present & (stage.rows if rows is None else rows)
-        return RigProblem(
-            law, self.contact, jnp.asarray(self.measured), jnp.asarray(counts * np.array(size)[:, None]), origin,
-            jnp.where(moves, scale, 0.0), parameters, self.channels, self.robust,
-        )  # fmt: skip
-
-    def residuals(self, law) -> np.ndarray:
-        """Fitted less measured (m, n), nan without a measurement."""
-        found = np.asarray(_forces(law, self.contact, self.channels, jnp.asarray(self.measured)))
-        return np.where(self.present, found - self.measured, np.nan)
-
-    def rmse(self, law) -> dict[str, float]:
-        return dict(zip(self.channels, np.sqrt(np.nanmean(self.residuals(law) ** 2, axis=1)).tolist(), strict=True))
-
-    def noise(self, law) -> dict[str, float]:
-        """The spread of residuals: their RMS, or where the fit is robust 1.48 times their median size."""
-        size = self.residuals(law)
-        spread = 1.4826 * np.nanmedian(np.abs(size), axis=1) if self.robust else np.sqrt(np.nanmean(size**2, axis=1))
-        return {
-            name: max(float(one), LEAST_NOISE * self.peak[name])
-            for name, one in zip(self.channels, spread, strict=True)
-        }
-
-    def share(self, law, stage: Stage) -> float:
-        """RMS of the stage's residuals over their channels' peaks."""
-        index = [self.channels.index(name) for name in stage.channels]
-        peaks = np.array([self.peak[name] for name in stage.channels])
-        rows = np.where(stage.rows, self.residuals(law)[index], np.nan) / peaks[:, None]
-        return float(np.sqrt(np.nanmean(rows**2)))
-
-    def fit(self, law, stage: Stage) -> tuple[AbstractTyre, StageReport]:
-        """One stage: from where the law is, then from its other starts; the best end counts."""
-        before = self.share(law, stage)
-        law, steps, converged = self._descend(law, stage)
-        # The others start from there: near the data in all else, they part from what they would run back to.
-        ends = [self._descend(one, stage, ROUND)[0] for one in starts_of(law, stage, self.bounds)]
-        best = min([law, *ends], key=lambda end: self.share(end, stage))
-        if best is not law:
-            law, more, converged = self._descend(best, stage)
-            steps += more
-        counts = int(
-            np.sum(stage.rows & self.present[[self.channels.index(name) for name in stage.channels]].any(axis=0))
-        )
-        after = self.share(law, stage)
-        names = len(stage.coefficients)
-        return law, StageReport(stage.name, counts, names, before, after, steps, converged)
-
-    def _descend(self, law, stage: Stage, max_steps: int | None = None) -> tuple[AbstractTyre, int, bool]:
-        """From one start, in rounds: the noise, which weighs channels and says what is an outlier, has to be found first."""
-        most, steps, alone = max_steps or self.max_steps, 0, not self.robust and len(stage.channels) == 1
-        count = int(np.sum(stage.rows & self.present[[self.channels.index(name) for name in stage.channels]]))
-        while steps < most:
-            before, problem = self.share(law, stage), self.problem(law, stage, self.noise(law))
-            solved = solve(problem, jnp.zeros(problem.origin.shape), min(ROUND, self.max_steps), self.tolerance)
-            law, steps = problem.filled(solved.z), steps + int(solved.steps)
-            after = self.share(law, stage)
-            gain = 2 * count * abs(before - after) / max(after, LEAST_NOISE)
-            if gain < SETTLED or (alone and bool(solved.converged)):
-                return law, steps, True
-        return law, steps, False
-
-    def cross_validate(self, law, joint: Stage, folds: int, tell: Callable[[int], None]) -> dict[str, float]:
-        """RMSE of each channel at rows that the fold's fit, from the fit to all, did not see."""
-        if folds == 0:
-            return {name: float("nan") for name in self.channels}
-        part, noise = fold_of(self.rig, folds), self.noise(law)
-        missed = np.full(self.measured.shape, np.nan)
-        for k in range(folds):
-            tell(k)
-            problem = self.problem(law, joint, noise, rows=part != k)
-            solved = solve(problem, jnp.zeros(problem.origin.shape), self.max_steps, self.tolerance)
-            found = np.asarray(predicted(problem, solved.z))
-            missed[:, part == k] = (found - self.measured)[:, part == k]
-        missed = np.where(self.present, missed, np.nan)
-        return dict(zip(self.channels, np.sqrt(np.nanmean(missed**2, axis=1)).tolist(), strict=True))
-
-
-def starts_of(law: AbstractTyre, stage: Stage, bounds: Mapping[str, tuple[float, float]]) -> list[AbstractTyre]:
-    """The law with every combination of the stage's other starts, within their bounds."""
-    choices = []
-    for name, values in stage.starts:
-        low, high = bounds.get(name, (-np.inf, np.inf))
-        choices.append([(name, value) for value in (None, *values) if value is None or low < value < high])
-    return [_started(law, one) for one in itertools.product(*choices)][1:]
-
-
-def _started(law: AbstractTyre, start: Sequence[tuple[str, float | None]]) -> AbstractTyre:
-    for name, value in start:
-        if value is not None:
-            like = jnp.asarray(_leaf(law, name))
-            law = eqx.tree_at(lambda law, name=name: _leaf(law, name), law, jnp.asarray(value, like.dtype))
-    return law
-
-
-def fold_of(rig: RigTable, folds: int) -> np.ndarray:
-    """The fold (n,) of each row: whole runs where the data number them, else blocks of neighbours, which are no copies of
-    each other, dealt in turn."""
-    check_at_least("folds", folds, 2)
-    if rig.run is not None and len(np.unique(rig.run)) >= folds:
-        _, run = np.unique(rig.run, return_inverse=True)
-        return run % folds
-    rows = rig.load.size
-    check_at_least(f"{rig.source}: rows for {folds} folds", rows, 4 * folds)
-    return (np.arange(rows) * 4 * folds // rows) % folds
-
-
-def _result(data: _Data, law, joint: Stage, reports, start_rmse, validation) -> RigFit:
+def _result(data: RigData, law, joint: Stage, reports, start_rmse, validation) -> RigFit:
     parameters = data.parameters(law)
     values = np.array([float(value) for value in pick(law, parameters)])
     problem = data.problem(law, joint, data.noise(law))
     # The noise is that of the fit, with the degrees of freedom that coefficients take.
     count = int(data.present.sum())
     free = count / (count - len(parameters))
-    spread, known = covariance(information(problem, jnp.zeros(problem.origin.shape)))
+    spread, known = _spread(data, law, joint, problem)
     line = np.asarray(spread * problem.scale * problem.scale[:, None]) * free
     unseen = np.asarray(jnp.diagonal(spread)) > 1.0
     slopes = np.array([float(p.domain.slope(value)) for p, value in zip(parameters, values, strict=True)])
@@ -354,13 +189,13 @@ def _result(data: _Data, law, joint: Stage, reports, start_rmse, validation) -> 
     )
 
 
-@eqx.filter_jit
-def _forces(law, contact, channels, measured):
-    found = law.forces(contact)
-    return jnp.stack([jnp.asarray(getattr(found, name), measured.dtype) + 0 * measured[0] for name in channels])
-
-
-def _leaf(law, name: str) -> Any:
-    for part in name.split("."):
-        law = getattr(law, part)
-    return law
+def _spread(data: RigData, law: AbstractTyre, joint: Stage, problem: RigProblem) -> tuple[Any, Any]:
+    """The covariance (p, p) in the problem's coordinates, and how many directions the data identify."""
+    zero = jnp.zeros(problem.origin.shape)
+    found = information(problem, zero)
+    spread, known = covariance(found)
+    if not data.chosen.weights:
+        return spread, known
+    # Weights of the user's change what is minimised, not what is known: the sandwich, and what the data know without them.
+    middle, plain = (information(data.problem(law, joint, data.noise(law), power), zero) for power in (1.0, 0.0))
+    return spread @ middle @ spread, covariance(plain)[1]

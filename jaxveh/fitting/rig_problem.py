@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 from jaxveh._core.parameter import Parameter, pick, put
@@ -150,7 +151,8 @@ def contact_of(rig) -> Contact:
         slip_ratio=jnp.asarray(rig.slip_ratio),
         load=jnp.asarray(rig.load),
         camber=0.0 if rig.camber is None else jnp.asarray(rig.camber),
-        speed=optional(rig.speed),
+        # Zero throughout is what rigs write that do not tell it.
+        speed=None if rig.speed is None or not np.any(rig.speed) else jnp.asarray(rig.speed),
         pressure=optional(rig.pressure),
     )
 
@@ -163,7 +165,8 @@ def offered(law: AbstractTyre, contact: Contact) -> tuple[str, ...]:
 
 
 def start_of(law: AbstractTyre, parameters: tuple[Parameter, ...]) -> tuple[jax.Array, jax.Array]:
-    """Origin and scale (p,) of the coordinates: a declared scale, or a tenth of itself for what is positive or bounded."""
+    """Origin and scale (p,) of the coordinates: its own size or the declared scale, the larger; one on the bijector's line
+    (for what is positive a factor of e) for what is positive or bounded."""
     origin, scale = [], []
     for p, value in zip(parameters, pick(law, parameters), strict=True):
         value = jnp.asarray(value)

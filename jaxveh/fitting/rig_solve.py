@@ -20,11 +20,12 @@ eight of 28 fits, this one in one.
 
 
 class Solved(NamedTuple):
-    """Coordinates `z` (p,), `steps`, and whether the solver `converged`."""
+    """Coordinates `z` (p,), `steps`, whether the solver `converged`, and by how much it `lowered` the loss."""
 
     z: Any
     steps: Any
     converged: Any
+    lowered: Any
 
 
 class _Search(NamedTuple):
@@ -37,7 +38,7 @@ class _Search(NamedTuple):
 
 
 @eqx.filter_jit
-def solve(problem: RigProblem, z, max_steps: int, tolerance: float) -> Solved:
+def solve(problem: RigProblem, z, max_steps, tolerance: float) -> Solved:
     """Least squares from the coordinates z (p,), by Levenberg-Marquardt in the form of J. J. Moré, The Levenberg-Marquardt
     algorithm: implementation and theory, Numerical Analysis, Lecture Notes in Mathematics 630 (1978): each coordinate
     is damped by the largest curvature that it has shown.
@@ -55,7 +56,7 @@ def solve(problem: RigProblem, z, max_steps: int, tolerance: float) -> Solved:
     at = normal_equations(z, problem)
     start = _Search(z, at, jnp.diagonal(at.matrix), jnp.asarray(FIRST, z.dtype), jnp.asarray(0), jnp.asarray(False))
     found = lax.while_loop(going, step, start)
-    return Solved(found.z, found.steps, found.done)
+    return Solved(found.z, found.steps, found.done, at.loss - found.at.loss)
 
 
 def _step(problem: RigProblem, search: _Search, tolerance: float) -> _Search:
@@ -81,12 +82,6 @@ def information(problem: RigProblem, z):
     """The Gauss-Newton matrix (p, p) of the data at the coordinates z."""
     matrix = normal_equations(z, problem).matrix
     return matrix - PULL**2 * jnp.eye(z.size, dtype=z.dtype)
-
-
-@eqx.filter_jit
-def predicted(problem: RigProblem, z):
-    """The channels (m, n) at the coordinates z."""
-    return problem.forces(problem.filled(z))
 
 
 def covariance(information) -> tuple[jax.Array, jax.Array]:

@@ -67,7 +67,6 @@ class Group(NamedTuple):
         found = self.always.split()
         for name in ("load", "camber", "pressure", "speed"):
             found += getattr(self, name).split() if name in varies else []
-        # Together, "camber & load" need both.
         return tuple(f"{self.section}.{name}" for name in found)
 
 
@@ -75,6 +74,7 @@ ALONG = Group(
     "longitudinal", "F_x", "PCX1 PDX1 PEX1 PEX4 PKX1 PHX1 PVX1", "PDX2 PEX2 PEX3 PKX2 PKX3 PHX2 PVX2", "PDX3",
     "PPX1 PPX2 PPX3 PPX4",
 )  # fmt: skip
+ALONG_52 = ALONG._replace(pressure="")
 ALONG_COMBINED = Group("longitudinal", "F_x", "RBX1 RBX2 RCX1 REX1 RHX1", "REX2", "RBX3")
 ACROSS = Group(
     "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PKY4 PHY2 PVY2",
@@ -90,8 +90,10 @@ ALIGNING = Group(
     "aligning", "M_z", "QBZ1 QBZ9 QCZ1 QDZ1 QDZ6 QEZ1 QEZ4 QHZ1", "QBZ2 QBZ3 QDZ2 QDZ7 QEZ2 QEZ3 QHZ2",
     "QBZ4 QBZ5 QDZ3 QDZ4 QDZ8 QDZ9 QDZ10 QDZ11 QEZ5 QHZ3 QHZ4", "PPZ1 PPZ2",
 )  # fmt: skip
+ALIGNING_52 = ALIGNING._replace(camber="QBZ4 QBZ5 QDZ3 QDZ4 QDZ8 QDZ9 QEZ5 QHZ3 QHZ4", pressure="")
 ALIGNING_COMBINED = Group("aligning", "M_z", "SSZ1 SSZ2", "", "SSZ3 SSZ4")
 OVERTURNING = Group("overturning", "M_x", "QSX1 QSX3 QSX4 QSX8 QSX9", "QSX5 QSX6", "QSX2 QSX7 QSX10 QSX11", "PPMX1")
+OVERTURNING_52 = Group("overturning", "M_x", "QSX1 QSX3", "", "QSX2")
 ROLLING = Group("rolling", "M_y", "QSY1", "QSY7", "QSY5 QSY6", "QSY8", "QSY3 QSY4")
 ROLLING_52 = Group("rolling", "M_y", "QSY1", "", "", "", "QSY3 QSY4")
 
@@ -124,21 +126,24 @@ def stages_of(
     across, along = np.abs(rig.slip_angle) <= PURE_ANGLE, np.abs(rig.slip_ratio) <= PURE_RATIO
     old = law.version == 52
     plan = [
-        ("F_x, pure", ALONG, across, "slip_ratio"),
+        ("F_x, pure", ALONG_52 if old else ALONG, across, "slip_ratio"),
         ("F_y, pure", ACROSS_52 if old else ACROSS, along, "slip_angle"),
         ("F_x, combined", ALONG_COMBINED, every, "both"),
         ("F_y, combined", ACROSS_COMBINED, every, "both"),
-        ("M_z", ALIGNING, every, "slip_angle"),
+        ("M_z", ALIGNING_52 if old else ALIGNING, every, "slip_angle"),
         ("M_z, combined", ALIGNING_COMBINED, every, "both"),
-        ("M_x", OVERTURNING, every, "slip_angle"),
+        ("M_x", OVERTURNING_52 if old else OVERTURNING, every, "slip_angle"),
         ("M_y", ROLLING_52 if old else ROLLING, every, ""),
     ]
     combined = bool(np.any(~across & ~along)) and {"slip_angle", "slip_ratio"} <= varies
     found = []
     for name, group, rows, needs in plan:
         shown = combined if needs == "both" else (not needs or needs in varies)
-        if group.channel not in measured or not shown or not np.any(rows):
+        if group.channel not in measured or not shown:
             continue
+        # Rows of pure slip show its coefficients alone; without one that was measured, all rows have to do.
+        seen = np.isfinite(getattr(rig, group.channel))
+        rows = rows & seen if np.any(rows & seen) else seen
         names = group.shown(varies)
         names = names if chosen is None else tuple(name for name in names if name in chosen)
         if names:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of
+from jaxveh.fitting.rig_stages import LEAST_SPREAD
 from jaxveh.io.rig_table import RigTable
 from jaxveh.tyres import (
     HSRI,
@@ -74,7 +75,8 @@ def _slope(rig: RigTable, channel: str, load: float) -> float | None:
     force, share = getattr(rig, channel), rig.load / load
     name, other = ("slip_angle", "slip_ratio") if channel == "F_y" else ("slip_ratio", "slip_angle")
     slip = getattr(rig, name)
-    if force is None:
+    # What stands still but for noise says nothing of a slope.
+    if force is None or np.ptp(np.percentile(slip, [2, 98])) < LEAST_SPREAD[name]:
         return None
     rows = np.isfinite(force) & (np.abs(getattr(rig, other)) <= SMALL[other]) & (slip != 0) & (share > LEAST_LOAD)
     near = rows & (share > 1 / NEAR_LOAD) & (share < NEAR_LOAD)
@@ -84,13 +86,19 @@ def _slope(rig: RigTable, channel: str, load: float) -> float | None:
     rows &= np.abs(slip) <= max(SMALL[name], np.sort(np.abs(slip[rows]))[LEAST_ROWS - 1])
     # A line with an offset (conicity, ply steer); the share of the load brings other loads near the median one.
     columns = np.stack([slip[rows], np.ones(rows.sum())], axis=1)
-    slope = float(np.linalg.lstsq(columns, force[rows] / share[rows], rcond=None)[0][0])
-    if slope <= 0:
+    target = force[rows] / share[rows]
+    slope, offset = np.linalg.lstsq(columns, target, rcond=None)[0]
+    left = target - slope * slip[rows] - offset
+    spread = np.sum((slip[rows] - np.mean(slip[rows])) ** 2)
+    if spread == 0:
+        return None
+    error = np.sqrt(np.mean(left**2) / spread)
+    if slope < -3 * error:
         raise InputError(
             f"{rig.source}: {channel} falls with {name} ({slope:.3g} N per unit): a positive slip must give a positive force; "
             "are the axes of the data those that were told (iso-w or ours)?"
         )
-    return slope
+    return float(slope) if slope > 0 else None
 
 
 def _friction(rig: RigTable, load: float) -> float:
@@ -138,9 +146,6 @@ STARTS: dict[str, Callable[[RigFacts], AbstractTyre]] = {
 }
 """Laws by the names that programs know them by."""
 
-KNOWN = {"nominal_load"}
-"""Parameters that say where others hold: known, not fitted."""
-
 
 def starting_tyre(model: str, rig: RigTable) -> AbstractTyre:
     """A law to start a fit from, by its name (`STARTS`).
@@ -153,11 +158,3 @@ def starting_tyre(model: str, rig: RigTable) -> AbstractTyre:
     """
     check_one_of("model", model, tuple(STARTS))
     return STARTS[model](rig_facts(rig))
-
-
-def fitted_leaves(law: AbstractTyre) -> list:
-    """What a fit may move in a law other than MF-Tyre, for `where`: all parameters but those of `KNOWN`."""
-    names = [name for name, value in vars(law).items() if value is not None and name not in KNOWN]
-    if not names:
-        raise InputError(f"{type(law).__name__} has no parameter to be fitted.")
-    return [getattr(law, name) for name in names]

@@ -23,7 +23,7 @@ INPUTS = {
     "P": ("in_P", "P", "pressure"),
 }
 """Names under which a table may hold an input: load (N), slip ratio, slip angle, camber (rad), turn slip (1/m), speed (m/s),
-pressure (Pa). The load is needed; others are zero, speed and pressure nominal, where the table has none."""
+pressure (Pa). The load is needed; others are zero, speed LONGVL and pressure INFLPRES, where the table has none."""
 
 OUTPUTS = {
     "Re": "R_e", "rho": "rho", "t": "trail", "mux": "mu_x", "muy": "mu_y", "omega": "omega", "Rl": "R_l", "Mzr": "M_zr",
@@ -48,6 +48,9 @@ def evaluate(tyre: MFTyre, columns: Mapping[str, np.ndarray], *, axes: str = "is
     if given["Fz"] is None:
         raise InputError(f"no load among the columns {', '.join(columns)}: one of {', '.join(INPUTS['Fz'])} is needed.")
     rows = len(given["Fz"])
+    for name, value in given.items():
+        if value is not None and len(value) != rows:
+            raise InputError(f"{INPUTS[name][0]}: {len(value)} rows, {INPUTS['Fz'][0]} has {rows}; must be as many.")
     _refuse(given["Vx"], lambda x: x < 0, "speed", "must be at least 0: turn the wheel's axes instead")
     filled = {name: np.zeros(rows) if value is None else value for name, value in given.items()}
     if given["Vx"] is None:

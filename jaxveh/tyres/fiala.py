@@ -19,9 +19,9 @@ class Fiala(AbstractTyre):
     """Fiala (1954) with longitudinal coupling (Hindiyeh & Gerdes, J. Dyn. Sys. Meas. Control 136, 2014, eqs 3 to 6).
 
     `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `half_length` (m). `F_x = C_x kappa` within
-    `+- mu F_z`; what is left, `f = sqrt((mu F_z)^2 - F_x^2)`, bounds `F_y = f (q - q^2 / 3 + q^3 / 27)`, with
-    `q = C tan(alpha) / f` up to q = 3, f beyond. Without F_x this is the form of ADAMS (erratum: the model-adaptive
-    paper prints coefficients of an interpolation instead). `M_z` is the brush model's.
+    `+- mu F_z`; what is left, `f = sqrt((mu F_z)^2 - F_x^2)` but no less than a tenth of `mu F_z`, bounds
+    `F_y = f (q - q^2 / 3 + q^3 / 27)`, with `q = C tan(alpha) / f` up to q = 3, f beyond. Without F_x this is the form of
+    ADAMS (erratum: the model-adaptive paper prints coefficients of an interpolation instead). `M_z` is the brush model's.
 
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """

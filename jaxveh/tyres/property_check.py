@@ -115,7 +115,7 @@ def _model(file: PropertyFile, version: int) -> Iterator[Finding]:
 def _missing(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
     """Values of which a default is taken that no one should rely on."""
     wanted = ["LONGVL", "VERTICAL_STIFFNESS"]
-    if tyre.version == 61:
+    if tyre.version != 52:
         wanted += ["NOMPRES", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS"]
     for key in wanted:
         if file.find(key) is None:

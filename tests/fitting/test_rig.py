@@ -9,7 +9,8 @@ from rig_sweeps import brush, measured_of, peak, small_plan, table
 
 from jaxveh import fitting, tyres
 from jaxveh._core.errors import FilterError, InputError
-from jaxveh.fitting.rig import fold_of
+from jaxveh.fitting.rig_data import fold_of
+from jaxveh.fitting.rig_problem import contact_of
 
 CHANNELS = ("F_x", "F_y", "M_z")
 COLUMNS, RUN = small_plan()
@@ -86,6 +87,35 @@ def test_weights_move_the_compromise(clean):
     assert along["F_x"] < 0.9 * across["F_x"] and across["F_y"] < 0.9 * along["F_y"]
 
 
+def test_weights_do_not_make_data_better(clean):
+    """Standard errors cover what weights do to the fit; they do not take them for knowledge."""
+    weights = {"F_y": 25.0}
+    plain = fitting.fit_rig(start(), rig(clean))
+    fits = [fitting.fit_rig(start(), rig(clean, seed=seed), weights=weights) for seed in range(40)]
+    assert np.all(fits[0].std > 0.9 * plain.std)
+    assert fits[0].identified == plain.identified
+    spread = np.std([fit.values for fit in fits], axis=0)
+    np.testing.assert_allclose(np.mean([fit.std for fit in fits], axis=0), spread, rtol=0.3)
+
+
+def test_a_speed_of_zero_throughout_was_not_told(clean):
+    columns = COLUMNS.copy()
+    columns[4] = 0.0
+    silent = contact_of(table(clean, columns))
+    assert silent.speed is None and contact_of(table(clean, COLUMNS)).speed is not None
+
+
+def test_a_start_without_finite_forces_is_named(clean):
+    with pytest.raises(InputError, match=r"F_x is not finite in row 0 of rig table: start from another tyre"):
+        fitting.fit_rig(Nowhere(*start().__dict__.values()), rig(clean))
+
+
+class Nowhere(tyres.Brush):
+    def forces(self, contact, state=None):
+        found = super().forces(contact)
+        return found._replace(F_x=found.F_x * jnp.nan)
+
+
 def test_bounds_hold(clean):
     fit = fitting.fit_rig(start(), rig(clean), bounds={"friction": (0.5, 0.9)}, throw=False)
     assert 0.88 < fit.values[2] < 0.9
@@ -159,6 +189,7 @@ def test_a_second_fit_compiles_nothing(clean):
         (dict(bounds={"grip": (0.0, 1.0)}), "bounds: .*grip"),
         (dict(bounds={"friction": (0.8, 1.0)}), r"bounds\['friction'\] = \(0.8, 1\): the start 0.7 must lie inside"),
         (dict(folds=1), "folds = 1: must be at least 2"),
+        (dict(max_steps=0), "max_steps = 0: must be at least 1"),
         (dict(where=lambda tyre: tyre.grip), "where: .*grip"),
     ],
 )

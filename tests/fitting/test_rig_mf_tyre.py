@@ -10,7 +10,7 @@ from rig_sweeps import measured_of, peak, plan, table, truth
 from shared_data import shared
 
 from jaxveh import fitting, io, tyres
-from jaxveh.fitting.rig import _leaf as leaf
+from jaxveh.fitting.rig_data import leaf_of as leaf
 
 CHANNELS = ("F_x", "F_y")
 NOISE = 0.02

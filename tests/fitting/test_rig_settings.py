@@ -6,8 +6,8 @@ import pytest
 
 from jaxveh import FilterError, InputError, tyres
 from jaxveh.fitting import fit_rig
-from jaxveh.fitting.rig import starts_of
-from jaxveh.fitting.rig_stages import CURVATURES, Stage
+from jaxveh.fitting.rig_data import starts_of
+from jaxveh.fitting.rig_stages import CURVATURES, Stage, stages_of
 from jaxveh.io import RigTable
 
 STAGE = Stage("F_y, pure", ("F_y",), ("lateral.PEY1",), np.ones(1, bool), (("lateral.PEY1", CURVATURES),))
@@ -54,3 +54,36 @@ def test_a_fit_has_converged_where_its_residuals_have_settled():
     assert fit_rig(best.tyre, rig, **hasty).stages[-1].converged
     with pytest.raises(FilterError, match="stopped after 2 steps"):
         fit_rig(tyres.Brush(2e4, 2e4, 0.4), rig, **hasty)
+
+
+def lateral(**changed):
+    slip = np.linspace(-0.1, 0.1, 30)
+    return RigTable(
+        **{"slip_angle": slip, "slip_ratio": 0 * slip, "load": 4e3 * (1 + slip), "F_y": 6e4 * slip} | changed
+    )
+
+
+def test_version_52_is_fitted_with_its_own_coefficients():
+    varied = lateral(
+        pressure=np.linspace(2e5, 3e5, 30), camber=np.linspace(-0.1, 0.1, 30), M_z=np.ones(30), M_x=np.ones(30)
+    )
+    channels = ("F_y", "M_z", "M_x")
+    names = lambda version: {
+        name.partition(".")[2]
+        for stage in stages_of(tyres.typical_mf_tyre(4e3, version=version), varied, channels, None)
+        for name in stage.coefficients
+    }
+    newer = {"PPY1", "PPZ1", "PPMX1", "QDZ10", "QDZ11", "QSX4", "QSX8", "PKY4", "PKY6"}
+    assert newer <= names(61) and not newer & names(52)
+    assert {"PKY3", "QDZ9", "QSX1", "QSX2", "QSX3"} <= names(52)
+
+
+def test_a_stage_takes_rows_that_were_measured():
+    """Free rolling that was measured at a slip ratio of its own still shows the lateral coefficients."""
+    law = tyres.typical_mf_tyre(4e3)
+    dragged = stages_of(law, lateral(slip_ratio=np.full(30, 0.015)), ("F_y",), None)
+    assert [stage.name for stage in dragged] == ["F_y, pure"] and dragged[0].rows.all()
+    force = 6e4 * np.linspace(-0.1, 0.1, 30)
+    gaps = np.where(np.arange(30) % 3 == 0, np.nan, force)
+    stage = stages_of(law, lateral(F_y=gaps), ("F_y",), None)[0]
+    np.testing.assert_array_equal(stage.rows, np.isfinite(gaps))

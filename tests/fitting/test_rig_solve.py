@@ -37,7 +37,7 @@ def residuals(z, problem):
 
 
 @pytest.mark.parametrize("robust", [False, True])
-@pytest.mark.parametrize("rows", [50, 60, 61])
+@pytest.mark.parametrize("rows", [60, 61])
 def test_normal_equations_are_those_of_all_rows_at_once(rows, robust, monkeypatch):
     monkeypatch.setattr(rig_problem, "BLOCK", 20)
     problem, z = made(rows, robust=robust), jnp.asarray([0.1, -0.05, 0.2, 0.3, -0.4, 0.1])
@@ -73,8 +73,8 @@ def test_finds_the_truth_without_noise():
 def test_stops_where_it_starts_and_where_it_is_told():
     problem = made(300)
     end = solve(problem, jnp.zeros(6), 100, 1e-10).z
-    again = solve(problem, end + 1e-5, 100, 1e-7)
-    assert bool(again.converged) and int(again.steps) < 8
+    again = solve(problem, end + 1e-6, 100, 1e-7)
+    assert bool(again.converged) and int(again.steps) == 1
     np.testing.assert_allclose(again.z, end, atol=1e-4)
     short = solve(problem, jnp.zeros(6), 2, 1e-10)
     assert not bool(short.converged) and int(short.steps) == 2

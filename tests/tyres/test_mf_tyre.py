@@ -219,6 +219,12 @@ def test_turn_slip_is_smooth_at_zero_and_refused_in_52():
     for phi, camber in ((0.0, 0.0), (0.0, 0.02), (1e-3, 0.0), (30.0, 0.0)):
         found = gradients(tyre, contact._replace(turn_slip=jnp.asarray(phi), camber=jnp.asarray(camber)))
         assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found)), (phi, camber)
+    # A section of zeros is a tyre that spin does not shift.
+    zeros = dataclasses.replace(tyre, turn_slip=jax.tree.map(jnp.zeros_like, tyre.turn_slip))
+    for leaf in jax.tree.leaves(
+        gradients(zeros, contact._replace(turn_slip=jnp.asarray(0.1), camber=jnp.asarray(0.02)))
+    ):
+        assert np.isfinite(leaf).all()
     # Turning on the spot needs a moment against the turn, and leaves less force sideways.
     slides = contact._replace(slip_angle=jnp.asarray(0.1))
     assert abs(tyre.forces(slides._replace(turn_slip=jnp.asarray(2.0))).F_y) < abs(tyre.forces(slides).F_y)

@@ -41,7 +41,11 @@ class Rolling(eqx.Module):
         return moment * numerics.stored(self._rolls(at, ranges, slip_ratio))
 
     def _rolls(self, at, ranges, slip_ratio):
-        """1 for a wheel that rolls forward, -1 backward, smooth between: about the locked wheel, and zero at standstill."""
+        """1 for a wheel that rolls forward, -1 backward, smooth between: about the locked wheel, and zero at standstill.
+
+        The bounds are the reference evaluator's, made for a VXLOW of 1 m/s: with others they are not symmetric to the locked
+        wheel.
+        """
         moves = at.speed > 0
         high = ranges.VXLOW / jnp.where(moves, at.speed, 1) - 1
         low = -1 - ranges.VXLOW - high

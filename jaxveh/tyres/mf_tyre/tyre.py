@@ -66,7 +66,7 @@ class MFTyre(AbstractTyre):
     contact's turn slip counts, and camber's share of it, by `turn_slip`. Every coefficient is a leaf, such as
     `lambda tyre: tyre.lateral.PKY1`.
 
-    The contact's load is needed; a speed or pressure that it does not tell is the nominal one. Its friction multiplies
+    The contact's load is needed; a speed that it does not tell is LONGVL, a pressure INFLPRES. Its friction multiplies
     LMUX and LMUY.
 
     **Raises** `InputError` for an unknown version, turn slip in version 5.2, which has none, or a contact without a load.

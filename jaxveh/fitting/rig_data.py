@@ -1,0 +1,242 @@
+"""Rig data as the stages of a fit see them: what counts, how much, from where, and when it is done."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.bijectors import Interval
+from jaxveh._core.errors import InputError, check_at_least, check_positive
+from jaxveh._core.names import check_names
+from jaxveh._core.parameter import Parameter, resolve
+from jaxveh.fitting.rig_problem import RigProblem, start_of
+from jaxveh.fitting.rig_solve import solve
+from jaxveh.fitting.rig_stages import Stage
+from jaxveh.io.rig_table import RigTable
+from jaxveh.tyres import AbstractTyre, Contact
+
+LEAST_NOISE = 1e-4
+"""The least noise over peak that weighs a channel: one that fits perfectly would outweigh all others."""
+
+ROUND = 100
+"""Steps between which the noise is estimated anew and the pull starts afresh: along valleys that data hardly show, several such
+rounds come further than one long one."""
+
+SETTLED = 0.5
+"""A fit has converged where a round lowers the sum of squares, in units of the noise's variance, by less than this: no
+combination of coefficients would move by more than a standard error. What data do not tell apart may drift on without end."""
+
+
+class StageReport(NamedTuple):
+    """What one stage did: its `name`, `rows` and `coefficients` that counted, the RMS of its channels' residuals over their
+    peak `before` and `after`, `steps` taken from the start that won, and whether it `converged`: by the solver's word, or because
+    a round of steps gained nothing that the noise would let one see."""
+
+    name: str
+    rows: int
+    coefficients: int
+    before: float
+    after: float
+    steps: int
+    converged: bool
+
+
+class Settings(NamedTuple):
+    """What a user chose: `weights` and `bounds` by name, `robust`, the most steps a stage, the solver's tolerance."""
+
+    weights: Mapping[str, float]
+    bounds: Mapping[str, tuple[float, float]]
+    robust: bool
+    max_steps: int
+    tolerance: float
+
+
+class RigData:
+    """Rig data, the `channels` that are compared and the `names` of the coefficients that are fitted: what all stages share.
+
+    `measured` and `present` (m, n): values, zero where there is none, and where there is one; `peak` by channel: the 99.5th
+    percentile of their sizes.
+    """
+
+    def __init__(
+        self, rig: RigTable, contact: Contact, channels: tuple[str, ...], names: tuple[str, ...], chosen: Settings
+    ):
+        self.rig, self.contact, self.channels, self.names, self.chosen = rig, contact, channels, names, chosen
+        measured = np.stack([getattr(rig, name) for name in channels])
+        self.present = np.isfinite(measured)
+        self.measured = np.where(self.present, measured, 0.0)
+        sizes = [
+            np.percentile(np.abs(row[here]), 99.5) if here.any() else np.nan
+            for row, here in zip(measured, self.present, strict=True)
+        ]
+        self.peak = dict(zip(channels, (float(size) for size in sizes), strict=True))
+        for name, size in self.peak.items():
+            check_positive(f"{rig.source}: largest {name}", size, advice="Leave this channel out: measured=...")
+
+    def check(self, law: AbstractTyre) -> None:
+        """Raise for bounds without a coefficient or its start, for a start without finite forces, and for fewer measurements
+        than coefficients."""
+        check_names("bounds", self.chosen.bounds, self.names)
+        self.parameters(law)
+        count, coefficients = int(self.present.sum()), len(self.names)
+        check_at_least(f"{self.rig.source}: measurements for {coefficients} coefficients", count, coefficients + 1)
+        wrong = self.present & ~np.isfinite(self.residuals(law))
+        if wrong.any():
+            channel, row = np.argwhere(wrong)[0]
+            raise InputError(
+                f"{type(law).__name__}: {self.channels[channel]} is not finite in row {row} of {self.rig.source}: "
+                "start from another tyre."
+            )
+
+    def without(self, rows: np.ndarray) -> RigData:
+        """The same data without the measurements of some rows, a mask (n,)."""
+        rest = copy.copy(self)
+        rest.present = self.present & ~rows
+        return rest
+
+    def parameters(self, law: AbstractTyre) -> tuple[Parameter, ...]:
+        """What is fitted, with its bounds."""
+        found = resolve(law, lambda law: [leaf_of(law, name) for name in self.names])
+        return tuple(self._bounded(law, p) for p in found)
+
+    def _bounded(self, law: AbstractTyre, p: Parameter) -> Parameter:
+        if p.name not in self.chosen.bounds:
+            return p
+        low, high = self.chosen.bounds[p.name]
+        value = float(leaf_of(law, p.name))
+        if not low < value < high:
+            raise InputError(f"bounds[{p.name!r}] = ({low:g}, {high:g}): the start {value:g} must lie inside.")
+        return p._replace(domain=Interval(float(low), float(high)))
+
+    def problem(self, law: AbstractTyre, stage: Stage, noise: Mapping[str, float], power: float = 0.5) -> RigProblem:
+        """The stage's problem, weighted by one over the noise of each channel and its weight to a `power`.
+
+        All stages have the same shapes, what a stage does not compare weighing nothing and what it does not fit being held:
+        one compilation, which takes longer than all steps, serves them all.
+        """
+        parameters = self.parameters(law)
+        origin, scale = start_of(law, parameters)
+        moves = np.array([name in stage.coefficients for name in self.names])
+        size = [
+            self.chosen.weights.get(name, 1.0) ** power / noise[name] if name in stage.channels else 0.0
+            for name in self.channels
+        ]
+        counts = self.present & stage.rows
+        return RigProblem(
+            law, self.contact, jnp.asarray(self.measured), jnp.asarray(counts * np.array(size)[:, None]), origin,
+            jnp.where(moves, scale, 0.0), parameters, self.channels, self.chosen.robust,
+        )  # fmt: skip
+
+    def residuals(self, law: AbstractTyre) -> np.ndarray:
+        """Fitted less measured (m, n), nan without a measurement."""
+        found = np.asarray(_forces(law, self.contact, self.channels, jnp.asarray(self.measured)))
+        return np.where(self.present, found - self.measured, np.nan)
+
+    def rmse(self, law: AbstractTyre) -> dict[str, float]:
+        """Of each channel."""
+        return rms(self.channels, self.residuals(law))
+
+    def noise(self, law: AbstractTyre) -> dict[str, float]:
+        """The spread of residuals: their RMS, or where the fit is robust 1.48 times their median size."""
+        size = self.residuals(law)
+        robust = self.chosen.robust
+        spread = 1.4826 * np.nanmedian(np.abs(size), axis=1) if robust else np.sqrt(np.nanmean(size**2, axis=1))
+        return {
+            name: max(float(one), LEAST_NOISE * self.peak[name])
+            for name, one in zip(self.channels, spread, strict=True)
+        }
+
+    def share(self, law: AbstractTyre, stage: Stage) -> float:
+        """RMS of the stage's residuals over their channels' peaks."""
+        peaks = np.array([[self.peak[name]] for name in self.channels])
+        rows = np.where(self._counts(stage), self.residuals(law), np.nan) / peaks
+        return float(np.sqrt(np.nanmean(rows**2)))
+
+    def loss(self, law: AbstractTyre, stage: Stage, noise: Mapping[str, float]) -> float:
+        """What the stage minimises, for several laws by the same noise; infinite where a force is not finite."""
+        problem = self.problem(law, stage, noise)
+        bent = problem.bent(problem.weight * jnp.asarray(np.where(self._counts(stage), self.residuals(law), 0.0)))[0]
+        return float(np.nan_to_num(jnp.sum(bent**2), nan=np.inf))
+
+    def _counts(self, stage: Stage) -> np.ndarray:
+        return self.present & stage.rows & np.array([[name in stage.channels] for name in self.channels])
+
+    def fit(self, law: AbstractTyre, stage: Stage) -> tuple[AbstractTyre, StageReport]:
+        """One stage: from where the law is, then from its other starts; the best end counts."""
+        before = self.share(law, stage)
+        law, steps, converged = self._descend(law, stage, self.chosen.max_steps)
+        # The others start from there: near the data in all else, they part from what they would run back to.
+        ends = [self._descend(one, stage, ROUND)[0] for one in starts_of(law, stage, self.chosen.bounds)]
+        noise = self.noise(law)
+        best = min([law, *ends], key=lambda end: self.loss(end, stage, noise))
+        if best is not law:
+            law, steps, converged = self._descend(best, stage, self.chosen.max_steps)
+        rows = int(np.sum(self._counts(stage).any(axis=0)))
+        report = StageReport(
+            stage.name, rows, len(stage.coefficients), before, self.share(law, stage), steps, converged
+        )
+        return law, report
+
+    def _descend(self, law: AbstractTyre, stage: Stage, most: int) -> tuple[AbstractTyre, int, bool]:
+        """From one start, in rounds: the noise, which weighs channels and says what is an outlier, has to be found first."""
+        steps, alone = 0, not self.chosen.robust and len(stage.channels) == 1
+        while steps < most:
+            problem, limit = self.problem(law, stage, self.noise(law)), min(ROUND, most - steps)
+            solved = solve(problem, jnp.zeros(problem.origin.shape), jnp.asarray(limit), self.chosen.tolerance)
+            law, steps = problem.filled(solved.z), steps + int(solved.steps)
+            if 2 * float(solved.lowered) < SETTLED or (alone and bool(solved.converged)):
+                return law, steps, True
+        return law, steps, False
+
+
+def rms(channels: tuple[str, ...], residuals: np.ndarray) -> dict[str, float]:
+    """Of residuals (m, n), by channel; nan does not count."""
+    return dict(zip(channels, np.sqrt(np.nanmean(residuals**2, axis=1)).tolist(), strict=True))
+
+
+def starts_of(law: AbstractTyre, stage: Stage, bounds: Mapping[str, tuple[float, float]]) -> list[AbstractTyre]:
+    """The law with every combination of the stage's other starts, within their bounds."""
+    choices = []
+    for name, values in stage.starts:
+        low, high = bounds.get(name, (-np.inf, np.inf))
+        choices.append([(name, value) for value in (None, *values) if value is None or low < value < high])
+    return [_started(law, one) for one in itertools.product(*choices)][1:]
+
+
+def _started(law: AbstractTyre, start: Sequence[tuple[str, float | None]]) -> AbstractTyre:
+    for name, value in start:
+        if value is not None:
+            like = jnp.asarray(leaf_of(law, name))
+            law = eqx.tree_at(lambda law, name=name: leaf_of(law, name), law, jnp.asarray(value, like.dtype))
+    return law
+
+
+def fold_of(rig: RigTable, folds: int) -> np.ndarray:
+    """The fold (n,) of each row: whole runs where the data number them, else blocks of neighbours, which are no copies of
+    each other, dealt in turn."""
+    check_at_least("folds", folds, 2)
+    if rig.run is not None and len(np.unique(rig.run)) >= folds:
+        _, run = np.unique(rig.run, return_inverse=True)
+        return run % folds
+    rows = rig.load.size
+    check_at_least(f"{rig.source}: rows for {folds} folds", rows, 4 * folds)
+    return (np.arange(rows) * 4 * folds // rows) % folds
+
+
+@eqx.filter_jit
+def _forces(law, contact, channels, measured):
+    found = law.forces(contact)
+    return jnp.stack([jnp.asarray(getattr(found, name), measured.dtype) + 0 * measured[0] for name in channels])
+
+
+def leaf_of(law: AbstractTyre, name: str) -> Any:
+    """The coefficient of a dotted name."""
+    for part in name.split("."):
+        law = getattr(law, part)
+    return law
