@@ -84,7 +84,7 @@ def test_units_comments_tables_and_unknown_sections():
         ("[NOBODY_KNOWS]", "[NOBODY_KNOWS]\nFNOMIN = 3", "FNOMIN has several values"),
         ("'mm'", "'furlong'", "LENGTH = 'furlong': must be one of meter"),
         ("FNOMIN = 4.0d3", "FNOMIN = -4", "Structure.FNOMIN = -4"),
-        ("FITTYP = 61", "FITTYP = 62", "FITTYP = 62: must be one of 5, 6"),
+        ("FITTYP = 61", "FITTYP = 63", "FITTYP = 63: must be one of 5, 6"),
         ("FITTYP = 61", "", "neither FITTYP nor a PROPERTY_FILE_FORMAT"),
     ],
 )
