@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxveh._core.parameter import resolve
 from jaxveh.fitting import rig_problem, rig_solve, rig_stages
+from jaxveh.fitting.rig_data import leaf_of
 from jaxveh.tyres import mf_tyre
 
 from . import ours
@@ -65,7 +66,7 @@ def make_rig(count: int, seed: int = 0) -> Rig:
 def ours_compiled(rig: Rig) -> tuple[rig_problem.RigProblem, Callable[[], rig_solve.Solved]]:
     """The problem as the joint stage of `fit_rig` states it, and its fit."""
     law = _started(rig.start)
-    parameters = resolve(law, lambda law: [_leaf(law, name) for name in _names()])
+    parameters = resolve(law, lambda law: [leaf_of(law, name) for name in _names()])
     origin, scale = rig_problem.start_of(law, parameters)
     weight = jnp.full(rig.measured.shape, 1 / NOISE)
     problem = rig_problem.RigProblem(
@@ -122,8 +123,3 @@ def _started(start: dict[str, float]) -> mf_tyre.MFTyre:
 def _short(name: str) -> str:
     """The name in a property file."""
     return name.rpartition(".")[2]
-
-
-def _leaf(law: mf_tyre.MFTyre, name: str) -> Any:
-    section, _, coefficient = name.partition(".")
-    return getattr(getattr(law, section), coefficient)

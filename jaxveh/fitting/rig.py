@@ -15,11 +15,11 @@ from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Where, pick, resolve
 from jaxveh._core.progress import Progress, silent
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
-from jaxveh.fitting.rig_problem import RigProblem, contact_of, offered
+from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered
 from jaxveh.fitting.rig_solve import covariance, information
 from jaxveh.fitting.rig_stages import Stage, stages_of
 from jaxveh.io.rig_table import MEASURED, RigTable
-from jaxveh.tyres import AbstractTyre
+from jaxveh.tyres import AbstractTyre, MFTyre
 
 JOINT = "joint"
 
@@ -81,7 +81,8 @@ def fit_rig(
     where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law
     that is near the data already.
 
-    **Raises** `InputError` for a channel, weight or bound that has no match, a start outside its bounds, too few rows;
+    **Raises** `InputError` for a channel, weight or bound that has no match, a start outside its bounds or without finite
+    forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`;
     `FilterError` where the joint fit does not converge, unless `throw=False`.
     """
     contact = contact_of(rig)
@@ -150,7 +151,12 @@ def _channels(law: AbstractTyre, rig: RigTable, contact: Any, measured: Sequence
 def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None) -> tuple[str, ...]:
     if chosen is not None:
         return chosen
-    if plan:
+    if isinstance(law, MFTyre):
+        if not plan:
+            raise InputError(
+                "neither slip angle nor slip ratio varies enough to show a coefficient of MF-Tyre: "
+                "fit sweeps of slip, or pick coefficients with `where`."
+            )
         return tuple(dict.fromkeys(name for stage in plan for name in stage.coefficients))
     every = resolve(law, lambda law: jax.tree.leaves(law))
     found = tuple(p.name for p in every if p.name.rpartition(".")[2] not in KNOWN)
@@ -196,6 +202,8 @@ def _spread(data: RigData, law: AbstractTyre, joint: Stage, problem: RigProblem)
     spread, known = covariance(found)
     if not data.chosen.weights:
         return spread, known
-    # Weights of the user's change what is minimised, not what is known: the sandwich, and what the data know without them.
+    # Weights of the user's change what is minimised, not what is known: the sandwich, and what the data know without them. The
+    # pull counts in its middle as in its ends: what data do not show stays unknown.
     middle, plain = (information(data.problem(law, joint, data.noise(law), power), zero) for power in (1.0, 0.0))
+    middle = middle + PULL**2 * jnp.eye(middle.shape[0], dtype=middle.dtype)
     return spread @ middle @ spread, covariance(plain)[1]

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from jaxveh._core.bijectors import Real
 from jaxveh._core.parameter import Parameter, pick, put
 from jaxveh.numerics import on_cpu
 from jaxveh.tyres import AbstractTyre, Contact
@@ -177,6 +178,4 @@ def start_of(law: AbstractTyre, parameters: tuple[Parameter, ...]) -> tuple[jax.
 
 
 def _is_real(p: Parameter) -> bool:
-    from jaxveh._core.bijectors import Real
-
     return isinstance(p.domain, Real)

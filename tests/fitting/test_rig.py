@@ -98,6 +98,11 @@ def test_weights_do_not_make_data_better(clean):
     np.testing.assert_allclose(np.mean([fit.std for fit in fits], axis=0), spread, rtol=0.3)
 
 
+def test_weights_leave_unknown_what_the_data_do_not_show(clean):
+    fit = fitting.fit_rig(start(), rig(clean), measured=("F_y",), weights={"F_y": 4.0}, throw=False)
+    assert np.isnan(fit.std[3]) and fit.identified == 3
+
+
 def test_a_speed_of_zero_throughout_was_not_told(clean):
     columns = COLUMNS.copy()
     columns[4] = 0.0

@@ -78,6 +78,12 @@ def test_version_52_is_fitted_with_its_own_coefficients():
     assert {"PKY3", "QDZ9", "QSX1", "QSX2", "QSX3"} <= names(52)
 
 
+def test_rows_without_a_sweep_are_refused():
+    still = lateral(slip_angle=np.full(30, 0.05))
+    with pytest.raises(InputError, match="neither slip angle nor slip ratio varies enough"):
+        fit_rig(tyres.typical_mf_tyre(4e3), still)
+
+
 def test_a_stage_takes_rows_that_were_measured():
     """Free rolling that was measured at a slip ratio of its own still shows the lateral coefficients."""
     law = tyres.typical_mf_tyre(4e3)
