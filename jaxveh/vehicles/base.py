@@ -1,21 +1,40 @@
-"""The one contract of a vehicle: state and inputs at one instant go in, rates and outputs come out."""
+"""The one contract of a vehicle: state, inputs and ground at one instant go in, rates and outputs come out."""
 
 from __future__ import annotations
 
 import abc
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 
+from jaxveh.roads import LEVEL, Ground
+
 GRAVITY = 9.80665
 """Standard acceleration of free fall, m/s^2."""
+
+
+class Motion(NamedTuple):
+    """How a car moves, without any force: what a driver sees, and what carries it along the road.
+
+    World position `x`, `y` (m) of the point that the speeds belong to (the centre of gravity, unless the vehicle says
+    otherwise), zero for a car that does not know it; `yaw` (rad, unwrapped); `v_x`, `v_y` (m/s) in the car's directions;
+    `yaw_rate` (rad/s).
+    """
+
+    x: Any
+    y: Any
+    yaw: Any
+    v_x: Any
+    v_y: Any
+    yaw_rate: Any
 
 
 class AbstractVehicle(eqx.Module):
     """Equations of motion of one vehicle: array leaves are parameters, states and inputs are NamedTuples of scalars.
 
     Written for one instant and elementwise: a batch of vehicles, states or parameters has arrays in the fields. Axes
-    of ISO 8855 (x forward, y left, z up; yaw, yaw rate and steer positive to the left), SI units.
+    of ISO 8855 (x forward, y left, z up; yaw, yaw rate and steer positive to the left), SI units. Speeds and accelerations
+    are those of the centre of gravity in the intermediate axes, which lie in the road's plane and turn with the car.
     """
 
     @property
@@ -38,13 +57,23 @@ class AbstractVehicle(eqx.Module):
         """The state of straight running at the inputs `u`, with fields replaced by keyword."""
 
     @abc.abstractmethod
-    def evaluate(self, t: Any, x: Any, u: Any) -> tuple[Any, Any]:
+    def evaluate(self, t: Any, x: Any, u: Any, ground: Ground = LEVEL) -> tuple[Any, Any]:
         """The state's time derivative (the state's NamedTuple) and the outputs (a NamedTuple), forces computed once."""
 
-    def derivatives(self, t: Any, x: Any, u: Any) -> Any:
-        """The state's time derivative, the same NamedTuple."""
-        return self.evaluate(t, x, u)[0]
+    @abc.abstractmethod
+    def motion(self, x: Any, u: Any) -> Motion:
+        """How the car moves; needs no tyre force."""
 
-    def outputs(self, t: Any, x: Any, u: Any) -> Any:
+    @property
+    def wheel_positions(self) -> tuple[tuple[Any, Any], ...]:
+        """Where the wheels (front left, front right, rear left, rear right) touch the road: (x, y) in m from the point of
+        `motion`, in the car's directions; all in that point for a car without wheels."""
+        return ((0.0, 0.0),) * 4
+
+    def derivatives(self, t: Any, x: Any, u: Any, ground: Ground = LEVEL) -> Any:
+        """The state's time derivative, the same NamedTuple."""
+        return self.evaluate(t, x, u, ground)[0]
+
+    def outputs(self, t: Any, x: Any, u: Any, ground: Ground = LEVEL) -> Any:
         """Everything that can be said about the vehicle at this instant, a NamedTuple."""
-        return self.evaluate(t, x, u)[1]
+        return self.evaluate(t, x, u, ground)[1]

@@ -12,9 +12,11 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_finite, check_positive
 from jaxveh._core.names import check_names, record_type
 from jaxveh._core.parameter import parameter, positive
+from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
-from jaxveh.vehicles.base import GRAVITY, AbstractVehicle
+from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
 from jaxveh.vehicles.slip import slip_angle
+from jaxveh.vehicles.wheels import gravity, stored
 
 
 class SingleTrackState(NamedTuple):
@@ -152,20 +154,29 @@ class SingleTrack(AbstractVehicle):
             settled += list(tyre.start(contact)) if isinstance(tyre, AbstractDynamicTyre) else []
         return self.state_type(*body, *settled)._replace(**given)
 
-    def evaluate(self, t, x, u):
+    @property
+    def wheel_positions(self):
+        front, rear = (self.front_axle_to_cg, 0.0), (-self.rear_axle_to_cg, 0.0)
+        return front, front, rear, rear
+
+    def motion(self, x, u):
+        return Motion(0.0, 0.0, x.yaw, u.v_x, x.v_y, x.yaw_rate)
+
+    def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
         cosine, sine = self._steered(u)
-        contacts = self._contacts(x, u, cosine, sine)
+        contacts = self._contacts(x, u, cosine, sine, ground)
         states = self._tyre_states(x)
         front, rear = (
-            _stored(tyre.forces(*at)) for tyre, *at in zip((self.front, self.rear), contacts, states, strict=True)
+            stored(tyre.forces(*at)) for tyre, *at in zip((self.front, self.rear), contacts, states, strict=True)
         )
         F_f = front.F_y * cosine + front.F_x * sine
         F_r = rear.F_y
         moment = self.front_axle_to_cg * F_f - self.rear_axle_to_cg * F_r + (front.M_z + rear.M_z)
         a_y = (F_f + F_r) / self.mass
         yaw_acceleration = moment / self.yaw_inertia
-        rates = SingleTrackState(v_y=a_y - u.v_x * x.yaw_rate, yaw=x.yaw_rate, yaw_rate=yaw_acceleration)
+        drift = a_y - u.v_x * x.yaw_rate if ground is LEVEL else a_y + gravity(ground)[1] - u.v_x * x.yaw_rate
+        rates = SingleTrackState(v_y=drift, yaw=x.yaw_rate, yaw_rate=yaw_acceleration)
         outputs = SingleTrackOutputs(
             v_x=u.v_x,
             v_y=x.v_y,
@@ -184,9 +195,12 @@ class SingleTrack(AbstractVehicle):
         )
         return self._with_tyre_rates(rates, contacts, states), outputs
 
-    def loads(self, x, u) -> tuple[jax.Array, jax.Array]:
+    def loads(self, x, u, ground: Ground = LEVEL) -> tuple[jax.Array, jax.Array]:
         """Loads of front and rear axle, N; they may become negative where the car would lift an axle."""
         front, rear = self.static_loads()
+        if ground is not LEVEL:
+            pressed = -gravity(ground)[2] / GRAVITY
+            front, rear = front * pressed, rear * pressed
         if self.cg_height is None:
             return front, rear
         if not (hasattr(u, "a_x") or hasattr(u, "v_x_rate")):
@@ -204,19 +218,21 @@ class SingleTrack(AbstractVehicle):
         steer = u.steer + self.steer_offset
         return numerics.cos(steer), numerics.sin(steer)
 
-    def _contacts(self, x, u, cosine, sine) -> tuple[Contact, Contact]:
-        front_load, rear_load = self.loads(x, u)
+    def _contacts(self, x, u, cosine, sine, ground: Ground = LEVEL) -> tuple[Contact, Contact]:
+        front_load, rear_load = self.loads(x, u, ground)
         across = x.v_y + self.front_axle_to_cg * x.yaw_rate
         along_wheel = u.v_x * cosine + across * sine
         across_wheel = across * cosine - u.v_x * sine
         front = Contact(
             slip_angle=slip_angle(along_wheel, across_wheel, self.crawl_speed),
             load=front_load,
+            friction=0.5 * (ground.friction_fl + ground.friction_fr),
             speed=jnp.abs(along_wheel),
         )
         rear = Contact(
             slip_angle=slip_angle(u.v_x, x.v_y - self.rear_axle_to_cg * x.yaw_rate, self.crawl_speed),
             load=rear_load,
+            friction=0.5 * (ground.friction_rl + ground.friction_rr),
             speed=jnp.abs(u.v_x),
         )
         return front, rear
@@ -237,12 +253,6 @@ class SingleTrack(AbstractVehicle):
 
 def _state_names(tyre) -> tuple[str, ...]:
     return tyre.state_names if isinstance(tyre, AbstractDynamicTyre) else ()
-
-
-def _stored(forces):
-    """Forces that each consumer reads instead of computing them again; numbers known beforehand stay numbers."""
-    arrays, numbers = eqx.partition(forces, eqx.is_array)
-    return eqx.combine(numerics.barrier(arrays), numbers)
 
 
 def _longitudinal_acceleration(x, u):

@@ -1,0 +1,55 @@
+"""Who turns the wheels: from the driver's torques to each wheel's."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any
+
+import equinox as eqx
+import jax
+
+from jaxveh._core.errors import check
+from jaxveh._core.parameter import parameter
+from jaxveh.vehicles.wheels import Wheels, front_rear, named, of
+
+
+class AbstractDrive(eqx.Module):
+    """From inputs to torques at the wheels (N m): `drive` turns a wheel forwards where positive, `brake` slows it down."""
+
+    inputs: eqx.AbstractVar[tuple[str, ...]]
+
+    @abc.abstractmethod
+    def torques(self, u: Any) -> tuple[Wheels, Wheels]:
+        """Driving torque (of either sign) and braking torque (at least zero, against the rotation) of each wheel, N m."""
+
+
+class AxleDrive(AbstractDrive):
+    """One engine and open differentials: `drive_torque` and `brake_torque` are sums over the wheels (N m).
+
+    `front_drive` and `front_brake` (-) are the front axle's shares: 1 drives or brakes the front wheels alone. Within an
+    axle both wheels get the same.
+
+    **Raises** `InputError` for a share outside 0 to 1.
+    """
+
+    front_drive: jax.Array = parameter("-", scale=0.1, default=1.0)
+    front_brake: jax.Array = parameter("-", scale=0.1, default=0.65)
+    inputs: tuple[str, ...] = eqx.field(static=True, default=("drive_torque", "brake_torque"))
+
+    def __check_init__(self):
+        for name in ("front_drive", "front_brake"):
+            check(f"AxleDrive.{name}", getattr(self, name), lambda v: (v >= 0) & (v <= 1), "between 0 and 1")
+
+    def torques(self, u):
+        drive = front_rear(0.5 * self.front_drive * u.drive_torque, 0.5 * (1.0 - self.front_drive) * u.drive_torque)
+        brake = front_rear(0.5 * self.front_brake * u.brake_torque, 0.5 * (1.0 - self.front_brake) * u.brake_torque)
+        return drive, brake
+
+
+class FourMotors(AbstractDrive):
+    """A motor a wheel: `torque_fl`, `torque_fr`, `torque_rl`, `torque_rr` (N m), negative where the motor brakes."""
+
+    inputs: tuple[str, ...] = eqx.field(static=True, default=named("torque"))
+
+    def torques(self, u):
+        return of(u, "torque"), Wheels(0.0, 0.0, 0.0, 0.0)

@@ -1,0 +1,123 @@
+"""How the loads of a car without suspension follow its accelerations."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.names import record_type
+from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.vehicles.wheels import Wheels, clip_transfer
+
+
+class AbstractLoadTransfer(eqx.Module):
+    """Which accelerations shift the loads. `felt` are those at an instant; states, where there are any, are the car's."""
+
+    state_names: eqx.AbstractVar[tuple[str, ...]]
+    inputs: eqx.AbstractVar[tuple[str, ...]]
+
+    @abc.abstractmethod
+    def felt(self, x: Any, u: Any, guess: tuple[Any, Any]) -> tuple[Any, Any]:
+        """(a_x, a_y), m/s^2, that the loads feel; `guess` are those of the car in a steady turn under its torques."""
+
+    @abc.abstractmethod
+    def rates(self, x: Any, a_x: Any, a_y: Any) -> tuple:
+        """The time derivatives of the states where the car's accelerations are a_x, a_y (m/s^2)."""
+
+    def start(self, guess: tuple[Any, Any]) -> tuple:
+        """The settled states."""
+        return tuple(guess) if self.state_names else ()
+
+
+class StaticLoads(AbstractLoadTransfer):
+    """Loads as at rest."""
+
+    state_names: tuple[str, ...] = eqx.field(static=True, default=())
+    inputs: tuple[str, ...] = eqx.field(static=True, default=())
+
+    def felt(self, x, u, guess):
+        return 0.0, 0.0
+
+    def rates(self, x, a_x, a_y):
+        return ()
+
+
+class QuasiStatic(AbstractLoadTransfer):
+    """Loads follow at once the accelerations of a steady turn, `a_y = v_x yaw_rate`, and of the torques, `a_x = T / (m r)`.
+
+    They need no tyre force, so that there is no loop to solve; at the limit of grip they promise more than the tyres hold.
+    """
+
+    state_names: tuple[str, ...] = eqx.field(static=True, default=())
+    inputs: tuple[str, ...] = eqx.field(static=True, default=())
+
+    def felt(self, x, u, guess):
+        return guess
+
+    def rates(self, x, a_x, a_y):
+        return ()
+
+
+class LaggedLoads(AbstractLoadTransfer):
+    """Loads follow the car's own accelerations with a first-order lag of `time` (s), that of its roll and pitch.
+
+    The states `a_x_felt`, `a_y_felt` (m/s^2) break the loop from forces over accelerations and loads back to forces; in a
+    steady state the loads are those of the accelerations.
+    """
+
+    time: jax.Array = positive("s", default=0.1)
+    state_names: tuple[str, ...] = eqx.field(static=True, default=("a_x_felt", "a_y_felt"))
+    inputs: tuple[str, ...] = eqx.field(static=True, default=())
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    def felt(self, x, u, guess):
+        return x.a_x_felt, x.a_y_felt
+
+    def rates(self, x, a_x, a_y):
+        return (a_x - x.a_x_felt) / self.time, (a_y - x.a_y_felt) / self.time
+
+
+class MeasuredLoads(AbstractLoadTransfer):
+    """Loads of accelerations that are measured: `a_x` and `a_y` (m/s^2) become inputs, as in filters on real logs."""
+
+    state_names: tuple[str, ...] = eqx.field(static=True, default=())
+    inputs: tuple[str, ...] = eqx.field(static=True, default=("a_x", "a_y"))
+
+    def felt(self, x, u, guess):
+        return u.a_x, u.a_y
+
+    def rates(self, x, a_x, a_y):
+        return ()
+
+
+def planar_loads(car: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
+    """Wheel loads, N, of a rigid car whose body neither rolls nor pitches visibly.
+
+    In the road's plane, with a_x, a_y what accelerometers at the centre of gravity say (slopes are in them), h its height
+    and q the front axle's share of the lateral transfer:
+
+        front axle:  m (g_z b - a_x h) / (a + b),   moved to its right wheel:  q m a_y h / track_front
+        rear axle:   m (g_z a + a_x h) / (a + b),   moved to its right wheel:  (1 - q) m a_y h / track_rear
+
+    No wheel is pulled down: one that lifts leaves the axle's load to the other, and an axle that lifts to the other axle.
+    """
+    a, b = car.front_axle_to_cg, car.rear_axle_to_cg
+    share = b / (a + b) if car.front_roll_share is None else car.front_roll_share
+    lever = car.mass * car.cg_height
+    weight = -car.mass * g_z
+    moved = lever * a_x / (a + b)
+    front = jnp.clip(weight * (b / (a + b)) - moved, 0.0, weight)
+    fl, fr = clip_transfer(front, share * lever * a_y / car.track_front)
+    rl, rr = clip_transfer(weight - front, (1.0 - share) * lever * a_y / car.track_rear)
+    return Wheels(fl, fr, rl, rr)
+
+
+def state_of(transfer: AbstractLoadTransfer, x: Any) -> Any:
+    """The transfer's own states out of the car's."""
+    return record_type("TransferState", transfer.state_names)(*[getattr(x, name) for name in transfer.state_names])

@@ -1,0 +1,73 @@
+"""Any vehicle with its place in the world, on a road that changes along the way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh import numerics
+from jaxveh._core.names import check_names, record, record_type
+from jaxveh.roads import LEVEL, Ground
+from jaxveh.vehicles.base import AbstractVehicle, Motion
+
+PLACE = ("x", "y")
+
+
+class Travelling(AbstractVehicle):
+    """`vehicle` with its position `x`, `y` (m, world) as the first two states.
+
+        dx/dt = v_x cos(yaw) - v_y sin(yaw),    dy/dt = v_x sin(yaw) + v_y cos(yaw)
+
+    With a `road` (`jaxveh.roads`) its wheels find the friction of the place where each of them stands, and the car the slopes
+    of its place; without, the ground is what `evaluate` is told. Outputs gain `x`, `y` and, with a road, `grade` and `bank`
+    (rad, in the car's directions) and `friction_fl` ...
+    """
+
+    vehicle: AbstractVehicle
+    road: Any = None
+
+    @property
+    def inputs(self):
+        return self.vehicle.inputs
+
+    @property
+    def state_type(self):
+        """`x`, `y`, then the vehicle's."""
+        return record_type("TravellingState", (*PLACE, *self.vehicle.state_type._fields))
+
+    @property
+    def units(self):
+        own = {**dict.fromkeys(PLACE, "m"), **dict.fromkeys(("grade", "bank"), "rad")}
+        return own | {f: "-" for f in Ground._fields if f.startswith("friction")} | self.vehicle.units
+
+    @property
+    def wheel_positions(self):
+        return self.vehicle.wheel_positions
+
+    def motion(self, x, u):
+        return self.vehicle.motion(self._inner(x), u)._replace(x=x.x, y=x.y)
+
+    def start(self, t, u, **values):
+        check_names("start", values, self.state_type._fields)
+        inner = self.vehicle.start(t, u, **{name: value for name, value in values.items() if name not in PLACE})
+        place = [values.get(name, 0.0) + 0.0 * inner[0] for name in PLACE]
+        return self.state_type(*place, *inner)
+
+    def evaluate(self, t, x, u, ground: Ground = LEVEL):
+        inner, moves = self._inner(x), self.motion(x, u)
+        if self.road is not None:
+            from jaxveh.roads import under
+
+            ground = under(self.road, x.x, x.y, moves.yaw, self.wheel_positions)
+        rates, outputs = self.vehicle.evaluate(t, inner, u, ground)
+        shown = {"x": x.x, "y": x.y, **outputs._asdict()}
+        if self.road is not None:
+            shown |= ground._asdict()
+        return self.state_type(*_velocity(moves), *rates), record("TravellingOutputs", shown)
+
+    def _inner(self, x):
+        return self.vehicle.state_type(*x[len(PLACE) :])
+
+
+def _velocity(moves: Motion):
+    cosine, sine = numerics.cos(moves.yaw), numerics.sin(moves.yaw)
+    return moves.v_x * cosine - moves.v_y * sine, moves.v_x * sine + moves.v_y * cosine

@@ -1,0 +1,232 @@
+"""Four wheels as named scalars: where they are, how they touch the road, and what the road does to the car."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.names import record_type
+from jaxveh.roads import Ground
+from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces
+from jaxveh.tyres.mirrored import ODD_INPUTS
+from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles.slip import regularised_speed
+
+CORNERS = ("fl", "fr", "rl", "rr")
+"""Front left, front right, rear left, rear right: the suffixes of what a wheel has for itself."""
+
+
+class Wheels(NamedTuple):
+    """One value a wheel: front left, front right, rear left, rear right."""
+
+    fl: Any
+    fr: Any
+    rl: Any
+    rr: Any
+
+
+def each(function: Callable, *wheels: Wheels) -> Wheels:
+    """`function` of each wheel's values."""
+    return Wheels(*[function(*values) for values in zip(*wheels, strict=True)])
+
+
+def front_rear(front: Any, rear: Any) -> Wheels:
+    """What the wheels of an axle have in common."""
+    return Wheels(front, front, rear, rear)
+
+
+def named(prefix: str) -> tuple[str, ...]:
+    """`prefix_fl`, `prefix_fr`, `prefix_rl`, `prefix_rr`."""
+    return tuple(f"{prefix}_{corner}" for corner in CORNERS)
+
+
+def of(values: Any, prefix: str) -> Wheels:
+    """The four fields `prefix_fl` ... of a NamedTuple."""
+    return Wheels(*[getattr(values, name) for name in named(prefix)])
+
+
+def total(wheels: Wheels) -> Any:
+    """The sum over the wheels."""
+    return (wheels.fl + wheels.fr) + (wheels.rl + wheels.rr)
+
+
+def corners(a: Any, b: Any, track_front: Any, track_rear: Any) -> Wheels:
+    """(x, y), m, of the wheels from the centre of gravity: `a` and `b` to the axles, tracks between the wheels' middles."""
+    return Wheels((a, 0.5 * track_front), (a, -0.5 * track_front), (-b, 0.5 * track_rear), (-b, -0.5 * track_rear))
+
+
+def frictions(ground: Ground) -> Wheels:
+    """The road's friction under each wheel."""
+    return of(ground, "friction")
+
+
+def gravity(ground: Ground) -> tuple[Any, Any, Any]:
+    """Acceleration of free fall along the car's x, y and z in the road's plane, m/s^2: (0, 0, -g) on a level road.
+
+    The plane has the slopes tan(grade) and tan(bank): its normal is (-tan(grade), -tan(bank), 1), normalised.
+    """
+    if isinstance(ground.grade, float) and isinstance(ground.bank, float) and ground.grade == ground.bank == 0.0:
+        return 0.0, 0.0, -GRAVITY
+    along, across = numerics.tan(ground.grade), numerics.tan(ground.bank)
+    # x stays in the vertical plane of the car's heading, y completes it in the road's plane.
+    run = numerics.sqrt(1.0 + along * along)
+    rise = numerics.sqrt(run * run + across * across)
+    return -GRAVITY * (along / run), -GRAVITY * across / (run * rise), -GRAVITY / rise
+
+
+class Rolling(NamedTuple):
+    """How a wheel moves over the road: speeds of the contact point in the wheel's axes (m/s), the steer's cosine and sine."""
+
+    along: Any
+    across: Any
+    cosine: Any
+    sine: Any
+
+
+def rolling(position: tuple[Any, Any], v_x: Any, v_y: Any, yaw_rate: Any, cosine: Any, sine: Any) -> Rolling:
+    """The contact point's motion of a wheel at `position` (m) that is turned by an angle of this cosine and sine."""
+    x, y = position
+    u, v = v_x - yaw_rate * y, v_y + yaw_rate * x
+    if isinstance(sine, float) and sine == 0.0:
+        return Rolling(u, v, 1.0, 0.0)
+    return Rolling(u * cosine + v * sine, v * cosine - u * sine, cosine, sine)
+
+
+def contact(
+    moves: Rolling, load: Any, friction: Any, crawl: float, wheel_speed: Any = None, camber: Any = 0.0
+) -> Contact:
+    """How a wheel touches the road; `wheel_speed` is `omega r_e` (m/s), None for a wheel that rolls freely.
+
+    Slip angle and slip ratio are those of ISO 8855, regularised below the `crawl` speed (m/s).
+    """
+    speed = regularised_speed(moves.along, crawl)
+    return Contact(
+        slip_angle=-numerics.arctan(moves.across / speed),
+        slip_ratio=0.0 if wheel_speed is None else (wheel_speed - moves.along) / speed,
+        load=load,
+        camber=camber,
+        friction=friction,
+        speed=jnp.abs(moves.along),
+    )
+
+
+def forces_at(tyre: AbstractTyre, at: Contact, state: Any, right: bool) -> Forces:
+    """The forces on a wheel; a wheel on the right is the mirror image of the one on the left, its tyre's states included."""
+    if not right:
+        return stored(tyre.forces(at, state))
+    found = stored(tyre.forces(_turned(at), state))
+    return found._replace(F_y=-found.F_y, M_x=-found.M_x, M_z=-found.M_z)
+
+
+def tyre_rates(tyre: AbstractDynamicTyre, at: Contact, state: Any, right: bool) -> Any:
+    """The time derivative of a tyre's states; of a wheel on the right in the mirror."""
+    return tyre.derivatives(_turned(at) if right else at, state)
+
+
+def tyre_start(tyre: AbstractDynamicTyre, at: Contact, right: bool) -> Any:
+    """The settled states of a tyre; of a wheel on the right in the mirror."""
+    return tyre.start(_turned(at) if right else at)
+
+
+def _turned(at: Contact) -> Contact:
+    return at._replace(**{name: -getattr(at, name) for name in ODD_INPUTS})
+
+
+def stored(forces: Forces) -> Forces:
+    """Forces that each consumer reads instead of computing them again; numbers known beforehand stay numbers."""
+    arrays, numbers = eqx.partition(forces, eqx.is_array)
+    return eqx.combine(numerics.barrier(arrays), numbers)
+
+
+class Tyres(NamedTuple):
+    """The tyres of a two-track car's axles, each serving both wheels: the right ones mirrored where `mirrored`."""
+
+    front: AbstractTyre
+    rear: AbstractTyre
+    mirrored: bool
+
+    @property
+    def wheels(self) -> Wheels:
+        """The tyre of each wheel."""
+        return front_rear(self.front, self.rear)
+
+    @property
+    def right(self) -> Wheels:
+        """Whether each wheel's tyre is seen in the mirror."""
+        return Wheels(False, self.mirrored, False, self.mirrored)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The states of dynamic tyres: `fl_<name>` and so on."""
+        return tuple(f"{c}_{name}" for c, tyre in zip(CORNERS, self.wheels, strict=True) for name in _names(tyre))
+
+    def states(self, x: Any) -> Wheels:
+        """Each tyre's state out of the car's, None for a tyre without."""
+        return Wheels(*[_state(c, tyre, x) for c, tyre in zip(CORNERS, self.wheels, strict=True)])
+
+    def start(self, contacts: Wheels) -> tuple:
+        """The settled states, in the order of `state_names`."""
+        return self._gather(lambda tyre, at, right: tyre_start(tyre, at, right), contacts, self.right)
+
+    def forces(self, contacts: Wheels, states: Wheels) -> Wheels:
+        """What the road does to each wheel, in the wheel's axes."""
+        return each(forces_at, self.wheels, contacts, states, self.right)
+
+    def rates(self, contacts: Wheels, states: Wheels) -> tuple:
+        """The time derivatives, in the order of `state_names`."""
+        return self._gather(tyre_rates, contacts, states, self.right)
+
+    def _gather(self, function: Callable, *wheels: Wheels) -> tuple:
+        found = [function(*one) for one in zip(self.wheels, *wheels, strict=True) if _names(one[0])]
+        return tuple(value for state in found for value in state)
+
+
+def _names(tyre: AbstractTyre) -> tuple[str, ...]:
+    return tyre.state_names if isinstance(tyre, AbstractDynamicTyre) else ()
+
+
+def _state(corner: str, tyre: AbstractTyre, x: Any) -> Any:
+    names = _names(tyre)
+    return record_type("TyreState", names)(*[getattr(x, f"{corner}_{name}") for name in names]) if names else None
+
+
+class Pushed(NamedTuple):
+    """What the road does to the car through all wheels: forces along its x and y (N), moment about its z (N m); and each
+    wheel's forces along the car's x and y."""
+
+    F_x: Any
+    F_y: Any
+    M_z: Any
+    F_x_wheels: Wheels
+    F_y_wheels: Wheels
+
+
+def pushed(positions: Wheels, moves: Wheels, forces: Wheels) -> Pushed:
+    """The wheels' forces turned into the car's directions and summed."""
+    along = each(lambda m, f: f.F_x * m.cosine - f.F_y * m.sine, moves, forces)
+    across = each(lambda m, f: f.F_x * m.sine + f.F_y * m.cosine, moves, forces)
+    turning = each(lambda p, X, Y, f: p[0] * Y - p[1] * X + f.M_z, positions, along, across, forces)
+    return Pushed(total(along), total(across), total(turning), along, across)
+
+
+def clip_transfer(axle_load: Any, moved: Any) -> tuple[Any, Any]:
+    """Loads of the left and the right wheel, N, of an axle: a wheel that lifts leaves all to the other.
+
+    `moved` (N) goes from the left to the right wheel.
+    """
+    half = 0.5 * jnp.maximum(axle_load, 0.0)
+    moved = jnp.clip(moved, -half, half)
+    return half - moved, half + moved
+
+
+STANDSTILL = 0.5
+"""m/s: about it brakes and rolling resistance turn round smoothly, so that standstill is an ordinary point."""
+
+
+def opposing(speed: Any) -> Any:
+    """-1 ... 1: the direction that brakes and rolling resistance push against, smooth about standstill (m/s)."""
+    return jnp.tanh(speed * (1.0 / STANDSTILL))
