@@ -1,5 +1,23 @@
-"""A vehicle, a manoeuvre and sensors make a Recording."""
+"""Drives: vehicle, road, driver and sensors through diffrax, into a Recording."""
 
-from jaxveh.simulation.simulate import simulate
+from jaxveh.simulation.driven import Driven, DrivenState
+from jaxveh.simulation.events import Event, standstill, wheel_lift
+from jaxveh.simulation.simulate import driven_car, simulate
+from jaxveh.simulation.solve import Grid, Solution, even_grid, grid_through, solve
+from jaxveh.simulation.stiffness import fastest_pole
 
-__all__ = ["simulate"]
+__all__ = [
+    "Driven",
+    "DrivenState",
+    "Event",
+    "Grid",
+    "Solution",
+    "driven_car",
+    "even_grid",
+    "fastest_pole",
+    "grid_through",
+    "simulate",
+    "solve",
+    "standstill",
+    "wheel_lift",
+]

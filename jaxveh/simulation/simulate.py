@@ -1,160 +1,223 @@
-"""Simulate a drive through diffrax: exact states, noisy measurements, the truth beside them."""
+"""Simulate a drive: exact states, what the sensors say, the truth beside them."""
 
 from __future__ import annotations
 
-import math
+import warnings
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import diffrax
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import FilterError, InputError, check, check_positive, is_concrete
+from jaxveh._core.errors import FilterError, InputError, JaxvehWarning, check_one_of, is_concrete
 from jaxveh._core.names import as_mapping
+from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import TRUTH, Recording
 from jaxveh._core.result import Result
-from jaxveh.manoeuvres import AbstractManoeuvre
-from jaxveh.sensors import Instrumented, SensorSet
+from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre
+from jaxveh.sensors import Instrumented, SensorSet, Suite
+from jaxveh.simulation import stiffness
+from jaxveh.simulation.driven import Driven, as_driver, check_inputs, driver_name, vehicle_name
+from jaxveh.simulation.events import Event
+from jaxveh.simulation.meter import told
+from jaxveh.simulation.solve import Grid, Solution, even_grid, grid_through, solve
+from jaxveh.simulation.stiffness import Choice
 from jaxveh.statespace import RK4
-from jaxveh.vehicles import AbstractVehicle
+from jaxveh.vehicles import AbstractVehicle, Travelling
 
-_ADAPTIVE_STEPS_A_ROW = 64
+SOLVERS = ("auto", "explicit", "implicit")
 
+SAME = 1e-9
+"""s: instants that differ by less are one."""
 
-class _Drive(NamedTuple):
-    """What a simulation gives by row, each leaf (T,): states, inputs, outputs, noise-free measurements."""
-
-    x: Any
-    u: Any
-    outputs: Any
-    measured: Any
-    finished: Any
+ROUNDS = 3
+"""Runs at most until the steps hold the fastest motion of what they show."""
 
 
 def simulate(
     car: AbstractVehicle,
-    manoeuvre: AbstractManoeuvre,
-    sensors: SensorSet | None = None,
+    manoeuvre: AbstractManoeuvre | AbstractDriver,
+    sensors: SensorSet | Suite | None = None,
     key: jax.Array | None = None,
     *,
+    road: Any = None,
     dt: float = 0.01,
     max_step: float = 0.002,
-    solver: diffrax.AbstractSolver | None = None,
+    solver: str | diffrax.AbstractSolver = "auto",
     stepsize_controller: diffrax.AbstractStepSizeController | None = None,
     adjoint: diffrax.AbstractAdjoint | None = None,
     start: Mapping[str, Any] | Any = None,
+    until: Event | None = None,
+    progress: Progress = silent,
     throw: bool = True,
 ) -> Recording:
     """Drive `car` through `manoeuvre` and record it: rows at 0, dt, 2 dt, ... up to the manoeuvre's duration.
 
-    **Channels**: each measured channel by its name, with the sensors' noise; the car's inputs (`steer`, `v_x`, ...)
-    exact unless the sensors measure them; and the truth, every output of the car, as `true.<name>`. Units are in the
-    recording.
+    **The drive**: `manoeuvre` is open-loop, or a driver who sees the car. A car with engine and brakes whose manoeuvre says a
+    speed gets a driver who holds it (`manoeuvres.SpeedControl`). `road` (`jaxveh.roads`) has friction and slopes along the way
+    (None: level). `start`: state fields that differ from straight running, by name (`{"yaw": 0.05}`), world position `x`, `y`
+    included. `until`: an event that ends the simulation early (`simulation.standstill()`); later rows are cut off.
 
-    **Arguments**: `key` draws the noise; without a key the measurements carry none. `dt` (s): time between rows.
-    Without a `stepsize_controller`, the `solver` (default `RK4`) takes equal steps of at most `max_step` (s) that
-    meet every row; with one (`diffrax.PIDController` and a solver with an error estimate) it chooses its own.
-    `start`: state fields that differ from straight running, by name (`{"yaw": 0.05}`). `adjoint`: diffrax's way to
-    differentiate; the default serves reverse mode, `diffrax.ForwardMode()` forward mode.
+    **Channels** with a `SensorSet` (or none): each measured channel by its name, with the sensors' noise, and the car's inputs
+    (`steer`, `v_x`, ...) exact unless the sensors measure them. With a `Suite` of devices: what they say, when they say it (its
+    rows instead of `dt`'s, NaN where a device was silent). In both the truth, every output of the car, as `true.<name>`.
+    `key` draws all randomness; without a key the measurements carry none.
+
+    **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened to what the car's
+    fastest motion asks for (the spins of wheels at low speed), or Kvaerno's implicit method where they would become too short;
+    "explicit" and "implicit" insist, and a warning says where equal steps were too long for what happened. A diffrax solver
+    takes equal steps, or its own with a `stepsize_controller`. Under jit, vmap or grad nothing can be looked at: "auto" is then
+    "explicit". `adjoint`: diffrax's way to differentiate; the default serves reverse mode, `diffrax.ForwardMode()` forward mode.
+    `progress` hears how far it is (single runs).
 
     It may be jitted, vmapped over keys, cars and manoeuvres, and differentiated with respect to any of their leaves.
 
-    **Raises** `InputError` for arguments out of range or a manoeuvre that lacks an input of the car; `FilterError`,
-    naming the time, where the motion does not stay finite. The latter needs `throw=True` and acts on the host; under
+    **Raises** `InputError` for arguments out of range or a manoeuvre that lacks an input of the car; `FilterError`, naming
+    time, state and a remedy, where the motion does not stay finite. The latter needs `throw=True` and acts on the host; under
     jit look at the channels.
     """
-    times, substeps = _times(manoeuvre, dt, max_step)
-    instrumented = Instrumented(car, sensors)
-    _check_inputs(car, manoeuvre)
-    dtype = jnp.result_type(jax.tree.leaves(eqx.filter(car, eqx.is_inexact_array))[0])
-    drive = _drive(
-        instrumented,
-        manoeuvre,
-        {} if start is None else as_mapping(start, "start"),
-        jnp.asarray(np.linspace(0.0, times[-1], (len(times) - 1) * substeps + 1), dtype),
-        substeps,
-        RK4() if solver is None else solver,
-        stepsize_controller,
-        diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint,
-    )
+    driven = driven_car(car, manoeuvre, sensors if isinstance(sensors, SensorSet) else None, road)
+    duration, values = driven.driver.duration, {} if start is None else as_mapping(start, "start")
+    rows = None if not isinstance(sensors, Suite) else device_rows(sensors, duration)
+
+    def grid(step: float) -> Grid:
+        return even_grid(duration, dt, step) if rows is None else grid_through(rows, step)
+
+    times = grid(max_step).rows
+    with told(progress) as meter:
+        run = lambda choice: solve(driven, values, grid(choice.max_step), choice, until, adjoint, meter)
+        found = _run(driven, values, run, _choice(solver, stepsize_controller, max_step), times, max_step)
     if throw:
-        _check_finished(drive, times)
-    return _recording(instrumented, manoeuvre, drive, times, key)
+        _check_finished(found, times)
+    source = f"simulation: {vehicle_name(car)}, {driver_name(driven.driver)}"
+    if isinstance(sensors, Suite):
+        recording = _devices(driven, found, times, sensors, duration, key, source)
+    else:
+        recording = _recording(driven, found, times, key, source)
+    return _cut(recording, found, until)
 
 
-def _times(manoeuvre, dt, max_step) -> tuple[np.ndarray, int]:
-    check_positive("dt", dt, "s")
-    check_positive("max_step", max_step, "s")
-    check("dt", dt, lambda v: v <= manoeuvre.duration, f"at most the manoeuvre's duration, {manoeuvre.duration:g} s")
-    # A duration that is a whole number of steps but for rounding keeps its last row.
-    steps = math.floor(manoeuvre.duration / dt + 1e-9)
-    return dt * np.arange(steps + 1), math.ceil(dt / max_step - 1e-9)
+def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None = None, road: Any = None) -> Driven:
+    """The car on its road with sensors and driver, as `simulate` integrates it; raises `InputError` where they do not fit."""
+    placed = car if isinstance(car, Travelling) and road is None else Travelling(car, road)
+    driven = Driven(Instrumented(placed, sensors), as_driver(manoeuvre, placed))
+    check_inputs(driven)
+    return driven
 
 
-def _check_inputs(car, manoeuvre) -> None:
-    given = jax.eval_shape(manoeuvre.inputs, 0.0)._fields
-    # The car makes the acceleration of the speed's rate by itself.
-    known = (*given, "a_x") if "v_x_rate" in given else given
-    missing = [name for name in car.inputs if name not in known]
-    if missing:
+def _choice(solver, controller, max_step) -> Choice | None:
+    """What the caller insists on; None for "auto"."""
+    if not isinstance(solver, str):
+        return Choice(solver, controller, max_step)
+    check_one_of("solver", solver, SOLVERS)
+    if controller is not None:
         raise InputError(
-            f"{type(manoeuvre).__name__} gives {', '.join(given)}, but {type(car).__name__} needs {', '.join(missing)} "
-            "too: add the channel to the manoeuvre (or, for a_x, leave the car's cg_height out)."
+            f'solver = "{solver}" with a stepsize_controller: name the diffrax solver that it shall control.'
+        )
+    if solver == "auto":
+        return None
+    return stiffness.explicit(max_step) if solver == "explicit" else stiffness.implicit(max_step)
+
+
+def _run(driven: Driven, values: dict, run, asked: Choice | None, times: np.ndarray, max_step: float) -> Solution:
+    """Run as asked; on "auto" look at the fastest motion before and after, and run again where steps were too long."""
+    looks = is_concrete(driven, values) and stiffness.may_be_stiff(driven)
+    if asked is not None or not looks:
+        choice = stiffness.explicit(max_step) if asked is None else asked
+        found = run(choice)
+        if looks and choice.controller is None:
+            _warn_of_long_steps(driven, found, choice, times)
+        return found
+    choice = stiffness.choose(stiffness.at_start(driven, values, times), max_step)
+    for _ in range(ROUNDS):
+        found = run(choice)
+        if choice.controller is not None:
+            break
+        pole, _ = stiffness.worst(driven, times, found.x)
+        if pole * choice.max_step <= stiffness.LIMIT:
+            break
+        choice = stiffness.choose(pole, max_step)
+    return found
+
+
+def _warn_of_long_steps(driven: Driven, found: Solution, choice: Choice, times: np.ndarray) -> None:
+    if not isinstance(choice.solver, RK4):
+        return
+    pole, time = stiffness.worst(driven, times, found.x)
+    if pole * choice.max_step > stiffness.LIMIT:
+        warnings.warn(
+            f"simulate: steps of {choice.max_step:g} s are too long for a motion of {pole:.0f} 1/s at t = {time:g} s, so what is "
+            f'seen there may be ringing of the solver: take max_step = {stiffness.STABLE / pole:.2g} s, or solver = "auto".',
+            JaxvehWarning,
+            stacklevel=4,
         )
 
 
-def _rates(t, x, args):
-    instrumented, manoeuvre = args
-    return instrumented.derivatives(t, x, manoeuvre.inputs(t))
-
-
-@eqx.filter_jit
-def _drive(instrumented, manoeuvre, start, fine, substeps, solver, controller, adjoint) -> _Drive:
-    rows = fine[::substeps]
-    x0 = instrumented.start(fine[0], manoeuvre.inputs(fine[0]), **start)
-    x0 = jax.tree.map(lambda leaf: jnp.asarray(leaf, fine.dtype), x0)
-    fixed = controller is None
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(_rates),
-        solver,
-        t0=fine[0],
-        t1=fine[-1],
-        dt0=None,
-        y0=x0,
-        args=(instrumented, manoeuvre),
-        saveat=diffrax.SaveAt(ts=rows),
-        stepsize_controller=diffrax.StepTo(ts=fine) if fixed else controller,
-        adjoint=adjoint,
-        max_steps=len(fine) if fixed else _ADAPTIVE_STEPS_A_ROW * len(fine),
-        throw=False,
+def _check_finished(found: Solution, times: np.ndarray) -> None:
+    if not is_concrete(found) or int(found.result) == Result.successful:
+        return
+    reached = times <= float(found.end)
+    leaves = {**found.x.car._asdict(), **found.outputs._asdict()}
+    bad = {name: ~np.isfinite(np.asarray(leaf)) & reached for name, leaf in leaves.items()}
+    any_bad = np.any(list(bad.values()), axis=0)
+    row = int(np.argmax(any_bad)) if any_bad.any() else int(reached.sum()) - 1
+    names = [name for name in found.x.car._fields if bad[name][row]] or [name for name in bad if bad[name][row]]
+    raise FilterError(
+        f"simulation failed at t = {times[row]:g} s ({', '.join(names) or 'outputs'}): {Result(int(found.result)).message}."
+        + _last_state(found, row)
     )
-    u = jax.vmap(manoeuvre.inputs)(rows)
-    outputs, measured = jax.vmap(instrumented.see)(rows, solution.ys, u)
-    return _Drive(solution.ys, u, outputs, measured, solution.result == diffrax.RESULTS.successful)
 
 
-def _check_finished(drive: _Drive, times: np.ndarray) -> None:
-    if not is_concrete(drive):
-        return
-    finite = np.all([np.isfinite(np.asarray(leaf)) for leaf in (*drive.x, *drive.outputs)], axis=0)
-    if finite.all() and bool(drive.finished):
-        return
-    row = int(np.argmin(finite)) if not finite.all() else len(times) - 1
-    code = Result.non_finite_state if bool(drive.finished) else Result.too_stiff
-    fields = [name for name, leaf in drive.x._asdict().items() if not np.isfinite(np.asarray(leaf)[row])]
-    raise FilterError(f"simulation failed at t = {times[row]:g} s ({', '.join(fields) or 'outputs'}): {code.message}.")
+def _last_state(found: Solution, row: int) -> str:
+    if row == 0:
+        return ""
+    state = ", ".join(f"{name} = {float(leaf[row - 1]):.4g}" for name, leaf in found.x.car._asdict().items())
+    return f" The row before: {state}."
 
 
-def _recording(instrumented, manoeuvre, drive: _Drive, times, key) -> Recording:
-    car, sensors = instrumented.vehicle, instrumented.sensors
-    outputs, u = drive.outputs._asdict(), drive.u._asdict()
-    channels = {name: u[name] if name in u else outputs[name] for name in car.inputs}
+def _recording(driven: Driven, found: Solution, times: np.ndarray, key, source: str) -> Recording:
+    sensors = driven.car.sensors
+    channels = _inputs(driven, found)
     if sensors is not None:
         noise = sensors.noise.sample(key, times.shape) if key is not None else {}
-        channels |= {name: v + noise[name] if noise else v for name, v in drive.measured._asdict().items()}
-    channels |= {TRUTH + name: value for name, value in outputs.items()}
-    units = {name: car.units[name.removeprefix(TRUTH)] for name in channels}
-    return Recording(times, channels, units, f"simulation: {type(car).__name__}, {type(manoeuvre).__name__}")
+        channels |= {name: v + noise[name] if noise else v for name, v in found.measured._asdict().items()}
+    channels |= {TRUTH + name: value for name, value in found.outputs._asdict().items()}
+    return Recording(times, channels, _units(driven, channels), source)
+
+
+def _inputs(driven: Driven, found: Solution) -> dict:
+    """The car's inputs; what the driver does not say outright is among the outputs."""
+    u, outputs = found.u._asdict(), found.outputs._asdict()
+    return {name: u[name] if name in u else outputs[name] for name in driven.car.inputs}
+
+
+def _units(driven: Driven, channels: Mapping) -> dict:
+    units = driven.car.vehicle.units
+    return {name: units[name.removeprefix(TRUTH)] for name in channels}
+
+
+def device_rows(suite: Suite, duration: float) -> np.ndarray:
+    """The instants from 0 on at which a device of the suite speaks, or at which one looks (s)."""
+    every = np.unique(np.concatenate([[0.0], suite.sample_times(duration), suite.look_times(duration)]))
+    # What differs by rounding alone is one instant.
+    return every[np.concatenate([[True], np.diff(every) > SAME])]
+
+
+def _devices(driven: Driven, found: Solution, rows: np.ndarray, suite: Suite, duration, key, source) -> Recording:
+    """What the devices say, and the truth at the instants when any of them speaks."""
+    truth = {**_inputs(driven, found), **found.outputs._asdict()}
+    times, said, units = suite.record(rows, truth, duration, key)
+    at = np.clip(np.searchsorted(rows, times - SAME), 0, len(rows) - 1)
+    shown = {TRUTH + name: value[at] for name, value in truth.items()}
+    return Recording(times, {**said, **shown}, {**_units(driven, shown), **units}, source)
+
+
+def _cut(recording: Recording, found: Solution, until: Event | None) -> Recording:
+    """Without the rows after an event, and with a word about it; under jit they stay, as NaN."""
+    if until is None or not is_concrete(found):
+        return recording
+    end, reached = float(found.end), int(np.sum(recording.time <= float(found.end)))
+    if reached == len(recording):
+        return recording
+    return recording.rows(slice(0, reached)).replace(source=f"{recording.source}; {until.name} at t = {end:.3f} s")

@@ -29,7 +29,7 @@ def drive():
 def test_channels_units_and_time(drive):
     np.testing.assert_allclose(drive.time, 0.01 * np.arange(201), rtol=1e-15)
     assert drive.names[:4] == ("steer", "v_x", "yaw_rate", "a_y")
-    assert set(drive.truth.names) == set(vehicles.SingleTrackOutputs._fields)
+    assert set(drive.truth.names) == {*vehicles.SingleTrackOutputs._fields, "x", "y"}
     units = [drive.unit(name) for name in ("steer", "v_x", "yaw_rate", "a_y", "true.F_yf", "true.sideslip")]
     assert units == ["rad", "m/s", "rad/s", "m/s^2", "N", "rad"]
     assert "SingleTrack, DoubleLaneChange" in drive.source

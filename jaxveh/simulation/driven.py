@@ -1,0 +1,144 @@
+"""A car, its sensors and its driver as one differential equation."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import record
+from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre, OpenLoop, SpeedControl
+from jaxveh.sensors import Instrumented
+from jaxveh.vehicles import AbstractVehicle, Motion
+from jaxveh.vehicles.wheels import named, opposing
+
+
+class DrivenState(NamedTuple):
+    """The state of the car with its sensors, and that of its driver."""
+
+    car: Any
+    driver: Any
+
+
+class Driven(eqx.Module):
+    """A car on its way: `car` with sensors, a `Travelling` within, and the `driver` who sees how it moves."""
+
+    car: Instrumented
+    driver: AbstractDriver
+
+    def start(self, t: Any, dtype: Any, **values: Any) -> DrivenState:
+        """Straight running at the driver's speed (fields of the car's state replaced by keyword), the driver settled."""
+        values = {name: jnp.asarray(value, dtype) for name, value in values.items()}
+        zero = jnp.zeros((), dtype)
+        moves = Motion(*[values.get(name, zero) for name in Motion._fields])
+        driver = self.driver.start(t, moves)
+        given = self._given(t, moves, driver)
+        if "v_x" in given._fields and "v_x" not in values:
+            moves = moves._replace(v_x=jnp.asarray(given.v_x, dtype))
+            if "v_x" in self.car.state_type._fields:
+                values["v_x"] = moves.v_x
+            driver = self.driver.start(t, moves)
+        car = self.car.start(t, self._given(t, moves, driver), **values)
+        return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), DrivenState(car, driver))
+
+    def inputs(self, t: Any, x: DrivenState) -> Any:
+        """What the driver does: the car's inputs."""
+        return self._inputs(t, x)[0]
+
+    def derivatives(self, t: Any, x: DrivenState) -> DrivenState:
+        """The state's time derivative."""
+        u, moves = self._inputs(t, x)
+        return DrivenState(self.car.derivatives(t, x.car, u), self.driver.derivatives(t, moves, x.driver))
+
+    def see(self, t: Any, x: DrivenState) -> tuple[Any, Any, Any]:
+        """Inputs, outputs of the car, and what the sensors say of them without noise (None without sensors)."""
+        u = self.inputs(t, x)
+        return u, *self.car.see(t, x.car, u)
+
+    def _inputs(self, t, x: DrivenState):
+        vehicle, _ = self.car.split(x.car)
+        moves = self.car.vehicle.motion(vehicle, _Unknown()) if not self._told_speed else None
+        if moves is None:
+            # A car that is told its speed moves as its driver says; the driver says it without looking at the speed.
+            blind = self.car.vehicle.motion(vehicle, _Unknown())
+            given = self.driver.inputs(t, blind, x.driver)
+            moves = blind._replace(v_x=given.v_x)
+        return self._given(t, moves, x.driver), moves
+
+    @property
+    def _told_speed(self) -> bool:
+        return "v_x" in self.car.inputs
+
+    def _given(self, t, moves: Motion, driver) -> Any:
+        return adapted(self.car.vehicle, self.driver.inputs(t, moves, driver), moves)
+
+
+class _Unknown(NamedTuple):
+    """Inputs of which only a speed that nobody knows yet is asked."""
+
+    v_x: Any = 0.0
+    steer: Any = 0.0
+
+
+def adapted(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
+    """The driver's inputs with those that the car needs and that follow from them.
+
+    `steering_wheel` from `steer` by the car's steering ratio; a quarter of the torques for each of four motors. The
+    acceleration `a_x` the car makes of `v_x_rate` by itself.
+    """
+    missing = [name for name in vehicle.inputs if name not in given._fields]
+    found = {}
+    for name in missing:
+        if name == "steering_wheel" and "steer" in given._fields:
+            found[name] = given.steer * vehicle.steering_ratio
+        elif name in named("torque") and "drive_torque" in given._fields:
+            found[name] = 0.25 * (given.drive_torque - given.brake_torque * opposing(moves.v_x))
+    return record("DriverInputs", {**given._asdict(), **found}) if found else given
+
+
+def check_inputs(driven: Driven) -> None:
+    """Raise `InputError` where the car needs an input that its driver does not give."""
+    vehicle, driver = driven.car.vehicle, driven.driver
+    moves = Motion(*[jnp.zeros(())] * len(Motion._fields))
+    given = eqx.filter_eval_shape(
+        lambda: adapted(vehicle, driver.inputs(0.0, moves, driver.start(0.0, moves)), moves)
+    )._fields
+    known = (*given, "a_x") if "v_x_rate" in given else given
+    missing = [name for name in vehicle.inputs if name not in known]
+    if missing:
+        raise InputError(
+            f"{driver_name(driver)} gives {', '.join(given)}, but {vehicle_name(vehicle)} needs {', '.join(missing)} too: "
+            "add the channel to the manoeuvre (or, for a_x, leave the car's cg_height out)."
+        )
+
+
+def vehicle_name(vehicle: Any) -> str:
+    """The class of the car itself, without what wraps it."""
+    while hasattr(vehicle, "vehicle"):
+        vehicle = vehicle.vehicle
+    return type(vehicle).__name__
+
+
+def driver_name(driver: Any) -> str:
+    """The class of the manoeuvre itself, without what wraps it."""
+    while hasattr(driver, "manoeuvre") or hasattr(driver, "driver"):
+        driver = getattr(driver, "manoeuvre", None) or driver.driver
+    return type(driver).__name__
+
+
+def as_driver(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: AbstractVehicle) -> AbstractDriver:
+    """The driver of a manoeuvre, who works the pedals where the car has them and the manoeuvre says a speed alone."""
+    driver = OpenLoop(manoeuvre) if isinstance(manoeuvre, AbstractManoeuvre) else manoeuvre
+    if not isinstance(driver, AbstractDriver):
+        raise InputError(
+            f"manoeuvre = {type(manoeuvre).__name__}: must be a manoeuvre or a driver of jaxveh.manoeuvres."
+        )
+    moves = Motion(*[jnp.zeros(())] * len(Motion._fields))
+    given = eqx.filter_eval_shape(lambda: driver.inputs(0.0, moves, driver.start(0.0, moves)))._fields
+    pedals = {"drive_torque", *named("torque")} & set(vehicle.inputs)
+    if pedals and "v_x" in given and not {"drive_torque", *named("torque")} & set(given):
+        return SpeedControl.of(driver, vehicle)
+    return driver

@@ -1,0 +1,118 @@
+"""One simulation through diffrax: states at the rows, and what became of it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any, NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import check, check_positive
+from jaxveh._core.result import Result, code
+from jaxveh.simulation.driven import Driven
+from jaxveh.simulation.events import Event
+from jaxveh.simulation.stiffness import Choice
+
+ADAPTIVE_STEPS_A_ROW = 64
+"""Steps that a solver with steps of its own may take, times the rows and equal steps of the longest length."""
+
+
+class Solution(NamedTuple):
+    """What a simulation gives by row, each leaf (T,): states, inputs, outputs, noise-free measurements; and as scalars the
+    `result` code (`Result`) and the time `end` (s) at which it ended. Rows after the end are NaN."""
+
+    x: Any
+    u: Any
+    outputs: Any
+    measured: Any
+    result: Any
+    end: Any
+
+
+class Grid(NamedTuple):
+    """Instants of the rows `rows` (s) and of the ends of equal steps between them `steps` (s), both from 0 up."""
+
+    rows: np.ndarray
+    steps: np.ndarray
+
+
+def even_grid(duration: float, dt: float, max_step: float) -> Grid:
+    """Rows at 0, dt, 2 dt, ...; steps of at most `max_step` that meet each of them."""
+    check_positive("dt", dt, "s")
+    check_positive("max_step", max_step, "s")
+    check("dt", dt, lambda v: v <= duration, f"at most the manoeuvre's duration, {duration:g} s")
+    # A duration that is a whole number of steps but for rounding keeps its last row.
+    count = math.floor(duration / dt + 1e-9)
+    rows = dt * np.arange(count + 1)
+    return Grid(rows, np.linspace(0.0, rows[-1], count * math.ceil(dt / max_step - 1e-9) + 1))
+
+
+def grid_through(rows: np.ndarray, max_step: float) -> Grid:
+    """Steps of at most `max_step` (s) that meet every one of `rows`, which start at 0 and increase."""
+    check_positive("max_step", max_step, "s")
+    pieces = [
+        np.linspace(start, end, math.ceil((end - start) / max_step - 1e-9) + 1)[1:]
+        for start, end in itertools.pairwise(rows)
+    ]
+    return Grid(rows, np.concatenate([rows[:1], *pieces]))
+
+
+def solve(
+    driven: Driven,
+    start: dict,
+    grid: Grid,
+    choice: Choice,
+    until: Event | None = None,
+    adjoint: diffrax.AbstractAdjoint | None = None,
+    meter: diffrax.AbstractProgressMeter | None = None,
+) -> Solution:
+    """Simulate the driven car over the grid. It may be jitted, vmapped and differentiated."""
+    dtype = jnp.result_type(jax.tree.leaves(eqx.filter(driven.car.vehicle, eqx.is_inexact_array))[0])
+    rows, steps = jnp.asarray(grid.rows, dtype), jnp.asarray(grid.steps, dtype)
+    if adjoint is None:
+        adjoint = diffrax.RecursiveCheckpointAdjoint()
+    meter = diffrax.NoProgressMeter() if meter is None else meter
+    return _solve(driven, start, rows, steps, choice.solver, choice.controller, until, adjoint, meter)
+
+
+def _rates(t, x, driven: Driven):
+    return driven.derivatives(t, x)
+
+
+@eqx.filter_jit
+def _solve(driven: Driven, start, rows, steps, solver, controller, until, adjoint, meter) -> Solution:
+    fixed = controller is None
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(_rates),
+        solver,
+        t0=rows[0],
+        t1=rows[-1],
+        dt0=None,
+        y0=driven.start(rows[0], rows.dtype, **start),
+        args=driven,
+        saveat=diffrax.SaveAt(subs=[diffrax.SubSaveAt(ts=rows), diffrax.SubSaveAt(t1=True, fn=lambda t, y, args: t)]),
+        stepsize_controller=diffrax.StepTo(ts=steps) if fixed else controller,
+        adjoint=adjoint,
+        event=None if until is None else until.of_solver(1e-6),
+        progress_meter=meter,
+        max_steps=len(steps) if fixed else ADAPTIVE_STEPS_A_ROW * len(steps),
+        throw=False,
+    )
+    x, (end,) = solution.ys
+    if until is not None:
+        reached = rows <= end
+        x = jax.tree.map(lambda leaf: jnp.where(reached, leaf, jnp.nan), x)
+    u, outputs, measured = jax.vmap(driven.see)(rows, x)
+    return Solution(x, u, outputs, measured, _result(solution.result, x, outputs, rows <= end), end)
+
+
+def _result(result, x, outputs, reached):
+    finite = jnp.all(jnp.stack([jnp.all(jnp.isfinite(v) | ~reached) for v in jax.tree.leaves((x, outputs))]))
+    ended = (result == diffrax.RESULTS.successful) | (result == diffrax.RESULTS.event_occurred)
+    failed = jnp.where(ended, code(Result.non_finite_state), code(Result.too_stiff))
+    return jnp.where(finite & ended, code(Result.successful), failed)

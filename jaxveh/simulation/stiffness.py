@@ -1,0 +1,122 @@
+"""How fast the fastest motion of a simulated car is, and which solver that asks for."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh.simulation.driven import Driven
+from jaxveh.statespace import RK4
+
+STABLE = 2.5
+"""Step times fastest pole up to which RK4 decays with it: it ends at 2.79 on the real, at 2.83 on the imaginary axis."""
+
+LIMIT = 2.75
+"""Step times fastest pole beyond which RK4 grows or rings."""
+
+LEAST_STEP = 2.5e-4
+"""s: below it an implicit solver is the cheaper one."""
+
+SETTLING = 24
+"""Iterations that turn to the fastest motion; as many again measure it."""
+
+LEAST_SIZE = 1e-30
+
+LOOKS = 16
+"""Rows of a simulation that are looked at."""
+
+
+SLOW = {
+    *("x", "y", "z", "yaw", "roll", "pitch", "v_x", "v_y", "v_z", "yaw_rate", "roll_rate", "pitch_rate", "sideslip"),
+    *("a_x_felt", "a_y_felt", "steer", "speed", "hitch"),
+}
+"""States whose poles stay below some hundred 1/s in any car; spins, wheel travels and tyre deflections may not."""
+
+
+class Choice(NamedTuple):
+    """A solver with equal steps of at most `max_step` (s), or with a controller that chooses its own."""
+
+    solver: diffrax.AbstractSolver
+    controller: diffrax.AbstractStepSizeController | None
+    max_step: float
+
+
+def fastest_pole(driven: Driven, t: Any, x: Any) -> jax.Array:
+    """The spectral radius of the state's Jacobian at one instant, 1/s, within a few per cent.
+
+    By power iteration with Jacobian-vector products: the mean growth over its second half, which is that of the largest
+    eigenvalue, real or a complex pair.
+    """
+    along = lambda v: jax.jvp(lambda y: driven.derivatives(t, y), (x,), (v,))[1]
+
+    def step(i, carry):
+        v, grown = carry
+        v = along(v)
+        size = jnp.maximum(jnp.sqrt(sum(jnp.sum(leaf**2) for leaf in jax.tree.leaves(v))), LEAST_SIZE)
+        grown = grown + jnp.where(i < SETTLING, 0.0, jnp.log(size))
+        return jax.tree.map(lambda leaf: leaf / size, v), grown
+
+    # A start with a share in every direction.
+    start = jax.tree.map(lambda leaf: jnp.cos(1.0 + jnp.abs(leaf)), x)
+    _, grown = jax.lax.fori_loop(0, 2 * SETTLING, step, (start, jnp.zeros_like(jax.tree.leaves(x)[0])))
+    return jnp.exp(grown / SETTLING)
+
+
+def may_be_stiff(driven: Driven) -> bool:
+    """Whether the car has states of which it cannot be told by name that they are slow."""
+    return not set(driven.car.vehicle.state_type._fields) <= SLOW
+
+
+def at_start(driven: Driven, values: dict, times: np.ndarray) -> float:
+    """The fastest pole at the start, 1/s."""
+    dtype = jnp.result_type(jax.tree.leaves(eqx.filter(driven.car.vehicle, eqx.is_inexact_array))[0])
+    x = driven.start(jnp.asarray(times[0], dtype), dtype, **values)
+    # As many rows as are looked at later: one compilation serves both.
+    rows = len(looked_at(len(times)))
+    many = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (rows,)), x)
+    return float(fastest_poles(driven, jnp.full(rows, times[0], dtype), many)[0])
+
+
+@eqx.filter_jit
+def fastest_poles(driven: Driven, t: Any, x: Any) -> jax.Array:
+    """`fastest_pole` of each row: t (n,), the leaves of x (n,)."""
+    return jax.vmap(lambda t, x: fastest_pole(driven, t, x))(t, x)
+
+
+def looked_at(rows: int) -> np.ndarray:
+    """The rows of a simulation that are looked at, first and last included."""
+    return np.unique(np.linspace(0, rows - 1, min(LOOKS, rows)).round().astype(int))
+
+
+def worst(driven: Driven, times: np.ndarray, x: Any) -> tuple[float, float]:
+    """The fastest pole (1/s) over some rows of a simulation, and its time (s); rows that are not finite are left out."""
+    some = looked_at(len(times))
+    at = jax.tree.map(lambda leaf: leaf[some], x)
+    dtype = jax.tree.leaves(at)[0].dtype
+    found = np.asarray(fastest_poles(driven, jnp.asarray(times[some], dtype), at))
+    finite = np.all([np.isfinite(np.asarray(leaf)) for leaf in jax.tree.leaves(at)], axis=0) & np.isfinite(found)
+    if not finite.any():
+        return float("nan"), float(times[0])
+    row = int(np.argmax(np.where(finite, found, -np.inf)))
+    return float(found[row]), float(times[some][row])
+
+
+def explicit(max_step: float) -> Choice:
+    """RK4 with equal steps."""
+    return Choice(RK4(), None, max_step)
+
+
+def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> Choice:
+    """Kvaerno's stiff method of fifth order (2004) with steps of its own."""
+    return Choice(diffrax.Kvaerno5(), diffrax.PIDController(rtol=rtol, atol=atol, dtmax=0.05), max_step)
+
+
+def choose(pole: float, max_step: float) -> Choice:
+    """RK4 with steps that hold the fastest pole, or where they would be shorter than `LEAST_STEP` the implicit method."""
+    step = min(max_step, STABLE / pole) if np.isfinite(pole) and pole > 0 else max_step
+    return explicit(step) if step >= LEAST_STEP else implicit(max_step)

@@ -1,0 +1,338 @@
+"""What holds for every vehicle, each in turn: a new one is a line in `CARS` that says what it can do."""
+
+import dataclasses
+import functools
+import zlib
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import InputError, manoeuvres, statespace, tyres, vehicles
+from jaxveh._core.bijectors import Positive
+from jaxveh._core.names import record
+from jaxveh.roads import LEVEL, Ground
+from jaxveh.simulation import simulate
+
+SPEED = 15.0
+
+
+def brush():
+    return tyres.Brush(80000.0, 60000.0, 1.0)
+
+
+def geometry():
+    return dict(
+        mass=1500.0, yaw_inertia=2500.0, front_axle_to_cg=1.2, rear_axle_to_cg=1.4,
+        track_front=1.5, track_rear=1.52, cg_height=0.5,
+    )  # fmt: skip
+
+
+def seven(front=None, **more):
+    return vehicles.SevenDOF(
+        **geometry(), front=front or brush(), rear=brush(), drag=0.4, rolling_resistance=0.01, **more
+    )
+
+
+def shifted_mf():
+    """A tyre with ply-steer and conicity, which only a mirror image on the other side makes straight again."""
+    tyre = tyres.typical_mf_tyre(4000.0)
+    return eqx.tree_at(lambda t: (t.lateral.PHY1, t.lateral.PVY1), tyre, (jnp.asarray(0.003), jnp.asarray(0.02)))
+
+
+def relaxed(car):
+    return eqx.tree_at(lambda c: c.front, car, tyres.Relaxed(car.front, None, 0.4))
+
+
+class Car(NamedTuple):
+    """A vehicle and what it can do.
+
+    `told_speed`: its speed is an input, not a state. `lateral`: it turns. `friction`, `slope`: the road's friction and slopes
+    count. `heavy`: it takes long to compile, so that what is the same for every tyre is left to the others.
+    """
+
+    make: Callable[[], vehicles.AbstractVehicle]
+    told_speed: bool = False
+    lateral: bool = True
+    friction: bool = True
+    slope: bool = True
+    heavy: bool = False
+
+
+CARS = {
+    "SingleTrack": Car(vehicles.passenger_car, told_speed=True),
+    "SingleTrack, relaxed": Car(lambda: relaxed(vehicles.passenger_car()), told_speed=True),
+    "SevenDOF": Car(seven),
+    "SevenDOF, quasi-static": Car(lambda: seven(load_transfer=vehicles.QuasiStatic())),
+    "SevenDOF, four motors": Car(lambda: seven(drive=vehicles.FourMotors(), load_transfer=vehicles.StaticLoads())),
+    "SevenDOF, relaxed MF-Tyre": Car(lambda: seven(tyres.Relaxed(shifted_mf())), heavy=True),
+    "Travelling": Car(lambda: vehicles.Travelling(seven())),
+}  # fmt: skip
+
+LIGHT = [name for name, car in CARS.items() if not car.heavy]
+LATERAL = [name for name, car in CARS.items() if car.lateral]
+
+STEPS = {
+    "m/s": 0.3, "rad": 0.02, "rad/s": 0.1, "m": 0.01, "m/s^2": 0.5, "N": 100.0, "N m": 50.0, "rad/s^2": 0.1, "-": 0.01,
+}  # fmt: skip
+"""By how much states and inputs are stirred, by unit."""
+
+ODD = ("y", "v_y", "yaw", "yaw_rate", "yaw_acceleration", "a_y", "a_y_felt", "sideslip", "steer", "steering_wheel", "F_y", "M_z",
+       "M_x", "roll", "roll_rate", "roll_acceleration", "bank", "slip_angle", "steering_torque", "steer_rate", "F_yf", "F_yr",
+       "slip_angle_front", "slip_angle_rear", "hitch", "front_deflection_y", "rear_deflection_y", "camber")  # fmt: skip
+"""What changes sign in the mirror; what a wheel has for itself also changes sides. Tyre states of a wheel (`fl_<name>`) are
+kept in the frame of the wheel that is mirrored, so they only change sides."""
+
+
+@functools.cache
+def made(name):
+    return CARS[name].make()
+
+
+def inputs(car, dtype=float, **values):
+    return record("Inputs", {name: jnp.asarray(values.get(name, 0.0), dtype) for name in car.inputs})
+
+
+def start(name, speed=SPEED, dtype=float, car=None):
+    car = made(name) if car is None else car
+    u = inputs(car, dtype, v_x=speed, speed=speed)
+    known = {"v_x": speed, "speed": speed}
+    return car.start(jnp.zeros((), dtype), u, **{k: v for k, v in known.items() if k in car.state_type._fields}), u
+
+
+def stirred(name, seed=0, car=None):
+    """A state and inputs away from every symmetry, the same each time."""
+    car = made(name) if car is None else car
+    x, u = start(name, car=car)
+    rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
+    move = lambda values: type(values)(
+        *[v + rng.normal() * STEPS.get(car.units.get(n, "-"), 0.01) for n, v in values._asdict().items()]
+    )
+    return move(x), move(u)
+
+
+def swapped(name):
+    """The name on the other side of the car."""
+    sides = {"fl": "fr", "fr": "fl", "rl": "rr", "rr": "rl"}
+    parts = name.split("_")
+    if parts[-1] in sides:
+        return "_".join([*parts[:-1], sides[parts[-1]]])
+    return "_".join([sides[parts[0]], *parts[1:]]) if parts[0] in sides else name
+
+
+def in_mirror(values):
+    fields = values._asdict()
+
+    def of(name):
+        other = swapped(name)
+        stem = (
+            "_".join(name.split("_")[:-1])
+            if other != name and name.split("_")[0] not in ("fl", "fr", "rl", "rr")
+            else name
+        )
+        return -fields[other] if stem in ODD else fields[other]
+
+    return type(values)(*[of(name) for name in fields])
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_names_units_and_shapes(name):
+    car, (x, u) = made(name), stirred(name)
+    assert isinstance(car, vehicles.AbstractVehicle)
+    assert type(x) is car.state_type
+    rates, outputs = car.evaluate(0.0, x, u)
+    assert type(rates) is type(x)
+    for value in (*rates, *outputs):
+        assert value.shape == () and value.dtype == np.float64 and np.isfinite(value)
+    told = {
+        n
+        for n in (*car.state_type._fields, *car.inputs, *outputs._fields)
+        if n.split("_")[0] not in ("fl", "fr", "rl", "rr")
+    }
+    told -= {n for n in told if n.startswith(("front_", "rear_"))}
+    assert told <= set(car.units), told - set(car.units)
+    assert {"v_x", "v_y", "yaw", "yaw_rate", "a_x", "a_y"} <= set(outputs._fields)
+    moves = car.motion(x, u)
+    np.testing.assert_allclose([moves.v_x, moves.v_y, moves.yaw], [outputs.v_x, outputs.v_y, outputs.yaw], atol=1e-12)
+    again = car.derivatives(0.0, x, u), car.outputs(0.0, x, u)
+    assert jax.tree.all(jax.tree.map(lambda a, b: bool(jnp.all(a == b)), again, (rates, outputs)))
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_straight_running_stays_straight(name):
+    car, (x, u) = made(name), start(name)
+    rates, outputs = car.evaluate(0.0, x, u)
+    for field in ("v_y", "yaw", "yaw_rate", "roll", "roll_rate"):
+        assert abs(getattr(rates, field, 0.0)) < 1e-9, field
+    assert abs(outputs.a_y) < 1e-9
+
+
+@pytest.mark.parametrize("name", LATERAL)
+def test_a_mirror_turns_everything_round(name):
+    car, (x, u) = made(name), stirred(name)
+    ground = Ground(0.9, 0.8, 1.1, 0.7, 0.02, 0.03)
+    rates, outputs = car.evaluate(0.0, x, u, ground)
+    seen_rates, seen_outputs = car.evaluate(0.0, in_mirror(x), in_mirror(u), in_mirror(ground))
+    for got, expected in ((seen_rates, in_mirror(rates)), (seen_outputs, in_mirror(outputs))):
+        for field, value in got._asdict().items():
+            np.testing.assert_allclose(value, getattr(expected, field), rtol=1e-9, atol=1e-9, err_msg=field)
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_turning_and_moving_the_world_changes_nothing(name):
+    car, (x, u) = made(name), stirred(name)
+    shift = {field: by for field, by in (("yaw", 2.0), ("x", 50.0), ("y", -7.0)) if field in x._fields}
+    if not shift:
+        pytest.skip("it knows neither yaw nor place")
+    moved = x._replace(**{field: getattr(x, field) + by for field, by in shift.items()})
+    (rates, outputs), (other, seen) = car.evaluate(0.0, x, u), car.evaluate(0.0, moved, u)
+    for field, value in other._asdict().items():
+        if field not in ("x", "y"):
+            np.testing.assert_allclose(value, getattr(rates, field), rtol=1e-12, atol=1e-12, err_msg=field)
+    for field, value in seen._asdict().items():
+        expected = getattr(outputs, field) + shift.get(field, 0.0)
+        np.testing.assert_allclose(value, expected, rtol=1e-12, atol=1e-10, err_msg=field)
+    if "x" in x._fields:
+        turned = complex(rates.x, rates.y) * np.exp(2.0j)
+        np.testing.assert_allclose([other.x, other.y], [turned.real, turned.imag], rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", LIGHT)
+def test_standstill_is_an_ordinary_point(name):
+    """Nothing moves by itself, and the derivatives in every direction are finite."""
+    car, (x, u) = made(name), start(name, speed=0.0)
+    rates, outputs = car.evaluate(0.0, x, u)
+    assert np.all(np.isfinite(jax.tree.leaves((rates, outputs))))
+    np.testing.assert_allclose(jax.tree.leaves(rates), 0.0, atol=1e-9)
+    slopes = jax.jacfwd(lambda x, u: car.evaluate(0.0, x, u), argnums=(0, 1))(x, u)
+    assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(slopes))
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_reversing_and_crawling_are_finite(name):
+    car = made(name)
+    for speed in (-5.0, -0.01, 1e-6, 0.3):
+        x, u = start(name, speed)
+        assert np.all(np.isfinite(jax.tree.leaves(car.evaluate(0.0, x, u)))), speed
+
+
+@pytest.mark.parametrize("name", LIGHT)
+def test_gradients_equal_finite_differences(name):
+    """Of a sum of all rates and outputs, along a direction through state, inputs and every parameter, in both modes."""
+    (x, u), car = stirred(name), made(name)
+    weights = np.random.default_rng(1).normal(size=1000)
+
+    at = (car, x, u)
+    arrays, rest = eqx.partition(at, eqx.is_inexact_array)
+    rng = np.random.default_rng(2)
+    along = jax.tree.map(lambda leaf: jnp.asarray(rng.normal(size=leaf.shape) * 0.01 * (0.01 + jnp.abs(leaf))), arrays)
+
+    def on_line(s):
+        return _weighted(eqx.combine(jax.tree.map(lambda a, d: a + s * d, arrays, along), rest), weights, at)
+
+    step = 1e-4
+    expected = (on_line(step) - on_line(-step)) / (2 * step)
+    forward = jax.jvp(on_line, (jnp.zeros(()),), (jnp.ones(()),))[1]
+    gradient = jax.grad(lambda arrays: _weighted(eqx.combine(arrays, rest), weights, at))(arrays)
+    reverse = sum(jnp.vdot(g, d) for g, d in zip(jax.tree.leaves(gradient), jax.tree.leaves(along), strict=True))
+    np.testing.assert_allclose(forward, expected, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(reverse, forward, rtol=1e-8, atol=1e-10)
+
+
+def _weighted(at, weights, reference):
+    """The rates and outputs at a point, each in units of what it is at the reference."""
+    sizes = [1e-3 + abs(float(v)) for v in jax.tree.leaves(reference[0].evaluate(0.0, *reference[1:]))]
+    values = jax.tree.leaves(at[0].evaluate(0.0, *at[1:]))
+    return sum(w * v / size for w, v, size in zip(weights, values, sizes, strict=False))
+
+
+@pytest.mark.parametrize("name", LIGHT)
+def test_a_batch_and_vmap_equal_single_cars(name):
+    car = made(name)
+    points = [stirred(name, seed) for seed in range(3)]
+    batch = jax.tree.map(lambda *leaves: jnp.stack(leaves), *points)
+    singles = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[car.evaluate(0.0, *point) for point in points])
+    evaluate = lambda x, u: car.evaluate(0.0, x, u)
+    for got in (evaluate(*batch), jax.jit(jax.vmap(evaluate))(*batch)):
+        for a, b in zip(jax.tree.leaves(got), jax.tree.leaves(singles), strict=True):
+            np.testing.assert_allclose(np.broadcast_to(a, (3,)), b, rtol=1e-9, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", LIGHT)
+def test_float32_in_float32_out(name):
+    car, (x, u) = made(name), stirred(name)
+    single = statespace.cast(car, np.float32)
+    low = jax.tree.map(lambda leaf: jnp.asarray(leaf, np.float32), (x, u))
+    found = single.evaluate(jnp.zeros((), np.float32), *low)
+    assert {leaf.dtype for leaf in jax.tree.leaves(found)} == {np.dtype(np.float32)}
+    begun = single.start(jnp.zeros((), np.float32), low[1])
+    assert {leaf.dtype for leaf in jax.tree.leaves(begun)} == {np.dtype(np.float32)}
+    for (field, a), b in zip(found[1]._asdict().items(), car.evaluate(0.0, x, u)[1], strict=True):
+        np.testing.assert_allclose(a, b, rtol=2e-3, atol=2e-3 * (1 + float(jnp.abs(b))), err_msg=field)
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_the_ground_counts(name):
+    car, about = made(name), CARS[name]
+    x, u = stirred(name)
+    level = car.evaluate(0.0, x, u, LEVEL)
+    same = car.evaluate(0.0, x, u, Ground(*jnp.asarray([1.0, 1.0, 1.0, 1.0, 0.0, 0.0])))
+    for a, b in zip(jax.tree.leaves(level), jax.tree.leaves(same), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-9)
+    if about.friction and about.lateral:
+        slippery = car.evaluate(0.0, x, u, Ground(*[0.05] * 4))[1]
+        assert abs(slippery.a_y) < abs(level[1].a_y)
+    if about.slope and about.lateral:
+        rest, u = start(name, 0.0)
+        across = car.derivatives(0.0, rest, u, Ground(bank=jnp.asarray(0.1)))
+        assert across.v_y < -0.5, "the left side is higher: the car slides to the right"
+    if about.slope and not about.told_speed:
+        rest, u = start(name, 0.0)
+        uphill = car.derivatives(0.0, rest, u, Ground(grade=jnp.asarray(0.1)))
+        assert uphill.v_x < -0.5, "the car rolls back"
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_loads_carry_the_car(name):
+    outputs = made(name).evaluate(0.0, *start(name))[1]._asdict()
+    loads = [value for field, value in outputs.items() if field.startswith("load")]
+    if not loads:
+        pytest.skip("it has no loads")
+    weight = made_mass(name) * vehicles.GRAVITY
+    np.testing.assert_allclose(sum(loads), weight, rtol=1e-9)
+    assert all(load > 0 for load in loads)
+
+
+def made_mass(name):
+    car = made(name)
+    while hasattr(car, "vehicle"):
+        car = car.vehicle
+    return car.mass
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_parameters_outside_their_domain_raise_by_name(name):
+    car = made(name)
+    while hasattr(car, "vehicle"):
+        car = car.vehicle
+    fields = [f for f in dataclasses.fields(car) if isinstance(f.metadata.get("domain"), Positive)]
+    assert fields
+    for field in fields:
+        if getattr(car, field.name) is None:
+            continue
+        for bad in (0.0, -1.0, np.nan):
+            with pytest.raises(InputError, match=rf"{field.name} = .*must be positive"):
+                dataclasses.replace(car, **{field.name: bad})
+
+
+@pytest.mark.parametrize("name", [name for name in LATERAL if name in LIGHT])
+def test_a_drive_turns_to_the_side_of_the_steer(name):
+    drive = simulate(made(name), manoeuvres.step_steer(SPEED, 0.02, start=0.1, duration=1.0), dt=0.05)
+    assert drive["true.yaw"][-1] > 0.02
+    assert drive["true.y"][-1] > 0.1
+    assert drive["true.a_y"][-1] > 0.5
+    assert 13.0 < drive["true.x"][-1] < 15.5
