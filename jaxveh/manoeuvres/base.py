@@ -9,6 +9,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh.numerics import smooth_step
+
 
 class DriverInputs(NamedTuple):
     """`steer` (rad at the road wheels, positive to the left), `v_x` (m/s) and its rate `v_x_rate` (m/s^2)."""
@@ -26,12 +28,6 @@ class AbstractManoeuvre(eqx.Module):
     @abc.abstractmethod
     def inputs(self, t: Any) -> Any:
         """The inputs at time t (s, a scalar or an array): a NamedTuple of arrays in the shape of t."""
-
-
-def smooth_step(s: jax.Array) -> jax.Array:
-    """From 0 at s <= 0 to 1 at s >= 1, twice continuously differentiable: `10 s^3 - 15 s^4 + 6 s^5` between."""
-    s = jnp.clip(s, 0.0, 1.0)
-    return s * s * s * (10.0 - s * (15.0 - 6.0 * s))
 
 
 def window(t: jax.Array, start: float, end: float, edge: float) -> jax.Array:
