@@ -105,7 +105,9 @@ def test_derivatives_are_finite_and_continuous_as_stated(line, road):
             if order:
                 value = jax.jacfwd(value)
             ends = (-20.0, 150.0) if direction == 0 else (-2.0, 2.0)
-            jumps = [np.max(np.abs(np.diff(jax.jit(jax.vmap(value))(jnp.linspace(*ends, n)), axis=0))) for n in (2001, 8001)]
+            jumps = [
+                np.max(np.abs(np.diff(jax.jit(jax.vmap(value))(jnp.linspace(*ends, n)), axis=0))) for n in (2001, 8001)
+            ]
             assert np.isfinite(jumps).all()
             assert jumps[1] <= 0.35 * jumps[0] + 1e-12
 
