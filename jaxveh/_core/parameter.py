@@ -10,6 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 
 from jaxveh._core.bijectors import AbstractBijector, Positive, Real
 from jaxveh._core.errors import InputError, check_finite, check_positive, float_array
@@ -27,6 +28,16 @@ def parameter(unit: str = "-", domain: AbstractBijector | None = None, scale: fl
     domain = Real() if domain is None else domain
     metadata = {"unit": unit, "domain": domain, "scale": scale}
     return eqx.field(converter=float_array, metadata=metadata, **kwargs)
+
+
+def table(unit: str = "-", domain: AbstractBijector | None = None, scale: float | None = None, **kwargs):
+    """Declare a parameter that may be given as a list of numbers, too."""
+    metadata = {"unit": unit, "domain": Real() if domain is None else domain, "scale": scale}
+    return eqx.field(converter=_table_array, metadata=metadata, **kwargs)
+
+
+def _table_array(value):
+    return float_array(np.asarray(value, float) if isinstance(value, list | tuple) else value)
 
 
 def positive(unit: str = "-", **kwargs):

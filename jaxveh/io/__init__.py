@@ -1,5 +1,5 @@
-"""Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, the file that describes a car, tyre property
-files, and tables of tyre test rigs (CSV, TYDEX).
+"""Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, the files that describe a car and a road, tyre
+property files, and tables of tyre test rigs (CSV, TYDEX).
 
 pandas, pyarrow, asammdf and pint are the extra `io`, imported where they are used.
 """
@@ -13,6 +13,7 @@ from jaxveh.io.merge import resample
 from jaxveh.io.property_file import PropertyFile, read_property_file, write_property_file
 from jaxveh.io.recordings import SUFFIXES, read_recording, with_units_in_names, write_recording
 from jaxveh.io.rig_table import RigTable, read_rig_table
+from jaxveh.io.road import RoadSpecification, read_road, write_road
 from jaxveh.io.tydex import TydexFile, read_tydex
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "ChannelMap",
     "PropertyFile",
     "RigTable",
+    "RoadSpecification",
     "TydexFile",
     "canonical_unit",
     "check_readable",
@@ -33,6 +35,7 @@ __all__ = [
     "read_property_file",
     "read_recording",
     "read_rig_table",
+    "read_road",
     "read_tydex",
     "replacing",
     "resample",
@@ -42,5 +45,6 @@ __all__ = [
     "write_frame",
     "write_property_file",
     "write_recording",
+    "write_road",
     "write_text",
 ]

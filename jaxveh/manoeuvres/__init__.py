@@ -1,7 +1,35 @@
-"""What the driver does over time: open-loop steering inputs with smooth edges, and the replay of a recording."""
+"""What the driver does over time: open-loop inputs with smooth edges, drivers who see the car, replays of recordings."""
 
-from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, smooth_step
+from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, PedalInputs
+from jaxveh.manoeuvres.braking import Braking, braking_in_a_turn, mu_jump_braking
+from jaxveh.manoeuvres.cones import (
+    Course,
+    Lane,
+    centre_line,
+    clearance,
+    cones,
+    iso_3888_1,
+    iso_3888_2,
+    passes,
+)
+from jaxveh.manoeuvres.courses import iso_lane_change, iso_obstacle_avoidance, slalom_course, steady_circle
+from jaxveh.manoeuvres.cruise import Cruise, cruise
+from jaxveh.manoeuvres.driver import AbstractDriver, Motion, OpenLoop, as_driver
+from jaxveh.manoeuvres.named import MANOEUVRES, NamedManoeuvre, named_manoeuvre
+from jaxveh.manoeuvres.path_driver import PathDriver
+from jaxveh.manoeuvres.paths import AbstractGraph, AbstractPath, Beside, Circle, LaneChanges, Sine, Straight, Target
+from jaxveh.manoeuvres.random_steering import RandomSteering, random_steering
 from jaxveh.manoeuvres.replayed import Replay, replay
+from jaxveh.manoeuvres.speed_control import SpeedControl
+from jaxveh.manoeuvres.speeds import AbstractSpeed, ChangingSpeed, SteadySpeed, WaveringSpeed, wavering_speed
+from jaxveh.manoeuvres.standard_steering import (
+    RampSteer,
+    SineWithDwell,
+    Slalom,
+    ramp_steer,
+    sine_with_dwell,
+    slalom,
+)
 from jaxveh.manoeuvres.steering import (
     DoubleLaneChange,
     StepSteer,
@@ -10,17 +38,17 @@ from jaxveh.manoeuvres.steering import (
     step_steer,
     swept_sine,
 )
+from jaxveh.numerics import smooth_step
 
 __all__ = [
-    "AbstractManoeuvre",
-    "DoubleLaneChange",
-    "DriverInputs",
-    "Replay",
-    "StepSteer",
-    "SweptSine",
-    "double_lane_change",
-    "replay",
-    "smooth_step",
-    "step_steer",
-    "swept_sine",
-]
+    "MANOEUVRES",
+    "AbstractDriver", "AbstractGraph", "AbstractManoeuvre", "AbstractPath", "AbstractSpeed", "Beside", "Braking",
+    "ChangingSpeed", "Circle", "Course", "Cruise", "DoubleLaneChange", "DriverInputs", "Lane", "LaneChanges",
+    "Motion", "NamedManoeuvre", "OpenLoop", "PathDriver", "PedalInputs", "RampSteer", "RandomSteering", "Replay",
+    "Sine", "SineWithDwell", "Slalom", "SpeedControl", "SteadySpeed", "StepSteer", "Straight", "SweptSine", "Target",
+    "WaveringSpeed",
+    "as_driver", "braking_in_a_turn", "centre_line", "clearance", "cones", "cruise", "double_lane_change",
+    "iso_3888_1", "iso_3888_2", "iso_lane_change", "iso_obstacle_avoidance", "mu_jump_braking", "named_manoeuvre",
+    "passes", "ramp_steer", "random_steering", "replay", "sine_with_dwell", "slalom", "slalom_course", "smooth_step",
+    "steady_circle", "step_steer", "swept_sine", "wavering_speed",
+]  # fmt: skip

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import abc
+import math
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError, check, check_at_least, check_finite, check_positive
+from jaxveh.numerics import smooth_step
 
 
 class DriverInputs(NamedTuple):
@@ -16,6 +20,19 @@ class DriverInputs(NamedTuple):
     steer: Any
     v_x: Any
     v_x_rate: Any
+
+
+class PedalInputs(NamedTuple):
+    """`DriverInputs` of a driver who works the pedals, too.
+
+    `drive_torque` and `brake_torque` (N m, never negative): totals at the wheels.
+    """
+
+    steer: Any
+    v_x: Any
+    v_x_rate: Any
+    drive_torque: Any
+    brake_torque: Any
 
 
 class AbstractManoeuvre(eqx.Module):
@@ -28,12 +45,6 @@ class AbstractManoeuvre(eqx.Module):
         """The inputs at time t (s, a scalar or an array): a NamedTuple of arrays in the shape of t."""
 
 
-def smooth_step(s: jax.Array) -> jax.Array:
-    """From 0 at s <= 0 to 1 at s >= 1, twice continuously differentiable: `10 s^3 - 15 s^4 + 6 s^5` between."""
-    s = jnp.clip(s, 0.0, 1.0)
-    return s * s * s * (10.0 - s * (15.0 - 6.0 * s))
-
-
 def window(t: jax.Array, start: float, end: float, edge: float) -> jax.Array:
     """1 between `start` and `end` but for smooth edges of length `edge` inside them, 0 outside."""
     return smooth_step((t - start) / edge) * smooth_step((end - t) / edge)
@@ -43,3 +54,18 @@ def constant_speed(steer: jax.Array, speed: jax.Array) -> DriverInputs:
     """Steering at a constant speed."""
     v_x = jnp.broadcast_to(speed, jnp.shape(steer)).astype(steer.dtype)
     return DriverInputs(steer=steer, v_x=v_x, v_x_rate=jnp.zeros_like(steer))
+
+
+def check_drive(speed, duration, steer=0.0) -> None:
+    """Raise `InputError` unless speed, duration and steer are those of a drive."""
+    check_finite("speed", speed)
+    check_at_least("speed", speed, 0.0)
+    check("steer", steer, lambda v: abs(v) < math.pi / 2, "within a quarter turn", "It is in rad, not degrees.")
+    check_positive("duration", duration, "s")
+    if eqx.is_array(duration):
+        raise InputError("duration is an array: it must be a Python number, because it sets how many rows there are.")
+
+
+def as_time(t: Any, like: jax.Array) -> jax.Array:
+    """The time as an array of a parameter's type."""
+    return jnp.asarray(t, jnp.result_type(like))

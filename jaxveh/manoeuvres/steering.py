@@ -10,9 +10,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check, check_at_least, check_finite, check_positive
+from jaxveh._core.errors import check, check_at_least, check_positive
 from jaxveh._core.parameter import parameter
-from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, constant_speed, smooth_step, window
+from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, as_time, check_drive, constant_speed, window
+from jaxveh.numerics import smooth_step
 
 
 class DoubleLaneChange(AbstractManoeuvre):
@@ -29,7 +30,7 @@ class DoubleLaneChange(AbstractManoeuvre):
     steer: jax.Array = parameter("rad", scale=0.1)
 
     def inputs(self, t: Any) -> DriverInputs:
-        t = _time(t, self.steer)
+        t = as_time(t, self.steer)
         back = self.start + self.period + self.pause
         return constant_speed(self.steer * (self._change(t, self.start) - self._change(t, back)), self.speed)
 
@@ -50,7 +51,7 @@ class StepSteer(AbstractManoeuvre):
     steer: jax.Array = parameter("rad", scale=0.1)
 
     def inputs(self, t: Any) -> DriverInputs:
-        t = _time(t, self.steer)
+        t = as_time(t, self.steer)
         return constant_speed(self.steer * smooth_step((t - self.start) / self.ramp), self.speed)
 
 
@@ -65,7 +66,7 @@ class SweptSine(AbstractManoeuvre):
     steer: jax.Array = parameter("rad", scale=0.1)
 
     def inputs(self, t: Any) -> DriverInputs:
-        t = _time(t, self.steer)
+        t = as_time(t, self.steer)
         rise = (self.to_frequency - self.from_frequency) / (2 * self.duration)
         turns = t * (self.from_frequency + rise * t)
         wave = numerics.sin((2 * math.pi) * turns) * window(t, 0.0, self.duration, self.edge)
@@ -83,7 +84,7 @@ def double_lane_change(
 
     **Raises** `InputError` for values out of range, or where the two periods do not fit into the duration.
     """
-    _check(speed, steer, duration)
+    check_drive(speed, duration, steer)
     check_at_least("start", start, 0.0)
     check_at_least("pause", pause, 0.0)
     check_positive("period", period, "s")
@@ -104,7 +105,7 @@ def step_steer(speed, steer, *, ramp: float = 0.2, start: float = 1.0, duration:
 
     **Raises** `InputError` for values out of range, or where the ramp does not end within the duration.
     """
-    _check(speed, steer, duration)
+    check_drive(speed, duration, steer)
     check_at_least("start", start, 0.0)
     check_positive("ramp", ramp, "s", "A step without a ramp has no derivative; 0.01 s is a sharp one.")
     check("duration", duration, lambda d: d >= start + ramp, f"at least start + ramp = {start + ramp:g} s")
@@ -126,7 +127,7 @@ def swept_sine(
 
     **Raises** `InputError` for values out of range, or edges that fill more than the duration.
     """
-    _check(speed, steer, duration)
+    check_drive(speed, duration, steer)
     check_positive("from_frequency", from_frequency, "Hz")
     check_positive("to_frequency", to_frequency, "Hz")
     check_positive("edge", edge, "s")
@@ -139,16 +140,3 @@ def swept_sine(
         to_frequency=float(to_frequency),
         edge=float(edge),
     )
-
-
-def _check(speed, steer, duration):
-    check_finite("speed", speed)
-    check_at_least("speed", speed, 0.0)
-    check("steer", steer, lambda v: abs(v) < math.pi / 2, "within a quarter turn", "It is in rad, not degrees.")
-    check_positive("duration", duration, "s")
-    if eqx.is_array(duration):
-        raise InputError("duration is an array: it must be a Python number, because it sets how many rows there are.")
-
-
-def _time(t, like):
-    return jnp.asarray(t, jnp.result_type(like))

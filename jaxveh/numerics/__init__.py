@@ -5,6 +5,7 @@ All are safe to jit, batch and differentiate.
 
 from jaxveh.numerics.blocks import sum_in_blocks
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
+from jaxveh.numerics.harmonics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
 from jaxveh.numerics.linear_algebra import (
     cholesky,
     inverse_psd,
@@ -19,11 +20,14 @@ from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu, stored
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 from jaxveh.numerics.roots import secant
+from jaxveh.numerics.smooth import smooth_bump, smooth_clip, smooth_ramp, smooth_step
 from jaxveh.numerics.sums import total
+from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
 
 __all__ = [
     "arctan",
     "arctan2",
+    "band_harmonics",
     "barrier",
     "barriers_hold",
     "cauchy",
@@ -31,7 +35,10 @@ __all__ = [
     "cos",
     "ess",
     "exponential",
+    "gauss_markov_harmonics",
     "hypot",
+    "interpolate_linear",
+    "interpolate_smooth",
     "inverse_psd",
     "log",
     "log_det",
@@ -44,6 +51,10 @@ __all__ = [
     "residual",
     "secant",
     "sin",
+    "smooth_bump",
+    "smooth_clip",
+    "smooth_ramp",
+    "smooth_step",
     "solve_lower",
     "solve_lower_transposed",
     "solve_psd",
@@ -52,6 +63,7 @@ __all__ = [
     "stratified",
     "student_t",
     "sum_in_blocks",
+    "sum_of_harmonics",
     "symmetric",
     "systematic",
     "tan",

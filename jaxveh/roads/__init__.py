@@ -1,5 +1,34 @@
-"""The road along the way: friction, grade and bank."""
+"""Friction, grade and bank along the way: a place on the road goes in, its surface comes out."""
 
-from jaxveh.roads.ground import LEVEL, Ground
+from jaxveh.roads.base import AbstractRoad, Surface
+from jaxveh.roads.combined import Combined
+from jaxveh.roads.friction import Level, MuJump, SplitMu
+from jaxveh.roads.ground import LEVEL, Ground, under
+from jaxveh.roads.named import ROADS, NamedRoad, from_specification, named_road
+from jaxveh.roads.profile import INTERPOLATIONS, Profile
+from jaxveh.roads.random_road import RandomRoad, Variation, band, gauss_markov
+from jaxveh.roads.slopes import Banked, Hill
 
-__all__ = ["LEVEL", "Ground"]
+__all__ = [
+    "INTERPOLATIONS",
+    "LEVEL",
+    "ROADS",
+    "AbstractRoad",
+    "Banked",
+    "Combined",
+    "Ground",
+    "Hill",
+    "Level",
+    "MuJump",
+    "NamedRoad",
+    "Profile",
+    "RandomRoad",
+    "SplitMu",
+    "Surface",
+    "Variation",
+    "band",
+    "from_specification",
+    "gauss_markov",
+    "named_road",
+    "under",
+]

@@ -1,17 +1,24 @@
-"""What the wheels of one car stand on at one instant."""
+"""What a car's wheels stand on: a road seen from the car."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
+from jaxveh.roads.base import AbstractRoad
 
 
 class Ground(NamedTuple):
-    """The road under a car, in the car's own directions.
+    """What a car's wheels stand on, in the car's own directions.
 
-    - `friction_fl`, `friction_fr`, `friction_rl`, `friction_rr` (-): under each wheel, over that of the road on which the
-      tyres' parameters hold.
-    - `grade` (rad): uphill, in the direction in which the car points, is positive.
-    - `bank` (rad): positive where the car's left side is higher. The tangents of both are the slopes of the road's plane.
+    - `friction_fl`, `friction_fr`, `friction_rl`, `friction_rr` (-): over that of the road on which the tyres'
+      parameters hold; front left, front right, rear left, rear right.
+    - `grade` (rad): positive uphill in the direction in which the car points.
+    - `bank` (rad): positive where the car's left side is higher.
     """
 
     friction_fl: Any = 1.0
@@ -23,4 +30,29 @@ class Ground(NamedTuple):
 
 
 LEVEL = Ground()
-"""A level road of the friction at which the tyres were measured."""
+"""A level road with the friction of the one on which the tyres' parameters hold."""
+
+
+def under(road: AbstractRoad, x: Any, y: Any, yaw: Any, wheels: Sequence[tuple[Any, Any]]) -> Ground:
+    """The ground under a car at the world's `x`, `y` (m) that points along `yaw` (rad, left of the road's direction).
+
+    `wheels`: the wheels' positions in the body, (forward, left) of the centre of gravity in m, in the order front left,
+    front right, rear left, rear right. Friction is looked up under each wheel, slopes under the centre of gravity:
+
+        tan(grade_car) =  tan(grade) cos(yaw) + tan(bank) sin(yaw)
+        tan(bank_car)  = -tan(grade) sin(yaw) + tan(bank) cos(yaw)
+
+    Elementwise in x, y and yaw. **Raises** `InputError` unless there are four wheels.
+    """
+    if len(wheels) != 4:
+        raise InputError(f"wheels: {len(wheels)} positions; there must be 4 (front left, front right, rear left, ...).")
+    cosine, sine = numerics.cos(yaw), numerics.sin(yaw)
+    friction = [
+        road.at(x + forward * cosine - left * sine, y + forward * sine + left * cosine).friction
+        for forward, left in wheels
+    ]
+    here = road.at(x, y)
+    along, across = numerics.tan(here.grade), numerics.tan(here.bank)
+    grade = numerics.arctan(along * cosine + across * sine)
+    bank = numerics.arctan(across * cosine - along * sine)
+    return Ground(*jnp.broadcast_arrays(*friction, grade, bank))

@@ -1,0 +1,172 @@
+"""Lane changes between cones: the lanes of ISO 3888, where the cones stand, and whether a car hits them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_finite, check_positive
+from jaxveh.manoeuvres.paths import LaneChanges
+
+CONE_DIAMETER = 0.3
+"""Diameter of a cone's base, m: ours."""
+
+
+class Lane(NamedTuple):
+    """A straight lane between cones, from `start` to `end` (m along x), between `right` and `left` (m along y)."""
+
+    start: float
+    end: float
+    right: float
+    left: float
+
+    @property
+    def centre(self) -> float:
+        """Its centre line, m along y."""
+        return (self.left + self.right) / 2
+
+
+class Course(NamedTuple):
+    """The lanes of a test in their order, each of which limits the car; between them nothing does."""
+
+    name: str
+    lanes: tuple[Lane, ...]
+
+
+def iso_3888_1(width: float, start: float = 30.0) -> Course:
+    """The double lane change of ISO 3888-1 for a car of a `width` (m, without mirrors), from `start` (m) on.
+
+    Sections of 15, 30, 25, 25, 15 and 15 m, 125 m in all (the last two are one lane). Lane widths 1.1 w + 0.25, 1.2 w +
+    0.25 and 1.3 w + 0.25 m. The second lane's right limit lies 3.5 m left of the first's; the third's is in line with
+    the first's. y = 0 is the first lane's centre line. Figures: ISO 3888-1:2018, figure 1 and table 1, from secondary
+    sources that agree.
+
+    **Raises** `InputError` for a width that is not positive.
+    """
+    _check(width, start)
+    first, second, third = 1.1 * width + 0.25, 1.2 * width + 0.25, 1.3 * width + 0.25
+    right = -first / 2
+    lanes = (
+        Lane(start, start + 15.0, right, right + first),
+        Lane(start + 45.0, start + 70.0, right + 3.5, right + 3.5 + second),
+        Lane(start + 95.0, start + 125.0, right, right + third),
+    )
+    return Course("ISO 3888-1", lanes)
+
+
+def iso_3888_2(width: float, start: float = 30.0) -> Course:
+    """The obstacle avoidance of ISO 3888-2 for a car of a `width` (m, without mirrors), from `start` (m) on.
+
+    Sections of 12, 13.5, 11, 12.5 and 12 m, 61 m in all. Lane widths 1.1 w + 0.25, w + 1 and 1.3 w + 0.25 m, the last at
+    least 3 m. The second lane's right limit lies 1 m left of the first's left limit; the third's left limit is in line
+    with the first's. y = 0 is the first lane's centre line. Figures: ISO 3888-2:2011, figure 1 and table 1, from
+    secondary sources that agree.
+
+    **Raises** `InputError` for a width that is not positive.
+    """
+    _check(width, start)
+    first, second, third = 1.1 * width + 0.25, width + 1.0, max(1.3 * width + 0.25, 3.0)
+    left = first / 2
+    lanes = (
+        Lane(start, start + 12.0, -left, left),
+        Lane(start + 25.5, start + 36.5, left + 1.0, left + 1.0 + second),
+        Lane(start + 49.0, start + 61.0, left - third, left),
+    )
+    return Course("ISO 3888-2", lanes)
+
+
+def centre_line(course: Course, lead: float) -> LaneChanges:
+    """A smooth path through the middle of a course of three lanes that starts along x.
+
+    `lead` (m): each lane is left that far before its end and met that far after its start, which makes the turns wider.
+
+    **Raises** `InputError` for a course of other than three lanes, or a lead that does not fit into the lanes.
+    """
+    if len(course.lanes) != 3:
+        raise InputError(f"course = {course.name}: {len(course.lanes)} lanes; there must be 3.")
+    first, second, third = course.lanes
+    if not 0 <= 2 * lead <= second.end - second.start:
+        raise InputError(
+            f"lead = {lead}: must be between 0 and half the second lane, {(second.end - second.start) / 2} m."
+        )
+    return LaneChanges(
+        over=second.centre - first.centre,
+        back=third.centre - second.centre,
+        over_from=first.end - lead,
+        over_to=second.start + lead,
+        back_from=second.end - lead,
+        back_to=third.start + lead,
+    )
+
+
+def cones(course: Course, spacing: float = 3.0, diameter: float = CONE_DIAMETER) -> np.ndarray:
+    """Centres of the cones, (n, 2) of x and y in m: along both limits of each lane, its ends included.
+
+    The limits touch the cones' bases (of a `diameter`, m) from inside, as in ISO 3888. They stand evenly, at most `spacing`
+    (m) apart: that is ours.
+
+    **Raises** `InputError` for a spacing or diameter that is not positive.
+    """
+    check_positive("spacing", spacing, "m")
+    check_positive("diameter", diameter, "m")
+    places = []
+    for lane in course.lanes:
+        count = math.ceil((lane.end - lane.start) / spacing) + 1
+        for side in (lane.right - diameter / 2, lane.left + diameter / 2):
+            places += [(x, side) for x in np.linspace(lane.start, lane.end, count)]
+    return np.array(places)
+
+
+def clearance(x: Any, y: Any, yaw: Any, width: Any, length: Any, course: Course, centre: Any = 0.0) -> jax.Array:
+    """The least distance, m along y, of a driven body's outline to the limits of the lanes; negative is a hit.
+
+    `x`, `y` (m), `yaw` (rad): (T,), the centre of gravity and heading at the rows of a drive. `width`, `length` (m) of
+    the body, a rectangle whose middle is `centre` (m) ahead of the centre of gravity. Minus infinity where the drive does
+    not go through the whole course. Between rows nothing is seen: 0.01 s at 100 km/h is 0.3 m.
+
+    **Raises** `InputError` for a size that is not positive.
+    """
+    check_positive("width", width, "m")
+    check_positive("length", length, "m")
+    x, y, yaw = jnp.asarray(x), jnp.asarray(y), jnp.asarray(yaw)
+    corners = _corners(x, y, yaw, width, length, centre)
+    margins = [jnp.min(_margin(corners, lane)) for lane in course.lanes]
+    whole = (jnp.min(x) <= course.lanes[0].start) & (jnp.max(x) >= course.lanes[-1].end)
+    return jnp.where(whole, jnp.min(jnp.stack(margins)), -jnp.inf)
+
+
+def passes(x: Any, y: Any, yaw: Any, width: Any, length: Any, course: Course, centre: Any = 0.0) -> jax.Array:
+    """Whether a driven body goes through the whole course without a hit; arguments are those of `clearance`."""
+    return clearance(x, y, yaw, width, length, course, centre) >= 0
+
+
+def _corners(x, y, yaw, width, length, centre):
+    """The outline's corners in their order, (x, y) each."""
+    cosine, sine = jnp.cos(yaw), jnp.sin(yaw)
+    places = [(f * length / 2 + centre, s * width / 2) for f, s in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+    return [(x + ahead * cosine - left * sine, y + ahead * sine + left * cosine) for ahead, left in places]
+
+
+def _margin(corners, lane: Lane):
+    """The least distance to the lane's limits of the outline within it: of corners there, and where sides enter or leave."""
+    margins = []
+    for (x, y), (x_next, y_next) in zip(corners, corners[1:] + corners[:1], strict=True):
+        margins.append(_within(y, lane, (x >= lane.start) & (x <= lane.end)))
+        for limit in (lane.start, lane.end):
+            crosses = (x - limit) * (x_next - limit) < 0
+            share = (limit - x) / jnp.where(crosses, x_next - x, 1.0)
+            margins.append(_within(y + share * (y_next - y), lane, crosses))
+    return jnp.min(jnp.stack(margins), axis=0)
+
+
+def _within(y, lane: Lane, counts):
+    return jnp.where(counts, jnp.minimum(lane.left - y, y - lane.right), jnp.inf)
+
+
+def _check(width, start) -> None:
+    check_positive("width", width, "m")
+    check_finite("start", start)

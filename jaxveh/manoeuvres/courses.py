@@ -1,0 +1,93 @@
+"""Closed-loop manoeuvres: a path, a speed, and a driver who follows them."""
+
+from __future__ import annotations
+
+import math
+
+from jaxveh._core.errors import InputError, check_finite, check_positive, is_concrete
+from jaxveh.manoeuvres.base import check_drive
+from jaxveh.manoeuvres.cones import centre_line, iso_3888_1, iso_3888_2
+from jaxveh.manoeuvres.path_driver import PathDriver
+from jaxveh.manoeuvres.paths import Circle, Sine
+from jaxveh.manoeuvres.speeds import ChangingSpeed, SteadySpeed
+
+
+def iso_lane_change(
+    speed=80 / 3.6,
+    width: float = 1.8,
+    *,
+    start: float = 30.0,
+    lead: float = 5.0,
+    duration: float | None = None,
+    **driver,
+) -> PathDriver:
+    """The double lane change of ISO 3888-1 in closed loop at `speed` (m/s) with a car of a `width` (m).
+
+    The course is `iso_3888_1(width, start)`; the car starts in the origin along x. `lead` (m): see `centre_line`.
+    `duration` (s): by default until 15 m behind the course. `driver`: parameters of the `PathDriver` by name.
+
+    **Raises** `InputError` for values out of range.
+    """
+    path = centre_line(iso_3888_1(width, start), lead)
+    return _driver(path, speed, start + 140.0, duration, driver)
+
+
+def iso_obstacle_avoidance(
+    speed=50 / 3.6,
+    width: float = 1.8,
+    *,
+    start: float = 30.0,
+    lead: float = 2.0,
+    duration: float | None = None,
+    **driver,
+) -> PathDriver:
+    """The obstacle avoidance of ISO 3888-2 in closed loop at `speed` (m/s) with a car of a `width` (m).
+
+    The course is `iso_3888_2(width, start)`; otherwise as `iso_lane_change`, with a preview of 0.5 s unless told.
+    """
+    path = centre_line(iso_3888_2(width, start), lead)
+    return _driver(path, speed, start + 76.0, duration, {"preview_time": 0.5, **driver})
+
+
+def slalom_course(
+    speed, amplitude=1.5, *, spacing=18.0, count: int = 6, start: float = 30.0, duration: float | None = None, **driver
+) -> PathDriver:
+    """A slalom in closed loop at `speed` (m/s): a sine path of an `amplitude` (m) that passes cones on alternating sides.
+
+    `count` cones stand `spacing` (m) apart; otherwise as `iso_lane_change`.
+    """
+    check_positive("spacing", spacing, "m")
+    if count < 2:
+        raise InputError(f"count = {count}: must be at least 2 cones.")
+    path = Sine(amplitude, 2.0 * spacing, start, count / 2)
+    return _driver(path, speed, start + (count + 1) * spacing, duration, driver)
+
+
+def steady_circle(
+    radius=40.0, from_speed=5.0, to_speed=20.0, *, time: float = 60.0, start: float = 2.0, duration: float | None = None,
+    **driver,
+) -> PathDriver:  # fmt: skip
+    """A circle of a `radius` (m, negative to the right) at a speed that rises slowly (ISO 4138, constant radius).
+
+    The speed rises from `from_speed` to `to_speed` (m/s) within `time` (s) from `start` (s) on. `duration` (s): by
+    default until 2 s after. The car starts in the origin along x. `driver`: parameters of the `PathDriver` by name.
+
+    **Raises** `InputError` for values out of range.
+    """
+    duration = start + time + 2.0 if duration is None else duration
+    check_drive(from_speed, duration)
+    check_drive(to_speed, duration)
+    return PathDriver(
+        Circle(radius), ChangingSpeed(from_speed, to_speed, float(start), float(time)), float(duration), **driver
+    )
+
+
+def _driver(path, speed, length: float, duration: float | None, driver: dict) -> PathDriver:
+    if duration is None:
+        if not is_concrete(speed):
+            raise InputError("duration = None: a traced speed does not say how long the drive is; give it in s.")
+        check_finite("speed", speed)
+        check_positive("speed", speed, "m/s")
+        duration = math.ceil(100 * length / float(speed)) / 100
+    check_drive(speed, duration)
+    return PathDriver(path, SteadySpeed(speed), float(duration), **driver)

@@ -1,0 +1,65 @@
+"""Straight on with a wavering speed and a restless foot: what shows mass and grade."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import check, check_at_least, check_positive
+from jaxveh._core.parameter import parameter
+from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs, as_time, check_drive
+from jaxveh.manoeuvres.speeds import AbstractSpeed, SteadySpeed, wavering_speed
+from jaxveh.numerics import gauss_markov_harmonics, smooth_ramp, sum_of_harmonics
+
+
+class Cruise(AbstractManoeuvre):
+    """Straight on at a given speed over time, with coloured noise on the pedals.
+
+    The pedals carry the noise alone, drive where it is positive and brake where it is negative (within a tenth of its
+    spread about zero both, their difference being the noise): what holds the speed is `SpeedControl`, which adds them.
+    """
+
+    speed: AbstractSpeed
+    duration: float = eqx.field(static=True)
+    pedal_noise: jax.Array = parameter("N m", scale=100.0)
+    frequencies: jax.Array = parameter("Hz", scale=1.0)
+    phases: jax.Array = parameter("rad", scale=1.0)
+
+    def inputs(self, t: Any) -> PedalInputs:
+        t = as_time(t, self.pedal_noise)
+        v_x, v_x_rate = self.speed.at(t)
+        noise = sum_of_harmonics(t, self.frequencies, self.phases)
+        return PedalInputs(
+            steer=jnp.zeros_like(t),
+            v_x=v_x,
+            v_x_rate=v_x_rate,
+            drive_torque=self.pedal_noise * smooth_ramp(noise, 0.1),
+            brake_torque=self.pedal_noise * smooth_ramp(-noise, 0.1),
+        )
+
+
+def cruise(
+    speed, key: jax.Array, *, speed_std=2.0, speed_time: float = 10.0, pedal_noise=50.0, pedal_time: float = 2.0,
+    count: int = 40, duration: float = 120.0,
+) -> Cruise:  # fmt: skip
+    """Straight on about `speed` (m/s) for estimating mass and grade; `key` draws speed and pedals.
+
+    `speed_std` (m/s): spread of the wanted speed, of the correlation time `speed_time` (s); zero holds it.
+    `pedal_noise` (N m, total at the wheels): spread of the coloured noise on the pedals, of the correlation time
+    `pedal_time` (s), nothing in it faster than four swings a second.
+
+    **Raises** `InputError` for values out of range.
+    """
+    check_drive(speed, duration)
+    check_at_least("speed_std", speed_std, 0.0)
+    check_at_least("pedal_noise", pedal_noise, 0.0)
+    check_positive("speed_time", speed_time, "s")
+    check_positive("pedal_time", pedal_time, "s")
+    check("count", count, lambda v: v >= 1, "at least 1")
+    wander, foot = jax.random.split(key)
+    held = not eqx.is_array(speed_std) and speed_std == 0
+    wanted = SteadySpeed(speed) if held else wavering_speed(speed, speed_std, wander, time=speed_time, count=count)
+    return Cruise(wanted, float(duration), pedal_noise, *gauss_markov_harmonics(foot, pedal_time, 4.0, count))

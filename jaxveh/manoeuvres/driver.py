@@ -1,0 +1,92 @@
+"""The contract of a driver who sees the car, and the driver who does not look."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import record_type
+from jaxveh.manoeuvres.base import AbstractManoeuvre
+
+
+class Motion(NamedTuple):
+    """How a car moves at one instant, at its centre of gravity.
+
+    `x`, `y` (m): position in the world. `yaw` (rad, unwrapped): of the car's x axis, left of the world's. `v_x`, `v_y`
+    (m/s): speeds forward and to the left, in the car's axes. `yaw_rate` (rad/s).
+    """
+
+    x: Any
+    y: Any
+    yaw: Any
+    v_x: Any
+    v_y: Any
+    yaw_rate: Any
+
+
+class AbstractDriver(eqx.Module):
+    """A driver who sees the car: from the time, the car's motion and his own state to the car's inputs.
+
+    Array leaves are parameters. States (reaction lag, integrals) are scalars of a NamedTuple whose fields are
+    `state_names`; a simulation carries them beside the car's. Elementwise, from t = 0 to `duration` (s).
+    """
+
+    duration: eqx.AbstractVar[float]
+
+    @property
+    @abc.abstractmethod
+    def state_names(self) -> tuple[str, ...]:
+        """The fields of the state."""
+
+    @abc.abstractmethod
+    def start(self, t: Any, motion: Motion) -> Any:
+        """The state that has settled at a motion."""
+
+    @abc.abstractmethod
+    def inputs(self, t: Any, motion: Motion, state: Any) -> Any:
+        """The car's inputs, a NamedTuple of arrays."""
+
+    @abc.abstractmethod
+    def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
+        """The state's time derivative, the same NamedTuple."""
+
+
+class OpenLoop(AbstractDriver):
+    """The driver who does a manoeuvre with his eyes closed: `inputs(t)`, no states.
+
+    **Raises** `InputError` for what is no manoeuvre.
+    """
+
+    manoeuvre: AbstractManoeuvre
+    duration: float = eqx.field(static=True)
+
+    def __init__(self, manoeuvre: AbstractManoeuvre):
+        if not isinstance(manoeuvre, AbstractManoeuvre):
+            raise InputError(f"OpenLoop.manoeuvre = {type(manoeuvre).__name__}: must be a manoeuvre or a driver.")
+        self.manoeuvre, self.duration = manoeuvre, manoeuvre.duration
+
+    @property
+    def state_names(self):
+        return ()
+
+    def start(self, t: Any, motion: Motion) -> Any:
+        return driver_state(())()
+
+    def inputs(self, t: Any, motion: Motion, state: Any) -> Any:
+        return self.manoeuvre.inputs(t)
+
+    def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
+        return driver_state(())()
+
+
+def driver_state(names: tuple[str, ...]):
+    """The NamedTuple class of a driver's state."""
+    return record_type("DriverState", names)
+
+
+def as_driver(what: AbstractDriver | AbstractManoeuvre) -> AbstractDriver:
+    """A driver as it is, a manoeuvre as `OpenLoop`; raises `InputError` for anything else."""
+    return what if isinstance(what, AbstractDriver) else OpenLoop(what)

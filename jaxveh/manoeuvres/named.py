@@ -1,0 +1,93 @@
+"""Manoeuvres by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+
+from jaxveh._core.errors import check_one_of
+from jaxveh.manoeuvres.base import AbstractManoeuvre
+from jaxveh.manoeuvres.braking import braking_in_a_turn, mu_jump_braking
+from jaxveh.manoeuvres.courses import iso_lane_change, iso_obstacle_avoidance, slalom_course, steady_circle
+from jaxveh.manoeuvres.cruise import cruise
+from jaxveh.manoeuvres.driver import AbstractDriver
+from jaxveh.manoeuvres.random_steering import random_steering
+from jaxveh.manoeuvres.standard_steering import ramp_steer, sine_with_dwell, slalom
+from jaxveh.manoeuvres.steering import double_lane_change, step_steer, swept_sine
+
+
+class Drive(NamedTuple):
+    """What a named manoeuvre is made of: `speed` (m/s), `steer` (rad at the road wheels), `options` by name, `key`."""
+
+    speed: float
+    steer: float
+    options: dict
+    key: jax.Array
+
+
+class NamedManoeuvre(NamedTuple):
+    """How to make a manoeuvre, whether the driver sees the car and whether he works the pedals, and what to say."""
+
+    make: Callable[[Drive], AbstractManoeuvre | AbstractDriver]
+    help: str
+    closed_loop: bool = False
+    pedals: bool = False
+
+
+MANOEUVRES: dict[str, NamedManoeuvre] = {
+    "double-lane-change": NamedManoeuvre(
+        lambda d: double_lane_change(d.speed, d.steer, **d.options), "a sine period of steer and its mirror, open loop"
+    ),
+    "step-steer": NamedManoeuvre(lambda d: step_steer(d.speed, d.steer, **d.options), "a steer step (ISO 7401)"),
+    "swept-sine": NamedManoeuvre(
+        lambda d: swept_sine(d.speed, d.steer, **d.options), "sine steer of rising frequency (ISO 7401)"
+    ),
+    "sine-with-dwell": NamedManoeuvre(
+        lambda d: sine_with_dwell(d.speed, d.steer, **d.options), "0.7 Hz sine held at its second peak (FMVSS 126)"
+    ),
+    "ramp-steer": NamedManoeuvre(
+        lambda d: ramp_steer(d.speed, d.steer, **d.options), "steer that grows slowly at constant speed (ISO 4138)"
+    ),
+    "slalom": NamedManoeuvre(lambda d: slalom(d.speed, d.steer, **d.options), "sine periods of steer, open loop"),
+    "random-steering": NamedManoeuvre(
+        lambda d: random_steering(d.speed, d.steer, d.key, **d.options), "random steer in a band (ISO 7401); steer is its spread"
+    ),
+    "braking-in-a-turn": NamedManoeuvre(
+        lambda d: braking_in_a_turn(d.speed, d.steer, **d.options), "brakes pressed with the steer held (ISO 7975)", pedals=True
+    ),
+    "mu-jump-braking": NamedManoeuvre(
+        lambda d: mu_jump_braking(d.speed, **d.options), "braking straight ahead, for roads mu-jump and split-mu", pedals=True
+    ),
+    "cruise": NamedManoeuvre(
+        lambda d: cruise(d.speed, d.key, **d.options), "straight on, speed and pedals wavering, for mass and grade", pedals=True
+    ),
+    "iso-lane-change": NamedManoeuvre(
+        lambda d: iso_lane_change(d.speed, **d.options), "double lane change between cones (ISO 3888-1)", closed_loop=True
+    ),
+    "iso-obstacle-avoidance": NamedManoeuvre(
+        lambda d: iso_obstacle_avoidance(d.speed, **d.options), "obstacle avoidance between cones (ISO 3888-2)", closed_loop=True
+    ),
+    "slalom-course": NamedManoeuvre(
+        lambda d: slalom_course(d.speed, **d.options), "slalom between cones, closed loop", closed_loop=True
+    ),
+    "steady-circle": NamedManoeuvre(
+        lambda d: steady_circle(to_speed=d.speed, **d.options), "a circle at slowly rising speed (ISO 4138)", closed_loop=True
+    ),
+}  # fmt: skip
+"""Manoeuvres by name, for programs: each is made of speed, steer, options and a key, of which it takes what it needs."""
+
+
+def named_manoeuvre(
+    name: str, speed: float, steer: float = 0.05, key: jax.Array | None = None, **options
+) -> AbstractManoeuvre | AbstractDriver:
+    """The manoeuvre or driver of a name in `MANOEUVRES`.
+
+    `speed` (m/s; of "steady-circle" the last), `steer` (rad at the road wheels, where the manoeuvre has one), `key` for
+    random ones (default `jax.random.key(0)`), `options`: keyword arguments of its function, `duration` among them.
+
+    **Raises** `InputError` for another name, listing those there are, and as its function does.
+    """
+    check_one_of("manoeuvre", name, MANOEUVRES)
+    return MANOEUVRES[name].make(Drive(speed, steer, options, jax.random.key(0) if key is None else key))

@@ -1,0 +1,55 @@
+"""Random steering in a band of frequencies, for identification."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+
+from jaxveh._core.errors import check, check_positive
+from jaxveh._core.parameter import parameter
+from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, as_time, check_drive, constant_speed, window
+from jaxveh.numerics import band_harmonics, sum_of_harmonics
+
+
+class RandomSteering(AbstractManoeuvre):
+    """Steer that is random, white between two frequencies, at a constant speed, with smooth edges at both ends.
+
+    `steer` (rad) is its standard deviation; `frequencies` (Hz) and `phases` (rad) are those of its harmonics, (n,).
+    """
+
+    edge: float = eqx.field(static=True)
+    duration: float = eqx.field(static=True)
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
+    frequencies: jax.Array = parameter("Hz", scale=1.0)
+    phases: jax.Array = parameter("rad", scale=1.0)
+
+    def inputs(self, t: Any) -> DriverInputs:
+        t = as_time(t, self.steer)
+        wave = sum_of_harmonics(t, self.frequencies, self.phases) * window(t, 0.0, self.duration, self.edge)
+        return constant_speed(self.steer * wave, self.speed)
+
+
+def random_steering(
+    speed, steer, key: jax.Array, *, lowest: float = 0.1, highest: float = 2.0, count: int = 60, edge: float = 1.0,
+    duration: float = 60.0,
+) -> RandomSteering:  # fmt: skip
+    """Random steer of standard deviation `steer` (rad at the road wheels) at `speed` (m/s) (ISO 7401, random input).
+
+    White between the frequencies `lowest` and `highest` (Hz), as `count` harmonics of equal amplitude, one at a random
+    place in each equal part of the band, with random phases from `key`. `edge` (s): smooth fades at both ends.
+
+    **Raises** `InputError` for values out of range.
+    """
+    check_drive(speed, duration, steer)
+    check_positive("lowest", lowest, "Hz")
+    check("highest", highest, lambda v: v > lowest, f"above lowest = {lowest:g} Hz")
+    check("count", count, lambda v: v >= 1, "at least 1")
+    check_positive("edge", edge, "s")
+    check("edge", edge, lambda e: 2 * e <= duration, f"at most half the duration, {duration / 2:g} s")
+    frequencies, phases = band_harmonics(key, lowest, highest, count)
+    return RandomSteering(
+        edge=float(edge), duration=float(duration), speed=speed, steer=steer, frequencies=frequencies, phases=phases
+    )

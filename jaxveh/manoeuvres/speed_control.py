@@ -1,0 +1,102 @@
+"""A foot on the pedals: torques that hold a car at the speed that its driver wants."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
+from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs
+from jaxveh.manoeuvres.driver import AbstractDriver, Motion, as_driver, driver_state
+from jaxveh.numerics import smooth_clip, smooth_ramp
+from jaxveh.vehicles import GRAVITY
+
+AIR_DENSITY = 1.2
+"""kg/m^3, at 20 degrees Celsius near sea level."""
+
+_EDGE = 0.1
+"""Over which drive turns into brake and limits round off, m/s^2."""
+
+_CRAWL = 0.5
+"""Below this speed (m/s) the rolling resistance that is allowed for fades to zero."""
+
+
+class SpeedControl(AbstractDriver):
+    """A driver's (or a manoeuvre's) steering, and pedals that make the car follow the speed that he wants.
+
+    The wanted acceleration is `v_x_rate + gain e + integral`, `e = v_x - motion.v_x` and `d integral/dt = gain e /
+    integral_time`; the force is `mass` times it, and what air and rolling take. It is held within `drive_limit` and
+    `brake_limit` with smooth corners; what is cut off flows back into the integral (back-calculation, K. J. Astrom
+    and R. M. Murray, Feedback Systems, sec. 10.4), so that it does not wind up. Positive force becomes
+    `drive_torque`, negative `brake_torque` (N m, total at the wheels, never negative; both are there within 0.1 m/s^2
+    of zero, smoothly). What the wrapped driver does with the pedals himself is added.
+
+    **Parameters**: `mass` (kg), `wheel_radius` (m), `gain` (1/s), `integral_time` (s), `drag_area` (m^2: drag
+    coefficient times area), `rolling_resistance` (-), `drive_limit` and `brake_limit` (m/s^2).
+
+    **States**: those of the driver, and `speed_integral` (m/s^2).
+
+    **Raises** `InputError` for parameters that are not positive, a driver that is none, or one that wants no speed.
+    """
+
+    driver: AbstractDriver
+    mass: jax.Array = positive("kg")
+    wheel_radius: jax.Array = positive("m")
+    gain: jax.Array = positive("1/s")
+    integral_time: jax.Array = positive("s")
+    drag_area: jax.Array = positive("m^2")
+    rolling_resistance: jax.Array = positive("-")
+    drive_limit: jax.Array = positive("m/s^2")
+    brake_limit: jax.Array = positive("m/s^2")
+    duration: float = eqx.field(static=True)
+
+    def __init__(
+        self, driver: AbstractDriver | AbstractManoeuvre, mass, *, wheel_radius=0.3, gain=1.0, integral_time=4.0,
+        drag_area=0.7, rolling_resistance=0.012, drive_limit=4.0, brake_limit=9.0,
+    ):  # fmt: skip
+        self.driver = as_driver(driver)
+        self.duration = self.driver.duration
+        self.mass, self.wheel_radius = mass, wheel_radius
+        self.gain, self.integral_time = gain, integral_time
+        self.drag_area, self.rolling_resistance = drag_area, rolling_resistance
+        self.drive_limit, self.brake_limit = drive_limit, brake_limit
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def state_names(self):
+        return (*self.driver.state_names, "speed_integral")
+
+    def start(self, t: Any, motion: Motion) -> Any:
+        return driver_state(self.state_names)(*self.driver.start(t, motion), 0.0 * motion.v_x)
+
+    def inputs(self, t: Any, motion: Motion, state: Any) -> PedalInputs:
+        u, wanted, _ = self._wanted(t, motion, state)
+        own = getattr(u, "drive_torque", 0.0) - getattr(u, "brake_torque", 0.0)
+        torque, edge = self.mass * self.wheel_radius * wanted + own, self.mass * self.wheel_radius * _EDGE
+        return PedalInputs(u.steer, u.v_x, u.v_x_rate, smooth_ramp(torque, edge), smooth_ramp(-torque, edge))
+
+    def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
+        u, _, cut = self._wanted(t, motion, state)
+        rate = self.gain * (u.v_x - motion.v_x) / self.integral_time + cut / self.integral_time
+        return driver_state(self.state_names)(*self.driver.derivatives(t, motion, self._inner(state)), rate)
+
+    def _wanted(self, t, motion, state):
+        """The driver's inputs, the acceleration that the pedals give, and how much of it the limits add."""
+        u = self.driver.inputs(t, motion, self._inner(state))
+        if not hasattr(u, "v_x"):
+            raise InputError(f"SpeedControl: the driver gives {', '.join(u._fields)}, and no v_x to follow.")
+        v = motion.v_x
+        resistance = GRAVITY * self.rolling_resistance * v / numerics.hypot(v, _CRAWL)
+        drag = 0.5 * AIR_DENSITY * self.drag_area * v * abs(v) / self.mass
+        wish = getattr(u, "v_x_rate", 0.0) + self.gain * (u.v_x - v) + state.speed_integral + drag + resistance
+        held = smooth_clip(wish, -self.brake_limit, self.drive_limit, _EDGE)
+        return u, held, held - wish
+
+    def _inner(self, state):
+        return driver_state(self.driver.state_names)(*state[:-1])

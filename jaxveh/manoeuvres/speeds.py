@@ -1,0 +1,106 @@
+"""Speeds over time that a driver wants to drive."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import check, check_at_least, check_positive
+from jaxveh._core.parameter import check_parameters, parameter
+from jaxveh.manoeuvres.base import as_time
+from jaxveh.numerics import gauss_markov_harmonics, smooth_ramp, sum_of_harmonics
+
+
+class AbstractSpeed(eqx.Module):
+    """A smooth function of time, its array leaves are its parameters."""
+
+    @abc.abstractmethod
+    def v_x(self, t: Any) -> jax.Array:
+        """The speed at the times t (s), m/s, in their shape."""
+
+    def at(self, t: Any) -> tuple[jax.Array, jax.Array]:
+        """The speed (m/s) and its rate (m/s^2) at the times t (s)."""
+        t = as_time(t, jax.tree.leaves(self)[0])
+        return jax.jvp(self.v_x, (t,), (jnp.ones_like(t),))
+
+
+class SteadySpeed(AbstractSpeed):
+    """One `speed` (m/s). **Raises** `InputError` for a negative one."""
+
+    speed: jax.Array = parameter("m/s", scale=20.0)
+
+    def __check_init__(self):
+        check_parameters(self)
+        check_at_least("speed", self.speed, 0.0)
+
+    def v_x(self, t: Any) -> jax.Array:
+        return jnp.broadcast_to(self.speed, jnp.shape(t))
+
+
+class ChangingSpeed(AbstractSpeed):
+    """A speed that changes linearly from one value to another, with rounded corners.
+
+    `before`, `after` (m/s), `start` (s): where the change begins, `time` (s): how long it takes, `edge` (s, default 1):
+    over which the corners are rounded.
+
+    **Raises** `InputError` for negative speeds, or times that are not positive.
+    """
+
+    before: jax.Array = parameter("m/s", scale=20.0)
+    after: jax.Array = parameter("m/s", scale=20.0)
+    start: float = eqx.field(static=True, default=1.0)
+    time: float = eqx.field(static=True, default=10.0)
+    edge: float = eqx.field(static=True, default=1.0)
+
+    def __check_init__(self):
+        check_parameters(self)
+        check_at_least("before", self.before, 0.0)
+        check_at_least("after", self.after, 0.0)
+        check_positive("time", self.time, "s")
+        check_positive("edge", self.edge, "s")
+        check("edge", self.edge, lambda v: v <= self.time, f"at most time = {self.time:g} s")
+
+    def v_x(self, t: Any) -> jax.Array:
+        half = self.edge / 2
+        gone = smooth_ramp(t - self.start, half) - smooth_ramp(t - self.start - self.time, half)
+        return self.before + (self.after - self.before) * (gone / self.time)
+
+
+class WaveringSpeed(AbstractSpeed):
+    """A speed that wavers at random about its mean: harmonics of equal energy (`wavering_speed` draws them).
+
+    `mean`, `std` (m/s), `frequencies` (Hz) and `phases` (rad), (n,) each. It does not fall below zero.
+    """
+
+    mean: jax.Array = parameter("m/s", scale=20.0)
+    std: jax.Array = parameter("m/s", scale=1.0)
+    frequencies: jax.Array = parameter("Hz", scale=0.1)
+    phases: jax.Array = parameter("rad", scale=1.0)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    def v_x(self, t: Any) -> jax.Array:
+        wanted = self.mean + self.std * sum_of_harmonics(t, self.frequencies, self.phases)
+        return smooth_ramp(wanted, 0.5)
+
+
+def wavering_speed(
+    mean, std, key: jax.Array, *, time: float = 10.0, fastest: float = 5.0, count: int = 40
+) -> WaveringSpeed:
+    """A speed about `mean` with the standard deviation `std` (m/s): Gauss-Markov of correlation `time` (s).
+
+    Nothing is faster than one swing in `fastest` (s), so that it can be driven. One `key` gives one drive.
+
+    **Raises** `InputError` for values out of range.
+    """
+    check_at_least("mean", mean, 0.0)
+    check_at_least("std", std, 0.0)
+    check_positive("time", time, "s")
+    check_positive("fastest", fastest, "s")
+    check("count", count, lambda v: v >= 1, "at least 1")
+    return WaveringSpeed(mean, std, *gauss_markov_harmonics(key, time, 1.0 / fastest, count))

@@ -1,0 +1,161 @@
+"""Open-loop steering of the standards at constant speed: sine with dwell, ramp, slalom.
+
+All are three times continuously differentiable in time: corners of a shape are rounded within an `edge`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import equinox as eqx
+import jax
+
+from jaxveh import numerics
+from jaxveh._core.errors import check, check_at_least, check_positive
+from jaxveh._core.parameter import parameter
+from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, as_time, check_drive, constant_speed
+from jaxveh.numerics import smooth_ramp
+
+
+class SineWithDwell(AbstractManoeuvre):
+    """One sine period of steer whose second peak is held for a while (FMVSS 126: 49 CFR 571.126, S7.9).
+
+    The sine's phase runs at its frequency, stands still during the dwell, and starts and stops smoothly within `edge`,
+    half of it before and half after, so that the quarters keep their times.
+    """
+
+    frequency: float = eqx.field(static=True)
+    dwell: float = eqx.field(static=True)
+    edge: float = eqx.field(static=True)
+    start: float = eqx.field(static=True)
+    duration: float = eqx.field(static=True)
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
+
+    def inputs(self, t: Any) -> DriverInputs:
+        t = as_time(t, self.steer)
+        period, held = 1.0 / self.frequency, self.start + 0.75 / self.frequency
+        runs = ((self.start, held), (held + self.dwell, self.start + period + self.dwell))
+        running = sum(_since(t, begin, self.edge) - _since(t, end, self.edge) for begin, end in runs)
+        return constant_speed(self.steer * numerics.sin((2 * math.pi * self.frequency) * running), self.speed)
+
+
+class RampSteer(AbstractManoeuvre):
+    """Steer that grows linearly from `start` for `rise` and is then held (ISO 4138, constant speed, variable steer)."""
+
+    rise: float = eqx.field(static=True)
+    edge: float = eqx.field(static=True)
+    start: float = eqx.field(static=True)
+    duration: float = eqx.field(static=True)
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
+
+    def inputs(self, t: Any) -> DriverInputs:
+        t = as_time(t, self.steer)
+        rising = _since(t, self.start, self.edge) - _since(t, self.start + self.rise, self.edge)
+        return constant_speed(self.steer * (rising / self.rise), self.speed)
+
+
+class Slalom(AbstractManoeuvre):
+    """A number of sine periods of steer, as between cones."""
+
+    frequency: float = eqx.field(static=True)
+    periods: float = eqx.field(static=True)
+    edge: float = eqx.field(static=True)
+    start: float = eqx.field(static=True)
+    duration: float = eqx.field(static=True)
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
+
+    def inputs(self, t: Any) -> DriverInputs:
+        t = as_time(t, self.steer)
+        running = _since(t, self.start, self.edge) - _since(t, self.start + self.periods / self.frequency, self.edge)
+        return constant_speed(self.steer * numerics.sin((2 * math.pi * self.frequency) * running), self.speed)
+
+
+def _since(t: jax.Array, start: float, edge: float) -> jax.Array:
+    """The time since `start`, zero before, with the corner rounded over `edge`."""
+    return smooth_ramp(t - start, edge / 2)
+
+
+def sine_with_dwell(
+    speed,
+    steer,
+    *,
+    frequency: float = 0.7,
+    dwell: float = 0.5,
+    edge: float = 0.05,
+    start: float = 1.0,
+    duration: float = 6.0,
+) -> SineWithDwell:
+    """The sine with dwell of FMVSS 126 at `speed` (m/s): peaks of `steer` and minus `steer` (rad at the road wheels).
+
+    A sine of 0.7 Hz from `start` (s) on, a `dwell` of 0.5 s at its second peak (after three quarters), then its last
+    quarter (49 CFR 571.126, S7.9; speed 80 km/h, steer there in multiples of the steering wheel's angle at 0.3 g).
+    `edge` (s): over which the phase starts and stops; of the dwell, `dwell - edge` is exact and the rest within
+    2e-4 of the peak at the default values.
+
+    **Raises** `InputError` for values out of range, or a sine that does not end within the duration.
+    """
+    check_drive(speed, duration, steer)
+    check_positive("frequency", frequency, "Hz")
+    check_positive("dwell", dwell, "s")
+    _check_edge(edge, start, min(dwell, 0.25 / frequency))
+    end = start + 1 / frequency + dwell + edge / 2
+    check("duration", duration, lambda d: d >= end, f"at least start + period + dwell + edge / 2 = {end:g} s")
+    return SineWithDwell(
+        frequency=float(frequency), dwell=float(dwell), edge=float(edge), start=float(start),
+        duration=float(duration), speed=speed, steer=steer,
+    )  # fmt: skip
+
+
+def ramp_steer(
+    speed, steer, *, rise: float = 20.0, edge: float = 0.5, start: float = 1.0, duration: float | None = None
+) -> RampSteer:
+    """Steer that grows at a constant rate to `steer` (rad at the road wheels) at `speed` (m/s), then is held.
+
+    `rise` (s): how long it grows from `start` (s) on; slow enough, the car is in steady state throughout (ISO 4138,
+    constant speed with variable steer). `duration` (s): by default until 2 s after the end.
+
+    **Raises** `InputError` for values out of range, or a ramp that does not end within the duration.
+    """
+    end = start + rise + edge / 2
+    duration = end + 2.0 if duration is None else duration
+    check_drive(speed, duration, steer)
+    check_positive("rise", rise, "s")
+    _check_edge(edge, start, rise)
+    check("duration", duration, lambda d: d >= end, f"at least start + rise + edge / 2 = {end:g} s")
+    return RampSteer(
+        rise=float(rise), edge=float(edge), start=float(start), duration=float(duration), speed=speed, steer=steer
+    )
+
+
+def slalom(
+    speed, steer, *, frequency: float = 0.5, periods: float = 4.0, edge: float = 0.2, start: float = 1.0,
+    duration: float | None = None,
+) -> Slalom:  # fmt: skip
+    """Sine periods of steer with peaks of `steer` (rad at the road wheels) at `speed` (m/s), open loop.
+
+    `frequency` (Hz), `periods`: how many, from `start` (s) on; between cones a distance d apart the frequency is
+    `speed / (2 d)`. `duration` (s): by default until 1 s after the end. In closed loop: `slalom_course`.
+
+    **Raises** `InputError` for values out of range, or periods that do not end within the duration.
+    """
+    check_positive("frequency", frequency, "Hz")
+    check_positive("periods", periods)
+    end = start + periods / frequency + edge / 2
+    duration = end + 1.0 if duration is None else duration
+    check_drive(speed, duration, steer)
+    _check_edge(edge, start, min(0.25, periods) / frequency)
+    check("duration", duration, lambda d: d >= end, f"at least start + periods / frequency + edge / 2 = {end:g} s")
+    return Slalom(
+        frequency=float(frequency), periods=float(periods), edge=float(edge), start=float(start),
+        duration=float(duration), speed=speed, steer=steer,
+    )  # fmt: skip
+
+
+def _check_edge(edge: float, start: float, most: float) -> None:
+    check_positive("edge", edge, "s", "A corner without an edge has no derivative; 0.01 s is a sharp one.")
+    check("edge", edge, lambda v: v <= most, f"at most {most:g} s, what it stands in")
+    check_at_least("start", start, edge / 2, "The first edge begins half of it before the start.")

@@ -1,0 +1,56 @@
+"""Random signals of unit variance as sums of harmonics: smooth, of a stated spectrum, the same for the same key.
+
+Every harmonic carries the same energy and stands at a random place in its own share of the spectrum, with a random
+phase (M. Shinozuka and C.-M. Jan, J. Sound and Vibration 25 (1972), with shares of equal energy). Over keys, mean,
+variance and autocorrelation are those of the spectrum; over a long stretch of one signal they tend to them, too.
+"""
+
+from __future__ import annotations
+
+import math
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import DTypeLike
+
+from jaxveh.numerics.elementary import cos, tan
+from jaxveh.numerics.random import uniform
+
+
+def band_harmonics(
+    key: Array, lowest: float, highest: float, count: int, dtype: DTypeLike | None = None
+) -> tuple[Array, Array]:
+    """Frequencies and phases (rad), (count,) each, of a signal that is white between two frequencies, else nothing."""
+    share, phases = _shares(key, count, dtype)
+    return lowest + (highest - lowest) * share, phases
+
+
+def gauss_markov_harmonics(
+    key: Array, length: float, highest: float, count: int, dtype: DTypeLike | None = None
+) -> tuple[Array, Array]:
+    """Frequencies and phases (rad), (count,) each, of a signal with the autocorrelation `exp(-|lag| / length)`.
+
+    Its one-sided spectral density is `4 L / (1 + (2 pi f L)^2)` with L the correlation `length` (of the argument's
+    unit), cut off above the `highest` frequency so that the signal has derivatives; the rest is scaled to variance 1.
+    """
+    share, phases = _shares(key, count, dtype)
+    # The integral of the density is (2 / pi) atan(2 pi f L): frequencies of equal energy are tangents.
+    turn = 2.0 * math.pi * length
+    return tan(share * math.atan(turn * highest)) / turn, phases
+
+
+def sum_of_harmonics(x: Array, frequencies: Array, phases: Array) -> Array:
+    """`sqrt(2 / n) sum cos(2 pi f x + phase)` over n harmonics: variance 1, the shape of x.
+
+    `frequencies` and `phases` are (n,).
+    """
+    angles = (2.0 * math.pi) * (x[..., None] * frequencies) + phases
+    return math.sqrt(2.0 / frequencies.shape[-1]) * jnp.sum(cos(angles), axis=-1)
+
+
+def _shares(key: Array, count: int, dtype: DTypeLike | None) -> tuple[Array, Array]:
+    """One random number in each of `count` equal parts of (0, 1), and random phases."""
+    places, phases = jax.random.split(key)
+    inside = uniform(places, (count,), dtype)
+    return (jnp.arange(count, dtype=inside.dtype) + inside) / count, (2.0 * math.pi) * uniform(phases, (count,), dtype)

@@ -1,0 +1,32 @@
+"""The friction of one road on the shape of another."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh.roads.base import AbstractRoad, Surface
+
+
+class Combined(AbstractRoad):
+    """A road with the `friction` of one road, the `grade` of another and the `bank` of a third (None: of the second).
+
+    **Raises** `InputError` for a part that is no road.
+    """
+
+    friction: AbstractRoad
+    grade: AbstractRoad
+    bank: AbstractRoad | None = None
+
+    def __check_init__(self):
+        for name in ("friction", "grade", "bank"):
+            road = getattr(self, name)
+            if not isinstance(road, AbstractRoad) and not (name == "bank" and road is None):
+                raise InputError(f"Combined.{name} = {type(road).__name__}: must be a road of jaxveh.roads.")
+
+    def at(self, s: Any, y: Any = 0.0) -> Surface:
+        friction, shape = self.friction.at(s, y).friction, self.grade.at(s, y)
+        bank = shape.bank if self.bank is None else self.bank.at(s, y).bank
+        return Surface(*jnp.broadcast_arrays(friction, shape.grade, bank))

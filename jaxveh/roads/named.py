@@ -1,0 +1,62 @@
+"""Roads by name, and from files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.road import read_road
+from jaxveh.roads.base import AbstractRoad
+from jaxveh.roads.friction import Level, MuJump, SplitMu
+from jaxveh.roads.profile import Profile
+from jaxveh.roads.random_road import RandomRoad, gauss_markov
+from jaxveh.roads.slopes import Banked
+
+
+class NamedRoad(NamedTuple):
+    """How to make a road, and what to say about it."""
+
+    make: Callable[[], AbstractRoad]
+    help: str
+
+
+def _hills() -> RandomRoad:
+    return RandomRoad(grade=gauss_markov(0.03, 150.0, jax.random.key(0)))
+
+
+ROADS: dict[str, NamedRoad] = {
+    "level": NamedRoad(Level, "level, with the friction on which the tyres were measured"),
+    "wet": NamedRoad(lambda: Level(0.7), "level, 0.7 of that friction"),
+    "ice": NamedRoad(lambda: Level(0.15), "level, 0.15 of that friction"),
+    "split-mu": NamedRoad(lambda: SplitMu(1.0, 0.3), "level, 0.3 of that friction right of the centre line"),
+    "mu-jump": NamedRoad(lambda: MuJump(1.0, 0.4, 50.0), "level, 0.4 of that friction from 50 m on"),
+    "hills": NamedRoad(_hills, "random grade: standard deviation 3 %, correlation length 150 m"),
+    "banked": NamedRoad(lambda: Banked(0.05), "tilts to 0.05 rad (left side higher) within 50 m"),
+}
+"""Roads by name; their numbers are ours, of the size that is usual."""
+
+
+def from_specification(spec: Any) -> AbstractRoad:
+    """A road from its file's content: `jaxveh.io.RoadSpecification`, or anything with its fields."""
+    distance = (0.0, 1.0) if spec.distance is None else spec.distance
+    table = lambda value: jax.numpy.asarray(value, float)
+    return Profile(
+        table(distance), table(spec.friction), table(spec.grade), table(spec.bank), interpolation=spec.interpolation
+    )
+
+
+def named_road(name: str | os.PathLike) -> AbstractRoad:
+    """A road by its name in `ROADS`, or from a file ending in .toml (`jaxveh.io.road.SCHEMA`).
+
+    **Raises** `InputError` for another name (listing those there are), or a file that is no road.
+    """
+    if str(name) in ROADS:
+        return ROADS[str(name)].make()
+    if Path(name).suffix.lower() == ".toml":
+        return from_specification(read_road(name))
+    raise InputError(f"road = {str(name)!r}: must be one of {', '.join(ROADS)}, or a file that ends in .toml.")
