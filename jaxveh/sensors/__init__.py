@@ -1,7 +1,48 @@
-"""What a car measures: channels, noise laws, mounting position, low-pass filters."""
+"""What a car measures: sets of channels as filters see them, and devices that speak as those of a real car do."""
 
+from jaxveh.sensors.device import AbstractDevice, AbstractInstrument
+from jaxveh.sensors.faults import AbstractFault, BiasStep, Dropout, Spikes, Stuck
+from jaxveh.sensors.gnss import GNSS
+from jaxveh.sensors.imu import IMU, Alignment
 from jaxveh.sensors.instrumented import Instrumented
 from jaxveh.sensors.low_pass import LowPass, low_pass
+from jaxveh.sensors.optical import OpticalSideslip
 from jaxveh.sensors.sensor_set import Position, SensorSet, esc
+from jaxveh.sensors.signal import Signal
+from jaxveh.sensors.steering_angle import SteeringAngle
+from jaxveh.sensors.suite import Measured, Suite
+from jaxveh.sensors.torque import BrakeTorque, MotorTorque
+from jaxveh.sensors.typical import production_car, proving_ground_car
+from jaxveh.sensors.wheel_speeds import WheelSpeeds
+from jaxveh.sensors.wrapper import AbstractWrapper, Renamed
 
-__all__ = ["Instrumented", "LowPass", "Position", "SensorSet", "esc", "low_pass"]
+__all__ = [
+    "GNSS",
+    "IMU",
+    "AbstractDevice",
+    "AbstractFault",
+    "AbstractInstrument",
+    "AbstractWrapper",
+    "Alignment",
+    "BiasStep",
+    "BrakeTorque",
+    "Dropout",
+    "Instrumented",
+    "LowPass",
+    "Measured",
+    "MotorTorque",
+    "OpticalSideslip",
+    "Position",
+    "Renamed",
+    "SensorSet",
+    "Signal",
+    "Spikes",
+    "SteeringAngle",
+    "Stuck",
+    "Suite",
+    "WheelSpeeds",
+    "esc",
+    "low_pass",
+    "production_car",
+    "proving_ground_car",
+]

@@ -101,12 +101,14 @@ def low_pass(recording: Recording, channels, cutoff_hz: float = 20.0, order: int
                 f'a filter remembers. Fill it first: recording.fill("{name}", "linear").'
             )
         device = LowPass(jnp.asarray(cutoff_hz, values.dtype), order)
-        filtered[name] = _run(device, values, jnp.asarray(steps, values.dtype))
+        filtered[name] = filtered_rows(device, values, jnp.asarray(steps, values.dtype))
     return recording.replace(**filtered)
 
 
 @eqx.filter_jit
-def _run(device: LowPass, values: jax.Array, steps: jax.Array) -> jax.Array:
+def filtered_rows(device: LowPass, values: jax.Array, steps: jax.Array) -> jax.Array:
+    """The low-pass of rows `values` (T, ...), `steps` (T - 1,) seconds apart, settled at the first of them."""
+
     def body(state, row):
         state = device.step(state, *row)
         return state, state[0]

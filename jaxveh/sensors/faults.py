@@ -1,0 +1,157 @@
+"""Faults of devices: each wraps a device and acts on what it says (after delay, limits and rounding)."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check, is_concrete
+from jaxveh._core.names import check_names
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.sensors.device import AbstractDevice, name_of
+from jaxveh.sensors.randomness import subkey
+from jaxveh.sensors.spans import as_spans, check_spans, inside, since
+from jaxveh.sensors.wrapper import AbstractWrapper
+
+Channels = dict[str, jax.Array]
+
+
+def _names(channel) -> tuple[str, ...]:
+    return (channel,) if isinstance(channel, str) else tuple(channel)
+
+
+def _names_or_none(channel) -> tuple[str, ...] | None:
+    return None if channel is None else _names(channel)
+
+
+class AbstractFault(AbstractWrapper):
+    """A fault in some of a device's channels (None: in all); times are those at which the device speaks, s."""
+
+    channel: eqx.AbstractVar[tuple[str, ...] | None]
+
+    def __check_init__(self):
+        check_names(f"{name_of(self)}.channel", self.channel or (), self.device.channels)
+        check_parameters(self)
+
+    @abc.abstractmethod
+    def spoil(self, times: jax.Array, said: Channels, key: Any) -> Channels:
+        """What becomes of the faulty channels, a mapping to (n,) arrays."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The inner device's."""
+        return self.device.channels
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The inner device's."""
+        return self.device.units
+
+    def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> Channels:
+        """What the inner device says, spoilt in the faulty channels."""
+        said = self.device.say(times, outputs, key)
+        faulty = self.channels if self.channel is None else self.channel
+        return said | self.spoil(times, {name: said[name] for name in faulty}, self.own_key(key))
+
+
+class BiasStep(AbstractFault):
+    """From `at` (s) on, `size` (the channel's unit) is added to `channel` (a name or several)."""
+
+    device: AbstractDevice
+    channel: tuple[str, ...] = eqx.field(static=True, converter=_names)
+    at: jax.Array = parameter("s")
+    size: jax.Array = parameter("unit")
+
+    def spoil(self, times: jax.Array, said: Channels, key: Any) -> Channels:
+        """The channels with the step."""
+        step = jnp.where(since(times, self.at), self.size, 0.0)
+        return {name: value + step for name, value in said.items()}
+
+
+class Stuck(AbstractFault):
+    """From `start` to before `end` (s), `channel` (a name or several) says what it last said before `start`.
+
+    A channel that has said nothing yet is stuck at its first value, and one that was silent (NaN) stays silent.
+
+    **Raises** `InputError` for an end that is not after the start.
+    """
+
+    device: AbstractDevice
+    channel: tuple[str, ...] = eqx.field(static=True, converter=_names)
+    start: jax.Array = parameter("s")
+    end: jax.Array = parameter("s")
+
+    def __check_init__(self):
+        if is_concrete(self.start, self.end):
+            check("Stuck.end", self.end, lambda end: end > self.start, f"after start = {self.start} s")
+
+    def spoil(self, times: jax.Array, said: Channels, key: Any) -> Channels:
+        """The channels, stuck."""
+        late = since(times, self.start)
+        stuck = late & ~since(times, self.end)
+        last = jnp.maximum(jnp.sum(~late) - 1, 0)
+        return {name: jnp.where(stuck, value[last], value) for name, value in said.items()}
+
+
+class Spikes(AbstractFault):
+    """Each sample of `channel` (a name or several) is off by `size`, of random sign, with `probability`.
+
+    Channels are hit one by one. Without a key there are none.
+
+    **Raises** `InputError` for a probability beyond 0 to 1 or a size that is not positive.
+    """
+
+    device: AbstractDevice
+    channel: tuple[str, ...] = eqx.field(static=True, converter=_names)
+    probability: jax.Array = parameter("-")
+    size: jax.Array = positive("unit")
+
+    def __check_init__(self):
+        check("Spikes.probability", self.probability, lambda p: (p >= 0) & (p <= 1), "between 0 and 1")
+
+    def spoil(self, times: jax.Array, said: Channels, key: Any) -> Channels:
+        """The channels with their spikes."""
+        if key is None:
+            return said
+        keys = {name: subkey(key, self.channels.index(name)) for name in said}
+        return {name: value + self._spikes(keys[name], value) for name, value in said.items()}
+
+    def _spikes(self, key: Any, like: jax.Array) -> jax.Array:
+        u = numerics.uniform(key, like.shape, like.dtype)
+        # The half of the probability that the number falls into decides on the sign.
+        spike = jnp.where(u < 0.5 * self.probability, -self.size, self.size)
+        return jnp.where(u < self.probability, spike, 0.0)
+
+
+class Dropout(AbstractFault):
+    """`channel` (a name, several, or None for all) says nothing (NaN) in `spans`, and with `probability` a sample.
+
+    `spans`: ((start, end), ...) in s. The channels fall silent together, as when a message is lost; for others wrap
+    once more. Without a key there are the spans alone.
+
+    **Raises** `InputError` for reversed spans, a probability beyond 0 to 1, or neither of the two.
+    """
+
+    device: AbstractDevice
+    channel: tuple[str, ...] | None = eqx.field(static=True, converter=_names_or_none, default=None)
+    spans: tuple[tuple[float, float], ...] = eqx.field(static=True, converter=as_spans, default=())
+    probability: jax.Array | None = parameter("-", default=None)
+
+    def __check_init__(self):
+        check_spans("Dropout.spans", self.spans)
+        check("Dropout.probability", self.probability, lambda p: (p >= 0) & (p <= 1), "between 0 and 1")
+        if not self.spans and self.probability is None:
+            raise InputError("Dropout: neither spans nor a probability; give at least one of them.")
+
+    def spoil(self, times: jax.Array, said: Channels, key: Any) -> Channels:
+        """The channels with their gaps."""
+        silent = inside(times, self.spans)
+        if self.probability is not None and key is not None:
+            silent = silent | (numerics.uniform(key, times.shape, times.dtype) < self.probability)
+        return {name: jnp.where(silent, jnp.nan, value) for name, value in said.items()}

@@ -1,0 +1,95 @@
+"""The inertial measurement unit: accelerometers and gyroscopes in one box that is fixed to the body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.parameter import check_parameters, parameter
+from jaxveh.sensors.device import AbstractInstrument
+from jaxveh.sensors.low_pass import LowPass, filtered_rows
+from jaxveh.sensors.rigid_body import POSES, into_axes, specific_force, turning
+from jaxveh.sensors.sensor_set import Position
+from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
+
+_UNITS = {
+    **dict.fromkeys(("a_x", "a_y", "a_z"), "m/s^2"),
+    **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"), "rad/s"),
+}
+
+
+class Alignment(eqx.Module):
+    """How a box is turned on the body: by `yaw` about z, then `pitch` about y, then `roll` about x, rad."""
+
+    roll: jax.Array = parameter("rad", scale=0.01, default=0.0)
+    pitch: jax.Array = parameter("rad", scale=0.01, default=0.0)
+    yaw: jax.Array = parameter("rad", scale=0.01, default=0.0)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+
+class IMU(AbstractInstrument):
+    """An inertial measurement unit that rolls, pitches and turns with the body.
+
+    - `signals`: the channels and their errors, a mapping to `Signal`, out of `a_x`, `a_y`, `a_z` (m/s^2, specific
+      force) and `roll_rate`, `pitch_rate`, `yaw_rate` (rad/s, about the box's own axes); names alone have no errors.
+    - `position`: of the box from the centre of gravity, in the body's axes. It feels the whole rigid body's
+      `f + alpha x r + omega x (omega x r)`, and gravity through roll and pitch.
+    - `alignment`: how the box is turned on the body; exact rotations.
+    - `low_pass`: a `LowPass` in every channel, before the errors (it does not see what is between samples).
+
+    Cars without roll, pitch and their rates have zero of them; without `a_z` it is the gravity normal to the road.
+
+    **Raises** `InputError` for unknown channels, or anything that is not what it should be.
+    """
+
+    signals: dict[str, Signal] = eqx.field(converter=as_signals, default=("a_x", "a_y", "yaw_rate"))
+    position: Position = eqx.field(default_factory=Position)
+    alignment: Alignment = eqx.field(default_factory=Alignment)
+    low_pass: LowPass | None = None
+
+    def __check_init__(self):
+        check_signals("IMU.signals", self.signals, _UNITS)
+        for name, kind in (("position", Position), ("alignment", Alignment)):
+            if not isinstance(getattr(self, name), kind):
+                raise InputError(f"IMU.{name} = {getattr(self, name)!r}: must be a {kind.__name__}.")
+        if not (self.low_pass is None or isinstance(self.low_pass, LowPass)):
+            raise InputError(f"IMU.low_pass = {self.low_pass!r}: must be a LowPass(cutoff_hz) or None.")
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels, accelerations first."""
+        return tuple(name for name in _UNITS if name in self.signals)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """m/s^2 and rad/s."""
+        return {name: _UNITS[name] for name in self.channels}
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Specific force in the road's plane, and how the car turns."""
+        return ("a_x", "a_y", "yaw_rate", "yaw_acceleration")
+
+    @property
+    def may_use(self) -> tuple[str, ...]:
+        """How the body stands on the road, and the road in space."""
+        return (*POSES, "roll_acceleration", "pitch_acceleration", "a_z", "grade", "bank")
+
+    def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
+        """Accelerations and angular rates in the box's axes."""
+        rates, accelerations = turning(outputs)
+        force = specific_force(outputs, self.position, rates, accelerations)
+        turn = (self.alignment.roll, self.alignment.pitch, self.alignment.yaw)
+        felt = dict(zip(_UNITS, (*into_axes(force, *turn), *into_axes(rates, *turn)), strict=True))
+        if self.low_pass is not None:
+            rows = jnp.stack([felt[name] for name in self.channels], axis=-1)
+            steps = jnp.full(times.shape[0] - 1, self.period, rows.dtype)
+            felt = dict(zip(self.channels, filtered_rows(self.low_pass, rows, steps).T, strict=True))
+        return apply_all(self.signals, _UNITS, felt, self.period, key)

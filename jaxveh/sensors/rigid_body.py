@@ -1,0 +1,96 @@
+"""What a point of the car's body feels: angular rates, specific force and velocity away from the centre of gravity.
+
+Vectors are tuples (x, y, z). The intermediate axes (road-parallel) become the body's by a turn of `pitch` about y, then
+of `roll` about x (ISO 8855): roll positive with the left side up, pitch positive with the nose down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh.vehicles.base import GRAVITY
+
+Vector = tuple[Any, Any, Any]
+
+POSES = ("roll", "pitch", "roll_rate", "pitch_rate")
+"""The outputs that say how the body stands on the road; zero where a car does not have them."""
+
+
+def into_axes(v: Vector, roll: Any, pitch: Any, yaw: Any = None) -> Vector:
+    """The vector in axes that are turned by yaw about z, then pitch about y, then roll about x."""
+    x, y, z = v
+    if yaw is not None:
+        c, s = numerics.cos(yaw), numerics.sin(yaw)
+        x, y = c * x + s * y, c * y - s * x
+    c, s = numerics.cos(pitch), numerics.sin(pitch)
+    x, z = c * x - s * z, c * z + s * x
+    c, s = numerics.cos(roll), numerics.sin(roll)
+    return x, c * y + s * z, c * z - s * y
+
+
+def out_of_axes(v: Vector, roll: Any, pitch: Any) -> Vector:
+    """The way back: a vector of the turned axes in those before the turns of pitch and roll."""
+    x, y, z = v
+    c, s = numerics.cos(roll), numerics.sin(roll)
+    y, z = c * y - s * z, c * z + s * y
+    c, s = numerics.cos(pitch), numerics.sin(pitch)
+    return c * x + s * z, y, c * z - s * x
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """The vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def add(*vectors: Vector) -> Vector:
+    """The sum of vectors."""
+    x, y, z = (sum(parts[1:], parts[0]) for parts in zip(*vectors, strict=True))
+    return x, y, z
+
+
+def of_angles(roll, pitch, roll_rate, pitch_rate, yaw_rate) -> Vector:
+    """The body's angular velocity in its own axes, of the rates of yaw, pitch and roll."""
+    zero = jnp.zeros_like(yaw_rate)
+    _, about_y, about_z = into_axes((zero, pitch_rate, zero), roll, zero)
+    turn = into_axes((zero, zero, yaw_rate), roll, pitch)
+    return add((roll_rate, about_y, about_z), turn)
+
+
+def turning(outputs: Mapping[str, jax.Array]) -> tuple[Vector, Vector]:
+    """The body's angular velocity and acceleration in its own axes; the second is the first's exact derivative."""
+    at = lambda name: outputs.get(name, jnp.zeros_like(outputs["yaw_rate"]))
+    values = (*(at(name) for name in POSES), outputs["yaw_rate"])
+    rates = (at("roll_rate"), at("pitch_rate"), at("roll_acceleration"), at("pitch_acceleration"))
+    return jax.jvp(of_angles, values, (*rates, outputs["yaw_acceleration"]))
+
+
+def specific_force(outputs: Mapping[str, jax.Array], position: Any, rates: Vector, accelerations: Vector) -> Vector:
+    """What an ideal accelerometer at `position` (m from the centre of gravity, body axes) shows in the body's axes.
+
+    `f + alpha x r + omega x (omega x r)`. A car without `a_z` presses on its road with the gravity normal to it.
+    """
+    roll, pitch = (outputs.get(name, jnp.zeros_like(outputs["a_x"])) for name in POSES[:2])
+    force = outputs["a_x"], outputs["a_y"], outputs["a_z"] if "a_z" in outputs else _normal_gravity(outputs)
+    r = (position.x, position.y, position.z)
+    return add(into_axes(force, roll, pitch), cross(accelerations, r), cross(rates, cross(rates, r)))
+
+
+def velocity(outputs: Mapping[str, jax.Array], position: Any) -> tuple[Any, Any]:
+    """The velocity of a point of the body in the intermediate axes, m/s: forward and to the left."""
+    roll, pitch, roll_rate, pitch_rate = (outputs.get(name, jnp.zeros_like(outputs["v_x"])) for name in POSES)
+    rates = of_angles(roll, pitch, roll_rate, pitch_rate, outputs["yaw_rate"])
+    r = (position.x, position.y, position.z)
+    x, y, _ = out_of_axes(cross(rates, r), roll, pitch)
+    return outputs["v_x"] + x, outputs["v_y"] + y
+
+
+def _normal_gravity(outputs: Mapping[str, jax.Array]) -> jax.Array:
+    """Gravity's part normal to a road whose slopes are tan(grade) and tan(bank), positive."""
+    zero = jnp.zeros_like(outputs["a_x"])
+    along, across = (numerics.tan(outputs.get(name, zero)) for name in ("grade", "bank"))
+    return GRAVITY / numerics.sqrt(1 + along * along + across * across)

@@ -1,0 +1,41 @@
+"""Spans of time in which something holds: `((start, end), ...)` in s, the start included and the end not."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+
+_LATE = 1e-9  # stamps that should be equal may differ by rounding
+
+
+def as_spans(spans) -> tuple[tuple[float, float], ...]:
+    """Spans as a static tuple of pairs of floats; one pair alone is one span."""
+    spans = tuple(spans)
+    if len(spans) == 2 and not any(hasattr(end, "__len__") for end in spans):
+        spans = (spans,)
+    return tuple(tuple(float(end) for end in span) for span in spans)  # type: ignore[misc]
+
+
+def check_spans(name: str, spans) -> None:
+    """Raise unless every span is a pair with a finite start before its end."""
+    for span in spans:
+        if len(span) != 2 or not (math.isfinite(span[0]) and span[0] < span[1]):
+            raise InputError(f"{name} = {span}: must be pairs (start, end) in s, with start before end.")
+
+
+def since(times: jax.Array, start: Any) -> jax.Array:
+    """Whether each time is at or after `start`."""
+    return times - jnp.asarray(start, times.dtype) >= -_LATE
+
+
+def inside(times: jax.Array, spans) -> jax.Array:
+    """Whether each time lies in one of the spans."""
+    found = jnp.zeros(times.shape, bool)
+    for start, end in spans:
+        found = found | (since(times, start) & ~since(times, end))
+    return found

@@ -1,0 +1,115 @@
+"""What control units say of torques: from the brake's pressure, from the motor's currents."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.sensors.device import AbstractInstrument
+from jaxveh.sensors.low_pass import LowPass, filtered_rows
+from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
+
+_WHEELS = ("fl", "fr", "rl", "rr")
+_BRAKE = ("brake_torque", *(f"brake_torque_{wheel}" for wheel in _WHEELS))
+_MOTOR = ("drive_torque", *(f"drive_torque_{wheel}" for wheel in _WHEELS), *(f"torque_{wheel}" for wheel in _WHEELS))
+
+
+class BrakeTorque(AbstractInstrument):
+    """Braking torque as made of the measured pressure, N m, never negative.
+
+    - `signals`: the channels and their errors, a mapping to `Signal`: `brake_torque` (the sum) or `brake_torque_fl` ...
+      (at a wheel), each a vehicle output. The pads' friction that is not as assumed is the signal's `scale`.
+    - `lag` (s): time constant of the first order by which what is said is later; None: none.
+
+    **Raises** `InputError` for unknown channels or numbers out of range.
+    """
+
+    signals: dict[str, Signal] = eqx.field(converter=as_signals, default=("brake_torque",))
+    lag: jax.Array | None = positive("s", default=None)
+
+    def __check_init__(self):
+        check_signals("BrakeTorque.signals", self.signals, _BRAKE)
+        check_parameters(self)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels."""
+        return tuple(name for name in _BRAKE if name in self.signals)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """N m."""
+        return dict.fromkeys(self.channels, "N*m")
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The torques that it says."""
+        return self.channels
+
+    @property
+    def may_use(self) -> tuple[str, ...]:
+        """Nothing else."""
+        return ()
+
+    def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
+        """The torques."""
+        true = {name: lagged(outputs[name], self.lag, self.period) for name in self.channels}
+        said = apply_all(self.signals, _BRAKE, true, self.period, key)
+        return {name: jnp.where(value > 0, value, 0.0) for name, value in said.items()}
+
+
+class MotorTorque(AbstractInstrument):
+    """Driving torque as made of currents or of an engine's map, N m, of either sign.
+
+    - `signals`: the channels and their errors, a mapping to `Signal`: `drive_torque` (the sum at the wheels),
+      `drive_torque_fl` ... or `torque_fl` ... (at a wheel), each a vehicle output. A map's error is the signal's `scale`.
+    - `lag` (s): time constant of the first order by which what is said is later; None: none.
+
+    **Raises** `InputError` for unknown channels or numbers out of range.
+    """
+
+    signals: dict[str, Signal] = eqx.field(converter=as_signals, default=("drive_torque",))
+    lag: jax.Array | None = positive("s", default=None)
+
+    def __check_init__(self):
+        check_signals("MotorTorque.signals", self.signals, _MOTOR)
+        check_parameters(self)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels."""
+        return tuple(name for name in _MOTOR if name in self.signals)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """N m."""
+        return dict.fromkeys(self.channels, "N*m")
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The torques that it says."""
+        return self.channels
+
+    @property
+    def may_use(self) -> tuple[str, ...]:
+        """Nothing else."""
+        return ()
+
+    def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
+        """The torques."""
+        true = {name: lagged(outputs[name], self.lag, self.period) for name in self.channels}
+        return apply_all(self.signals, _MOTOR, true, self.period, key)
+
+
+def lagged(values: jax.Array, lag: jax.Array | None, period: float) -> jax.Array:
+    """The values (n,) through a first-order lag, settled at the first; linear between samples, solved exactly."""
+    if lag is None:
+        return values
+    steps = jnp.full(values.shape[0] - 1, period, values.dtype)
+    return filtered_rows(LowPass(1 / (2 * math.pi * lag), 1), values, steps)

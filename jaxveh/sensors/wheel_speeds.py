@@ -1,0 +1,154 @@
+"""Wheel speeds as a control unit has them: from the edges of a toothed ring that have passed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check, check_one_of
+from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.sensors.device import AbstractInstrument
+from jaxveh.sensors.randomness import subkey
+from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
+
+WHEELS = ("fl", "fr", "rl", "rr")
+_SPEEDS = tuple(f"wheel_speed_{wheel}" for wheel in WHEELS)
+_SPINS = tuple(f"omega_{wheel}" for wheel in WHEELS)
+_TEETH_TAG, _START_TAG = 100, 101
+_LONG = 1e3
+"""Seconds since the last edge of a wheel that stands at the start."""
+
+
+class _Ring(NamedTuple):
+    """What the counter knows of each wheel: the way since the last edge (in teeth), the time since it, the last speed."""
+
+    way: Any
+    since: Any
+    held: Any
+
+
+class WheelSpeeds(AbstractInstrument):
+    """Wheel speed sensors on toothed rings, with the arithmetic of the unit that counts them.
+
+    - `signals`: the channels and their errors, a mapping to `Signal`: `wheel_speed_fl` ... (m/s, at the stored
+      `radius`) or `omega_fl` ... (rad/s); names alone have no errors. A tyre that is not as large as the stored
+      radius is the signal's `scale`: it spins faster at the same speed. `noise` and so on come on top of the teeth.
+    - `teeth`: edges a revolution. `method`: "M" counts the edges of one period, so that speeds are multiples of
+      `2 pi / (teeth period)`; "M/T" divides them by the time between the last edges of two periods, which is exact at
+      constant speed, and between edges holds the last speed as long as no slower one is certain (Ohmae et al., IEEE
+      Trans. Industrial Electronics 29, 1982).
+    - `tooth_error`: standard deviation of each edge's place over the pitch of the teeth ("M/T" only).
+    - `lowest`: below it (in the channel's unit) `below` is said, "zero" or "nan".
+    - `signed`: whether the sensors know the direction; most do not and say the magnitude.
+
+    The way between two samples is taken from their mean spin, and the wheel is taken to have turned steadily before
+    the first. Where in a pitch a wheel starts is random (without a key: in the middle).
+
+    **Raises** `InputError` for numbers out of range, unknown channels, speeds without a radius.
+    """
+
+    signals: dict[str, Signal] = eqx.field(converter=as_signals, default=_SPEEDS)
+    radius: jax.Array | None = positive("m", default=None)
+    lowest: jax.Array | None = positive("unit", default=None)
+    tooth_error: jax.Array | None = positive("-", default=None)
+    teeth: int = eqx.field(static=True, default=48)
+    method: str = eqx.field(static=True, default="M/T")
+    below: str = eqx.field(static=True, default="zero")
+    signed: bool = eqx.field(static=True, default=False)
+
+    def __check_init__(self):
+        check_signals("WheelSpeeds.signals", self.signals, (*_SPEEDS, *_SPINS))
+        check_parameters(self)
+        check("WheelSpeeds.teeth", self.teeth, lambda n: (n >= 1) & (n == n // 1), "a whole number of at least 1")
+        check_one_of("WheelSpeeds.method", self.method, ("M", "M/T"))
+        check_one_of("WheelSpeeds.below", self.below, ("zero", "nan"))
+        if self.tooth_error is not None:
+            check("WheelSpeeds.tooth_error", self.tooth_error, lambda e: e <= 0.1, "at most 0.1 of the pitch")
+        if self.radius is None and any(name in _SPEEDS for name in self.signals):
+            raise InputError(
+                "WheelSpeeds.radius = None: speeds in m/s need the radius (m) that the control unit stores."
+            )
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels, front left first."""
+        return tuple(name for name in (*_SPEEDS, *_SPINS) if name in self.signals)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """m/s or rad/s."""
+        return {name: "m/s" if name in _SPEEDS else "rad/s" for name in self.channels}
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The spins of the wheels that are measured."""
+        return tuple(name for name in _SPINS if name in self.signals or _speed_of(name) in self.signals)
+
+    @property
+    def may_use(self) -> tuple[str, ...]:
+        """Nothing else."""
+        return ()
+
+    @property
+    def pitch(self) -> float:
+        """Angle from edge to edge, rad."""
+        return 2 * math.pi / self.teeth
+
+    def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
+        """Wheel speeds by channel."""
+        omega = jnp.stack([outputs[name] for name in self.needs], axis=-1)
+        counted = dict(zip(self.needs, self._count(omega, key).T, strict=True))
+        true = dict(counted)
+        for name in self.needs:
+            if _speed_of(name) in self.signals:
+                true[_speed_of(name)] = self.radius * counted[name]
+        said = apply_all(self.signals, (*_SPEEDS, *_SPINS), true, self.period, key)
+        return said if self.lowest is None else {name: self._cut(value, self.lowest) for name, value in said.items()}
+
+    def _cut(self, value: jax.Array, lowest: jax.Array) -> jax.Array:
+        nothing = 0.0 if self.below == "zero" else jnp.nan
+        return jnp.where(jnp.abs(value) < lowest, nothing, value)
+
+    def _count(self, omega: jax.Array, key: Any) -> jax.Array:
+        """Spins (n, wheels) as counted from edges."""
+        spin = 0.5 * (omega + jnp.concatenate([omega[:1], omega[:-1]]))
+        teeth = jnp.abs(spin) * (self.period / self.pitch)
+        errors = jnp.zeros_like(teeth)
+        if self.tooth_error is not None and key is not None:
+            errors = self.tooth_error * numerics.normal(subkey(key, _TEETH_TAG), teeth.shape, teeth.dtype)
+        _, counted = jax.lax.scan(lambda ring, row: self._next(ring, row), self._start(teeth[0], key), (teeth, errors))
+        return counted * jnp.sign(spin) if self.signed else counted
+
+    def _start(self, teeth: jax.Array, key: Any) -> _Ring:
+        way = jnp.full_like(teeth, 0.5)
+        if key is not None:
+            way = numerics.uniform(subkey(key, _START_TAG), teeth.shape, teeth.dtype)
+        turns = teeth > 0
+        since = jnp.where(turns, jnp.minimum(way * self.period / jnp.where(turns, teeth, 1.0), _LONG), _LONG)
+        return _Ring(way, since, self.pitch / self.period * teeth)
+
+    def _next(self, ring: _Ring, row: tuple) -> tuple[_Ring, jax.Array]:
+        """One period: `teeth` is the way in it, `error` how far the last edge in it is from its place."""
+        teeth, error = row
+        gone = ring.way + teeth
+        edges = jnp.floor(gone)
+        way = gone - edges
+        new = edges > 0
+        waited = ring.since + self.period
+        since = jnp.where(new, (way - error) / jnp.where(new, teeth, 1.0) * self.period, waited)
+        # Errors of two edges may cross where a wheel passes hardly more than one in a period.
+        between = jnp.maximum(waited - since, 1e-3 * self.period)
+        slower = jnp.minimum(ring.held, self.pitch / waited)
+        timed = jnp.where(new, self.pitch * edges / jnp.where(new, between, 1.0), slower)
+        said = timed if self.method == "M/T" else self.pitch / self.period * edges
+        return _Ring(way, since, timed), said
+
+
+def _speed_of(spin: str) -> str:
+    return spin.replace("omega", "wheel_speed")
