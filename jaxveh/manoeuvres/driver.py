@@ -3,28 +3,14 @@
 from __future__ import annotations
 
 import abc
-from typing import Any, NamedTuple
+from typing import Any
 
 import equinox as eqx
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record_type
 from jaxveh.manoeuvres.base import AbstractManoeuvre
-
-
-class Motion(NamedTuple):
-    """How a car moves at one instant, at its centre of gravity.
-
-    `x`, `y` (m): position in the world. `yaw` (rad, unwrapped): of the car's x axis, left of the world's. `v_x`, `v_y`
-    (m/s): speeds forward and to the left, in the car's axes. `yaw_rate` (rad/s).
-    """
-
-    x: Any
-    y: Any
-    yaw: Any
-    v_x: Any
-    v_y: Any
-    yaw_rate: Any
+from jaxveh.vehicles import Motion
 
 
 class AbstractDriver(eqx.Module):

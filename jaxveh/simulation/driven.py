@@ -10,7 +10,8 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
-from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre, OpenLoop, SpeedControl
+from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre, SpeedControl, as_driver
+from jaxveh.manoeuvres.speed_control import AIR_DENSITY
 from jaxveh.sensors import Instrumented
 from jaxveh.vehicles import AbstractVehicle, Motion
 from jaxveh.vehicles.wheels import named, opposing
@@ -117,9 +118,16 @@ def check_inputs(driven: Driven) -> None:
 
 def vehicle_name(vehicle: Any) -> str:
     """The class of the car itself, without what wraps it."""
-    while hasattr(vehicle, "vehicle"):
-        vehicle = vehicle.vehicle
-    return type(vehicle).__name__
+    return type(car_itself(vehicle)).__name__
+
+
+def dtype_of(vehicle: AbstractVehicle) -> Any:
+    """The dtype of the car's parameters, which is that of its states."""
+    return jnp.result_type(jax.tree.leaves(eqx.filter(vehicle, eqx.is_inexact_array))[0])
+
+
+def _still(vehicle: AbstractVehicle) -> Motion:
+    return Motion(*[jnp.zeros((), dtype_of(vehicle))] * len(Motion._fields))
 
 
 def driver_name(driver: Any) -> str:
@@ -129,16 +137,30 @@ def driver_name(driver: Any) -> str:
     return type(driver).__name__
 
 
-def as_driver(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: AbstractVehicle) -> AbstractDriver:
+def with_pedals(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: AbstractVehicle) -> AbstractDriver:
     """The driver of a manoeuvre, who works the pedals where the car has them and the manoeuvre says a speed alone."""
-    driver = OpenLoop(manoeuvre) if isinstance(manoeuvre, AbstractManoeuvre) else manoeuvre
-    if not isinstance(driver, AbstractDriver):
-        raise InputError(
-            f"manoeuvre = {type(manoeuvre).__name__}: must be a manoeuvre or a driver of jaxveh.manoeuvres."
-        )
-    moves = Motion(*[jnp.zeros(())] * len(Motion._fields))
+    driver = as_driver(manoeuvre)
+    moves = _still(vehicle)
     given = eqx.filter_eval_shape(lambda: driver.inputs(0.0, moves, driver.start(0.0, moves)))._fields
-    pedals = {"drive_torque", *named("torque")} & set(vehicle.inputs)
-    if pedals and "v_x" in given and not {"drive_torque", *named("torque")} & set(given):
-        return SpeedControl.of(driver, vehicle)
-    return driver
+    torques = {"drive_torque", *named("torque")}
+    if not torques & set(vehicle.inputs) or torques & set(given) or "v_x" not in given:
+        return driver
+    car = car_itself(vehicle)
+    return SpeedControl(
+        driver,
+        car.mass,
+        wheel_radius=car.wheel_radius,
+        drag_area=jnp.maximum(car.drag * (2.0 / AIR_DENSITY), LEAST),
+        rolling_resistance=jnp.maximum(car.rolling_resistance, LEAST),
+    )
+
+
+def car_itself(vehicle: Any) -> Any:
+    """The car without what wraps it."""
+    while hasattr(vehicle, "vehicle"):
+        vehicle = vehicle.vehicle
+    return vehicle
+
+
+LEAST = 1e-6
+"""In place of no drag or rolling resistance, which the driver need not allow for."""

@@ -18,7 +18,7 @@ from jaxveh._core.result import Result
 from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre
 from jaxveh.sensors import Instrumented, SensorSet, Suite
 from jaxveh.simulation import stiffness
-from jaxveh.simulation.driven import Driven, as_driver, check_inputs, driver_name, vehicle_name
+from jaxveh.simulation.driven import Driven, check_inputs, driver_name, vehicle_name, with_pedals
 from jaxveh.simulation.events import Event
 from jaxveh.simulation.meter import told
 from jaxveh.simulation.solve import Grid, Solution, even_grid, grid_through, solve
@@ -101,7 +101,7 @@ def simulate(
 def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None = None, road: Any = None) -> Driven:
     """The car on its road with sensors and driver, as `simulate` integrates it; raises `InputError` where they do not fit."""
     placed = car if isinstance(car, Travelling) and road is None else Travelling(car, road)
-    driven = Driven(Instrumented(placed, sensors), as_driver(manoeuvre, placed))
+    driven = Driven(Instrumented(placed, sensors), with_pedals(manoeuvre, placed))
     check_inputs(driven)
     return driven
 

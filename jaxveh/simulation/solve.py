@@ -14,7 +14,7 @@ import numpy as np
 
 from jaxveh._core.errors import check, check_positive
 from jaxveh._core.result import Result, code
-from jaxveh.simulation.driven import Driven
+from jaxveh.simulation.driven import Driven, dtype_of
 from jaxveh.simulation.events import Event
 from jaxveh.simulation.stiffness import Choice
 
@@ -72,7 +72,7 @@ def solve(
     meter: diffrax.AbstractProgressMeter | None = None,
 ) -> Solution:
     """Simulate the driven car over the grid. It may be jitted, vmapped and differentiated."""
-    dtype = jnp.result_type(jax.tree.leaves(eqx.filter(driven.car.vehicle, eqx.is_inexact_array))[0])
+    dtype = dtype_of(driven.car.vehicle)
     rows, steps = jnp.asarray(grid.rows, dtype), jnp.asarray(grid.steps, dtype)
     if adjoint is None:
         adjoint = diffrax.RecursiveCheckpointAdjoint()
@@ -103,7 +103,8 @@ def _solve(driven: Driven, start, rows, steps, solver, controller, until, adjoin
         max_steps=len(steps) if fixed else ADAPTIVE_STEPS_A_ROW * len(steps),
         throw=False,
     )
-    x, (end,) = solution.ys
+    ys: Any = solution.ys
+    x, (end,) = ys
     if until is not None:
         reached = rows <= end
         x = jax.tree.map(lambda leaf: jnp.where(reached, leaf, jnp.nan), x)

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh.simulation.driven import Driven
+from jaxveh.simulation.driven import Driven, dtype_of
 from jaxveh.statespace import RK4
 
 STABLE = 2.5
@@ -74,7 +74,7 @@ def may_be_stiff(driven: Driven) -> bool:
 
 def at_start(driven: Driven, values: dict, times: np.ndarray) -> float:
     """The fastest pole at the start, 1/s."""
-    dtype = jnp.result_type(jax.tree.leaves(eqx.filter(driven.car.vehicle, eqx.is_inexact_array))[0])
+    dtype = dtype_of(driven.car.vehicle)
     x = driven.start(jnp.asarray(times[0], dtype), dtype, **values)
     # As many rows as are looked at later: one compilation serves both.
     rows = len(looked_at(len(times)))

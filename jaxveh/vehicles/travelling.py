@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from jaxveh import numerics
+from jaxveh._core.errors import InputError
 from jaxveh._core.names import check_names, record, record_type
-from jaxveh.roads import LEVEL, Ground
+from jaxveh.roads import LEVEL, AbstractRoad, Ground, under
 from jaxveh.vehicles.base import AbstractVehicle, Motion
 
 PLACE = ("x", "y")
@@ -20,10 +19,16 @@ class Travelling(AbstractVehicle):
     With a `road` (`jaxveh.roads`) its wheels find the friction of the place where each of them stands, and the car the slopes
     of its place; without, the ground is what `evaluate` is told. Outputs gain `x`, `y` and, with a road, `grade` and `bank`
     (rad, in the car's directions) and `friction_fl` ...
+
+    **Raises** `InputError` for a road that is none.
     """
 
     vehicle: AbstractVehicle
-    road: Any = None
+    road: AbstractRoad | None = None
+
+    def __check_init__(self):
+        if not (self.road is None or isinstance(self.road, AbstractRoad)):
+            raise InputError(f"Travelling.road = {type(self.road).__name__}: must be a road of jaxveh.roads, or None.")
 
     @property
     def inputs(self):
@@ -55,8 +60,6 @@ class Travelling(AbstractVehicle):
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         inner, moves = self._inner(x), self.motion(x, u)
         if self.road is not None:
-            from jaxveh.roads import under
-
             ground = under(self.road, x.x, x.y, moves.yaw, self.wheel_positions)
         rates, outputs = self.vehicle.evaluate(t, inner, u, ground)
         shown = {"x": x.x, "y": x.y, **outputs._asdict()}
