@@ -1,6 +1,6 @@
 """Faults of devices: each wraps a device and acts on what it says (after delay, limits and rounding)."""
 
-from __future__ import annotations
+# No postponed annotations here: equinox does not see an AbstractVar in a string.
 
 import abc
 from collections.abc import Mapping

@@ -1,6 +1,6 @@
 """Devices around a device: what they do not change is the inner one's."""
 
-from __future__ import annotations
+# No postponed annotations here: equinox does not see an AbstractVar in a string.
 
 from collections.abc import Mapping
 from typing import Any
