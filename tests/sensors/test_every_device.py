@@ -27,7 +27,7 @@ class Device(NamedTuple):
 
 
 def imu(**clock):
-    axes = dict.fromkeys(("a_x", "a_y", "a_z", "roll_rate", "pitch_rate", "yaw_rate"), SMOOTH)
+    axes = {"a_y": SMOOTH, "a_z": Signal(), "roll_rate": Signal(), "yaw_rate": ROUND}
     return sensors.IMU(axes, SPOT, Alignment(0.02, -0.03, 0.05), LowPass(15.0), **clock)
 
 
@@ -44,8 +44,14 @@ def optical(**clock):
     return sensors.OpticalSideslip(dict.fromkeys(("v_x", "v_y", "sideslip"), SMOOTH), SPOT, 0.5, **clock)
 
 
+def light(**clock):
+    """A device that compiles fast, for those that wrap one."""
+    axes = {"a_x": Signal(bias=0.1), "a_y": Signal(noise=0.02), "a_z": Signal(), "yaw_rate": Signal(noise=0.01)}
+    return sensors.IMU(axes, **clock)
+
+
 def faulty(**clock):
-    device = sensors.BiasStep(imu(**clock), "a_x", 0.5, 0.3)
+    device = sensors.BiasStep(light(**clock), "a_x", 0.5, 0.3)
     device = sensors.Stuck(device, ("a_y", "a_z"), 0.7, 0.9)
     return sensors.Dropout(sensors.Spikes(device, "yaw_rate", 0.2, 0.5), probability=0.1)
 
@@ -69,7 +75,9 @@ DEVICES = {
         lambda d: d.signals["drive_torque"].scale,
     ),
     "faulty": Device(faulty, lambda d: d.device.device.device.size),
-    "Renamed": Device(lambda **c: sensors.Renamed(imu(**c), {"a_x": "second"}), lambda d: d.device.signals["a_x"].bias),
+    "Renamed": Device(
+        lambda **c: sensors.Renamed(light(**c), {"a_x": "second"}), lambda d: d.device.signals["a_x"].bias
+    ),
 }
 
 
@@ -111,7 +119,7 @@ def slopes(device, times, outputs, key):
 @pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
 def test_it_says_its_channels_in_the_outputs_dtype(device, dtype):
     said = heard(device, jax.random.key(0), dtype=dtype)
-    assert tuple(said) == device.channels and set(device.units) == set(device.channels)
+    assert set(said) == set(device.channels) == set(device.units)
     for value in said.values():
         assert value.dtype == dtype and value.shape == device.sample_times(2.0).shape
         assert np.isfinite(value).mean() > 0.5 and not np.isinf(value).any()

@@ -43,7 +43,7 @@ def test_a_stuck_channel_says_its_last_value():
 
 
 def test_a_channel_that_is_stuck_from_the_start_says_its_first_value():
-    said = heard(Stuck(NOISY, "a_x", 0.0, np.inf))[1]
+    said = heard(Stuck(NOISY, "a_x", 0.0))[1]
     np.testing.assert_array_equal(said["a_x"], HEALTHY["a_x"][0])
 
 

@@ -40,8 +40,8 @@ def heard(device):
 
 
 def test_offset_and_steps():
-    said = heard(SteeringAngle(Signal(bias=0.05, quantisation=0.02), rate=100.0))
-    np.testing.assert_allclose(said, 0.02 * np.round((LOOP + 0.05) / 0.02), atol=1e-12)
+    said = heard(SteeringAngle(Signal(bias=0.053, quantisation=0.02), rate=100.0))
+    np.testing.assert_allclose(said, 0.02 * np.round((LOOP + 0.053) / 0.02), atol=1e-12)
 
 
 def test_the_steering_wheel_is_the_cars_or_made_of_a_ratio():
