@@ -41,32 +41,40 @@ def everything(driver, t, motion, state):
     return jnp.stack([*driver.inputs(t, motion, state), *driver.derivatives(t, motion, state)])
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.fixture(scope="module")
+def batch():
+    return Motion(*[jnp.asarray(values) for values in zip(*MOTIONS, strict=True)])
+
+
 @pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
-def test_values_and_gradients_are_finite_in_their_precision(driver, motion, dtype):
-    driver, motion, t = cast(driver, dtype), arrays(motion, dtype), jnp.asarray(5.0, dtype)
-    state = driver.start(t, motion)
+def test_values_and_gradients_are_finite_in_their_precision(driver, batch, dtype):
+    driver, batch, t = cast(driver, dtype), cast(batch, dtype), jnp.asarray(5.0, dtype)
+    state = driver.start(t, batch)
     assert state._fields == driver.state_names
-    assert type(driver.derivatives(t, motion, state)) is type(state)
+    assert type(driver.derivatives(t, batch, state)) is type(state)
     assert {leaf.dtype for leaf in state} <= {jnp.dtype(dtype)}
-    values = jax.jit(everything)(driver, t, motion, state)
+
+    @eqx.filter_jit
+    @eqx.filter_value_and_grad(has_aux=True)
+    def total(args):
+        driver, t, batch, state = args
+        values = jax.vmap(lambda motion, own: everything(driver, t, motion, own))(batch, state)
+        return jnp.sum(values), values
+
+    (_, values), gradients = total((driver, t, batch, state))
     assert values.dtype == dtype and np.isfinite(values).all()
-    total = lambda *args: jnp.sum(everything(*args))
-    gradients = eqx.filter_jit(eqx.filter_grad(lambda args: total(*args)))((driver, t, motion, state))
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(gradients))
 
 
-def test_a_batch_is_its_members(driver):
-    batch = Motion(*[jnp.asarray(values) for values in zip(*MOTIONS, strict=True)])
+def test_a_batch_is_its_members(driver, batch):
     t = jnp.asarray(5.0)
     state = driver.start(t, batch)
-    mapped = jax.vmap(lambda motion: driver.start(t, motion))(batch)
-    for name in driver.state_names:
-        np.testing.assert_allclose(getattr(state, name), getattr(mapped, name), rtol=1e-12, atol=1e-13)
-    one = jax.vmap(lambda m, x: everything(driver, t, m, x))(batch, mapped)
+    whole = jax.jit(lambda t, m, x: everything(driver, t, m, x))
+    mapped = jax.vmap(whole, in_axes=(None, 0, 0))(t, batch, state)
     for number, motion in enumerate(MOTIONS):
-        alone = everything(driver, t, arrays(motion), driver.start(t, arrays(motion)))
-        np.testing.assert_allclose(one[number], alone, rtol=1e-11, atol=1e-12)
+        own = driver.start(t, arrays(motion))
+        np.testing.assert_allclose([leaf[number] for leaf in state], list(own), rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(mapped[number], whole(t, arrays(motion), own), rtol=1e-11, atol=1e-12)
 
 
 def test_gradients_are_those_of_differences(driver):
@@ -74,13 +82,14 @@ def test_gradients_are_those_of_differences(driver):
     state = driver.start(t, motion)
     if driver.state_names:
         state = type(state)(*[leaf + 0.01 for leaf in state])
-    slope = jax.jacfwd(lambda *args: everything(driver, *args), argnums=(0, 1, 2))(t, motion, state)
+    found = jax.jit(lambda *args: everything(driver, *args))
+    slope = jax.jit(jax.jacfwd(found, argnums=(0, 1, 2)))(t, motion, state)
     leaves, treedef = jax.tree.flatten((t, motion, state))
     for number, column in enumerate(jax.tree.leaves(slope)):
         up, down = (
             jax.tree.unflatten(treedef, [v + (i == number) * h for i, v in enumerate(leaves)]) for h in (1e-6, -1e-6)
         )
-        difference = (everything(driver, *up) - everything(driver, *down)) / 2e-6
+        difference = (found(*up) - found(*down)) / 2e-6
         np.testing.assert_allclose(column, difference, rtol=1e-5, atol=1e-5)
 
 

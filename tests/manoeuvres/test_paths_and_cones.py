@@ -29,10 +29,9 @@ def point(path, s):
     def step(place, _):
         x, y, heading = place
         target = path.preview(x, y, heading, s / 2000)
-        x, y = (
-            x + target.ahead * jnp.cos(heading) - target.left * jnp.sin(heading),
-            y + target.ahead * jnp.sin(heading) + target.left * jnp.cos(heading),
-        )
+        cosine, sine = jnp.cos(heading), jnp.sin(heading)
+        x = x + target.ahead * cosine - target.left * sine
+        y = y + target.ahead * sine + target.left * cosine
         return (x, y, path.beside(x, y).heading), None
 
     start = (jnp.asarray(0.0), path.y(0.0) if hasattr(path, "y") else jnp.asarray(0.0), jnp.asarray(0.0))
@@ -175,7 +174,10 @@ def test_clearance_sees_the_corners_and_the_sides_of_a_body_that_stands_askew():
 def test_clearance_counts_the_overhang():
     x, y, yaw = straight(0.0)
     ahead = manoeuvres.clearance(x, y, yaw + 0.1, 1.0, 4.0, COURSE, centre=0.5)
-    np.testing.assert_allclose(ahead, 1.5 - (2.5 * np.sin(0.1) + 0.5 * np.cos(0.1)), rtol=1e-12)
+    front, rear = (reach * np.sin(0.1) + 0.5 * np.cos(0.1) for reach in (2.5, 1.5))
+    np.testing.assert_allclose(ahead, min(1.5 - front, 1.2 - rear), rtol=1e-12)
+    back = manoeuvres.clearance(x, y, yaw + 0.1, 1.0, 4.0, COURSE, centre=-0.5)
+    np.testing.assert_allclose(back, min(1.5 - rear, 1.2 - front), rtol=1e-12)
 
 
 def test_a_drive_that_ends_before_the_course_does_not_pass():
