@@ -17,7 +17,7 @@ def iso_lane_change(
     width: float = 1.8,
     *,
     start: float = 30.0,
-    lead: float = 5.0,
+    lead: float = 4.0,
     duration: float | None = None,
     **driver,
 ) -> PathDriver:
@@ -33,11 +33,11 @@ def iso_lane_change(
 
 
 def iso_obstacle_avoidance(
-    speed=50 / 3.6,
+    speed=45 / 3.6,
     width: float = 1.8,
     *,
     start: float = 30.0,
-    lead: float = 2.0,
+    lead: float = 1.0,
     duration: float | None = None,
     **driver,
 ) -> PathDriver:
@@ -77,9 +77,8 @@ def steady_circle(
     duration = start + time + 2.0 if duration is None else duration
     check_drive(from_speed, duration)
     check_drive(to_speed, duration)
-    return PathDriver(
-        Circle(radius), ChangingSpeed(from_speed, to_speed, float(start), float(time)), float(duration), **driver
-    )
+    speed = ChangingSpeed(from_speed, to_speed, float(start), float(time))
+    return PathDriver(path=Circle(radius), speed=speed, duration=float(duration), **driver)
 
 
 def _driver(path, speed, length: float, duration: float | None, driver: dict) -> PathDriver:
@@ -90,4 +89,4 @@ def _driver(path, speed, length: float, duration: float | None, driver: dict) ->
         check_positive("speed", speed, "m/s")
         duration = math.ceil(100 * length / float(speed)) / 100
     check_drive(speed, duration)
-    return PathDriver(path, SteadySpeed(speed), float(duration), **driver)
+    return PathDriver(path=path, speed=SteadySpeed(speed), duration=float(duration), **driver)
