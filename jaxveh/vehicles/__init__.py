@@ -18,8 +18,11 @@ from jaxveh.vehicles.parameter_sets import (
 )
 from jaxveh.vehicles.seven_dof import SevenDOF
 from jaxveh.vehicles.single_track import SingleTrack, SingleTrackOutputs, SingleTrackState
+from jaxveh.vehicles.single_track_3dof import SingleTrack3DOF
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
 from jaxveh.vehicles.travelling import Travelling
+from jaxveh.vehicles.two_track_2dof import TwoTrack2DOF
+from jaxveh.vehicles.two_track_3dof import TwoTrack3DOF
 
 __all__ = [
     "GRAVITY",
@@ -34,10 +37,13 @@ __all__ = [
     "QuasiStatic",
     "SevenDOF",
     "SingleTrack",
+    "SingleTrack3DOF",
     "SingleTrackOutputs",
     "SingleTrackState",
     "StaticLoads",
     "Travelling",
+    "TwoTrack2DOF",
+    "TwoTrack3DOF",
     "axle_from_stiffness",
     "from_specification",
     "linear",
