@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import equinox as eqx
 import jax
 
 from jaxveh._core.errors import InputError, check
@@ -48,6 +49,13 @@ class Steered(AbstractVehicle):
     inertia: jax.Array | None = positive("kg m^2", default=None)
     trail: jax.Array = parameter("m", scale=0.03, default=0.0)
     assist: jax.Array = parameter("-", scale=1.0, default=0.0)
+    # Kept apart from the parameters, which may be taken out while they are estimated.
+    own_states: tuple[str, ...] = eqx.field(static=True, default=())
+
+    def __init__(self, vehicle, ratio, compliance=None, damping=300.0, inertia=None, trail=0.0, assist=0.0):
+        self.vehicle, self.ratio, self.compliance, self.damping = vehicle, ratio, compliance, damping
+        self.inertia, self.trail, self.assist = inertia, trail, assist
+        self.own_states = () if compliance is None else ("steer",) if inertia is None else ("steer", "steer_rate")
 
     def __check_init__(self):
         if not isinstance(self.vehicle, AbstractVehicle):
@@ -69,7 +77,7 @@ class Steered(AbstractVehicle):
     @property
     def state_type(self):
         """The vehicle's; with a compliance `steer` (rad), with an inertia `steer_rate` (rad/s), at its end."""
-        return record_type("SteeredState", (*self.vehicle.state_type._fields, *self._own_states))
+        return record_type("SteeredState", (*self.vehicle.state_type._fields, *self.own_states))
 
     @property
     def units(self):
@@ -87,10 +95,10 @@ class Steered(AbstractVehicle):
         """The vehicle's start with the road wheels at `steering_wheel / ratio`."""
         check_names("start", values, self.state_type._fields)
         steer = values.get("steer", u.steering_wheel / self.ratio)
-        rest = {name: value for name, value in values.items() if name not in self._own_states}
+        rest = {name: value for name, value in values.items() if name not in self.own_states}
         inner = self.vehicle.start(t, _steering(u, steer), **rest)
         own = {"steer": steer + 0.0 * inner[0], "steer_rate": values.get("steer_rate", 0.0) + 0.0 * inner[0]}
-        return self.state_type(*inner, *[own[name] for name in self._own_states])
+        return self.state_type(*inner, *[own[name] for name in self.own_states])
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         inner_x, inner_u = self._inner(x, u)
@@ -98,7 +106,7 @@ class Steered(AbstractVehicle):
         moment = _aligning(outputs, self.trail)
         shown = outputs._asdict() | {"steering_wheel": u.steering_wheel, "steer": inner_u.steer}
         own = ()
-        if self.compliance is not None:
+        if self.own_states:
             if moment is None:
                 raise InputError(
                     f"Steered.vehicle = {type(self.vehicle).__name__}: says no front lateral force that would twist "
@@ -111,20 +119,14 @@ class Steered(AbstractVehicle):
             shown["steering_torque"] = -moment / (self.ratio * (1.0 + self.assist))
         return self.state_type(*rates, *own), record("SteeredOutputs", filled(shown, inner_u.steer))
 
-    @property
-    def _own_states(self) -> tuple[str, ...]:
-        if self.compliance is None:
-            return ()
-        return ("steer",) if self.inertia is None else ("steer", "steer_rate")
-
     def _turning(self, x, moment) -> tuple:
-        if self.inertia is None:
+        if "steer_rate" not in self.own_states:
             return (moment / self.damping,)
         return x.steer_rate, (moment - self.damping * x.steer_rate) / self.inertia
 
     def _inner(self, x, u):
-        steer = u.steering_wheel / self.ratio if self.compliance is None else x.steer
-        inner = self.vehicle.state_type(*x[: len(x) - len(self._own_states)])
+        steer = u.steering_wheel / self.ratio if not self.own_states else x.steer
+        inner = self.vehicle.state_type(*x[: len(x) - len(self.own_states)])
         return inner, _steering(u, steer)
 
 
