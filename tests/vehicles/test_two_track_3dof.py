@@ -37,14 +37,12 @@ def turning(car, **more):
 
 
 def test_a_gentle_manoeuvre_is_that_of_seven_degrees_of_freedom():
-    # Under a small torque and 2 m/s^2 sideways the slip ratios that the spins add stay below 1 per cent.
-    lag = vehicles.LaggedLoads(0.1)
-    cars = car_of(TwoTrack3DOF, load_transfer=lag), car_of(vehicles.SevenDOF, load_transfer=lag)
-    at = lambda t: inputs(drive_torque=100.0, brake_torque=0.0)._asdict() | {"steer": 0.015 * jnp.sin(2.0 * t)}
-    U_at = lambda t: type(inputs(steer=0.0, drive_torque=0.0, brake_torque=0.0))(
-        at(t)["steer"], at(t)["drive_torque"], at(t)["brake_torque"]
-    )
-    short, full = (drive(car, U_at, car.start(0.0, U, v_x=20.0), 4.0, 1e-3) for car in cars)
+    # The torque balances the drag, so that the wheels' inertia, which this car lacks, has next to nothing to say.
+    more = {"load_transfer": vehicles.LaggedLoads(0.1), "drag": 0.4}
+    cars = car_of(TwoTrack3DOF, **more), car_of(vehicles.SevenDOF, **more)
+    gentle = inputs(steer=0.0, drive_torque=0.4 * 20.0**2 * RADIUS, brake_torque=0.0)
+    at = lambda t: gentle._replace(steer=0.015 * jnp.sin(2.0 * t))
+    short, full = (drive(car, at, car.start(0.0, U, v_x=20.0), 4.0, 1e-3) for car in cars)
     for name in ("v_x", "v_y", "yaw", "yaw_rate"):
         found, expected = getattr(short, name), getattr(full, name)
         assert np.max(np.abs(found - expected)) < 0.01 * np.max(np.abs(expected)), name
@@ -67,7 +65,7 @@ def test_the_ellipse_holds_and_ends_at_a_tenth_of_the_lateral_force():
     found = within_grip(tyres.Forces(F_y=F_y0, M_z=-50.0), wish, limit)
     np.testing.assert_allclose((found.F_x / limit) ** 2 + (found.F_y / F_y0) ** 2, 1.0, rtol=1e-13)
     np.testing.assert_allclose(found.M_z / -50.0, found.F_y / F_y0, rtol=1e-13)
-    np.testing.assert_allclose(found.F_y[[0, -1]], 0.1 * F_y0, rtol=1e-12)
+    np.testing.assert_allclose((found.F_y[0], found.F_y[-1]), 0.1 * F_y0, rtol=1e-12)
     gentle = np.abs(wish) < 0.89 * limit
     np.testing.assert_allclose(found.F_x[gentle], wish[gentle], rtol=1e-14)
     assert (np.diff(found.F_x) >= 0).all()
