@@ -67,7 +67,7 @@ def test_at_standstill_the_wheels_turn_as_a_spring_and_damper_do(inertia):
     else:
         fading, ring = C / (2 * inertia), np.sqrt(k / inertia - (C / (2 * inertia)) ** 2)
         expected = end * (1 - np.exp(-fading * t) * (np.cos(ring * t) + fading / ring * np.sin(ring * t)))
-        assert expected.max() > 1.05 * end
+        assert expected.max() > 1.04 * end  # It rings: exp(-pi) is the first overshoot.
     np.testing.assert_allclose(x.steer, expected, rtol=1e-6, atol=1e-12)
 
 
