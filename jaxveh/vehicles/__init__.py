@@ -16,10 +16,16 @@ from jaxveh.vehicles.parameter_sets import (
     passenger_car,
     passenger_car_as_printed,
 )
+from jaxveh.vehicles.roll_3dof import Roll3DOF
+from jaxveh.vehicles.roll_4dof import Roll4DOF
 from jaxveh.vehicles.seven_dof import SevenDOF
 from jaxveh.vehicles.single_track import SingleTrack, SingleTrackOutputs, SingleTrackState
+from jaxveh.vehicles.single_track_3dof import SingleTrack3DOF
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
+from jaxveh.vehicles.steered import Steered
 from jaxveh.vehicles.travelling import Travelling
+from jaxveh.vehicles.two_track_2dof import TwoTrack2DOF
+from jaxveh.vehicles.two_track_3dof import TwoTrack3DOF
 
 __all__ = [
     "GRAVITY",
@@ -32,12 +38,18 @@ __all__ = [
     "MeasuredLoads",
     "Motion",
     "QuasiStatic",
+    "Roll3DOF",
+    "Roll4DOF",
     "SevenDOF",
     "SingleTrack",
+    "SingleTrack3DOF",
     "SingleTrackOutputs",
     "SingleTrackState",
     "StaticLoads",
+    "Steered",
     "Travelling",
+    "TwoTrack2DOF",
+    "TwoTrack3DOF",
     "axle_from_stiffness",
     "from_specification",
     "linear",
