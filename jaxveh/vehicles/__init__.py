@@ -1,7 +1,15 @@
 """Equations of motion and outputs of one vehicle at one instant; named parameter sets."""
 
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
+from jaxveh.vehicles.commanded import Commanded
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive, FourMotors
+from jaxveh.vehicles.kinematic import Kinematic, KinematicOutputs, KinematicState
+from jaxveh.vehicles.kinematic_crawl import KinematicCrawl
+from jaxveh.vehicles.kinematic_trailer import KinematicTrailer, KinematicTrailerOutputs, KinematicTrailerState
+from jaxveh.vehicles.lateral_system import LateralResponse, LateralSystem
+from jaxveh.vehicles.limits import AccelerationLimits, SteerLimits
+from jaxveh.vehicles.linear_handling import LinearSingleTrack, LinearSingleTrackState
+from jaxveh.vehicles.linearisation import linear_single_track
 from jaxveh.vehicles.load_transfer import (
     AbstractLoadTransfer,
     LaggedLoads,
@@ -9,6 +17,7 @@ from jaxveh.vehicles.load_transfer import (
     QuasiStatic,
     StaticLoads,
 )
+from jaxveh.vehicles.longitudinal import Longitudinal, LongitudinalOutputs, LongitudinalState
 from jaxveh.vehicles.parameter_sets import (
     axle_from_stiffness,
     from_specification,
@@ -26,9 +35,25 @@ __all__ = [
     "AbstractDrive",
     "AbstractLoadTransfer",
     "AbstractVehicle",
+    "AccelerationLimits",
     "AxleDrive",
+    "Commanded",
     "FourMotors",
+    "Kinematic",
+    "KinematicCrawl",
+    "KinematicOutputs",
+    "KinematicState",
+    "KinematicTrailer",
+    "KinematicTrailerOutputs",
+    "KinematicTrailerState",
     "LaggedLoads",
+    "LateralResponse",
+    "LateralSystem",
+    "LinearSingleTrack",
+    "LinearSingleTrackState",
+    "Longitudinal",
+    "LongitudinalOutputs",
+    "LongitudinalState",
     "MeasuredLoads",
     "Motion",
     "QuasiStatic",
@@ -37,10 +62,12 @@ __all__ = [
     "SingleTrackOutputs",
     "SingleTrackState",
     "StaticLoads",
+    "SteerLimits",
     "Travelling",
     "axle_from_stiffness",
     "from_specification",
     "linear",
+    "linear_single_track",
     "passenger_car",
     "passenger_car_as_printed",
     "regularised_speed",
