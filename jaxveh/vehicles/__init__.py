@@ -1,5 +1,6 @@
 """Equations of motion and outputs of one vehicle at one instant; named parameter sets."""
 
+from jaxveh.vehicles import sets
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
 from jaxveh.vehicles.commanded import Commanded
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive, FourMotors
@@ -25,6 +26,16 @@ from jaxveh.vehicles.parameter_sets import (
     passenger_car,
     passenger_car_as_printed,
 )
+from jaxveh.vehicles.sets import (
+    CarNumbers,
+    SuspensionNumbers,
+    TyreNumbers,
+    build,
+    commonroad_limits,
+    from_commonroad,
+    named_car,
+    numbers_of,
+)
 from jaxveh.vehicles.seven_dof import SevenDOF
 from jaxveh.vehicles.single_track import SingleTrack, SingleTrackOutputs, SingleTrackState
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
@@ -37,6 +48,7 @@ __all__ = [
     "AbstractVehicle",
     "AccelerationLimits",
     "AxleDrive",
+    "CarNumbers",
     "Commanded",
     "FourMotors",
     "Kinematic",
@@ -63,13 +75,21 @@ __all__ = [
     "SingleTrackState",
     "StaticLoads",
     "SteerLimits",
+    "SuspensionNumbers",
     "Travelling",
+    "TyreNumbers",
     "axle_from_stiffness",
+    "build",
+    "commonroad_limits",
+    "from_commonroad",
     "from_specification",
     "linear",
     "linear_single_track",
+    "named_car",
+    "numbers_of",
     "passenger_car",
     "passenger_car_as_printed",
     "regularised_speed",
+    "sets",
     "slip_angle",
 ]
