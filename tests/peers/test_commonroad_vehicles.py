@@ -10,7 +10,9 @@ scaled by ours over theirs. What is not the same, each with its test:
 - A trailer at a right angle stays there for ever; ours leaves where the car pulls it away.
 """
 
+import dataclasses
 import importlib
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -19,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import vehicles
+from jaxveh import io, vehicles
 
 pytestmark = pytest.mark.peers
 
@@ -199,3 +201,31 @@ def test_the_rate_of_the_kinematic_sideslip_is_ours(p_mass):
     commands = np.array([[0.3, 0.0]])
     slope = 0.3 * float(jax.grad(lambda steer: jnp.arctan(lean * jnp.tan(steer)))(0.5))
     np.testing.assert_allclose(ours(our_single_track(p_mass), NAMES["st"], rows, commands)[0, 6], slope, rtol=1e-12)
+
+
+FOLDER = Path(parameters.__file__).parent / "parameters"
+CARS = {1: "ford_escort", 2: "bmw_320i", 3: "vw_vanagon", 4: "semi_trailer_truck"}
+
+
+@pytest.mark.parametrize("number", CARS)
+def test_their_files_read_and_are_the_cars_of_our_sets(number, p_of):
+    p = p_of(number)
+    spec = io.read_commonroad(FOLDER / f"parameters_vehicle{number}.yaml", FOLDER / "parameters_tire.yaml")
+    ours = getattr(vehicles.sets.commonroad_cars, CARS[number])()
+    for entry in dataclasses.fields(spec):
+        if entry.name == "tyre":
+            continue
+        read, kept = getattr(spec, entry.name), getattr(ours, entry.name)
+        theirs = p
+        for part in entry.metadata["key"].split("."):
+            theirs = getattr(theirs, part)
+        assert read == (None if theirs is None else float(theirs)), entry.name
+        if kept is not None:
+            np.testing.assert_allclose(kept, read, rtol=5e-5, err_msg=entry.name)
+    known = {name: value for name, value in spec.tyre.items() if value != 0}
+    assert ours.tyre is None or dict(ours.tyre) == known
+
+
+@pytest.fixture
+def p_of():
+    return parameters.setup_vehicle_parameters

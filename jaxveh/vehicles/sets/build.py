@@ -60,5 +60,6 @@ def _tyres(numbers: CarNumbers, entries, options) -> dict[str, Any]:
 def _drive(numbers: CarNumbers, entries, options) -> dict[str, Any]:
     if "drive" not in entries or "drive" in options:
         return {}
-    drive = FourMotors() if numbers.four_motors else AxleDrive(numbers.front_drive, numbers.front_brake)
-    return {"drive": drive}
+    if numbers.four_motors:
+        return {"drive": FourMotors()}
+    return {"drive": AxleDrive(front_drive=numbers.front_drive, front_brake=numbers.front_brake)}

@@ -11,8 +11,10 @@ RIDE_FRONT, RIDE_REAR = 1.3, 1.5
 """Hz: natural frequencies of the body on its springs."""
 DAMPING = 0.27
 """Damping ratio of the body on its springs."""
-ROLL_RADIUS, PITCH_RADIUS = 0.34, 0.48
-"""Radii of gyration of the sprung mass over the mean track and over the wheelbase."""
+ROLL_RADIUS = 0.34
+"""Radius of gyration of the sprung mass in roll over the mean track."""
+PITCH_OVER_YAW = 1.04
+"""Pitch inertia of the sprung mass over its yaw inertia."""
 TYRE_STIFFNESS = 50.0
 """1/m: vertical stiffness of a tyre over its load at rest."""
 
@@ -32,7 +34,7 @@ def estimated_suspension(
 ) -> SuspensionNumbers:
     """An ordinary car's suspension under a car whose other numbers are known: **an estimate of our own**.
 
-    Frequencies, damping ratio, radii of gyration and the tyre's stiffness are about those of the cars that were measured for
+    Frequencies, damping ratio, roll and pitch inertia and the tyre's stiffness are about those of the cars that were measured for
     CommonRoad (`commonroad_cars`); anti-roll bars have 0.2 and 0.05 of the springs' stiffness, roll centres lie 0.05 m and 0.1 m
     high. The sprung mass' place and yaw inertia follow from the car's, with the unsprung masses as points in the wheels' centres.
     """
@@ -49,7 +51,7 @@ def estimated_suspension(
         unsprung_mass_front=unsprung_mass_front,
         unsprung_mass_rear=unsprung_mass_rear,
         roll_inertia=sprung * (ROLL_RADIUS * 0.5 * (track_front + track_rear)) ** 2,
-        pitch_inertia=sprung * (PITCH_RADIUS * length) ** 2,
+        pitch_inertia=PITCH_OVER_YAW * (yaw_inertia - turning),
         yaw_inertia=yaw_inertia - turning,
         front_axle_to_cg=a_s,
         rear_axle_to_cg=length - a_s,
