@@ -2,6 +2,7 @@
 
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive, FourMotors
+from jaxveh.vehicles.fourteen_dof import FourteenDOF
 from jaxveh.vehicles.load_transfer import (
     AbstractLoadTransfer,
     LaggedLoads,
@@ -28,6 +29,7 @@ __all__ = [
     "AbstractVehicle",
     "AxleDrive",
     "FourMotors",
+    "FourteenDOF",
     "LaggedLoads",
     "MeasuredLoads",
     "Motion",
