@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
@@ -170,7 +171,7 @@ class FourteenDOF(AbstractVehicle):
             forces,
             omegas,
         )
-        shafts = self._shafts(stand, u, omegas)
+        roads, shafts = numerics.stored((roads, self._shafts(stand, u, omegas)))
         suspension, damping = suspension_forces(self, of(x, "travel"), of(x, "travel_rate"))
         found = self._accelerate(x, stand, roads, shafts, suspension, omegas, g)
         roll, pitch, yaw = angle_accelerations(body.axes, x, body.omega, found.angular)
@@ -203,7 +204,7 @@ class FourteenDOF(AbstractVehicle):
 
     def _stand(self, x, u, ground: Ground) -> Stand:
         """How the car stands on the road, before any tyre force."""
-        body = body_of(x)
+        body = numerics.stored(body_of(x))
         wheels = each(
             lambda joint, travel, rate: wheel_at(joint, travel, rate, body),
             joints(self), of(x, "travel"), of(x, "travel_rate"),
@@ -213,7 +214,8 @@ class FourteenDOF(AbstractVehicle):
             lambda wheel, axis, omega, mu: touch(self, body, wheel, axis, omega, mu),
             wheels, turned, of(x, "omega"), frictions(ground),
         )  # fmt: skip
-        return Stand(body, wheels, turned, Wheels(*[b[0] for b in both]), Wheels(*[b[1] for b in both]))
+        stand = Stand(body, wheels, turned, Wheels(*[b[0] for b in both]), Wheels(*[b[1] for b in both]))
+        return numerics.stored(stand)
 
     def _shafts(self, stand: Stand, u, omegas: Wheels) -> Wheels:
         """Torques of motors and brakes, which sit on the body."""

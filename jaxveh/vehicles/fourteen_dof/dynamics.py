@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from jaxveh.numerics import solve_scalars
+from jaxveh.numerics import solve_scalars, stored
 from jaxveh.vehicles.fourteen_dof.suspension import Joint, Wheel
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
-from jaxveh.vehicles.wheels import Wheels, each
+from jaxveh.vehicles.wheels import Wheels, each, total
 
 
 class Inertia(NamedTuple):
@@ -51,11 +51,12 @@ def accelerations(
     and leaves for the body a symmetric system in (a, alpha), in which each wheel has the inertia of a point mass across its
     joint: m_u (J^T J - q q^T / |d|^2) with J = (1, -[r]x).
     """
-    on_wheel = each(_free_force, joints, wheels, on_wheels)
-    matrix, b = _body_alone(inertia, omega, spin, force, moment)
-    for joint, wheel, G, S in zip(joints, wheels, on_wheel, suspension, strict=True):
-        matrix, b = _with_wheel(matrix, b, joint, wheel, G, S)
-    found = solve_scalars(matrix, b)
+    on_wheel = each(lambda joint, wheel, F: minus(F, scaled(joint.mass, wheel.bias)), joints, wheels, on_wheels)
+    ways = each(lambda joint, wheel: (*joint.slope, *cross(wheel.place, joint.slope)), joints, wheels)
+    matrix = _matrix(inertia, joints, wheels, ways)
+    b = _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension)
+    matrix, b = stored((matrix, b))
+    found = stored(solve_scalars(matrix, b))
     linear, angular = Vector(*found[:3]), Vector(*found[3:])
 
     def travel(joint: Joint, wheel: Wheel, G: Vector, S: Any):
@@ -65,44 +66,34 @@ def accelerations(
     return Accelerations(linear, angular, each(travel, joints, wheels, on_wheel, suspension))
 
 
-def _free_force(joint: Joint, wheel: Wheel, force: Vector) -> Vector:
-    """Force on a wheel less what its centripetal and Coriolis acceleration needs, N."""
-    return minus(force, scaled(joint.mass, wheel.bias))
+def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> list:
+    """Rows up to the diagonal of the system in (a, alpha): all as one rigid body, less what the joints leave free."""
+    m = each(lambda joint: joint.mass, joints)
+    moment = each(lambda mass, wheel: scaled(mass, wheel.place), m, wheels)
+    s = add(*moment)
+    second = lambda a, b: total(each(lambda f, wheel: getattr(f, a) * getattr(wheel.place, b), moment, wheels))
+    xx, yy, zz = second("x", "x"), second("y", "y"), second("z", "z")
+    xy, xz, yz = second("x", "y"), second("x", "z"), second("y", "z")
+    mass = inertia.mass + total(m)
+    rigid = [
+        [mass],
+        [0.0, mass],
+        [0.0, 0.0, mass],
+        [0.0, -s.z, s.y, inertia.x + (yy + zz)],
+        [s.z, 0.0, -s.x, -xy, inertia.y + (xx + zz)],
+        [-s.y, s.x, 0.0, -inertia.xz - xz, -yz, inertia.z + (xx + yy)],
+    ]
+    shares = each(lambda joint, q: [joint.mass / joint.square * e for e in q], joints, ways)
+    free = lambda i, j: total(each(lambda share, q: share[i] * q[j], shares, ways))
+    return [[entry - free(i, j) for j, entry in enumerate(row)] for i, row in enumerate(rigid)]
 
 
-def _body_alone(inertia: Inertia, omega: Vector, spin: Vector, force: Vector, moment: Vector):
-    """Rows of the system up to the diagonal, and its right-hand side, of the body without wheels."""
+def _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension) -> list:
+    """Forces and moments on all as one rigid body, less what the joints do not carry."""
     I, w = inertia, omega
     turns = Vector(I.x * w.x - I.xz * w.z, I.y * w.y, I.z * w.z - I.xz * w.x)
     rest = minus(moment, cross(w, add(turns, spin)))
-    matrix = [
-        [I.mass],
-        [0.0, I.mass],
-        [0.0, 0.0, I.mass],
-        [0.0, 0.0, 0.0, I.x],
-        [0.0, 0.0, 0.0, 0.0, I.y],
-        [0.0, 0.0, 0.0, -I.xz, 0.0, I.z],
-    ]
-    return matrix, [*force, *rest]
-
-
-def _with_wheel(matrix: list, b: list, joint: Joint, wheel: Wheel, G: Vector, S: Any):
-    """The system with one wheel more."""
-    m, r, d = joint.mass, wheel.place, joint.slope
-    q = (*d, *cross(r, d))
-    share = m / joint.square
-    point = [
-        [m],
-        [0.0, m],
-        [0.0, 0.0, m],
-        [0.0, -m * r.z, m * r.y, m * (r.y * r.y + r.z * r.z)],
-        [m * r.z, 0.0, -m * r.x, -m * r.x * r.y, m * (r.x * r.x + r.z * r.z)],
-        [-m * r.y, m * r.x, 0.0, -m * r.x * r.z, -m * r.y * r.z, m * (r.x * r.x + r.y * r.y)],
-    ]
-    along = (dot(d, G) - S) / joint.square
-    rows = [
-        [old + new - share * (q[i] * q[j]) for j, (old, new) in enumerate(zip(before, added, strict=True))]
-        for i, (before, added) in enumerate(zip(matrix, point, strict=True))
-    ]
-    right = [old + new - along * e for old, new, e in zip(b, (*G, *cross(r, G)), q, strict=True)]
-    return rows, right
+    levers = each(lambda wheel, G: cross(wheel.place, G), wheels, on_wheel)
+    along = each(lambda joint, G, S: (dot(joint.slope, G) - S) / joint.square, joints, on_wheel, suspension)
+    right = [*add(force, *on_wheel), *add(rest, *levers)]
+    return [entry - total(each(lambda l, q: l * q[i], along, ways)) for i, entry in enumerate(right)]  # noqa: B023
