@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
-from jaxveh import tyres, vehicles
+from jaxveh import tyres
+from jaxveh.roads import LEVEL
 from jaxveh.tyres import AbstractTyre, Forces
 from jaxveh.vehicles import FourteenDOF
 
@@ -27,6 +29,20 @@ class Frictionless(AbstractTyre):
 
     def forces(self, contact, state=None):
         return Forces()
+
+
+class AllMoments(AbstractTyre):
+    """Every force and moment, linear and quick to compile; camber and load count."""
+
+    def forces(self, contact, state=None):
+        load, slip, camber = contact.load, contact.slip_angle, contact.camber
+        return Forces(
+            F_x=18.0 * load * contact.slip_ratio,
+            F_y=load * (14.0 * slip + 0.9 * camber),
+            M_x=-0.05 * load * camber - 0.01 * load * slip,
+            M_y=-0.004 * load,
+            M_z=load * (0.02 * camber - 0.4 * slip),
+        )
 
 
 def mf(load=4000.0):
@@ -72,5 +88,26 @@ def moving(car, u=None, v_x=20.0, **values):
 
 
 @eqx.filter_jit
-def evaluate(car, x, u, ground=vehicles.base.LEVEL):
+def evaluate(car, x, u, ground=LEVEL):
     return car.evaluate(0.0, x, u, ground)
+
+
+@eqx.filter_jit
+def roll_out(car, x, us, dt=0.001, ground=LEVEL):
+    """States and outputs at the beginning of each step of RK4, inputs held over it; (T,) in each field.
+
+    The stages are a loop: the car is compiled once.
+    """
+    shares = jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6.0
+
+    def step(x, u):
+        def stage(carried, share):
+            k, end = carried
+            here = jax.tree.map(lambda v, d: v + share[0] * dt * d, x, k)
+            k, shown = car.evaluate(0.0, here, u, ground)
+            return (k, jax.tree.map(lambda v, d: v + share[1] * dt * d, end, k)), shown
+
+        (_, end), shown = jax.lax.scan(stage, (jax.tree.map(jnp.zeros_like, x), x), shares)
+        return end, (x, jax.tree.map(lambda v: v[0], shown))
+
+    return jax.lax.scan(step, x, us)[1]
