@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import tyres
-from jaxveh.roads import LEVEL
+from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre, Forces
 from jaxveh.vehicles import FourteenDOF
 
@@ -92,12 +92,14 @@ def evaluate(car, x, u, ground=LEVEL):
     return car.evaluate(0.0, x, u, ground)
 
 
-@eqx.filter_jit
-def roll_out(car, x, us, dt=0.001, ground=LEVEL):
-    """States and outputs at the beginning of each step of RK4, inputs held over it; (T,) in each field.
+def roll_out(car, x, us, dt=0.001, grade=0.0):
+    """States and outputs at the beginning of each step of RK4, inputs held over it; (T,) in each field."""
+    return _roll_out(car, x, us, jnp.asarray(dt), Ground(grade=jnp.asarray(grade)))
 
-    The stages are a loop: the car is compiled once.
-    """
+
+@eqx.filter_jit
+def _roll_out(car, x, us, dt, ground):
+    # The stages are a loop, so that the car is compiled once.
     shares = jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6.0
 
     def step(x, u):
@@ -111,3 +113,8 @@ def roll_out(car, x, us, dt=0.001, ground=LEVEL):
         return end, (x, jax.tree.map(lambda v: v[0], shown))
 
     return jax.lax.scan(step, x, us)[1]
+
+
+def held(u, steps=4000):
+    """The same inputs at every step."""
+    return jax.tree.map(lambda v: jnp.broadcast_to(v, (steps,)), u)

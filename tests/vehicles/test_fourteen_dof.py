@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from fourteen_dof_cars import AllMoments, evaluate, inputs, lossless, make, mf, moving, roll_out
+from fourteen_dof_cars import AllMoments, evaluate, held, inputs, lossless, make, mf, moving, roll_out
 
 from jaxveh import InputError, tyres
 from jaxveh.roads import Ground
@@ -46,9 +46,8 @@ def test_nothing_moves_by_itself(v_x):
 def test_it_stands_where_it_was_put():
     """Rest is stable: a car that is dropped comes back to it."""
     car = make()
-    us = jax.tree.map(lambda v: jnp.broadcast_to(v, (4000,)), inputs())
     rest = car.start(0.0, inputs())
-    states, _ = roll_out(car, car.start(0.0, inputs(), z=0.62, roll=0.03, pitch=0.02), us)
+    states, _ = roll_out(car, car.start(0.0, inputs(), z=0.62, roll=0.03, pitch=0.02), held(inputs()))
     assert np.ptp(np.asarray(states.z)) > 0.03
     for name in ("z", "roll", "pitch", *named("travel")):
         np.testing.assert_allclose(getattr(states, name)[-1], getattr(rest, name), atol=1e-4)
@@ -155,8 +154,7 @@ def test_a_car_rolls_down_a_slope():
     """dv/dt = -g sin(grade) m / (m + 4 J / r^2), once it has sunk and its wheels roll."""
     car = make(drag=0.0, rolling_resistance=0.0)
     grade = -0.06
-    us = jax.tree.map(lambda v: jnp.broadcast_to(v, (4000,)), inputs())
-    states, shown = roll_out(car, car.start(0.0, inputs(), v_x=5.0), us, 0.001, Ground(grade=jnp.asarray(grade)))
+    states, shown = roll_out(car, car.start(0.0, inputs(), v_x=5.0), held(inputs()), grade=grade)
     gained = (states.v_x[-1] - states.v_x[2000]) / 1.999
     mass = 1370.0 + 2 * (38.0 + 42.0)
     radius = float(jnp.mean(jnp.stack([5.0 / car.start(0.0, inputs(), v_x=5.0).omega_fl])))

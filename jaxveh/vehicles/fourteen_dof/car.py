@@ -59,8 +59,8 @@ class FourteenDOF(AbstractVehicle):
     `crawl_speed` (m/s); brakes and rolling resistance turn round smoothly about 0.5 m/s. Wheel hop (about 10 Hz) and spins
     (see `SevenDOF`) are stiff.
 
-    Equations: d'Alembert's principle (see `dynamics.accelerations`); the mechanism is that of R. N. Jazar, Vehicle Dynamics,
-    ch. 13, and T. Shim and C. Ghike, Vehicle System Dynamics 45 (2007) 697, with joints inclined for the roll centres.
+    Equations: d'Alembert's principle, see `dynamics.accelerations`. The degrees of freedom are those of T. Shim and C. Ghike,
+    Vehicle System Dynamics 45 (2007) 191, with joints inclined for the roll centres and nothing linearised.
 
     **Parameters**: `sprung_mass`, `unsprung_mass_front`, `unsprung_mass_rear` (kg; the latter each wheel's); `roll_inertia`,
     `pitch_inertia`, `yaw_inertia`, `roll_yaw_product` (the integral of x z dm; kg m^2, of the sprung mass about its centre of
