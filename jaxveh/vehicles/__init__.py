@@ -4,6 +4,7 @@ from jaxveh.vehicles import sets
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
 from jaxveh.vehicles.commanded import Commanded
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive, FourMotors
+from jaxveh.vehicles.fourteen_dof import FourteenDOF
 from jaxveh.vehicles.kinematic import Kinematic, KinematicOutputs, KinematicState
 from jaxveh.vehicles.kinematic_crawl import KinematicCrawl
 from jaxveh.vehicles.kinematic_trailer import KinematicTrailer, KinematicTrailerOutputs, KinematicTrailerState
@@ -57,6 +58,7 @@ __all__ = [
     "CarNumbers",
     "Commanded",
     "FourMotors",
+    "FourteenDOF",
     "Kinematic",
     "KinematicCrawl",
     "KinematicOutputs",
