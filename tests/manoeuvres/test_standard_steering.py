@@ -1,5 +1,6 @@
 """Manoeuvres of the standards: their times, amplitudes and spectra, bad input."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -86,7 +87,7 @@ def test_mu_jump_braking_is_straight():
 
 def test_cruise_has_the_spreads_of_its_speed_and_its_pedals():
     m = manoeuvres.cruise(25.0, KEY, speed_std=2.0, pedal_noise=60.0, duration=4000.0)
-    u = jax.jit(m.inputs)(jnp.arange(0.0, 4000.0, 0.1))
+    u = eqx.filter_jit(m.inputs)(jnp.arange(0.0, 4000.0, 0.1))
     np.testing.assert_allclose([jnp.mean(u.v_x), jnp.std(u.v_x)], [25.0, 2.0], rtol=0.05)
     net = u.drive_torque - u.brake_torque
     np.testing.assert_allclose(jnp.std(net), 60.0, rtol=0.05)
