@@ -126,6 +126,11 @@ class FourteenDOF(AbstractVehicle):
         check_fourteen_dof(self)
 
     @property
+    def mass(self) -> jax.Array:
+        """Mass of the whole car, kg."""
+        return self.sprung_mass + 2.0 * (self.unsprung_mass_front + self.unsprung_mass_rear)
+
+    @property
     def inputs(self):
         return ("steer", *self.drive.inputs)
 

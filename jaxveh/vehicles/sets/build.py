@@ -34,6 +34,8 @@ def build(numbers: CarNumbers, kind: type[V], **options: Any) -> V:
         for name, entry in entries.items()
         if name in known and entry.default is not None and name not in options
     }
+    if "grip" in entries and numbers.front is not None:
+        given.setdefault("grip", numbers.front.friction)
     given |= _tyres(numbers, entries, options) | _drive(numbers, entries, options) | options
     missing = [name for name, entry in entries.items() if _needed(entry) and name not in given]
     if missing:

@@ -7,15 +7,21 @@ from typing import Any
 
 from jaxveh.io.naming import check_known
 from jaxveh.vehicles.base import AbstractVehicle
+from jaxveh.vehicles.fourteen_dof import FourteenDOF
 from jaxveh.vehicles.kinematic import Kinematic
 from jaxveh.vehicles.kinematic_trailer import KinematicTrailer
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
 from jaxveh.vehicles.longitudinal import Longitudinal
+from jaxveh.vehicles.roll_3dof import Roll3DOF
+from jaxveh.vehicles.roll_4dof import Roll4DOF
 from jaxveh.vehicles.sets import commonroad_cars, heavy_cars, passenger_cars, race_cars
 from jaxveh.vehicles.sets.build import build
 from jaxveh.vehicles.sets.numbers import CarNumbers
 from jaxveh.vehicles.seven_dof import SevenDOF
 from jaxveh.vehicles.single_track import SingleTrack
+from jaxveh.vehicles.single_track_3dof import SingleTrack3DOF
+from jaxveh.vehicles.two_track_2dof import TwoTrack2DOF
+from jaxveh.vehicles.two_track_3dof import TwoTrack3DOF
 
 CARS: dict[str, Callable[[], CarNumbers]] = {
     "passenger_car": passenger_cars.passenger_car,
@@ -37,7 +43,13 @@ FIDELITIES: dict[str, type[AbstractVehicle]] = {
     "kinematic-trailer": KinematicTrailer,
     "linear": LinearSingleTrack,
     "single-track": SingleTrack,
+    "single-track-3dof": SingleTrack3DOF,
+    "two-track-2dof": TwoTrack2DOF,
+    "two-track-3dof": TwoTrack3DOF,
+    "roll-3dof": Roll3DOF,
+    "roll-4dof": Roll4DOF,
     "seven-dof": SevenDOF,
+    "fourteen-dof": FourteenDOF,
 }
 """Classes of vehicles, by name, the simplest first."""
 

@@ -142,4 +142,18 @@ class CarNumbers:
         if suspension is not None:
             own = {entry.name: getattr(suspension, entry.name) for entry in fields(suspension)}
             found |= own if sprung else {name: value for name, value in own.items() if name not in found}
+            found |= self._rolling(suspension)
         return {name: value for name, value in found.items() if value is not None}
+
+    def _rolling(self, s: SuspensionNumbers) -> dict[str, Any]:
+        """Roll stiffness (N m/rad) and damping (N m s/rad) of each axle: springs and bar, with the tyres in series."""
+        found = {}
+        for axle in ("front", "rear"):
+            track = getattr(self, f"track_{axle}")
+            if track is None:
+                continue
+            spring = track**2 * (0.5 * getattr(s, f"spring_{axle}") + getattr(s, f"anti_roll_{axle}"))
+            tyre = 0.5 * track**2 * s.tyre_stiffness
+            found[f"roll_stiffness_{axle}"] = spring * tyre / (spring + tyre)
+            found[f"roll_damping_{axle}"] = 0.5 * track**2 * getattr(s, f"damper_{axle}")
+        return found
