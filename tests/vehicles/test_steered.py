@@ -61,6 +61,9 @@ def test_at_standstill_the_wheels_turn_as_a_spring_and_damper_do(inertia):
     u = inputs(steering_wheel=0.6, v_x=0.0)
     x = drive(car, lambda t: u, car.start(0.0, u, steer=0.0), 0.3, 2e-4)
     k, C, end = 1e4, 400.0, 0.6 / 15.0
+    # The hands feel the spring, not the road, which pushes back with nothing here.
+    torque = car.outputs(0.0, car.start(0.0, u, steer=0.0), u).steering_torque
+    np.testing.assert_allclose(torque, k * end / 15.0, rtol=1e-12)
     t = 2e-4 * np.arange(1, len(x.steer) + 1)
     if inertia is None:
         expected = end * (1 - np.exp(-k / C * t))
