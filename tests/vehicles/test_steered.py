@@ -61,6 +61,9 @@ def test_at_standstill_the_wheels_turn_as_a_spring_and_damper_do(inertia):
     u = inputs(steering_wheel=0.6, v_x=0.0)
     x = drive(car, lambda t: u, car.start(0.0, u, steer=0.0), 0.3, 2e-4)
     k, C, end = 1e4, 400.0, 0.6 / 15.0
+    # The hands feel the spring, not the road, which pushes back with nothing here.
+    torque = car.outputs(0.0, car.start(0.0, u, steer=0.0), u).steering_torque
+    np.testing.assert_allclose(torque, k * end / 15.0, rtol=1e-12)
     t = 2e-4 * np.arange(1, len(x.steer) + 1)
     if inertia is None:
         expected = end * (1 - np.exp(-k / C * t))
@@ -91,7 +94,7 @@ def test_in_a_steady_turn_the_twist_is_compliance_times_moment():
 
 
 def test_a_stiff_steering_is_a_rigid_one():
-    stiff, rigid = (settled(Steered(inner(), 15.0, **more), U) for more in ({"compliance": 1e-7, "damping": 40.0}, {}))
+    stiff, rigid = (settled(Steered(inner(), 15.0, **more), U) for more in ({"compliance": 1e-9, "damping": 5e6}, {}))
     np.testing.assert_allclose((stiff.yaw_rate, stiff.v_y), (rigid.yaw_rate, rigid.v_y), rtol=2e-4)
 
 
