@@ -182,7 +182,11 @@ def test_sliding_loses_energy_forwards_and_backwards():
     for v in (12.0, -12.0):
         x, u = point(car, v_x=v, sideslip=0.1, yaw_rate=0.0, steer=0.0)
         out = car.outputs(0.0, x, u)
-        assert (out.F_yf + out.F_yr) * out.v_y < 0
+        assert out.F_yf * out.v_y < 0
+        assert out.F_yr * out.v_y < 0
+        # A front wheel that points to the left and rolls backwards slides to its left: it is pushed to the right.
+        turned = car.outputs(0.0, *point(car, v_x=v, sideslip=0.0, yaw_rate=0.0, steer=0.1))
+        assert turned.F_yf * v > 0
 
 
 def test_it_is_the_linearised_single_track():

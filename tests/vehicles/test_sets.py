@@ -154,10 +154,11 @@ class Sprung(vehicles.AbstractVehicle):
 
 
 def test_build_serves_classes_that_it_does_not_know():
-    numbers = sets.compact_car()
-    built = vehicles.build(numbers, Sprung)
+    built = vehicles.build(sets.compact_car(), Sprung)
     assert (built.sprung_mass, built.front_axle_to_cg) == (1094.5, 0.88392)
     assert built.anti_roll_front == pytest.approx(12880.0 / 1.3899**2)
+    assert vehicles.build(sets.suv(), Sprung).front_axle_to_cg == 1.545
+    assert sets.suv().front_axle_to_cg == 1.573
     assert isinstance(built.front, MFTyre)
 
 
