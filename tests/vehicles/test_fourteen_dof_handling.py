@@ -12,6 +12,8 @@ from jaxveh.vehicles import GRAVITY, AxleDrive, SevenDOF
 from jaxveh.vehicles.wheels import named
 
 UNKNOWN = ("v_y", "z", "roll", "pitch", "yaw_rate", *named("travel"), *named("omega"))
+POINT = brush(half_length=1e-9)
+"""A tyre without aligning moment: where the roll axis is inclined, or wheels lean, that moment turns the body too."""
 BALANCED = ("v_x", "v_y", "v_z", "roll_rate", "pitch_rate", "yaw_rate", *named("travel_rate"), *named("omega"))
 
 
@@ -40,7 +42,7 @@ def steady(car, v_x, steer):
 def test_load_transfer_of_a_steady_turn_balances_the_moments():
     """About the point of the road below the sprung mass: the loads hold weights, centrifugal forces and turning momenta."""
     # With the torque behind and free front wheels no moment about an axle has a part about the car's x.
-    car = make(roll_yaw_product=0.0, rolling_resistance=0.0, drive=AxleDrive(front_drive=0.0))
+    car = make(POINT, roll_yaw_product=0.0, rolling_resistance=0.0, drive=AxleDrive(front_drive=0.0))
     x, u = steady(car, 22.0, 0.03)
     shown = evaluate(car, x, u)[1]
     mechanism = Mechanism(car)
@@ -61,6 +63,10 @@ def test_load_transfer_of_a_steady_turn_balances_the_moments():
     contacts = places[1:, 1] + places[1:, 2] * axes[:, 2] * axes[:, 1] / (1 - axes[:, 2] ** 2)
     roll = np.sum(contacts * loads) - GRAVITY * np.sum(masses * places[:, 1])
     roll += np.sum(masses * places[:, 2] * accelerations[:, 1]) - momentum[0]
+    # The arm of longitudinal forces about an axle that rolls and pitches: rolling radius instead of the slant.
+    slants = np.asarray(Mechanism(car, 0.03).slants(q))
+    F_x = np.array([float(getattr(shown, name)) for name in named("F_x")])
+    roll += np.sum((slants - 0.33 + (0.33 - slants) / 3) * F_x * axes[:, 0])
     transfer = abs(loads[1] + loads[3] - loads[0] - loads[2]) * 0.76
     assert transfer > 3000
     assert abs(roll) < 1e-8 * transfer
@@ -76,7 +82,7 @@ def test_roll_gradient_is_the_closed_form(centres):
     """
     front, rear = centres
     car = make(
-        roll_centre_front=front, roll_centre_rear=rear, tyre_stiffness=2e8, roll_yaw_product=0.0, drag=0.0,
+        POINT, roll_centre_front=front, roll_centre_rear=rear, tyre_stiffness=2e8, roll_yaw_product=0.0, drag=0.0,
         pitch_slope_front=0.0, pitch_slope_rear=0.0, rolling_resistance=0.0,
     )  # fmt: skip
     x, u = steady(car, 20.0, 1e-4)
