@@ -10,10 +10,19 @@ mean, where the words differ:
 - Their roll axis is fixed to the axle a tyre radius below the wheel's centre: below the road by the tyre's compression.
 - Their tyre grows with load in proportion, without limit: MF-Tyre 5.2 at its nominal load, times the load (`test_commonroad`).
 
-Faults of their tyre that `test_commonroad` found are taken out (p_vx1; shifts by the sign of the camber, p_hy1 and p_vy1). What
-is left is theirs alone: wheels lean by D_f, D_r with the travel, where ours keep to the body; the body hangs on a sideways
-spring and damper (K_ras, K_rad); the tyre gives way sideways (K_lt); axles and body all feel the same `yaw_rate v_x`; and an
-axle turns as a whole. Without the first and the third, which can be put to zero, the cars are nearer still.
+Its equations are those of axes with y to the right and z down, so that its turn to the left is one to the right, and its
+roll, about the same x, has the other sign in the mirror. Measured, root mean square over the peak: yaw rate 0.014, roll 0.064.
+What differs, beside the faults of its tyre that `test_commonroad` found (taken out: p_vx1; shifts by the sign of the camber,
+p_hy1 and p_vy1):
+
+- Its tyre, made for y to the left, takes the roll of axes with y to the right for its camber: wheels are pushed away from the
+  side to which they lean. With the signs of p_hy3, p_vy3 and r_vy3 turned it is as meant.
+- Its slip angles take the sideways speed of the sprung mass' centre of gravity for that of the contact points, as if the body
+  did not roll above the road. We compare the speed at the road, `v_y + h roll_rate`; the rest, 0.18 of the peak, is theirs.
+- Its wheels lean by D_f, D_r with the travel, where ours keep to the body; the tyre gives way sideways (K_lt). Both are put to
+  zero where the cars should be near.
+- The body hangs on a sideways spring and damper (K_ras, K_rad), an axle turns as a whole, and axles and body feel the same
+  `yaw_rate v_x`.
 """
 
 import dataclasses
@@ -126,7 +135,7 @@ def drive_theirs(p):
 
 @eqx.filter_jit
 def drive_ours(car, steers):
-    """The same of ours, and the lateral acceleration; steers at every half step."""
+    """The same of ours, in their axes, v_y at the road; and a_y. `steers`: before, within and after each step."""
     shares = jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6.0
     none = Inputs(*[jnp.zeros(())] * 3)
 
@@ -140,31 +149,41 @@ def drive_ours(car, steers):
         before, middle, after = angles
         table = (*shares, jnp.stack([before, middle, middle, after]))
         (_, end), a_y = jax.lax.scan(stage, (jax.tree.map(jnp.zeros_like, x), x), table)
-        return end, (x.yaw_rate, x.v_y, x.roll, a_y[0])
+        return end, (x.yaw_rate, x.v_y + car.cg_height * x.roll_rate, -x.roll, a_y[0])
 
     return jax.lax.scan(step, car.start(0.0, none, v_x=SPEED), steers)[1]
 
 
-def compared(p):
-    """Root mean square differences over the peaks of yaw rate, lateral speed, roll; and the peak of a_y."""
+def compared(p, meant=None):
+    """Root mean square differences over the peaks of yaw rate, speed at the road, roll; and the peak of a_y.
+
+    `meant`: their parameters where they differ from those, `p`, that ours are made of.
+    """
     ours = drive_ours(our_car(p), tuple(jnp.asarray(steer(TIMES + share * DT)) for share in (0.0, 0.5, 1.0)))
     a_y = np.asarray(ours[3])
     shares = [
         np.sqrt(np.mean((np.asarray(one) - other) ** 2)) / np.max(np.abs(other))
-        for one, other in zip(ours, drive_theirs(p), strict=False)
+        for one, other in zip(ours, drive_theirs(p if meant is None else meant), strict=False)
     ]
     return shares, np.max(np.abs(a_y))
 
 
 def test_a_double_lane_change_is_the_same():
-    (yaw_rate, v_y, roll), peak = compared(theirs())
-    print(yaw_rate, v_y, roll, peak)
-    assert 0.35 * 9.81 < peak < 0.5 * 9.81
+    (yaw_rate, _, roll), peak = compared(theirs())
+    assert 0.35 * 9.81 < peak < 0.45 * 9.81
     assert yaw_rate < 0.10
+    assert roll < 0.10
 
 
-def test_without_what_ours_has_not_the_cars_are_nearer():
-    (yaw_rate, v_y, roll), peak = compared(theirs(D_f=0.0, D_r=0.0, K_lt=0.0))
-    print(yaw_rate, v_y, roll, peak)
-    assert peak > 0.35 * 9.81
-    assert yaw_rate < 0.05
+def test_as_its_camber_is_meant_sideways_speeds_are_near_too():
+    p = theirs(D_f=0.0, D_r=0.0, K_lt=0.0)
+    turned = {name: -getattr(p.tire, name) for name in ("p_hy3", "p_vy3", "r_vy3")}
+    (yaw_rate, v_y, roll), _ = compared(p, dataclasses.replace(p, tire=dataclasses.replace(p.tire, **turned)))
+    assert yaw_rate < 0.03
+    assert v_y < 0.25
+    assert roll < 0.10
+
+
+def test_with_its_camber_sideways_speeds_are_not():
+    (_, v_y, _), _ = compared(theirs(D_f=0.0, D_r=0.0, K_lt=0.0))
+    assert v_y > 1.0

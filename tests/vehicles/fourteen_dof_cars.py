@@ -49,8 +49,8 @@ def mf(load=4000.0):
     return tyres.typical_mf_tyre(load, radius=0.33)
 
 
-def brush(load=4000.0):
-    return tyres.Brush(slip_stiffness=20.0 * load, cornering_stiffness=17.0 * load, friction=1.05)
+def brush(load=4000.0, half_length=0.06):
+    return tyres.Brush(20.0 * load, 17.0 * load, friction=1.05, half_length=half_length)
 
 
 def make(front: AbstractTyre | None = None, rear: AbstractTyre | None = None, **changed) -> FourteenDOF:

@@ -46,9 +46,10 @@ class Mechanism:
         a, b = car.front_axle_to_cg, car.rear_axle_to_cg
         self.masses = per_axle(car.unsprung_mass_front, car.unsprung_mass_rear)
         self.preload = 0.5 * car.sprung_mass * GRAVITY / (a + b) * per_axle(b, a)
-        sunk = (self.preload + self.masses * GRAVITY) / car.tyre_stiffness
+        lean = jnp.cos(per_axle(car.camber_front, car.camber_rear))
+        at_rest = lean * (car.wheel_radius - (self.preload + self.masses * GRAVITY) * lean / car.tyre_stiffness)
         tracks = per_axle(car.track_front, car.track_rear)
-        self.rest = jnp.stack([per_axle(a, -b), 0.5 * SIDES * tracks, car.wheel_radius - sunk - car.cg_height], 1)
+        self.rest = jnp.stack([per_axle(a, -b), 0.5 * SIDES * tracks, at_rest - car.cg_height], 1)
         centres = per_axle(car.roll_centre_front, car.roll_centre_rear)
         slopes = per_axle(car.pitch_slope_front, car.pitch_slope_rear)
         self.ways = jnp.stack([slopes, SIDES * 2 * centres / tracks, jnp.ones(4)], 1)
@@ -64,6 +65,11 @@ class Mechanism:
     def centres(self, q):
         """The wheels' centres in the world, (4, 3)."""
         return q[:3] + (self.rest + self.ways * q[6:10, None]) @ body_to_world(q).T
+
+    def slants(self, q):
+        """From each wheel's centre down to the road in the wheel's plane, m."""
+        lean = (self.axes @ body_to_world(q).T)[:, 2]
+        return self.centres(q)[:, 2] / jnp.sqrt(1 - lean**2)
 
     def spins(self, q, qd):
         """Each wheel's whole spin about its axle: over the body, and that of the body."""
@@ -85,7 +91,7 @@ class Mechanism:
         bars = jnp.stack([car.anti_roll_front, car.anti_roll_rear])
         twist = jnp.stack([travel[0] - travel[1], travel[2] - travel[3]])
         centres = self.centres(q)
-        sinks = jnp.maximum(car.wheel_radius - centres[:, 2], 0.0)
+        sinks = jnp.maximum(car.wheel_radius - self.slants(q), 0.0)
         heavy = car.sprung_mass * q[:3] + self.masses @ centres
         return (
             jnp.sum(self.preload * travel + 0.5 * springs * travel**2)

@@ -112,6 +112,14 @@ def test_a_tyre_never_pulls():
     np.testing.assert_allclose(wheels(rest, "load") - wheels(slow, "load"), 300.0, rtol=1e-12)
 
 
+@eqx.filter_jit
+@eqx.filter_value_and_grad
+def size(given):
+    """One number of all rates and outputs, and its slopes."""
+    rate, shown = given[0].evaluate(0.0, given[1], given[2])
+    return sum(jnp.sum(jnp.square(v)) for v in (*rate, *shown))
+
+
 @pytest.mark.parametrize("where", ["standing", "in the air", "locked"])
 def test_values_and_gradients_are_finite(where):
     car = make(tyres.Relaxed(tyres.Brush(8e4, 7e4), 0.4, 0.5), ackermann=0.3)
@@ -122,12 +130,6 @@ def test_values_and_gradients_are_finite(where):
         "locked": {"v_x": 10.0} | dict.fromkeys(named("omega"), 0.0),
     }[where]
     x = car.start(0.0, u, **values)
-
-    @eqx.filter_jit
-    @eqx.filter_value_and_grad
-    def size(given):
-        rate, shown = given[0].evaluate(0.0, given[1], given[2])
-        return sum(jnp.sum(jnp.square(v)) for v in (*rate, *shown))
 
     value, slopes = size((car, x, u))
     assert np.isfinite(value)

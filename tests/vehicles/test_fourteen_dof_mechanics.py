@@ -23,19 +23,21 @@ def other_power(car, mechanism, x, u, shown):
     """Power of the forces that no potential makes, as a function of the velocities; the tyres' forces as the car says them."""
     q, _ = mechanism.coordinates(x)
     up = jnp.array([0.0, 0.0, 1.0])
-    heights = mechanism.centres(q)[:, 2]
-    sinks = jnp.maximum(car.wheel_radius - heights, 0.0)
+    sinks = jnp.maximum(car.wheel_radius - mechanism.slants(q), 0.0)
     radii = car.wheel_radius - sinks / 3
     axes = mechanism.axes @ body_to_world(q).T
     ahead = jnp.cross(axes, up)
     ahead = ahead / jnp.linalg.norm(ahead, axis=1, keepdims=True)
     left = jnp.cross(up, ahead)
+    arms = -mechanism.slants(q)[:, None] * jnp.cross(ahead, axes)
     F_x, F_y, load = wheels(shown, "F_x"), wheels(shown, "F_y"), wheels(shown, "load")
     M_x, M_y, M_z = wheels(shown, "M_x"), wheels(shown, "M_y"), wheels(shown, "M_z")
     omegas = wheels(x, "omega")
-    push = F_x[:, None] * ahead + F_y[:, None] * left + (load - car.tyre_stiffness * sinks)[:, None] * up
+    # What the tyre's spring makes of the load is in the potential.
+    damped = load - car.tyre_stiffness * sinks / jnp.sqrt(1 - axes[:, 2] ** 2)
+    push = F_x[:, None] * ahead + F_y[:, None] * left + damped[:, None] * up
     own = M_x[:, None] * ahead + M_y[:, None] * left + M_z[:, None] * up
-    whole = own + jnp.cross(-heights[:, None] * up, push)
+    whole = own + jnp.cross(arms, push)
     about = lambda moment: jnp.sum(moment * axes, 1)
     on_body = whole - about(whole)[:, None] * axes
     on_spin = about(own) - radii * F_x - car.rolling_resistance * load * radii * jnp.tanh(omegas * radii / 0.5)

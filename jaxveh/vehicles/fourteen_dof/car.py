@@ -27,7 +27,7 @@ from jaxveh.vehicles.fourteen_dof.suspension import (
     unsprung,
     wheel_at,
 )
-from jaxveh.vehicles.fourteen_dof.tyre_contact import ROLLING_SHARE, axles, reaction, touch
+from jaxveh.vehicles.fourteen_dof.tyre_contact import ROLLING_SHARE, Touch, axles, reaction, touch
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, scaled
 from jaxveh.vehicles.two_track import air_drag, body_outputs, filled, positions_of, tyres_of, wheel_outputs
 from jaxveh.vehicles.wheels import Wheels, each, frictions, gravity, named, of, opposing, pushed, total
@@ -47,7 +47,8 @@ class FourteenDOF(AbstractVehicle):
       negative is anti-squat and anti-lift. Wheels keep their angle to the body: camber is that of the body and `camber`.
     - `omega` is a wheel's whole spin about its axle (a sensor on the body reads it less the body's turning about the axle,
       about the pitch rate). Spin momentum makes gyroscopic moments; a turning steer makes none.
-    - A tyre is a spring and a damper along the road's normal that never pull; its contact point is below the wheel's centre.
+    - A tyre is a spring and a damper in the wheel's plane that never pull; its contact point is where that plane, below the
+      centre, meets the road.
       It rolls with the unloaded radius less a third of the compression, which is also the arm of its longitudinal force
       about the axle: with the smaller loaded radius tyres would make energy. M_x, M_y, M_z of the tyre count; that of
       rolling resistance turns round with the direction of travel, and `rolling_resistance` comes on top.
@@ -189,7 +190,9 @@ class FourteenDOF(AbstractVehicle):
         )  # fmt: skip
         felt = minus(linear, g)
         push = pushed(
-            each(lambda wheel: _below(body, wheel), stand.wheels), each(lambda how: how.moves, stand.touches), forces
+            each(lambda wheel, how: _below(body, wheel, how), stand.wheels, stand.touches),
+            each(lambda how: how.moves, stand.touches),
+            forces,
         )
         shown = body_outputs(x, x.v_x, felt.x, felt.y, yaw, u.steer, push)
         shown |= attitude_outputs(x, roll, pitch, felt.z)
@@ -273,7 +276,7 @@ class Shaft(NamedTuple):
     brake_power: Any
 
 
-def _below(body: Body, wheel: Wheel) -> tuple[Any, Any]:
+def _below(body: Body, wheel: Wheel, how: Touch) -> tuple[Any, Any]:
     """Where a wheel touches the road: x, y (m) in the intermediate axes from the centre of gravity."""
-    at = to_road(body.axes, wheel.place)
+    at = add(to_road(body.axes, wheel.place), how.arm)
     return at.x, at.y

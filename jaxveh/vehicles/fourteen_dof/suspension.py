@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from jaxveh import numerics
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.fourteen_dof.kinematics import Body
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, scaled
@@ -50,8 +51,13 @@ def static_loads(car: Any) -> Wheels:
 
 
 def sunk_at_rest(car: Any) -> Wheels:
-    """By how much each tyre is compressed at rest, m."""
-    return each(lambda load: load / car.tyre_stiffness, static_loads(car))
+    """By how much each tyre is compressed at rest, m, in the plane of its wheel, which camber inclines."""
+    return each(lambda load, lean: load * lean / car.tyre_stiffness, static_loads(car), leans(car))
+
+
+def leans(car: Any) -> Wheels:
+    """The cosine of each wheel's camber at rest."""
+    return front_rear(numerics.cos(car.camber_front), numerics.cos(car.camber_rear))
 
 
 def joints(car: Any) -> Wheels:
@@ -64,13 +70,13 @@ def joints(car: Any) -> Wheels:
     tracks = front_rear(car.track_front, car.track_rear)
     pitch_slopes = front_rear(car.pitch_slope_front, car.pitch_slope_rear)
 
-    def one(position, side, centre, track, along, mass, sunk):
+    def one(position, side, centre, track, along, mass, sunk, lean):
         x, y = position
         slope = Vector(along, side * 2.0 * centre / track, 1.0)
-        return Joint(Vector(x, y, car.wheel_radius - sunk - car.cg_height), slope, dot(slope, slope), mass)
+        return Joint(Vector(x, y, lean * (car.wheel_radius - sunk) - car.cg_height), slope, dot(slope, slope), mass)
 
     masses, sunk = unsprung(car), sunk_at_rest(car)
-    return each(one, positions_of(car), LEFT, centres, tracks, pitch_slopes, masses, sunk)
+    return each(one, positions_of(car), LEFT, centres, tracks, pitch_slopes, masses, sunk, leans(car))
 
 
 def wheel_at(joint: Joint, travel: Any, rate: Any, body: Body) -> Wheel:

@@ -10,7 +10,7 @@ from jaxveh import numerics
 from jaxveh.tyres import Contact, Forces
 from jaxveh.vehicles.fourteen_dof.kinematics import Body, to_body, to_road
 from jaxveh.vehicles.fourteen_dof.suspension import LEFT, Wheel
-from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, scaled
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
 from jaxveh.vehicles.wheels import Rolling, Wheels, contact, each, front_rear, opposing
 
 ROLLING_SHARE = 1.0 / 3.0
@@ -42,12 +42,12 @@ def axles(car: Any, steer: Any) -> Wheels:
 class Touch(NamedTuple):
     """How a wheel stands on the road. Vectors are in the intermediate axes.
 
-    `height` of its centre over the road, `radius` with which it rolls (m), `axis` of its spin, `turns`: the body's angular
-    velocity, `moves` (as `wheels.rolling`), and what makes the load: `sinks` (compression's rate, m/s) and `damped`,
-    the damping's part of the load (N).
+    `arm` from its centre to the contact point, `radius` with which it rolls (m), `axis` of its spin, `turns`: the body's
+    angular velocity, `moves` (as `wheels.rolling`), and what makes the load: `sinks`, the contact point's speed into the
+    road (m/s), and `damped`, the damping's part of the load (N).
     """
 
-    height: Any
+    arm: Vector
     radius: Any
     axis: Vector
     turns: Vector
@@ -59,23 +59,28 @@ class Touch(NamedTuple):
 def touch(car: Any, body: Body, wheel: Wheel, axis: Vector, omega: Any, friction: Any) -> tuple[Contact, Touch]:
     """The contact of a wheel that spins with `omega` (rad/s) about `axis` (body's axes).
 
-    The contact point lies below the wheel's centre, along the road's normal; its speed is that of the wheel's material there.
+    The contact point lies below the centre in the wheel's plane (ISO 8855; H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed.,
+    sec. 2.2), its speed is that of the wheel's material there. The tyre is compressed along the wheel's plane, so that the
+    load, along the road's normal, is by 1 / cos(camber) larger: the potential of the compression then makes it.
     """
     height = body.height + dot(body.axes.up, wheel.place)
     speed, turns, axis = (to_road(body.axes, a) for a in (wheel.velocity, body.omega, axis))
-    compression = jnp.maximum(car.wheel_radius - height, 0.0)
-    load = jnp.where(compression > 0, car.tyre_stiffness * compression - car.tyre_damping * speed.z, 0.0)
-    load = jnp.maximum(load, 0.0)
-    radius = car.wheel_radius - ROLLING_SHARE * compression
-    flat = numerics.hypot(axis.x, axis.y)
+    flat = numerics.hypot(axis.x, axis.y)  # the camber's cosine
     cosine, sine = axis.y / flat, -axis.x / flat
+    aside = height * axis.z / flat
+    arm = Vector(-sine * aside, cosine * aside, -height)
     # The wheel does not turn with the body about its own axis.
     held = minus(turns, scaled(dot(turns, axis), axis))
-    u, v = speed.x - height * held.y, speed.y + height * held.x
-    moves = Rolling(u * cosine + v * sine, v * cosine - u * sine, cosine, sine)
+    at = add(speed, cross(held, arm))
+    compression = jnp.maximum(car.wheel_radius - height / flat, 0.0)
+    spring = car.tyre_stiffness * compression / flat
+    load = jnp.where(compression > 0, spring - car.tyre_damping * at.z / (flat * flat), 0.0)
+    load = jnp.maximum(load, 0.0)
+    radius = car.wheel_radius - ROLLING_SHARE * compression
+    moves = Rolling(at.x * cosine + at.y * sine, at.y * cosine - at.x * sine, cosine, sine)
     camber = numerics.arctan2(axis.z, flat)
-    at = contact(moves, load, friction, car.crawl_speed, omega * radius, camber)
-    return at, Touch(height, radius, axis, turns, moves, -speed.z, load - car.tyre_stiffness * compression)
+    found = contact(moves, load, friction, car.crawl_speed, omega * radius, camber)
+    return found, Touch(arm, radius, axis, turns, moves, -at.z, load - spring)
 
 
 class Reaction(NamedTuple):
@@ -101,8 +106,7 @@ def reaction(car: Any, body: Body, at: Contact, how: Touch, forces: Forces, omeg
     rolling_moment = forces.M_y * opposing(moves.along)
     push = Vector(forces.F_x * c - forces.F_y * s, forces.F_x * s + forces.F_y * c, at.load)
     own = Vector(forces.M_x * c - rolling_moment * s, forces.M_x * s + rolling_moment * c, forces.M_z)
-    lever = Vector(how.height * push.y, -how.height * push.x, 0.0)
-    whole = add(own, lever)
+    whole = add(own, cross(how.arm, push))
     on_body = minus(whole, scaled(dot(whole, axis), axis))
     resisting = car.rolling_resistance * at.load * how.radius * opposing(omega * how.radius)
     turning = dot(own, axis) - resisting
