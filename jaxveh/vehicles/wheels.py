@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
@@ -15,6 +16,7 @@ from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces
 from jaxveh.tyres.mirrored import ODD_INPUTS
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.slip import regularised_speed
+from jaxveh.vehicles.together import alike, long_law, together
 
 CORNERS = ("fl", "fr", "rl", "rr")
 """Front left, front right, rear left, rear right: the suffixes of what a wheel has for itself."""
@@ -114,24 +116,6 @@ def contact(
     )
 
 
-def forces_at(tyre: AbstractTyre, at: Contact, state: Any, right: bool) -> Forces:
-    """The forces on a wheel; a wheel on the right is the mirror image of the one on the left, its tyre's states included."""
-    if not right:
-        return stored(tyre.forces(at, state))
-    found = stored(tyre.forces(_turned(at), state))
-    return found._replace(F_y=-found.F_y, M_x=-found.M_x, M_z=-found.M_z)
-
-
-def tyre_rates(tyre: AbstractDynamicTyre, at: Contact, state: Any, right: bool) -> Any:
-    """The time derivative of a tyre's states; of a wheel on the right in the mirror."""
-    return tyre.derivatives(_turned(at) if right else at, state)
-
-
-def tyre_start(tyre: AbstractDynamicTyre, at: Contact, right: bool) -> Any:
-    """The settled states of a tyre; of a wheel on the right in the mirror."""
-    return tyre.start(_turned(at) if right else at)
-
-
 def _turned(at: Contact) -> Contact:
     return at._replace(**{name: -getattr(at, name) for name in ODD_INPUTS})
 
@@ -169,20 +153,49 @@ class Tyres(NamedTuple):
         return Wheels(*[_state(c, tyre, x) for c, tyre in zip(CORNERS, self.wheels, strict=True)])
 
     def start(self, contacts: Wheels) -> tuple:
-        """The settled states, in the order of `state_names`."""
-        return self._gather(lambda tyre, at, right: tyre_start(tyre, at, right), contacts, self.right)
+        """The settled states, in the order of `state_names`; of a wheel on the right in the mirror."""
+        return self._gather(lambda tyre, at: tyre.start(at), self._seen(contacts))
 
     def forces(self, contacts: Wheels, states: Wheels) -> Wheels:
-        """What the road does to each wheel, in the wheel's axes."""
-        return each(forces_at, self.wheels, contacts, states, self.right)
+        """What the road does to each wheel, in the wheel's axes.
+
+        A wheel on the right is the mirror image of the one on the left, its tyre's states included.
+        """
+        found = self._each(lambda tyre, at, state: tyre.forces(at, state), self._seen(contacts), states)
+        return each(lambda forces, right: _turned_back(forces) if right else forces, each(stored, found), self.right)
 
     def rates(self, contacts: Wheels, states: Wheels) -> tuple:
-        """The time derivatives, in the order of `state_names`."""
-        return self._gather(tyre_rates, contacts, states, self.right)
+        """The time derivatives, in the order of `state_names`; of a wheel on the right in the mirror."""
+        return self._gather(lambda tyre, at, state: tyre.derivatives(at, state), self._seen(contacts), states)
+
+    def _seen(self, contacts: Wheels) -> Wheels:
+        return each(lambda at, right: _turned(at) if right else at, contacts, self.right)
+
+    def _each(self, function: Callable, *wheels: Wheels) -> Wheels:
+        """`function(tyre, ...)` of each wheel; by as few calls as there are long laws."""
+        if long_law(self.front) and alike(self.front, self.rear) and _same_kind(wheels):
+            return Wheels(*together(function, tuple(self.wheels), *wheels))
+        return Wheels(*self._axle(function, self.front, wheels, 0), *self._axle(function, self.rear, wheels, 2))
+
+    def _axle(self, function: Callable, tyre: AbstractTyre, wheels: tuple, first: int) -> list:
+        pair = [values[first : first + 2] for values in wheels]
+        if long_law(tyre):
+            return together(function, (tyre, tyre), *pair)
+        return [function(tyre, *values) for values in zip(*pair, strict=True)]
 
     def _gather(self, function: Callable, *wheels: Wheels) -> tuple:
-        found = [function(*one) for one in zip(self.wheels, *wheels, strict=True) if _names(one[0])]
-        return tuple(value for state in found for value in state)
+        """The states that `function` makes, of the tyres that have any."""
+        some = lambda tyre, *values: function(tyre, *values) if _names(tyre) else None
+        return tuple(value for state in self._each(some, *wheels) if state is not None for value in state)
+
+
+def _turned_back(forces: Forces) -> Forces:
+    return forces._replace(F_y=-forces.F_y, M_x=-forces.M_x, M_z=-forces.M_z)
+
+
+def _same_kind(wheels: tuple) -> bool:
+    """Whether what the wheels are given has one structure."""
+    return all(len({jax.tree.structure(value) for value in values}) == 1 for values in wheels)
 
 
 def _names(tyre: AbstractTyre) -> tuple[str, ...]:

@@ -1,0 +1,68 @@
+"""Tyres of long laws on several wheels at once: one call of the law, an axis of wheels inside it and nowhere else.
+
+Wheels are named scalars because that is fast for laws of a few operations. MF-Tyre has a thousand; four copies of it in each
+stage of a solver compile for minutes, and one copy over an axis of four wheels costs nothing at run time (a 7-DOF car on
+MF-Tyres: 44 s to compile its simulation with four copies, TIME with one).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh.tyres import AbstractTyre, MFTyre
+
+
+def long_law(tyre: AbstractTyre) -> bool:
+    """Whether a tyre's law is so long that its copies should be few: there is an MF-Tyre in it."""
+    is_mf = lambda node: isinstance(node, MFTyre)
+    return any(is_mf(node) for node in jax.tree.leaves(tyre, is_leaf=is_mf))
+
+
+def alike(*tyres: AbstractTyre) -> bool:
+    """Whether tyres are the same law with other numbers, so that one call serves them."""
+    parts = [eqx.partition(tyre, eqx.is_array) for tyre in tyres]
+    shapes = [jax.tree.map(jnp.shape, arrays) for arrays, _ in parts]
+    return all(
+        bool(eqx.tree_equal(rest, parts[0][1])) and shape == shapes[0]
+        for (_, rest), shape in zip(parts, shapes, strict=True)
+    )
+
+
+def together(function: Callable[..., Any], tyres: tuple, *per_wheel: tuple) -> list:
+    """`function(tyre, ...)` for each wheel by one call: `tyres` (n of them, `alike`), and n of each of what it is given.
+
+    Everything is stacked along a new leading axis of n, in front of the batch's; what is the same Python number or None for all
+    wheels stays that.
+    """
+    n = len(tyres)
+    shape = jnp.broadcast_shapes(*[jnp.shape(leaf) for leaf in jax.tree.leaves(per_wheel)])
+    stacked = [jax.tree.map(lambda *leaves: _stack(leaves, shape), *values) for values in per_wheel]
+    found = function(_one(tyres, len(shape)), *stacked)
+    part = lambda leaf, i: jnp.broadcast_to(leaf, (n, *shape))[i] if eqx.is_array(leaf) else leaf
+    return [jax.tree.map(lambda leaf, i=i: part(leaf, i), found) for i in range(n)]
+
+
+def _stack(leaves: tuple, shape: tuple) -> Any:
+    if not any(eqx.is_array(leaf) for leaf in leaves) and all(leaf == leaves[0] for leaf in leaves):
+        return leaves[0]
+    dtype = jnp.result_type(*[leaf for leaf in leaves if eqx.is_array(leaf)] or [float])
+    return jnp.stack([jnp.broadcast_to(jnp.asarray(leaf, dtype), shape) for leaf in leaves])
+
+
+def _one(tyres: tuple, batch: int) -> AbstractTyre:
+    """One tyre whose numbers have the wheels' axis; as it is where all wheels have the same."""
+    if all(tyre is tyres[0] for tyre in tyres):
+        return tyres[0]
+
+    def stack(*leaves):
+        if not eqx.is_array(leaves[0]):
+            return leaves[0]
+        values = jnp.stack(leaves)
+        return values.reshape(len(leaves), *(1,) * (batch - leaves[0].ndim), *leaves[0].shape)
+
+    return jax.tree.map(stack, *tyres)
