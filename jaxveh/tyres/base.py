@@ -36,6 +36,7 @@ class Contact(NamedTuple):
     speed: Any = None
     pressure: Any = None
     turn_slip: Any = 0.0
+    lateral_slip: Any = None
 
 
 class Forces(NamedTuple):

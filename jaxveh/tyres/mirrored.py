@@ -7,7 +7,7 @@ from typing import Any
 from jaxveh._core.errors import InputError
 from jaxveh.tyres.base import AbstractDynamicTyre, AbstractTyre, Contact, Forces
 
-ODD_INPUTS = ("slip_angle", "camber", "turn_slip")
+ODD_INPUTS = ("slip_angle", "camber", "turn_slip", "lateral_slip")
 """What of a contact changes sign in the mirror of the wheel's x-z plane; all else stays."""
 
 

@@ -23,6 +23,7 @@ def theoretical(contact: Contact):
 
 def practical(contact: Contact):
     """`kappa` and `tan(alpha)`: sliding speed over forward speed, positive like their forces."""
+    if contact.lateral_slip is not None: return contact.slip_ratio, contact.lateral_slip
     angle = contact.slip_angle + 0.0 * contact.slip_ratio
     return contact.slip_ratio + 0.0 * angle, numerics.tan(jnp.asarray(angle))
 

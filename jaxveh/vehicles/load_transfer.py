@@ -111,10 +111,10 @@ def planar_loads(car: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     share = b / (a + b) if car.front_roll_share is None else car.front_roll_share
     lever = car.mass * car.cg_height
     weight = -car.mass * g_z
-    moved = lever * a_x / (a + b)
+    moved = lever / (a + b) * a_x
     front = jnp.clip(weight * (b / (a + b)) - moved, 0.0, weight)
-    fl, fr = clip_transfer(front, share * lever * a_y / car.track_front)
-    rl, rr = clip_transfer(weight - front, (1.0 - share) * lever * a_y / car.track_rear)
+    fl, fr = clip_transfer(front, share / car.track_front * lever * a_y)
+    rl, rr = clip_transfer(weight - front, (1.0 - share) / car.track_rear * lever * a_y)
     return Wheels(fl, fr, rl, rr)
 
 

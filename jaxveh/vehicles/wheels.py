@@ -103,10 +103,20 @@ def contact(
 
     Slip angle and slip ratio are those of ISO 8855, regularised below the `crawl` speed (m/s).
     """
-    speed = regularised_speed(moves.along, crawl)
+    import os
+    B=os.environ.get("BAR","")
+    if "m" in B: moves = numerics.barrier(moves)
+    inverse = 1.0 / regularised_speed(moves.along, crawl)
+    lateral_slip = -moves.across * inverse
+    slip_ratio=0.0 if wheel_speed is None else (wheel_speed - moves.along) * inverse
+    import os
+    B=os.environ.get("BAR","")
+    if "s" in B: slip_ratio, lateral_slip = numerics.barrier((slip_ratio, lateral_slip))
+    if "l" in B: load = numerics.barrier(load)
     return Contact(
-        slip_angle=-numerics.arctan(moves.across / speed),
-        slip_ratio=0.0 if wheel_speed is None else (wheel_speed - moves.along) / speed,
+        slip_angle=numerics.arctan(lateral_slip),
+        slip_ratio=slip_ratio,
+        lateral_slip=lateral_slip,
         load=load,
         camber=camber,
         friction=friction,
@@ -223,10 +233,16 @@ def clip_transfer(axle_load: Any, moved: Any) -> tuple[Any, Any]:
     return half - moved, half + moved
 
 
-STANDSTILL = 0.5
-"""m/s: about it brakes and rolling resistance turn round smoothly, so that standstill is an ordinary point."""
+STANDSTILL = 15 / 16
+"""m/s: below it brakes and rolling resistance turn round smoothly, so that standstill is an ordinary point."""
 
 
 def opposing(speed: Any) -> Any:
-    """-1 ... 1: the direction that brakes and rolling resistance push against, smooth about standstill (m/s)."""
-    return jnp.tanh(speed * (1.0 / STANDSTILL))
+    """-1 ... 1: the direction that brakes and rolling resistance push against, their whole from `STANDSTILL` (m/s) upwards.
+
+    Below, `(15 s - 10 s^3 + 3 s^5) / 8` with `s = speed / STANDSTILL`: twice continuously differentiable, with a slope of 2
+    at zero. A hyperbolic tangent of this slope takes XX times as long.
+    """
+    s = jnp.clip(speed * (1.0 / STANDSTILL), -1.0, 1.0)
+    square = s * s
+    return s * (1.875 + square * (0.375 * square - 1.25))
