@@ -21,7 +21,7 @@ from jaxveh.numerics.platform import Tree, barrier, on_cpu
 _TANGENT_OF_PI_8 = math.sqrt(2) - 1
 _TANGENT_OF_3_PI_8 = math.sqrt(2) + 1
 
-_MANY = 128
+_MANY = 64
 """From this size on computing a number twice costs more than storing it."""
 
 # Multiples of these parts are exact up to 2^13 (float32) and 2^26 (float64) half turns: Cody and Waite's reduction.

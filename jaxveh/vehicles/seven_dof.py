@@ -134,9 +134,6 @@ class SevenDOF(AbstractVehicle):
         push = pushed(positions_of(self), moves, forces)
         g_x, g_y, _ = gravity(ground)
         # Multiplied by inverses, which belong to the car and not to the instant: a division costs five multiplications.
-        import os
-        B=os.environ.get("BAR","")
-        if "p" in B: push=numerics.barrier(push)
         inverse_mass = 1.0 / self.mass
         a_x = (push.F_x - air_drag(self.drag, x.v_x)) * inverse_mass
         a_y = push.F_y * inverse_mass

@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh.roads import Ground
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces
-from jaxveh.tyres.mirrored import ODD_INPUTS
+from jaxveh.tyres.mirrored import turned
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.slip import regularised_speed
 
@@ -103,16 +103,11 @@ def contact(
 
     Slip angle and slip ratio are those of ISO 8855, regularised below the `crawl` speed (m/s).
     """
-    import os
-    B=os.environ.get("BAR","")
-    if "m" in B: moves = numerics.barrier(moves)
     inverse = 1.0 / regularised_speed(moves.along, crawl)
     lateral_slip = -moves.across * inverse
-    slip_ratio=0.0 if wheel_speed is None else (wheel_speed - moves.along) * inverse
-    import os
-    B=os.environ.get("BAR","")
-    if "s" in B: slip_ratio, lateral_slip = numerics.barrier((slip_ratio, lateral_slip))
-    if "l" in B: load = numerics.barrier(load)
+    slip_ratio = 0.0 if wheel_speed is None else (wheel_speed - moves.along) * inverse
+    # Read several times by every law of forces: 122 instead of 139 ns a step of 7-DOF cars (float64, 1000 runs).
+    lateral_slip, slip_ratio, load = stored((lateral_slip, slip_ratio, load))
     return Contact(
         slip_angle=numerics.arctan(lateral_slip),
         slip_ratio=slip_ratio,
@@ -128,27 +123,23 @@ def forces_at(tyre: AbstractTyre, at: Contact, state: Any, right: bool) -> Force
     """The forces on a wheel; a wheel on the right is the mirror image of the one on the left, its tyre's states included."""
     if not right:
         return stored(tyre.forces(at, state))
-    found = stored(tyre.forces(_turned(at), state))
+    found = stored(tyre.forces(turned(at), state))
     return found._replace(F_y=-found.F_y, M_x=-found.M_x, M_z=-found.M_z)
 
 
 def tyre_rates(tyre: AbstractDynamicTyre, at: Contact, state: Any, right: bool) -> Any:
     """The time derivative of a tyre's states; of a wheel on the right in the mirror."""
-    return tyre.derivatives(_turned(at) if right else at, state)
+    return tyre.derivatives(turned(at) if right else at, state)
 
 
 def tyre_start(tyre: AbstractDynamicTyre, at: Contact, right: bool) -> Any:
     """The settled states of a tyre; of a wheel on the right in the mirror."""
-    return tyre.start(_turned(at) if right else at)
+    return tyre.start(turned(at) if right else at)
 
 
-def _turned(at: Contact) -> Contact:
-    return at._replace(**{name: -getattr(at, name) for name in ODD_INPUTS})
-
-
-def stored(forces: Forces) -> Forces:
-    """Forces that each consumer reads instead of computing them again; numbers known beforehand stay numbers."""
-    arrays, numbers = eqx.partition(forces, eqx.is_array)
+def stored(values: Any) -> Any:
+    """A tree of values that each consumer reads instead of computing them again; numbers known beforehand stay numbers."""
+    arrays, numbers = eqx.partition(values, eqx.is_array)
     return eqx.combine(numerics.barrier(arrays), numbers)
 
 
