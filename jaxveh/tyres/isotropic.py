@@ -15,12 +15,10 @@ from jaxveh.tyres.slip import length, practical
 class IsotropicMagicFormula(AbstractTyre):
     """Combined slip from one Magic Formula: the force points against the sliding, its size follows the slip's.
 
-        F = mu F_z sin(C arctan(B s - E (B s - arctan(B s)))),    s = |(kappa, tan(alpha))|,    (F_x, F_y) = F (kappa, tan(alpha)) / s
+        F = mu F_z sin(C arctan(x - E (x - arctan(x)))),    x = |(x_x, x_y)| = B |(kappa, tan(alpha))|,    F_i = F x_i / x
 
     The general form of H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., eqs. 4.6 to 4.8, with the slip's length in the place
-    of the slip, as for a tyre that is as stiff along as across (sec. 3.2.3: isotropic model properties). The usual law of
-    controllers and of their simulated cars (R. Rajamani, Vehicle Dynamics and Control, 2nd ed., sec. 13.9: tyres of friction
-    circles), and the cheapest of combined slip.
+    of the slip: a tyre that is as stiff and grips as well along as across, and the cheapest law of combined slip.
 
     - `B` (-) stiffness factor, `C` (-) shape factor: positive; `E` (-) curvature factor.
     - `friction` (-): the peak force over the load, positive.
@@ -42,8 +40,9 @@ class IsotropicMagicFormula(AbstractTyre):
         """F_x and F_y, N."""
         limit = self.friction * contact.friction * need_load(contact, "IsotropicMagicFormula")
         s_x, s_y = practical(contact)
-        s = length(s_x, s_y)
-        x = self.B * s
+        # Scaled before its length is taken, so that one length serves the curve and the direction.
+        x_x, x_y = self.B * s_x, self.B * s_y
+        x = length(x_x, x_y)
         curved = x - self.E * (x - numerics.arctan(x))
-        per_slip = limit * numerics.sin(self.C * numerics.arctan(curved)) / s
-        return Forces(F_x=per_slip * s_x, F_y=per_slip * s_y)
+        per_slip = limit * numerics.sin(self.C * numerics.arctan(curved)) / x
+        return Forces(F_x=per_slip * x_x, F_y=per_slip * x_y)

