@@ -58,13 +58,13 @@ def test_rolled_stages_are_the_same_method():
 
 @pytest.mark.full
 def test_gradient_follows_finite_differences():
-    problem = drives(2, rows=3)
+    problem = drives(2, rows=30)
     chosen, *rest = simulation.gradient_arguments(problem)
     loss = jax.jit(lambda chosen: simulation.mean_square(problem, chosen, *rest))
     gradient = jax.grad(loss)(chosen)
     for leaf, (path, slope) in enumerate(jax.tree_util.tree_leaves_with_path(gradient)):
         leaves, tree = jax.tree.flatten(chosen)
-        step = 1e-5 * leaves[leaf]
+        step = 1e-4 * leaves[leaf]
         up, down = (jax.tree.unflatten(tree, [*leaves[:leaf], leaves[leaf] + s, *leaves[leaf + 1 :]]) for s in (step, -step))
         difference = loss(up) - loss(down)
         np.testing.assert_allclose(difference, 2 * np.sum(slope * step), rtol=1e-4, err_msg=jax.tree_util.keystr(path))

@@ -40,8 +40,8 @@ def test_time_reaches_the_rates():
 
 def test_it_is_diffeqsolve():
     expected = diffrax.diffeqsolve(
-        diffrax.ODETerm(rates), statespace.RK4(), 0.0, 1.0, 0.1, START, 4.0, saveat=diffrax.SaveAt(t0=True, steps=True), max_steps=10,
-        stepsize_controller=diffrax.StepTo(ts=0.1 * jnp.arange(11)),
+        diffrax.ODETerm(rates), statespace.RK4(), 0.0, 1.0, None, START, 4.0, saveat=diffrax.SaveAt(t0=True, steps=True), max_steps=10,
+        stepsize_controller=diffrax.StepTo(ts=jnp.linspace(0.0, 1.0, 11)),
     ).ys  # fmt: skip
     x = simulation.fixed_steps(rates, START, 4.0, rows=10, step=0.1)
     np.testing.assert_allclose(x.place, expected.place[:11], rtol=1e-12, atol=1e-14)
