@@ -167,8 +167,9 @@ def _gradient(problem: Drives) -> Sequence[Contestant]:
     arguments = gradient_arguments(problem)
     loss = functools.partial(mean_square, problem)
     both = jax.jit(jax.value_and_grad(loss)).lower(*arguments).compile()
-    memory = both.memory_analysis().temp_size_in_bytes / 1e6
+    analysis = both.memory_analysis()
+    note = f"{analysis.temp_size_in_bytes / 1e6:.1f} MB" if analysis else ""
     return [
         Contestant(VALUE, _calling(dtype, jax.jit(loss), arguments), work),
-        Contestant(GRADIENT, _calling(dtype, both, arguments), work, note=f"{memory:.1f} MB"),
+        Contestant(GRADIENT, _calling(dtype, both, arguments), work, note=note),
     ]

@@ -65,7 +65,9 @@ def test_gradient_follows_finite_differences():
     for leaf, (path, slope) in enumerate(jax.tree_util.tree_leaves_with_path(gradient)):
         leaves, tree = jax.tree.flatten(chosen)
         step = 1e-4 * leaves[leaf]
-        up, down = (jax.tree.unflatten(tree, [*leaves[:leaf], leaves[leaf] + s, *leaves[leaf + 1 :]]) for s in (step, -step))
+        up, down = (
+            jax.tree.unflatten(tree, [*leaves[:leaf], leaves[leaf] + s, *leaves[leaf + 1 :]]) for s in (step, -step)
+        )
         difference = loss(up) - loss(down)
         np.testing.assert_allclose(difference, 2 * np.sum(slope * step), rtol=1e-4, err_msg=jax.tree_util.keystr(path))
 

@@ -34,13 +34,16 @@ def test_an_oscillator_swings(solver):
 
 
 def test_time_reaches_the_rates():
-    x = simulation.fixed_steps(lambda t, x, args: 3 * t**2, jnp.asarray(8.0), rows=4, step=0.25, steps_a_row=2, start=2.0)
+    x = simulation.fixed_steps(
+        lambda t, x, args: 3 * t**2, jnp.asarray(8.0), rows=4, step=0.25, steps_a_row=2, start=2.0
+    )
     np.testing.assert_allclose(x, (2 + 0.5 * np.arange(5)) ** 3, rtol=1e-14)
 
 
 def test_it_is_diffeqsolve():
     expected = diffrax.diffeqsolve(
-        diffrax.ODETerm(rates), statespace.RK4(), 0.0, 1.0, None, START, 4.0, saveat=diffrax.SaveAt(t0=True, steps=True), max_steps=10,
+        diffrax.ODETerm(rates), statespace.RK4(), 0.0, 1.0, None, START, 4.0,
+        saveat=diffrax.SaveAt(t0=True, steps=True), max_steps=10,
         stepsize_controller=diffrax.StepTo(ts=jnp.linspace(0.0, 1.0, 11)),
     ).ys  # fmt: skip
     x = simulation.fixed_steps(rates, START, 4.0, rows=10, step=0.1)
@@ -57,7 +60,9 @@ def test_a_batch_is_its_runs():
 
 @pytest.mark.parametrize("solver", [statespace.RK4(), statespace.RolledRK4()])
 def test_gradients_are_those_of_the_closed_form(solver):
-    place = lambda k: simulation.fixed_steps(rates, START, k, rows=5, step=0.01, steps_a_row=20, solver=solver).place[-1]
+    place = lambda k: simulation.fixed_steps(rates, START, k, rows=5, step=0.01, steps_a_row=20, solver=solver).place[
+        -1
+    ]
     expected = -np.sin(2.0) / 4  # d cos(sqrt(k) t) / dk at t = 1, k = 4
     np.testing.assert_allclose(jax.grad(place)(4.0), expected, rtol=1e-7)
     np.testing.assert_allclose(jax.jacfwd(place)(4.0), expected, rtol=1e-7)
