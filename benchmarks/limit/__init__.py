@@ -14,6 +14,7 @@ import numpy as np
 
 from ..mf_tyre_problem import COEFFICIENTS, Contacts
 from ..problems import SingleTrack, SpeedAndMass
+from ..seven_dof_problem import STATES, Drives
 from .build import LimitUnavailable, build, library, unavailable
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "build",
     "mf_tyre",
     "particle_filter",
+    "seven_dof",
     "unavailable",
     "unscented",
 ]
@@ -79,6 +81,14 @@ class _UnscentedProblem(ctypes.Structure):
         ("torque", _Doubles),
         ("speed", ctypes.c_void_p),
         *((name, _Doubles) for name in ["truck", "prior_mean", "prior_std", "process_std", "sensor_std", "spread"]),
+    ]
+
+
+class _DrivesProblem(ctypes.Structure):
+    _fields_ = [
+        *((name, ctypes.c_int) for name in ("runs", "rows", "steps_a_row")),
+        ("step", ctypes.c_double),
+        *((name, _Doubles) for name in ("body", "own", "start", "steering")),
     ]
 
 
@@ -192,6 +202,38 @@ def mf_tyre(
     def run() -> TyreForces:
         assert given  # the pointers lead into these arrays, so they live as long
         function(single, len(given[0]), _pointer(coefficients), *pointers)
+        return found
+
+    return run
+
+
+def seven_dof(
+    problem: Drives, *, dtype: np.typing.DTypeLike = np.float64, extra_flags: tuple[str, ...] = ()
+) -> Callable[[], np.ndarray]:
+    """All drives, ready to run: states (8, rows, runs) at the end of each row. The array is overwritten by the next call.
+
+    One run is computed in plain scalars, in float64 alone.
+    """
+    single = _is_single(dtype)
+    p = problem
+    if p.runs == 1 and single:
+        raise ValueError("one run is computed in float64 alone")
+    function = library(extra_flags).jaxveh_seven_dof
+    function.restype = None
+    function.argtypes = [ctypes.c_int, ctypes.POINTER(_DrivesProblem), ctypes.c_void_p]
+    torques = 0.5 * p.drive_torque * np.array([p.front_drive, 1 - p.front_drive])
+    arrays = [
+        _doubles(*p.body.values(), p.shape, p.curvature, torques),
+        _doubles(p.mass, p.stiffness_front, p.friction_front, p.stiffness_rear, p.friction_rear),
+        _doubles(p.speed),
+        _doubles(p.steer(0.5 * p.step * np.arange(2 * p.steps + 1))),
+    ]
+    structure = _DrivesProblem(p.runs, p.rows, p.steps_a_row, p.step, *map(_pointer, arrays))
+    structure.arrays = arrays  # it points into them, so they live as long
+    found = np.zeros((len(STATES), p.rows, p.runs), dtype)
+
+    def run() -> np.ndarray:
+        function(single, ctypes.byref(structure), found.ctypes.data)
         return found
 
     return run

@@ -76,7 +76,9 @@ def build(extra_flags: tuple[str, ...] = ()) -> Path:
     with tempfile.TemporaryDirectory(dir=target.parent) as folder:
         Path(folder, "coefficients.hpp").write_text(header)
         output = Path(folder, target.name)
-        sources = [str(SOURCES / name) for name in ("particle_filters.cpp", "unscented.cpp", "mf_tyre.cpp")]
+        sources = [
+            str(SOURCES / name) for name in ("particle_filters.cpp", "unscented.cpp", "mf_tyre.cpp", "seven_dof.cpp")
+        ]
         command = ["g++", *flags, f"-I{folder}", f"-I{SOURCES}", *sources, "-o", str(output)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:

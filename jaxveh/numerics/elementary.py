@@ -21,7 +21,7 @@ from jaxveh.numerics.platform import Tree, barrier, on_cpu
 _TANGENT_OF_PI_8 = math.sqrt(2) - 1
 _TANGENT_OF_3_PI_8 = math.sqrt(2) + 1
 
-_MANY = 128
+_MANY = 64
 """From this size on computing a number twice costs more than storing it."""
 
 # Multiples of these parts are exact up to 2^13 (float32) and 2^26 (float64) half turns: Cody and Waite's reduction.
@@ -263,17 +263,17 @@ def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
 # Arctangent
 
 
-def _three_ranges(height: Array, width: Array) -> tuple[Array, Array]:
-    """arctan(height / width), both not negative, as turned + arctan(r) with |r| <= tan(pi / 8), by one division.
+def _three_ranges(height: Array, width: Array) -> tuple[Array, Array, Array]:
+    """arctan(height / width), both not negative, as turned + arctan(top / bottom) with a quotient within tan(pi / 8) of 0.
 
     Above tan(pi / 8) it is pi / 4 + arctan((h - w) / (h + w)), above tan(3 pi / 8) it is pi / 2 + arctan(-w / h), so that
-    half the terms of the polynomial suffice. 0 / 0 counts as 0.
+    half the terms of the polynomial suffice.
     """
     middle, steep = height > _TANGENT_OF_PI_8 * width, height > _TANGENT_OF_3_PI_8 * width
     top = jnp.where(steep, -width, jnp.where(middle, height - width, height))
     bottom = jnp.where(steep, height, jnp.where(middle, height + width, width))
     turned = jnp.where(steep, math.pi / 2, jnp.where(middle, math.pi / 4, 0.0))
-    return turned, top / jnp.where(bottom == 0.0, 1.0, bottom)
+    return turned, top, bottom
 
 
 def _arctan_polynomial(turned: Array, r: Array) -> Array:
@@ -287,8 +287,8 @@ def _arctan(x: Array) -> Array:
     if not _ours(x):
         return jnp.arctan(x)
     x = _stored(x)
-    angle = _arctan_polynomial(*_three_ranges(jnp.abs(x), jnp.ones_like(x)))
-    return _with_sign(angle, x)
+    turned, top, bottom = _three_ranges(jnp.abs(x), jnp.ones_like(x))
+    return _with_sign(_arctan_polynomial(turned, top / bottom), x)
 
 
 @jax.custom_jvp
@@ -298,7 +298,9 @@ def _arctan2(y: Array, x: Array) -> Array:
     x, y = _stored(jnp.broadcast_arrays(x, y))
     largest = float(jnp.finfo(x.dtype).max) / 4  # so that infinities and sums of the two stay finite
     width, height = (jnp.where(jnp.abs(z) > largest, largest, jnp.abs(z)) for z in (x, y))
-    angle = _arctan_polynomial(*_three_ranges(height, width))
+    turned, top, bottom = _three_ranges(height, width)
+    # 0 / 0 counts as 0.
+    angle = _arctan_polynomial(turned, top / jnp.where(bottom == 0.0, 1.0, bottom))
     return _with_sign(jnp.where(x < 0.0, math.pi - angle, angle), y)
 
 

@@ -2,6 +2,7 @@
 
 from jaxveh.simulation.driven import Driven, DrivenState
 from jaxveh.simulation.events import Event, standstill, wheel_lift
+from jaxveh.simulation.fixed_steps import fixed_steps
 from jaxveh.simulation.simulate import driven_car, simulate
 from jaxveh.simulation.solve import Grid, Solution, even_grid, grid_through, solve
 from jaxveh.simulation.stiffness import fastest_pole
@@ -15,6 +16,7 @@ __all__ = [
     "driven_car",
     "even_grid",
     "fastest_pole",
+    "fixed_steps",
     "grid_through",
     "simulate",
     "solve",

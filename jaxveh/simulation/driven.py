@@ -13,7 +13,7 @@ from jaxveh._core.names import record
 from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre, SpeedControl, as_driver
 from jaxveh.manoeuvres.speed_control import AIR_DENSITY
 from jaxveh.sensors import Instrumented
-from jaxveh.vehicles import AbstractVehicle, Motion
+from jaxveh.vehicles import AbstractVehicle, Motion, Steered
 from jaxveh.vehicles.wheels import named, opposing
 
 
@@ -94,10 +94,17 @@ def adapted(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
     found = {}
     for name in missing:
         if name == "steering_wheel" and "steer" in given._fields:
-            found[name] = given.steer * vehicle.steering_ratio
+            found[name] = given.steer * steering_ratio(vehicle)
         elif name in named("torque") and "drive_torque" in given._fields:
             found[name] = 0.25 * (given.drive_torque - given.brake_torque * opposing(moves.v_x))
     return record("DriverInputs", {**given._asdict(), **found}) if found else given
+
+
+def steering_ratio(vehicle: Any) -> Any:
+    """The steering ratio of a car with a steering wheel, which is that of the `Steered` among what wraps it."""
+    while not isinstance(vehicle, Steered):
+        vehicle = vehicle.vehicle
+    return vehicle.ratio
 
 
 def check_inputs(driven: Driven) -> None:

@@ -23,7 +23,7 @@ from jaxveh.simulation.events import Event
 from jaxveh.simulation.meter import told
 from jaxveh.simulation.solve import Grid, Solution, even_grid, grid_through, solve
 from jaxveh.simulation.stiffness import Choice
-from jaxveh.statespace import RK4
+from jaxveh.statespace import RK4, RolledRK4
 from jaxveh.vehicles import AbstractVehicle, Travelling
 
 SOLVERS = ("auto", "explicit", "implicit")
@@ -142,7 +142,7 @@ def _run(driven: Driven, values: dict, run, asked: Choice | None, times: np.ndar
 
 
 def _warn_of_long_steps(driven: Driven, found: Solution, choice: Choice, times: np.ndarray) -> None:
-    if not isinstance(choice.solver, RK4):
+    if not isinstance(choice.solver, (RK4, RolledRK4)):
         return
     pole, time = stiffness.worst(driven, times, found.x)
     if pole * choice.max_step > stiffness.LIMIT:

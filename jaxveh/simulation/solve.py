@@ -108,7 +108,8 @@ def _solve(driven: Driven, start, rows, steps, solver, controller, until, adjoin
     if until is not None:
         reached = rows <= end
         x = jax.tree.map(lambda leaf: jnp.where(reached, leaf, jnp.nan), x)
-    u, outputs, measured = jax.vmap(driven.see)(rows, x)
+    # Row by row, not as a batch: as quick for some hundred rows, and compiled in a third of the time.
+    u, outputs, measured = jax.lax.map(lambda at: driven.see(*at), (rows, x))
     return Solution(x, u, outputs, measured, _result(solution.result, x, outputs, rows <= end), end)
 
 

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh.simulation.driven import Driven, dtype_of
-from jaxveh.statespace import RK4
+from jaxveh.statespace import RolledRK4
 
 STABLE = 2.5
 """Step times fastest pole up to which RK4 decays with it: it ends at 2.79 on the real, at 2.83 on the imaginary axis."""
@@ -111,7 +111,7 @@ def worst(driven: Driven, times: np.ndarray, x: Any) -> tuple[float, float]:
 
 def explicit(max_step: float) -> Choice:
     """RK4 with equal steps."""
-    return Choice(RK4(rolled=True), None, max_step)
+    return Choice(RolledRK4(), None, max_step)
 
 
 def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> Choice:

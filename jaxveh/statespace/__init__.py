@@ -11,7 +11,7 @@ from jaxveh.statespace.noise import (
 )
 from jaxveh.statespace.parameters import parameter_view, put_parameters, start_from, with_parameters
 from jaxveh.statespace.process import AbstractProcessNoise, Continuous, Discrete
-from jaxveh.statespace.solvers import RK4, Heun, Propagate
+from jaxveh.statespace.solvers import RK4, Heun, Propagate, RolledRK4
 
 __all__ = [
     "RK4",
@@ -28,6 +28,7 @@ __all__ = [
     "PerPoint",
     "Prior",
     "Propagate",
+    "RolledRK4",
     "Row",
     "StateSpace",
     "StudentT",

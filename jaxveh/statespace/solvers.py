@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -19,12 +20,7 @@ class RK4(diffrax.AbstractSolver):
 
     The stages are written out: a Butcher tableau keeps a stage buffer that costs 1.3 times in a batch and 2 to 4 times
     under `vmap`. A barrier after each stage keeps XLA from computing a stage anew in every consumer.
-
-    `rolled`: the four stages as a loop over one, for a single run of a car of many equations: half the time to compile
-    (SevenDOF: 5.3 instead of 9.7 s), and a fifth faster there; a batch is faster written out.
     """
-
-    rolled: bool = eqx.field(static=True, default=False)
 
     term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[Callable] = diffrax.LocalLinearInterpolation
@@ -37,13 +33,6 @@ class RK4(diffrax.AbstractSolver):
 
     def step(self, terms, t0, t1, y0, args, solver_state, made_jump):
         del solver_state, made_jump
-        y1 = self._in_a_loop(terms, t0, t1, y0, args) if self.rolled else self._written_out(terms, t0, t1, y0, args)
-        return y1, None, dict(y0=y0, y1=y1), None, diffrax.RESULTS.successful
-
-    def func(self, terms, t0, y0, args):
-        return terms.vf(t0, y0, args)
-
-    def _written_out(self, terms, t0, t1, y0, args):
         dt = terms.contr(t0, t1)
         half = t0 + (t1 - t0) / 2
 
@@ -58,21 +47,49 @@ class RK4(diffrax.AbstractSolver):
         k3 = stage(half, ahead(0.5, k2))
         k4 = stage(t1, ahead(1.0, k3))
         y1 = jax.tree.map(lambda y, a, b, c, d: y + (a + 2 * b + 2 * c + d) / 6, y0, k1, k2, k3, k4)
-        return numerics.barrier(y1)
+        y1 = numerics.barrier(y1)
+        return y1, None, dict(y0=y0, y1=y1), None, diffrax.RESULTS.successful
 
-    def _in_a_loop(self, terms, t0, t1, y0, args):
+    def func(self, terms, t0, y0, args):
+        return terms.vf(t0, y0, args)
+
+
+class RolledRK4(diffrax.AbstractSolver):
+    """The same method as `RK4` with its four stages in a loop: a quarter of the program.
+
+    For gradients through rates of hundreds of operations: reverse mode keeps the states of the stages alone and computes each
+    stage again for its slopes. Value and gradient of 100 7-DOF cars over 1000 steps of 1 ms take 6.0 times the value and 1.1 MB
+    (8.0 and 6.0 MB with `RK4`), and compile in 45 instead of 250 s. Forwards it takes 1.1 times as long as `RK4`.
+    """
+
+    term_structure: ClassVar = diffrax.AbstractTerm
+    interpolation_cls: ClassVar[Callable] = diffrax.LocalLinearInterpolation
+
+    def order(self, terms):
+        return 4
+
+    def init(self, terms, t0, t1, y0, args):
+        return None
+
+    def step(self, terms, t0, t1, y0, args, solver_state, made_jump):
+        del solver_state, made_jump
         dt = terms.contr(t0, t1)
+        dtype = jnp.result_type(*jax.tree.leaves(y0))
 
-        def stage(carry, coefficients):
-            k, total = carry
-            ahead, weight = coefficients
-            k = terms.vf_prod(t0 + ahead * (t1 - t0), jax.tree.map(lambda y, d: y + ahead * d, y0, k), args, dt)
-            return (k, jax.tree.map(lambda so_far, d: so_far + weight * d, total, k)), None
+        @functools.partial(jax.checkpoint, prevent_cse=False)
+        def stage(carry, given):
+            k, y1 = carry
+            reach, weight = given
+            y = jax.tree.map(lambda y, d: y + reach * d, y0, k)
+            k = numerics.barrier(terms.vf_prod(t0 + reach * (t1 - t0), y, args, dt))
+            return (k, jax.tree.map(lambda y, d: y + weight * d, y1, k)), None
 
-        none = jax.tree.map(jnp.zeros_like, y0)
-        table = jnp.asarray([[0.0, 1 / 6], [0.5, 1 / 3], [0.5, 1 / 3], [1.0, 1 / 6]], jnp.result_type(t0))
-        (_, total), _ = jax.lax.scan(stage, (none, none), (table[:, 0], table[:, 1]))
-        return jax.tree.map(jnp.add, y0, total)
+        reaches, weights = jnp.array([0, 0.5, 0.5, 1], dtype), jnp.array([1 / 6, 1 / 3, 1 / 3, 1 / 6], dtype)
+        (_, y1), _ = jax.lax.scan(stage, (jax.tree.map(jnp.zeros_like, y0), y0), (reaches, weights))
+        return y1, None, dict(y0=y0, y1=y1), None, diffrax.RESULTS.successful
+
+    def func(self, terms, t0, y0, args):
+        return terms.vf(t0, y0, args)
 
 
 class Heun(diffrax.AbstractSolver):

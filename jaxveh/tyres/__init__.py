@@ -10,6 +10,7 @@ from jaxveh.tyres.fiala_adams import FialaADAMS
 from jaxveh.tyres.fiala_polynomial import FialaPolynomial
 from jaxveh.tyres.friction_ellipse import FrictionEllipse
 from jaxveh.tyres.hsri import HSRI
+from jaxveh.tyres.isotropic import IsotropicMagicFormula
 from jaxveh.tyres.linear import Linear
 from jaxveh.tyres.linear_with_load import LinearWithLoad
 from jaxveh.tyres.longitudinal import Longitudinal
@@ -44,6 +45,7 @@ __all__ = [
     "Finding",
     "Forces",
     "FrictionEllipse",
+    "IsotropicMagicFormula",
     "Linear",
     "LinearWithLoad",
     "Longitudinal",

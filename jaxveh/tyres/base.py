@@ -26,6 +26,8 @@ class Contact(NamedTuple):
     - `pressure` (Pa): inflation pressure; None means the tyre's own.
     - `turn_slip` (1/m): curvature of the contact point's path as far as the wheel turns with it, phi_t of the book (4.75) in
       ISO-W's sign; laws without it ignore it.
+    - `lateral_slip` (-): tan(slip_angle), from whoever has it at hand, as a vehicle does: laws that want the tangent need no
+      trigonometry then. None: they take it themselves. Who replaces a slip angle replaces this too.
     """
 
     slip_angle: Any = 0.0
@@ -36,6 +38,7 @@ class Contact(NamedTuple):
     speed: Any = None
     pressure: Any = None
     turn_slip: Any = 0.0
+    lateral_slip: Any = None
 
 
 class Forces(NamedTuple):
@@ -105,4 +108,6 @@ def cornering_stiffness(tyre: AbstractTyre, contact: Contact) -> jax.Array:
     At zero slip it is the cornering stiffness of the book.
     """
     slip = jnp.asarray(contact.slip_angle, jnp.result_type(float if contact.load is None else contact.load))
-    return jax.jvp(lambda a: tyre.forces(contact._replace(slip_angle=a)).F_y, (slip,), (jnp.ones_like(slip),))[1]
+    return jax.jvp(
+        lambda a: tyre.forces(contact._replace(slip_angle=a, lateral_slip=None)).F_y, (slip,), (jnp.ones_like(slip),)
+    )[1]

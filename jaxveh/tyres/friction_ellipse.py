@@ -41,9 +41,10 @@ class FrictionEllipse(AbstractTyre):
         s = length(s_x, s_y)
 
         def along(slip):
-            return self.along.forces(contact._replace(slip_ratio=slip, slip_angle=0.0 * slip)).F_x
+            return self.along.forces(contact._replace(slip_ratio=slip, slip_angle=0.0 * slip, lateral_slip=None)).F_x
 
         def across(slip):
-            return self.across.forces(contact._replace(slip_ratio=0.0 * slip, slip_angle=numerics.arctan(slip))).F_y
+            at = contact._replace(slip_ratio=0.0 * slip, slip_angle=numerics.arctan(slip), lateral_slip=slip)
+            return self.across.forces(at).F_y
 
         return Forces(F_x=along(0.0 * s) + share(along, s_x, s), F_y=across(0.0 * s) + share(across, s_y, s))

@@ -23,5 +23,5 @@ class Longitudinal(AbstractTyre):
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """Longitudinal force alone, N."""
-        turned = contact._replace(slip_angle=contact.slip_ratio, slip_ratio=0.0, camber=0.0)
+        turned = contact._replace(slip_angle=contact.slip_ratio, lateral_slip=None, slip_ratio=0.0, camber=0.0)
         return Forces(F_x=self.law.forces(turned).F_y)

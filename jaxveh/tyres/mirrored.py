@@ -7,8 +7,14 @@ from typing import Any
 from jaxveh._core.errors import InputError
 from jaxveh.tyres.base import AbstractDynamicTyre, AbstractTyre, Contact, Forces
 
-ODD_INPUTS = ("slip_angle", "camber", "turn_slip")
+ODD_INPUTS = ("slip_angle", "camber", "turn_slip", "lateral_slip")
 """What of a contact changes sign in the mirror of the wheel's x-z plane; all else stays."""
+
+
+def turned(contact: Contact) -> Contact:
+    """The contact, seen in a mirror."""
+    odd = {name: getattr(contact, name) for name in ODD_INPUTS}
+    return contact._replace(**{name: -value for name, value in odd.items() if value is not None})
 
 
 class Mirrored(AbstractTyre):
@@ -31,6 +37,5 @@ class Mirrored(AbstractTyre):
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """Forces (N) and moments (N m) at a contact, in the axes of the wheel as it is mounted."""
-        turned = contact._replace(**{name: -getattr(contact, name) for name in ODD_INPUTS})
-        found = self.tyre.forces(turned, state)
+        found = self.tyre.forces(turned(contact), state)
         return found._replace(F_y=-found.F_y, M_x=-found.M_x, M_z=-found.M_z)

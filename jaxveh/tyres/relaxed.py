@@ -100,7 +100,8 @@ class Relaxed(AbstractDynamicTyre):
         if "x" in self.lags:
             slips["slip_ratio"] = state.deflection_x / lengths["x"]
         if "y" in self.lags:
-            slips["slip_angle"] = numerics.arctan(state.deflection_y / lengths["y"])
+            slips["lateral_slip"] = state.deflection_y / lengths["y"]
+            slips["slip_angle"] = numerics.arctan(slips["lateral_slip"])
         return self.tyre.forces(contact._replace(**slips))
 
     def _settled(self, contact: Contact) -> list:

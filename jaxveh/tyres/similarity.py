@@ -55,8 +55,8 @@ class Similarity(AbstractTyre):
 
         def curve(slip):
             angle = numerics.arctan(slip)
-            at = contact._replace(slip_angle=angle, slip_ratio=0.0 * slip, load=self.reference_load, friction=1.0)
-            return self.tyre.forces(at).F_y
+            at = contact._replace(slip_angle=angle, lateral_slip=slip, slip_ratio=0.0 * slip)
+            return self.tyre.forces(at._replace(load=self.reference_load, friction=1.0)).F_y
 
         if self.slip_stiffness_ratio is None:
             _, s_y = theoretical(contact._replace(slip_ratio=0.0))

@@ -16,15 +16,18 @@ SMALLEST = 1e-5
 
 def theoretical(contact: Contact):
     """`kappa / (1 + kappa)` and `tan(alpha) / (1 + kappa)`, positive like their forces; finite for a locked wheel."""
-    angle = contact.slip_angle + 0.0 * contact.slip_ratio
-    rolls = jnp.maximum(1.0 + contact.slip_ratio + 0.0 * angle, LOCKED)
-    return contact.slip_ratio / rolls, numerics.tan(jnp.asarray(angle)) / rolls
+    s_x, s_y = practical(contact)
+    rolls = jnp.maximum(1.0 + s_x, LOCKED)
+    return s_x / rolls, s_y / rolls
 
 
 def practical(contact: Contact):
     """`kappa` and `tan(alpha)`: sliding speed over forward speed, positive like their forces."""
-    angle = contact.slip_angle + 0.0 * contact.slip_ratio
-    return contact.slip_ratio + 0.0 * angle, numerics.tan(jnp.asarray(angle))
+    if contact.lateral_slip is None:
+        angle = contact.slip_angle + 0.0 * contact.slip_ratio
+        return contact.slip_ratio + 0.0 * angle, numerics.tan(jnp.asarray(angle))
+    tangent = contact.lateral_slip + 0.0 * contact.slip_ratio
+    return contact.slip_ratio + 0.0 * tangent, tangent
 
 
 def length(x, y):

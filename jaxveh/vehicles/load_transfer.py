@@ -111,8 +111,8 @@ def planar_loads(car: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     share = b / (a + b) if car.front_roll_share is None else car.front_roll_share
     lever = car.mass * car.cg_height
     front, rear = axle_loads(car, a_x, g_z)
-    fl, fr = clip_transfer(front, share * lever * a_y / car.track_front)
-    rl, rr = clip_transfer(rear, (1.0 - share) * lever * a_y / car.track_rear)
+    fl, fr = clip_transfer(front, share / car.track_front * lever * a_y)
+    rl, rr = clip_transfer(rear, (1.0 - share) / car.track_rear * lever * a_y)
     return Wheels(fl, fr, rl, rr)
 
 
@@ -120,7 +120,7 @@ def axle_loads(car: Any, a_x: Any, g_z: Any) -> tuple[Any, Any]:
     """Loads of the front and the rear axle, N: `m (g_z b - a_x h) / (a + b)` and the rest of the weight, none below zero."""
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     weight = -car.mass * g_z
-    moved = car.mass * car.cg_height * a_x / (a + b)
+    moved = car.mass * car.cg_height / (a + b) * a_x
     front = jnp.clip(weight * (b / (a + b)) - moved, 0.0, weight)
     return front, weight - front
 

@@ -114,9 +114,11 @@ class SevenDOF(AbstractVehicle):
         forces = tyres.forces(contacts, states)
         push = pushed(positions_of(self), moves, forces)
         g_x, g_y, _ = gravity(ground)
-        a_x = (push.F_x - air_drag(self.drag, x.v_x)) / self.mass
-        a_y = push.F_y / self.mass
-        yaw_acceleration = push.M_z / self.yaw_inertia
+        # Multiplied by inverses, which belong to the car and not to the instant: a division costs five multiplications.
+        inverse_mass = 1.0 / self.mass
+        a_x = (push.F_x - air_drag(self.drag, x.v_x)) * inverse_mass
+        a_y = push.F_y * inverse_mass
+        yaw_acceleration = push.M_z * (1.0 / self.yaw_inertia)
         omegas = of(x, "omega")
         drive, brake = self.drive.torques(u)
         spins = each(self._spin, omegas, contacts, forces, drive, brake)
@@ -140,8 +142,8 @@ class SevenDOF(AbstractVehicle):
         """Accelerations of a steady turn under these torques, m/s^2; what no load transfer asks for is never computed."""
         drive, brake = self.drive.torques(u)
         torque = total(drive) - total(brake) * opposing(x.v_x)
-        return torque / (self.mass * self.wheel_radius), x.v_x * x.yaw_rate - gravity(ground)[1]
+        return torque * (1.0 / (self.mass * self.wheel_radius)), x.v_x * x.yaw_rate - gravity(ground)[1]
 
     def _spin(self, omega, at, force, drive, brake):
         slowing = (brake + self.rolling_resistance * at.load * self.wheel_radius) * opposing(omega * self.wheel_radius)
-        return (drive - slowing - self.wheel_radius * force.F_x) / self.wheel_inertia
+        return (drive - slowing - self.wheel_radius * force.F_x) * (1.0 / self.wheel_inertia)

@@ -14,8 +14,8 @@ def regularised_speed(v: jax.Array, crawl: float) -> jax.Array:
     Twice continuously differentiable, even, and never below `3 crawl / 8`, so that a division by it is safe and the
     poles of lateral motion, which grow with 1 / |v|, stay within reach of an explicit solver.
     """
-    # Clipped before the polynomial, so that the branch not taken cannot overflow.
-    square = jnp.square(jnp.clip(v * (1.0 / crawl), -1.0, 1.0))
+    # Bounded before the polynomial, so that the branch not taken cannot overflow.
+    square = jnp.minimum(jnp.square(v * (1.0 / crawl)), 1.0)
     return jnp.where(jnp.abs(v) >= crawl, jnp.abs(v), (crawl / 8.0) * (3.0 + square * (6.0 - square)))
 
 

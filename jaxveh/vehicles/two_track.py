@@ -53,7 +53,7 @@ def positions_of(car: Any) -> Wheels:
 
 def rolling_wheels(car: Any, v_x: Any, v_y: Any, yaw_rate: Any, steer: Any) -> Wheels:
     """How the wheels move over the road; both front wheels turn by the steer (rad)."""
-    turn = numerics.cos(steer), numerics.sin(steer)
+    turn = numerics.barrier((numerics.cos(steer), numerics.sin(steer)))
     turned = Wheels(turn, turn, (1.0, 0.0), (1.0, 0.0))
     return each(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), positions_of(car), turned)
 

@@ -58,6 +58,7 @@ LAWS = {
     "FialaADAMS": Law(lambda: tyres.FialaADAMS(80000.0, 60000.0, 0.9, 0.7), bound=0.9 * np.sqrt(2)),
     "FialaPolynomial": Law(lambda: tyres.FialaPolynomial(80000.0, 60000.0, 0.9), bound=0.9 * np.hypot(1, 1.00631)),
     "HSRI": Law(lambda: tyres.HSRI(80000.0, 60000.0, 0.9)),
+    "IsotropicMagicFormula": Law(lambda: tyres.IsotropicMagicFormula(10.0, 1.4, 0.9, 0.2)),
     "Linear": Law(lambda: tyres.Linear(60000.0, 80000.0), bound=None, load=False, friction=False),
     "LinearWithLoad": Law(lambda: tyres.LinearWithLoad(60000.0, 5000.0, 20.0), bound=None, friction=False),
     "MF-Tyre": Law(mf_tyre, bound=None, symmetric=False),

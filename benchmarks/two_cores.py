@@ -1,0 +1,80 @@
+"""`python -m benchmarks.two_cores [--runs N] [--rounds N]`: what a second core gives 1000 drives of the 7-DOF car.
+
+XLA does not use it by itself: `shard_map` over two host devices does. Wall time, not pinned to a core, so that it stands
+apart from the other benchmarks; the machine should have nothing else to do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import os
+import statistics
+import sys
+import time
+from collections.abc import Callable
+
+from .machine import VECTOR_WIDTH_FLAG
+
+__all__ = ["main", "measure"]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure and print; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.two_cores", description=__doc__)
+    parser.add_argument("--runs", type=int, default=1000, help="drives, an even number (default 1000)")
+    parser.add_argument("--rows", type=int, default=100, help="rows of ten steps (default 100)")
+    parser.add_argument("--rounds", type=int, default=9, help="rounds over both (default 9)")
+    options = parser.parse_args(arguments)
+    if options.runs < 2 or options.runs % 2 or min(options.rows, options.rounds) < 1:
+        parser.error(f"--runs is {options.runs}; it must be even, and --rows and --rounds at least 1")
+    os.environ["XLA_FLAGS"] = f"{VECTOR_WIDTH_FLAG} --xla_force_host_platform_device_count=2"
+    os.environ.setdefault("JAX_PLATFORMS", "cpu")
+    ratios = measure(options.runs, options.rows, options.rounds)
+    print(f"two cores: {statistics.median(ratios):.2f} times one core (rounds: {min(ratios):.2f} to {max(ratios):.2f})")
+    return 0
+
+
+def measure(runs: int, rows: int, rounds: int) -> list[float]:
+    """Wall time of one device over that of two, a number a round; both give the same states, or it raises."""
+    import jax
+    import numpy as np
+
+    jax.config.update("jax_enable_x64", True)
+    one, two = contestants(runs, rows)
+    for a, b in zip(jax.tree.leaves(one()), jax.tree.leaves(two()), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9)
+    return [_seconds(one) / _seconds(two) for _ in range(rounds)]
+
+
+def contestants(runs: int, rows: int) -> tuple[Callable[[], object], Callable[[], object]]:
+    """All drives on one device, and half of them on each of two."""
+    import jax
+    import jax.numpy as jnp
+    import numpy as np
+    from jax.sharding import Mesh, NamedSharding
+    from jax.sharding import PartitionSpec as P
+
+    from . import simulation
+    from .seven_dof_problem import drives
+
+    problem = drives(runs, rows)
+    cars, speed = simulation.car(problem, np.float64), jnp.asarray(problem.speed)
+    run = functools.partial(simulation.simulate, problem)
+    mesh = Mesh(jax.devices()[:2], "runs")
+    parts = jax.tree.map(lambda leaf: P("runs") if leaf.ndim else P(), (cars, speed))
+    # No check of what varies over devices: a car that starts at rest sideways has constants among its states.
+    split = jax.jit(jax.shard_map(run, mesh=mesh, in_specs=parts, out_specs=P(None, "runs"), check_vma=False))
+    given = jax.device_put((cars, speed), jax.tree.map(lambda part: NamedSharding(mesh, part), parts))
+    whole = jax.jit(run)
+    return lambda: jax.block_until_ready(whole(cars, speed)), lambda: jax.block_until_ready(split(*given))
+
+
+def _seconds(function: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    function()
+    return time.perf_counter() - started
+
+
+if __name__ == "__main__":
+    sys.exit(main())

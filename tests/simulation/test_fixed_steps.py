@@ -1,0 +1,80 @@
+"""Equal steps of a diffrax solver: against a closed form, against diffeqsolve, in batches, in gradients."""
+
+from typing import NamedTuple
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import simulation, statespace
+from jaxveh._core.errors import InputError
+
+
+class Spring(NamedTuple):
+    place: object
+    speed: object
+
+
+def rates(t, x, stiffness):
+    return Spring(x.speed, -stiffness * x.place + 0.0 * t)
+
+
+START = Spring(jnp.asarray(1.0), jnp.asarray(0.0))
+
+
+@pytest.mark.parametrize("solver", [None, statespace.RolledRK4(), statespace.Heun(), diffrax.Tsit5()])
+def test_an_oscillator_swings(solver):
+    x = simulation.fixed_steps(rates, START, 4.0, rows=20, step=1e-3, steps_a_row=50, solver=solver)
+    t = 0.05 * np.arange(21)
+    assert x.place.shape == (21,)
+    np.testing.assert_allclose(x.place, np.cos(2 * t), atol=2e-6)
+    np.testing.assert_allclose(x.speed, -2 * np.sin(2 * t), atol=4e-6)
+
+
+def test_time_reaches_the_rates():
+    x = simulation.fixed_steps(
+        lambda t, x, args: 3 * t**2, jnp.asarray(8.0), rows=4, step=0.25, steps_a_row=2, start=2.0
+    )
+    np.testing.assert_allclose(x, (2 + 0.5 * np.arange(5)) ** 3, rtol=1e-14)
+
+
+def test_it_is_diffeqsolve():
+    expected = diffrax.diffeqsolve(
+        diffrax.ODETerm(rates), statespace.RK4(), 0.0, 1.0, None, START, 4.0,
+        saveat=diffrax.SaveAt(t0=True, steps=True), max_steps=10,
+        stepsize_controller=diffrax.StepTo(ts=jnp.linspace(0.0, 1.0, 11)),
+    ).ys  # fmt: skip
+    x = simulation.fixed_steps(rates, START, 4.0, rows=10, step=0.1)
+    np.testing.assert_allclose(x.place, expected.place[:11], rtol=1e-12, atol=1e-14)
+
+
+def test_a_batch_is_its_runs():
+    stiffness = jnp.array([1.0, 4.0, 9.0])
+    wide = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (3,)), START)
+    whole = simulation.fixed_steps(rates, wide, stiffness, rows=3, step=0.01, steps_a_row=4)
+    mapped = jax.vmap(lambda k: simulation.fixed_steps(rates, START, k, rows=3, step=0.01, steps_a_row=4), out_axes=1)
+    np.testing.assert_allclose(whole.place, mapped(stiffness).place, rtol=1e-14)
+
+
+@pytest.mark.parametrize("solver", [statespace.RK4(), statespace.RolledRK4()])
+def test_gradients_are_those_of_the_closed_form(solver):
+    place = lambda k: simulation.fixed_steps(rates, START, k, rows=5, step=0.01, steps_a_row=20, solver=solver).place[
+        -1
+    ]
+    expected = -np.sin(2.0) / 4  # d cos(sqrt(k) t) / dk at t = 1, k = 4
+    np.testing.assert_allclose(jax.grad(place)(4.0), expected, rtol=1e-7)
+    np.testing.assert_allclose(jax.jacfwd(place)(4.0), expected, rtol=1e-7)
+
+
+def test_single_precision_stays_single():
+    start = jax.tree.map(lambda leaf: leaf.astype(jnp.float32), START)
+    x = simulation.fixed_steps(rates, start, jnp.float32(4.0), rows=3, step=0.01)
+    assert x.place.dtype == x.speed.dtype == jnp.float32
+
+
+@pytest.mark.parametrize("wrong", [{"rows": 0}, {"step": 0.0}, {"step": -1.0}, {"steps_a_row": 0}])
+def test_wrong_numbers_are_named(wrong):
+    with pytest.raises(InputError, match=next(iter(wrong))):
+        simulation.fixed_steps(rates, START, 4.0, **{"rows": 2, "step": 0.1, **wrong})
