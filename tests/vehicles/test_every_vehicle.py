@@ -329,11 +329,12 @@ def test_the_ground_counts(name):
     for a, b in zip(jax.tree.leaves(level), jax.tree.leaves(same), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-9)
     if about.friction and about.lateral:
-        straight, steered = start(name)
-        steered = steered._replace(steer=jnp.asarray(0.05)) if "steer" in steered._fields else steered
-        straight = straight._replace(steer=jnp.asarray(0.05)) if "steer" in straight._fields else straight
-        dry = car.evaluate(0.0, straight, steered)[1].a_y
-        assert 0.0 < car.evaluate(0.0, straight, steered, Ground(*[0.05] * 4))[1].a_y < 0.5 * dry
+        # Started with the wheels turned, so that relaxed tyres have settled at their slip.
+        turned = inputs(car, v_x=SPEED, steer=0.05, steering_wheel=0.8)
+        known = {"v_x": SPEED, "speed": SPEED, "steer": 0.05}
+        begun = car.start(0.0, turned, **{k: v for k, v in known.items() if k in car.state_type._fields})
+        dry = car.evaluate(0.0, begun, turned)[1].a_y
+        assert 0.0 < car.evaluate(0.0, begun, turned, Ground(*[0.05] * 4))[1].a_y < 0.5 * dry
     if about.slope and about.lateral:
         rest, u = start(name, 0.0)
         across = car.derivatives(0.0, rest, u, Ground(bank=jnp.asarray(0.1)))
