@@ -39,14 +39,15 @@ def iso_obstacle_avoidance(
     start: float = 30.0,
     lead: float = 2.0,
     duration: float | None = None,
+    preview_time=0.5,
     **driver,
 ) -> PathDriver:
     """The obstacle avoidance of ISO 3888-2 in closed loop at `speed` (m/s) with a car of a `width` (m).
 
-    The course is `iso_3888_2(width, start)`; otherwise as `iso_lane_change`, with a preview of 0.5 s unless told.
+    The course is `iso_3888_2(width, start)`; otherwise as `iso_lane_change`; `preview_time` (s) is the driver's.
     """
     path = centre_line(iso_3888_2(width, start), lead)
-    return _driver(path, speed, start + 76.0, duration, {"preview_time": 0.5, **driver})
+    return _driver(path, speed, start + 76.0, duration, {"preview_time": preview_time, **driver})
 
 
 def slalom_course(
@@ -77,9 +78,8 @@ def steady_circle(
     duration = start + time + 2.0 if duration is None else duration
     check_drive(from_speed, duration)
     check_drive(to_speed, duration)
-    return PathDriver(
-        Circle(radius), ChangingSpeed(from_speed, to_speed, float(start), float(time)), float(duration), **driver
-    )
+    speed = ChangingSpeed(from_speed, to_speed, float(start), float(time))
+    return PathDriver(path=Circle(radius), speed=speed, duration=float(duration), **driver)
 
 
 def _driver(path, speed, length: float, duration: float | None, driver: dict) -> PathDriver:
@@ -90,4 +90,4 @@ def _driver(path, speed, length: float, duration: float | None, driver: dict) ->
         check_positive("speed", speed, "m/s")
         duration = math.ceil(100 * length / float(speed)) / 100
     check_drive(speed, duration)
-    return PathDriver(path, SteadySpeed(speed), float(duration), **driver)
+    return PathDriver(path=path, speed=SteadySpeed(speed), duration=float(duration), **driver)

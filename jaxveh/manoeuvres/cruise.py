@@ -62,4 +62,7 @@ def cruise(
     wander, foot = jax.random.split(key)
     held = not eqx.is_array(speed_std) and speed_std == 0
     wanted = SteadySpeed(speed) if held else wavering_speed(speed, speed_std, wander, time=speed_time, count=count)
-    return Cruise(wanted, float(duration), pedal_noise, *gauss_markov_harmonics(foot, pedal_time, 4.0, count))
+    frequencies, phases = gauss_markov_harmonics(foot, pedal_time, 4.0, count)
+    return Cruise(
+        speed=wanted, duration=float(duration), pedal_noise=pedal_noise, frequencies=frequencies, phases=phases
+    )
