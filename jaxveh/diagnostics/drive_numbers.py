@@ -38,13 +38,15 @@ class LowestFrequency(NamedTuple):
 
 
 def peaks(recording: Recording) -> Peaks:
-    """The greatest sizes in a drive. **Raises** `InputError` where a channel is missing."""
+    """The greatest sizes in a drive; NaN for what the recording does not have."""
     loads = [f"load_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has(recording, f"load_{wheel}")]
     size = lambda values: float(np.max(np.abs(values)))
+    of = lambda name: size(channel(recording, name)) if has(recording, name) else float("nan")
+    slides = has(recording, "sideslip") or has(recording, "v_x", "v_y")
     return Peaks(
-        size(channel(recording, "a_y")),
-        size(channel(recording, "yaw_rate")),
-        size(sideslip(recording)),
+        of("a_y"),
+        of("yaw_rate"),
+        size(sideslip(recording)) if slides else float("nan"),
         min((float(np.min(channel(recording, name))) for name in loads), default=float("nan")),
     )
 

@@ -53,7 +53,7 @@ def frequency_response(
     step = float(np.median(np.diff(time))) if time.size > 1 else 1.0
     even = time[0] + step * np.arange(int(length / step + 0.5) + 1)
     u, y = (np.interp(even, time, channel(recording, name)) for name in (input, output))
-    rows = min(int(round(segment / step)), even.size)
+    rows = min(round(segment / step), even.size)
     if rows < 8:
         raise InputError(f"segment = {segment:g} s: has {rows} rows; there must be at least 8.")
     if all(_straight_ends(values) for values in (u, y)):

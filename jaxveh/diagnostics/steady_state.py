@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel, sideslip
+from jaxveh.diagnostics.drive_channels import channel, seconds, sideslip
 
 LINEAR = 4.0
 """m/s^2: the lateral acceleration up to which passenger cars are taken as linear."""
@@ -17,6 +17,12 @@ SLOWEST = 2.0
 """m/s: below it nothing is said of turns."""
 
 FEWEST = 5
+
+STEADY = 0.5
+"""m/s^3: rows count as steady while the lateral acceleration changes by less in a second; ours."""
+
+SETTLED = 1.0
+"""s: how long rows after an unsteady one are left out; ours."""
 
 
 class SteadyTurns(NamedTuple):
@@ -38,15 +44,22 @@ class Understeer(NamedTuple):
     rows: int
 
 
-def steady_turns(recording: Recording, wheelbase: float | None = None) -> SteadyTurns:
-    """The rows of a drive that is quasi-steady throughout: a slow ramp of steer, a circle at slowly rising speed.
+def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady: float = STEADY) -> SteadyTurns:
+    """The quasi-steady rows of a drive: a slow ramp of steer, a circle at slowly rising speed.
 
-    Curvature is `yaw_rate / v_x`; rows below `SLOWEST` are left out.
+    Left out are rows below `SLOWEST`, those about which the lateral acceleration changes by more than `steady` (m/s^3) within
+    a second, and what follows them within `SETTLED`. Curvature is `yaw_rate / v_x`.
 
-    **Raises** `InputError` for a channel that is not there, or a wheelbase that is not positive.
+    **Raises** `InputError` for a channel that is not there, a wheelbase that is not positive, or where no row is steady.
     """
+    check_positive("steady", steady, "m/s^3")
     v_x = channel(recording, "v_x")
-    moves = v_x >= SLOWEST
+    moves = (v_x >= SLOWEST) & _settled(seconds(recording), channel(recording, "a_y"), steady)
+    if not moves.any():
+        raise InputError(
+            f"steady_turns: in no row the car is faster than {SLOWEST:g} m/s and its lateral acceleration changes by less than "
+            f"{steady:g} m/s^3: drive more slowly into the turn."
+        )
     geometric = None
     if wheelbase is not None:
         check_positive("wheelbase", wheelbase, "m")
@@ -54,6 +67,17 @@ def steady_turns(recording: Recording, wheelbase: float | None = None) -> Steady
     return SteadyTurns(
         channel(recording, "a_y")[moves], channel(recording, "steer")[moves], sideslip(recording)[moves], geometric
     )
+
+
+def _settled(time: np.ndarray, a_y: np.ndarray, steady: float) -> np.ndarray:
+    """Whether each row, and those of the last `SETTLED` seconds, are steady."""
+    before, after = np.clip(time - 0.5, time[0], time[-1]), np.clip(time + 0.5, time[0], time[-1])
+    rate = np.abs(np.interp(after, time, a_y) - np.interp(before, time, a_y)) / np.where(
+        after > before, after - before, 1.0
+    )
+    unsteady = np.append(time[rate > steady], np.inf)
+    last = np.concatenate([[-np.inf], unsteady])[np.searchsorted(unsteady, time, side="right")]
+    return time - last > SETTLED
 
 
 def understeer(turns: SteadyTurns, *, above: float = 0.2, linear: float = LINEAR) -> Understeer:

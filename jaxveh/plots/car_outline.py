@@ -47,7 +47,14 @@ class Footprint(NamedTuple):
         half = max(self.track_front, self.track_rear) / 2 + BESIDE
         nose, tail = self.front + OVERHANG[0], -self.rear - OVERHANG[1]
         return np.array(
-            [(tail, -half), (nose - 0.5, -half), (nose, -half + 0.4), (nose, half - 0.4), (nose - 0.5, half), (tail, half)]
+            [
+                (tail, -half),
+                (nose - 0.5, -half),
+                (nose, -half + 0.4),
+                (nose, half - 0.4),
+                (nose - 0.5, half),
+                (tail, half),
+            ]
         )
 
 
@@ -58,10 +65,16 @@ def footprint(recording: Recording, car: Any, wheelbase: float | None, track: fl
     for name, value in (("wheelbase", wheelbase), ("track", track)):
         if value is not None:
             check_positive(name, value, "m")
-    front, rear = float(getattr(car, "front_axle_to_cg", TYPICAL["front"])), float(getattr(car, "rear_axle_to_cg", TYPICAL["rear"]))
+    front, rear = (
+        float(getattr(car, "front_axle_to_cg", TYPICAL["front"])),
+        float(getattr(car, "rear_axle_to_cg", TYPICAL["rear"])),
+    )
     if wheelbase is not None:
         front, rear = (wheelbase * part / (front + rear) for part in (front, rear))
-    tracks = [float(getattr(car, f"track_{axle}", TYPICAL["track"])) if track is None else float(track) for axle in ("front", "rear")]
+    tracks = [
+        float(getattr(car, f"track_{axle}", TYPICAL["track"])) if track is None else float(track)
+        for axle in ("front", "rear")
+    ]
     return Footprint(front, rear, *tracks, single=not has(recording, "F_y_fl") and has(recording, "F_yf"))
 
 
@@ -78,7 +91,11 @@ def wheel_angles(recording: Recording, footprint: Footprint) -> dict[str, np.nda
     for name in footprint.wheels:
         own = {"fl": "steer_left", "fr": "steer_right"}.get(name, "steer")
         front = name[0] == "f"
-        found[name] = channel(recording, own if has(recording, own) else "steer") if front and has(recording, "steer") else straight
+        found[name] = (
+            channel(recording, own if has(recording, own) else "steer")
+            if front and has(recording, "steer")
+            else straight
+        )
     return found
 
 

@@ -17,7 +17,11 @@ from jaxveh.plots.handling import handling_diagram
 from jaxveh.plots.panels import overview
 from jaxveh.plots.step_responses import step_response
 from jaxveh.plots.style import new_figure, style
-from jaxveh.plots.top_views import top_view
+from jaxveh.plots.top_views import top_view, top_view_height
+
+
+OVERVIEW_HEIGHT = 5.2
+"""Inches of what the car does, beneath a view from above."""
 
 
 class Seen(NamedTuple):
@@ -64,8 +68,9 @@ def _path(seen: Seen) -> Any:
     if not has(seen.recording, "x", "y", "yaw"):
         return _overview(seen)
     with style():
-        figure = new_figure(9.0) if seen.figure is None else seen.figure
-        above, below = figure.subfigures(2, 1, height_ratios=[4.0, 5.0])
+        heights = [top_view_height(seen.recording, seen.course), OVERVIEW_HEIGHT]
+        figure = new_figure(sum(heights)) if seen.figure is None else seen.figure
+        above, below = figure.subfigures(2, 1, height_ratios=heights)
         top_view(seen.recording, seen.course, car=seen.car, wheelbase=seen.wheelbase, figure=above)
         overview(seen.recording, figure=below)
     return figure

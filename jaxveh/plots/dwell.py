@@ -38,7 +38,7 @@ def sine_with_dwell(recording: Recording, *, steering_ratio: float = 16.0, figur
         _mark_yaw(axes[1], recording, found)
         if placed:
             _way(axes[2], recording, found)
-        figure.suptitle(f"FMVSS 126: {_words(found)}", x=0.01, ha="left", fontsize=9, fontweight="bold")
+        note(axes[0], f"FMVSS 126: {_words(found)}")
         legend(figure, axes)
     return figure
 
@@ -60,14 +60,18 @@ def _mark_yaw(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
         top = side * limit * np.degrees(found.peak)
         ax.plot([at, at], [0.0, top], color=FORBIDDEN, linewidth=1.4)
         ax.plot([at - 0.12, at + 0.12], [top, top], color=FORBIDDEN, linewidth=1.8, label="limit")
-        shade = ALLOWED if ratio <= limit else FORBIDDEN
-        ax.plot([at], [float(np.interp(at, time, yaw_rate))], "o", color=shade, markersize=5, label="measured")
+        _dot(ax, at, float(np.interp(at, time, yaw_rate)), ratio <= limit)
     ax.axvline(found.completed, color=GREY, linewidth=0.7, linestyle=":")
     words = [
         f"{100 * ratio:.0f} % of the peak after {after:g} s (at most {100 * limit:.0f} %)"
         for (after, limit), ratio in zip(LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True)
     ]
     note(ax, ",  ".join(words))
+
+
+def _dot(ax: Any, at: float, value: float, allowed: bool) -> None:
+    shade, words = (ALLOWED, "within the limit") if allowed else (FORBIDDEN, "beyond the limit")
+    ax.plot([at], [value], "o", color=shade, markersize=5, label=words)
 
 
 def _way(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
@@ -82,8 +86,7 @@ def _way(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
     ax.plot(time, left, color=CYCLE[0], linewidth=1.2)
     ax.axvspan(found.begins, at, color=SHADE, linewidth=0, zorder=0)
     ax.plot([at - 0.12, at + 0.12], [side * DISPLACEMENT] * 2, color=FORBIDDEN, linewidth=1.8, label="limit")
-    shade = ALLOWED if found.responsive else FORBIDDEN
-    ax.plot([at], [there], "o", color=shade, markersize=5, label="measured")
+    _dot(ax, at, there, found.responsive)
     label_above(ax, "lateral displacement [m]")
     # What happens long after the instant would hide it.
     reach = 3.0 * max(abs(there), DISPLACEMENT)

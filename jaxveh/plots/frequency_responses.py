@@ -44,12 +44,20 @@ def frequency_response(
                 fine = np.geomspace(found.frequency[0], found.frequency[-1], POINTS)
                 exact = np.asarray(closed_form[name](fine))
                 _response(
-                    column, name, fine, exact, color=COLOURS["truth"], linewidth=1.0, linestyle="--", label="closed form"
+                    column,
+                    name,
+                    fine,
+                    exact,
+                    color=COLOURS["truth"],
+                    linewidth=1.0,
+                    linestyle="--",
+                    label="closed form",
                 )
             column[2].plot(found.frequency, found.coherence, color=CYCLE[0])
             column[2].set_ylim(0, 1.05)
             _label(column, name, found.frequency)
-        legend(figure, axes)
+        if closed_form:
+            legend(figure, axes)
     return figure
 
 
@@ -70,6 +78,10 @@ def _label(column: Any, name: str, frequency: np.ndarray) -> None:
     column[0].set_ylim(bottom=0)
     column[2].set_xlabel("frequency [Hz]")
     column[2].set_xscale("log")
-    ticks = [tick for tick in (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20) if frequency[0] <= tick <= frequency[-1]]
+    ticks = [
+        tick
+        for tick in (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20)
+        if 0.99 * frequency[0] <= tick <= 1.01 * frequency[-1]
+    ]
     column[2].set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     column[2].set_xticks([], minor=True)

@@ -46,7 +46,9 @@ def stack(figure: Any, count: int, each: float = 1.35) -> tuple[Any, np.ndarray]
 
 def line(ax: Any, recording: Recording, name: str, **style: Any) -> None:
     """One channel over time, with its label above."""
-    ax.plot(drive_channels.seconds(recording), values(recording, name), **{"color": CYCLE[0], "linewidth": 1.2, **style})
+    ax.plot(
+        drive_channels.seconds(recording), values(recording, name), **{"color": CYCLE[0], "linewidth": 1.2, **style}
+    )
     label_above(ax, shown(name).label)
 
 
@@ -67,7 +69,7 @@ def has_wheels(recording: Recording, prefix: str) -> bool:
 
 def note(ax: Any, text: str) -> None:
     """Numbers that belong to a panel, above it on the right, where no line runs."""
-    ax.set_title(text, loc="right", fontweight="normal", fontsize=8, color=GREY, pad=3.0)
+    ax.set_title(text.replace("-", "\N{MINUS SIGN}"), loc="right", fontweight="normal", fontsize=8, color=GREY, pad=3.0)
 
 
 def round_number(value: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -13,7 +14,7 @@ from jaxveh.diagnostics.drive_channels import channel, seconds
 from jaxveh.manoeuvres import Course, cones
 from jaxveh.plots.car_outline import WHEEL, Footprint, footprint, turned, wheel_angles, wheel_forces
 from jaxveh.plots.panels import round_number
-from jaxveh.plots.style import COLOURS, CYCLE, SHADE, WIDTH, label_above, new_figure, style
+from jaxveh.plots.style import CYCLE, SHADE, WIDTH, label_above, new_figure, style
 
 SNAPSHOTS = 12
 """How often the car is shown, about, unless told."""
@@ -22,8 +23,11 @@ MOST_ROWS = 4
 TALL = 4.6
 """A long and narrow drive is cut along x into rows, as long as they stay within so many inches."""
 
-BAR = 0.9
-"""Inches that the colour's bar and the labels take of the width."""
+BESIDE, BENEATH, EACH = 0.6, 0.95, 0.4
+"""Inches that labels take of the width, the colour's bar and labels of the height, and the ticks of each row."""
+
+FLAT = 0.4
+"""Height over width of the rows below which times stand along their lower edge, clear of arrows."""
 
 FORCE = CYCLE[1]
 
@@ -49,31 +53,33 @@ def top_view(
     **Returns** the figure. **Raises** `InputError` where position or yaw is missing, or an argument is out of range.
     """
     check_one_of("colour", colour, ("speed", "time"))
-    print_ = footprint(recording, car, wheelbase, track)
+    feet = footprint(recording, car, wheelbase, track)
     time, x, y = seconds(recording), channel(recording, "x"), channel(recording, "y")
     every = round_number(max(time[-1] - time[0], 1e-3) / SNAPSHOTS * 1.5) if every is None else every
     check_positive("every", every, "s")
     at = np.searchsorted(time, np.arange(time[0], time[-1] + 1e-9, every) - 1e-9)
-    boxes, height = _rows(x, y, course, print_)
+    boxes, height = _rows(x, y, course, feet)
     with style():
         figure = new_figure(height) if figure is None else figure
         axes = figure.subplots(len(boxes), 1, squeeze=False)[:, 0]
-        coloured = _speed(recording) if colour == "speed" else time
-        forces = wheel_forces(recording, print_)
-        scale = _metres_per_newton(forces, print_)
+        coloured = channel(recording, "v_x") if colour == "speed" else time
+        forces = wheel_forces(recording, feet)
+        scale = _metres_per_newton(forces, feet)
         for ax, (left, right, low, high) in zip(axes, boxes, strict=True):
             ax.set(xlim=(left, right), ylim=(low, high), aspect="equal")
             _course(ax, course)
             path = _path(ax, x, y, coloured)
             for k in at:
-                _car(ax, recording, print_, int(k), every)
-            _forces(ax, recording, print_, forces, at, scale)
-        _label(figure, axes, path, colour, forces, scale)
+                _car(ax, recording, feet, int(k), every)
+            _forces(ax, recording, feet, forces, at, scale)
+        _label(figure, axes, path, colour, scale)
     return figure
 
 
-def _speed(recording: Recording) -> np.ndarray:
-    return channel(recording, "v_x")
+def top_view_height(recording: Recording, course: Course | None = None) -> float:
+    """Inches of height that the view takes of its own accord."""
+    feet = footprint(recording, None, None, None)
+    return _rows(channel(recording, "x"), channel(recording, "y"), course, feet)[1]
 
 
 def _rows(x: np.ndarray, y: np.ndarray, course: Course | None, car: Footprint) -> tuple[list, float]:
@@ -82,13 +88,13 @@ def _rows(x: np.ndarray, y: np.ndarray, course: Course | None, car: Footprint) -
     left, right = float(np.min(x)) - margin, float(np.max(x)) + margin
     sides = [*y, *([lane.left for lane in course.lanes] + [lane.right for lane in course.lanes] if course else [])]
     low, high = float(np.min(sides)) - 3.0, float(np.max(sides)) + 3.0
-    inches = lambda count: (WIDTH - BAR) * (high - low) * count / (right - left) + 0.35
+    inches = lambda count: count * ((WIDTH - BESIDE) * (high - low) * count / (right - left) + EACH)
     count = 1
-    while count < MOST_ROWS and (count + 1) * inches(count + 1) <= TALL:
+    while count < MOST_ROWS and inches(count + 1) <= TALL:
         count += 1
     edges = np.linspace(left, right, count + 1)
-    rows = [(a, b, low, high) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-    return rows, max(count * inches(count) + 0.6, 1.6)
+    rows = [(a, b, low, high) for a, b in itertools.pairwise(edges.tolist())]
+    return rows, inches(count) + BENEATH
 
 
 def _course(ax: Any, course: Course | None) -> None:
@@ -133,9 +139,12 @@ def _car(ax: Any, recording: Recording, car: Footprint, k: int, every: float) ->
         ends = place + turned(ends, yaw)
         ax.plot(ends[:, 0], ends[:, 1], color="#222222", linewidth=1.6, solid_capstyle="butt", zorder=2.3)
     decimals = max(0, -math.floor(math.log10(every) + 1e-9))
-    over = place + turned([(0.0, 0.0)], yaw)[0] + np.array([0.0, np.max(body[:, 1]) - place[1] + 0.25])
-    ax.text(*over, f"{seconds(recording)[k]:.{decimals}f} s", fontsize=6.5, color="#666666", ha="center", va="bottom",
-            clip_on=True)  # fmt: skip
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    flat = high - low < FLAT * (right - left)
+    under = low + 0.2 if flat else float(np.max(body[:, 1])) + 0.25
+    if left <= place[0] <= right:
+        ax.text(place[0], under, f"{seconds(recording)[k]:.{decimals}f} s", fontsize=6.5, color="#666666", ha="center",
+                va="bottom", clip_on=True)  # fmt: skip
 
 
 def _place(recording: Recording, k: int) -> tuple[np.ndarray, float]:
@@ -158,19 +167,18 @@ def _forces(ax: Any, recording: Recording, car: Footprint, forces: dict, at: np.
             starts.append(place + turned([position], yaw)[0])
             arrows.append(turned([forces[name][k]], yaw)[0] * scale)
     starts, arrows = np.array(starts), np.array(arrows)
-    ax.quiver(*starts.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, color=FORCE, width=0.9, units="dots", zorder=3,
+    ax.quiver(*starts.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, color=FORCE, width=0.012, units="inches", zorder=3,
               headwidth=5, headlength=6, headaxislength=5.5, minlength=0)  # fmt: skip
 
 
-def _label(figure: Any, axes: Any, path: Any, colour: str, forces: dict, scale: float) -> None:
+def _label(figure: Any, axes: Any, path: Any, colour: str, scale: float) -> None:
     label_above(axes[0], "y [m]")
     axes[-1].set_xlabel("x [m]")
-    bar = figure.colorbar(path, ax=list(axes), fraction=0.03, aspect=12 * len(axes), pad=0.01)
+    bar = figure.colorbar(path, ax=list(axes), location="bottom", fraction=0.04, shrink=0.4, aspect=32, pad=0.02)
     bar.set_label("speed [m/s]" if colour == "speed" else "time [s]")
     bar.outline.set_visible(False)
-    if scale == 0.0:
-        return
-    _scale_arrow(axes[0], round_number(2.0 / scale), scale)
+    if scale > 0.0:
+        _scale_arrow(axes[0], round_number(2.0 / scale), scale)
 
 
 def _scale_arrow(ax: Any, newtons: float, scale: float) -> None:
@@ -179,6 +187,8 @@ def _scale_arrow(ax: Any, newtons: float, scale: float) -> None:
     length = newtons * scale
     y = high - 0.08 * (high - low)
     start = right - length - 0.02 * (right - left)
-    ax.quiver([start], [y], [length], [0.0], angles="xy", scale_units="xy", scale=1.0, color=COLOURS["MAP"], width=0.9,
-              units="dots", headwidth=5, headlength=6, headaxislength=5.5, zorder=4)  # fmt: skip
-    ax.text(start - 0.01 * (right - left), y, f"{newtons / 1e3:g} kN", fontsize=7.5, color=FORCE, ha="right", va="center")
+    ax.quiver([start], [y], [length], [0.0], angles="xy", scale_units="xy", scale=1.0, color=FORCE, width=0.012,
+              units="inches", headwidth=5, headlength=6, headaxislength=5.5, zorder=4)  # fmt: skip
+    ax.text(
+        start - 0.01 * (right - left), y, f"{newtons / 1e3:g} kN", fontsize=7.5, color=FORCE, ha="right", va="center"
+    )

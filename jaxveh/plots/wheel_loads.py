@@ -25,7 +25,9 @@ def loads(recording: Recording, *, figure: Any = None) -> Any:
     """
     axles = drive_channels.has(recording, "load_front", "load_rear")
     if not has_wheels(recording, "load") and not axles:
-        raise InputError("plots.loads: the recording has neither load_fl, load_fr, load_rl, load_rr nor load_front, load_rear.")
+        raise InputError(
+            "plots.loads: the recording has neither load_fl, load_fr, load_rl, load_rr nor load_front, load_rear."
+        )
     time = drive_channels.seconds(recording)
     accelerations = [name for name in ("a_y", "a_x") if drive_channels.has(recording, name)]
     with style():
@@ -55,7 +57,9 @@ def _shade_lift(ax: Any, recording: Recording, time: np.ndarray) -> None:
     up = lifted(recording)
     edges = np.flatnonzero(np.diff(np.r_[False, up, False].astype(int)))
     for start, end in zip(edges[::2], edges[1::2], strict=True):
-        ax.axvspan(time[start], time[min(end, time.size - 1)], color=SHADE, linewidth=0, zorder=0, label="a wheel lifts")
+        ax.axvspan(
+            time[start], time[min(end, time.size - 1)], color=SHADE, linewidth=0, zorder=0, label="a wheel lifts"
+        )
     each = {words: drive_channels.channel(recording, f"load_{wheel}") for wheel, words in WHEELS.items()}
     lightest = min(each, key=lambda words: float(np.min(each[words])))
     note(ax, f"least: {float(np.min(each[lightest])) / 1e3:.2f} kN, {lightest}")

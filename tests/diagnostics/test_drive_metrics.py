@@ -41,9 +41,7 @@ def understeer_gradient(car):
 def closed_form(car, speed, frequency):
     """Yaw rate and lateral acceleration over steer of the linear single track at frequencies in Hz, complex."""
     front, rear = stiffnesses(car)
-    m, J, a, b = (
-        float(v) for v in (car.mass, car.yaw_inertia, car.front_axle_to_cg, car.rear_axle_to_cg)
-    )
+    m, J, a, b = (float(v) for v in (car.mass, car.yaw_inertia, car.front_axle_to_cg, car.rear_axle_to_cg))
     A = np.array(
         [
             [-(front + rear) / (m * speed), (b * rear - a * front) / (m * speed) - speed],
@@ -60,7 +58,9 @@ def stepped(answer, start=2.0, height=0.02, **more):
     """A recording whose steer is a step at `start` and whose yaw rate is `answer` of the time since."""
     since = TIME - start
     steer = np.where(since >= 0, height, 0.0)
-    return Recording(TIME, {"steer": steer, "yaw_rate": np.where(since >= 0, answer(np.maximum(since, 0)), 0.0), **more})
+    return Recording(
+        TIME, {"steer": steer, "yaw_rate": np.where(since >= 0, answer(np.maximum(since, 0)), 0.0), **more}
+    )
 
 
 def test_first_order_answer_by_hand():
@@ -233,7 +233,9 @@ def test_a_car_that_does_not_become_slow_has_no_mean_deceleration():
 
 
 def test_peaks_are_of_either_sign_and_loads_of_the_lightest_wheel():
-    log = Recording(TIME, {"a_y": -TIME, "yaw_rate": 0.1 * TIME, "v_x": 10 + 0 * TIME, "v_y": 0 * TIME, "load_fl": TIME + 3})
+    log = Recording(
+        TIME, {"a_y": -TIME, "yaw_rate": 0.1 * TIME, "v_x": 10 + 0 * TIME, "v_y": 0 * TIME, "load_fl": TIME + 3}
+    )
     found = peaks(log)
     assert (found.a_y, found.yaw_rate, found.sideslip, found.least_load) == (10.0, 1.0, 0.0, 3.0)
 
@@ -257,7 +259,9 @@ BAD = {
 
 def turning(rate=0.03):
     a_y = 1.0 + rate * TIME * 10
-    return Recording(TIME, {"v_x": 20 + 0 * TIME, "steer": 0.01 * a_y, "a_y": a_y, "yaw_rate": a_y / 20, "sideslip": 0 * TIME})
+    return Recording(
+        TIME, {"v_x": 20 + 0 * TIME, "steer": 0.01 * a_y, "a_y": a_y, "yaw_rate": a_y / 20, "sideslip": 0 * TIME}
+    )
 
 
 @pytest.mark.parametrize("name", BAD)
