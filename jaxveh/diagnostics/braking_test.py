@@ -19,10 +19,13 @@ BETWEEN = (0.8, 0.1)
 
 
 class BrakingTest(NamedTuple):
-    """`begins`: when the brake is pressed (s). `speed`: there (m/s). `mean_deceleration` (m/s^2): the mean fully developed
-    deceleration (v_b^2 - v_e^2) / (2 (s_e - s_b)) of UN R13-H, with `v_b`, `v_e` 0.8 and 0.1 of the initial speed; NaN where
-    the car does not become that slow. `distance` (m): from there to a tenth of the initial speed, likewise. `peak_deceleration` (m/s^2).
-    `most_slip`: the greatest size of any wheel's slip ratio while braking (-; NaN where there is none)."""
+    """The numbers of a braking test; those of slower speeds are NaN where the car does not become that slow.
+
+    `begins`: when the brake is pressed (s). `speed`: there (m/s). `mean_deceleration` (m/s^2): the mean fully developed
+    deceleration (v_b^2 - v_e^2) / (2 (s_e - s_b)) of UN R13-H, with `v_b`, `v_e` 0.8 and 0.1 of the initial speed. `distance`
+    (m): from the beginning to a tenth of the initial speed. `peak_deceleration` (m/s^2). `most_slip`: the greatest size of
+    any wheel's slip ratio while braking (-; NaN where the recording has none).
+    """
 
     begins: float
     speed: float

@@ -19,7 +19,6 @@ from jaxveh.plots.step_responses import step_response
 from jaxveh.plots.style import new_figure, style
 from jaxveh.plots.top_views import top_view, top_view_height
 
-
 OVERVIEW_HEIGHT = 5.2
 """Inches of what the car does, beneath a view from above."""
 

@@ -63,7 +63,7 @@ def _mark_yaw(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
         _dot(ax, at, float(np.interp(at, time, yaw_rate)), ratio <= limit)
     ax.axvline(found.completed, color=GREY, linewidth=0.7, linestyle=":")
     words = [
-        f"{100 * ratio:.0f} % of the peak after {after:g} s (at most {100 * limit:.0f} %)"
+        f"{round(100 * ratio) + 0:d} % of the peak after {after:g} s (at most {100 * limit:.0f} %)"
         for (after, limit), ratio in zip(LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True)
     ]
     note(ax, ",  ".join(words))

@@ -26,6 +26,9 @@ TALL = 4.6
 BESIDE, BENEATH, EACH = 0.6, 0.95, 0.4
 """Inches that labels take of the width, the colour's bar and labels of the height, and the ticks of each row."""
 
+NEAR = 2.0
+"""m: a car that has moved by less is not shown again."""
+
 FLAT = 0.4
 """Height over width of the rows below which times stand along their lower edge, clear of arrows."""
 
@@ -57,7 +60,7 @@ def top_view(
     time, x, y = seconds(recording), channel(recording, "x"), channel(recording, "y")
     every = round_number(max(time[-1] - time[0], 1e-3) / SNAPSHOTS * 1.5) if every is None else every
     check_positive("every", every, "s")
-    at = np.searchsorted(time, np.arange(time[0], time[-1] + 1e-9, every) - 1e-9)
+    at = _snapshots(time, x, y, every)
     boxes, height = _rows(x, y, course, feet)
     with style():
         figure = new_figure(height) if figure is None else figure
@@ -70,10 +73,19 @@ def top_view(
             _course(ax, course)
             path = _path(ax, x, y, coloured)
             for k in at:
-                _car(ax, recording, feet, int(k), every)
+                _car(ax, recording, feet, k, every)
             _forces(ax, recording, feet, forces, at, scale)
         _label(figure, axes, path, colour, scale)
     return figure
+
+
+def _snapshots(time: np.ndarray, x: np.ndarray, y: np.ndarray, every: float) -> list[int]:
+    """The rows at which the car is shown; a car that stands is shown once."""
+    shown: list[int] = []
+    for k in np.searchsorted(time, np.arange(time[0], time[-1] + 1e-9, every) - 1e-9):
+        if not shown or math.hypot(x[k] - x[shown[-1]], y[k] - y[shown[-1]]) > NEAR:
+            shown.append(int(k))
+    return shown
 
 
 def top_view_height(recording: Recording, course: Course | None = None) -> float:
@@ -157,12 +169,12 @@ def _metres_per_newton(forces: dict[str, np.ndarray], car: Footprint) -> float:
     return (car.front + car.rear) / most if most > 0 else 0.0
 
 
-def _forces(ax: Any, recording: Recording, car: Footprint, forces: dict, at: np.ndarray, scale: float) -> None:
+def _forces(ax: Any, recording: Recording, car: Footprint, forces: dict, at: list[int], scale: float) -> None:
     if scale == 0.0:
         return
     starts, arrows = [], []
     for k in at:
-        place, yaw = _place(recording, int(k))
+        place, yaw = _place(recording, k)
         for name, position in car.wheels.items():
             starts.append(place + turned([position], yaw)[0])
             arrows.append(turned([forces[name][k]], yaw)[0] * scale)
@@ -182,13 +194,15 @@ def _label(figure: Any, axes: Any, path: Any, colour: str, scale: float) -> None
 
 
 def _scale_arrow(ax: Any, newtons: float, scale: float) -> None:
-    left, right = ax.get_xlim()
-    low, high = ax.get_ylim()
-    length = newtons * scale
-    y = high - 0.08 * (high - low)
-    start = right - length - 0.02 * (right - left)
-    ax.quiver([start], [y], [length], [0.0], angles="xy", scale_units="xy", scale=1.0, color=FORCE, width=0.012,
-              units="inches", headwidth=5, headlength=6, headaxislength=5.5, zorder=4)  # fmt: skip
-    ax.text(
-        start - 0.01 * (right - left), y, f"{newtons / 1e3:g} kN", fontsize=7.5, color=FORCE, ha="right", va="center"
+    """An arrow for scale above the axes on the right, where no car is."""
+    from matplotlib.transforms import ScaledTranslation
+
+    above = ax.transData + ScaledTranslation(0.0, 7 / 72, ax.figure.dpi_scale_trans)
+    right, high = ax.get_xlim()[1], ax.get_ylim()[1]
+    tail = right - newtons * scale
+    arrow = {"arrowstyle": "-|>", "color": FORCE, "linewidth": 1.2, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 8}
+    ax.annotate(
+        "", (right, high), (tail, high), xycoords=above, textcoords=above, annotation_clip=False, arrowprops=arrow
     )
+    ax.annotate(f"{newtons / 1e3:g} kN", (tail, high), (-4, 0), xycoords=above, textcoords="offset points",
+                annotation_clip=False, fontsize=7.5, color=FORCE, ha="right", va="center")  # fmt: skip
