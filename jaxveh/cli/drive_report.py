@@ -21,8 +21,9 @@ BODY = 4.5
 
 def wheelbase_of(car: Any) -> float | None:
     """Between the axles, m; None for a car without."""
-    arms = [getattr(car, name, None) for name in ("front_axle_to_cg", "rear_axle_to_cg")]
-    return None if None in arms else float(sum(arms))
+    if not (hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg")):
+        return None
+    return float(car.front_axle_to_cg) + float(car.rear_axle_to_cg)
 
 
 def numbers_of(recording: Recording, asked: Asked, car: Any) -> dict[str, dict[str, Any]]:
@@ -35,8 +36,8 @@ def numbers_of(recording: Recording, asked: Asked, car: Any) -> dict[str, dict[s
     shown = {title: one._asdict() for title, one in found.items()}
     course = course_of(asked)
     if course is not None and has(recording, "x", "y", "yaw"):
-        place = [channel(recording, name) for name in ("x", "y", "yaw")]
-        shown[course.name] = {"clearance": float(clearance(*place, width_of(asked), BODY, course))}
+        x, y, yaw = (channel(recording, name) for name in ("x", "y", "yaw"))
+        shown[course.name] = {"clearance": float(clearance(x, y, yaw, width_of(asked), BODY, course))}
     return shown
 
 

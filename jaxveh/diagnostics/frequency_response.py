@@ -46,8 +46,8 @@ def frequency_response(
     **Raises** `InputError` for missing channels, an input that does not move, or a segment that is out of range.
     """
     time = seconds(recording)
-    length = time[-1] - time[0]
-    segment = min(length / 4, LONGEST) if segment is None else segment
+    length = float(time[-1] - time[0])
+    segment = float(min(length / 4, LONGEST)) if segment is None else segment
     check_positive("segment", segment, "s")
     check("segment", segment, lambda v: v <= length, f"at most the drive's length, {length:g} s")
     step = float(np.median(np.diff(time))) if time.size > 1 else 1.0

@@ -160,7 +160,7 @@ def braked(**more):
 
 def test_braking_shows_wheel_speeds_slips_and_deceleration():
     figure = plots.braking(braked())
-    speed, slip, deceleration, torque = figure.axes
+    speed, slip, deceleration, _ = figure.axes
     v_x = line(speed, "car").get_ydata()
     np.testing.assert_allclose(line(speed, "rear left").get_ydata(), np.where(TIME < 1.0, v_x, 0.9 * v_x), atol=1e-9)
     np.testing.assert_allclose(line(slip, "front right").get_ydata()[-1], -10.0)

@@ -1,0 +1,198 @@
+"""`jaxveh simulate`: vehicles, manoeuvres, roads, devices and events by name; numbers and figures; bad input in one line."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from programs import error_line, run, write_car
+
+from jaxveh import io, roads, vehicles
+from jaxveh.cli.devices import DEVICES
+from jaxveh.cli.manoeuvre import USUAL, asked, course_of, make
+from jaxveh.cli.vehicle import BUILT_IN, FIDELITIES, HELP, vehicle_of
+from jaxveh.manoeuvres import MANOEUVRES
+
+QUICK = ("--duration", "1", "--rate", "50", "--manoeuvre", "step-steer", "--set", "start=0.1")
+
+
+def simulate(*arguments):
+    return run("simulate", *arguments)
+
+
+def read_json(path):
+    return json.loads(path.read_text())
+
+
+def test_list_shows_all_that_there_is():
+    result = simulate("--list")
+    assert result.exit_code == 0, result.output
+    for names in (BUILT_IN, FIDELITIES, MANOEUVRES, roads.ROADS, DEVICES):
+        for name in names:
+            assert name in result.stdout
+    assert "ramp=0.2 start=1" in result.stdout
+    assert "25 m/s, 7°" in result.stdout
+    assert set(HELP) == set(BUILT_IN)
+
+
+def test_help_teaches_by_examples():
+    text = " ".join(simulate("--help").stdout.split())
+    for word in (
+        "--manoeuvre step-steer",
+        "--fidelity seven-dof",
+        "--until standstill",
+        "--set",
+        "--list",
+        "split-mu",
+        "proving",
+    ):
+        assert word in text
+
+
+def test_every_manoeuvre_has_usual_values_and_can_be_made():
+    import jax
+
+    assert set(USUAL) == set(MANOEUVRES)
+    car = vehicles.passenger_car()
+    for name in MANOEUVRES:
+        one = asked(name, None, None, None, (), car)
+        assert make(one, jax.random.key(0)).duration > 0
+        assert (course_of(one) is not None) == name.startswith("iso-")
+
+
+def test_what_the_manoeuvre_wants_of_the_car_comes_from_the_car():
+    car = vehicle_of("passenger_car", "seven-dof")
+    brakes = asked("braking-in-a-turn", None, None, None, (), car).options
+    assert brakes == {"mass": 1420.0, "wheel_radius": pytest.approx(0.32)}
+    path = asked("iso-lane-change", None, None, None, ("wheelbase=3", "width=2"), car)
+    assert path.options == {"wheelbase": 3.0, "width": 2.0}
+    assert course_of(path).lanes[0].left == pytest.approx((1.1 * 2 + 0.25) / 2)
+    assert asked("slalom-course", None, None, None, ("count=4",), car).options["count"] == 4
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_each_fidelity_corners_alike_when_gentle(fidelity):
+    """The same car: its understeer in a gentle turn does not depend on how it is described."""
+    import jax.numpy as jnp
+
+    from jaxveh import manoeuvres
+    from jaxveh import simulate as drive
+
+    car = vehicle_of("passenger_car", fidelity)
+    last = drive(car, manoeuvres.step_steer(20.0, 0.005, duration=3.0), dt=0.1, max_step=0.01)["true.yaw_rate"][-1]
+    linear = drive(
+        vehicle_of("passenger_car", "linear"), manoeuvres.step_steer(20.0, 0.005, duration=3.0), dt=0.1, max_step=0.01
+    )
+    np.testing.assert_allclose(last, linear["true.yaw_rate"][-1], rtol=0.02)
+    assert jnp.isfinite(last)
+
+
+def test_settings_options_and_road_reach_the_drive(tmp_path):
+    drive, numbers = tmp_path / "drive.csv", tmp_path / "numbers.json"
+    car = write_car(tmp_path)
+    extra = ("--vehicle", car, "--fidelity", "linear", "--speed", "15", "--steer-deg", "1", "--set", "ramp=0.1")
+    result = simulate(
+        *QUICK, *extra, "--devices", "none", "--road", "banked", "--solver", "explicit", "-o", drive, "--json", numbers
+    )
+    assert result.exit_code == 0, result.output
+    recording = io.read_recording(drive)
+    assert len(recording) == 51 and "yaw_rate" not in recording
+    np.testing.assert_allclose(recording["true.v_x"], 15.0)
+    steer, time = np.asarray(recording["steer"]), np.asarray(recording.time)
+    np.testing.assert_allclose(
+        np.interp([0.1, 0.15, 0.2], time, steer), [0, math.radians(0.5), math.radians(1)], atol=0.003
+    )
+    assert np.ptp(np.asarray(recording["true.bank"])) > 0
+    content = read_json(numbers)
+    told = content["manifest"]["configuration"]
+    assert told["road"] == "banked" and told["options"] == {"start": 0.1, "ramp": 0.1, "duration": 1.0}
+    assert told["fidelity"] == "linear" and told["devices"] == "none"
+    assert content["numbers"]["peaks"]["a_y"] == pytest.approx(np.max(np.abs(recording["true.a_y"])), rel=1e-6)
+    assert content["end"] == 1.0
+
+
+def test_numbers_of_the_standard_and_figures(tmp_path):
+    out, numbers = tmp_path / "figures", tmp_path / "numbers.json"
+    result = simulate(
+        *QUICK, "--fidelity", "linear", "--set", "ramp=0.05", "--duration", "2", "--out", out, "--json", numbers
+    )
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in out.iterdir()) == ["channels.png", "drive.png", "loads.png", "top_view.png"]
+    found = read_json(numbers)["numbers"]["step response of yaw_rate (ISO 7401)"]
+    car = vehicle_of("passenger_car", "linear")
+    front, rear = float(car.front.cornering_stiffness), float(car.rear.cornering_stiffness)
+    understeer = float(car.mass) / 2.55 * (1.59 / front - 0.96 / rear)
+    assert found["gain"] == pytest.approx(25 / (2.55 + understeer * 625), rel=0.01)
+    assert f"response_time {found['response_time']:.4g}" in result.stdout
+    assert read_json(numbers)["file"] is None
+
+
+def test_a_drive_too_short_for_its_standard_says_so_and_is_written(tmp_path):
+    drive = tmp_path / "drive.csv"
+    result = simulate(*QUICK, "--duration", "0.5", "--set", "ramp=0.3", "--out", tmp_path / "figures", "-o", drive)
+    assert result.exit_code == 0, result.output
+    assert "warning: no numbers of step-steer" in result.stderr and "warning: no figure of step-steer" in result.stderr
+    assert drive.exists() and (tmp_path / "figures" / "drive.png").exists()
+
+
+def test_devices_speak_at_their_own_rates(tmp_path):
+    drive = tmp_path / "drive.parquet"
+    result = simulate(*QUICK, "--devices", "production", "--seed", "2", "-o", drive)
+    assert result.exit_code == 0, result.output
+    recording = io.read_recording(drive)
+    assert {"a_y", "yaw_rate", "steer"} <= set(recording.names)
+    spoke = np.isfinite(np.asarray(recording["yaw_rate"]))
+    assert 90 <= spoke.sum() <= 101 < len(recording)
+
+
+def test_braking_ends_at_standstill(tmp_path):
+    drive = tmp_path / "drive.csv"
+    settings = ("--set", "brake_at=0.1", "--set", "brake_ramp=0.1", "--speed", "6", "--duration", "3")
+    named = ("--manoeuvre", "mu-jump-braking", "--fidelity", "seven-dof", "--until", "standstill")
+    result = simulate(*named, *settings, "--rate", "50", "--devices", "none", "-o", drive)
+    assert result.exit_code == 0, result.output
+    recording = io.read_recording(drive)
+    assert 0.5 < recording.time[-1] < 2.0
+    assert 0.05 < recording["true.v_x"][-1] < 0.5
+    assert "braking (UN R13-H): " in result.stdout and "mean_deceleration" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--manoeuvre", "drift"), "--manoeuvre = 'drift': must be one of 'double-lane-change'"),
+        (
+            ("--manoeuvre", "step-steer", "--set", "radius=40"),
+            "--set radius=40: step-steer has no option 'radius'; there are: ramp",
+        ),
+        (("--set", "period"), "--set period: must be NAME=VALUE, such as --set start=2."),
+        (("--set", "period=fast"), "--set period=fast: 'fast' is no number."),
+        (("--set", "speed=30"), "--set speed=30: speed has an option of its own, --speed."),
+        (("--manoeuvre", "slalom-course", "--set", "count=2.5"), "--set count=2.5: '2.5' is no whole number."),
+        (("--set", "period=-1"), "period = -1.0: must be positive"),
+        (("--fidelity", "42-dof"), "--fidelity = '42-dof': must be one of 'linear'"),
+        (("--road", "moon"), "road = 'moon': must be one of level"),
+        (("--devices", "radar"), "--devices = 'radar': must be one of 'none'"),
+        (("--solver", "magic"), "--solver = 'magic': must be one of 'auto'"),
+        (("--until", "dawn"), "--until = 'dawn': must be one of 'standstill', 'wheel-lift'"),
+        (("--until", "wheel-lift"), "wheel_lift: the car has no loads a wheel"),
+        (("--vehicle", "tank"), "--vehicle tank: must be the path of a .toml file"),
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(tmp_path, arguments, words):
+    line = error_line(simulate(*arguments, "-o", tmp_path / "out.csv"))
+    assert words in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_to_write_is_refused():
+    assert "nothing to write" in error_line(simulate("--manoeuvre", "step-steer"))
+
+
+def test_a_product_that_exists_is_kept_unless_forced(tmp_path):
+    drive = tmp_path / "drive.csv"
+    drive.write_text("mine")
+    assert "exists already" in error_line(simulate(*QUICK, "-o", drive))
+    assert drive.read_text() == "mine"
+    assert simulate(*QUICK, "-o", drive, "--force").exit_code == 0
+    assert len(io.read_recording(drive)) == 51
