@@ -1,6 +1,6 @@
 """jaxveh: estimate what a car cannot measure, in JAX, differentiable end to end."""
 
-from jaxveh import estimators, filters, fitting, manoeuvres, sensors, statespace, tyres, vehicles
+from jaxveh import estimators, filters, fitting, manoeuvres, roads, sensors, statespace, tyres, vehicles
 from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
@@ -23,6 +23,7 @@ __all__ = [
     "filters",
     "fitting",
     "manoeuvres",
+    "roads",
     "run",
     "sensors",
     "simulate",

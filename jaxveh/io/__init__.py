@@ -1,12 +1,13 @@
 """Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, the files that describe a car and a road, tyre
-property files, and tables of tyre test rigs (CSV, TYDEX).
+property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX).
 
-pandas, pyarrow, asammdf and pint are the extra `io`, imported where they are used.
+pandas, pyarrow, asammdf, pint and pyyaml are the extra `io`, imported where they are used.
 """
 
 from jaxveh.io.canonical import CANONICAL, CanonicalChannel, canonical_unit
 from jaxveh.io.car import AxleTyre, CarSpecification, read_car, write_car
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
+from jaxveh.io.commonroad import CommonRoadSpecification, read_commonroad
 from jaxveh.io.files import check_readable, replacing, write_text
 from jaxveh.io.frames import to_frame, write_frame
 from jaxveh.io.merge import resample
@@ -24,6 +25,7 @@ __all__ = [
     "CarSpecification",
     "Channel",
     "ChannelMap",
+    "CommonRoadSpecification",
     "PropertyFile",
     "RigTable",
     "RoadSpecification",
@@ -32,6 +34,7 @@ __all__ = [
     "check_readable",
     "read_car",
     "read_channel_map",
+    "read_commonroad",
     "read_property_file",
     "read_recording",
     "read_rig_table",

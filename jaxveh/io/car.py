@@ -32,6 +32,14 @@ steering_ratio = 15.0                # steering wheel angle over road wheel angl
 steer_offset = 0.002                 # rad: what the steer channel shows (at the road wheels) when the car runs straight
 sensor_position = [0.1, 0.0, 0.3]    # m from the centre of gravity: forward, left, up
 low_pass = 20.0                      # Hz, cutoff of the low-pass in the accelerometers and the gyroscope
+wheel_radius = 0.32                  # m; this and the following are of cars on four wheels
+wheel_inertia = 1.2                  # kg m^2, of one wheel about its axle
+drag = 0.4                           # N s^2/m^2: half the air's density times c_W times the area
+rolling_resistance = 0.01            # force over load
+front_drive = 1.0                    # the front axle's share of the driving torque
+front_brake = 0.65                   # the front axle's share of the braking torque
+# front_tyre = "tyres/front.tir"     # the tyre property file of a front wheel, from this file's folder
+# rear_tyre = "tyres/rear.tir"
 
 # The Magic Formula of an axle, F_y = D sin(C atan(B a - E (B a - atan(B a)))) + S_v with a = slip angle + S_h.
 [front]
@@ -83,7 +91,8 @@ class CarSpecification:
 
     Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
     `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`: x, y, z
-    in metres from the centre of gravity. `low_pass`: cutoff in hertz.
+    in metres from the centre of gravity. `low_pass`: cutoff in hertz. `front_tyre`, `rear_tyre`: paths of the tyre property files
+    of a wheel, which nobody opens before a car on four wheels is built.
 
     **Raises** `InputError` with name, value and allowed range for what no car has, such as a negative mass.
     """
@@ -102,6 +111,14 @@ class CarSpecification:
     steer_offset: float | None = _number(-0.5, 0.5, "rad", default=None)
     sensor_position: tuple[float, float, float] | None = _number(-30.0, 30.0, "m", default=None)
     low_pass: float | None = _number(1e-3, 1e6, "Hz", default=None)
+    wheel_radius: float | None = _number(1e-3, 5.0, "m", default=None)
+    wheel_inertia: float | None = _number(1e-6, 1e4, "kg m^2", default=None)
+    drag: float | None = _number(0.0, 1e3, "N s^2/m^2", default=None)
+    rolling_resistance: float | None = _number(0.0, 1.0, default=None)
+    front_drive: float | None = _number(0.0, 1.0, default=None)
+    front_brake: float | None = _number(0.0, 1.0, default=None)
+    front_tyre: str | None = None
+    rear_tyre: str | None = None
     front: AxleTyre | None = None
     rear: AxleTyre | None = None
 
@@ -134,7 +151,7 @@ def read_car(path: str | os.PathLike) -> CarSpecification:
     content = read_toml(path)
     check_keys(str(path), content, [entry.name for entry in fields(CarSpecification)])
     try:
-        values = {key: _value(key, value) for key, value in content.items()}
+        values = {key: _value(key, value, path.parent) for key, value in content.items()}
         return _build(CarSpecification, values)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
@@ -165,7 +182,7 @@ def _lines(values: Any) -> list[str]:
     return lines
 
 
-def _value(key: str, value: Any) -> Any:
+def _value(key: str, value: Any, folder: Path) -> Any:
     if key in ("front", "rear"):
         check_keys(f"[{key}]", value, [entry.name for entry in fields(AxleTyre)])
         try:
@@ -174,6 +191,8 @@ def _value(key: str, value: Any) -> Any:
             raise InputError(f"[{key}]: {error}") from error
     if key == "name":
         return text(key, value)
+    if key in ("front_tyre", "rear_tyre"):
+        return str(folder / text(key, value))
     if key == "sensor_position":
         if not isinstance(value, list) or len(value) != 3:
             raise InputError(f"{key} = {value!r}: must be [x, y, z] in metres.")

@@ -91,7 +91,8 @@ def mu_jump_braking(
 
     Arguments and errors are those of `braking_in_a_turn`; the steer is zero.
     """
+    check_positive("brake_at", brake_at, "s")
     return braking_in_a_turn(
-        speed, 0.0, deceleration, mass=mass, wheel_radius=wheel_radius, start=0.0, ramp=min(1.0, brake_at) or 1.0,
+        speed, 0.0, deceleration, mass=mass, wheel_radius=wheel_radius, start=0.0, ramp=brake_at,
         brake_at=brake_at, brake_ramp=brake_ramp, duration=duration,
     )  # fmt: skip

@@ -17,7 +17,7 @@ def iso_lane_change(
     width: float = 1.8,
     *,
     start: float = 30.0,
-    lead: float = 5.0,
+    lead: float = 4.0,
     duration: float | None = None,
     **driver,
 ) -> PathDriver:
@@ -33,11 +33,11 @@ def iso_lane_change(
 
 
 def iso_obstacle_avoidance(
-    speed=50 / 3.6,
+    speed=45 / 3.6,
     width: float = 1.8,
     *,
     start: float = 30.0,
-    lead: float = 2.0,
+    lead: float = 1.0,
     duration: float | None = None,
     preview_time=0.5,
     **driver,

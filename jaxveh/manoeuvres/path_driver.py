@@ -16,26 +16,30 @@ from jaxveh.manoeuvres.driver import AbstractDriver, Motion, driver_state
 from jaxveh.manoeuvres.paths import AbstractPath
 from jaxveh.manoeuvres.speeds import AbstractSpeed
 from jaxveh.numerics import smooth_clip
+from jaxveh.vehicles import regularised_speed
 
 _CRAWL = 1.0
-"""Below this speed (m/s) the car's course tends to its heading."""
+"""Below this speed (m/s) course and curvature are regularised, so that standstill is an ordinary point."""
 
 
 class PathDriver(AbstractDriver):
-    """Single-point preview: the arc from the car, along its course, to the path's point at the preview distance.
+    """Single-point preview: he turns the wheel until the arc on which the car runs meets the path's point ahead.
 
-    With the car's course psi + beta and the point (ahead, left) seen along it at the distance v_x T_p, the arc has the
-    curvature
+    Seen along the car's course (yaw + sideslip angle), the path's point at the distance v_x T_p is (ahead, left). The
+    arc to it has the curvature kappa, the one on which the car runs kappa_now, and the wheel turns at the rate
 
-        kappa = 2 left / (ahead^2 + left^2),
+        kappa = 2 left / (ahead^2 + left^2),   kappa_now = yaw_rate / v_x,
+        d steer/dt = gain (wheelbase + understeer_gradient v_x^2) (kappa - kappa_now) / reaction_lag.
 
-    which for small angles is the acceleration that takes a point mass to the path after T_p: MacAdam's optimal preview
-    (C. C. MacAdam, J. Dyn. Syst. Meas. Control 102 (1980)) with all weight on one point. The steer for it in steady
-    state is `gain (wheelbase + understeer_gradient v_x^2) kappa`. It comes after the `reaction_lag` (first order), held
-    within `steer_limit` and `rate_limit` with smooth corners. Nothing of the future is used but the path.
+    For small angles `kappa v_x^2` is the acceleration that takes a point mass to the path after T_p: MacAdam's optimal
+    preview (C. C. MacAdam, J. Dyn. Syst. Meas. Control 102 (1980)) with all weight on one point. Because kappa_now is
+    seen and not computed from the steer, a car of another understeer than he thinks is held to the path as well. Steer
+    and its rate stay within `steer_limit` and `rate_limit` with smooth corners. Nothing of the future is used but the
+    path. For driving forwards.
 
     **Parameters**: `preview_time` T_p (s), `reaction_lag` (s), `wheelbase` (m), `understeer_gradient` (rad s^2/m, the
-    steer at the road wheels that a lateral acceleration of 1 m/s^2 needs beyond the geometric one), `gain` (-),
+    steer at the road wheels that a lateral acceleration of 1 m/s^2 needs beyond the geometric one), `gain` (-; below 0.8
+    or with a lag above 0.15 s he weaves at speed),
     `steer_limit` (rad), `rate_limit` (rad/s), `shortest_preview` (m, at standstill).
 
     **State**: `steer` (rad at the road wheels). **Inputs**: `steer`, and `v_x`, `v_x_rate` of the wanted `speed`.
@@ -53,7 +57,7 @@ class PathDriver(AbstractDriver):
     gain: jax.Array = positive("-", default=1.0)
     steer_limit: jax.Array = positive("rad", default=0.5)
     rate_limit: jax.Array = positive("rad/s", default=1.0)
-    shortest_preview: jax.Array = positive("m", default=3.0)
+    shortest_preview: jax.Array = positive("m", default=2.0)
 
     def __check_init__(self):
         check_parameters(self)
@@ -67,7 +71,9 @@ class PathDriver(AbstractDriver):
         return ("steer",)
 
     def start(self, t: Any, motion: Motion) -> Any:
-        return driver_state(self.state_names)(self.wish(motion))
+        """The steer that the arc to the point ahead needs in steady state."""
+        curvature, needed = self._arc(motion)
+        return driver_state(self.state_names)(self._held(needed * curvature))
 
     def inputs(self, t: Any, motion: Motion, state: Any) -> DriverInputs:
         v_x, v_x_rate = self.speed.at(t)
@@ -75,15 +81,20 @@ class PathDriver(AbstractDriver):
         return DriverInputs(state.steer, jnp.broadcast_to(v_x, shape), jnp.broadcast_to(v_x_rate, shape))
 
     def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
-        rate = (self.wish(motion) - state.steer) / self.reaction_lag
+        curvature, needed = self._arc(motion)
+        now = motion.yaw_rate / regularised_speed(motion.v_x, _CRAWL)
+        wish = self._held(state.steer + self.gain * needed * (curvature - now))
+        rate = (wish - state.steer) / self.reaction_lag
         return driver_state(self.state_names)(smooth_clip(rate, -self.rate_limit, self.rate_limit, self.rate_limit / 8))
 
-    def wish(self, motion: Motion) -> jax.Array:
-        """The steer that the driver would hold, rad at the road wheels, but for his lag."""
-        course = motion.yaw + numerics.arctan2(motion.v_y, numerics.hypot(motion.v_x, _CRAWL))
+    def _arc(self, motion: Motion) -> tuple[jax.Array, jax.Array]:
+        """The curvature of the arc to the point ahead (1/m), and the steer that a curvature needs (rad m)."""
+        course = motion.yaw + numerics.arctan2(motion.v_y, regularised_speed(motion.v_x, _CRAWL))
         distance = numerics.hypot(self.preview_time * motion.v_x, self.shortest_preview)
         target = self.path.preview(motion.x, motion.y, course, distance)
         square = target.ahead * target.ahead + target.left * target.left
         curvature = 2.0 * target.left / jnp.where(square > 0, square, 1.0)
-        needed = self.wheelbase + self.understeer_gradient * motion.v_x * motion.v_x
-        return smooth_clip(self.gain * needed * curvature, -self.steer_limit, self.steer_limit, self.steer_limit / 8)
+        return curvature, self.wheelbase + self.understeer_gradient * motion.v_x * motion.v_x
+
+    def _held(self, steer: jax.Array) -> jax.Array:
+        return smooth_clip(steer, -self.steer_limit, self.steer_limit, self.steer_limit / 8)

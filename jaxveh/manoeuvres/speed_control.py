@@ -6,13 +6,14 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs
 from jaxveh.manoeuvres.driver import AbstractDriver, Motion, as_driver, driver_state
-from jaxveh.numerics import smooth_clip, smooth_ramp
+from jaxveh.numerics import smooth_clip, smooth_ramp, smooth_step
 from jaxveh.vehicles import GRAVITY
 
 AIR_DENSITY = 1.2
@@ -30,8 +31,8 @@ class SpeedControl(AbstractDriver):
 
     The wanted acceleration is `v_x_rate + gain e + integral`, `e = v_x - motion.v_x` and `d integral/dt = gain e /
     integral_time`; the force is `mass` times it, and what air and rolling take. It is held within `drive_limit` and
-    `brake_limit` with smooth corners; what is cut off flows back into the integral (back-calculation, K. J. Astrom
-    and R. M. Murray, Feedback Systems, sec. 10.4), so that it does not wind up. Positive force becomes
+    `brake_limit` with smooth corners; while they hold it the integral stands still (conditional integration, K. J.
+    Astrom and T. Hagglund, Advanced PID Control, sec. 3.5), so that it does not wind up. Positive force becomes
     `drive_torque`, negative `brake_torque` (N m, total at the wheels, never negative; both are there within 0.1 m/s^2
     of zero, smoothly). What the wrapped driver does with the pedals himself is added.
 
@@ -83,7 +84,8 @@ class SpeedControl(AbstractDriver):
 
     def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
         u, _, cut = self._wanted(t, motion, state)
-        rate = self.gain * (u.v_x - motion.v_x) / self.integral_time + cut / self.integral_time
+        free = 1.0 - smooth_step(jnp.abs(cut) / _EDGE)
+        rate = free * self.gain * (u.v_x - motion.v_x) / self.integral_time
         return driver_state(self.state_names)(*self.driver.derivatives(t, motion, self._inner(state)), rate)
 
     def _wanted(self, t, motion, state):

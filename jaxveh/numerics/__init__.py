@@ -20,6 +20,7 @@ from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu, stored
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 from jaxveh.numerics.roots import secant
+from jaxveh.numerics.small_systems import solve_scalars
 from jaxveh.numerics.smooth import smooth_bump, smooth_clip, smooth_ramp, smooth_step
 from jaxveh.numerics.sums import total
 from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
@@ -58,6 +59,7 @@ __all__ = [
     "solve_lower",
     "solve_lower_transposed",
     "solve_psd",
+    "solve_scalars",
     "sqrt",
     "stored",
     "stratified",

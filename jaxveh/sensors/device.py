@@ -1,6 +1,6 @@
 """The one contract of a device: what it looks at, when it speaks, and what it says."""
 
-from __future__ import annotations
+# No postponed annotations here: equinox does not see an AbstractVar in a string.
 
 import abc
 import math

@@ -1,6 +1,6 @@
 """Faults of devices: each wraps a device and acts on what it says (after delay, limits and rounding)."""
 
-from __future__ import annotations
+# No postponed annotations here: equinox does not see an AbstractVar in a string.
 
 import abc
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.sensors.device import AbstractDevice, name_of
 from jaxveh.sensors.randomness import subkey
 from jaxveh.sensors.spans import as_spans, check_spans, inside, since
-from jaxveh.sensors.wrapper import AbstractWrapper
+from jaxveh.sensors.wrapper import AbstractWrapper, check_device
 
 Channels = dict[str, jax.Array]
 
@@ -36,6 +36,7 @@ class AbstractFault(AbstractWrapper):
     channel: eqx.AbstractVar[tuple[str, ...] | None]
 
     def __check_init__(self):
+        check_device(self)
         check_names(f"{name_of(self)}.channel", self.channel or (), self.device.channels)
         check_parameters(self)
 
@@ -75,7 +76,7 @@ class BiasStep(AbstractFault):
 
 
 class Stuck(AbstractFault):
-    """From `start` to before `end` (s), `channel` (a name or several) says what it last said before `start`.
+    """From `start` to before `end` (s; None: for good), `channel` (a name or several) says its last value before `start`.
 
     A channel that has said nothing yet is stuck at its first value, and one that was silent (NaN) stays silent.
 
@@ -85,16 +86,16 @@ class Stuck(AbstractFault):
     device: AbstractDevice
     channel: tuple[str, ...] = eqx.field(static=True, converter=_names)
     start: jax.Array = parameter("s")
-    end: jax.Array = parameter("s")
+    end: jax.Array | None = parameter("s", default=None)
 
     def __check_init__(self):
-        if is_concrete(self.start, self.end):
+        if is_concrete(self.start):
             check("Stuck.end", self.end, lambda end: end > self.start, f"after start = {self.start} s")
 
     def spoil(self, times: jax.Array, said: Channels, key: Any) -> Channels:
         """The channels, stuck."""
         late = since(times, self.start)
-        stuck = late & ~since(times, self.end)
+        stuck = late if self.end is None else late & ~since(times, self.end)
         last = jnp.maximum(jnp.sum(~late) - 1, 0)
         return {name: jnp.where(stuck, value[last], value) for name, value in said.items()}
 

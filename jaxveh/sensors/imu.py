@@ -56,9 +56,9 @@ class IMU(AbstractInstrument):
 
     def __check_init__(self):
         check_signals("IMU.signals", self.signals, _UNITS)
-        for name, kind in (("position", Position), ("alignment", Alignment)):
+        for name, article, kind in (("position", "a", Position), ("alignment", "an", Alignment)):
             if not isinstance(getattr(self, name), kind):
-                raise InputError(f"IMU.{name} = {getattr(self, name)!r}: must be a {kind.__name__}.")
+                raise InputError(f"IMU.{name} = {getattr(self, name)!r}: must be {article} {kind.__name__}.")
         if not (self.low_pass is None or isinstance(self.low_pass, LowPass)):
             raise InputError(f"IMU.low_pass = {self.low_pass!r}: must be a LowPass(cutoff_hz) or None.")
 

@@ -54,8 +54,8 @@ def proving_ground_car(
     - Inertial unit of six axes, 100 Hz, 2 ms late: noise 0.01 m/s^2 and 0.02 deg/s, offsets 0.005 m/s^2 and 0.01 deg/s,
       0.1 % of gain, low-pass 40 Hz; limits 10 g and 300 deg/s. Our choice, of the size of navigation-grade test systems.
     - Optical sensor `optical_position` (m) from the centre of gravity, 250 Hz, 6 ms late: `v_x`, `v_y` with 0.05 m/s of
-      noise and 0.2 % of gain, silent below 0.3 m/s. Our choice, so that sideslip at 20 m/s is within the 0.5 deg that ISO
-      15037-1 allows.
+      noise and 0.2 % of gain, silent below 0.3 m/s. Our choice, so that sideslip at 20 m/s is mostly within 0.5 deg (the
+      error that ISO 15037-1 allows, as makers of such systems cite it).
     - Steering angle and wheel speeds as in `production_car`; satellite navigation with position, 20 Hz, 20 ms
       late, 0.02 m/s, 0.02 m: our choice, of the size of carrier-phase receivers.
     """

@@ -1,6 +1,6 @@
 """Devices around a device: what they do not change is the inner one's."""
 
-from __future__ import annotations
+# No postponed annotations here: equinox does not see an AbstractVar in a string.
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,10 +21,6 @@ class AbstractWrapper(AbstractDevice):
     """A device around another: it looks at what that one looks at, and speaks when that one speaks."""
 
     device: eqx.AbstractVar[AbstractDevice]
-
-    def __check_init__(self):
-        if not isinstance(self.device, AbstractDevice):
-            raise InputError(f"{name_of(self)}.device = {self.device!r}: must be a device.")
 
     @property
     def rate(self) -> float:
@@ -68,6 +64,7 @@ class Renamed(AbstractWrapper):
     names: tuple[tuple[str, str], ...] = eqx.field(static=True, converter=lambda names: tuple(dict(names).items()))
 
     def __check_init__(self):
+        check_device(self)
         check_names("Renamed.names", dict(self.names), self.device.channels)
         if len(set(self.channels)) < len(self.channels):
             raise InputError(
@@ -88,6 +85,12 @@ class Renamed(AbstractWrapper):
         """What the inner device says, under the new names."""
         said = self.device.say(times, outputs, key)
         return {dict(self.names).get(name, name): value for name, value in said.items()}
+
+
+def check_device(wrapper: AbstractWrapper) -> None:
+    """Raise unless there is a device inside; to be called before anything is asked of it."""
+    if not isinstance(wrapper.device, AbstractDevice):
+        raise InputError(f"{name_of(wrapper)}.device = {wrapper.device!r}: must be a device, such as IMU(rate=100.0).")
 
 
 def _depth(device: AbstractDevice) -> int:

@@ -19,7 +19,12 @@ class RK4(diffrax.AbstractSolver):
 
     The stages are written out: a Butcher tableau keeps a stage buffer that costs 1.3 times in a batch and 2 to 4 times
     under `vmap`. A barrier after each stage keeps XLA from computing a stage anew in every consumer.
+
+    `rolled`: the four stages as a loop over one, for a single run of a car of many equations: half the time to compile
+    (SevenDOF: 5.3 instead of 9.7 s), and a fifth faster there; a batch is faster written out.
     """
+
+    rolled: bool = eqx.field(static=True, default=False)
 
     term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[Callable] = diffrax.LocalLinearInterpolation
@@ -32,6 +37,13 @@ class RK4(diffrax.AbstractSolver):
 
     def step(self, terms, t0, t1, y0, args, solver_state, made_jump):
         del solver_state, made_jump
+        y1 = self._in_a_loop(terms, t0, t1, y0, args) if self.rolled else self._written_out(terms, t0, t1, y0, args)
+        return y1, None, dict(y0=y0, y1=y1), None, diffrax.RESULTS.successful
+
+    def func(self, terms, t0, y0, args):
+        return terms.vf(t0, y0, args)
+
+    def _written_out(self, terms, t0, t1, y0, args):
         dt = terms.contr(t0, t1)
         half = t0 + (t1 - t0) / 2
 
@@ -46,11 +58,21 @@ class RK4(diffrax.AbstractSolver):
         k3 = stage(half, ahead(0.5, k2))
         k4 = stage(t1, ahead(1.0, k3))
         y1 = jax.tree.map(lambda y, a, b, c, d: y + (a + 2 * b + 2 * c + d) / 6, y0, k1, k2, k3, k4)
-        y1 = numerics.barrier(y1)
-        return y1, None, dict(y0=y0, y1=y1), None, diffrax.RESULTS.successful
+        return numerics.barrier(y1)
 
-    def func(self, terms, t0, y0, args):
-        return terms.vf(t0, y0, args)
+    def _in_a_loop(self, terms, t0, t1, y0, args):
+        dt = terms.contr(t0, t1)
+
+        def stage(carry, coefficients):
+            k, total = carry
+            ahead, weight = coefficients
+            k = terms.vf_prod(t0 + ahead * (t1 - t0), jax.tree.map(lambda y, d: y + ahead * d, y0, k), args, dt)
+            return (k, jax.tree.map(lambda so_far, d: so_far + weight * d, total, k)), None
+
+        none = jax.tree.map(jnp.zeros_like, y0)
+        table = jnp.asarray([[0.0, 1 / 6], [0.5, 1 / 3], [0.5, 1 / 3], [1.0, 1 / 6]], jnp.result_type(t0))
+        (_, total), _ = jax.lax.scan(stage, (none, none), (table[:, 0], table[:, 1]))
+        return jax.tree.map(jnp.add, y0, total)
 
 
 class Heun(diffrax.AbstractSolver):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -34,7 +34,7 @@ class AxleDrive(AbstractDrive):
 
     front_drive: jax.Array = parameter("-", scale=0.1, default=1.0)
     front_brake: jax.Array = parameter("-", scale=0.1, default=0.65)
-    inputs: tuple[str, ...] = eqx.field(static=True, default=("drive_torque", "brake_torque"))
+    inputs: ClassVar[tuple[str, ...]] = ("drive_torque", "brake_torque")
 
     def __check_init__(self):
         for name in ("front_drive", "front_brake"):
@@ -49,7 +49,7 @@ class AxleDrive(AbstractDrive):
 class FourMotors(AbstractDrive):
     """A motor a wheel: `torque_fl`, `torque_fr`, `torque_rl`, `torque_rr` (N m), negative where the motor brakes."""
 
-    inputs: tuple[str, ...] = eqx.field(static=True, default=named("torque"))
+    inputs: ClassVar[tuple[str, ...]] = named("torque")
 
     def torques(self, u):
         return of(u, "torque"), Wheels(0.0, 0.0, 0.0, 0.0)

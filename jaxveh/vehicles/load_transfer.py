@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -36,8 +36,8 @@ class AbstractLoadTransfer(eqx.Module):
 class StaticLoads(AbstractLoadTransfer):
     """Loads as at rest."""
 
-    state_names: tuple[str, ...] = eqx.field(static=True, default=())
-    inputs: tuple[str, ...] = eqx.field(static=True, default=())
+    state_names: ClassVar[tuple[str, ...]] = ()
+    inputs: ClassVar[tuple[str, ...]] = ()
 
     def felt(self, x, u, guess):
         return 0.0, 0.0
@@ -52,8 +52,8 @@ class QuasiStatic(AbstractLoadTransfer):
     They need no tyre force, so that there is no loop to solve; at the limit of grip they promise more than the tyres hold.
     """
 
-    state_names: tuple[str, ...] = eqx.field(static=True, default=())
-    inputs: tuple[str, ...] = eqx.field(static=True, default=())
+    state_names: ClassVar[tuple[str, ...]] = ()
+    inputs: ClassVar[tuple[str, ...]] = ()
 
     def felt(self, x, u, guess):
         return guess
@@ -70,8 +70,8 @@ class LaggedLoads(AbstractLoadTransfer):
     """
 
     time: jax.Array = positive("s", default=0.1)
-    state_names: tuple[str, ...] = eqx.field(static=True, default=("a_x_felt", "a_y_felt"))
-    inputs: tuple[str, ...] = eqx.field(static=True, default=())
+    state_names: ClassVar[tuple[str, ...]] = ("a_x_felt", "a_y_felt")
+    inputs: ClassVar[tuple[str, ...]] = ()
 
     def __check_init__(self):
         check_parameters(self)
@@ -86,8 +86,8 @@ class LaggedLoads(AbstractLoadTransfer):
 class MeasuredLoads(AbstractLoadTransfer):
     """Loads of accelerations that are measured: `a_x` and `a_y` (m/s^2) become inputs, as in filters on real logs."""
 
-    state_names: tuple[str, ...] = eqx.field(static=True, default=())
-    inputs: tuple[str, ...] = eqx.field(static=True, default=("a_x", "a_y"))
+    state_names: ClassVar[tuple[str, ...]] = ()
+    inputs: ClassVar[tuple[str, ...]] = ("a_x", "a_y")
 
     def felt(self, x, u, guess):
         return u.a_x, u.a_y
@@ -110,12 +110,19 @@ def planar_loads(car: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     share = b / (a + b) if car.front_roll_share is None else car.front_roll_share
     lever = car.mass * car.cg_height
-    weight = -car.mass * g_z
-    moved = lever * a_x / (a + b)
-    front = jnp.clip(weight * (b / (a + b)) - moved, 0.0, weight)
+    front, rear = axle_loads(car, a_x, g_z)
     fl, fr = clip_transfer(front, share * lever * a_y / car.track_front)
-    rl, rr = clip_transfer(weight - front, (1.0 - share) * lever * a_y / car.track_rear)
+    rl, rr = clip_transfer(rear, (1.0 - share) * lever * a_y / car.track_rear)
     return Wheels(fl, fr, rl, rr)
+
+
+def axle_loads(car: Any, a_x: Any, g_z: Any) -> tuple[Any, Any]:
+    """Loads of the front and the rear axle, N: `m (g_z b - a_x h) / (a + b)` and the rest of the weight, none below zero."""
+    a, b = car.front_axle_to_cg, car.rear_axle_to_cg
+    weight = -car.mass * g_z
+    moved = car.mass * car.cg_height * a_x / (a + b)
+    front = jnp.clip(weight * (b / (a + b)) - moved, 0.0, weight)
+    return front, weight - front
 
 
 def state_of(transfer: AbstractLoadTransfer, x: Any) -> Any:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 
-from jaxveh import numerics
-from jaxveh._core.names import check_names, record, record_type
+from jaxveh._core.names import record
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
@@ -21,22 +19,14 @@ from jaxveh.vehicles.two_track import (
     check_car,
     filled,
     positions_of,
+    rolling_wheels,
+    started,
+    state_type,
+    touching,
     tyres_of,
     wheel_outputs,
 )
-from jaxveh.vehicles.wheels import (
-    Wheels,
-    contact,
-    each,
-    frictions,
-    gravity,
-    named,
-    of,
-    opposing,
-    pushed,
-    rolling,
-    total,
-)
+from jaxveh.vehicles.wheels import each, gravity, named, of, opposing, pushed, total
 
 SPINS = named("omega")
 STATES = ("v_x", "v_y", "yaw", "yaw_rate", *SPINS)
@@ -97,8 +87,7 @@ class SevenDOF(AbstractVehicle):
     @property
     def state_type(self):
         """The body's and the wheels' states, then those of the load transfer and of dynamic tyres (`fl_<name>` ...)."""
-        extra = (*self.load_transfer.state_names, *tyres_of(self).state_names)
-        return record_type("SevenDOFState", (*STATES, *extra))
+        return state_type(self, "SevenDOFState", STATES)
 
     @property
     def units(self):
@@ -113,17 +102,9 @@ class SevenDOF(AbstractVehicle):
 
     def start(self, t, u, **values):
         """Straight running with wheels that roll freely; `v_x` is the speed (m/s), 0 unless given."""
-        check_names("start", values, self.state_type._fields)
-        dtype = jnp.result_type(self.mass)
-        given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
-        zero = jnp.zeros(jnp.shape(u.steer), dtype)
-        rolls = given.get("v_x", zero) / self.wheel_radius
-        body = {name: given.get(name, rolls if name in SPINS else zero) for name in STATES}
-        felt = self.load_transfer.start((zero, zero))
-        names = (*STATES, *self.load_transfer.state_names)
-        x = record_type("Body", names)(*body.values(), *felt)._replace(**{k: given[k] for k in given if k in names})
-        contacts, _ = self._contacts(x, u, LEVEL)
-        return self.state_type(*x, *tyres_of(self).start(contacts))._replace(**given)
+        rolls = lambda given, zero: given.get("v_x", zero) / self.wheel_radius
+        body = {name: rolls if name in SPINS else None for name in STATES}
+        return started(self, body, u.steer, values, lambda x: self._contacts(x, u, LEVEL)[0])
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
@@ -149,23 +130,17 @@ class SevenDOF(AbstractVehicle):
         return self.state_type(*rates), record("SevenDOFOutputs", filled(shown, push.F_y))
 
     def _contacts(self, x, u, ground: Ground):
-        positions = positions_of(self)
-        cosine, sine = numerics.cos(u.steer), numerics.sin(u.steer)
-        turned = Wheels((cosine, sine), (cosine, sine), (1.0, 0.0), (1.0, 0.0))
-        moves = each(lambda at, turn: rolling(at, x.v_x, x.v_y, x.yaw_rate, *turn), positions, turned)
-        a_x, a_y = self.load_transfer.felt(x, u, self._steady(x, u))
+        moves = rolling_wheels(self, x.v_x, x.v_y, x.yaw_rate, u.steer)
+        a_x, a_y = self.load_transfer.felt(x, u, self._steady(x, u, ground))
         loads = planar_loads(self, a_x, a_y, gravity(ground)[2])
         speeds = each(lambda omega: omega * self.wheel_radius, of(x, "omega"))
-        at = each(
-            lambda m, load, mu, v: contact(m, load, mu, self.crawl_speed, v), moves, loads, frictions(ground), speeds
-        )
-        return at, moves
+        return touching(self, moves, loads, ground, speeds), moves
 
-    def _steady(self, x, u):
+    def _steady(self, x, u, ground: Ground):
         """Accelerations of a steady turn under these torques, m/s^2; what no load transfer asks for is never computed."""
         drive, brake = self.drive.torques(u)
         torque = total(drive) - total(brake) * opposing(x.v_x)
-        return torque / (self.mass * self.wheel_radius), x.v_x * x.yaw_rate
+        return torque / (self.mass * self.wheel_radius), x.v_x * x.yaw_rate - gravity(ground)[1]
 
     def _spin(self, omega, at, force, drive, brake):
         slowing = (brake + self.rolling_resistance * at.load * self.wheel_radius) * opposing(omega * self.wheel_radius)

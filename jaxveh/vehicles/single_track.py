@@ -13,10 +13,12 @@ from jaxveh._core.errors import InputError, check, check_finite, check_positive
 from jaxveh._core.names import check_names, record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
+from jaxveh.tyres import AbstractTyre, Contact
+from jaxveh.vehicles.axles import AxleTyres
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
+from jaxveh.vehicles.given_speed import longitudinal_acceleration
 from jaxveh.vehicles.slip import slip_angle
-from jaxveh.vehicles.wheels import gravity, stored
+from jaxveh.vehicles.wheels import gravity
 
 
 class SingleTrackState(NamedTuple):
@@ -30,7 +32,7 @@ class SingleTrackState(NamedTuple):
 class SingleTrackOutputs(NamedTuple):
     """What can be said of a single track at one instant, at the centre of gravity, in the body's axes.
 
-    Speeds m/s, angles rad, rates rad/s, accelerations m/s^2 (those of an ideal accelerometer on a level road), axle
+    Speeds m/s, angles rad, rates rad/s, accelerations m/s^2 (those of an ideal accelerometer), axle
     forces in the wheel's axes and loads N. `sideslip = atan2(v_y, v_x)`, zero at standstill.
     """
 
@@ -124,7 +126,7 @@ class SingleTrack(AbstractVehicle):
     @property
     def state_type(self):
         """`SingleTrackState`, followed by the states of dynamic tyres as `front_<name>`, `rear_<name>`."""
-        extra = [f"{axle}_{name}" for axle in ("front", "rear") for name in _state_names(getattr(self, axle))]
+        extra = self._tyres.state_names
         if not extra:
             return SingleTrackState
         return record_type("SingleTrackState", (*SingleTrackState._fields, *extra))
@@ -149,9 +151,7 @@ class SingleTrack(AbstractVehicle):
         given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
         zero = jnp.zeros(jnp.shape(u.v_x), dtype)
         body = SingleTrackState(*[given.get(name, zero) for name in SingleTrackState._fields])
-        settled = []
-        for tyre, contact in zip((self.front, self.rear), self._contacts(body, u, *self._steered(u)), strict=True):
-            settled += list(tyre.start(contact)) if isinstance(tyre, AbstractDynamicTyre) else []
+        settled = self._tyres.start(self._contacts(body, u, *self._steered(u)))
         return self.state_type(*body, *settled)._replace(**given)
 
     @property
@@ -166,10 +166,9 @@ class SingleTrack(AbstractVehicle):
         del t
         cosine, sine = self._steered(u)
         contacts = self._contacts(x, u, cosine, sine, ground)
-        states = self._tyre_states(x)
-        front, rear = (
-            stored(tyre.forces(*at)) for tyre, *at in zip((self.front, self.rear), contacts, states, strict=True)
-        )
+        tyres = self._tyres
+        states = tyres.states(x)
+        front, rear = tyres.forces(contacts, states)
         F_f = front.F_y * cosine + front.F_x * sine
         F_r = rear.F_y
         moment = self.front_axle_to_cg * F_f - self.rear_axle_to_cg * F_r + (front.M_z + rear.M_z)
@@ -183,7 +182,7 @@ class SingleTrack(AbstractVehicle):
             yaw=x.yaw,
             yaw_rate=x.yaw_rate,
             yaw_acceleration=yaw_acceleration,
-            a_x=_longitudinal_acceleration(x, u),
+            a_x=longitudinal_acceleration(x, u, gravity(ground)[0]),
             a_y=a_y,
             sideslip=numerics.arctan2(x.v_y, u.v_x),
             slip_angle_front=contacts[0].slip_angle,
@@ -193,7 +192,7 @@ class SingleTrack(AbstractVehicle):
             load_front=contacts[0].load,
             load_rear=contacts[1].load,
         )
-        return self._with_tyre_rates(rates, contacts, states), outputs
+        return self.state_type(*rates, *tyres.rates(contacts, states)), outputs
 
     def loads(self, x, u, ground: Ground = LEVEL) -> tuple[jax.Array, jax.Array]:
         """Loads of front and rear axle, N; they may become negative where the car would lift an axle."""
@@ -207,7 +206,8 @@ class SingleTrack(AbstractVehicle):
             raise InputError(
                 f"inputs = {', '.join(u._fields)}: a car with a cg_height needs a_x (or v_x_rate) among them."
             )
-        moved = self.mass * _longitudinal_acceleration(x, u) * self.cg_height / self.wheelbase
+        a_x = longitudinal_acceleration(x, u, gravity(ground)[0])
+        moved = self.mass * a_x * self.cg_height / self.wheelbase
         return front - moved, rear + moved
 
     def contacts(self, x, u) -> tuple[Contact, Contact]:
@@ -237,27 +237,6 @@ class SingleTrack(AbstractVehicle):
         )
         return front, rear
 
-    def _tyre_states(self, x):
-        def of(axle, tyre):
-            names = _state_names(tyre)
-            return record_type("TyreState", names)(*[getattr(x, f"{axle}_{name}") for name in names]) if names else None
-
-        return of("front", self.front), of("rear", self.rear)
-
-    def _with_tyre_rates(self, rates, contacts, states):
-        extra = []
-        for tyre, contact, state in zip((self.front, self.rear), contacts, states, strict=True):
-            extra += list(tyre.derivatives(contact, state)) if state is not None else []
-        return self.state_type(*rates, *extra)
-
-
-def _state_names(tyre) -> tuple[str, ...]:
-    return tyre.state_names if isinstance(tyre, AbstractDynamicTyre) else ()
-
-
-def _longitudinal_acceleration(x, u):
-    """What an ideal accelerometer at the centre of gravity says along x; the speed is constant if nobody says."""
-    if hasattr(u, "a_x"):
-        return u.a_x
-    turning = x.v_y * x.yaw_rate
-    return u.v_x_rate - turning if hasattr(u, "v_x_rate") else -turning
+    @property
+    def _tyres(self) -> AxleTyres:
+        return AxleTyres(self.front, self.rear)

@@ -8,16 +8,18 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
+from jaxveh._core.names import check_names, record_type
 from jaxveh._core.parameter import check_parameters
+from jaxveh.roads import Ground
 from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.wheels import Pushed, Tyres, Wheels, corners, named
+from jaxveh.vehicles.wheels import Pushed, Tyres, Wheels, contact, corners, each, frictions, named, rolling
 
 UNITS = {
     **dict.fromkeys(("v_x", "v_y"), "m/s"),
     **dict.fromkeys(("a_x", "a_y", "a_x_felt", "a_y_felt", "v_x_rate"), "m/s^2"),
-    **dict.fromkeys(("steer", "yaw", "sideslip", *named("slip_angle")), "rad"),
-    **dict.fromkeys(("yaw_rate", *named("omega")), "rad/s"),
-    "yaw_acceleration": "rad/s^2",
+    **dict.fromkeys(("steer", "yaw", "roll", "sideslip", *named("slip_angle")), "rad"),
+    **dict.fromkeys(("yaw_rate", "roll_rate", *named("omega")), "rad/s"),
+    **dict.fromkeys(("yaw_acceleration", "roll_acceleration"), "rad/s^2"),
     **dict.fromkeys(named("slip_ratio"), "-"),
     **dict.fromkeys(("F_x", "F_y", *named("load"), *named("F_x"), *named("F_y")), "N"),
     **dict.fromkeys(("M_z", "drive_torque", "brake_torque", *named("torque"), *named("M_z")), "N m"),
@@ -49,19 +51,56 @@ def positions_of(car: Any) -> Wheels:
     return corners(car.front_axle_to_cg, car.rear_axle_to_cg, car.track_front, car.track_rear)
 
 
+def rolling_wheels(car: Any, v_x: Any, v_y: Any, yaw_rate: Any, steer: Any) -> Wheels:
+    """How the wheels move over the road; both front wheels turn by the steer (rad)."""
+    turn = numerics.cos(steer), numerics.sin(steer)
+    turned = Wheels(turn, turn, (1.0, 0.0), (1.0, 0.0))
+    return each(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), positions_of(car), turned)
+
+
+def touching(car: Any, moves: Wheels, loads: Wheels, ground: Ground, speeds: Wheels | None = None) -> Wheels:
+    """How the wheels touch the road; `speeds` are `omega r_e` (m/s), None where all roll freely."""
+    speeds = Wheels(None, None, None, None) if speeds is None else speeds
+    return each(
+        lambda m, load, mu, v: contact(m, load, mu, car.crawl_speed, v), moves, loads, frictions(ground), speeds
+    )
+
+
+def state_type(car: Any, name: str, body: tuple[str, ...]) -> Any:
+    """The states of the body, then those of the load transfer and of dynamic tyres (`fl_<name>` ...)."""
+    return record_type(name, (*body, *car.load_transfer.state_names, *tyres_of(car).state_names))
+
+
+def started(car: Any, body: dict, like: Any, values: dict, contacts_of: Any) -> Any:
+    """The state with `values` given by name, all else as `body` says, of the shape of `like`; dynamic tyres have settled.
+
+    `body` has the body's states: a number, or a function of the given values. `contacts_of(x)` are the contacts in a state `x`
+    of the body and the load transfer, whose felt accelerations are zero.
+    """
+    check_names("start", values, car.state_type._fields)
+    dtype = jnp.result_type(car.mass)
+    given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
+    zero = jnp.zeros(jnp.shape(like), dtype)
+    rest = {name: zero if value is None else value(given, zero) for name, value in body.items()}
+    rest |= dict(zip(car.load_transfer.state_names, car.load_transfer.start((zero, zero)), strict=True))
+    rest |= {name: value for name, value in given.items() if name in rest}
+    x = record_type("Body", tuple(rest))(*rest.values())
+    return car.state_type(*x, *tyres_of(car).start(contacts_of(x)))._replace(**given)
+
+
 def air_drag(drag: Any, v_x: Any) -> Any:
     """Drag of the air against the motion, N: `drag` (N s^2/m^2) is half the air's density times c_W times the area."""
     return drag * v_x * jnp.abs(v_x)
 
 
-def wheel_outputs(contacts: Wheels, forces: Wheels, omegas: Wheels) -> dict:
-    """What each wheel says, in its own axes: slips, loads, forces, aligning moments, spins."""
+def wheel_outputs(contacts: Wheels, forces: Wheels, omegas: Wheels | None = None) -> dict:
+    """What each wheel says, in its own axes: slips, loads, forces, aligning moments, spins; without `omegas` no slip ratio."""
     shown = {}
-    for name in ("slip_angle", "slip_ratio", "load"):
+    for name in ("slip_angle", "load") if omegas is None else ("slip_angle", "slip_ratio", "load"):
         shown |= zip(named(name), (getattr(at, name) for at in contacts), strict=True)
     for name in ("F_x", "F_y", "M_z"):
         shown |= zip(named(name), (getattr(f, name) for f in forces), strict=True)
-    return shown | dict(zip(named("omega"), omegas, strict=True))
+    return shown if omegas is None else shown | dict(zip(named("omega"), omegas, strict=True))
 
 
 def body_outputs(x: Any, v_x: Any, a_x: Any, a_y: Any, yaw_acceleration: Any, steer: Any, push: Pushed) -> dict:

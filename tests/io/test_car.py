@@ -35,7 +35,7 @@ def test_plain_car(toml):
     assert car.wheelbase == pytest.approx(2.7)
     assert (car.front_cornering_stiffness, car.rear_cornering_stiffness) == (9e4, 1.1e5)
     optional = [entry.name for entry in dataclasses.fields(car)][6:]
-    assert len(optional) == 10
+    assert len(optional) == 18
     assert all(getattr(car, name) is None for name in optional)
 
 
@@ -48,7 +48,10 @@ def test_the_schema_is_a_car(toml):
     keys = {entry.name for entry in dataclasses.fields(io.CarSpecification)} | {
         entry.name for entry in dataclasses.fields(io.AxleTyre)
     }
-    assert all(f"\n{key} =" in SCHEMA or f"\n[{key}]" in SCHEMA for key in keys)
+    # Paths are commented out, as the files that they name are not there.
+    assert all(any(f"\n{start}" in SCHEMA for start in (f"{key} =", f"[{key}]", f'# {key} = "')) for key in keys)
+    assert (car.wheel_radius, car.wheel_inertia, car.drag) == (0.32, 1.2, 0.4)
+    assert (car.rolling_resistance, car.front_drive, car.front_brake) == (0.01, 1.0, 0.65)
 
 
 def test_stiffness_from_the_tyre(toml):
@@ -56,6 +59,14 @@ def test_stiffness_from_the_tyre(toml):
     car = io.read_car(toml(text))
     assert car.front_cornering_stiffness == pytest.approx(10.0 * 1.3 * 8000.0)
     assert car.rear_cornering_stiffness == pytest.approx(12.0 * 1.3 * 6600.0)
+
+
+def test_tyre_files_are_found_from_the_folder_of_the_car(toml, tmp_path):
+    car = io.read_car(toml(PLAIN + 'front_tyre = "tyres/front.tir"\nrear_tyre = "/data/rear.tir"\n'))
+    assert (car.front_tyre, car.rear_tyre) == (str(tmp_path / "tyres/front.tir"), "/data/rear.tir")
+    (tmp_path / "elsewhere").mkdir()
+    io.write_car(car, tmp_path / "elsewhere" / "car.toml")
+    assert io.read_car(tmp_path / "elsewhere" / "car.toml") == car
 
 
 @pytest.mark.parametrize("source", [PLAIN, SCHEMA], ids=["plain", "full"])
@@ -97,6 +108,8 @@ BROKEN = {
         r"\[rear\]: B = -3.0: must be between 0.01 and 1000 1/rad",
     ),
     "name": ("name = 3" + PLAIN, r"name = 3: must be a string"),
+    "tyre path": ("front_tyre = 3" + PLAIN, r"front_tyre = 3: must be a string"),
+    "share": ("front_drive = 60" + PLAIN, r"front_drive = 60.0: must be between 0 and 1"),
 }
 
 

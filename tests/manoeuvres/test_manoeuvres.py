@@ -1,4 +1,4 @@
-"""Manoeuvres: shapes, smooth edges, precision, gradients, replay, bad input."""
+"""Lane change, step, sweep and replay: shapes, rows, bad input."""
 
 import jax
 import jax.numpy as jnp
@@ -8,51 +8,9 @@ import pytest
 from jaxveh import InputError, Recording, manoeuvres
 from jaxveh.statespace import cast
 
-SHAPES = {
-    "double lane change": lambda: manoeuvres.double_lane_change(25.0, 0.12),
-    "step steer": lambda: manoeuvres.step_steer(25.0, 0.12),
-    "swept sine": lambda: manoeuvres.swept_sine(25.0, 0.12, 0.2, 2.0, 20.0),
-}
-
-
-@pytest.fixture(params=SHAPES, ids=str)
-def manoeuvre(request):
-    return SHAPES[request.param]()
-
 
 def steer(manoeuvre, t):
     return manoeuvre.inputs(jnp.asarray(t)).steer
-
-
-def test_every_shape_starts_straight_at_its_speed_and_stays_within_its_amplitude(manoeuvre):
-    t = np.linspace(0.0, manoeuvre.duration, 4001)
-    u = manoeuvre.inputs(t)
-    assert u.steer[0] == 0
-    assert 0.99 * 0.12 < np.max(np.abs(u.steer)) <= 0.12 * (1 + 1e-12)
-    np.testing.assert_array_equal(u.v_x, 25.0)
-    np.testing.assert_array_equal(u.v_x_rate, 0.0)
-
-
-def test_every_shape_has_a_continuous_second_derivative(manoeuvre):
-    """Jumps of the curvature would show as differences that do not shrink with the step."""
-    curvature = jax.jit(jax.vmap(jax.grad(jax.grad(lambda t: manoeuvre.inputs(t).steer))))
-    jumps = [
-        float(np.max(np.abs(np.diff(curvature(jnp.linspace(0.0, manoeuvre.duration, n)))))) for n in (20_001, 80_001)
-    ]
-    assert jumps[1] < 0.3 * jumps[0]
-
-
-def test_every_shape_keeps_its_precision(manoeuvre):
-    single = cast(manoeuvre, np.float32)
-    t = np.linspace(0.0, manoeuvre.duration, 1001)
-    u = single.inputs(t.astype(np.float32))
-    assert {leaf.dtype for leaf in u} == {np.dtype(np.float32)}
-    np.testing.assert_allclose(u.steer, steer(manoeuvre, t), atol=0.12 * 5e-5)
-
-
-def test_amplitude_is_a_differentiable_leaf(manoeuvre):
-    slope = jax.jacfwd(lambda m: m.inputs(1.25).steer)(manoeuvre)
-    np.testing.assert_allclose(slope.steer, steer(manoeuvre, 1.25) / 0.12, rtol=1e-12)
 
 
 def test_double_lane_change_is_a_sine_period_and_its_mirror():

@@ -1,0 +1,53 @@
+"""The tyres of a car on one track: an axle's tyres together are one law."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from jaxveh._core.names import record_type
+from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces
+from jaxveh.vehicles.wheels import stored
+
+AXLES = ("front", "rear")
+
+
+class AxleTyres(NamedTuple):
+    """The tyres of the front and of the rear axle; pairs below are in this order."""
+
+    front: AbstractTyre
+    rear: AbstractTyre
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The states of dynamic tyres: `front_<name>`, `rear_<name>`."""
+        return tuple(f"{axle}_{name}" for axle, tyre in zip(AXLES, self, strict=True) for name in _names(tyre))
+
+    def states(self, x: Any) -> tuple[Any, Any]:
+        """Each axle's tyre state out of the car's, None for a tyre without."""
+        return _state("front", self.front, x), _state("rear", self.rear, x)
+
+    def start(self, contacts: tuple[Contact, Contact]) -> tuple:
+        """The settled states, in the order of `state_names`."""
+        settled = [t.start(at) for t, at in zip(self, contacts, strict=True) if isinstance(t, AbstractDynamicTyre)]
+        return tuple(value for state in settled for value in state)
+
+    def forces(self, contacts: tuple[Contact, Contact], states: tuple[Any, Any]) -> tuple[Forces, Forces]:
+        """What the road does to each axle, in the wheels' axes."""
+        front, rear = (stored(tyre.forces(*at)) for tyre, *at in zip(self, contacts, states, strict=True))
+        return front, rear
+
+    def rates(self, contacts: tuple[Contact, Contact], states: tuple[Any, Any]) -> tuple:
+        """The time derivatives, in the order of `state_names`."""
+        found = []
+        for tyre, contact, state in zip(self, contacts, states, strict=True):
+            found += list(tyre.derivatives(contact, state)) if isinstance(tyre, AbstractDynamicTyre) else []
+        return tuple(found)
+
+
+def _names(tyre: AbstractTyre) -> tuple[str, ...]:
+    return tyre.state_names if isinstance(tyre, AbstractDynamicTyre) else ()
+
+
+def _state(axle: str, tyre: AbstractTyre, x: Any) -> Any:
+    names = _names(tyre)
+    return record_type("TyreState", names)(*[getattr(x, f"{axle}_{name}") for name in names]) if names else None

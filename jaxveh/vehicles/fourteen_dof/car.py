@@ -1,0 +1,279 @@
+"""The car of fourteen degrees of freedom: a body, four wheels on suspensions, and their spins."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.names import check_names, record, record_type
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.roads import LEVEL, Ground
+from jaxveh.tyres import AbstractTyre
+from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
+from jaxveh.vehicles.fourteen_dof.checks import check_fourteen_dof
+from jaxveh.vehicles.fourteen_dof.dynamics import Accelerations, Inertia, accelerations
+from jaxveh.vehicles.fourteen_dof.kinematics import Body, angle_accelerations, body_of, to_body, to_road
+from jaxveh.vehicles.fourteen_dof.shown import UNITS, attitude_outputs, by_wheel, moments
+from jaxveh.vehicles.fourteen_dof.suspension import (
+    Wheel,
+    joints,
+    sunk_at_rest,
+    suspension_forces,
+    unsprung,
+    wheel_at,
+)
+from jaxveh.vehicles.fourteen_dof.tyre_contact import ROLLING_SHARE, axles, reaction, touch
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, scaled
+from jaxveh.vehicles.two_track import air_drag, body_outputs, filled, positions_of, tyres_of, wheel_outputs
+from jaxveh.vehicles.wheels import Wheels, each, frictions, gravity, named, of, opposing, pushed, total
+
+BODY = ("v_x", "v_y", "v_z", "z", "roll", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate")
+SPINS = named("omega")
+STATES = (*BODY, *named("travel"), *named("travel_rate"), *SPINS)
+
+
+class FourteenDOF(AbstractVehicle):
+    """A rigid body with all six degrees of freedom, four unsprung masses on springs, four wheels that spin: the truth.
+
+    The equations are exact for this mechanism, for angles of any size (pitch below 90 degrees), and keep energy:
+
+    - A wheel's mass travels along a straight joint fixed in the body, inclined so that the contact point turns about the
+      roll centre (`roll_centre`) and moves forward by `pitch_slope` in bump: in front positive is anti-dive, at the rear
+      negative is anti-squat and anti-lift. Wheels keep their angle to the body: camber is that of the body and `camber`.
+    - `omega` is a wheel's whole spin about its axle (a sensor on the body reads it less the body's turning about the axle,
+      about the pitch rate). Spin momentum makes gyroscopic moments; a turning steer makes none.
+    - A tyre is a spring and a damper along the road's normal that never pull; its contact point is below the wheel's centre.
+      It rolls with the unloaded radius less a third of the compression, which is also the arm of its longitudinal force
+      about the axle: with the smaller loaded radius tyres would make energy. M_x, M_y, M_z of the tyre count; that of
+      rolling resistance turns round with the direction of travel, and `rolling_resistance` comes on top.
+    - The road is the plane of x and y; slopes tilt gravity. The air's drag acts on the sprung mass' centre of gravity.
+
+    Speeds, place and accelerations are those of the *sprung mass'* centre of gravity, in the intermediate axes (x, y in the
+    road's plane); `a_x`, `a_y`, `a_z` are what an ideal accelerometer there says in these axes (a_z = g at rest). Springs
+    are preloaded for rest on a level road, where `start` puts the car. Slips are those of `wheels.contact`, regularised below
+    `crawl_speed` (m/s); brakes and rolling resistance turn round smoothly about 0.5 m/s. Wheel hop (about 10 Hz) and spins
+    (see `SevenDOF`) are stiff.
+
+    Equations: d'Alembert's principle, see `dynamics.accelerations`. The degrees of freedom are those of T. Shim and C. Ghike,
+    Vehicle System Dynamics 45 (2007) 191, with joints inclined for the roll centres and nothing linearised.
+
+    **Parameters**: `sprung_mass`, `unsprung_mass_front`, `unsprung_mass_rear` (kg; the latter each wheel's); `roll_inertia`,
+    `pitch_inertia`, `yaw_inertia`, `roll_yaw_product` (the integral of x z dm; kg m^2, of the sprung mass about its centre of
+    gravity); `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (m, of the sprung mass' centre of gravity at rest);
+    `track_front`, `track_rear` (m); `spring_`, `damper_`, `anti_roll_` `front` and `rear` (N/m, N s/m at the wheel; N per m of
+    difference of the wheels' travels); `roll_centre_` (m over the road), `pitch_slope_` (-); `tyre_stiffness` (N/m),
+    `tyre_damping` (N s/m); `wheel_radius` (m, unloaded), `wheel_inertia` (kg m^2, about the axle; about other axes it belongs
+    to the body); `front` and `rear`: the tyre of a wheel on each axle (`mirrored`: the right wheels' is its mirror image);
+    `drag` (N s^2/m^2), `rolling_resistance` (-), `toe_` (rad, inwards), `camber_` (rad, tops outwards), `ackermann` (-: 0 both
+    front wheels turn alike, 1 about one point), `drive`.
+
+    **Inputs**: `steer` (rad at the road wheels) and those of `drive`.
+
+    **Outputs** beside those of `SevenDOF`: `z`, `v_z`, `roll`, `pitch`, their rates and accelerations, `a_z`, `camber_fl`,
+    `travel_fl` (m, up), `travel_rate_fl`, `suspension_force_fl` (N), `M_x_fl`, `M_y_fl` ..., and the powers (W) that leave the
+    car: `tyre_dissipation` (slip, moments, rolling, tyre damping), `damper_dissipation`, `brake_dissipation`,
+    `drag_dissipation`. With `drive_power` they balance the energy.
+
+    **Raises** `InputError` for parameters outside their domain, an inertia that is not positive definite, tyres too soft to
+    carry the car, or a tyre that is none.
+    """
+
+    sprung_mass: jax.Array = positive("kg")
+    unsprung_mass_front: jax.Array = positive("kg")
+    unsprung_mass_rear: jax.Array = positive("kg")
+    roll_inertia: jax.Array = positive("kg m^2")
+    pitch_inertia: jax.Array = positive("kg m^2")
+    yaw_inertia: jax.Array = positive("kg m^2")
+    front_axle_to_cg: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    track_front: jax.Array = positive("m")
+    track_rear: jax.Array = positive("m")
+    cg_height: jax.Array = positive("m")
+    spring_front: jax.Array = positive("N/m")
+    spring_rear: jax.Array = positive("N/m")
+    damper_front: jax.Array = parameter("N s/m", scale=1500.0)
+    damper_rear: jax.Array = parameter("N s/m", scale=1500.0)
+    front: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
+    rear: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
+    roll_yaw_product: jax.Array = parameter("kg m^2", scale=50.0, default=0.0)
+    anti_roll_front: jax.Array = parameter("N/m", scale=1e4, default=0.0)
+    anti_roll_rear: jax.Array = parameter("N/m", scale=1e4, default=0.0)
+    roll_centre_front: jax.Array = parameter("m", scale=0.1, default=0.0)
+    roll_centre_rear: jax.Array = parameter("m", scale=0.1, default=0.0)
+    pitch_slope_front: jax.Array = parameter("-", scale=0.1, default=0.0)
+    pitch_slope_rear: jax.Array = parameter("-", scale=0.1, default=0.0)
+    tyre_stiffness: jax.Array = positive("N/m", default=2.2e5)
+    tyre_damping: jax.Array = parameter("N s/m", scale=100.0, default=50.0)
+    wheel_radius: jax.Array = positive("m", default=0.32)
+    wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
+    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.0)
+    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.0)
+    toe_front: jax.Array = parameter("rad", scale=0.005, default=0.0)
+    toe_rear: jax.Array = parameter("rad", scale=0.005, default=0.0)
+    camber_front: jax.Array = parameter("rad", scale=0.02, default=0.0)
+    camber_rear: jax.Array = parameter("rad", scale=0.02, default=0.0)
+    ackermann: jax.Array = parameter("-", scale=1.0, default=0.0)
+    drive: AbstractDrive = eqx.field(default_factory=AxleDrive)
+    mirrored: bool = eqx.field(static=True, default=True)
+    crawl_speed: float = eqx.field(static=True, default=3.0)
+
+    def __check_init__(self):
+        check_fourteen_dof(self)
+
+    @property
+    def mass(self) -> jax.Array:
+        """Mass of the whole car, kg."""
+        return self.sprung_mass + 2.0 * (self.unsprung_mass_front + self.unsprung_mass_rear)
+
+    @property
+    def inputs(self):
+        return ("steer", *self.drive.inputs)
+
+    @property
+    def state_type(self):
+        """The body's states, travels and their rates, spins, then those of dynamic tyres (`fl_<name>` ...)."""
+        return record_type("FourteenDOFState", (*STATES, *tyres_of(self).state_names))
+
+    @property
+    def units(self):
+        return dict(UNITS)
+
+    @property
+    def wheel_positions(self):
+        return tuple(positions_of(self))
+
+    def motion(self, x, u):
+        return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
+
+    def start(self, t, u, **values):
+        """At rest on its springs on a level road, or rolling there freely with `v_x` (m/s)."""
+        check_names("start", values, self.state_type._fields)
+        dtype = jnp.result_type(self.sprung_mass)
+        given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
+        zero = jnp.zeros(jnp.shape(u.steer), dtype)
+        speed = given.get("v_x", zero)
+        spins = each(lambda sunk: speed / (self.wheel_radius - ROLLING_SHARE * sunk), sunk_at_rest(self))
+        rest = {"z": self.cg_height + zero, **dict(zip(SPINS, spins, strict=True))}
+        x = record("Body", {name: given.get(name, rest.get(name, zero)) for name in STATES})
+        if not tyres_of(self).state_names:
+            return self.state_type(*x)
+        return self.state_type(*x, *tyres_of(self).start(self._stand(x, u, LEVEL).contacts))._replace(**given)
+
+    def evaluate(self, t, x, u, ground: Ground = LEVEL):
+        del t
+        tyres, stand, omegas = tyres_of(self), self._stand(x, u, ground), of(x, "omega")
+        body, states, g = stand.body, tyres.states(x), Vector(*gravity(ground))
+        forces = tyres.forces(stand.contacts, states)
+        roads = each(
+            lambda at, how, f, omega: reaction(self, body, at, how, f, omega),
+            stand.contacts,
+            stand.touches,
+            forces,
+            omegas,
+        )
+        roads, shafts = numerics.stored((roads, self._shafts(stand, u, omegas)))
+        suspension, damping = suspension_forces(self, of(x, "travel"), of(x, "travel_rate"))
+        found = self._accelerate(x, stand, roads, shafts, suspension, omegas, g)
+        roll, pitch, yaw = angle_accelerations(body.axes, x, body.omega, found.angular)
+        linear = to_road(body.axes, found.linear)
+        spins = each(lambda road, shaft: (road.spin + shaft.torque) / self.wheel_inertia, roads, shafts)
+        rates = (
+            linear.x + x.v_y * x.yaw_rate, linear.y - x.v_x * x.yaw_rate, linear.z, x.v_z,
+            x.roll_rate, x.pitch_rate, x.yaw_rate, roll, pitch, yaw,
+            *of(x, "travel_rate"), *found.travels, *spins, *tyres.rates(stand.contacts, states),
+        )  # fmt: skip
+        felt = minus(linear, g)
+        push = pushed(
+            each(lambda wheel: _below(body, wheel), stand.wheels), each(lambda how: how.moves, stand.touches), forces
+        )
+        shown = body_outputs(x, x.v_x, felt.x, felt.y, yaw, u.steer, push)
+        shown |= attitude_outputs(x, roll, pitch, felt.z)
+        shown |= wheel_outputs(stand.contacts, forces, omegas) | moments(forces)
+        shown |= by_wheel(
+            camber=each(lambda at: at.camber, stand.contacts), travel=of(x, "travel"),
+            travel_rate=of(x, "travel_rate"), suspension_force=suspension,
+        )  # fmt: skip
+        shown |= {
+            "drive_power": total(each(lambda shaft: shaft.drive_power, shafts)),
+            "tyre_dissipation": total(each(lambda road: road.dissipation, roads)),
+            "damper_dissipation": total(each(lambda force, rate: force * rate, damping, of(x, "travel_rate"))),
+            "brake_dissipation": total(each(lambda shaft: shaft.brake_power, shafts)),
+            "drag_dissipation": air_drag(self.drag, x.v_x) * x.v_x,
+        }
+        return self.state_type(*rates), record("FourteenDOFOutputs", filled(shown, push.F_y))
+
+    def _stand(self, x, u, ground: Ground) -> Stand:
+        """How the car stands on the road, before any tyre force."""
+        body = numerics.stored(body_of(x))
+        wheels = each(
+            lambda joint, travel, rate: wheel_at(joint, travel, rate, body),
+            joints(self), of(x, "travel"), of(x, "travel_rate"),
+        )  # fmt: skip
+        turned = axles(self, u.steer)
+        both = each(
+            lambda wheel, axis, omega, mu: touch(self, body, wheel, axis, omega, mu),
+            wheels, turned, of(x, "omega"), frictions(ground),
+        )  # fmt: skip
+        stand = Stand(body, wheels, turned, Wheels(*[b[0] for b in both]), Wheels(*[b[1] for b in both]))
+        return numerics.stored(stand)
+
+    def _shafts(self, stand: Stand, u, omegas: Wheels) -> Wheels:
+        """Torques of motors and brakes, which sit on the body."""
+        drive, brake = self.drive.torques(u)
+
+        def one(axis, how, omega, driving, braking):
+            turns = omega - dot(axis, stand.body.omega)
+            slowing = braking * opposing(turns * how.radius)
+            return Shaft(driving - slowing, driving * turns, slowing * turns)
+
+        return each(one, stand.axles, stand.touches, omegas, drive, brake)
+
+    def _accelerate(self, x, stand: Stand, roads, shafts, suspension, omegas, g: Vector) -> Accelerations:
+        """Gravity, drag and the reactions of torques on the body; gravity and the road on the wheels."""
+        axes = stand.body.axes
+        g = to_body(axes, g)
+        force = add(scaled(self.sprung_mass, g), scaled(-air_drag(self.drag, x.v_x), axes.forward))
+        moments = each(
+            lambda road, shaft, axis: minus(road.moment, scaled(shaft.torque, axis)), roads, shafts, stand.axles
+        )
+        momentum = each(lambda omega, axis: scaled(self.wheel_inertia * omega, axis), omegas, stand.axles)
+        return accelerations(
+            Inertia(self.sprung_mass, self.roll_inertia, self.pitch_inertia, self.yaw_inertia, self.roll_yaw_product),
+            joints(self),
+            stand.wheels,
+            stand.body.omega,
+            add(*momentum),
+            force,
+            add(*moments),
+            each(lambda road, mass: add(road.force, scaled(mass, g)), roads, unsprung(self)),
+            suspension,
+        )
+
+
+class Stand(NamedTuple):
+    """How the car stands on the road: the body, each wheel's centre, axis (body's axes), contact and touch."""
+
+    body: Body
+    wheels: Wheels
+    axles: Wheels
+    contacts: Wheels
+    touches: Wheels
+
+
+class Shaft(NamedTuple):
+    """Torque on a wheel (N m), power of its motor and power lost in its brake (W)."""
+
+    torque: Any
+    drive_power: Any
+    brake_power: Any
+
+
+def _below(body: Body, wheel: Wheel) -> tuple[Any, Any]:
+    """Where a wheel touches the road: x, y (m) in the intermediate axes from the centre of gravity."""
+    at = to_road(body.axes, wheel.place)
+    return at.x, at.y

@@ -1,0 +1,32 @@
+"""What the parameters of the car of fourteen degrees of freedom must hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import check, check_at_least, is_concrete
+from jaxveh.vehicles.fourteen_dof.suspension import static_loads
+from jaxveh.vehicles.two_track import check_car
+
+NOT_NEGATIVE = (
+    "damper_front", "damper_rear", "anti_roll_front", "anti_roll_rear", "tyre_damping", "drag", "rolling_resistance",
+)  # fmt: skip
+
+
+def check_fourteen_dof(car: Any) -> None:
+    """Raise `InputError` unless parameters are in their domains, the inertia is positive definite and the tyres carry the car."""
+    check_car(car)
+    kind = type(car).__name__
+    for name in NOT_NEGATIVE:
+        check_at_least(f"{kind}.{name}", getattr(car, name), 0)
+    if is_concrete(car.roll_inertia, car.yaw_inertia):
+        most = np.sqrt(np.asarray(car.roll_inertia) * np.asarray(car.yaw_inertia))
+        limit = "below sqrt(roll_inertia yaw_inertia) in size (kg m^2): the inertia is positive definite"
+        check(f"{kind}.roll_yaw_product", car.roll_yaw_product, lambda v: np.abs(v) < most, limit)
+    loads = static_loads(car)
+    if is_concrete(loads, car.wheel_radius):
+        least = np.maximum(np.asarray(loads.fl), np.asarray(loads.rl)) / np.asarray(car.wheel_radius)
+        limit = "above static load / wheel_radius (N/m), or the rim stands on the road"
+        check(f"{kind}.tyre_stiffness", car.tyre_stiffness, lambda v: v > least, limit)

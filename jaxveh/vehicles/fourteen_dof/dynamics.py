@@ -1,0 +1,99 @@
+"""The equations of motion of a body with four masses on prismatic joints, exact and without an axis of vectors."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from jaxveh.numerics import solve_scalars, stored
+from jaxveh.vehicles.fourteen_dof.suspension import Joint, Wheel
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
+from jaxveh.vehicles.wheels import Wheels, each, total
+
+
+class Inertia(NamedTuple):
+    """The sprung mass (kg) and its moments of inertia about its centre of gravity (kg m^2); `xz` is the integral of x z dm."""
+
+    mass: Any
+    x: Any
+    y: Any
+    z: Any
+    xz: Any
+
+
+class Accelerations(NamedTuple):
+    """Of the body's centre of gravity (m/s^2) and of its turning (rad/s^2), in its axes; of each wheel's travel (m/s^2)."""
+
+    linear: Vector
+    angular: Vector
+    travels: Wheels
+
+
+def accelerations(
+    inertia: Inertia,
+    joints: Wheels,
+    wheels: Wheels,
+    omega: Vector,
+    spin: Vector,
+    force: Vector,
+    moment: Vector,
+    on_wheels: Wheels,
+    suspension: Wheels,
+) -> Accelerations:
+    """Accelerations of all masses, in the body's axes.
+
+    `force` (N) and `moment` (N m) act on the body at its centre of gravity, gravity included; `on_wheels` (N) on the wheels'
+    centres, gravity included; `suspension` (N) along each joint, pushing the wheel down. `spin` is the wheels' angular
+    momentum (N m s). With d a joint's slope, r the wheel's place, q = (d, r x d), A the wheel's acceleration and G = F -
+    m_u A' without the part of A that is unknown, d'Alembert's principle along the joint takes the travel out:
+
+        |d|^2 m_u zeta'' = d . G - S - m_u d . (a + alpha x r)
+
+    and leaves for the body a symmetric system in (a, alpha), in which each wheel has the inertia of a point mass across its
+    joint: m_u (J^T J - q q^T / |d|^2) with J = (1, -[r]x).
+    """
+    on_wheel = each(lambda joint, wheel, F: minus(F, scaled(joint.mass, wheel.bias)), joints, wheels, on_wheels)
+    ways = each(lambda joint, wheel: (*joint.slope, *cross(wheel.place, joint.slope)), joints, wheels)
+    matrix = _matrix(inertia, joints, wheels, ways)
+    b = _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension)
+    matrix, b = stored((matrix, b))
+    found = stored(solve_scalars(matrix, b))
+    linear, angular = Vector(*found[:3]), Vector(*found[3:])
+
+    def travel(joint: Joint, wheel: Wheel, G: Vector, S: Any):
+        carried = add(linear, cross(angular, wheel.place))
+        return (dot(joint.slope, minus(G, scaled(joint.mass, carried))) - S) / (joint.mass * joint.square)
+
+    return Accelerations(linear, angular, each(travel, joints, wheels, on_wheel, suspension))
+
+
+def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> list:
+    """Rows up to the diagonal of the system in (a, alpha): all as one rigid body, less what the joints leave free."""
+    m = each(lambda joint: joint.mass, joints)
+    moment = each(lambda mass, wheel: scaled(mass, wheel.place), m, wheels)
+    s = add(*moment)
+    second = lambda a, b: total(each(lambda f, wheel: getattr(f, a) * getattr(wheel.place, b), moment, wheels))
+    xx, yy, zz = second("x", "x"), second("y", "y"), second("z", "z")
+    xy, xz, yz = second("x", "y"), second("x", "z"), second("y", "z")
+    mass = inertia.mass + total(m)
+    rigid = [
+        [mass],
+        [0.0, mass],
+        [0.0, 0.0, mass],
+        [0.0, -s.z, s.y, inertia.x + (yy + zz)],
+        [s.z, 0.0, -s.x, -xy, inertia.y + (xx + zz)],
+        [-s.y, s.x, 0.0, -inertia.xz - xz, -yz, inertia.z + (xx + yy)],
+    ]
+    shares = each(lambda joint, q: [joint.mass / joint.square * e for e in q], joints, ways)
+    free = lambda i, j: total(each(lambda share, q: share[i] * q[j], shares, ways))
+    return [[entry - free(i, j) for j, entry in enumerate(row)] for i, row in enumerate(rigid)]
+
+
+def _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension) -> list:
+    """Forces and moments on all as one rigid body, less what the joints do not carry."""
+    I, w = inertia, omega
+    turns = Vector(I.x * w.x - I.xz * w.z, I.y * w.y, I.z * w.z - I.xz * w.x)
+    rest = minus(moment, cross(w, add(turns, spin)))
+    levers = each(lambda wheel, G: cross(wheel.place, G), wheels, on_wheel)
+    along = each(lambda joint, G, S: (dot(joint.slope, G) - S) / joint.square, joints, on_wheel, suspension)
+    right = [*add(force, *on_wheel), *add(rest, *levers)]
+    return [entry - total(each(lambda l, q: l * q[i], along, ways)) for i, entry in enumerate(right)]  # noqa: B023

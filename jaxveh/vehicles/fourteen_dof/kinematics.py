@@ -1,0 +1,77 @@
+"""How the body lies and turns over the road: roll, pitch and yaw, and the axes fixed in the body."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from jaxveh import numerics
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
+
+
+class Attitude(NamedTuple):
+    """The intermediate axes (x, y in the road's plane, z its normal, turned by the yaw), seen in the body's axes.
+
+    The body is turned from them by the pitch about y, then by the roll about its own x (yaw-pitch-roll of ISO 8855: pitch is
+    positive nose down, roll left side up).
+    """
+
+    forward: Vector
+    left: Vector
+    up: Vector
+
+
+def attitude(roll: Any, pitch: Any) -> Attitude:
+    """The attitude at roll and pitch, rad."""
+    s_r, c_r = numerics.sin(roll), numerics.cos(roll)
+    s_p, c_p = numerics.sin(pitch), numerics.cos(pitch)
+    return Attitude(
+        forward=Vector(c_p, s_p * s_r, s_p * c_r),
+        left=Vector(0.0, c_r, -s_r),
+        up=Vector(-s_p, c_p * s_r, c_p * c_r),
+    )
+
+
+def to_road(axes: Attitude, a: Vector) -> Vector:
+    """A vector of the body's axes, in the intermediate ones."""
+    return Vector(dot(axes.forward, a), dot(axes.left, a), dot(axes.up, a))
+
+
+def to_body(axes: Attitude, a: Vector) -> Vector:
+    """A vector of the intermediate axes, in the body's."""
+    return add(scaled(a.x, axes.forward), scaled(a.y, axes.left), scaled(a.z, axes.up))
+
+
+def turning(axes: Attitude, roll_rate: Any, pitch_rate: Any, yaw_rate: Any) -> Vector:
+    """The body's angular velocity, rad/s, in its own axes: roll about its x, pitch about `left`, yaw about `up`."""
+    across = add(scaled(pitch_rate, axes.left), scaled(yaw_rate, axes.up))
+    return across._replace(x=roll_rate + across.x)
+
+
+def angle_accelerations(axes: Attitude, x: Any, omega: Vector, alpha: Vector) -> tuple[Any, Any, Any]:
+    """Second derivatives of roll, pitch and yaw, rad/s^2, of a body with the angular acceleration `alpha` (body's axes).
+
+    `left` turns with the yaw alone and `up` not at all, so that in the body's axes they move with what is left of `omega`.
+    """
+    moves_left = cross(minus(scaled(x.yaw_rate, axes.up), omega), axes.left)
+    moves_up = cross(axes.up, omega)
+    rest = minus(alpha, add(scaled(x.pitch_rate, moves_left), scaled(x.yaw_rate, moves_up)))
+    up = axes.up
+    yaw = (up.y * rest.y + up.z * rest.z) / (up.y * up.y + up.z * up.z)
+    return rest.x - yaw * up.x, dot(axes.left, rest), yaw
+
+
+class Body(NamedTuple):
+    """How the body moves: attitude, height of its centre of gravity over the road (m), and in its own axes velocity of that
+    point (m/s) and angular velocity (rad/s)."""
+
+    axes: Attitude
+    height: Any
+    velocity: Vector
+    omega: Vector
+
+
+def body_of(x: Any) -> Body:
+    """The body's motion out of the car's state."""
+    axes = attitude(x.roll, x.pitch)
+    velocity = to_body(axes, Vector(x.v_x, x.v_y, x.v_z))
+    return Body(axes, x.z, velocity, turning(axes, x.roll_rate, x.pitch_rate, x.yaw_rate))

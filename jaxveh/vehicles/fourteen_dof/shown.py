@@ -1,0 +1,40 @@
+"""What the car of fourteen degrees of freedom says of itself beyond what all two-track cars say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh.vehicles.two_track import UNITS as TWO_TRACK
+from jaxveh.vehicles.wheels import Wheels, named
+
+UNITS = {
+    **TWO_TRACK,
+    **dict.fromkeys(("z", *named("travel")), "m"),
+    **dict.fromkeys(("v_z", *named("travel_rate")), "m/s"),
+    "a_z": "m/s^2",
+    **dict.fromkeys(("roll", "pitch", *named("camber")), "rad"),
+    **dict.fromkeys(("roll_rate", "pitch_rate"), "rad/s"),
+    **dict.fromkeys(("roll_acceleration", "pitch_acceleration"), "rad/s^2"),
+    **dict.fromkeys(named("suspension_force"), "N"),
+    **dict.fromkeys((*named("M_x"), *named("M_y")), "N m"),
+    **dict.fromkeys(("tyre_dissipation", "damper_dissipation", "brake_dissipation", "drag_dissipation"), "W"),
+}
+"""Units of states, inputs and outputs."""
+
+
+def by_wheel(**values: Wheels) -> dict:
+    """Outputs `<name>_fl` ... of each wheel's values."""
+    return {name: v for prefix, wheels in values.items() for name, v in zip(named(prefix), wheels, strict=True)}
+
+
+def moments(forces: Wheels) -> dict:
+    """Overturning and rolling resistance moments of the tyres."""
+    pick = lambda name: Wheels(*[getattr(f, name) for f in forces])
+    return by_wheel(M_x=pick("M_x"), M_y=pick("M_y"))
+
+
+def attitude_outputs(x: Any, roll_acceleration: Any, pitch_acceleration: Any, a_z: Any) -> dict:
+    """Heave, roll and pitch."""
+    kept = ("z", "v_z", "roll", "pitch", "roll_rate", "pitch_rate")
+    own = {"roll_acceleration": roll_acceleration, "pitch_acceleration": pitch_acceleration, "a_z": a_z}
+    return {name: getattr(x, name) for name in kept} | own

@@ -1,0 +1,114 @@
+"""Where a wheel touches the road, how it slides there, and what the road's forces are to the body and to the wheel's spin."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh.tyres import Contact, Forces
+from jaxveh.vehicles.fourteen_dof.kinematics import Body, to_body, to_road
+from jaxveh.vehicles.fourteen_dof.suspension import LEFT, Wheel
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, scaled
+from jaxveh.vehicles.wheels import Rolling, Wheels, contact, each, front_rear, opposing
+
+ROLLING_SHARE = 1.0 / 3.0
+"""Of a tyre's compression the part by which its effective rolling radius shrinks: a belt that hardly stretches."""
+
+
+def axles(car: Any, steer: Any) -> Wheels:
+    """The axis about which each wheel spins, pointing to the left, in the body's axes.
+
+    The front wheels turn about the body's z axis: by the steer, and as far as `ackermann` says by the angle with which
+    all wheels would turn about one point on the rear axle's line. Toe is positive inwards, camber where the tops lean out.
+    """
+    base, half = car.front_axle_to_cg + car.rear_axle_to_cg, 0.5 * car.track_front
+    s, c = numerics.sin(steer), numerics.cos(steer)
+
+    def front(side):
+        return (1.0 - car.ackermann) * steer + car.ackermann * numerics.arctan2(base * s, base * c - side * half * s)
+
+    def one(side, angle, toe, camber):
+        angle, lean = angle - side * toe, numerics.cos(camber)
+        return Vector(-lean * numerics.sin(angle), lean * numerics.cos(angle), -side * numerics.sin(camber))
+
+    steers = Wheels(front(1.0), front(-1.0), 0.0, 0.0)
+    return each(
+        one, LEFT, steers, front_rear(car.toe_front, car.toe_rear), front_rear(car.camber_front, car.camber_rear)
+    )
+
+
+class Touch(NamedTuple):
+    """How a wheel stands on the road. Vectors are in the intermediate axes.
+
+    `height` of its centre over the road, `radius` with which it rolls (m), `axis` of its spin, `turns`: the body's angular
+    velocity, `moves` (as `wheels.rolling`), and what makes the load: `sinks` (compression's rate, m/s) and `damped`,
+    the damping's part of the load (N).
+    """
+
+    height: Any
+    radius: Any
+    axis: Vector
+    turns: Vector
+    moves: Rolling
+    sinks: Any
+    damped: Any
+
+
+def touch(car: Any, body: Body, wheel: Wheel, axis: Vector, omega: Any, friction: Any) -> tuple[Contact, Touch]:
+    """The contact of a wheel that spins with `omega` (rad/s) about `axis` (body's axes).
+
+    The contact point lies below the wheel's centre, along the road's normal; its speed is that of the wheel's material there.
+    """
+    height = body.height + dot(body.axes.up, wheel.place)
+    speed, turns, axis = (to_road(body.axes, a) for a in (wheel.velocity, body.omega, axis))
+    compression = jnp.maximum(car.wheel_radius - height, 0.0)
+    load = jnp.where(compression > 0, car.tyre_stiffness * compression - car.tyre_damping * speed.z, 0.0)
+    load = jnp.maximum(load, 0.0)
+    radius = car.wheel_radius - ROLLING_SHARE * compression
+    flat = numerics.hypot(axis.x, axis.y)
+    cosine, sine = axis.y / flat, -axis.x / flat
+    # The wheel does not turn with the body about its own axis.
+    held = minus(turns, scaled(dot(turns, axis), axis))
+    u, v = speed.x - height * held.y, speed.y + height * held.x
+    moves = Rolling(u * cosine + v * sine, v * cosine - u * sine, cosine, sine)
+    camber = numerics.arctan2(axis.z, flat)
+    at = contact(moves, load, friction, car.crawl_speed, omega * radius, camber)
+    return at, Touch(height, radius, axis, turns, moves, -speed.z, load - car.tyre_stiffness * compression)
+
+
+class Reaction(NamedTuple):
+    """What the road does through one wheel: force on its centre (N), moment on the body about that (N m; both in the body's
+    axes), moment on the wheel about its axis (N m), and the power that it takes from the car (W)."""
+
+    force: Vector
+    moment: Vector
+    spin: Any
+    dissipation: Any
+
+
+def reaction(car: Any, body: Body, at: Contact, how: Touch, forces: Forces, omega: Any) -> Reaction:
+    """The road's forces on body and wheel.
+
+    The longitudinal force turns the wheel with the arm of the *rolling* radius. With the loaded radius, which is smaller,
+    a driven tyre would give more power to the car (F_x r_e omega) than it takes from the shaft (F_x r_l omega). The
+    difference, F_x (r_e - r_l), is a moment of the road: the load's centre moves forward under a driving force.
+    """
+    moves, axis = how.moves, how.axis
+    c, s = moves.cosine, moves.sine
+    # Tyres know no direction of travel: their rolling resistance is that of rolling forwards.
+    rolling_moment = forces.M_y * opposing(moves.along)
+    push = Vector(forces.F_x * c - forces.F_y * s, forces.F_x * s + forces.F_y * c, at.load)
+    own = Vector(forces.M_x * c - rolling_moment * s, forces.M_x * s + rolling_moment * c, forces.M_z)
+    lever = Vector(how.height * push.y, -how.height * push.x, 0.0)
+    whole = add(own, lever)
+    on_body = minus(whole, scaled(dot(whole, axis), axis))
+    resisting = car.rolling_resistance * at.load * how.radius * opposing(omega * how.radius)
+    turning = dot(own, axis) - resisting
+    own_on_body = minus(own, scaled(dot(own, axis), axis))
+    taken = (
+        forces.F_x * (how.radius * omega - moves.along) - forces.F_y * moves.across
+        - dot(own_on_body, how.turns) - turning * omega + how.damped * how.sinks
+    )  # fmt: skip
+    return Reaction(to_body(body.axes, push), to_body(body.axes, on_body), turning - how.radius * forces.F_x, taken)

@@ -1,0 +1,116 @@
+"""The kinematic single track: wheels that roll where they point."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.names import check_names
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.roads import LEVEL, Ground
+from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.wheels import gravity
+
+
+class KinematicState(NamedTuple):
+    """`yaw` (rad, unwrapped)."""
+
+    yaw: Any
+
+
+class KinematicOutputs(NamedTuple):
+    """What can be said without forces, at the reference point: speeds m/s, angles rad, rates rad/s, accelerations m/s^2.
+
+    `a_x` and `a_y` are those of an ideal accelerometer in a turn of constant speed and steer; `sideslip` is that of the steer,
+    forwards and backwards alike, at standstill too; `curvature` (1/m) is that of the rear axle's path.
+    """
+
+    v_x: Any
+    v_y: Any
+    yaw: Any
+    yaw_rate: Any
+    a_x: Any
+    a_y: Any
+    sideslip: Any
+    curvature: Any
+
+
+UNITS = {
+    **dict.fromkeys(("v_x", "v_y"), "m/s"),
+    **dict.fromkeys(("a_x", "a_y"), "m/s^2"),
+    **dict.fromkeys(("steer", "yaw", "sideslip"), "rad"),
+    "yaw_rate": "rad/s",
+    "curvature": "1/m",
+}
+
+
+class Kinematic(AbstractVehicle):
+    """A single track whose wheels do not slip: true at walking speed, and the usual car of path planning.
+
+    With delta the steer, L the wheelbase and d how far the reference point lies ahead of the rear axle (R. Rajamani, Vehicle
+    Dynamics and Control, 2nd ed., sec. 2.2, with v_x along the car instead of the speed along the path):
+
+        dyaw/dt = v_x tan(delta) / L,    v_y = d dyaw/dt,    sideslip = atan(d tan(delta) / L)
+
+    **Parameters**: `wheelbase` (m), `rear_axle_to_reference` d (m): the point that position and speeds belong to, 0 for the rear
+    axle, the distance of the axle from the centre of gravity for the latter.
+
+    **Inputs**: `steer` (rad at the road wheels) and `v_x` (m/s), the same at every point of the car's middle.
+
+    **Raises** `InputError` for parameters outside their domain.
+    """
+
+    wheelbase: jax.Array = positive("m")
+    rear_axle_to_reference: jax.Array = parameter("m", scale=1.0, default=0.0)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def inputs(self):
+        return ("steer", "v_x")
+
+    @property
+    def state_type(self):
+        return KinematicState
+
+    @property
+    def units(self):
+        return dict(UNITS)
+
+    @property
+    def wheel_positions(self):
+        front = (self.wheelbase - self.rear_axle_to_reference, 0.0)
+        rear = (-self.rear_axle_to_reference, 0.0)
+        return front, front, rear, rear
+
+    def start(self, t, u, **values):
+        check_names("start", values, KinematicState._fields)
+        dtype = jnp.result_type(self.wheelbase)
+        return KinematicState(jnp.asarray(values.get("yaw", jnp.zeros(jnp.shape(u.v_x))), dtype))
+
+    def motion(self, x, u):
+        yaw_rate = u.v_x * self._curvature(u)
+        return Motion(0.0, 0.0, x.yaw, u.v_x, self.rear_axle_to_reference * yaw_rate, yaw_rate)
+
+    def evaluate(self, t, x, u, ground: Ground = LEVEL):
+        del t
+        g_x, g_y, _ = gravity(ground)
+        moves, curvature = self.motion(x, u), self._curvature(u)
+        outputs = KinematicOutputs(
+            v_x=u.v_x,
+            v_y=moves.v_y,
+            yaw=x.yaw,
+            yaw_rate=moves.yaw_rate,
+            a_x=-moves.v_y * moves.yaw_rate - g_x,
+            a_y=u.v_x * moves.yaw_rate - g_y,
+            sideslip=numerics.arctan(self.rear_axle_to_reference * curvature),
+            curvature=curvature,
+        )
+        return KinematicState(moves.yaw_rate), outputs
+
+    def _curvature(self, u):
+        return numerics.tan(u.steer) / self.wheelbase

@@ -1,0 +1,135 @@
+"""A kinematic single track that pulls a trailer."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import check
+from jaxveh._core.names import check_names
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.roads import LEVEL, Ground
+from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.wheels import gravity
+
+
+class KinematicTrailerState(NamedTuple):
+    """`yaw` of the car and `hitch_angle` (rad): the trailer's yaw less the car's, unwrapped."""
+
+    yaw: Any
+    hitch_angle: Any
+
+
+class KinematicTrailerOutputs(NamedTuple):
+    """What can be said without forces, at the car's rear axle: speeds m/s, angles rad, rates rad/s, accelerations m/s^2 (of an
+    ideal accelerometer in a turn of constant speed and steer); `trailer_yaw`, and `trailer_v_x` (m/s), the speed of the
+    trailer's axle along the trailer."""
+
+    v_x: Any
+    v_y: Any
+    yaw: Any
+    yaw_rate: Any
+    a_x: Any
+    a_y: Any
+    sideslip: Any
+    hitch_angle: Any
+    hitch_rate: Any
+    trailer_yaw: Any
+    trailer_v_x: Any
+
+
+UNITS = {
+    **dict.fromkeys(("v_x", "v_y", "trailer_v_x"), "m/s"),
+    **dict.fromkeys(("a_x", "a_y"), "m/s^2"),
+    **dict.fromkeys(("steer", "yaw", "sideslip", "hitch_angle", "trailer_yaw"), "rad"),
+    **dict.fromkeys(("yaw_rate", "hitch_rate"), "rad/s"),
+}
+
+
+class KinematicTrailer(AbstractVehicle):
+    """A kinematic single track with a trailer of one axle; no wheel slips. Position and speeds are those of the rear axle.
+
+    With r the yaw rate, alpha the hitch angle, c the hitch's distance behind the rear axle and l the trailer's length from the
+    hitch to its axle (S. M. LaValle, Planning Algorithms, 2006, sec. 13.1.2, and CommonRoad's KST model for c = 0):
+
+        dyaw/dt   = v_x tan(delta) / L
+        dalpha/dt = -(v_x sin(alpha) + c r cos(alpha)) / l - r
+
+    At `hitch_limit` (rad either way, a right angle by default) the trailer touches the car: the angle does not grow.
+
+    **Parameters**: `wheelbase` L, `trailer_length` l, `hitch_behind_axle` c (m; 0: the hitch sits on the rear axle).
+
+    **Inputs**: `steer` (rad at the road wheels) and `v_x` (m/s).
+
+    **Raises** `InputError` for parameters outside their domain.
+    """
+
+    wheelbase: jax.Array = positive("m")
+    trailer_length: jax.Array = positive("m")
+    hitch_behind_axle: jax.Array = parameter("m", scale=1.0, default=0.0)
+    hitch_limit: float = eqx.field(static=True, default=math.pi / 2)
+
+    def __check_init__(self):
+        check_parameters(self)
+        check("KinematicTrailer.hitch_limit", self.hitch_limit, lambda v: (v > 0) & (v <= math.pi), "in (0, pi] rad")
+
+    @property
+    def inputs(self):
+        return ("steer", "v_x")
+
+    @property
+    def state_type(self):
+        return KinematicTrailerState
+
+    @property
+    def units(self):
+        return dict(UNITS)
+
+    @property
+    def wheel_positions(self):
+        """Those of the car; the trailer's own are not among them."""
+        front, rear = (self.wheelbase, 0.0), (0.0, 0.0)
+        return front, front, rear, rear
+
+    def start(self, t, u, **values):
+        check_names("start", values, KinematicTrailerState._fields)
+        dtype = jnp.result_type(self.wheelbase)
+        zero = jnp.zeros(jnp.shape(u.v_x))
+        return KinematicTrailerState(
+            *[jnp.asarray(values.get(name, zero), dtype) for name in KinematicTrailerState._fields]
+        )
+
+    def motion(self, x, u):
+        yaw_rate = u.v_x * (numerics.tan(u.steer) / self.wheelbase)
+        return Motion(0.0, 0.0, x.yaw, u.v_x, jnp.zeros_like(yaw_rate), yaw_rate)
+
+    def evaluate(self, t, x, u, ground: Ground = LEVEL):
+        del t
+        g_x, g_y, _ = gravity(ground)
+        moves = self.motion(x, u)
+        yaw_rate = moves.yaw_rate
+        sine, cosine = numerics.sin(x.hitch_angle), numerics.cos(x.hitch_angle)
+        # The hitch moves with (v_x, -c r) in the car's directions; across the trailer that is l times the trailer's yaw rate.
+        swing = self.hitch_behind_axle * yaw_rate
+        turning = -(u.v_x * sine + swing * cosine) / self.trailer_length - yaw_rate
+        outwards = turning * jnp.sign(x.hitch_angle) > 0
+        hitch_rate = jnp.where((jnp.abs(x.hitch_angle) >= self.hitch_limit) & outwards, 0.0, turning)
+        outputs = KinematicTrailerOutputs(
+            v_x=u.v_x,
+            v_y=moves.v_y,
+            yaw=x.yaw,
+            yaw_rate=yaw_rate,
+            a_x=jnp.zeros_like(yaw_rate) - g_x,
+            a_y=u.v_x * yaw_rate - g_y,
+            sideslip=jnp.zeros_like(yaw_rate),
+            hitch_angle=x.hitch_angle,
+            hitch_rate=hitch_rate,
+            trailer_yaw=x.yaw + x.hitch_angle,
+            trailer_v_x=u.v_x * cosine - swing * sine,
+        )
+        return KinematicTrailerState(yaw_rate, hitch_rate), outputs

@@ -1,0 +1,206 @@
+"""The textbook's linear single track, and its handling in closed form."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.names import check_names
+from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.roads import LEVEL, Ground
+from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
+from jaxveh.vehicles.lateral_system import LateralSystem
+from jaxveh.vehicles.single_track import UNITS, SingleTrackOutputs
+from jaxveh.vehicles.slip import regularised_speed
+from jaxveh.vehicles.wheels import gravity
+
+
+class LinearSingleTrackState(NamedTuple):
+    """`sideslip` of the centre of gravity (rad), `yaw` (rad, unwrapped) and `yaw_rate` (rad/s)."""
+
+    sideslip: Any
+    yaw: Any
+    yaw_rate: Any
+
+
+class LinearSingleTrack(AbstractVehicle):
+    """The single track for small angles: linear in steer, sideslip and yaw rate at a given speed v.
+
+    With C_f, C_r the axles' cornering stiffnesses, a and b their distances from the centre of gravity (P. Riekert & T. E.
+    Schunck 1940; R. Rajamani, Vehicle Dynamics and Control, 2nd ed., sec. 2.3):
+
+        m v (dbeta/dt + r) = F_f + F_r,      J_z dr/dt = a F_f - b F_r
+        F_f = C_f (delta - beta - a r / v),  F_r = C_r (-beta + b r / v)
+
+    For small angles the speed along the car is that along the path: `v_x` is taken as the latter, so that the velocity has the
+    components `v cos(beta)` and `v sin(beta)`. Backwards (v < 0) the slip angles turn round, as the tyres' forces do. Below
+    `crawl_speed` (m/s, 3 by default) |v| in the denominators is `regularised_speed`, so that standstill is an ordinary point.
+    A road's bank pushes by `m g_y`; its friction does not count, as always in a linear law.
+
+    **Parameters**: `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `rear_axle_to_cg` (m), `front_stiffness`,
+    `rear_stiffness` (N/rad, of the axle at rest on a level road), `cg_height` (m; None: stiffnesses stay). With a height the
+    stiffnesses are proportional to the axles' loads, which move by `m a_x h / (a + b)` to the rear, as in CommonRoad's ST model.
+
+    **Inputs**: `steer` (rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, `v_x_rate = dv_x/dt` (m/s^2).
+
+    **Raises** `InputError` for parameters that are not positive.
+    """
+
+    mass: jax.Array = positive("kg")
+    yaw_inertia: jax.Array = positive("kg m^2")
+    front_axle_to_cg: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    front_stiffness: jax.Array = positive("N/rad")
+    rear_stiffness: jax.Array = positive("N/rad")
+    cg_height: jax.Array | None = positive("m", default=None)
+    crawl_speed: float = eqx.field(static=True, default=3.0)
+
+    def __check_init__(self):
+        check_parameters(self)
+        check_positive("LinearSingleTrack.crawl_speed", self.crawl_speed, "m/s")
+
+    @property
+    def inputs(self):
+        return ("steer", "v_x") if self.cg_height is None else ("steer", "v_x", "v_x_rate")
+
+    @property
+    def state_type(self):
+        return LinearSingleTrackState
+
+    @property
+    def units(self):
+        return dict(UNITS)
+
+    @property
+    def wheel_positions(self):
+        front, rear = (self.front_axle_to_cg, 0.0), (-self.rear_axle_to_cg, 0.0)
+        return front, front, rear, rear
+
+    @property
+    def wheelbase(self) -> jax.Array:
+        """Distance between the axles, m."""
+        return self.front_axle_to_cg + self.rear_axle_to_cg
+
+    def start(self, t, u, **values):
+        check_names("start", values, LinearSingleTrackState._fields)
+        dtype, zero = jnp.result_type(self.mass), jnp.zeros(jnp.shape(u.v_x))
+        return LinearSingleTrackState(
+            *[jnp.asarray(values.get(name, zero), dtype) for name in LinearSingleTrackState._fields]
+        )
+
+    def motion(self, x, u):
+        along, across = numerics.cos(x.sideslip), numerics.sin(x.sideslip)
+        return Motion(0.0, 0.0, x.yaw, u.v_x * along, u.v_x * across, x.yaw_rate)
+
+    def evaluate(self, t, x, u, ground: Ground = LEVEL):
+        del t
+        a, b = self.front_axle_to_cg, self.rear_axle_to_cg
+        speed = regularised_speed(u.v_x, self.crawl_speed)
+        way = u.v_x / speed
+        front, rear = self.load_shares(u, ground)
+        slip_front = way * (u.steer - x.sideslip) - a * x.yaw_rate / speed
+        slip_rear = -way * x.sideslip + b * x.yaw_rate / speed
+        F_yf = front * self.front_stiffness * slip_front
+        F_yr = rear * self.rear_stiffness * slip_rear
+        g_x, g_y, _ = gravity(ground)
+        a_y = (F_yf + F_yr) / self.mass
+        yaw_acceleration = (a * F_yf - b * F_yr) / self.yaw_inertia
+        rates = LinearSingleTrackState(way * (a_y + g_y) / speed - x.yaw_rate, x.yaw_rate, yaw_acceleration)
+        moves = self.motion(x, u)
+        weight = self.mass * GRAVITY / self.wheelbase
+        outputs = SingleTrackOutputs(
+            v_x=moves.v_x,
+            v_y=moves.v_y,
+            yaw=x.yaw,
+            yaw_rate=x.yaw_rate,
+            yaw_acceleration=yaw_acceleration,
+            a_x=(0.0 * u.v_x if self.cg_height is None else u.v_x_rate) - g_x,
+            a_y=a_y,
+            sideslip=x.sideslip,
+            slip_angle_front=slip_front,
+            slip_angle_rear=slip_rear,
+            F_yf=F_yf,
+            F_yr=F_yr,
+            load_front=front * weight * b + 0.0 * u.v_x,
+            load_rear=rear * weight * a + 0.0 * u.v_x,
+        )
+        return rates, outputs
+
+    def load_shares(self, u, ground: Ground = LEVEL) -> tuple[Any, Any]:
+        """Loads of front and rear axle over those at rest on a level road (-); they multiply the stiffnesses."""
+        if self.cg_height is None:
+            return 1.0, 1.0
+        if not hasattr(u, "v_x_rate"):
+            raise InputError(f"inputs = {', '.join(u._fields)}: a car with a cg_height needs v_x_rate among them.")
+        g_x, _, g_z = gravity(ground)
+        moved = (u.v_x_rate - g_x) * self.cg_height / GRAVITY
+        pressed = -g_z / GRAVITY
+        return pressed - moved / self.rear_axle_to_cg, pressed + moved / self.front_axle_to_cg
+
+    def system(self, speed: Any) -> LateralSystem:
+        """The matrices at a constant forward `speed` (m/s, any shape, above the crawl speed to agree with `evaluate`), on a level
+        road. **Raises** `InputError` for a speed that is not positive."""
+        check_positive("LinearSingleTrack.system: speed", speed, "m/s")
+        v = speed
+        m, J, a, b = self.mass, self.yaw_inertia, self.front_axle_to_cg, self.rear_axle_to_cg
+        C_f, C_r = self.front_stiffness, self.rear_stiffness
+        leverage = a * C_f - b * C_r
+        return LateralSystem(
+            a_11=-(C_f + C_r) / (m * v),
+            a_12=-leverage / (m * v * v) - 1.0,
+            a_21=-leverage / J + 0.0 * v,
+            a_22=-(a * a * C_f + b * b * C_r) / (J * v),
+            b_1=C_f / (m * v),
+            b_2=a * C_f / J + 0.0 * v,
+            speed=v,
+        )
+
+    @property
+    def understeer_gradient(self) -> jax.Array:
+        """K = m / L (b / C_f - a / C_r), rad s^2/m: in a steady turn of radius R the steer is `L / R + K a_y` (T. D. Gillespie,
+        Fundamentals of Vehicle Dynamics, ch. 6, and so the following)."""
+        bending = self.rear_axle_to_cg / self.front_stiffness - self.front_axle_to_cg / self.rear_stiffness
+        return self.mass / self.wheelbase * bending
+
+    @property
+    def understeer_gradient_deg_per_g(self) -> jax.Array:
+        """The same in the usual unit: degrees at the road wheels a g of lateral acceleration."""
+        return jnp.rad2deg(self.understeer_gradient) * GRAVITY
+
+    @property
+    def characteristic_speed(self) -> jax.Array:
+        """sqrt(L / K), m/s: there the yaw-rate gain of an understeering car is greatest; infinite for another car."""
+        return _speed(self.wheelbase, self.understeer_gradient)
+
+    @property
+    def critical_speed(self) -> jax.Array:
+        """sqrt(-L / K), m/s: beyond it an oversteering car is unstable; infinite for another car."""
+        return _speed(self.wheelbase, -self.understeer_gradient)
+
+    def yaw_rate_gain(self, speed: Any) -> Any:
+        """Steady yaw rate over steer, v / (L + K v^2), 1/s."""
+        return speed / self._steadiness(speed)
+
+    def lateral_acceleration_gain(self, speed: Any) -> Any:
+        """Steady lateral acceleration over steer, v^2 / (L + K v^2), m/s^2 a rad."""
+        return speed * speed / self._steadiness(speed)
+
+    def sideslip_gain(self, speed: Any) -> Any:
+        """Steady sideslip over steer, (b - a m v^2 / (L C_r)) / (L + K v^2) (-): positive at low speed, where the rear runs on a
+        smaller circle, negative at high speed (Mitschke & Wallentowitz, the same chapter)."""
+        pushed = self.front_axle_to_cg * self.mass * speed * speed / (self.wheelbase * self.rear_stiffness)
+        return (self.rear_axle_to_cg - pushed) / self._steadiness(speed)
+
+    def _steadiness(self, speed):
+        return self.wheelbase + self.understeer_gradient * speed * speed
+
+
+def _speed(wheelbase, gradient):
+    """sqrt(L / K) where K is positive, else infinite."""
+    held = gradient > 0
+    return jnp.where(held, numerics.sqrt(wheelbase / jnp.where(held, gradient, 1.0)), jnp.inf)

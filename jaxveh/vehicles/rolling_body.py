@@ -1,0 +1,137 @@
+"""The body that rolls on its axles: accelerations of the coupled motions, and the loads that springs and dampers pass on."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import check
+from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles.load_transfer import axle_loads
+from jaxveh.vehicles.two_track import check_car
+from jaxveh.vehicles.wheels import Wheels, clip_transfer
+
+NOT_NEGATIVE = ("roll_damping_front", "roll_damping_rear", "roll_centre_front", "roll_centre_rear")
+
+
+def check_rolling_car(car: Any) -> None:
+    """Raise `InputError` unless the car's parameters are in their domains and its body stands upright on its springs."""
+    check_car(car)
+    kind = type(car).__name__
+    for name in NOT_NEGATIVE:
+        check(f"{kind}.{name}", getattr(car, name), lambda v: v >= 0, "at least 0")
+    check(f"{kind}.sprung_mass - {kind}.mass", car.sprung_mass - car.mass, lambda v: v <= 0, "at most 0 (kg)")
+    spare = car.yaw_inertia * car.roll_inertia - jnp.square(car.roll_yaw_product)
+    check(
+        f"{kind}: yaw_inertia * roll_inertia - roll_yaw_product^2", spare, lambda v: v > 0,
+        "positive (kg^2 m^4), or kinetic energy would not be",
+    )  # fmt: skip
+    geometry = roll_geometry(car)
+    check(f"{kind}: height of the sprung mass over the roll axis", geometry.arm, lambda v: v > 0, "positive (m)")
+    left = car.roll_stiffness_front + car.roll_stiffness_rear - car.sprung_mass * GRAVITY * geometry.arm
+    check(
+        f"{kind}: roll stiffness less sprung weight times its height over the roll axis", left, lambda v: v > 0,
+        "positive (N m/rad), or the car falls over",
+    )  # fmt: skip
+
+
+class RollGeometry(NamedTuple):
+    """Heights, m: of the sprung mass over the road and over the roll axis (`arm`); masses (kg) that do not roll."""
+
+    sprung_height: Any
+    arm: Any
+    unsprung_mass: Any
+
+
+def roll_geometry(car: Any) -> RollGeometry:
+    """The sprung mass's place: what the whole car's centre of gravity leaves, once the unsprung mass has its own height.
+
+    The roll axis joins the roll centres; its height counts below the centre of gravity, and its slope does not.
+    """
+    a, b = car.front_axle_to_cg, car.rear_axle_to_cg
+    unsprung = car.mass - car.sprung_mass
+    height = (car.mass * car.cg_height - unsprung * car.unsprung_height) / car.sprung_mass
+    axis = (b * car.roll_centre_front + a * car.roll_centre_rear) / (a + b)
+    return RollGeometry(height, height - axis, unsprung)
+
+
+class RollAccelerations(NamedTuple):
+    """What solves the equations of motion: `a_x`, `a_y` (m/s^2) of the point on the roll axis less gravity's, `yaw`, `roll`
+    (rad/s^2)."""
+
+    a_x: Any
+    a_y: Any
+    yaw: Any
+    roll: Any
+
+
+def roll_accelerations(car: Any, x: Any, X: Any, Y: Any, N: Any, g_z: Any, a_x: Any = None) -> RollAccelerations:
+    """Solve the car's equations for the accelerations, under forces X, Y (N) and a moment N (N m) about the vertical.
+
+    The kinetic energy, with phi the roll, p its rate, r the yaw rate, h the arm, S = m_s h, s and c the sine and cosine of phi,
+
+        T = m (v_x^2 + v_y^2) / 2 + S (v_x r s - v_y p c) + (I_x + S h) p^2 / 2 + (I_z + S h s^2) r^2 / 2 - I_xz p r
+
+    gives by Lagrange's equations in quasi-velocities (a_x = dv_x/dt - v_y r - g_x, a_y = dv_y/dt + v_x r - g_y)
+
+        m a_x + S s dr/dt + 2 S c p r                                   = X
+        m a_y - S c dp/dt + S s (p^2 + r^2)                             = Y
+        (I_z + S h s^2) dr/dt - I_xz dp/dt + 2 S h s c p r + S s a_x    = N
+        (I_x + S h) dp/dt - I_xz dr/dt - S c a_y - S h s c r^2          = -S g_z s - K phi - C p
+
+    of which a_x and a_y go out, and two by two is left. With `a_x` given (a car at a given speed) the first one says the X
+    that the given speed takes.
+    """
+    h = roll_geometry(car).arm
+    S, s, c = car.sprung_mass * h, numerics.sin(x.roll), numerics.cos(x.roll)
+    p, r = x.roll_rate, x.yaw_rate
+    stiffness, damping = (
+        getattr(car, f"roll_{n}_front") + getattr(car, f"roll_{n}_rear") for n in ("stiffness", "damping")
+    )
+    side = Y - S * s * (p * p + r * r)
+    rolling = -S * g_z * s - stiffness * x.roll - damping * p + S * h * s * c * r * r + S * c * side / car.mass
+    turning = N - 2.0 * S * h * s * c * p * r
+    I_r, I_p = car.yaw_inertia + S * h * s * s, car.roll_inertia + S * h - jnp.square(S * c) / car.mass
+    ahead = None
+    if a_x is None:
+        ahead = X - 2.0 * S * c * p * r
+        turning = turning - S * s * ahead / car.mass
+        I_r = I_r - jnp.square(S * s) / car.mass
+    else:
+        turning = turning - S * s * a_x
+    determinant = I_r * I_p - jnp.square(car.roll_yaw_product)
+    yaw = (I_p * turning + car.roll_yaw_product * rolling) / determinant
+    roll = (I_r * rolling + car.roll_yaw_product * turning) / determinant
+    a_y = (side + S * c * roll) / car.mass
+    return RollAccelerations(a_x if ahead is None else (ahead - S * s * yaw) / car.mass, a_y, yaw, roll)
+
+
+def roll_loads(car: Any, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
+    """Wheel loads, N, of a car whose body leans on springs and dampers.
+
+    On each axle, with the share of the masses m_s and m_u that it carries at rest, this moves from the left to the right wheel
+    (W. F. & D. L. Milliken, Race Car Vehicle Dynamics, ch. 18):
+
+        (K phi + C p + share a_y (m_s h_rc + m_u h_u)) / track
+
+    The springs' and dampers' part follows the body; the roll centres' (h_rc) and the unsprung mass's follow the a_y that
+    `load_transfer` feels, and the axles' loads its a_x. No wheel is pulled down: one that lifts leaves the load to the other.
+    """
+    a, b = car.front_axle_to_cg, car.rear_axle_to_cg
+    unsprung = roll_geometry(car).unsprung_mass
+    front, rear = axle_loads(car, a_x, g_z)
+    moved = []
+    for axle, share, track in (("front", b / (a + b), car.track_front), ("rear", a / (a + b), car.track_rear)):
+        stiffness, damping, centre = (
+            getattr(car, f"roll_{name}_{axle}") for name in ("stiffness", "damping", "centre")
+        )
+        direct = share * (car.sprung_mass * centre + unsprung * car.unsprung_height) * a_y
+        moved.append((stiffness * x.roll + damping * x.roll_rate + direct) / track)
+    return Wheels(*clip_transfer(front, moved[0]), *clip_transfer(rear, moved[1]))
+
+
+def roll_outputs(x: Any, acceleration: Any) -> dict:
+    """Roll (rad), its rate (rad/s) and acceleration (rad/s^2)."""
+    return {"roll": x.roll, "roll_rate": x.roll_rate, "roll_acceleration": acceleration}

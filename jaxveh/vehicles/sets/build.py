@@ -1,0 +1,67 @@
+"""From a car's numbers to a vehicle of any fidelity."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, fields
+from typing import Any, TypeVar
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import check_names
+from jaxveh.vehicles.base import AbstractVehicle
+from jaxveh.vehicles.drive import AxleDrive, FourMotors
+from jaxveh.vehicles.sets.numbers import CarNumbers
+from jaxveh.vehicles.sets.tyres import axle_tyre, wheel_tyre
+
+V = TypeVar("V", bound=AbstractVehicle)
+
+
+def build(numbers: CarNumbers, kind: type[V], **options: Any) -> V:
+    """The vehicle of class `kind`, such as `SevenDOF`, with a car's numbers.
+
+    Each parameter of the class gets the number of its name. Axles of a car with tracks get `wheel_tyre`s, those of one track
+    `axle_tyre`s, `drive` is an `AxleDrive` of the car's shares or `FourMotors`. A class that has no `mass` of its own has a
+    sprung one, and gets the sprung mass' place and inertias. Options of the class, whose default is None
+    (`SingleTrack.cg_height`), stay off. `options` are parameters to set otherwise, such as `front=tyre` or
+    `cg_height=numbers.cg_height`.
+
+    **Raises** `InputError` naming what the class needs and the car's numbers do not hold, and for options it does not have.
+    """
+    entries = {entry.name: entry for entry in fields(kind)}
+    check_names(f"build({numbers.name}, {kind.__name__})", options, entries)
+    known = numbers.values(sprung="mass" not in entries)
+    given = {
+        name: known[name]
+        for name, entry in entries.items()
+        if name in known and entry.default is not None and name not in options
+    }
+    if "grip" in entries and numbers.front is not None:
+        given.setdefault("grip", numbers.front.friction)
+    given |= _tyres(numbers, entries, options) | _drive(numbers, entries, options) | options
+    missing = [name for name, entry in entries.items() if _needed(entry) and name not in given]
+    if missing:
+        raise InputError(f"{numbers.name}: {kind.__name__} needs {', '.join(missing)}, which its numbers do not hold.")
+    return kind(**given)
+
+
+def _needed(entry) -> bool:
+    return entry.default is MISSING and entry.default_factory is MISSING
+
+
+def _tyres(numbers: CarNumbers, entries, options) -> dict[str, Any]:
+    found = {}
+    for axle, at in (("front", 0), ("rear", 1)):
+        tyre = getattr(numbers, axle)
+        if axle not in entries or axle in options or tyre is None:
+            continue
+        load = numbers.wheel_loads()[at]
+        wheels = "track_front" in entries
+        found[axle] = wheel_tyre(tyre, load, numbers.wheel_radius) if wheels else axle_tyre(tyre, 2.0 * load)
+    return found
+
+
+def _drive(numbers: CarNumbers, entries, options) -> dict[str, Any]:
+    if "drive" not in entries or "drive" in options:
+        return {}
+    if numbers.four_motors:
+        return {"drive": FourMotors()}
+    return {"drive": AxleDrive(front_drive=numbers.front_drive, front_brake=numbers.front_brake)}

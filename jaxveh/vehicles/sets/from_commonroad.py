@@ -1,0 +1,109 @@
+"""A car's numbers out of CommonRoad's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh._core.errors import InputError
+from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles.limits import AccelerationLimits, SteerLimits
+from jaxveh.vehicles.sets.numbers import CarNumbers, SuspensionNumbers, TyreNumbers
+
+
+def from_commonroad(specification: Any, name: str = "CommonRoad vehicle", source: str = "CommonRoad") -> CarNumbers:
+    """The numbers of a `jaxveh.io.CommonRoadSpecification`, for `build`.
+
+    As in CommonRoad's own single-track models the distances of the axles from the sprung mass' centre of gravity are taken for
+    the whole car's. Tyres have the cornering stiffness `-p_ky1 F_z`, the slip stiffness `p_kx1 F_z` and the friction `p_dy1`.
+    Unsprung masses are halved, an anti-roll bar's stiffness at the wheels is `-K_ts / T^2`, and the sprung mass' yaw inertia is
+    the car's less that of its wheels and axles as points at the wheels. Where masses are missing (a tractor with a trailer) only
+    kinematic cars can be built.
+    """
+    s = specification
+    weight = None if s.mass is None else 0.5 * s.mass * GRAVITY / (s.front_axle_to_cg + s.rear_axle_to_cg)
+    tyres = {"front": None, "rear": None}
+    if s.tyre is not None and weight is not None:
+        for axle, lever in (("front", s.rear_axle_to_cg), ("rear", s.front_axle_to_cg)):
+            tyres[axle] = _tyre(s.tyre, weight * lever)
+    return CarNumbers(
+        name=name,
+        source=source,
+        mass=s.mass,
+        yaw_inertia=s.yaw_inertia,
+        front_axle_to_cg=s.front_axle_to_cg,
+        rear_axle_to_cg=s.rear_axle_to_cg,
+        front=tyres["front"],
+        rear=tyres["rear"],
+        cg_height=s.cg_height,
+        track_front=s.track_front,
+        track_rear=s.track_rear,
+        wheel_radius=s.wheel_radius,
+        wheel_inertia=s.wheel_inertia,
+        front_drive=1.0 if s.front_drive is None else s.front_drive,
+        front_brake=0.65 if s.front_brake is None else s.front_brake,
+        suspension=_suspension(s),
+        trailer_length=s.trailer_wheelbase,
+    )
+
+
+def commonroad_limits(specification: Any) -> tuple[SteerLimits, AccelerationLimits]:
+    """The limits of steering and acceleration of a `jaxveh.io.CommonRoadSpecification`, for `Commanded`.
+
+    **Raises** `InputError` naming what the specification does not hold.
+    """
+    steering = ("steer_min", "steer_max", "steer_rate_min", "steer_rate_max")
+    driving = ("acceleration_max", "switching_speed", "speed_min", "speed_max")
+    missing = [name for name in (*steering, *driving) if getattr(specification, name) is None]
+    if missing:
+        raise InputError(f"limits of the vehicle: {', '.join(missing)} missing in the specification.")
+    return (
+        SteerLimits(*[getattr(specification, name) for name in steering]),
+        AccelerationLimits(*[getattr(specification, name) for name in driving]),
+    )
+
+
+def _tyre(coefficients, load: float) -> TyreNumbers:
+    missing = [name for name in ("p_ky1", "p_kx1", "p_dy1", "p_dx1", "p_cy1", "p_cx1") if name not in coefficients]
+    if missing:
+        raise InputError(f"tire: {', '.join(missing)} missing in the specification.")
+    return TyreNumbers(
+        cornering_stiffness=-coefficients["p_ky1"] * load,
+        slip_stiffness=coefficients["p_kx1"] * load,
+        friction=coefficients["p_dy1"],
+        coefficients={name.replace("_", "").upper(): value for name, value in coefficients.items()},
+    )
+
+
+NEEDED = (
+    *("sprung_mass", "unsprung_mass_front", "unsprung_mass_rear", "roll_inertia", "pitch_inertia", "yaw_inertia"),
+    *("sprung_cg_height", "track_front", "track_rear", "spring_front", "spring_rear", "damper_front", "damper_rear"),
+    "tyre_stiffness",
+)
+
+
+def _suspension(s: Any) -> SuspensionNumbers | None:
+    if any(getattr(s, name) is None for name in NEEDED):
+        return None
+    a, b, front, rear = s.front_axle_to_cg, s.rear_axle_to_cg, s.unsprung_mass_front, s.unsprung_mass_rear
+    outside = front * (a**2 + 0.25 * s.track_front**2) + rear * (b**2 + 0.25 * s.track_rear**2)
+    return SuspensionNumbers(
+        sprung_mass=s.sprung_mass,
+        unsprung_mass_front=0.5 * front,
+        unsprung_mass_rear=0.5 * rear,
+        roll_inertia=s.roll_inertia,
+        pitch_inertia=s.pitch_inertia,
+        yaw_inertia=s.yaw_inertia - outside,
+        roll_yaw_product=s.roll_yaw_product or 0.0,
+        front_axle_to_cg=a,
+        rear_axle_to_cg=b,
+        cg_height=s.sprung_cg_height,
+        spring_front=s.spring_front,
+        spring_rear=s.spring_rear,
+        damper_front=s.damper_front,
+        damper_rear=s.damper_rear,
+        tyre_stiffness=s.tyre_stiffness,
+        anti_roll_front=-(s.torsion_front or 0.0) / s.track_front**2,
+        anti_roll_rear=-(s.torsion_rear or 0.0) / s.track_rear**2,
+        roll_centre_front=s.roll_centre_front or 0.0,
+        roll_centre_rear=s.roll_centre_rear or 0.0,
+    )

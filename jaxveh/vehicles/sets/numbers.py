@@ -1,0 +1,159 @@
+"""What is known of a car, as plain numbers: one record from which vehicles of every fidelity are built."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from jaxveh._core.errors import InputError, check, check_finite, check_positive
+from jaxveh.vehicles.base import GRAVITY
+
+
+@dataclass(frozen=True)
+class TyreNumbers:
+    """One tyre, under its load at rest: `cornering_stiffness` (N/rad), `slip_stiffness` (N; None: as stiff as sideways), peak
+    `friction` (-). What is known better wins, in this order: `property_file`, the path of a tyre property file; `coefficients` of
+    PAC2002 by their names in property files, with stiffness proportional to load; `axle_formula`, the Magic Formula (B, C, D, E)
+    of both tyres of the axle together, for cars on one track alone."""
+
+    cornering_stiffness: float
+    slip_stiffness: float | None = None
+    friction: float = 1.0
+    property_file: str | None = None
+    coefficients: Mapping[str, float] | None = None
+    axle_formula: tuple[float, float, float, float] | None = None
+
+    def __post_init__(self):
+        for name in ("cornering_stiffness", "slip_stiffness", "friction"):
+            if getattr(self, name) is not None:
+                check_positive(f"TyreNumbers.{name}", getattr(self, name))
+
+
+@dataclass(frozen=True)
+class SuspensionNumbers:
+    """What carries the body: masses (kg; unsprung ones of a wheel), the inertias of the sprung mass about its own centre of
+    gravity (kg m^2), where that lies (m: distances to the axles, height at rest), springs (N/m) and dampers (N s/m) as felt at a
+    wheel, anti-roll bars (N/m: force at a wheel over the difference of the two wheels' travels), heights of the roll centres
+    (m), stiffness (N/m) and damping (N s/m) of a tyre."""
+
+    sprung_mass: float
+    unsprung_mass_front: float
+    unsprung_mass_rear: float
+    roll_inertia: float
+    pitch_inertia: float
+    yaw_inertia: float
+    front_axle_to_cg: float
+    rear_axle_to_cg: float
+    cg_height: float
+    spring_front: float
+    spring_rear: float
+    damper_front: float
+    damper_rear: float
+    tyre_stiffness: float
+    anti_roll_front: float = 0.0
+    anti_roll_rear: float = 0.0
+    roll_centre_front: float = 0.0
+    roll_centre_rear: float = 0.0
+    roll_yaw_product: float = 0.0
+    tyre_damping: float = 0.0
+
+    def __post_init__(self):
+        either = ("roll_centre_front", "roll_centre_rear", "roll_yaw_product")
+        zero = ("anti_roll_front", "anti_roll_rear", "damper_front", "damper_rear", "tyre_damping")
+        for entry in fields(self):
+            name, value = f"SuspensionNumbers.{entry.name}", getattr(self, entry.name)
+            if entry.name in either:
+                check_finite(name, value)
+            elif entry.name in zero:
+                check(name, value, lambda v: (v >= 0) & (v < 1e9), "at least 0 and finite")
+            else:
+                check_positive(name, value)
+
+
+@dataclass(frozen=True)
+class CarNumbers:
+    """A car's numbers in SI units, None where they are not known; `source` says where they are from.
+
+    Distances of the axles from the centre of gravity of the whole car, `cg_height`, tracks and `wheel_radius` in m; `mass` kg,
+    `yaw_inertia` kg m^2, `wheel_inertia` kg m^2 (of one wheel), `drag` N s^2/m^2, `rolling_resistance` (-), the front axle's
+    shares of driving and braking (-), `four_motors`: each wheel has its own; tyres of one wheel on the front and the rear axle;
+    `cg_height` stays out of cars for which it is an option (`build`). `trailer_length` (m): from the hitch to the trailer's axle.
+    `steer_offset` (rad) is added to the steer.
+
+    **Raises** `InputError` for what no car has.
+    """
+
+    name: str
+    source: str
+    front_axle_to_cg: float
+    rear_axle_to_cg: float
+    mass: float | None = None
+    yaw_inertia: float | None = None
+    front: TyreNumbers | None = None
+    rear: TyreNumbers | None = None
+    cg_height: float | None = None
+    track_front: float | None = None
+    track_rear: float | None = None
+    wheel_radius: float | None = None
+    wheel_inertia: float | None = None
+    drag: float | None = None
+    rolling_resistance: float | None = None
+    front_drive: float = 1.0
+    front_brake: float = 0.65
+    four_motors: bool = False
+    suspension: SuspensionNumbers | None = None
+    trailer_length: float | None = None
+    steer_offset: float = 0.0
+
+    def __post_init__(self):
+        for name in (
+            "front_axle_to_cg", "rear_axle_to_cg", "mass", "yaw_inertia", "cg_height", "track_front", "track_rear",
+            "wheel_radius", "wheel_inertia", "trailer_length",
+        ):  # fmt: skip
+            if getattr(self, name) is not None:
+                check_positive(f"{self.name}: {name}", getattr(self, name))
+        for name in ("front_drive", "front_brake"):
+            check(f"{self.name}: {name}", getattr(self, name), lambda v: (v >= 0) & (v <= 1), "between 0 and 1")
+        for name in ("drag", "rolling_resistance"):
+            check(f"{self.name}: {name}", getattr(self, name), lambda v: (v >= 0) & (v < 1e6), "at least 0 and finite")
+
+    @property
+    def wheelbase(self) -> float:
+        """Distance between the axles, m."""
+        return self.front_axle_to_cg + self.rear_axle_to_cg
+
+    def wheel_loads(self) -> tuple[float, float]:
+        """Loads of a front and of a rear wheel at rest on a level road, N."""
+        if self.mass is None:
+            raise InputError(f"{self.name}: mass is not known, and so no load.")
+        half = 0.5 * self.mass * GRAVITY / self.wheelbase
+        return half * self.rear_axle_to_cg, half * self.front_axle_to_cg
+
+    def values(self, sprung: bool = False) -> dict[str, Any]:
+        """Every number that is known, by the name that vehicles use; where and how heavy to turn the sprung mass is instead of
+        the whole car's if `sprung`. Axle stiffnesses are twice a tyre's."""
+        found = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        found |= {"wheelbase": self.wheelbase}
+        for axle in ("front", "rear"):
+            tyre = found.pop(axle)
+            found[f"{axle}_stiffness"] = None if tyre is None else 2.0 * tyre.cornering_stiffness
+        suspension = found.pop("suspension")
+        if suspension is not None:
+            own = {entry.name: getattr(suspension, entry.name) for entry in fields(suspension)}
+            found |= own if sprung else {name: value for name, value in own.items() if name not in found}
+            found |= self._rolling(suspension)
+        return {name: value for name, value in found.items() if value is not None}
+
+    def _rolling(self, s: SuspensionNumbers) -> dict[str, Any]:
+        """Roll stiffness (N m/rad) and damping (N m s/rad) of each axle: springs and bar, with the tyres in series."""
+        found = {}
+        for axle in ("front", "rear"):
+            track = getattr(self, f"track_{axle}")
+            if track is None:
+                continue
+            spring = track**2 * (0.5 * getattr(s, f"spring_{axle}") + getattr(s, f"anti_roll_{axle}"))
+            tyre = 0.5 * track**2 * s.tyre_stiffness
+            found[f"roll_stiffness_{axle}"] = spring * tyre / (spring + tyre)
+            found[f"roll_damping_{axle}"] = 0.5 * track**2 * getattr(s, f"damper_{axle}")
+        return found

@@ -1,0 +1,52 @@
+"""A car's numbers out of the file that describes it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh._core.errors import InputError
+from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles.sets.numbers import CarNumbers, TyreNumbers
+
+
+def numbers_of(specification: Any) -> CarNumbers:
+    """The numbers of a `jaxveh.io.CarSpecification`, for `build`: cars on four wheels out of the file of a single track.
+
+    A wheel's tyre is its property file's (`front_tyre`, `rear_tyre`) where there is one; else a typical one with half the axle's
+    cornering stiffness, and with the friction D over the axle's load where the axle's D is given, else 1. What the file
+    leaves out `build` asks for by name. `steer_offset` is what the steer channel shows when the car runs straight, so that the
+    car's own is the negative of it.
+
+    **Raises** `InputError` where an axle has neither coefficients nor cornering stiffness.
+    """
+    s = specification
+    weight = s.mass * GRAVITY / (s.front_axle_to_cg + s.rear_axle_to_cg)
+    return CarNumbers(
+        name=s.name or "car",
+        source="the car's file",
+        mass=s.mass,
+        yaw_inertia=s.yaw_inertia,
+        front_axle_to_cg=s.front_axle_to_cg,
+        rear_axle_to_cg=s.rear_axle_to_cg,
+        front=_tyre(s, "front", weight * s.rear_axle_to_cg),
+        rear=_tyre(s, "rear", weight * s.front_axle_to_cg),
+        # A file may hold 0 for a car whose loads stay.
+        cg_height=s.cg_height or None,
+        track_front=s.track_front,
+        track_rear=s.track_rear,
+        wheel_radius=s.wheel_radius,
+        wheel_inertia=s.wheel_inertia,
+        drag=s.drag,
+        rolling_resistance=s.rolling_resistance,
+        front_drive=1.0 if s.front_drive is None else s.front_drive,
+        front_brake=0.65 if s.front_brake is None else s.front_brake,
+        steer_offset=0.0 if s.steer_offset is None else -s.steer_offset,
+    )
+
+
+def _tyre(s: Any, axle: str, load: float) -> TyreNumbers:
+    formula, stiffness = getattr(s, axle), getattr(s, f"{axle}_cornering_stiffness")
+    if stiffness is None:
+        raise InputError(f"{axle} axle: the specification has neither coefficients nor {axle}_cornering_stiffness.")
+    friction = 1.0 if formula is None else formula.D / (load if formula.nominal_load is None else formula.nominal_load)
+    return TyreNumbers(cornering_stiffness=0.5 * stiffness, friction=friction, property_file=getattr(s, f"{axle}_tyre"))

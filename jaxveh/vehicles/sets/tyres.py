@@ -1,0 +1,67 @@
+"""Tyres from a few numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxveh.tyres import AbstractTyre, MagicFormula, MFTyre, from_property_file, mf_tyre, typical_mf_tyre
+from jaxveh.tyres.mf_tyre.typical import TYPICAL
+from jaxveh.vehicles.parameter_sets import GENERIC
+from jaxveh.vehicles.sets.numbers import TyreNumbers
+
+STRAIGHT = 1e4
+"""Multiple of the nominal load at which stiffness would be greatest: up to any real load it is proportional to it."""
+
+SHIFTS = ("PHX1", "PVX1", "PHY1", "PVY1")
+"""What a tyre pulls when it rolls straight: left out of cars whose right tyres mirror the left."""
+
+
+def wheel_tyre(numbers: TyreNumbers, load: float, radius: float | None = None) -> AbstractTyre:
+    """The tyre of one wheel, for combined slip and any load: a typical MF-Tyre 6.1 with these stiffnesses and this friction at
+    the static `load` (N), unless the numbers name a property file or give coefficients (then an MF-Tyre 5.2, without shifts).
+
+    `radius` (m) is that of the wheel, 0.32 unless known.
+    """
+    radius = 0.32 if radius is None else radius
+    if numbers.property_file is not None:
+        return from_property_file(numbers.property_file)
+    if numbers.coefficients is not None:
+        return _pac2002(numbers.coefficients, load, radius)
+    tyre = typical_mf_tyre(load, radius=radius)
+    along = numbers.cornering_stiffness if numbers.slip_stiffness is None else numbers.slip_stiffness
+    scales = {
+        "LKY": numbers.cornering_stiffness / (-TYPICAL["PKY1"] * load),
+        "LKX": along / (TYPICAL["PKX1"] * load),
+        "LMUX": numbers.friction / TYPICAL["PDX1"],
+        "LMUY": numbers.friction / TYPICAL["PDY1"],
+    }
+    return eqx.tree_at(
+        lambda t: [getattr(t.scaling, name) for name in scales], tyre, [jnp.asarray(v, float) for v in scales.values()]
+    )
+
+
+def axle_tyre(numbers: TyreNumbers, load: float) -> MagicFormula:
+    """Both tyres of an axle as one Magic Formula: its own where it is known; else of this stiffness and friction at the axle's
+    static `load` (N) and of ordinary shape (`GENERIC`), with force proportional to load."""
+    if numbers.axle_formula is not None:
+        return MagicFormula(*numbers.axle_formula)
+    D, C = numbers.friction * load, GENERIC["C"]
+    B = 2.0 * numbers.cornering_stiffness / (C * D)
+    return MagicFormula(B=B, C=C, D=D, E=GENERIC["E"], nominal_load=load)
+
+
+def _pac2002(coefficients, load: float, radius: float) -> MFTyre:
+    known = {name: value for name, value in coefficients.items() if name not in SHIFTS}
+    known |= {"FNOMIN": load, "UNLOADED_RADIUS": radius, "PKY1": known["PKY1"] * STRAIGHT / 2.0, "PKY2": STRAIGHT}
+
+    def section(kind):
+        return kind(**{entry.name: known[entry.name] for entry in dataclasses.fields(kind) if entry.name in known})
+
+    parts = (
+        mf_tyre.Structure, mf_tyre.Longitudinal, mf_tyre.Lateral, mf_tyre.Aligning,
+        mf_tyre.Overturning, mf_tyre.Rolling, mf_tyre.Scaling, mf_tyre.Ranges,
+    )  # fmt: skip
+    return MFTyre(*map(section, parts), version=52)

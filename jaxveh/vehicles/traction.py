@@ -1,0 +1,72 @@
+"""Longitudinal wheel forces straight from the torques, for cars whose wheels have no spin of their own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh.roads import Ground
+from jaxveh.tyres import Contact, Forces
+from jaxveh.vehicles.wheels import Wheels, each, frictions, gravity, opposing, total
+
+LEAST_SHARE = 0.1
+"""The share of its lateral force that a wheel keeps however large the torque (as `tyres.Fiala` does): F_x ends at
+`sqrt(1 - 0.1^2)` of the grip, where the ellipse's slope is finite."""
+
+_END = (1.0 - LEAST_SHARE**2) ** 0.5
+_CORNER = 0.1
+"""Half the width of the parabola that joins the straight line and the end."""
+
+_LEAST_LIMIT = 1.0
+"""N: so little load cannot be told from a wheel that has lifted, and a division by it is safe."""
+
+
+def saturated(wish: Any) -> Any:
+    """`wish` (-) as far as grip allows: exact up to 0.895, at most 0.995, and a parabola between, without a kink."""
+    held = jnp.clip(wish, -(_END + _CORNER), _END + _CORNER)
+    excess = jnp.maximum(jnp.abs(held) - (_END - _CORNER), 0.0)
+    return held - jnp.sign(held) * jnp.square(excess) / (4.0 * _CORNER)
+
+
+def within_grip(forces: Forces, wish: Any, limit: Any) -> Forces:
+    """Forces of a tyre at no slip ratio, with the torque's force `wish` (N) in their `F_x`, as an ellipse allows.
+
+        F_x = limit s,    F_y = F_y0 sqrt(1 - s^2),    M_z = M_z0 sqrt(1 - s^2),    s = saturated(wish / limit)
+
+    `limit` (N) is the greatest longitudinal force (R. Rajamani, Vehicle Dynamics and Control, 2nd ed., ch. 13.4; the friction
+    ellipse of Milliken & Milliken, Race Car Vehicle Dynamics, ch. 2, on forces).
+    """
+    share = saturated(wish / jnp.maximum(limit, _LEAST_LIMIT))
+    left = numerics.sqrt(1.0 - jnp.square(share))
+    return forces._replace(F_x=limit * share, F_y=left * forces.F_y, M_z=left * forces.M_z)
+
+
+def driven(car: Any, forces: Forces, at: Contact, along: Any, drive: Any, brake: Any) -> Forces:
+    """Forces of a wheel (or axle) of `car` under its torques (N m), where it rolls at `along` (m/s).
+
+    The torque less brake and rolling resistance, over the radius, is what the wheel asks of the road; `car.grip` times the
+    road's friction and the load is the most it gets.
+    """
+    load = jnp.maximum(at.load, 0.0)
+    slowing = brake + car.rolling_resistance * load * car.wheel_radius
+    wish = (drive - slowing * opposing(along)) / car.wheel_radius
+    return within_grip(forces, wish, car.grip * at.friction * load)
+
+
+def torque_acceleration(car: Any, drive: Wheels, brake: Wheels, v_x: Any, ground: Ground) -> Any:
+    """a_x, m/s^2, that the torques make, as far as grip allows: what loads can follow without knowing a force."""
+    push = (total(drive) - total(brake) * opposing(v_x)) / car.wheel_radius
+    limit = car.grip * car.mass * (-gravity(ground)[2] * 0.25 * total(frictions(ground)))
+    return limit * saturated(push / jnp.maximum(limit, _LEAST_LIMIT)) / car.mass
+
+
+def driven_wheels(car: Any, forces: Wheels, contacts: Wheels, moves: Wheels, drive: Wheels, brake: Wheels) -> Wheels:
+    """The forces of all wheels under their torques, as `driven`."""
+    return each(lambda f, at, m, *torques: driven(car, f, at, m.along, *torques), forces, contacts, moves, drive, brake)
+
+
+def drive_power(car: Any, drive: Wheels, moves: Wheels) -> Any:
+    """Power of the driving torques, W, on wheels that roll without slip."""
+    return total(each(lambda torque, move: torque * move.along, drive, moves)) / car.wheel_radius

@@ -1,0 +1,193 @@
+"""Drives with drivers, roads, devices and events; solvers by stiffness."""
+
+import warnings
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from systems import gripless, peak, seven
+
+from jaxveh import InputError, JaxvehWarning, manoeuvres, roads, sensors, simulation, statespace, vehicles
+from jaxveh.simulation import simulate, stiffness
+
+KEY = jax.random.key(3)
+
+
+def straight(speed=20.0, duration=1.0):
+    return manoeuvres.step_steer(speed, 0.0, start=0.1, duration=duration)
+
+
+def test_a_car_with_pedals_holds_the_speed_of_a_manoeuvre_that_says_one():
+    drive = simulate(seven(drag=0.4, rolling_resistance=0.012), straight(duration=6.0), dt=0.1)
+    assert {"drive_torque", "brake_torque", "steer"} <= set(drive.names)
+    np.testing.assert_allclose(drive["true.v_x"], 20.0, atol=0.05)
+    assert drive["drive_torque"][-1] > 50.0 > drive["brake_torque"][-1]
+    np.testing.assert_allclose(drive["true.x"][-1], 120.0, atol=0.3)
+
+
+def test_braking_by_torque_slows_as_newton_says():
+    brakes = manoeuvres.mu_jump_braking(
+        20.0, deceleration=3.0, mass=1500.0, wheel_radius=0.32, brake_at=0.5, duration=3.0
+    )
+    drive = simulate(seven(), brakes, dt=0.1)
+    assert float(jnp.min(drive["true.a_x"])) == pytest.approx(-3.0, abs=0.15)
+    # What the wheels' spins hold is braked, too: 4 J / r^2 of 47 kg beside 1500.
+    assert drive["true.v_x"][-1] == pytest.approx(20.0 - 3.0 * 2.35, abs=0.4)
+
+
+def test_friction_is_that_of_the_place_where_each_wheel_stands():
+    split = roads.SplitMu(1.0, 0.3)
+    drive = simulate(seven(), straight(), road=split, dt=0.05)
+    np.testing.assert_allclose(drive["true.friction_fl"], 1.0, atol=1e-6)
+    np.testing.assert_allclose(drive["true.friction_rr"], 0.3, atol=1e-6)
+    jump = roads.MuJump(1.0, 0.4, 10.0)
+    drive = simulate(seven(), straight(), road=jump, dt=0.01)
+    front = np.asarray(drive["true.friction_fl"]) < 0.7
+    rear = np.asarray(drive["true.friction_rl"]) < 0.7
+    first = lambda where: float(drive["true.x"][np.argmax(where)])
+    assert first(front) == pytest.approx(10.5 - 1.2, abs=0.2)
+    assert first(rear) == pytest.approx(10.5 + 1.4, abs=0.2)
+
+
+def test_a_hill_slows_a_car_without_engine():
+    """Gripless tyres on a steady grade: the energy is that of a mass point."""
+    hill = roads.Profile(jnp.asarray([0.0, 1000.0]), grade=jnp.asarray([0.05, 0.05]))
+    drive = simulate(
+        gripless(), manoeuvres.mu_jump_braking(20.0, brake_at=5.0, deceleration=1e-3, duration=6.0), road=hill, dt=0.5
+    )
+    v, x = np.asarray(drive["true.v_x"]), np.asarray(drive["true.x"])
+    np.testing.assert_allclose(v**2 / 2 + 9.80665 * np.sin(0.05) * x, 200.0, rtol=1e-3)
+    np.testing.assert_allclose(drive["true.a_x"], 0.0, atol=1e-3)
+
+
+def test_devices_speak_at_their_own_instants_and_say_the_past():
+    imu = sensors.IMU(rate=100.0, delay=0.013)
+    optical = sensors.OpticalSideslip(rate=40.0)
+    steer = manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=1.0)
+    drive = simulate(seven(), steer, sensors.Suite((imu, optical)))
+    exact = simulate(seven(), steer, dt=0.001, max_step=0.001)
+    late = np.interp(np.maximum(drive.time - 0.013, 0.0), exact.time, exact["true.yaw_rate"])
+    spoken = np.isfinite(np.asarray(drive["yaw_rate"]))
+    np.testing.assert_allclose(np.flatnonzero(spoken).size, 101)
+    np.testing.assert_allclose(np.asarray(drive["yaw_rate"])[spoken], late[spoken], atol=1e-5)
+    np.testing.assert_allclose(
+        drive["true.yaw_rate"], np.interp(drive.time, exact.time, exact["true.yaw_rate"]), atol=1e-5
+    )
+    assert int(np.isfinite(np.asarray(drive["v_y"])).sum()) == 41
+    assert "steer" not in drive and "true.steer" in drive
+
+
+def test_production_devices_draw_from_the_key_and_may_be_vmapped():
+    suite = sensors.production_car(0.32)
+    steer = manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=0.5)
+    one = simulate(seven(), steer, suite, KEY)
+    same = simulate(seven(), steer, suite, KEY)
+    np.testing.assert_array_equal(one["yaw_rate"], same["yaw_rate"])
+    many = jax.vmap(lambda key: simulate(seven(), steer, suite, key, solver="explicit"))(jax.random.split(KEY, 2))
+    assert many["yaw_rate"].shape == (2, len(one))
+    assert not np.allclose(np.nan_to_num(many["yaw_rate"][0]), np.nan_to_num(many["yaw_rate"][1]))
+
+
+def test_standstill_ends_a_braking():
+    brakes = manoeuvres.mu_jump_braking(
+        10.0, brake_at=0.2, deceleration=5.0, mass=1500.0, wheel_radius=0.32, duration=5.0
+    )
+    drive = simulate(seven(), brakes, until=simulation.standstill(0.2), dt=0.01)
+    assert drive.time[-1] < 3.0
+    assert float(drive["true.v_x"][-1]) == pytest.approx(0.2, abs=0.06)
+    assert "standstill (below 0.2 m/s) at t = 2." in drive.source
+    assert np.all(np.isfinite(np.asarray(drive["true.v_x"])))
+
+
+def test_rows_after_an_event_are_nan_under_jit():
+    brakes = manoeuvres.mu_jump_braking(
+        10.0, brake_at=0.2, deceleration=5.0, mass=1500.0, wheel_radius=0.32, duration=3.0
+    )
+    run = jax.jit(lambda car: simulate(car, brakes, until=simulation.standstill(1.0), dt=0.1)["true.v_x"])
+    v = np.asarray(run(seven()))
+    assert v.shape == (31,)
+    assert np.isnan(v[-1]) and np.isfinite(v[10])
+
+
+def test_a_wheel_that_lifts_ends_a_drive():
+    tall = eqx.tree_at(lambda car: car.cg_height, seven(), jnp.asarray(1.4, float))
+    drive = simulate(tall, manoeuvres.step_steer(20.0, 0.06, start=0.1, duration=2.0), until=simulation.wheel_lift(5.0))
+    assert "wheel lift" in drive.source and drive.time[-1] < 1.5
+    least = min(float(drive[f"true.load_{wheel}"][-1]) for wheel in ("fl", "rl"))
+    assert 0.0 <= least < 200.0
+    with pytest.raises(InputError, match="no loads a wheel"):
+        simulate(vehicles.passenger_car(), straight(), until=simulation.wheel_lift())
+
+
+def test_the_fastest_pole_is_the_spectral_radius():
+    driven = simulation.driven_car(seven(), straight())
+    x = driven.start(jnp.asarray(0.0), float, v_x=7.0)
+    flat, back = jax.flatten_util.ravel_pytree(x)
+    jacobian = jax.jacfwd(lambda z: jax.flatten_util.ravel_pytree(driven.derivatives(0.0, back(z)))[0])(flat)
+    expected = np.max(np.abs(np.linalg.eigvals(np.asarray(jacobian))))
+    assert expected > 500.0
+    assert float(simulation.fastest_pole(driven, 0.0, x)) == pytest.approx(expected, rel=0.02)
+
+
+def test_a_slow_car_gets_short_steps_and_a_crawling_one_an_implicit_solver():
+    assert stiffness.choose(200.0, 0.002).max_step == 0.002
+    assert stiffness.choose(2500.0, 0.002).max_step == pytest.approx(1e-3)
+    crawling = stiffness.choose(50000.0, 0.002)
+    assert crawling.controller is not None
+
+
+def test_steps_that_are_too_long_are_never_silent():
+    """At walking speed the spins are faster than 2 ms can hold: insisting warns, "auto" does not need to."""
+    drive = manoeuvres.step_steer(3.0, 0.05, start=0.1, duration=0.6)
+    with pytest.warns(JaxvehWarning, match=r"steps of 0\.002 s are too long for a motion of \d+ 1/s at t = .*max_step"):
+        simulate(seven(wheel_inertia=0.6), drive, solver="explicit", throw=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        auto = simulate(seven(wheel_inertia=0.6), drive)
+    exact = simulate(seven(wheel_inertia=0.6), drive, solver="implicit")
+    assert peak(auto["true.yaw_rate"] - exact["true.yaw_rate"]) < 1e-4 * peak(exact["true.yaw_rate"])
+    assert peak(auto["true.omega_fl"] - exact["true.omega_fl"]) < 1e-4 * peak(exact["true.omega_fl"])
+
+
+def test_unknown_solvers_and_roads_are_refused():
+    with pytest.raises(InputError, match=r"solver = 'rk4': must be one of 'auto', 'explicit', 'implicit'"):
+        simulate(seven(), straight(), solver="rk4")
+    with pytest.raises(InputError, match="Travelling.road = int: must be a road"):
+        simulate(seven(), straight(), road=3)
+    with pytest.raises(InputError, match="must be a manoeuvre or a driver"):
+        simulate(seven(), 3)
+
+
+def test_progress_is_told():
+    heard = []
+    simulate(seven(), straight(duration=0.5), progress=lambda done, total, stage: heard.append(done / total))
+    assert heard[0] == 0.0 and heard[-1] == 1.0
+    assert len(heard) > 20 and heard == sorted(heard)
+
+
+def test_gradients_go_through_driver_road_and_car():
+    """Reverse mode through a closed-loop drive on a slippery road, against finite differences."""
+    steer = manoeuvres.step_steer(15.0, 0.04, start=0.1, duration=0.4)
+
+    def miss(at):
+        car = eqx.tree_at(lambda c: (c.front.cornering_stiffness, c.mass), seven(), (at[0], at[1]))
+        road = roads.Level(at[2])
+        drive = simulate(car, steer, road=road, dt=0.02)
+        return jnp.sum(drive["true.yaw_rate"] ** 2) + 0.1 * jnp.sum((drive["true.y"]) ** 2)
+
+    at = jnp.asarray([80000.0, 1500.0, 0.5])
+    steps = np.asarray([10.0, 0.1, 1e-4])
+    expected = [(miss(at.at[i].add(s)) - miss(at.at[i].add(-s))) / (2 * s) for i, s in enumerate(steps)]
+    np.testing.assert_allclose(jax.grad(miss)(at), expected, rtol=1e-4)
+
+
+def test_float32_drives_are_float32():
+    car, steer = statespace.cast((seven(), manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=0.5)), np.float32)
+    drive = simulate(car, steer, road=statespace.cast(roads.Level(0.8), np.float32), dt=0.05)
+    exact = simulate(
+        seven(), manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=0.5), road=roads.Level(0.8), dt=0.05
+    )
+    assert {values.dtype for values in drive.channels.values()} == {np.dtype(np.float32)}
+    np.testing.assert_allclose(drive["true.yaw_rate"], exact["true.yaw_rate"], atol=1e-4)

@@ -1,0 +1,132 @@
+"""FourteenDOF in steady turns and manoeuvres: moment balance, roll gradient, anti-dive, the limit of stiff springs."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from fourteen_dof_cars import brush, held, inputs, make, roll_out
+from fourteen_dof_lagrange import Mechanism, body_to_world
+
+from jaxveh.vehicles import GRAVITY, SevenDOF
+from jaxveh.vehicles.wheels import named
+
+UNKNOWN = ("v_y", "z", "roll", "pitch", "yaw_rate", *named("travel"), *named("omega"))
+BALANCED = ("v_x", "v_y", "v_z", "roll_rate", "pitch_rate", "yaw_rate", *named("travel_rate"), *named("omega"))
+
+
+@eqx.filter_jit
+def _residual_and_slope(car, x, unknown, steer):
+    def residual(values):
+        at = x._replace(**dict(zip(UNKNOWN, values[:-1], strict=True)))
+        rate = car.derivatives(0.0, at, inputs()._replace(steer=steer, drive_torque=1e3 * values[-1]))
+        return jnp.stack([getattr(rate, name) for name in BALANCED])
+
+    return residual(unknown), jax.jacfwd(residual)(unknown)
+
+
+def steady(car, v_x, steer):
+    """The state, drive torque and outputs of a steady turn, by Newton's method."""
+    x = car.start(0.0, inputs(), v_x=v_x)
+    unknown = jnp.stack([*[getattr(x, name) for name in UNKNOWN], jnp.zeros(())])
+    for _ in range(12):
+        value, slope = _residual_and_slope(car, x, unknown, jnp.asarray(steer))
+        unknown = unknown - jnp.linalg.solve(slope, value)
+    assert np.max(np.abs(value)) < 1e-8
+    x = x._replace(**dict(zip(UNKNOWN, unknown[:-1], strict=True)))
+    return x, inputs(steer, 1e3 * unknown[-1])
+
+
+def test_load_transfer_of_a_steady_turn_balances_the_moments():
+    """About the point of the road below the sprung mass: the loads hold weights, centrifugal forces and turning momenta."""
+    car = make(roll_yaw_product=0.0)
+    x, u = steady(car, 22.0, 0.03)
+    shown = jax.jit(car.outputs)(0.0, x, u)
+    mechanism = Mechanism(car)
+    q, _ = mechanism.coordinates(x._replace(yaw=jnp.zeros(())))
+    places = np.vstack([[0.0, 0.0, float(x.z)], mechanism.centres(q)])
+    masses = np.array([1370.0, *mechanism.masses])
+    rate = float(x.yaw_rate)
+    accelerations = np.array([-rate * float(x.v_y), rate * float(x.v_x)]) - rate**2 * places[:, :2]
+    loads = np.array([float(getattr(shown, name)) for name in named("load")])
+    R = np.asarray(body_to_world(q))
+    turned = R @ np.asarray(mechanism.inertia) @ R.T
+    spin = np.sum([1.3 * float(w) * R[:, 1] for w in [getattr(x, name) for name in named("omega")]][2:], axis=0)
+    front = np.array([-np.sin(0.03), np.cos(0.03), 0.0])
+    spin = spin + 1.3 * float(x.omega_fl + x.omega_fr) * R @ front
+    momentum = np.cross([0.0, 0.0, rate], turned @ [0.0, 0.0, rate] + spin)
+    # Roll: weights and loads on their levers, and heights times lateral forces of inertia.
+    roll = np.sum(places[1:, 1] * loads) - GRAVITY * np.sum(masses * places[:, 1])
+    roll += np.sum(masses * places[:, 2] * accelerations[:, 1]) - momentum[0]
+    transfer = abs(loads[1] + loads[3] - loads[0] - loads[2]) * 0.76
+    assert transfer > 3000
+    assert abs(roll) < 1e-8 * transfer
+    np.testing.assert_allclose(loads.sum(), GRAVITY * masses.sum(), rtol=1e-10)
+
+
+@pytest.mark.parametrize("centres", [(0.0, 0.0), (0.06, 0.11), (0.3, -0.05)])
+def test_roll_gradient_is_the_closed_form(centres):
+    """Of small angles on hard tyres: roll (K - m g h) = m a_y h + spin, with h above the roll axis."""
+    front, rear = centres
+    # The wheels' masses sit on inclined joints too; light ones keep to the formula of the sprung mass.
+    car = make(
+        roll_centre_front=front, roll_centre_rear=rear, tyre_stiffness=2e8, roll_yaw_product=0.0, drag=0.0,
+        pitch_slope_front=0.0, pitch_slope_rear=0.0, rolling_resistance=0.0,
+    )  # fmt: skip
+    x, u = steady(car, 20.0, 1e-4)
+    shown = jax.jit(car.outputs)(0.0, x, u)
+    axis = (1.57 * front + 1.11 * rear) / (1.11 + 1.57)
+    h = 0.58 - axis
+    K = 1.54**2 * (26e3 / 2 + 13e3) + 1.51**2 * (23e3 / 2 + 6e3)
+    spin = 1.3 * sum(float(getattr(x, name)) for name in named("omega")) * float(x.yaw_rate)
+    expected = (1370.0 * float(shown.a_y) * h + spin) / (K - 1370.0 * GRAVITY * h)
+    assert float(x.roll) > 0
+    np.testing.assert_allclose(float(x.roll), expected, rtol=2e-3)
+
+
+def test_positive_slopes_in_front_and_negative_behind_hold_the_body_level():
+    level, dives = (
+        make(pitch_slope_front=0.15, pitch_slope_rear=-0.15),
+        make(pitch_slope_front=0.0, pitch_slope_rear=0.0),
+    )
+    u = inputs(0.0, 0.0, 2000.0)
+    pitches = []
+    for car in (level, dives):
+        states, _ = roll_out(car, car.start(0.0, u, v_x=25.0), held(u))
+        pitches.append(float(states.pitch[1500]))
+    assert 0.005 < pitches[0] < 0.85 * pitches[1]  # nose down both, one less
+
+
+def test_stiff_springs_make_a_seven_dof_car():
+    """A lane change at 0.3 g: the stiffer, the nearer to a rigid car of the same whole mass."""
+    lighter = 38.0 * 1.11 / 1.57  # the wheels' common centre of gravity is the body's
+    shared = dict(front_axle_to_cg=1.11, rear_axle_to_cg=1.57, track_front=1.54, track_rear=1.51, wheel_inertia=1.3)
+    masses = np.array([38.0, 38.0, lighter, lighter])
+    x_w, y_w = np.array([1.11, 1.11, -1.57, -1.57]), 0.5 * np.array([1.54, 1.54, 1.51, 1.51])
+    rigid = SevenDOF(
+        mass=1370.0 + masses.sum(), yaw_inertia=2300.0 + np.sum(masses * (x_w**2 + y_w**2)), cg_height=0.58,
+        wheel_radius=0.33, front=brush(), rear=brush(), **shared,
+    )  # fmt: skip
+    t = 0.0005 * np.arange(4000)
+    us = held(inputs())._replace(steer=jnp.asarray(0.022 * np.sin(2 * np.pi * 0.5 * t)))
+    expected, _ = roll_out(rigid, rigid.start(0.0, inputs(), v_x=20.0), us, 0.0005)
+    distances = []
+    for share in (1.0, 30.0):
+        stiff = {
+            f"{kind}_{axle}": share * v for kind, v in (("spring", 25e3), ("damper", 2e3)) for axle in ("front", "rear")
+        }
+        car = make(
+            unsprung_mass_rear=lighter, roll_yaw_product=0.0, drag=0.0, rolling_resistance=0.0,
+            tyre_stiffness=2e5 * share, tyre_damping=100.0 * share, **stiff,
+        )  # fmt: skip
+        found, shown = roll_out(car, car.start(0.0, inputs(), v_x=20.0), us, 0.0005)
+        assert np.max(np.abs(shown.a_y)) > 2.5
+        distances.append(
+            [
+                float(np.max(np.abs(getattr(found, name) - getattr(expected, name))) / np.ptp(getattr(expected, name)))
+                for name in ("yaw_rate", "v_y")
+            ]
+        )
+    soft, stiff = distances
+    assert max(stiff) < 0.01
+    assert soft[0] > 3 * stiff[0]
