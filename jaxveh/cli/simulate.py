@@ -16,7 +16,7 @@ from jaxveh.cli.console import progress, results, table
 from jaxveh.cli.devices import DEVICES, Noise, devices_of
 from jaxveh.cli.drive_report import draw, numbers_of, print_numbers
 from jaxveh.cli.output import check_product, check_report, write_numbers
-from jaxveh.cli.vehicle import BUILT_IN, FIDELITIES, HELP, vehicle_of
+from jaxveh.cli.vehicle import BUILT_IN, FIDELITIES, first_line, vehicle_of
 from jaxveh.manoeuvres import MANOEUVRES, manoeuvre_options
 from jaxveh.simulation.simulate import SOLVERS
 
@@ -134,8 +134,15 @@ def _check(product, vehicle, road, force, out, numbers, solver, until, rate) -> 
 
 def _list() -> None:
     """What there is to choose from."""
-    table("Vehicles (--vehicle)", ("name", "what"), [(name, HELP[name]) for name in BUILT_IN], left=2)
-    table("Fidelities (--fidelity)", ("name", "what"), [(name, one.help) for name, one in FIDELITIES.items()], left=2)
+    table(
+        "Vehicles (--vehicle)", ("name", "what"), [(name, first_line(make)) for name, make in BUILT_IN.items()], left=2
+    )
+    table(
+        "Fidelities (--fidelity)",
+        ("name", "what"),
+        [(name, first_line(kind)) for name, kind in FIDELITIES.items()],
+        left=2,
+    )
     rows = []
     for name, one in MANOEUVRES.items():
         settings = [
@@ -143,12 +150,10 @@ def _list() -> None:
             for key, value in manoeuvre_options(name).items()
             if key != "duration" and value is not None
         ]
-        rows.append((name, one.help, " ".join(settings)))
-    table(
-        "Manoeuvres (--manoeuvre), and what can be --set with its usual value",
-        ("name", "what", "options"),
-        rows,
-        left=3,
-    )
+        speed, steer = driving.USUAL[name]
+        usual = f"{speed:.3g} m/s" + (f", {steer:g}°" if steer else "")
+        rows.append((name, one.help, usual, " ".join(settings)))
+    heads = ("name", "what", "usual", "options")
+    table("Manoeuvres (--manoeuvre), their usual speed and steer, and what can be --set", heads, rows, left=4)
     table("Roads (--road)", ("name", "what"), [(name, one.help) for name, one in roads.ROADS.items()], left=2)
     table("Devices (--devices)", ("name", "what"), [(name, one.help) for name, one in DEVICES.items()], left=2)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, Recording, diagnostics, manoeuvres, plots, vehicles
+from jaxveh import InputError, Recording, diagnostics, manoeuvres, plots, tyres, vehicles
 from jaxveh.manoeuvres import MANOEUVRES
 from jaxveh.plots.car_outline import footprint, turned, wheel_forces
 from jaxveh.plots.drives import _FIGURES
@@ -309,3 +309,15 @@ def test_bad_input(name):
     with pytest.raises(InputError) as error:
         make()
     assert words in str(error.value)
+
+
+def test_a_sweep_has_the_linear_car_beside_it():
+    car = vehicles.LinearSingleTrack(1500.0, 2500.0, 1.2, 1.4, 80000.0, 90000.0)
+    sweep = shaken().replace(v_x=np.full(1500, 20.0))
+    drawn = line(plots.drive(sweep, "swept-sine", car=car).axes[0], "closed form")
+    np.testing.assert_allclose(drawn.get_ydata()[0], car.yaw_rate_gain(20.0), rtol=0.05)
+    # A car with tyres of the same slopes is the same linear car.
+    axles = vehicles.SingleTrack(1500.0, 2500.0, 1.2, 1.4, tyres.Linear(80000.0), tyres.Linear(90000.0))
+    same = line(plots.drive(sweep, "random-steering", car=axles).axes[0], "closed form")
+    np.testing.assert_allclose(same.get_ydata(), drawn.get_ydata(), rtol=1e-9)
+    assert not lines(plots.drive(sweep, "swept-sine").axes[0], "closed form")
