@@ -20,7 +20,8 @@ from jaxveh.plots.handling import handling_diagram
 from jaxveh.plots.panels import overview
 from jaxveh.plots.step_responses import step_response
 from jaxveh.plots.style import new_figure, style
-from jaxveh.plots.top_views import top_view, top_view_heightfrom jaxveh.vehicles import LinearSingleTrack, linear_single_track
+from jaxveh.plots.top_views import top_view, top_view_height
+from jaxveh.vehicles import LinearSingleTrack, linear_single_track
 
 OVERVIEW_HEIGHT = 5.2
 """Inches of what the car does, beneath a view from above."""
@@ -76,14 +77,18 @@ def linear_response(recording: Recording, car: Any) -> dict[str, Callable[[np.nd
     `frequency_response`; empty for a car that has none."""
     if isinstance(car, LinearSingleTrack):
         linear = car
-    elif all(hasattr(car, name) for name in ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "front", "rear")):
+    elif all(
+        hasattr(car, name) for name in ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "front", "rear")
+    ):
         linear = linear_single_track(car)
     else:
         return {}
     system = linear.system(jnp.asarray(np.mean(channel(recording, "v_x")), jnp.result_type(linear.mass)))
 
     def response(name: str) -> Callable[[np.ndarray], Any]:
-        return lambda frequency: getattr(system.frequency_response(jnp.asarray(2 * np.pi * frequency, system.a_11.dtype)), name)
+        return lambda frequency: getattr(
+            system.frequency_response(jnp.asarray(2 * np.pi * frequency, system.a_11.dtype)), name
+        )
 
     return {name: response(name) for name in ("yaw_rate", "a_y")}
 
