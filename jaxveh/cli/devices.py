@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from jaxveh import sensors
 from jaxveh._core.errors import check_one_of
+from jaxveh.vehicles.wheels import named
 
 
 class Noise(NamedTuple):
@@ -49,5 +50,5 @@ def devices_of(name: str, car: Any, noise: Noise) -> Any:
 
 def _radius(car: Any) -> float | None:
     """The radius of wheels that spin, m; None for a car without, which has no wheel speeds to measure."""
-    radius = getattr(car, "wheel_radius", None)
-    return None if radius is None else float(radius)
+    spins = set(named("omega")) <= set(car.state_type._fields)
+    return float(car.wheel_radius) if spins else None

@@ -8,7 +8,7 @@ import pytest
 from programs import error_line, run, write_car
 
 from jaxveh import io, roads, vehicles
-from jaxveh.cli.devices import DEVICES
+from jaxveh.cli.devices import DEVICES, Noise, devices_of
 from jaxveh.cli.manoeuvre import USUAL, asked, course_of, make
 from jaxveh.cli.vehicle import AS_PRINTED, BUILT_IN, FIDELITIES, vehicle_of
 from jaxveh.manoeuvres import MANOEUVRES
@@ -132,6 +132,13 @@ def test_a_drive_too_short_for_its_standard_says_so_and_is_written(tmp_path):
     assert result.exit_code == 0, result.output
     assert "warning: no numbers of step-steer" in result.stderr and "warning: no figure of step-steer" in result.stderr
     assert drive.exists() and (tmp_path / "figures" / "drive.png").exists()
+
+
+@pytest.mark.parametrize("name", ["production", "proving-ground"])
+def test_wheel_speeds_are_measured_where_wheels_spin(name):
+    measured = {f: devices_of(name, vehicle_of("sedan", f), Noise(0.01, 0.1)) for f in FIDELITIES if "trailer" not in f}
+    for fidelity, suite in measured.items():
+        assert ("wheel_speed_fl" in suite.channels) == (fidelity in ("seven-dof", "fourteen-dof")), fidelity
 
 
 def test_devices_speak_at_their_own_rates(tmp_path):

@@ -237,26 +237,29 @@ def test_a_standing_car_is_shown_once():
     assert times == ["0 s"]
 
 
+# The brake is pressed within the row before t = 1 s: 0.4 m at 20 m/s, then (20^2 - 2^2) / 16 m.
+BRAKED = "from 20.0 m/s: mean fully developed deceleration 8.00 m/s², 25.1 m to a tenth"
+
 DRIVES = {
-    "step-steer": (step, "steer [°]"),
-    "swept-sine": (shaken, "yaw rate over steer [1/s]"),
-    "random-steering": (shaken, "yaw rate over steer [1/s]"),
-    "ramp-steer": (ramp, "steer [°]"),
-    "steady-circle": (ramp, "steer [°]"),
-    "sine-with-dwell": (dwell, "steer [°]"),
-    "braking-in-a-turn": (braked, "speed [m/s]"),
-    "mu-jump-braking": (braked, "speed [m/s]"),
-    "iso-lane-change": (with_forces, "y [m]"),
-    "slalom": (drive, "y [m]"),
-    "cruise": (drive, "steer [°]"),
-}
+    "step-steer": (step, 4, "steer [°]", "times count from half of the step"),
+    "swept-sine": (shaken, 6, "yaw rate over steer [1/s]", ""),
+    "random-steering": (shaken, 6, "yaw rate over steer [1/s]", ""),
+    "ramp-steer": (ramp, 2, "steer [°]", ""),
+    "steady-circle": (ramp, 2, "steer [°]", ""),
+    "sine-with-dwell": (dwell, 3, "steer [°]", "FMVSS 126: passed"),
+    "braking-in-a-turn": (braked, 4, "speed [m/s]", BRAKED),
+    "mu-jump-braking": (braked, 4, "speed [m/s]", BRAKED),
+    "iso-lane-change": (with_forces, 7, "y [m]", ""),
+    "slalom": (drive, 7, "y [m]", ""),
+    "cruise": (drive, 5, "steer [°]", ""),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", DRIVES)
 def test_a_drive_has_the_figure_of_its_manoeuvre(name, tmp_path):
-    make, first = DRIVES[name]
+    make, count, first, note = DRIVES[name]
     figure = plots.drive(make(), name)
-    assert label(figure.axes[0]) == first
+    assert (len(figure.axes), label(figure.axes[0]), figure.axes[0].get_title(loc="right")) == (count, first, note)
     assert plots.save(figure, tmp_path / "drive.png").stat().st_size > 10_000
 
 
