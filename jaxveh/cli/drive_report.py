@@ -42,10 +42,12 @@ def numbers_of(recording: Recording, asked: Asked, car: Any) -> dict[str, dict[s
 
 
 def print_numbers(found: dict[str, dict[str, Any]]) -> None:
-    """A line a title."""
+    """A line a title, without what is not known."""
+    results().print("In SI units (s, m, m/s, m/s^2, rad, N):")
     for title, values in found.items():
         words = [f"{name} {_word(value)}" for name, value in values.items() if not _missing(value)]
-        results().print(f"{title}: {', '.join(words)}", markup=False, soft_wrap=True)
+        if words:
+            results().print(f"{title}: {', '.join(words)}", markup=False, soft_wrap=True)
 
 
 def _word(value: Any) -> str:

@@ -26,7 +26,7 @@ USUAL: dict[str, tuple[float, float]] = {
     "mu-jump-braking": (25.0, 0.0),
     "cruise": (25.0, 0.0),
     "iso-lane-change": (80 * KMH, 0.0),
-    "iso-obstacle-avoidance": (50 * KMH, 0.0),
+    "iso-obstacle-avoidance": (45 * KMH, 0.0),
     "slalom-course": (14.0, 0.0),
     "steady-circle": (16.0, 0.0),
 }
