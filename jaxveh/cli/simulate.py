@@ -73,7 +73,7 @@ def simulate(
     A step of the steering, with its figures: [bold]jaxveh simulate --manoeuvre step-steer --steer-deg 3 -o drive.parquet --out
     figures[/]
 
-    The lane change of ISO 3888-1 on four wheels: [bold]jaxveh simulate --manoeuvre iso-lane-change --fidelity seven-dof --set
+    The lane change of ISO 3888-1 on four wheels: [bold]jaxveh simulate --manoeuvre iso-lane-change --fidelity two-track-3dof --set
     preview_time=0.7 --out figures[/]
 
     Braking on ice to standstill, as the devices of a series car see it: [bold]jaxveh simulate --manoeuvre mu-jump-braking
