@@ -73,8 +73,8 @@ def simulate(
     A step of the steering, with its figures: [bold]jaxveh simulate --manoeuvre step-steer --steer-deg 3 -o drive.parquet --out
     figures[/]
 
-    The lane change of ISO 3888-1 on four wheels: [bold]jaxveh simulate --manoeuvre iso-lane-change --fidelity two-track-3dof --set
-    preview_time=0.7 --out figures[/]
+    The lane change of ISO 3888-1 on four wheels: [bold]jaxveh simulate --manoeuvre iso-lane-change --fidelity two-track-3dof
+    --set preview_time=0.7 --out figures[/]
 
     Braking on ice to standstill, as the devices of a series car see it: [bold]jaxveh simulate --manoeuvre mu-jump-braking
     --fidelity seven-dof --road ice --until standstill --devices production --duration 30 -o brake.mf4[/]
