@@ -77,7 +77,7 @@ def simulate(
     --set preview_time=0.7 --out figures[/]
 
     Braking on ice to standstill, as the devices of a series car see it: [bold]jaxveh simulate --manoeuvre mu-jump-braking
-    --fidelity seven-dof --road ice --until standstill --devices production --duration 30 -o brake.mf4[/]
+    --fidelity seven-dof --road ice --until standstill --devices production --duration 40 -o brake.mf4[/]
     """
     if listed:
         _list()
