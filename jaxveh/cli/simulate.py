@@ -2,84 +2,158 @@
 
 from __future__ import annotations
 
-import math
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import jax
 import typer
 
-from jaxveh import io, manoeuvres, sensors, simulation
-from jaxveh._core.errors import check_positive
+from jaxveh import InputError, Recording, io, roads, simulation
+from jaxveh._core.errors import check_one_of, check_positive
+from jaxveh.cli import manoeuvre as driving
 from jaxveh.cli import options
-from jaxveh.cli.console import progress, results
-from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
-from jaxveh.cli.vehicle import BUILT_IN, car_of
+from jaxveh.cli.console import progress, results, table
+from jaxveh.cli.devices import DEVICES, Noise, devices_of
+from jaxveh.cli.drive_report import draw, numbers_of, print_numbers
+from jaxveh.cli.output import check_product, check_report, write_numbers
+from jaxveh.cli.vehicle import BUILT_IN, FIDELITIES, first_line, vehicle_of
+from jaxveh.manoeuvres import MANOEUVRES, manoeuvre_options
+from jaxveh.simulation.simulate import SOLVERS
 
+EVENTS = {"standstill": simulation.standstill, "wheel-lift": simulation.wheel_lift}
 
-class Manoeuvre(StrEnum):
-    """What the driver does."""
-
-    double_lane_change = "double-lane-change"
-    step_steer = "step-steer"
-    swept_sine = "swept-sine"
-
-
-VEHICLE_HELP = f"A car file (jaxveh schema car), or one of {', '.join(BUILT_IN)}."
+PRODUCT = typer.Option("-o", metavar="FILE", help="The recording: .csv, .parquet, .mf4 or .mdf.", show_default=False)
+VEHICLE = typer.Option(
+    "--vehicle", metavar="CAR", help=f"A car file (jaxveh schema car), or one of {', '.join(BUILT_IN)}."
+)
+FIDELITY = typer.Option("--fidelity", metavar="NAME", help=f"What is made of the car: {', '.join(FIDELITIES)}.")
+MANOEUVRE = typer.Option("--manoeuvre", metavar="NAME", help="What the driver does (--list).")
+ROAD = typer.Option("--road", metavar="ROAD", help=f"A road file (.toml), or one of {', '.join(roads.ROADS)}.")
+FITTED = typer.Option("--devices", metavar="NAME", help=f"What measures: {', '.join(DEVICES)}.")
+SOLVER = typer.Option("--solver", metavar="NAME", help=f"{', '.join(SOLVERS)}.")
+UNTIL = typer.Option("--until", metavar="EVENT", help=f"End early at {' or '.join(EVENTS)}.", show_default=False)
+SET = typer.Option(
+    "--set", metavar="NAME=VALUE", help="An option of the manoeuvre (--list); repeatable.", show_default=False
+)
+SPEED = typer.Option("--speed", help="m/s; usual for the manoeuvre unless given.", show_default=False)
+STEER = typer.Option(
+    "--steer-deg", help="Amplitude at the road wheels, degrees, left positive; usual unless given.", show_default=False
+)
+DURATION = typer.Option("--duration", help="s; the manoeuvre's own unless given.", show_default=False)
+LIST = typer.Option("--list", help="Show vehicles, manoeuvres with their options, roads and devices, and stop.")
 
 
 def simulate(
-    product: Annotated[
-        Path,
-        typer.Option("-o", metavar="FILE", help="The recording: .csv, .parquet, .mf4 or .mdf.", show_default=False),
-    ],
-    vehicle: Annotated[str, typer.Option("--vehicle", metavar="CAR", help=VEHICLE_HELP)] = "passenger_car",
-    manoeuvre: Annotated[Manoeuvre, typer.Option("--manoeuvre")] = Manoeuvre.double_lane_change,
-    speed: Annotated[float, typer.Option("--speed", help="m/s, held.")] = 25.0,
-    steer_deg: Annotated[
-        float, typer.Option("--steer-deg", help="Amplitude at the road wheels, degrees, left positive.")
-    ] = 7.0,
-    duration: Annotated[float, typer.Option("--duration", help="s")] = 7.0,
-    rate: Annotated[float, typer.Option("--rate", help="Rows a second, Hz.")] = 100.0,
-    yaw_rate_std: Annotated[float, typer.Option("--yaw-rate-std", help="Noise of the yaw rate, rad/s.")] = 0.005,
-    a_y_std: Annotated[float, typer.Option("--a-y-std", help="Noise of the lateral acceleration, m/s^2.")] = 0.1,
+    product: Annotated[Path | None, PRODUCT] = None,
+    vehicle: Annotated[str, VEHICLE] = "passenger_car",
+    fidelity: Annotated[str, FIDELITY] = "single-track",
+    manoeuvre: Annotated[str, MANOEUVRE] = "double-lane-change",
+    speed: Annotated[float | None, SPEED] = None,
+    steer_deg: Annotated[float | None, STEER] = None,
+    duration: Annotated[float | None, DURATION] = None,
+    settings: Annotated[list[str] | None, SET] = None,
+    road: Annotated[str, ROAD] = "level",
+    devices: Annotated[str, FITTED] = "esc",
+    rate: Annotated[float, typer.Option("--rate", help="Rows a second, Hz; devices have rates of their own.")] = 100.0,
+    yaw_rate_std: Annotated[float, typer.Option("--yaw-rate-std", help="Noise of esc's yaw rate, rad/s.")] = 0.005,
+    a_y_std: Annotated[float, typer.Option("--a-y-std", help="Noise of esc's lateral acceleration, m/s^2.")] = 0.1,
+    solver: Annotated[str, SOLVER] = "auto",
+    until: Annotated[str | None, UNTIL] = None,
     seed: options.Seed = 0,
     out: options.Out = None,
     numbers: options.Numbers = None,
     force: options.Force = False,
+    listed: Annotated[bool, LIST] = False,
 ) -> None:
-    """Simulate a manoeuvre and write it as a recording: measured channels, inputs, and the truth as `true.<channel>`.
+    """Simulate a drive and write it as a recording: measured channels, inputs, and the truth as `true.<channel>`.
 
-    Example: [bold]jaxveh simulate --manoeuvre step-steer --steer-deg 3 -o drive.parquet --out figures[/]
+    The numbers that the manoeuvre's standard asks for are printed. --out draws the manoeuvre's own figure, the drive from
+    above, the wheel loads and the channels. --list shows what there is.
+
+    A step of the steering, with its figures: [bold]jaxveh simulate --manoeuvre step-steer --steer-deg 3 -o drive.parquet --out
+    figures[/]
+
+    The lane change of ISO 3888-1 on four wheels: [bold]jaxveh simulate --manoeuvre iso-lane-change --fidelity two-track-3dof
+    --set preview_time=0.7 --out figures[/]
+
+    Braking on ice to standstill, as the devices of a series car see it: [bold]jaxveh simulate --manoeuvre mu-jump-braking
+    --fidelity seven-dof --road ice --until standstill --devices production --duration 40 -o brake.mf4[/]
     """
-    check_product(product, io.SUFFIXES, force, (Path(vehicle),))
-    check_report(out, numbers)
-    check_positive("--rate", rate, "Hz")
-    car = car_of(vehicle)
-    drive = _manoeuvre(manoeuvre, speed, math.radians(steer_deg), duration)
-    devices = sensors.esc(yaw_rate=yaw_rate_std, a_y=a_y_std)
+    if listed:
+        _list()
+        return
+    _check(product, vehicle, road, force, out, numbers, solver, until, rate)
+    car = vehicle_of(vehicle, fidelity)
+    asked = driving.asked(manoeuvre, speed, steer_deg, duration, settings or (), car)
+    key = jax.random.key(seed)
+    driver = driving.make(asked, jax.random.fold_in(key, 1))
+    ground = None if road == "level" else roads.named_road(road)
+    fitted = devices_of(devices, car, Noise(yaw_rate_std, a_y_std))
     with progress("simulate") as report:
-        report(0, 1, f"{manoeuvre.value} (compiling)")
-        recording = simulation.simulate(car, drive, devices, key=jax.random.key(seed), dt=1 / rate)
-    io.write_recording(recording, product, overwrite=force)
-    results().print(f"{product}: {len(recording)} rows, {', '.join(recording.names)}")
+        report(0, 1, f"{manoeuvre} (compiling)")
+        recording = simulation.simulate(
+            car, driver, fitted, key, road=ground, dt=1 / rate, solver=solver, progress=report,
+            until=None if until is None else EVENTS[until](),
+        )  # fmt: skip
+    found = numbers_of(recording, asked, car)
+    print_numbers(found)
+    if product is not None:
+        io.write_recording(recording, product, overwrite=force)
+        results().print(f"{product}: {len(recording)} rows, {', '.join(recording.names)}")
     if out is not None:
-        from jaxveh import plots
-
-        make_folder(out)
-        results().print(f"figure: {plots.save(plots.recording(recording), out / 'channels.png')}")
+        for path in draw(recording, asked, car, out):
+            results().print(f"figure: {path}")
     configuration = {
-        "vehicle": vehicle, "manoeuvre": manoeuvre.value, "speed": speed, "steer_deg": steer_deg, "duration": duration,
-        "rate": rate, "yaw_rate_std": yaw_rate_std, "a_y_std": a_y_std,
+        "vehicle": vehicle, "fidelity": fidelity, "manoeuvre": manoeuvre, "speed": asked.speed, "steer_deg": asked.steer_deg,
+        "duration": driver.duration, "options": asked.options, "road": road, "devices": devices, "rate": rate,
+        "yaw_rate_std": yaw_rate_std, "a_y_std": a_y_std, "solver": solver, "until": until,
     }  # fmt: skip
-    shown = {"rows": len(recording), "channels": list(recording.names), "file": product}
-    write_numbers(numbers, shown, configuration, seed)
+    write_numbers(numbers, {**_shown(recording, product), "numbers": found}, configuration, seed)
 
 
-def _manoeuvre(kind: Manoeuvre, speed: float, steer: float, duration: float):
-    if kind is Manoeuvre.double_lane_change:
-        return manoeuvres.double_lane_change(speed=speed, steer=steer, duration=duration)
-    if kind is Manoeuvre.step_steer:
-        return manoeuvres.step_steer(speed=speed, steer=steer, duration=duration)
-    return manoeuvres.swept_sine(speed=speed, steer=steer, duration=duration)
+def _shown(recording: Recording, product: Path | None) -> dict[str, Any]:
+    return {
+        "rows": len(recording), "channels": list(recording.names), "source": recording.source, "file": product,
+        "start": recording.time[0], "end": recording.time[-1],
+    }  # fmt: skip
+
+
+def _check(product, vehicle, road, force, out, numbers, solver, until, rate) -> None:
+    """Raise before any work for what could not be done or written in the end."""
+    if product is None and out is None and numbers is None:
+        raise InputError(
+            "simulate: nothing to write: give -o FILE, --out DIR or --json FILE (--list shows what there is)."
+        )
+    check_product(product, io.SUFFIXES, force, (Path(vehicle), Path(road)))
+    check_report(out, numbers)
+    check_one_of("--solver", solver, SOLVERS)
+    if until is not None:
+        check_one_of("--until", until, EVENTS)
+    check_positive("--rate", rate, "Hz")
+
+
+def _list() -> None:
+    """What there is to choose from."""
+    table(
+        "Vehicles (--vehicle)", ("name", "what"), [(name, first_line(make)) for name, make in BUILT_IN.items()], left=2
+    )
+    table(
+        "Fidelities (--fidelity)",
+        ("name", "what"),
+        [(name, first_line(kind)) for name, kind in FIDELITIES.items()],
+        left=2,
+    )
+    rows = []
+    for name, one in MANOEUVRES.items():
+        settings = [
+            f"{key}={value:g}"
+            for key, value in manoeuvre_options(name).items()
+            if key != "duration" and value is not None
+        ]
+        speed, steer = driving.USUAL[name]
+        usual = f"{speed:.3g} m/s" + (f", {steer:g}°" if steer else "")
+        rows.append((name, one.help, usual, " ".join(settings)))
+    heads = ("name", "what", "usual", "options")
+    table("Manoeuvres (--manoeuvre), their usual speed and steer, and what can be --set", heads, rows, left=4)
+    table("Roads (--road)", ("name", "what"), [(name, one.help) for name, one in roads.ROADS.items()], left=2)
+    table("Devices (--devices)", ("name", "what"), [(name, one.help) for name, one in DEVICES.items()], left=2)

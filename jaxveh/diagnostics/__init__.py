@@ -1,8 +1,37 @@
-"""Diagnoses: whether a log is fit to estimate from, and what a recording can tell about parameters at all."""
+"""Diagnoses: whether a log is fit to estimate from, what a recording can tell about parameters at all, and the numbers that
+standards take from a drive."""
 
+from jaxveh.diagnostics.braking_test import BrakingTest, braking_test
+from jaxveh.diagnostics.drive_numbers import Peaks, drive_numbers, peaks
+from jaxveh.diagnostics.frequency_response import FrequencyResponse, frequency_response
 from jaxveh.diagnostics.log_check import check_log
 from jaxveh.diagnostics.log_findings import SEVERITIES, Finding
 from jaxveh.diagnostics.log_plausibility import check_car
 from jaxveh.diagnostics.observability import Observability, from_sensitivities
+from jaxveh.diagnostics.sine_with_dwell import SineWithDwellTest, sine_with_dwell
+from jaxveh.diagnostics.steady_state import SteadyTurns, Understeer, steady_turns, understeer
+from jaxveh.diagnostics.step_response import StepResponse, step_response
 
-__all__ = ["SEVERITIES", "Finding", "Observability", "check_car", "check_log", "from_sensitivities"]
+__all__ = [
+    "SEVERITIES",
+    "BrakingTest",
+    "Finding",
+    "FrequencyResponse",
+    "Observability",
+    "Peaks",
+    "SineWithDwellTest",
+    "SteadyTurns",
+    "StepResponse",
+    "Understeer",
+    "braking_test",
+    "check_car",
+    "check_log",
+    "drive_numbers",
+    "frequency_response",
+    "from_sensitivities",
+    "peaks",
+    "sine_with_dwell",
+    "steady_turns",
+    "step_response",
+    "understeer",
+]

@@ -28,6 +28,12 @@ def given(unit: str | None) -> TypeGuard[str]:
     return unit is not None and unit.strip().casefold() not in _NOT_GIVEN
 
 
+def same(unit: str, other: str) -> bool:
+    """Whether two units are one that is written in two ways, such as `N m` and `N*m`."""
+    plain = lambda one: _ALIASES.get(one.strip(), one.strip())
+    return plain(unit) == plain(other)
+
+
 def convert(values, unit: str, target: str, what: str) -> np.ndarray:
     """Values in `unit` as values in `target` (any shape); equal units leave them untouched.
 

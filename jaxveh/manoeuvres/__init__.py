@@ -16,6 +16,7 @@ from jaxveh.manoeuvres.courses import iso_lane_change, iso_obstacle_avoidance, s
 from jaxveh.manoeuvres.cruise import Cruise, cruise
 from jaxveh.manoeuvres.driver import AbstractDriver, Motion, OpenLoop, as_driver
 from jaxveh.manoeuvres.named import MANOEUVRES, NamedManoeuvre, named_manoeuvre
+from jaxveh.manoeuvres.options import manoeuvre_options
 from jaxveh.manoeuvres.path_driver import PathDriver
 from jaxveh.manoeuvres.paths import AbstractGraph, AbstractPath, Beside, Circle, LaneChanges, Sine, Straight, Target
 from jaxveh.manoeuvres.random_steering import RandomSteering, random_steering
@@ -48,7 +49,8 @@ __all__ = [
     "Sine", "SineWithDwell", "Slalom", "SpeedControl", "SteadySpeed", "StepSteer", "Straight", "SweptSine", "Target",
     "WaveringSpeed",
     "as_driver", "braking_in_a_turn", "centre_line", "clearance", "cones", "cruise", "double_lane_change",
-    "iso_3888_1", "iso_3888_2", "iso_lane_change", "iso_obstacle_avoidance", "mu_jump_braking", "named_manoeuvre",
+    "iso_3888_1", "iso_3888_2", "iso_lane_change", "iso_obstacle_avoidance", "manoeuvre_options", "mu_jump_braking",
+    "named_manoeuvre",
     "passes", "ramp_steer", "random_steering", "replay", "sine_with_dwell", "slalom", "slalom_course", "smooth_step",
     "steady_circle", "step_steer", "swept_sine", "wavering_speed",
 ]  # fmt: skip

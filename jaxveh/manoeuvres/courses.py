@@ -39,14 +39,15 @@ def iso_obstacle_avoidance(
     start: float = 30.0,
     lead: float = 1.0,
     duration: float | None = None,
+    preview_time=0.5,
     **driver,
 ) -> PathDriver:
     """The obstacle avoidance of ISO 3888-2 in closed loop at `speed` (m/s) with a car of a `width` (m).
 
-    The course is `iso_3888_2(width, start)`; otherwise as `iso_lane_change`, with a preview of 0.5 s unless told.
+    The course is `iso_3888_2(width, start)`; otherwise as `iso_lane_change`; `preview_time` (s) is the driver's.
     """
     path = centre_line(iso_3888_2(width, start), lead)
-    return _driver(path, speed, start + 76.0, duration, {"preview_time": 0.5, **driver})
+    return _driver(path, speed, start + 76.0, duration, {"preview_time": preview_time, **driver})
 
 
 def slalom_course(

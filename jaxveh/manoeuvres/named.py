@@ -13,6 +13,7 @@ from jaxveh.manoeuvres.braking import braking_in_a_turn, mu_jump_braking
 from jaxveh.manoeuvres.courses import iso_lane_change, iso_obstacle_avoidance, slalom_course, steady_circle
 from jaxveh.manoeuvres.cruise import cruise
 from jaxveh.manoeuvres.driver import AbstractDriver
+from jaxveh.manoeuvres.options import check_options
 from jaxveh.manoeuvres.random_steering import random_steering
 from jaxveh.manoeuvres.standard_steering import ramp_steer, sine_with_dwell, slalom
 from jaxveh.manoeuvres.steering import double_lane_change, step_steer, swept_sine
@@ -87,7 +88,8 @@ def named_manoeuvre(
     `speed` (m/s; of "steady-circle" the last), `steer` (rad at the road wheels, where the manoeuvre has one), `key` for
     random ones (default `jax.random.key(0)`), `options`: keyword arguments of its function, `duration` among them.
 
-    **Raises** `InputError` for another name, listing those there are, and as its function does.
+    **Raises** `InputError` for another name or option, listing those there are, and as its function does.
     """
     check_one_of("manoeuvre", name, MANOEUVRES)
+    check_options(name, options)
     return MANOEUVRES[name].make(Drive(speed, steer, options, jax.random.key(0) if key is None else key))

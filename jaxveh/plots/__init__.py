@@ -1,30 +1,49 @@
-"""Figures of recordings, estimates, tyre forces, parameters and rig fits, in one restrained style; matplotlib is the extra
-`plot`.
+"""Figures of recordings, drives, estimates, tyre forces, parameters and rig fits, in one restrained style; matplotlib is the
+extra `plot`.
 
 Every function returns a matplotlib `Figure` made without pyplot: no window, no global state, shown by notebooks as it
-is. Give `figure=` (a `Figure` or a `SubFigure`) to draw into one of your own. Angles are shown in degrees.
+is. Give `figure=` (a `Figure` or a `SubFigure`) to draw into one of your own. Angles are shown in degrees. Figures of drives
+show a simulation's truth where the recording has it, else what was measured.
 """
 
+from jaxveh.plots.braking_drives import braking
+from jaxveh.plots.drives import drive
+from jaxveh.plots.dwell import sine_with_dwell
 from jaxveh.plots.estimates import estimate
 from jaxveh.plots.force_curves import force_curves
+from jaxveh.plots.frequency_responses import frequency_response
 from jaxveh.plots.friction_ellipse import friction_ellipse
 from jaxveh.plots.gradient_map import gradient_map
+from jaxveh.plots.handling import handling_diagram
+from jaxveh.plots.panels import overview
 from jaxveh.plots.parameters import parameters
 from jaxveh.plots.recordings import recording
 from jaxveh.plots.rig_fit import rig_fit
+from jaxveh.plots.step_responses import step_response
 from jaxveh.plots.style import COLOURS, save, style
+from jaxveh.plots.top_views import top_view
 from jaxveh.plots.tyres import tyre
+from jaxveh.plots.wheel_loads import loads
 
 __all__ = [
     "COLOURS",
+    "braking",
+    "drive",
     "estimate",
     "force_curves",
+    "frequency_response",
     "friction_ellipse",
     "gradient_map",
+    "handling_diagram",
+    "loads",
+    "overview",
     "parameters",
     "recording",
     "rig_fit",
     "save",
+    "sine_with_dwell",
+    "step_response",
     "style",
+    "top_view",
     "tyre",
 ]

@@ -27,7 +27,8 @@ def recording(
     """A panel a channel over the log's own time; a simulation's truth as a black line beneath the measurement.
 
     **Arguments**: `channels`: names to show (default: the first `MOST` that are not `true.`). `spans`: (start, end,
-    label) in seconds to shade, such as a calibration or a finding. `figure`: where to draw. NaN leaves a gap.
+    label) in seconds to shade, such as a calibration or a finding. `figure`: where to draw. NaN leaves a gap; samples
+    between two gaps are dots.
 
     **Returns** the figure. **Raises** `InputError` for unknown channels, or nothing to show.
     """
@@ -43,7 +44,7 @@ def recording(
             shown = quantity(name, recording.unit(name))
             for start, end, label in spans:
                 ax.axvspan(start, end, color=SHADE, linewidth=0, zorder=0, label=label)
-            ax.plot(time, shown.show(recording[name]), color=CYCLE[0], linewidth=0.9, label="measured")
+            _measured(ax, time, shown.show(recording[name]))
             if TRUTH + name in recording:
                 ax.plot(time, shown.show(recording[TRUTH + name]), color=COLOURS["truth"], linewidth=0.9, label="truth")
             _mark_silence(ax, time, np.asarray(recording[name]))
@@ -56,6 +57,16 @@ def recording(
 
 def _default(recording: Recording) -> list[str]:
     return order(name for name in recording.names if not name.startswith(TRUTH))[:MOST]
+
+
+def _measured(ax: Any, time: np.ndarray, values: np.ndarray) -> None:
+    """A line, and a dot for each sample that stands between two gaps, where no line would show it (slow devices)."""
+    known = np.isfinite(values)
+    beside = np.r_[False, known[:-1]] | np.r_[known[1:], False]
+    ax.plot(time, values, color=CYCLE[0], linewidth=0.9, label="measured")
+    alone = known & ~beside
+    if alone.any():
+        ax.plot(time[alone], values[alone], ".", color=CYCLE[0], markersize=3.5)
 
 
 def _mark_silence(ax: Any, time: np.ndarray, values: np.ndarray) -> None:

@@ -13,6 +13,7 @@ from jaxveh._core.names import record
 from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre, SpeedControl, as_driver
 from jaxveh.manoeuvres.speed_control import AIR_DENSITY
 from jaxveh.sensors import Instrumented
+from jaxveh.statespace import cast
 from jaxveh.vehicles import AbstractVehicle, Motion, Steered
 from jaxveh.vehicles.wheels import named, opposing
 
@@ -110,7 +111,7 @@ def steering_ratio(vehicle: Any) -> Any:
 def check_inputs(driven: Driven) -> None:
     """Raise `InputError` where the car needs an input that its driver does not give."""
     vehicle, driver = driven.car.vehicle, driven.driver
-    moves = Motion(*[jnp.zeros(())] * len(Motion._fields))
+    moves = _still(vehicle)
     given = eqx.filter_eval_shape(
         lambda: adapted(vehicle, driver.inputs(0.0, moves, driver.start(0.0, moves)), moves)
     )._fields
@@ -153,13 +154,14 @@ def with_pedals(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: Abstract
     if not torques & set(vehicle.inputs) or torques & set(given) or "v_x" not in given:
         return driver
     car = car_itself(vehicle)
-    return SpeedControl(
+    control = SpeedControl(
         driver,
         car.mass,
         wheel_radius=car.wheel_radius,
         drag_area=jnp.maximum(car.drag * (2.0 / AIR_DENSITY), LEAST),
         rolling_resistance=jnp.maximum(car.rolling_resistance, LEAST),
     )
+    return cast(control, dtype_of(vehicle))
 
 
 def car_itself(vehicle: Any) -> Any:

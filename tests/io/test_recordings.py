@@ -89,6 +89,12 @@ def test_csv_refuses_known_channels_in_other_units(tmp_path):
     np.testing.assert_allclose(io.read_recording(tmp_path / "log.csv")["yaw_rate"], np.deg2rad([1.0, 2.0]), rtol=1e-15)
 
 
+def test_csv_takes_a_unit_that_is_written_otherwise(tmp_path):
+    recording = Recording([0.0, 1.0], {"drive_torque": [1.0, 2.0]}, {"drive_torque": "N m"})
+    io.write_recording(recording, tmp_path / "log.csv")
+    np.testing.assert_array_equal(io.read_recording(tmp_path / "log.csv")["drive_torque"], [1.0, 2.0])
+
+
 @pytest.mark.parametrize("header", ["time;v_x", "Time\tv_x", "timestamps, v_x", "t,v_x,"])
 def test_separators_and_time_names(tmp_path, header):
     separator = next(c for c in ";\t," if c in header)

@@ -54,6 +54,17 @@ def test_recording_by_default_shows_what_was_measured_and_says_what_is_silent():
     assert [text.get_text() for text in legend.get_texts()] == ["calibration", "measured", "truth"]
 
 
+def test_samples_of_a_slow_device_are_dots():
+    speed = np.where(np.arange(21) % 5 == 0, 20.0 + TIME, np.nan)
+    speed[6] = 20.0
+    (ax,) = plots.recording(Recording(TIME, {"speed": speed}), ["speed"]).axes
+    (dots,) = [one for one in ax.get_lines() if one.get_marker() == "."]
+    np.testing.assert_allclose(dots.get_xdata(), TIME[[0, 10, 15, 20]])
+    np.testing.assert_allclose(dots.get_ydata(), speed[[0, 10, 15, 20]])
+    (line_only,) = plots.recording(drive(), ["steer"]).axes
+    assert {one.get_marker() for one in line_only.get_lines()} == {"None"}
+
+
 def test_recording_refuses_unknown_channels():
     with pytest.raises(InputError, match="unknown name"):
         plots.recording(drive(), ["yaw_rat"])

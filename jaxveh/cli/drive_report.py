@@ -1,0 +1,78 @@
+"""What `simulate` shows of a drive: numbers of standards, and figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxveh import InputError, Recording, diagnostics
+from jaxveh.cli.console import number, results
+from jaxveh.cli.failure import say
+from jaxveh.cli.manoeuvre import Asked, course_of, width_of
+from jaxveh.cli.output import make_folder
+from jaxveh.diagnostics.drive_channels import channel, has
+from jaxveh.manoeuvres import clearance
+
+BODY = 4.5
+"""m: length of the car between cones; its width is the one that the course was made for."""
+
+
+def wheelbase_of(car: Any) -> float | None:
+    """Between the axles, m; None for a car without."""
+    if not (hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg")):
+        return None
+    return float(car.front_axle_to_cg) + float(car.rear_axle_to_cg)
+
+
+def numbers_of(recording: Recording, asked: Asked, car: Any) -> dict[str, dict[str, Any]]:
+    """Numbers by title and name, SI; where the drive does not carry its standard's, the peaks alone and a warning why."""
+    try:
+        found = diagnostics.drive_numbers(recording, asked.name, wheelbase_of(car))
+    except InputError as error:
+        say("warning", "yellow", f"no numbers of {asked.name}: {error}")
+        found = diagnostics.drive_numbers(recording)
+    shown = {title: one._asdict() for title, one in found.items()}
+    course = course_of(asked)
+    if course is not None and has(recording, "x", "y", "yaw"):
+        x, y, yaw = (channel(recording, name) for name in ("x", "y", "yaw"))
+        shown[course.name] = {"clearance": float(clearance(x, y, yaw, width_of(asked), BODY, course))}
+    return shown
+
+
+def print_numbers(found: dict[str, dict[str, Any]]) -> None:
+    """A line a title, without what is not known."""
+    results().print("In SI units (s, m, m/s, m/s^2, rad, N):")
+    for title, values in found.items():
+        words = [f"{name} {_word(value)}" for name, value in values.items() if not _missing(value)]
+        if words:
+            results().print(f"{title}: {', '.join(words)}", markup=False, soft_wrap=True)
+
+
+def _word(value: Any) -> str:
+    return ("yes" if value else "no") if isinstance(value, bool | np.bool_) else number(value)
+
+
+def _missing(value: Any) -> bool:
+    return not isinstance(value, bool | np.bool_) and np.isnan(value)
+
+
+def draw(recording: Recording, asked: Asked, car: Any, out: Path) -> list[Path]:
+    """Write the figures into a folder and return their paths."""
+    from jaxveh import plots
+
+    make_folder(out)
+    figures: dict[str, Any] = {}
+    course = course_of(asked)
+    try:
+        figures["drive"] = plots.drive(recording, asked.name, course=course, car=car)
+    except InputError as error:
+        say("warning", "yellow", f"no figure of {asked.name}, what the car does instead: {error}")
+        figures["drive"] = plots.overview(recording)
+    if has(recording, "x", "y", "yaw"):
+        figures["top_view"] = plots.top_view(recording, course, car=car)
+    if has(recording, "load_fl") or has(recording, "load_front"):
+        figures["loads"] = plots.loads(recording)
+    figures["channels"] = plots.recording(recording)
+    return [plots.save(figure, out / f"{name}.png") for name, figure in figures.items()]

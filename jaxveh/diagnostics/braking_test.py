@@ -1,0 +1,70 @@
+"""The numbers of a braking test (UN Regulation No. 13-H)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.recording import Recording
+from jaxveh.diagnostics.drive_channels import channel, crossing, has, seconds
+
+PRESSED = 0.01
+"""Share of the greatest brake torque from which on the brake is pressed; without that channel, share of the initial speed
+that is lost by then."""
+
+BETWEEN = (0.8, 0.1)
+"""Shares of the initial speed between which the deceleration counts as fully developed (UN R13-H, annex 3, 1.1.3)."""
+
+
+class BrakingTest(NamedTuple):
+    """The numbers of a braking test; those of slower speeds are NaN where the car does not become that slow.
+
+    `begins`: when the brake is pressed (s). `speed`: there (m/s). `mean_deceleration` (m/s^2): the mean fully developed
+    deceleration (v_b^2 - v_e^2) / (2 (s_e - s_b)) of UN R13-H, with `v_b`, `v_e` 0.8 and 0.1 of the initial speed. `distance`
+    (m): from the beginning to a tenth of the initial speed. `peak_deceleration` (m/s^2). `most_slip`: the greatest size of
+    any wheel's slip ratio while braking (-; NaN where the recording has none).
+    """
+
+    begins: float
+    speed: float
+    mean_deceleration: float
+    distance: float
+    peak_deceleration: float
+    most_slip: float
+
+
+def braking_test(recording: Recording) -> BrakingTest:
+    """The numbers of a drive that brakes once.
+
+    The way is the integral of `v_x`. Slip ratios count while the car is faster than a tenth of its initial speed.
+
+    **Raises** `InputError` where `v_x` is missing, or the car does not brake.
+    """
+    time, v_x = seconds(recording), channel(recording, "v_x")
+    begins = _begins(recording, time, v_x)
+    speed = float(np.interp(begins, time, v_x))
+    way = np.concatenate([[0.0], np.cumsum(np.diff(time) * (v_x[1:] + v_x[:-1]) / 2)])
+    place = lambda at: float(np.interp(at, time, way)) if np.isfinite(at) else float("nan")
+    v_b, v_e = (share * speed for share in BETWEEN)
+    at_b, at_e = (crossing(time, -v_x, -v, begins) for v in (v_b, v_e))
+    rate = -np.gradient(v_x, time)
+    braked = (time >= begins) & (v_x > v_e)
+    slips = [f"slip_ratio_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has(recording, f"slip_ratio_{wheel}")]
+    most = max((float(np.max(np.abs(channel(recording, name)[braked]))) for name in slips), default=float("nan"))
+    return BrakingTest(
+        begins, speed, (v_b**2 - v_e**2) / (2 * (place(at_e) - place(at_b))), place(at_e) - place(begins),
+        float(np.max(rate[braked])), most,
+    )  # fmt: skip
+
+
+def _begins(recording: Recording, time: np.ndarray, v_x: np.ndarray) -> float:
+    if has(recording, "brake_torque"):
+        torque = channel(recording, "brake_torque")
+        begins = crossing(time, torque, PRESSED * float(np.max(torque))) if np.max(torque) > 0 else float("nan")
+    else:
+        begins = crossing(time, v_x[0] - v_x, PRESSED * v_x[0])
+    if not np.isfinite(begins) or not begins < time[-1]:
+        raise InputError("braking_test: the car does not brake in this drive.")
+    return begins

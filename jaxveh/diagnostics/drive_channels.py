@@ -1,0 +1,69 @@
+"""A drive's channels as plain arrays without gaps, for the numbers of standards."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.recording import TRUTH, Recording
+
+
+def has(recording: Recording, *names: str) -> bool:
+    """Whether the recording has all of these channels, as truth or as measured."""
+    return all(TRUTH + name in recording or name in recording for name in names)
+
+
+def channel(recording: Recording, name: str) -> np.ndarray:
+    """A channel (T,) in SI units: a simulation's truth where there is one, else what was measured.
+
+    Rows without a sample are filled along lines between their neighbours (devices of several rates leave such gaps).
+
+    **Raises** `InputError` for a channel that is not there, or that has no finite sample.
+    """
+    if not has(recording, name):
+        names = ", ".join(dict.fromkeys(one.removeprefix(TRUTH) for one in recording.names))
+        raise InputError(f"recording: no channel {name!r} to look at; there are: {names}.")
+    values = np.asarray(recording[TRUTH + name if TRUTH + name in recording else name], np.float64)
+    known = np.isfinite(values)
+    if not known.any():
+        raise InputError(f"recording: {name} has no finite sample.")
+    if known.all():
+        return values
+    time = seconds(recording)
+    return np.interp(time, time[known], values[known])
+
+
+def seconds(recording: Recording) -> np.ndarray:
+    """The recording's own time, s."""
+    return np.asarray(recording.time, np.float64)
+
+
+def sideslip(recording: Recording) -> np.ndarray:
+    """Sideslip at the centre of gravity (T,), rad: the channel, else from `v_x` and `v_y`."""
+    if has(recording, "sideslip"):
+        return channel(recording, "sideslip")
+    return np.arctan2(channel(recording, "v_y"), channel(recording, "v_x"))
+
+
+def crossing(time: np.ndarray, values: np.ndarray, level: float, after: float = -np.inf) -> float:
+    """The first instant (s) at or after `after` at which `values` reach the `level` from below, along lines; NaN if never."""
+    above = np.flatnonzero((values >= level) & (time >= after))
+    if above.size == 0:
+        return float("nan")
+    k = int(above[0])
+    if k == 0 or time[k - 1] < after:
+        return float(time[k])
+    share = (level - values[k - 1]) / (values[k] - values[k - 1])
+    return float(time[k - 1] + share * (time[k] - time[k - 1]))
+
+
+def peak(time: np.ndarray, values: np.ndarray) -> tuple[float, float]:
+    """Instant (s) and height of the greatest value: the top of the parabola through it and its neighbours."""
+    k = int(np.argmax(values))
+    if k in (0, values.size - 1):
+        return float(time[k]), float(values[k])
+    a, b, c = np.polyfit(time[k - 1 : k + 2] - time[k], values[k - 1 : k + 2], 2)
+    if a >= 0:
+        return float(time[k]), float(values[k])
+    at = -b / (2 * a)
+    return float(time[k] + at), float(c + b * at / 2)

@@ -1,0 +1,106 @@
+"""The numbers that a test engineer takes from a drive, by the manoeuvre's name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxveh._core.recording import Recording
+from jaxveh.diagnostics.braking_test import braking_test
+from jaxveh.diagnostics.drive_channels import channel, has, sideslip
+from jaxveh.diagnostics.frequency_response import frequency_response
+from jaxveh.diagnostics.sine_with_dwell import sine_with_dwell
+from jaxveh.diagnostics.steady_state import steady_turns, understeer
+from jaxveh.diagnostics.step_response import step_response
+
+OUTPUTS = ("yaw_rate", "a_y")
+
+
+class Peaks(NamedTuple):
+    """Greatest sizes in a drive: `a_y` (m/s^2), `yaw_rate` (rad/s), `sideslip` (rad), and the least `load` of a wheel (N; NaN
+    where the recording has none)."""
+
+    a_y: float
+    yaw_rate: float
+    sideslip: float
+    least_load: float
+
+
+class LowestFrequency(NamedTuple):
+    """The `gain` (SI) of a frequency response at its lowest `frequency` (Hz), near the steady one, and the frequency
+    `at_45_deg` (Hz) from which on the answer lags by more than 45 degrees (NaN: nowhere)."""
+
+    frequency: float
+    gain: float
+    at_45_deg: float
+
+
+def peaks(recording: Recording) -> Peaks:
+    """The greatest sizes in a drive; NaN for what the recording does not have."""
+    loads = [f"load_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has(recording, f"load_{wheel}")]
+    size = lambda values: float(np.max(np.abs(values)))
+    of = lambda name: size(channel(recording, name)) if has(recording, name) else float("nan")
+    slides = has(recording, "sideslip") or has(recording, "v_x", "v_y")
+    return Peaks(
+        of("a_y"),
+        of("yaw_rate"),
+        size(sideslip(recording)) if slides else float("nan"),
+        min((float(np.min(channel(recording, name))) for name in loads), default=float("nan")),
+    )
+
+
+def drive_numbers(recording: Recording, manoeuvre: str | None = None, wheelbase: float | None = None) -> dict[str, Any]:
+    """Named tuples of numbers by title: what a drive of a `manoeuvre` (its name in `jaxveh.manoeuvres.MANOEUVRES`) is made for.
+
+    `wheelbase` (m) serves the understeer gradient. Other manoeuvres, and those without a name, have their peaks alone.
+
+    **Raises** `InputError` where the drive does not carry the numbers: too short, or a channel is missing.
+    """
+    return {"peaks": peaks(recording), **_NUMBERS.get(manoeuvre or "", _none)(recording, wheelbase)}
+
+
+def _none(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+    return {}
+
+
+def _step(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+    return {f"step response of {name} (ISO 7401)": step_response(recording, name) for name in OUTPUTS}
+
+
+def _sweep(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+    return {f"frequency response of {name} (ISO 7401)": _lowest(recording, name) for name in OUTPUTS}
+
+
+def _lowest(recording: Recording, name: str) -> LowestFrequency:
+    found = frequency_response(recording, name)
+    lags = np.flatnonzero(np.degrees(np.unwrap(np.angle(found.response))) < -45.0)
+    at = float(found.frequency[lags[0]]) if lags.size else float("nan")
+    return LowestFrequency(float(found.frequency[0]), float(np.abs(found.response[0])), at)
+
+
+def _turns(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+    if wheelbase is None:
+        return {}
+    return {"steady turns (ISO 4138)": understeer(steady_turns(recording, wheelbase))}
+
+
+def _dwell(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+    return {"sine with dwell (FMVSS 126)": sine_with_dwell(recording)}
+
+
+def _braking(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+    return {"braking (UN R13-H)": braking_test(recording)}
+
+
+_NUMBERS: dict[str, Callable[[Recording, float | None], dict[str, Any]]] = {
+    "step-steer": _step,
+    "swept-sine": _sweep,
+    "random-steering": _sweep,
+    "ramp-steer": _turns,
+    "steady-circle": _turns,
+    "sine-with-dwell": _dwell,
+    "braking-in-a-turn": _braking,
+    "mu-jump-braking": _braking,
+}

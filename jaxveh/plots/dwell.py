@@ -1,0 +1,95 @@
+"""A sine with dwell against the criteria of FMVSS 126."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.recording import Recording
+from jaxveh.diagnostics import SineWithDwellTest, drive_channels
+from jaxveh.diagnostics import sine_with_dwell as measure
+from jaxveh.diagnostics.sine_with_dwell import DISPLACED_AFTER, DISPLACEMENT, LIMITS
+from jaxveh.plots.panels import GREY, line, note, stack
+from jaxveh.plots.style import CYCLE, SHADE, label_above, legend, style
+
+ALLOWED, FORBIDDEN = CYCLE[2], CYCLE[1]
+
+
+def sine_with_dwell(recording: Recording, *, steering_ratio: float = 16.0, figure: Any = None) -> Any:
+    """Steer, yaw rate and, where the recording has a position, the lateral way, with the criteria of FMVSS 126 in words.
+
+    Marked are the yaw rate 1.0 s and 1.75 s after the completion of steer with its limits (35 % and 20 % of the peak), and the
+    lateral displacement 1.07 s after the beginning of steer with its limit (1.83 m). The numbers are those of
+    `jaxveh.diagnostics.sine_with_dwell` (which see for `steering_ratio`).
+
+    **Returns** the figure. **Raises** `InputError` where the steer is no sine with dwell, or the drive ends too early.
+    """
+    found = measure(recording, steering_ratio=steering_ratio)
+    placed = drive_channels.has(recording, "x", "y", "yaw")
+    with style():
+        figure, axes = stack(figure, 3 if placed else 2, 1.7)
+        line(axes[0], recording, "steer")
+        for at, words in ((found.begins, "begins"), (found.completed, "completed")):
+            axes[0].axvline(at, color=GREY, linewidth=0.7, linestyle=":")
+            axes[0].annotate(words, (at, 0.04), xycoords=("data", "axes fraction"), xytext=(3, 0), fontsize=7.5,
+                             textcoords="offset points", color=GREY)  # fmt: skip
+        line(axes[1], recording, "yaw_rate")
+        _mark_yaw(axes[1], recording, found)
+        if placed:
+            _way(axes[2], recording, found)
+        note(axes[0], f"FMVSS 126: {_words(found)}")
+        legend(figure, axes)
+    return figure
+
+
+def _words(found: SineWithDwellTest) -> str:
+    if found.passed:
+        return "passed"
+    failed = ["yaw rate left too high"] * (not found.stable) + ["displacement too small"] * (not found.responsive)
+    return f"failed ({', '.join(failed)})"
+
+
+def _mark_yaw(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
+    time, yaw_rate = drive_channels.seconds(recording), np.degrees(drive_channels.channel(recording, "yaw_rate"))
+    at_peak = float(np.interp(found.peak_at, time, yaw_rate))
+    side = np.sign(at_peak) or 1.0
+    ax.plot([found.peak_at], [at_peak], "s", color=GREY, markersize=4.5, label="first peak after the reversal")
+    for (after, limit), ratio in zip(LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True):
+        at = found.completed + after
+        top = side * limit * np.degrees(found.peak)
+        ax.plot([at, at], [0.0, top], color=FORBIDDEN, linewidth=1.4)
+        ax.plot([at - 0.12, at + 0.12], [top, top], color=FORBIDDEN, linewidth=1.8, label="limit")
+        _dot(ax, at, float(np.interp(at, time, yaw_rate)), ratio <= limit)
+    ax.axvline(found.completed, color=GREY, linewidth=0.7, linestyle=":")
+    words = [
+        f"{round(100 * ratio) + 0:d} % of the peak after {after:g} s (at most {100 * limit:.0f} %)"
+        for (after, limit), ratio in zip(LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True)
+    ]
+    note(ax, ",  ".join(words))
+
+
+def _dot(ax: Any, at: float, value: float, allowed: bool) -> None:
+    shade, words = (ALLOWED, "within the limit") if allowed else (FORBIDDEN, "beyond the limit")
+    ax.plot([at], [value], "o", color=shade, markersize=5, label=words)
+
+
+def _way(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
+    """How far the car is left of its initial straight path."""
+    time, yaw = drive_channels.seconds(recording), drive_channels.channel(recording, "yaw")[0]
+    x, y = (drive_channels.channel(recording, name) for name in ("x", "y"))
+    left = y * np.cos(yaw) - x * np.sin(yaw)
+    left = left - left[0]
+    at = found.begins + DISPLACED_AFTER
+    there = float(np.interp(at, time, left))
+    side = np.sign(there) * np.sign(found.displacement) or 1.0
+    ax.plot(time, left, color=CYCLE[0], linewidth=1.2)
+    ax.axvspan(found.begins, at, color=SHADE, linewidth=0, zorder=0)
+    ax.plot([at - 0.12, at + 0.12], [side * DISPLACEMENT] * 2, color=FORBIDDEN, linewidth=1.8, label="limit")
+    _dot(ax, at, there, found.responsive)
+    label_above(ax, "lateral displacement [m]")
+    # What happens long after the instant would hide it.
+    reach = 3.0 * max(abs(there), DISPLACEMENT)
+    low, high = ax.get_ylim()
+    ax.set_ylim(max(low, -reach), min(high, reach))
+    note(ax, f"{found.displacement:.2f} m {DISPLACED_AFTER:g} s after the steer begins (at least {DISPLACEMENT:g} m)")

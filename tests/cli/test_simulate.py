@@ -1,0 +1,213 @@
+"""`jaxveh simulate`: vehicles, manoeuvres, roads, devices and events by name; numbers and figures; bad input in one line."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from programs import error_line, run, write_car
+
+from jaxveh import io, roads, vehicles
+from jaxveh.cli.devices import DEVICES, Noise, devices_of
+from jaxveh.cli.manoeuvre import USUAL, asked, course_of, make
+from jaxveh.cli.vehicle import AS_PRINTED, BUILT_IN, FIDELITIES, vehicle_of
+from jaxveh.manoeuvres import MANOEUVRES
+
+QUICK = ("--duration", "1", "--rate", "50", "--manoeuvre", "step-steer", "--set", "start=0.1")
+
+
+def simulate(*arguments):
+    return run("simulate", *arguments)
+
+
+def read_json(path):
+    return json.loads(path.read_text())
+
+
+def test_list_shows_all_that_there_is():
+    result = simulate("--list")
+    assert result.exit_code == 0, result.output
+    for names in (BUILT_IN, FIDELITIES, MANOEUVRES, roads.ROADS, DEVICES):
+        for name in names:
+            assert name in result.stdout
+    assert "ramp=0.2 start=1" in result.stdout
+    assert "25 m/s, 7°" in result.stdout
+    assert "A BMW 320i, rear-wheel drive" in result.stdout
+
+
+def test_help_teaches_by_examples():
+    text = " ".join(simulate("--help").stdout.split())
+    for word in (
+        "--manoeuvre step-steer",
+        "--fidelity seven-dof",
+        "--until standstill",
+        "--set",
+        "--list",
+        "split-mu",
+        "proving",
+    ):
+        assert word in text
+
+
+def test_every_manoeuvre_has_usual_values_and_can_be_made():
+    import jax
+
+    assert set(USUAL) == set(MANOEUVRES)
+    car = vehicles.passenger_car()
+    for name in MANOEUVRES:
+        one = asked(name, None, None, None, (), car)
+        assert make(one, jax.random.key(0)).duration > 0
+        assert (course_of(one) is not None) == name.startswith("iso-")
+
+
+def test_what_the_manoeuvre_wants_of_the_car_comes_from_the_car():
+    car = vehicle_of("passenger_car", "seven-dof")
+    brakes = asked("braking-in-a-turn", None, None, None, (), car).options
+    assert brakes == {"mass": 1420.0, "wheel_radius": pytest.approx(0.3)}
+    path = asked("iso-lane-change", None, None, None, ("wheelbase=3", "width=2"), car)
+    assert path.options == {"wheelbase": 3.0, "width": 2.0}
+    assert course_of(path).lanes[0].left == pytest.approx((1.1 * 2 + 0.25) / 2)
+    assert asked("slalom-course", None, None, None, ("count=4",), car).options["count"] == 4
+
+
+@pytest.mark.parametrize("fidelity", [name for name in FIDELITIES if name != "kinematic-trailer"])
+def test_every_fidelity_is_made_of_a_named_car(fidelity):
+    assert type(vehicle_of("passenger_car", fidelity)) is FIDELITIES[fidelity]
+
+
+def test_a_car_file_is_made_into_what_its_numbers_reach_for(tmp_path):
+    car = write_car(tmp_path)
+    assert float(vehicle_of(car, "single-track").mass) == float(vehicle_of(car, "linear").mass) == 1420.0
+    line = error_line(simulate("--vehicle", car, "--fidelity", "seven-dof", "-o", tmp_path / "out.csv"))
+    assert "SevenDOF needs track_front, track_rear, cg_height" in line
+
+
+def test_the_car_as_printed_is_a_single_track_alone(tmp_path):
+    assert float(vehicle_of(AS_PRINTED).front_axle_to_cg) == 1.59
+    line = error_line(simulate("--vehicle", AS_PRINTED, "--fidelity", "linear", "-o", tmp_path / "out.csv"))
+    assert "--fidelity of passenger_car_as_printed = 'linear': must be one of 'single-track'" in line
+
+
+def test_settings_options_and_road_reach_the_drive(tmp_path):
+    drive, numbers = tmp_path / "drive.csv", tmp_path / "numbers.json"
+    car = write_car(tmp_path)
+    extra = ("--vehicle", car, "--fidelity", "linear", "--speed", "15", "--steer-deg", "1", "--set", "ramp=0.1")
+    result = simulate(
+        *QUICK, *extra, "--devices", "none", "--road", "banked", "--solver", "explicit", "-o", drive, "--json", numbers
+    )
+    assert result.exit_code == 0, result.output
+    recording = io.read_recording(drive)
+    assert len(recording) == 51 and "yaw_rate" not in recording
+    np.testing.assert_allclose(np.hypot(recording["true.v_x"], recording["true.v_y"]), 15.0)
+    steer, time = np.asarray(recording["steer"]), np.asarray(recording.time)
+    np.testing.assert_allclose(
+        np.interp([0.1, 0.15, 0.2], time, steer), [0, math.radians(0.5), math.radians(1)], atol=0.003
+    )
+    assert np.ptp(np.asarray(recording["true.bank"])) > 0
+    content = read_json(numbers)
+    told = content["manifest"]["configuration"]
+    assert told["road"] == "banked" and told["options"] == {"start": 0.1, "ramp": 0.1, "duration": 1.0}
+    assert told["fidelity"] == "linear" and told["devices"] == "none"
+    assert content["numbers"]["peaks"]["a_y"] == pytest.approx(np.max(np.abs(recording["true.a_y"])), rel=1e-6)
+    assert content["end"] == 1.0
+
+
+def test_numbers_of_the_standard_and_figures(tmp_path):
+    out, numbers = tmp_path / "figures", tmp_path / "numbers.json"
+    result = simulate(
+        *QUICK, "--fidelity", "linear", "--set", "ramp=0.05", "--duration", "2", "--out", out, "--json", numbers
+    )
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in out.iterdir()) == ["channels.png", "drive.png", "loads.png", "top_view.png"]
+    found = read_json(numbers)["numbers"]["step response of yaw_rate (ISO 7401)"]
+    car = vehicle_of("passenger_car", "linear")
+    assert found["gain"] == pytest.approx(float(car.yaw_rate_gain(25.0)), rel=0.01)
+    assert f"response_time {found['response_time']:.4g}" in result.stdout
+    assert read_json(numbers)["file"] is None
+
+
+def test_a_drive_too_short_for_its_standard_says_so_and_is_written(tmp_path):
+    drive = tmp_path / "drive.csv"
+    result = simulate(*QUICK, "--duration", "0.5", "--set", "ramp=0.3", "--out", tmp_path / "figures", "-o", drive)
+    assert result.exit_code == 0, result.output
+    assert "warning: no numbers of step-steer" in result.stderr and "warning: no figure of step-steer" in result.stderr
+    assert drive.exists() and (tmp_path / "figures" / "drive.png").exists()
+
+
+@pytest.mark.parametrize("name", ["production", "proving-ground"])
+def test_wheel_speeds_are_measured_where_wheels_spin(name):
+    measured = {f: devices_of(name, vehicle_of("sedan", f), Noise(0.01, 0.1)) for f in FIDELITIES if "trailer" not in f}
+    for fidelity, suite in measured.items():
+        assert ("wheel_speed_fl" in suite.channels) == (fidelity in ("seven-dof", "fourteen-dof")), fidelity
+
+
+def test_devices_speak_at_their_own_rates(tmp_path):
+    drive = tmp_path / "drive.parquet"
+    result = simulate(*QUICK, "--devices", "production", "--seed", "2", "-o", drive)
+    assert result.exit_code == 0, result.output
+    recording = io.read_recording(drive)
+    assert {"a_y", "yaw_rate", "steer"} <= set(recording.names)
+    spoke = np.isfinite(np.asarray(recording["yaw_rate"]))
+    # 100 Hz for the inertial unit, 5 Hz for the satellites, whatever --rate says.
+    assert 90 <= spoke.sum() <= 101
+    satellites = [name for name in recording.names if np.isfinite(np.asarray(recording[name])).sum() <= 6]
+    assert satellites
+
+
+def test_braking_ends_at_standstill(tmp_path):
+    drive = tmp_path / "drive.csv"
+    settings = ("--set", "brake_at=0.1", "--set", "brake_ramp=0.1", "--speed", "6", "--duration", "3")
+    named = ("--manoeuvre", "mu-jump-braking", "--fidelity", "longitudinal", "--until", "standstill")
+    result = simulate(*named, *settings, "--rate", "50", "--devices", "none", "-o", drive)
+    assert result.exit_code == 0, result.output
+    recording = io.read_recording(drive)
+    assert 0.5 < recording.time[-1] < 2.0
+    assert 0.05 < recording["true.v_x"][-1] < 0.5
+    assert "braking (UN R13-H): " in result.stdout and "mean_deceleration" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--manoeuvre", "drift"), "--manoeuvre = 'drift': must be one of 'double-lane-change'"),
+        (
+            ("--manoeuvre", "step-steer", "--set", "radius=40"),
+            "--set radius=40: step-steer has no option 'radius'; there are: ramp",
+        ),
+        (("--set", "period"), "--set period: must be NAME=VALUE, such as --set start=2."),
+        (("--set", "period=fast"), "--set period=fast: 'fast' is no number."),
+        (("--set", "speed=30"), "--set speed=30: speed has an option of its own, --speed."),
+        (("--manoeuvre", "slalom-course", "--set", "count=2.5"), "--set count=2.5: '2.5' is no whole number."),
+        (("--set", "period=-1"), "period = -1.0: must be positive"),
+        (("--fidelity", "42-dof"), "--fidelity = '42-dof': must be one of 'longitudinal'"),
+        (("--road", "moon"), "road = 'moon': must be one of level"),
+        (("--devices", "radar"), "--devices = 'radar': must be one of 'none'"),
+        (("--solver", "magic"), "--solver = 'magic': must be one of 'auto'"),
+        (("--until", "dawn"), "--until = 'dawn': must be one of 'standstill', 'wheel-lift'"),
+        (("--vehicle", "tank"), "--vehicle tank: must be the path of a .toml file"),
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(tmp_path, arguments, words):
+    line = error_line(simulate(*arguments, "-o", tmp_path / "out.csv"))
+    assert words in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_event_that_the_car_cannot_have_is_refused(tmp_path):
+    result = simulate(*QUICK, "--until", "wheel-lift", "-o", tmp_path / "out.csv")
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1].startswith("error: wheel_lift: the car has no loads a wheel")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_to_write_is_refused():
+    assert "nothing to write" in error_line(simulate("--manoeuvre", "step-steer"))
+
+
+def test_a_product_that_exists_is_kept_unless_forced(tmp_path):
+    drive = tmp_path / "drive.csv"
+    drive.write_text("mine")
+    assert "exists already" in error_line(simulate(*QUICK, "-o", drive))
+    assert drive.read_text() == "mine"
+    assert simulate(*QUICK, "-o", drive, "--force").exit_code == 0
+    assert len(io.read_recording(drive)) == 51
