@@ -117,6 +117,12 @@ CARS = {
     "SingleTrack, relaxed": Car(lambda: relaxed(vehicles.passenger_car()), told_speed=True, drives=True),
     "SingleTrack3DOF": Car(lambda: planar(vehicles.SingleTrack3DOF)),
     "Steered": Car(lambda: vehicles.Steered(planar(vehicles.TwoTrack3DOF), 16.0, 2e-5, trail=0.02), drives=True),
+    "Steered, with inertia": Car(
+        lambda: vehicles.Steered(
+            planar(vehicles.TwoTrack2DOF), 16.0, 1e-4, damping=400.0, inertia=8.0, trail=0.02, assist=1.0
+        ),
+        told_speed=True,
+    ),
     "Travelling": Car(lambda: vehicles.Travelling(seven())),
     "TwoTrack2DOF": Car(lambda: planar(vehicles.TwoTrack2DOF), told_speed=True),
     "TwoTrack3DOF": Car(lambda: planar(vehicles.TwoTrack3DOF)),
