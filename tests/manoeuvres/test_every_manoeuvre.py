@@ -100,8 +100,8 @@ def test_derivatives_are_continuous(line, manoeuvre):
     curve = lambda t: stacked(manoeuvre, t)
     for _ in range(line.smooth):
         curve = jax.jacfwd(curve)
-    curve = jax.jit(jax.vmap(curve))
-    jumps = [np.max(np.abs(np.diff(curve(times(manoeuvre, n)), axis=0)), axis=0) for n in (20_001, 80_001)]
+    values = np.asarray(jax.jit(jax.vmap(curve))(times(manoeuvre, 80_001)))
+    jumps = [np.max(np.abs(np.diff(values[::stride], axis=0)), axis=0) for stride in (4, 1)]
     assert np.isfinite(jumps).all()
     assert (jumps[1] <= 0.3 * jumps[0] + 1e-9).all()
 

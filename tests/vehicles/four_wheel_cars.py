@@ -8,7 +8,6 @@ import numpy as np
 from jaxveh import tyres, vehicles
 from jaxveh._core.names import record
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.statespace import cast
 
 BODY = {
     "mass": 1450.0,
@@ -94,14 +93,14 @@ def close(found, expected, rtol=1e-10, atol=1e-9):
         np.testing.assert_allclose(getattr(found, name), value, rtol=rtol, atol=atol, err_msg=name)
 
 
-@eqx.filter_jit
-def _evaluated(car, x, u, ground):
-    return car.evaluate(0.0, x, u, ground)
-
-
 def evaluated(car, x, u, ground=LEVEL):
-    """Rates and outputs, compiled once for cars of one kind."""
-    return _evaluated(car, x, u, Ground(*[jnp.asarray(v, float) for v in ground]))
+    """Rates and outputs. Not compiled: a test looks once or twice, and compiling takes a hundred times as long as looking."""
+    return car.evaluate(0.0, x, u, on(ground))
+
+
+def on(ground):
+    """The ground as arrays, which may be differentiated."""
+    return Ground(*[jnp.asarray(v, float) for v in ground])
 
 
 def assert_symmetric(car, x, u, ground=SLOPES):
@@ -122,78 +121,56 @@ def weighed(car, x, u, ground):
     return sum(w * jnp.tanh(1e-3 * jnp.sum(v)) for w, v in zip(weights, values, strict=True))
 
 
-@eqx.filter_jit
-def _value(everything):
-    return weighed(*everything)
-
-
-@eqx.filter_jit
-def _slopes(everything):
+def slopes(everything):
+    """Derivatives with respect to every array."""
     return eqx.filter_grad(lambda everything: weighed(*everything))(everything)
 
 
 def assert_gradients(car, x, u, ground=SLOPES, rtol=2e-6):
     """Reverse mode over every parameter, state, input and the ground agrees with central differences in ten directions."""
-    everything = car, x, u, Ground(*[jnp.asarray(v, float) for v in ground])
+    everything = car, x, u, on(ground)
     arrays, rest = eqx.partition(everything, eqx.is_inexact_array)
-    gradient = jax.tree.leaves(_slopes(everything))
+    gradient = jax.tree.leaves(slopes(everything))
     assert all(np.isfinite(leaf).all() for leaf in gradient)
     rng, step = np.random.default_rng(7), 1e-5
     for _ in range(10):
         way = jax.tree.map(lambda leaf: leaf * rng.normal(), arrays)
         shifted = [jax.tree.map(lambda leaf, d, s=s: leaf + s * step * d, arrays, way) for s in (1.0, -1.0)]
-        above, below = (_value(eqx.combine(these, rest)) for these in shifted)
+        above, below = (weighed(*eqx.combine(these, rest)) for these in shifted)
         found = sum(jnp.sum(g * d) for g, d in zip(gradient, jax.tree.leaves(way), strict=True))
         np.testing.assert_allclose(found, (above - below) / (2 * step), rtol=rtol, atol=1e-8)
 
 
 def assert_finite(car, x, u, ground=LEVEL):
     """Values, and the gradient of a mixture of them over every parameter, state, input and the ground, are finite."""
-    everything = car, x, u, Ground(*[jnp.asarray(v, float) for v in ground])
+    everything = car, x, u, on(ground)
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(evaluated(car, x, u, ground)))
-    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(_slopes(everything)))
-
-
-def assert_float32(car, x, u, ground=LEVEL):
-    """float32 in, float32 out, near the float64 values."""
-    ground = Ground(*[jnp.asarray(v, float) for v in ground])
-    single = cast((car, x, u, ground), jnp.float32)
-    for part, expected in zip(_evaluated(*single), _evaluated(car, x, u, ground), strict=True):
-        for name, value in part._asdict().items():
-            assert value.dtype == jnp.float32, name
-            np.testing.assert_allclose(value, getattr(expected, name), rtol=2e-3, atol=2e-3, err_msg=name)
-    assert all(leaf.dtype == jnp.float32 for leaf in single[0].start(jnp.float32(0.0), single[2]))
-
-
-def assert_said(car, x, u):
-    """Rates are of the state's type, every state, input and output has a unit, and a batch is elementwise."""
-    rates, outputs = car.evaluate(0.0, x, u)
-    assert type(rates) is car.state_type and type(car.start(0.0, u)) is car.state_type
-    assert {*rates._fields, *outputs._fields, *car.inputs} <= set(car.units)
-    batch = jax.tree.map(lambda leaf: leaf * jnp.linspace(0.5, 1.5, 7), x)
-    together = evaluated(car, batch, u)
-    one = evaluated(car, jax.tree.map(lambda leaf: leaf[2], batch), u)
-    for found, expected in zip(together, one, strict=True):
-        close(jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (7,))[2], found), expected, 1e-12)
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(slopes(everything)))
 
 
 def drive(car, inputs_at, x, duration, step):
-    """States at the steps' ends by RK4."""
+    """States at the steps' ends by RK4; cars of one kind over as many steps share one compilation."""
+    steps = round(duration / step)
+    starts = step * jnp.arange(steps, dtype=float)
+    times = starts[:, None] + step * jnp.asarray([0.0, 0.5, 0.5, 1.0])
+    u = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, times.shape), inputs_at(times))
+    return _drive(car, x, times, u, jnp.asarray(step))
 
-    @eqx.filter_jit
-    def run(car, x):
-        def rates(t, x):
-            return car.derivatives(t, x, inputs_at(t))
 
-        def advance(x, t):
-            along = lambda k, h: jax.tree.map(lambda a, b: a + h * b, x, k)
-            k1 = rates(t, x)
-            k2 = rates(t + 0.5 * step, along(k1, 0.5 * step))
-            k3 = rates(t + 0.5 * step, along(k2, 0.5 * step))
-            k4 = rates(t + step, along(k3, step))
-            x = jax.tree.map(lambda x, a, b, c, d: x + step / 6 * (a + 2 * b + 2 * c + d), x, k1, k2, k3, k4)
-            return x, x
+@eqx.filter_jit
+def _drive(car, x, times, inputs, step):
+    # The stages are a loop, so that the car is compiled once.
+    ahead, weights = jnp.asarray([0.0, 0.5, 0.5, 1.0]), jnp.asarray([1.0, 2.0, 2.0, 1.0]) / 6
 
-        return jax.lax.scan(advance, x, step * jnp.arange(round(duration / step), dtype=float))[1]
+    def advance(x, row):
+        def stage(carried, now):
+            rate, end = carried
+            t, u, share, weight = now
+            rate = car.derivatives(t, jax.tree.map(lambda a, k: a + share * step * k, x, rate), u)
+            return (rate, jax.tree.map(lambda a, k: a + weight * step * k, end, rate)), None
 
-    return run(car, x)
+        still = jax.tree.map(jnp.zeros_like, x)
+        (_, end), _ = jax.lax.scan(stage, (still, x), (*row, ahead, weights))
+        return end, end
+
+    return jax.lax.scan(advance, x, (times, inputs))[1]
