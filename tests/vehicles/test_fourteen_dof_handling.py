@@ -1,7 +1,6 @@
 """FourteenDOF in steady turns and manoeuvres: moment balance, roll gradient, anti-dive, the limit of stiff springs."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -18,21 +17,21 @@ BALANCED = ("v_x", "v_y", "v_z", "roll_rate", "pitch_rate", "yaw_rate", *named("
 
 
 @eqx.filter_jit
-def _residual_and_slope(car, x, unknown, steer):
-    def residual(values):
-        at = x._replace(**dict(zip(UNKNOWN, values[:-1], strict=True)))
-        rate = car.derivatives(0.0, at, inputs()._replace(steer=steer, drive_torque=1e3 * values[-1]))
-        return jnp.stack([getattr(rate, name) for name in BALANCED])
-
-    return residual(unknown), jax.jacfwd(residual)(unknown)
+def _residuals(car, x, unknown, steer):
+    """What is out of balance, a column for each column of the unknown."""
+    at = x._replace(**dict(zip(UNKNOWN, unknown[:-1], strict=True)))
+    rate = car.derivatives(0.0, at, inputs()._replace(steer=steer, drive_torque=1e3 * unknown[-1]))
+    return jnp.stack([jnp.broadcast_to(getattr(rate, name), unknown.shape[1:]) for name in BALANCED])
 
 
 def steady(car, v_x, steer):
-    """The state, drive torque and outputs of a steady turn, by Newton's method."""
+    """The state and inputs of a steady turn, by Newton's method with differences for slopes."""
     x = car.start(0.0, inputs(), v_x=v_x)
     unknown = jnp.stack([*[getattr(x, name) for name in UNKNOWN], jnp.zeros(())])
     for _ in range(12):
-        value, slope = _residual_and_slope(car, x, unknown, jnp.asarray(steer))
+        moved = unknown[:, None] + jnp.eye(len(unknown), len(unknown) + 1, 1) * 1e-7
+        columns = _residuals(car, x, moved, jnp.asarray(steer))
+        value, slope = columns[:, 0], (columns[:, 1:] - columns[:, :1]) / 1e-7
         unknown = unknown - jnp.linalg.solve(slope, value)
     assert np.max(np.abs(value)) < 1e-8
     x = x._replace(**dict(zip(UNKNOWN, unknown[:-1], strict=True)))
