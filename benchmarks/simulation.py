@@ -21,6 +21,7 @@ from .seven_dof_problem import Drives, drives
 __all__ = ["Inputs", "car", "cases", "chosen_of", "gradient_arguments", "mean_square", "simulate"]
 
 OURS, MAPPED, LIMIT, VALUE, GRADIENT = "jaxveh", "jaxveh, vmapped", "C++ limit", "value", "value and gradient"
+BLOCK = 64
 BOUNDS = {"float64": 1.3, "float32": 1.6}
 
 
@@ -49,7 +50,13 @@ def car(problem: Drives, dtype: np.typing.DTypeLike) -> vehicles.SevenDOF:
     )
 
 
-def simulate(problem: Drives, cars: vehicles.SevenDOF, speed: jax.Array, solver: diffrax.AbstractSolver | None = None):
+def simulate(
+    problem: Drives,
+    cars: vehicles.SevenDOF,
+    speed: jax.Array,
+    solver: diffrax.AbstractSolver | None = None,
+    block: int | None = BLOCK,
+):
     """States of every row, leaves (rows + 1, runs) or (rows + 1,), from drives' speeds, (runs,) or a scalar, in m/s."""
     p = problem
 
@@ -62,13 +69,14 @@ def simulate(problem: Drives, cars: vehicles.SevenDOF, speed: jax.Array, solver:
 
     x0 = cars.start(0.0, inputs(jnp.zeros((), speed.dtype)), v_x=speed)
     x0 = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, jnp.shape(speed)), x0)
-    return simulation.fixed_steps(rates, x0, cars, rows=p.rows, step=p.step, steps_a_row=p.steps_a_row, solver=solver)
+    times = {"rows": p.rows, "step": p.step, "steps_a_row": p.steps_a_row}
+    return simulation.fixed_steps(rates, x0, cars, **times, solver=solver, block=block)
 
 
 def mean_square(problem: Drives, chosen: tuple, cars: vehicles.SevenDOF, speed: jax.Array, truth) -> jax.Array:
     """Mean squared distance of yaw rate and lateral velocity from `truth`; `chosen` are mass, front and rear tyre."""
     cars = eqx.tree_at(chosen_of, cars, chosen)
-    x = simulate(problem, cars, speed, statespace.RolledRK4())
+    x = simulate(problem, cars, speed, statespace.RolledRK4(), block=None)
     return jnp.mean((x.yaw_rate - truth.yaw_rate) ** 2) + jnp.mean((x.v_y - truth.v_y) ** 2)
 
 

@@ -1,7 +1,8 @@
 """`python -m benchmarks.two_cores [--runs N] [--rounds N]`: what a second core gives 1000 drives of the 7-DOF car.
 
 XLA does not use it by itself: `shard_map` over two host devices does. Wall time, not pinned to a core, so that it stands
-apart from the other benchmarks; the machine should have nothing else to do.
+apart from the other benchmarks; the machine should have nothing else to do. The processors' time over the wall time says
+whether it had: 1 with one device and 2 with two. Beside other programs both threads may well share one core, at 1 and 1.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 from .machine import VECTOR_WIDTH_FLAG
 
-__all__ = ["main", "measure"]
+__all__ = ["Time", "main", "measure"]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -30,13 +32,32 @@ def main(arguments: list[str] | None = None) -> int:
         parser.error(f"--runs is {options.runs}; it must be even, and --rows and --rounds at least 1")
     os.environ["XLA_FLAGS"] = f"{VECTOR_WIDTH_FLAG} --xla_force_host_platform_device_count=2"
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
-    ratios = measure(options.runs, options.rows, options.rounds)
+    found = measure(options.runs, options.rows, options.rounds)
+    ratios, busy = (
+        [one.wall / two.wall for one, two in found],
+        [[t.busy for t in times] for times in zip(*found, strict=True)],
+    )
     print(f"two cores: {statistics.median(ratios):.2f} times one core (rounds: {min(ratios):.2f} to {max(ratios):.2f})")
+    print(
+        f"processors busy: {statistics.median(busy[0]):.2f} of the time with one, {statistics.median(busy[1]):.2f} with two"
+    )
     return 0
 
 
-def measure(runs: int, rows: int, rounds: int) -> list[float]:
-    """Wall time of one device over that of two, a number a round; both give the same states, or it raises."""
+class Time(NamedTuple):
+    """Seconds by the clock, and of all processors."""
+
+    wall: float
+    processors: float
+
+    @property
+    def busy(self) -> float:
+        """How many processors worked."""
+        return self.processors / self.wall
+
+
+def measure(runs: int, rows: int, rounds: int) -> list[tuple[Time, Time]]:
+    """Times of one device and of two, a pair a round; both give the same states, or it raises."""
     import jax
     import numpy as np
 
@@ -44,7 +65,7 @@ def measure(runs: int, rows: int, rounds: int) -> list[float]:
     one, two = contestants(runs, rows)
     for a, b in zip(jax.tree.leaves(one()), jax.tree.leaves(two()), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9)
-    return [_seconds(one) / _seconds(two) for _ in range(rounds)]
+    return [(_time(one), _time(two)) for _ in range(rounds)]
 
 
 def contestants(runs: int, rows: int) -> tuple[Callable[[], object], Callable[[], object]]:
@@ -70,10 +91,10 @@ def contestants(runs: int, rows: int) -> tuple[Callable[[], object], Callable[[]
     return lambda: jax.block_until_ready(whole(cars, speed)), lambda: jax.block_until_ready(split(*given))
 
 
-def _seconds(function: Callable[[], object]) -> float:
-    started = time.perf_counter()
+def _time(function: Callable[[], object]) -> Time:
+    wall, processors = time.perf_counter(), time.process_time()
     function()
-    return time.perf_counter() - started
+    return Time(time.perf_counter() - wall, time.process_time() - processors)
 
 
 if __name__ == "__main__":

@@ -45,10 +45,11 @@ template <bool Turned, class P, class S>
 INLINE Pushed<P> wheel(P u, P v, P omega, P load, P stiffness, P friction, S torque, const Body<S> &body, Steered<S> steer) {
   const P along = Turned ? u * P(steer.cosine) + v * P(steer.sine) : u, across = Turned ? v * P(steer.cosine) - u * P(steer.sine) : v;
   const P inverse = quotient(P(S(1)), regularised(along)), rim = omega * P(body.radius);
-  const P scale = stiffness * inverse, x_x = (rim - along) * scale, x_y = P(S(0)) - across * scale;
-  const P x = square_root(x_x * x_x + x_y * x_y + P(S(least_slip * least_slip)));
+  // The floor is that of the scaled slips: one number a run, which the compiler takes out of the loop.
+  const P s_x = (rim - along) * inverse, s_y = P(S(0)) - across * inverse, floor = quotient(P(S(least_slip)), stiffness);
+  const P s = square_root(s_x * s_x + s_y * s_y + floor * floor), x = stiffness * s;
   const P force = friction * load * sine(P(body.shape) * arctan(x - P(body.curvature) * (x - arctan(x))));
-  const P per_slip = quotient(force, x), F_x = per_slip * x_x, F_y = per_slip * x_y;
+  const P per_slip = quotient(force, s), F_x = per_slip * s_x, F_y = per_slip * s_y;
   const P slowing = P(body.rolling * body.radius) * load * opposing(rim);
   const P spin_rate = (P(torque) - slowing - P(body.radius) * F_x) * P(1 / body.wheel_inertia);
   if constexpr (Turned) return {F_x * P(steer.cosine) - F_y * P(steer.sine), F_x * P(steer.sine) + F_y * P(steer.cosine), spin_rate};

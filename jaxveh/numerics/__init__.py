@@ -16,7 +16,7 @@ from jaxveh.numerics.linear_algebra import (
     solve_psd,
     symmetric,
 )
-from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu, stored
+from jaxveh.numerics.platform import barrier, barriers_hold, kept, on_cpu, stored
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 from jaxveh.numerics.roots import secant
@@ -41,6 +41,7 @@ __all__ = [
     "interpolate_linear",
     "interpolate_smooth",
     "inverse_psd",
+    "kept",
     "log",
     "log_det",
     "mahalanobis",

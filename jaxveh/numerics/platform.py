@@ -45,6 +45,19 @@ def barrier(tree: Tree) -> Tree:
     return lax.optimization_barrier(tree) if on_cpu() else tree
 
 
+def kept(tree: Tree) -> Tree:
+    """`tree`, which XLA on the CPU computes once and stores as by a `barrier`, in every version of jax.
+
+    For rates of hundreds of operations, where computing them twice costs more than the branch that replaces the barrier before
+    jax 0.12: with it 1000 7-DOF cars take 175 instead of 400 ns a step there, and one takes 7.3 instead of 9.6 us.
+    """
+    leaves, structure = jax.tree.flatten(tree)
+    if not on_cpu() or not leaves:
+        return tree
+    hold = lax.optimization_barrier if barriers_hold() else _hold_by_branch
+    return jax.tree.unflatten(structure, hold(leaves))
+
+
 def stored(tree: Tree) -> Tree:
     """`tree` with its arrays held in memory as by a `barrier`, those long enough to be worth it and short enough for the cache.
 

@@ -37,7 +37,7 @@ class RK4(diffrax.AbstractSolver):
         half = t0 + (t1 - t0) / 2
 
         def stage(t, y):
-            return numerics.barrier(terms.vf_prod(t, y, args, dt))
+            return numerics.kept(terms.vf_prod(t, y, args, dt))
 
         def ahead(share, k):
             return jax.tree.map(lambda y, d: y + share * d, y0, k)

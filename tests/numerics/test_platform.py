@@ -104,6 +104,24 @@ def test_stored_by_a_branch_is_left_by_xla(monkeypatch):
     assert "conditional(" in compiled
 
 
+@pytest.mark.parametrize("barriers", [True, False])
+@pytest.mark.parametrize("size", [(), (1,), (5000,)])
+def test_kept_holds_every_size_and_changes_no_number(size, barriers, monkeypatch):
+    monkeypatch.setattr(platform, "barriers_hold", lambda: barriers)
+    law = lambda between: lambda x: jnp.sum(jnp.prod(jnp.stack(between((jnp.sin(x), x * x))), axis=0))
+    ours, theirs = law(numerics.kept), law(lambda tree: tree)
+    x = jnp.full(size, 0.3)
+    assert ("optimization_barrier" if barriers else "cond[") in str(jax.make_jaxpr(ours)(x))
+    for derivative in (lambda f: f, jax.grad, jax.jacfwd, lambda f: lambda x: jax.vmap(f)(jnp.stack([x, 2 * x]))):
+        np.testing.assert_allclose(derivative(ours)(x), derivative(theirs)(x), rtol=1e-13)
+
+
+def test_kept_leaves_alone_what_has_no_arrays(monkeypatch):
+    assert numerics.kept((None, ())) == (None, ())
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    assert "optimization_barrier" not in str(jax.make_jaxpr(lambda x: numerics.kept((x,)))(X))
+
+
 def test_stored_of_several_types_at_once(monkeypatch):
     monkeypatch.setattr(platform, "barriers_hold", lambda: False)
     given = jnp.ones(200), jnp.ones(200, jnp.float32), jnp.ones(200, jnp.int32)

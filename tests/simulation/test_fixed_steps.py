@@ -1,5 +1,6 @@
 """Equal steps of a diffrax solver: against a closed form, against diffeqsolve, in batches, in gradients."""
 
+import sys
 from typing import NamedTuple
 
 import diffrax
@@ -58,6 +59,46 @@ def test_a_batch_is_its_runs():
     np.testing.assert_allclose(whole.place, mapped(stiffness).place, rtol=1e-14)
 
 
+@pytest.mark.parametrize("barriers", [True, False])
+@pytest.mark.parametrize("runs", [5, 6, 7])  # the last block of 3 has two runs, three, one
+def test_blocks_are_the_whole_batch(runs, barriers, monkeypatch):
+    # The module; its name in the package is the function's.
+    monkeypatch.setattr(sys.modules[simulation.fixed_steps.__module__], "barriers_hold", lambda: barriers)
+    shapes = []
+
+    def seen(t, x, args):
+        stiffness, scale = args
+        shapes.append(x.place.shape)
+        return rates(t, x, stiffness * scale)
+
+    stiffness, scale = jnp.linspace(1.0, 9.0, runs), jnp.asarray(1.1)
+    start = Spring(jnp.linspace(-1.0, 1.0, runs), jnp.zeros(runs))
+    run = lambda stiffness, block: simulation.fixed_steps(
+        seen, start, (stiffness, scale), rows=3, step=0.01, steps_a_row=4, block=block
+    )
+    whole = run(stiffness, None)
+    shapes.clear()
+    cut = run(stiffness, 3)
+    assert set(shapes) == {(3,) if barriers else (runs,)}
+    assert cut.place.shape == (4, runs)
+    for a, b in zip(cut, whole, strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-14, atol=1e-15)
+    slope = lambda block: jax.grad(lambda k: jnp.sum(run(k, block).speed[-1] ** 2))(stiffness)
+    np.testing.assert_allclose(slope(3), slope(None), rtol=1e-12)
+
+
+def test_blocks_as_long_as_the_batch_and_of_one_run_change_nothing():
+    for start in (START, jax.tree.map(lambda leaf: leaf[None], START)):
+        expected, x = (simulation.fixed_steps(rates, start, 4.0, rows=2, step=0.01, block=b) for b in (None, 1))
+        np.testing.assert_array_equal(x.place, expected.place)
+
+
+def test_blocks_need_one_number_a_run():
+    for wrong in (Spring(jnp.ones((2, 3)), jnp.ones((2, 3))), Spring(jnp.ones(3), jnp.ones(()))):
+        with pytest.raises(InputError, match="x0: shapes"):
+            simulation.fixed_steps(rates, wrong, 4.0, rows=2, step=0.1, block=2)
+
+
 @pytest.mark.parametrize("solver", [statespace.RK4(), statespace.RolledRK4()])
 def test_gradients_are_those_of_the_closed_form(solver):
     place = lambda k: simulation.fixed_steps(rates, START, k, rows=5, step=0.01, steps_a_row=20, solver=solver).place[
@@ -74,7 +115,7 @@ def test_single_precision_stays_single():
     assert x.place.dtype == x.speed.dtype == jnp.float32
 
 
-@pytest.mark.parametrize("wrong", [{"rows": 0}, {"step": 0.0}, {"step": -1.0}, {"steps_a_row": 0}])
+@pytest.mark.parametrize("wrong", [{"rows": 0}, {"step": 0.0}, {"step": -1.0}, {"steps_a_row": 0}, {"block": 0}])
 def test_wrong_numbers_are_named(wrong):
     with pytest.raises(InputError, match=next(iter(wrong))):
         simulation.fixed_steps(rates, START, 4.0, **{"rows": 2, "step": 0.1, **wrong})
