@@ -15,6 +15,12 @@ from jaxveh.vehicles.wheels import gravity
 ODD = dict(toe_front=0.004, toe_rear=-0.003, camber_front=-0.02, camber_rear=0.015)
 
 
+def smooth_sign(speed):
+    """The direction against which brakes push: the curve of fifth order from -1 to 1 over 15/16 m/s to either side."""
+    s = jnp.clip(speed / (15 / 16), -1.0, 1.0)
+    return (15 * s - 10 * s**3 + 3 * s**5) / 8
+
+
 def wheels(values, prefix):
     return jnp.stack([getattr(values, f"{prefix}_{c}") for c in CORNERS])
 
@@ -40,7 +46,7 @@ def other_power(car, mechanism, x, u, shown):
     whole = own + jnp.cross(arms, push)
     about = lambda moment: jnp.sum(moment * axes, 1)
     on_body = whole - about(whole)[:, None] * axes
-    on_spin = about(own) - radii * F_x - car.rolling_resistance * load * radii * jnp.tanh(omegas * radii / 0.5)
+    on_spin = about(own) - radii * F_x - car.rolling_resistance * load * radii * smooth_sign(omegas * radii)
     share = jnp.array([0.5, 0.5, 0.0, 0.0]) * u.drive_torque
     slow = 0.5 * jnp.array([0.65, 0.65, 0.35, 0.35]) * u.brake_torque
     drag = car.drag * x.v_x * jnp.abs(x.v_x)
@@ -52,7 +58,7 @@ def other_power(car, mechanism, x, u, shown):
         W = Rd @ R.T
         omega = jnp.stack([W[2, 1], W[0, 2], W[1, 0]])
         turns = jax.lax.stop_gradient(qd_now[10:])
-        torque = share - slow * jnp.tanh(turns * radii / 0.5)
+        torque = share - slow * smooth_sign(turns * radii)
         return (
             jnp.sum(push * moves)
             + jnp.sum(on_body @ omega)

@@ -106,7 +106,8 @@ def test_the_record_of_the_passenger_car_is_the_papers_car():
 def test_every_fidelity_of_a_named_car():
     x = {name: vehicles.named_car("compact_car", name) for name in sets.FIDELITIES if name != "kinematic-trailer"}
     assert {type(vehicle).__name__ for vehicle in x.values()} == {
-        "Longitudinal", "Kinematic", "LinearSingleTrack", "SingleTrack", "SevenDOF",
+        "Longitudinal", "Kinematic", "LinearSingleTrack", "SingleTrack", "SingleTrack3DOF", "TwoTrack2DOF", "TwoTrack3DOF",
+        "Roll3DOF", "Roll4DOF", "SevenDOF", "FourteenDOF",
     }  # fmt: skip
     assert float(x["kinematic"].wheelbase) == pytest.approx(0.88392 + 1.50876)
     assert float(x["longitudinal"].wheel_inertia) == 1.7
