@@ -13,7 +13,7 @@ import numpy as np
 from jax import lax
 
 from jaxveh._core.errors import InputError, check_positive
-from jaxveh.numerics.platform import barriers_hold, on_cpu
+from jaxveh.numerics import barriers_hold, on_cpu
 from jaxveh.statespace import RK4
 
 
