@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import jax
 
-from jaxveh import InputError, manoeuvres
+from jaxveh import InputError, manoeuvres, vehicles
 from jaxveh._core.errors import check_one_of
 from jaxveh.manoeuvres import MANOEUVRES, Course, manoeuvre_options
 
@@ -82,12 +82,22 @@ def width_of(one: Asked) -> float:
 
 
 def _of_car(name: str, car: Any) -> dict[str, float]:
-    """What the manoeuvre would have to be told of the car: its mass and wheels where it brakes, its axles where it steers."""
+    """What the manoeuvre would have to be told of the car: its mass and wheels where it brakes, its axles and how much it
+    understeers where a driver follows a path."""
     known = manoeuvre_options(name)
     found = {part: getattr(car, part, None) for part in ("mass", "wheel_radius")}
     if hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg"):
         found["wheelbase"] = car.front_axle_to_cg + car.rear_axle_to_cg
+    if "understeer_gradient" in known:
+        found["understeer_gradient"] = _understeer(car)
     return {part: float(value) for part, value in found.items() if part in known and value is not None}
+
+
+def _understeer(car: Any) -> Any:
+    """Understeer gradient of the car on its tyres' slopes, rad s^2/m; None for a car without tyres."""
+    if isinstance(car, vehicles.LinearSingleTrack):
+        return car.understeer_gradient
+    return vehicles.linear_single_track(car).understeer_gradient if hasattr(car, "front") else None
 
 
 def _settings(name: str, settings: Sequence[str]) -> dict[str, float | int]:

@@ -65,7 +65,9 @@ def test_what_the_manoeuvre_wants_of_the_car_comes_from_the_car():
     brakes = asked("braking-in-a-turn", None, None, None, (), car).options
     assert brakes == {"mass": 1420.0, "wheel_radius": pytest.approx(0.3)}
     path = asked("iso-lane-change", None, None, None, ("wheelbase=3", "width=2"), car)
-    assert path.options == {"wheelbase": 3.0, "width": 2.0}
+    understeer = float(vehicles.linear_single_track(car).understeer_gradient)
+    assert 0.003 < understeer < 0.008
+    assert path.options == {"wheelbase": 3.0, "width": 2.0, "understeer_gradient": understeer}
     assert course_of(path).lanes[0].left == pytest.approx((1.1 * 2 + 0.25) / 2)
     assert asked("slalom-course", None, None, None, ("count=4",), car).options["count"] == 4
 
