@@ -106,6 +106,7 @@ def test_real_log_taken_at_its_word_beats_the_open_loop():
     assert numbers["sideslip_rmse_deg"] < 0.35
 
 
+@pytest.mark.full
 def test_real_log_calibrated_blind():
     first, rest, car = real_log()
     blind = ["steer", "v_x", "a_x", "a_y", "yaw_rate"]

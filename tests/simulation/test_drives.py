@@ -138,6 +138,7 @@ def test_a_slow_car_gets_short_steps_and_a_crawling_one_an_implicit_solver():
     assert crawling.controller is not None
 
 
+@pytest.mark.full
 def test_steps_that_are_too_long_are_never_silent():
     """At walking speed the spins are faster than 2 ms can hold: insisting warns, "auto" does not need to."""
     drive = manoeuvres.step_steer(3.0, 0.05, start=0.1, duration=0.6)
