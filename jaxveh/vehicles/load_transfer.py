@@ -9,7 +9,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.vehicles.wheels import Wheels, clip_transfer
 
@@ -123,8 +122,3 @@ def axle_loads(car: Any, a_x: Any, g_z: Any) -> tuple[Any, Any]:
     moved = car.mass * car.cg_height / (a + b) * a_x
     front = jnp.clip(weight * (b / (a + b)) - moved, 0.0, weight)
     return front, weight - front
-
-
-def state_of(transfer: AbstractLoadTransfer, x: Any) -> Any:
-    """The transfer's own states out of the car's."""
-    return record_type("TransferState", transfer.state_names)(*[getattr(x, name) for name in transfer.state_names])
