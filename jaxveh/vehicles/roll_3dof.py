@@ -9,12 +9,11 @@ from jaxveh._core.names import record
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.base import AbstractVehicle, Motion
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic
 from jaxveh.vehicles.rolling_body import check_rolling_car, roll_accelerations, roll_loads, roll_outputs
 from jaxveh.vehicles.two_track import (
-    UNITS,
+    AbstractTwoTrack,
     body_outputs,
     filled,
     positions_of,
@@ -30,7 +29,7 @@ from jaxveh.vehicles.wheels import gravity, pushed
 STATES = ("v_y", "yaw", "yaw_rate", "roll", "roll_rate")
 
 
-class Roll3DOF(AbstractVehicle):
+class Roll3DOF(AbstractTwoTrack):
     """`TwoTrack2DOF` with a body that rolls: lateral, yaw and roll at a given forward speed.
 
     Around the roll axis, which joins the roll centres, the sprung mass leans on springs and dampers; all else stays upright. The
@@ -96,17 +95,6 @@ class Roll3DOF(AbstractVehicle):
     def state_type(self):
         """`v_y`, `yaw`, `yaw_rate`, `roll`, `roll_rate`, then the states of the load transfer and of dynamic tyres."""
         return state_type(self, "Roll3DOFState", STATES)
-
-    @property
-    def units(self):
-        return dict(UNITS)
-
-    @property
-    def wheel_positions(self):
-        return tuple(positions_of(self))
-
-    def motion(self, x, u):
-        return Motion(0.0, 0.0, x.yaw, u.v_x, x.v_y, x.yaw_rate)
 
     def start(self, t, u, **values):
         return started(self, dict.fromkeys(STATES), u.v_x, values, lambda x: self._contacts(x, u, LEVEL)[0])

@@ -9,13 +9,12 @@ from jaxveh._core.names import record
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.base import AbstractVehicle, Motion
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic
 from jaxveh.vehicles.rolling_body import check_rolling_car, roll_accelerations, roll_loads, roll_outputs
 from jaxveh.vehicles.traction import drive_power, driven_wheels, torque_acceleration
 from jaxveh.vehicles.two_track import (
-    UNITS,
+    AbstractTwoTrack,
     air_drag,
     body_outputs,
     filled,
@@ -32,7 +31,7 @@ from jaxveh.vehicles.wheels import gravity, pushed
 STATES = ("v_x", "v_y", "yaw", "yaw_rate", "roll", "roll_rate")
 
 
-class Roll4DOF(AbstractVehicle):
+class Roll4DOF(AbstractTwoTrack):
     """`TwoTrack3DOF` with a body that rolls: longitudinal, lateral, yaw and roll.
 
     Around the roll axis, which joins the roll centres, the sprung mass leans on springs and dampers; all else stays upright. The
@@ -105,17 +104,6 @@ class Roll4DOF(AbstractVehicle):
     def state_type(self):
         """`v_x`, `v_y`, `yaw`, `yaw_rate`, `roll`, `roll_rate`, then the states of the load transfer and of dynamic tyres."""
         return state_type(self, "Roll4DOFState", STATES)
-
-    @property
-    def units(self):
-        return dict(UNITS)
-
-    @property
-    def wheel_positions(self):
-        return tuple(positions_of(self))
-
-    def motion(self, x, u):
-        return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
 
     def start(self, t, u, **values):
         """Straight running; `v_x` is the speed (m/s), 0 unless given."""

@@ -9,11 +9,10 @@ from jaxveh._core.names import record
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.base import AbstractVehicle, Motion
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, LaggedLoads, planar_loads
 from jaxveh.vehicles.two_track import (
-    UNITS,
+    AbstractTwoTrack,
     air_drag,
     body_outputs,
     check_car,
@@ -32,7 +31,7 @@ SPINS = named("omega")
 STATES = ("v_x", "v_y", "yaw", "yaw_rate", *SPINS)
 
 
-class SevenDOF(AbstractVehicle):
+class SevenDOF(AbstractTwoTrack):
     """A rigid car on four wheels that spin: the truth of many papers and the work horse of simulations.
 
     With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) the wheels' places, T_i the torques and
@@ -88,17 +87,6 @@ class SevenDOF(AbstractVehicle):
     def state_type(self):
         """The body's and the wheels' states, then those of the load transfer and of dynamic tyres (`fl_<name>` ...)."""
         return state_type(self, "SevenDOFState", STATES)
-
-    @property
-    def units(self):
-        return dict(UNITS)
-
-    @property
-    def wheel_positions(self):
-        return tuple(positions_of(self))
-
-    def motion(self, x, u):
-        return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
 
     def start(self, t, u, **values):
         """Straight running with wheels that roll freely; `v_x` is the speed (m/s), 0 unless given."""

@@ -12,6 +12,7 @@ from jaxveh._core.names import check_names, record_type
 from jaxveh._core.parameter import check_parameters
 from jaxveh.roads import Ground
 from jaxveh.tyres import AbstractTyre
+from jaxveh.vehicles.base import AbstractVehicle, Motion
 from jaxveh.vehicles.wheels import Pushed, Tyres, Wheels, contact, corners, each, frictions, named, rolling
 
 UNITS = {
@@ -26,6 +27,22 @@ UNITS = {
     "drive_power": "W",
 }
 """Units of what two-track cars have as states, inputs and outputs."""
+
+
+class AbstractTwoTrack(AbstractVehicle):
+    """A car on four wheels without a suspension of its own: what its kinds share. Each has the fields of `positions_of`."""
+
+    @property
+    def units(self):
+        return dict(UNITS)
+
+    @property
+    def wheel_positions(self):
+        return tuple(positions_of(self))
+
+    def motion(self, x, u):
+        # The speed is a state, or given.
+        return Motion(0.0, 0.0, x.yaw, x.v_x if hasattr(x, "v_x") else u.v_x, x.v_y, x.yaw_rate)
 
 
 def check_car(car: Any) -> None:

@@ -9,11 +9,10 @@ from jaxveh._core.names import record
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.base import AbstractVehicle, Motion
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic, planar_loads
 from jaxveh.vehicles.two_track import (
-    UNITS,
+    AbstractTwoTrack,
     body_outputs,
     check_car,
     filled,
@@ -30,7 +29,7 @@ from jaxveh.vehicles.wheels import gravity, pushed
 STATES = ("v_y", "yaw", "yaw_rate")
 
 
-class TwoTrack2DOF(AbstractVehicle):
+class TwoTrack2DOF(AbstractTwoTrack):
     """A rigid car on four freely rolling wheels at a given forward speed: `SingleTrack` with tracks and lateral load transfer.
 
     With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) their places (R. Rajamani, Vehicle Dynamics and
@@ -76,17 +75,6 @@ class TwoTrack2DOF(AbstractVehicle):
     def state_type(self):
         """`v_y`, `yaw`, `yaw_rate`, then the states of the load transfer and of dynamic tyres (`fl_<name>` ...)."""
         return state_type(self, "TwoTrack2DOFState", STATES)
-
-    @property
-    def units(self):
-        return dict(UNITS)
-
-    @property
-    def wheel_positions(self):
-        return tuple(positions_of(self))
-
-    def motion(self, x, u):
-        return Motion(0.0, 0.0, x.yaw, u.v_x, x.v_y, x.yaw_rate)
 
     def start(self, t, u, **values):
         return started(self, dict.fromkeys(STATES), u.v_x, values, lambda x: self._contacts(x, u, LEVEL)[0])

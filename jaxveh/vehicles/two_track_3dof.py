@@ -9,12 +9,11 @@ from jaxveh._core.names import record
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.base import AbstractVehicle, Motion
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic, planar_loads
 from jaxveh.vehicles.traction import drive_power, driven_wheels, torque_acceleration
 from jaxveh.vehicles.two_track import (
-    UNITS,
+    AbstractTwoTrack,
     air_drag,
     body_outputs,
     check_car,
@@ -32,7 +31,7 @@ from jaxveh.vehicles.wheels import gravity, pushed
 STATES = ("v_x", "v_y", "yaw", "yaw_rate")
 
 
-class TwoTrack3DOF(AbstractVehicle):
+class TwoTrack3DOF(AbstractTwoTrack):
     """`SevenDOF` without its stiff spins: wheel forces follow at once from the torques.
 
     With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) their places, g_x, g_y gravity along a sloping
@@ -88,17 +87,6 @@ class TwoTrack3DOF(AbstractVehicle):
     def state_type(self):
         """`v_x`, `v_y`, `yaw`, `yaw_rate`, then the states of the load transfer and of dynamic tyres (`fl_<name>` ...)."""
         return state_type(self, "TwoTrack3DOFState", STATES)
-
-    @property
-    def units(self):
-        return dict(UNITS)
-
-    @property
-    def wheel_positions(self):
-        return tuple(positions_of(self))
-
-    def motion(self, x, u):
-        return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
 
     def start(self, t, u, **values):
         """Straight running; `v_x` is the speed (m/s), 0 unless given."""
