@@ -14,6 +14,8 @@ class CanonicalChannel(NamedTuple):
     meaning: str
 
 
+WHEELS = (("fl", "front left"), ("fr", "front right"), ("rl", "rear left"), ("rr", "rear right"))
+
 CANONICAL: dict[str, CanonicalChannel] = {
     name: CanonicalChannel(unit, meaning)
     for name, unit, meaning in (
@@ -37,13 +39,13 @@ CANONICAL: dict[str, CanonicalChannel] = {
         ("steer", "rad", "mean angle of the front road wheels, positive to the left"),
         ("steer_left", "rad", "angle of the front left road wheel"),
         ("steer_right", "rad", "angle of the front right road wheel"),
-        ("steer_wheel", "rad", "angle of the steering wheel"),
-        ("steer_wheel_rate", "rad/s", "speed of the steering wheel"),
-        ("steer_torque", "N*m", "torque at the steering wheel"),
-        ("wheel_speed_front_left", "rad/s", "rotation of the front left wheel, positive forward"),
-        ("wheel_speed_front_right", "rad/s", "rotation of the front right wheel"),
-        ("wheel_speed_rear_left", "rad/s", "rotation of the rear left wheel"),
-        ("wheel_speed_rear_right", "rad/s", "rotation of the rear right wheel"),
+        ("steering_wheel", "rad", "angle of the steering wheel, positive to the left"),
+        ("steering_wheel_rate", "rad/s", "speed of the steering wheel"),
+        ("steering_torque", "N*m", "torque at the steering wheel"),
+        *[(f"omega_{at}", "rad/s", f"rotation of the {wheel} wheel, positive forward") for at, wheel in WHEELS],
+        *[(f"wheel_speed_{at}", "m/s", f"rotation of the {wheel} wheel times its radius") for at, wheel in WHEELS],
+        *[(f"load_{at}", "N", f"wheel load, {wheel}") for at, wheel in WHEELS],
+        *[(f"torque_{at}", "N*m", f"torque on the {wheel} wheel, positive when it drives") for at, wheel in WHEELS],
         ("throttle", "1", "driver's demand, 0 to 1"),
         ("brake_pressure", "Pa", "brake line pressure"),
         ("drive_torque", "N*m", "sum of the driving torques at the wheels"),
@@ -53,8 +55,8 @@ CANONICAL: dict[str, CanonicalChannel] = {
         ("friction", "1", "friction coefficient of the road"),
         ("slip_angle_front", "rad", "front axle, positive slip angle gives positive lateral force"),
         ("slip_angle_rear", "rad", "rear axle, positive slip angle gives positive lateral force"),
-        ("F_y_front", "N", "lateral force of the front axle, wheel axes"),
-        ("F_y_rear", "N", "lateral force of the rear axle, wheel axes"),
+        ("F_yf", "N", "lateral force of the front axle, wheel axes"),
+        ("F_yr", "N", "lateral force of the rear axle, wheel axes"),
     )
 }
 """Name to unit and meaning. Other names are allowed everywhere; they keep the unit of their file."""

@@ -29,15 +29,11 @@ _WORDS = {
     "steer": "steer",
     "F_yf": "front lateral force",
     "F_yr": "rear lateral force",
-    "F_y_front": "front lateral force",
-    "F_y_rear": "rear lateral force",
     "slip_angle_front": "front slip angle",
     "slip_angle_rear": "rear slip angle",
 }
 
 _UNITS = {
-    "F_yf": "N",
-    "F_yr": "N",
     "load_front": "N",
     "load_rear": "N",
     "yaw_acceleration": "rad/s^2",

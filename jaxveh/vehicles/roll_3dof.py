@@ -33,10 +33,10 @@ class Roll3DOF(AbstractTwoTrack):
     """`TwoTrack2DOF` with a body that rolls: lateral, yaw and roll at a given forward speed.
 
     Around the roll axis, which joins the roll centres, the sprung mass leans on springs and dampers; all else stays upright. The
-    equations, coupled by the sprung mass's height over the axis, are exact in the roll angle and stand in
-    `rolling_body.roll_accelerations`; for small angles and rates they are those of R. Rajamani (Vehicle Dynamics and Control, 2nd
-    ed., ch. 15) and M. Abe (Vehicle Handling Dynamics, ch. 6), there partly in SAE axes, here in ISO 8855: roll is positive
-    with the left side up, which is how a car leans in a left turn, and its centre of gravity then moves by -h sin(phi):
+    equations, coupled by the sprung mass's height over the axis, are exact in the roll angle but for the inertias' tilting, and
+    stand in `rolling_body.roll_accelerations`; for small angles and rates they are those of R. Rajamani (Vehicle Dynamics and
+    Control, 2nd ed., ch. 15) and M. Abe (Vehicle Handling Dynamics, ch. 6), there partly in SAE axes, here in ISO 8855: roll is
+    positive with the left side up, which is how a car leans in a left turn, and its centre of gravity then moves by -h sin(phi):
 
         m (dv_y/dt + v_x r) - m_s h dp/dt           = sum Y_i + m g_y
         I_z dr/dt - I_xz dp/dt                      = sum (x_i Y_i - y_i X_i + M_z,i)
@@ -47,7 +47,8 @@ class Roll3DOF(AbstractTwoTrack):
     those of `rolling_body.roll_loads`.
 
     **Parameters**: `mass`, `sprung_mass` (kg: the whole car's, and that of what rolls), `yaw_inertia` (kg m^2, whole car),
-    `roll_inertia` (kg m^2: of the sprung mass about its own centre of gravity), `roll_yaw_product` (kg m^2: the sum of m x z),
+    `roll_inertia` (kg m^2: of the sprung mass about its own centre of gravity), `roll_yaw_product` (kg m^2: the integral
+    of x z dm over what rolls, about the point of the roll axis below the car's centre of gravity),
     `front_axle_to_cg`, `rear_axle_to_cg`, `track_front`, `track_rear`, `cg_height` (m, whole car), `unsprung_height` (m: the
     centre of gravity of what does not roll), `roll_centre_front`, `roll_centre_rear` (m over the road), `roll_stiffness_front`,
     `roll_stiffness_rear` (N m/rad, springs and bars), `roll_damping_front`, `roll_damping_rear` (N m s/rad), `front` and `rear`:

@@ -10,7 +10,7 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
-from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic
+from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, LaggedLoads
 from jaxveh.vehicles.rolling_body import check_rolling_car, roll_accelerations, roll_loads, roll_outputs
 from jaxveh.vehicles.traction import drive_power, driven_wheels, torque_acceleration
 from jaxveh.vehicles.two_track import (
@@ -35,10 +35,10 @@ class Roll4DOF(AbstractTwoTrack):
     """`TwoTrack3DOF` with a body that rolls: longitudinal, lateral, yaw and roll.
 
     Around the roll axis, which joins the roll centres, the sprung mass leans on springs and dampers; all else stays upright. The
-    equations, coupled by the sprung mass's height over the axis, are exact in the roll angle and stand in
-    `rolling_body.roll_accelerations`; for small angles and rates they are those of R. Rajamani (Vehicle Dynamics and Control, 2nd
-    ed., ch. 15) and M. Abe (Vehicle Handling Dynamics, ch. 6), there partly in SAE axes, here in ISO 8855: roll is positive
-    with the left side up, which is how a car leans in a left turn, and its centre of gravity then moves by -h sin(phi):
+    equations, coupled by the sprung mass's height over the axis, are exact in the roll angle but for the inertias' tilting, and
+    stand in `rolling_body.roll_accelerations`; for small angles and rates they are those of R. Rajamani (Vehicle Dynamics and
+    Control, 2nd ed., ch. 15) and M. Abe (Vehicle Handling Dynamics, ch. 6), there partly in SAE axes, here in ISO 8855: roll is
+    positive with the left side up, which is how a car leans in a left turn, and its centre of gravity then moves by -h sin(phi):
 
         m (dv_x/dt - v_y r)                         = sum X_i - drag v_x |v_x| + m g_x
         m (dv_y/dt + v_x r) - m_s h dp/dt           = sum Y_i + m g_y
@@ -50,7 +50,8 @@ class Roll4DOF(AbstractTwoTrack):
     Wheel loads are those of `rolling_body.roll_loads`, wheel forces those of the torques as in `TwoTrack3DOF`.
 
     **Parameters**: `mass`, `sprung_mass` (kg: the whole car's, and that of what rolls), `yaw_inertia` (kg m^2, whole car),
-    `roll_inertia` (kg m^2: of the sprung mass about its own centre of gravity), `roll_yaw_product` (kg m^2: the sum of m x z),
+    `roll_inertia` (kg m^2: of the sprung mass about its own centre of gravity), `roll_yaw_product` (kg m^2: the integral
+    of x z dm over what rolls, about the point of the roll axis below the car's centre of gravity),
     `front_axle_to_cg`, `rear_axle_to_cg`, `track_front`, `track_rear`, `cg_height` (m, whole car), `unsprung_height` (m: the
     centre of gravity of what does not roll), `roll_centre_front`, `roll_centre_rear` (m over the road), `roll_stiffness_front`,
     `roll_stiffness_rear` (N m/rad, springs and bars), `roll_damping_front`, `roll_damping_rear` (N m s/rad), `front` and `rear`:
@@ -89,7 +90,7 @@ class Roll4DOF(AbstractTwoTrack):
     drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.0)
     rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.0)
     drive: AbstractDrive = eqx.field(default_factory=AxleDrive)
-    load_transfer: AbstractLoadTransfer = eqx.field(default_factory=QuasiStatic)
+    load_transfer: AbstractLoadTransfer = eqx.field(default_factory=LaggedLoads)
     mirrored: bool = eqx.field(static=True, default=True)
     crawl_speed: float = eqx.field(static=True, default=3.0)
 
@@ -122,7 +123,7 @@ class Roll4DOF(AbstractTwoTrack):
         found = roll_accelerations(self, x, X, push.F_y, push.M_z, g_z)
         rates = (
             found.a_x + g_x + x.v_y * x.yaw_rate, found.a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, found.yaw,
-            x.roll_rate, found.roll, *self.load_transfer.rates(x, a_x, a_y), *tyres.rates(contacts, states),
+            x.roll_rate, found.roll, *self.load_transfer.rates(x, push.F_x / self.mass, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
         shown = body_outputs(x, x.v_x, a_x, a_y, found.yaw, u.steer, push)
         shown |= roll_outputs(x, found.roll) | wheel_outputs(contacts, forces)

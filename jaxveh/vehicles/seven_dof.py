@@ -112,7 +112,7 @@ class SevenDOF(AbstractTwoTrack):
         spins = each(self._spin, omegas, contacts, forces, drive, brake)
         rates = (
             a_x + g_x + x.v_y * x.yaw_rate, a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration, *spins,
-            *self.load_transfer.rates(x, a_x, a_y), *tyres.rates(contacts, states),
+            *self.load_transfer.rates(x, push.F_x * inverse_mass, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
         shown = body_outputs(x, x.v_x, a_x, a_y, yaw_acceleration, u.steer, push)
         shown |= wheel_outputs(contacts, forces, omegas)

@@ -40,7 +40,7 @@ class SingleTrack3DOF(AbstractVehicle):
         I_z dr/dt           = a Y_f - b Y_r + M_z,f + M_z,r
 
     Axles have no spin: their longitudinal forces are torque over radius, as `traction.within_grip` lets them share the road's
-    grip with the lateral forces, and the tyres' own F_x does not count. The wheels' inertia (J / r^2 each) may be given as mass.
+    grip with the lateral forces, and the tyres' own F_x does not count.
     Load moves between the axles with the a_x that `load_transfer` feels (its a_y does not count: `LaggedLoads` carries it along).
 
     **Parameters**: `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height`, `wheel_radius` (m),
@@ -125,7 +125,7 @@ class SingleTrack3DOF(AbstractVehicle):
         yaw_acceleration = M_z / self.yaw_inertia
         rates = (
             a_x + g_x + x.v_y * x.yaw_rate, a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration,
-            *self.load_transfer.rates(x, a_x, a_y), *tyres.rates(contacts, states),
+            *self.load_transfer.rates(x, X / self.mass, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
         shown = {
             "v_x": x.v_x,

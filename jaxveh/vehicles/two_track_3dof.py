@@ -10,7 +10,7 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
-from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic, planar_loads
+from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, LaggedLoads, planar_loads
 from jaxveh.vehicles.traction import drive_power, driven_wheels, torque_acceleration
 from jaxveh.vehicles.two_track import (
     AbstractTwoTrack,
@@ -42,9 +42,9 @@ class TwoTrack3DOF(AbstractTwoTrack):
         I_z dr/dt           = sum (x_i Y_i - y_i X_i + M_z,i)
 
     A wheel's longitudinal force is its torque over the radius, as `traction.within_grip` lets it share the road's grip with the
-    lateral force; the tyre's own F_x does not count. Torques that differ from wheel to wheel (`FourMotors`) turn the car. The
-    wheels' inertia (J / r^2 each) may be given as mass. Loads follow `load_transfer`; slip angles are regularised below
-    `crawl_speed` (m/s), and brakes and rolling resistance turn round smoothly about 0.5 m/s.
+    lateral force; the tyre's own F_x does not count. Torques that differ from wheel to wheel (`FourMotors`) turn the car. What
+    spins the wheels up is left out (4 J / r^2 beside the mass: about 3 %). Loads follow `load_transfer`; slip angles are
+    regularised below `crawl_speed` (m/s), and brakes and rolling resistance turn round smoothly about 0.5 m/s.
 
     **Parameters**: `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `rear_axle_to_cg`, `track_front`, `track_rear`,
     `cg_height`, `wheel_radius` (m), `front` and `rear`: the tyre of a wheel on each axle (`mirrored`: the right wheels' is its
@@ -72,7 +72,7 @@ class TwoTrack3DOF(AbstractTwoTrack):
     rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.0)
     front_roll_share: jax.Array | None = parameter("-", scale=0.1, default=None)
     drive: AbstractDrive = eqx.field(default_factory=AxleDrive)
-    load_transfer: AbstractLoadTransfer = eqx.field(default_factory=QuasiStatic)
+    load_transfer: AbstractLoadTransfer = eqx.field(default_factory=LaggedLoads)
     mirrored: bool = eqx.field(static=True, default=True)
     crawl_speed: float = eqx.field(static=True, default=3.0)
 
@@ -105,7 +105,7 @@ class TwoTrack3DOF(AbstractTwoTrack):
         yaw_acceleration = push.M_z / self.yaw_inertia
         rates = (
             a_x + g_x + x.v_y * x.yaw_rate, a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration,
-            *self.load_transfer.rates(x, a_x, a_y), *tyres.rates(contacts, states),
+            *self.load_transfer.rates(x, push.F_x / self.mass, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
         shown = body_outputs(x, x.v_x, a_x, a_y, yaw_acceleration, u.steer, push) | wheel_outputs(contacts, forces)
         shown["drive_power"] = drive_power(self, drive, moves)

@@ -111,7 +111,7 @@ def test_without_torques_it_is_the_car_at_a_given_speed():
 
 
 def test_speeding_up_by_hand():
-    car = car_of(Roll4DOF, drag=0.4, rolling_resistance=0.012)
+    car = car_of(Roll4DOF, drag=0.4, rolling_resistance=0.012, load_transfer=vehicles.QuasiStatic())
     out = car.outputs(0.0, state(car, v_x=30.0), inputs(steer=0.0, drive_torque=600.0, brake_torque=0.0))
     m = BODY["mass"]
     np.testing.assert_allclose(out.a_x, (600.0 / RADIUS - 360.0 - 0.012 * m * GRAVITY) / m, rtol=1e-12)
@@ -153,7 +153,17 @@ def test_an_asymmetric_tyre_makes_a_symmetric_car():
 def test_tyres_with_states_bring_them_and_start_settled(tyre):
     car = car_of(Roll4DOF, rear=tyre)
     names = [f"{corner}_{name}" for corner in ("rl", "rr") for name in tyre.state_names]
-    assert car.state_type._fields == ("v_x", "v_y", "yaw", "yaw_rate", "roll", "roll_rate", *names)
+    assert car.state_type._fields == (
+        "v_x",
+        "v_y",
+        "yaw",
+        "yaw_rate",
+        "roll",
+        "roll_rate",
+        "a_x_felt",
+        "a_y_felt",
+        *names,
+    )
     x = car.start(0.0, U, v_x=22.0, v_y=-0.3, yaw_rate=0.2, roll=0.03)
     rates = car.derivatives(0.0, x, U)
     np.testing.assert_allclose([getattr(rates, name) for name in names], 0.0, atol=1e-12)

@@ -9,9 +9,12 @@ import pytest
 from planar_cars import point
 
 from jaxveh import InputError, vehicles
+from jaxveh._core.names import record
 from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.tyres import Brush, Contact, MFTyre
 from jaxveh.vehicles import GRAVITY, CarNumbers, SuspensionNumbers, TyreNumbers, sets
+from jaxveh.vehicles.load_transfer import planar_loads
+from jaxveh.vehicles.rolling_body import roll_geometry, roll_loads
 
 WITH_MASS = [name for name in sets.CARS if name != "semi_trailer"]
 WITH_SUSPENSION = [name for name in WITH_MASS if name != "ferrari_250lm"]
@@ -246,3 +249,38 @@ def test_bad_input_raises(make, message):
 def test_suspensions_are_records_of_numbers():
     assert isinstance(sets.suv().suspension, SuspensionNumbers)
     assert all(isinstance(value, float) for value in dataclasses.astuple(sets.suv().suspension))
+
+
+def test_numbers_that_a_body_on_springs_leaves_to_others():
+    numbers = sets.suv()
+    s, rigid, rolling = (
+        numbers.suspension,
+        *(vehicles.build(numbers, k) for k in (vehicles.SevenDOF, vehicles.Roll4DOF)),
+    )
+    truth = vehicles.build(numbers, vehicles.FourteenDOF)
+    # The sprung mass stands where it stands in the record, and the transfers of both cars are one.
+    np.testing.assert_allclose(roll_geometry(rolling).sprung_height, s.cg_height, rtol=0.01)
+    a, b = numbers.front_axle_to_cg, numbers.rear_axle_to_cg
+    axis = (b * s.roll_centre_front + a * s.roll_centre_rear) / (a + b)
+    ahead = s.sprung_mass * (a - s.front_axle_to_cg) * (s.cg_height - axis)
+    np.testing.assert_allclose(rolling.roll_yaw_product, s.roll_yaw_product + ahead, rtol=1e-12)
+    np.testing.assert_allclose(truth.roll_yaw_product, s.roll_yaw_product, rtol=1e-12)
+    stiff, a_y = rolling.roll_stiffness_front + rolling.roll_stiffness_rear, 1e-3
+    # Rolled by its springs alone, little and steadily.
+    roll = s.sprung_mass * (s.cg_height - axis) * a_y / stiff
+    zeros = rolling.state_type(*[0.0] * len(rolling.state_type._fields))
+    loads = roll_loads(rolling, zeros._replace(roll=roll), 0.0, a_y, -GRAVITY)
+    planar = planar_loads(rigid, 0.0, a_y, -GRAVITY)
+    np.testing.assert_allclose(planar.fr - planar.fl, loads.fr - loads.fl, rtol=0.03)
+
+
+@pytest.mark.parametrize("kind", [vehicles.SevenDOF, vehicles.FourteenDOF])
+def test_a_cars_rolling_resistance_counts_once(kind):
+    numbers = sets.suv()
+    car = vehicles.build(numbers, kind, drag=0.0)
+    u = record("Inputs", {name: jnp.asarray(0.0) for name in car.inputs})
+    x = car.start(0.0, u, v_x=25.0)
+    # A wheel that is held back takes the body with it only once it slips: what slows the spins says it at once.
+    rates = eqx.filter_jit(car.derivatives)(0.0, x, u)
+    asked = numbers.rolling_resistance * numbers.wheel_loads()[0] * numbers.wheel_radius
+    np.testing.assert_allclose(-rates.omega_fl * numbers.wheel_inertia, asked, rtol=0.05)

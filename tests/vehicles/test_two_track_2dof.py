@@ -82,6 +82,16 @@ def test_a_lifted_wheel_leaves_the_axles_load_to_the_other():
     np.testing.assert_allclose(out.load_fr + out.load_rr, BODY["mass"] * GRAVITY, rtol=1e-13)
 
 
+def test_what_an_axle_on_one_wheel_cannot_take_the_other_takes():
+    # At 7 m/s^2 the front axle, with nearly all of the transfer, stands on one wheel before the car does.
+    car = car_of(TwoTrack2DOF, cg_height=0.8, front_roll_share=0.9)
+    out = car.outputs(0.0, turning(car, yaw_rate=7.0 / 22.0), U)
+    assert out.load_fl == 0.0 and out.load_rl > 0.0
+    moment = 0.5 * TRACKS["track_front"] * (out.load_fr - out.load_fl)
+    moment = moment + 0.5 * TRACKS["track_rear"] * (out.load_rr - out.load_rl)
+    np.testing.assert_allclose(moment, BODY["mass"] * 7.0 * 0.8, rtol=1e-12)
+
+
 def test_the_speeds_rate_and_slopes_move_load_between_the_axles():
     car = car_of(TwoTrack2DOF)
     at_rest = car.outputs(0.0, state(car), inputs(steer=0.0, v_x=20.0))

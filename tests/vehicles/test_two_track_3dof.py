@@ -49,7 +49,7 @@ def test_a_gentle_manoeuvre_is_that_of_seven_degrees_of_freedom():
 
 def test_without_torques_it_is_the_car_at_a_given_speed():
     coasting = inputs(steer=0.04, drive_torque=0.0, brake_torque=0.0)
-    car, given = car_of(TwoTrack3DOF), car_of(TwoTrack2DOF)
+    car, given = car_of(TwoTrack3DOF, load_transfer=vehicles.QuasiStatic()), car_of(TwoTrack2DOF)
     x = turning(car)
     rates = car.derivatives(0.0, x, coasting)
     # The given speed's own acceleration, so that both shift the same load: none without torques.
@@ -90,13 +90,52 @@ def test_straight_running_under_torque_drag_and_rolling_resistance():
 
 
 def test_full_braking_takes_the_grip_of_the_road():
-    car = car_of(TwoTrack3DOF, grip=0.9)
+    car = car_of(TwoTrack3DOF, grip=0.9, load_transfer=vehicles.QuasiStatic())
     ground = LEVEL._replace(**{f"friction_{c}": 0.5 for c in ("fl", "fr", "rl", "rr")})
     out = car.outputs(0.0, state(car, v_x=20.0), inputs(steer=0.0, drive_torque=0.0, brake_torque=3e4), ground)
     np.testing.assert_allclose(out.a_x, -np.sqrt(0.99) * 0.45 * GRAVITY, rtol=1e-12)
     moved = BODY["mass"] * out.a_x * BODY["cg_height"] / 2.7
     static = BODY["mass"] * GRAVITY * BODY["rear_axle_to_cg"] / 2.7
     np.testing.assert_allclose(out.load_fl + out.load_fr, static - moved, rtol=1e-12)
+
+
+def test_loads_settle_to_what_the_tyres_push_whatever_follows_them():
+    # The air pushes at the height of the centre of gravity: at a steady speed the rear axle still carries more than at rest.
+    torque = (0.4 * 45.0**2 + 0.012 * BODY["mass"] * GRAVITY) * RADIUS
+    u = inputs(steer=0.0, drive_torque=torque, brake_torque=0.0)
+    make = lambda transfer: car_of(TwoTrack3DOF, drag=0.4, rolling_resistance=0.012, load_transfer=transfer)
+    quasi, lagged = make(vehicles.QuasiStatic()), make(vehicles.LaggedLoads(0.1))
+    push = 0.4 * 45.0**2 / BODY["mass"]
+    x = state(lagged, v_x=45.0, a_x_felt=push)
+    rates, out = lagged.derivatives(0.0, x, u), lagged.outputs(0.0, x, u)
+    np.testing.assert_allclose((rates.v_x, rates.a_x_felt), 0.0, atol=1e-12)
+    moved = BODY["mass"] * push * BODY["cg_height"] / 2.7
+    np.testing.assert_allclose(out.load_rl + out.load_rr, BODY["mass"] * GRAVITY * 1.15 / 2.7 + moved, rtol=1e-12)
+    # Quasi-static loads take the torque for the push, rolling resistance included.
+    settled = quasi.outputs(0.0, state(quasi, v_x=45.0), u)
+    np.testing.assert_allclose(settled.load_rl, out.load_rl, rtol=0.01)
+
+
+def test_on_two_frictions_it_turns_about_as_the_car_with_wheel_spins():
+    # Loads of a steady turn, speed times yaw rate, which this is not, make the car spin round.
+    ground = LEVEL._replace(friction_fr=0.2, friction_rr=0.2)
+    braking = inputs(steer=0.0, drive_torque=0.0, brake_torque=0.4 * BODY["mass"] * GRAVITY * RADIUS)
+
+    def heading(car):
+        step = 1e-3
+        half = lambda x, rates, h: jax.tree.map(lambda value, rate: value + h * rate, x, rates)
+
+        def midpoint(x, _):
+            between = half(x, car.derivatives(0.0, x, braking, ground), 0.5 * step)
+            return half(x, car.derivatives(0.0, between, braking, ground), step), None
+
+        return jax.lax.scan(midpoint, car.start(0.0, braking, v_x=25.0), length=2000)[0].yaw
+
+    two_track, seven = (float(jax.jit(heading)(car_of(kind))) for kind in (TwoTrack3DOF, vehicles.SevenDOF))
+    spun = float(jax.jit(heading)(car_of(TwoTrack3DOF, load_transfer=vehicles.QuasiStatic())))
+    # 16 and 10 degrees: a wheel without spin cannot lock, and keeps a tenth of its lateral force.
+    assert seven > 0.1 and abs(two_track - seven) < 0.1
+    assert spun > 2.5 * seven
 
 
 def test_motors_that_differ_turn_the_car():

@@ -12,6 +12,9 @@ from jaxveh.vehicles.drive import AxleDrive, FourMotors
 from jaxveh.vehicles.sets.numbers import CarNumbers
 from jaxveh.vehicles.sets.tyres import axle_tyre, wheel_tyre
 
+SWITCHES = ("cg_height",)
+"""Numbers that switch something on in classes where they may be left out."""
+
 V = TypeVar("V", bound=AbstractVehicle)
 
 
@@ -20,8 +23,8 @@ def build(numbers: CarNumbers, kind: type[V], **options: Any) -> V:
 
     Each parameter of the class gets the number of its name. Axles of a car with tracks get `wheel_tyre`s, those of one track
     `axle_tyre`s, `drive` is an `AxleDrive` of the car's shares or `FourMotors`. A class that has no `mass` of its own has a
-    sprung one, and gets the sprung mass' place and inertias. Options of the class, whose default is None
-    (`SingleTrack.cg_height`), stay off. `options` are parameters to set otherwise, such as `front=tyre` or
+    sprung one, and gets the sprung mass' place and inertias. What a number would switch on (load transfer of a `SingleTrack` by
+    `cg_height`) stays off. `options` are parameters to set otherwise, such as `front=tyre` or
     `cg_height=numbers.cg_height`.
 
     **Raises** `InputError` naming what the class needs and the car's numbers do not hold, and for options it does not have.
@@ -32,7 +35,7 @@ def build(numbers: CarNumbers, kind: type[V], **options: Any) -> V:
     given = {
         name: known[name]
         for name, entry in entries.items()
-        if name in known and entry.default is not None and name not in options
+        if name in known and name not in options and not (name in SWITCHES and entry.default is None)
     }
     if "grip" in entries and numbers.front is not None:
         given.setdefault("grip", numbers.front.friction)

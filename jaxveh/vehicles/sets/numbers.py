@@ -143,7 +143,32 @@ class CarNumbers:
             own = {entry.name: getattr(suspension, entry.name) for entry in fields(suspension)}
             found |= own if sprung else {name: value for name, value in own.items() if name not in found}
             found |= self._rolling(suspension)
+            if not sprung:
+                found |= self._leaning(suspension, found)
         return {name: value for name, value in found.items() if value is not None}
+
+    def _leaning(self, s: SuspensionNumbers, known: dict[str, Any]) -> dict[str, Any]:
+        """What cars that do not ride on their springs need of them: `unsprung_height`, `roll_yaw_product` about the roll axis
+        below the whole car's centre of gravity, and the front axle's share of the lateral transfer (`front_roll_share`): of
+        springs and bars by stiffness, of roll centres and unsprung masses by what each axle carries."""
+        found = {} if self.wheel_radius is None else {"unsprung_height": self.wheel_radius}
+        share = self.rear_axle_to_cg / self.wheelbase
+        axis = share * s.roll_centre_front + (1.0 - share) * s.roll_centre_rear
+        arm, ahead = s.cg_height - axis, self.front_axle_to_cg - s.front_axle_to_cg
+        found["roll_yaw_product"] = s.roll_yaw_product + s.sprung_mass * ahead * arm
+        stiff = [known.get(f"roll_stiffness_{axle}") for axle in ("front", "rear")]
+        if None in stiff or self.wheel_radius is None:
+            return found
+        leaning = s.sprung_mass * arm
+        direct = [
+            part * s.sprung_mass * centre + 2.0 * unsprung * self.wheel_radius
+            for part, centre, unsprung in (
+                (share, s.roll_centre_front, s.unsprung_mass_front),
+                (1.0 - share, s.roll_centre_rear, s.unsprung_mass_rear),
+            )
+        ]
+        front = leaning * stiff[0] / sum(stiff) + direct[0]
+        return found | {"front_roll_share": front / (leaning + sum(direct))}
 
     def _rolling(self, s: SuspensionNumbers) -> dict[str, Any]:
         """Roll stiffness (N m/rad) and damping (N m s/rad) of each axle: springs and bar, with the tyres in series."""
