@@ -3,19 +3,46 @@
 from jaxveh.filters.auxiliary import AuxiliaryParticleFilter
 from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info
 from jaxveh.filters.driver import Estimate, run, scan
+from jaxveh.filters.gaussian import (
+    AbstractForm,
+    AbstractGaussianFilter,
+    Covariance,
+    Cubature,
+    Extended,
+    GaussHermite,
+    GaussianBelief,
+    Iterated,
+    Kalman,
+    SigmaPointFilter,
+    Simplex,
+    SingularValues,
+    SquareRoot,
+    Unscented,
+)
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, ParticleFilter
-from jaxveh.filters.unscented import GaussianBelief, Unscented
 
 __all__ = [
     "AbstractBelief",
     "AbstractFilter",
+    "AbstractForm",
+    "AbstractGaussianFilter",
     "AbstractParticleFilter",
     "AuxiliaryParticleFilter",
+    "Covariance",
+    "Cubature",
     "Estimate",
+    "Extended",
+    "GaussHermite",
     "GaussianBelief",
     "Info",
+    "Iterated",
+    "Kalman",
     "ParticleBelief",
     "ParticleFilter",
+    "SigmaPointFilter",
+    "Simplex",
+    "SingularValues",
+    "SquareRoot",
     "Unscented",
     "run",
     "scan",

@@ -24,6 +24,7 @@ from jaxveh.numerics.small_systems import solve_scalars
 from jaxveh.numerics.smooth import smooth_bump, smooth_clip, smooth_ramp, smooth_step
 from jaxveh.numerics.sums import total
 from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
+from jaxveh.numerics.triangular import lower_factor
 
 __all__ = [
     "arctan",
@@ -44,6 +45,7 @@ __all__ = [
     "kept",
     "log",
     "log_det",
+    "lower_factor",
     "mahalanobis",
     "multinomial",
     "normal",

@@ -1,0 +1,32 @@
+"""Gaussian filters: one algebra, a rule that approximates functions, a form that keeps the covariance."""
+
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.family import (
+    Cubature,
+    Extended,
+    GaussHermite,
+    Kalman,
+    SigmaPointFilter,
+    Simplex,
+    Unscented,
+)
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
+from jaxveh.filters.gaussian.forms import AbstractForm, Covariance, SingularValues, SquareRoot
+from jaxveh.filters.gaussian.iterated import Iterated
+
+__all__ = [
+    "AbstractForm",
+    "AbstractGaussianFilter",
+    "Covariance",
+    "Cubature",
+    "Extended",
+    "GaussHermite",
+    "GaussianBelief",
+    "Iterated",
+    "Kalman",
+    "SigmaPointFilter",
+    "Simplex",
+    "SingularValues",
+    "SquareRoot",
+    "Unscented",
+]

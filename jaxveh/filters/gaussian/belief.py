@@ -1,0 +1,74 @@
+"""What a Gaussian filter knows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh.filters.base import AbstractBelief
+from jaxveh.filters.gaussian.rules import AbstractRule, times
+
+
+class GaussianBelief(AbstractBelief):
+    """A Gaussian over the state: mean as a vector (n,), a factor F (n, n) of the covariance P = F F^T, in the order of the
+    state's fields; `matrix` is P where the filter's form keeps it, else None."""
+
+    vector: jax.Array
+    factor: jax.Array
+    matrix: jax.Array | None
+    t: Any
+    u: Any
+    count: Any
+    state_type: Any = eqx.field(static=True)
+    rule: AbstractRule
+
+    @property
+    def mean(self):
+        """The state's mean (parameters on the real line), the state's NamedTuple."""
+        return self.state_type(*self.vector)
+
+    @property
+    def std(self):
+        """The state's standard deviations, the state's NamedTuple."""
+        return self.state_type(*jnp.sqrt(self.variances))
+
+    @property
+    def variances(self):
+        """(n,) in the order of the state's fields."""
+        return jnp.diagonal(self.matrix) if self.matrix is not None else jnp.sum(jnp.square(self.factor), axis=-1)
+
+    @property
+    def covariance(self):
+        """(n, n) in the order of the state's fields."""
+        return self.matrix if self.matrix is not None else times(self.factor, self.factor.T)
+
+    def moments(self, model):
+        if model.report_function is None:
+            return self.mean, self.std
+        names = []
+
+        def shown(rows):
+            report = model.report(self.t, self.state_type(*rows), self.u)
+            names.append(type(report))
+            return rows_of(report, rows)
+
+        image = self.rule.image(shown, self.vector, self.factor)
+        spread = jnp.sum(product_diagonal(image), axis=-1)
+        kind = names[0]
+        # A weight may be negative, so that rounding can leave a spread a little below zero.
+        return kind(*image.mean), kind(*numerics.sqrt(jnp.maximum(spread, 0.0)))
+
+
+def product_diagonal(image):
+    """Squared deviations (m, k), with their signs."""
+    squared = jnp.square(image.deviations)
+    return squared if image.signs is None else squared * jnp.asarray(image.signs, squared.dtype)
+
+
+def rows_of(values, like):
+    """The fields of a NamedTuple as rows (m, ...); a field that does not depend on the state is repeated."""
+    return jnp.stack([jnp.broadcast_to(field, like.shape[1:]) for field in values])

@@ -1,0 +1,93 @@
+"""The Kalman family: one filter a rule."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import equinox as eqx
+
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter
+from jaxveh.filters.gaussian.forms import AbstractForm, Covariance
+from jaxveh.filters.gaussian.linear import check_linear
+from jaxveh.filters.gaussian.rules import Points, Slopes
+from jaxveh.numerics import sigma_points
+
+
+class Kalman(AbstractRuleFilter):
+    """The exact filter of linear models with Gaussian noises (R. Kalman 1960; Sarkka 2013, sec. 4.3).
+
+    A model that is not linear raises `InputError`: take `Extended`, which linearises.
+    """
+
+    form: AbstractForm = Covariance()
+
+    def rule(self, n):
+        return Slopes()
+
+    def check(self, model):
+        super().check(model)
+        check_linear(type(self).__name__, model)
+
+
+class Extended(AbstractRuleFilter):
+    """The extended Kalman filter of first order, by slopes at the mean (Sarkka 2013, sec. 5.2)."""
+
+    form: AbstractForm = Covariance()
+
+    def rule(self, n):
+        return Slopes()
+
+
+class Unscented(AbstractRuleFilter):
+    """The unscented Kalman filter with scaled weights (Julier & Uhlmann 2004; Sarkka 2013, sec. 5.6).
+
+    `alpha`, `beta`, `kappa` as in `numerics.sigma_points.unscented`; Julier & Uhlmann's first weights are alpha = 1, beta = 0.
+    """
+
+    alpha: float = eqx.field(static=True, default=1.0)
+    beta: float = eqx.field(static=True, default=2.0)
+    kappa: float = eqx.field(static=True, default=0.0)
+    form: AbstractForm = Covariance()
+
+    def rule(self, n):
+        return Points(sigma_points.unscented(n, self.alpha, self.beta, self.kappa))
+
+
+class Simplex(AbstractRuleFilter):
+    """The unscented filter with the fewest points: n+2 on a spherical simplex, one of them central (S. Julier 2003)."""
+
+    central: float = eqx.field(static=True, default=0.0)
+    form: AbstractForm = Covariance()
+
+    def rule(self, n):
+        return Points(sigma_points.spherical_simplex(n, self.central))
+
+
+class Cubature(AbstractRuleFilter):
+    """The cubature Kalman filter of `degree` 3 (2n points) or 5 (2n^2+1) (Arasaratnam & Haykin 2009; Jia, Xin & Cheng 2013)."""
+
+    degree: int = eqx.field(static=True, default=3)
+    form: AbstractForm = Covariance()
+
+    def rule(self, n):
+        return Points(sigma_points.cubature(n, self.degree))
+
+
+class GaussHermite(AbstractRuleFilter):
+    """The Gauss-Hermite Kalman filter with `order` points an axis, order^n in all (Ito & Xiong 2000; Sarkka 2013, sec. 6.3)."""
+
+    order: int = eqx.field(static=True, default=3)
+    form: AbstractForm = Covariance()
+
+    def rule(self, n):
+        return Points(sigma_points.gauss_hermite(n, self.order))
+
+
+class SigmaPointFilter(AbstractRuleFilter):
+    """A filter by points of one's own: `points(n)` makes the `numerics.SigmaPoints` for n states."""
+
+    points: Callable[[int], sigma_points.SigmaPoints] = eqx.field(static=True)
+    form: AbstractForm = Covariance()
+
+    def rule(self, n):
+        return Points(self.points(n))

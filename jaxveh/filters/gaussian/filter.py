@@ -1,0 +1,208 @@
+"""What every Gaussian filter does: predict, update, and both as one step."""
+
+import abc
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import record
+from jaxveh._core.result import Result, code
+from jaxveh.filters.base import (
+    AbstractFilter,
+    Info,
+    always,
+    apart,
+    by_channel,
+    input_result,
+    presence,
+    wrap_angle,
+)
+from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
+from jaxveh.filters.gaussian.forms import AbstractForm, Conditioned, Spread
+from jaxveh.filters.gaussian.rules import AbstractRule, Image
+from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.noise import LOG_2PI
+
+
+class AbstractGaussianFilter(AbstractFilter):
+    """A filter whose belief is a Gaussian, with additive noises that have covariances (S. Sarkka, 2013, ch. 5 and 6).
+
+    `rule(n)` says how functions of it are approximated, `form` in which its covariance is kept. `predict` and `update` are
+    public, for sensors of different rates; points are drawn anew after the prediction, so that the update sees the process
+    noise (on linear models this is the exact Kalman filter). Differentiable with respect to every array leaf of the model.
+    """
+
+    whitens: ClassVar[bool] = True
+    # No postponed annotations in this file: they would make a field of it.
+    form: eqx.AbstractVar[AbstractForm]
+
+    @abc.abstractmethod
+    def rule(self, n: int) -> AbstractRule:
+        """The rule for n states."""
+
+    def check(self, model):
+        name, form = type(self).__name__, type(self.form)
+        check_covariances(name, model)
+        if form.needs_positive and not self.rule(len(model.states)).positive:
+            raise InputError(
+                f"{name}: a weight is negative for {len(model.states)} states, which {form.__name__} cannot take. "
+                "Use weights without (alpha = 1, kappa >= 0), or Covariance()."
+            )
+
+    def init(self, model, row, key=None):
+        del key
+        return apart(self._init, always(row.t), model, row)
+
+    def _init(self, model, row):
+        return self.update(model, self.prior(model, row), row)
+
+    def prior(self, model: StateSpace, row: Row) -> GaussianBelief:
+        """The model's prior as a belief at the row's time, before its measurement."""
+        spread = self.form.start(model.prior.covariance())
+        mean = jnp.stack(model.prior.mean)
+        return GaussianBelief(
+            mean, *spread, row.t, row.u, jnp.int32(0), type(model.prior.mean), self.rule(len(model.states))
+        )
+
+    def predict(self, model: StateSpace, belief: GaussianBelief, t) -> GaussianBelief:
+        """The belief at time `t`, propagated with the inputs that the belief carries (held)."""
+        return self.predict_between(model, belief, t, belief.u)
+
+    def predict_between(self, model: StateSpace, belief: GaussianBelief, t, u_next) -> GaussianBelief:
+        """The belief at time `t`, with the inputs `u_next` there (where the model's inputs run linearly)."""
+        image = transition_image(model, belief, t, u_next)
+        law = None if model.process_noise is None else model.process_noise.over(t - belief.t)
+        return with_spread(belief, image.mean, self.form.add(image, law, model.states), t=t)
+
+    def observe(self, model: StateSpace, belief: GaussianBelief, row: Row) -> Image:
+        """What the row's measurement would be under the belief, without noise, as rows in the order of the channels."""
+        _, present = presence(model, row)
+        return observation_image(model, belief, row, present)
+
+    @abc.abstractmethod
+    def update(self, model: StateSpace, belief: GaussianBelief, row: Row) -> tuple[GaussianBelief, Info]:
+        """The belief after the row's measurement, at the belief's own time (row.t is taken over, not propagated to)."""
+
+    def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
+        return self.update(model, self.predict_between(model, belief, row.t, row.u), row)
+
+
+class AbstractRuleFilter(AbstractGaussianFilter):
+    """A Gaussian filter whose update applies its rule once."""
+
+    def update(self, model, belief, row):
+        return corrected(self.form, model, belief, row, self.observe(model, belief, row))
+
+
+def corrected(
+    form: AbstractForm, model: StateSpace, belief: GaussianBelief, row: Row, image: Image
+) -> tuple[GaussianBelief, Info]:
+    """The belief after a row whose measurement has this image under it."""
+    measured, present = presence(model, row)
+    here = jnp.stack([present[name] for name in model.channels])
+    innovation = jnp.stack([measured[name] for name in model.channels]) - image.mean
+    innovation = jnp.where(here, _wrapped(model, innovation), 0)
+    before = Spread(belief.factor, belief.matrix)
+    found = form.condition(image, model.measurement_noise, model.channels, here, innovation, before)
+    after = with_spread(belief, belief.vector + found.shift, found.spread, t=row.t, u=row.u, count=belief.count + 1)
+    return after, _info(model, row, (belief, after), image, innovation, found)
+
+
+def check_covariances(name: str, model: StateSpace) -> None:
+    """Raise `InputError` where a law of the model has no covariance."""
+    laws = {"measurement noise": model.measurement_noise, "prior": model.prior.law}
+    if model.process_noise is not None:
+        laws["process noise"] = model.process_noise.law
+    for what, law in laws.items():
+        if not law.has_covariance:
+            raise InputError(
+                f"{name}: the {what} {type(law).__name__} has no covariance, which a Kalman filter needs. "
+                "Use a particle filter, or a Gaussian or Student-t law."
+            )
+
+
+def with_spread(belief: GaussianBelief, vector: Any, spread: Spread, t=None, u=None, count=None) -> GaussianBelief:
+    """The belief with another Gaussian, and another time, inputs and count where given."""
+    return GaussianBelief(
+        vector,
+        *spread,
+        belief.t if t is None else t,
+        belief.u if u is None else u,
+        belief.count if count is None else count,
+        belief.state_type,
+        belief.rule,
+    )
+
+
+def transition_image(model: StateSpace, belief: GaussianBelief, t, u_next) -> Image:
+    """The belief's image under the transition to time `t`."""
+    u = model.step_inputs(belief.t, t, belief.u, u_next)
+    move = lambda rows: rows_of(model.transition(belief.t, t, belief.state_type(*rows), u), rows)
+    return belief.rule.image(move, belief.vector, belief.factor)
+
+
+def observation_image(model: StateSpace, belief: GaussianBelief, row: Row, present: dict) -> Image:
+    """The belief's image under the observation; zero where a channel is missing, angles unwrapped about the first point."""
+
+    def see(rows):
+        observed = model.observation(row.t, belief.state_type(*rows), row.u)
+        found = []
+        for name in model.channels:
+            values = jnp.broadcast_to(getattr(observed, name), rows.shape[1:])
+            if name in model.angles and values.ndim:
+                values = values[0] + wrap_angle(values - values[0])
+            found.append(jnp.where(present[name], values, 0))
+        return jnp.stack(found)
+
+    return belief.rule.image(see, belief.vector, belief.factor)
+
+
+def _wrapped(model, innovation):
+    if not model.angles:
+        return innovation
+    wraps = jnp.asarray([name in model.angles for name in model.channels])
+    return jnp.where(wraps, wrap_angle(innovation), innovation)
+
+
+def _info(model, row, beliefs, image: Image, innovation, found: Conditioned) -> Info:
+    _, present = presence(model, row)
+    dtype = innovation.dtype
+    count = jnp.sum(jnp.stack([present[name] for name in model.channels]).astype(dtype))
+    nis, factor = jnp.sum(found.white**2), found.innovation_factor
+    variances = jnp.sum(jnp.square(factor), axis=-1)
+    named = lambda values: record("Measurements", dict(zip(model.channels, values, strict=True)))
+    return Info(
+        log_likelihood=-0.5 * (nis + numerics.log_det(factor) + count * LOG_2PI),
+        innovation=by_channel(model, innovation, present),
+        innovation_std=by_channel(model, jnp.sqrt(variances), present),
+        nis=nis,
+        ess=jnp.full((), jnp.nan, dtype),
+        whitened=named(found.white),
+        log_scale=named(jnp.log(jnp.diagonal(factor))),
+        result=_result(model, row, beliefs, image, factor),
+    )
+
+
+def _result(model, row, beliefs, image: Image, factor):
+    """The first thing that went wrong, in the order of the computation: what follows from it is not finite either."""
+    before, after = beliefs
+    diverged, indefinite = Result.non_finite_state, Result.not_positive_definite
+    result = input_result(model, row)
+    matrix = before.vector if before.matrix is None else before.matrix
+    for values, reason in (
+        (before.vector, diverged),
+        (matrix, diverged),
+        (before.factor, indefinite),
+        (image.mean, diverged),
+        (image.deviations, diverged),
+        (factor, indefinite),
+        (after.factor, indefinite),
+    ):
+        result = jnp.where((result == 0) & ~jnp.all(jnp.isfinite(values)), code(reason), result)
+    return result

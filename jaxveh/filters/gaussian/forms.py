@@ -1,0 +1,156 @@
+"""In which form a Gaussian filter keeps its covariance: whole, as a triangular factor, or as a factor of singular vectors."""
+
+import abc
+from typing import Any, ClassVar, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh.filters.gaussian.noises import covariance_in, factor_in
+from jaxveh.filters.gaussian.rules import Image, product, times
+from jaxveh.statespace import AbstractNoise
+
+
+class Spread(NamedTuple):
+    """A covariance P (n, n) by a factor F with P = F F^T, and P itself as `matrix` where the form keeps it, else None."""
+
+    factor: Any
+    matrix: Any
+
+
+class Conditioned(NamedTuple):
+    """What a measurement makes of a Gaussian: lower factor S of the innovation's covariance (m, m), the innovation whitened
+    by it (m,), the mean's `shift` (n,) and the `spread` after it."""
+
+    innovation_factor: Any
+    white: Any
+    shift: Any
+    spread: Spread
+
+
+class AbstractForm(eqx.Module):
+    """The algebra of covariances of a filter. `needs_positive`: no weight of a rule may be negative."""
+
+    needs_positive: eqx.AbstractClassVar[bool]
+
+    @abc.abstractmethod
+    def start(self, covariance: Any) -> Spread:
+        """The form of a covariance (n, n)."""
+
+    @abc.abstractmethod
+    def add(self, image: Image, law: AbstractNoise | None, fields: tuple[str, ...]) -> Spread:
+        """E W E^T + Q, with the noise of `law` on some of the `fields` of the image's values."""
+
+    @abc.abstractmethod
+    def condition(self, image: Image, law: AbstractNoise, fields: tuple[str, ...], here: Any, innovation: Any, before: Spread) -> Conditioned:
+        """The Gaussian `before`, given an innovation (m,) of the `fields`, those that are `here` (m,).
+
+        A missing channel counts as independent with unit variance and zero innovation: it changes nothing. The image's
+        deviations are zero there.
+        """
+
+
+class Covariance(AbstractForm):
+    """The covariance itself, with its Cholesky factor for the points: the fastest.
+
+        S = E W E^T + R,    K = X W E^T S^-1,    P+ = P - K S K^T
+    """
+
+    needs_positive: ClassVar[bool] = False
+
+    def start(self, covariance):
+        return Spread(numerics.cholesky(covariance), covariance)
+
+    def add(self, image, law, fields):
+        covariance = product(image.deviations, image.deviations, image.signs)
+        if law is not None:
+            covariance = covariance + covariance_in(law, fields, covariance.dtype)
+        return self.start(covariance)
+
+    def condition(self, image, law, fields, here, innovation, before):
+        E, X = image.deviations, image.spread
+        both = here[:, None] & here[None, :]
+        noise = jnp.where(both, covariance_in(law, fields, E.dtype), jnp.eye(len(fields), dtype=E.dtype))
+        factor = numerics.cholesky(product(E, E, image.signs) + noise)
+        white = numerics.solve_lower(factor, innovation)
+        gain = numerics.solve_lower(factor, product(E, X, image.signs))
+        covariance = before.matrix - times(gain.T, gain)
+        return Conditioned(factor, white, times(gain.T, white), self.start(covariance))
+
+
+class SquareRoot(AbstractForm):
+    """A lower triangular factor, never the covariance: it stays positive definite whatever the rounding, in float32 too.
+
+    Array algorithms, each one triangularisation (P. Kaminski, A. Bryson & S. Schmidt 1971; T. Kailath, A. Sayed & B. Hassibi,
+    Linear Estimation, sec. 12.1), with N the noise's factor:
+
+        [E  N] -> F,        [E  N]    [S    0 ]
+                            [X  0] -> [K S  F+]
+    """
+
+    needs_positive: ClassVar[bool] = True
+
+    def start(self, covariance):
+        return Spread(numerics.cholesky(covariance), None)
+
+    def add(self, image, law, fields):
+        E = image.deviations
+        both = E if law is None else jnp.concatenate([E, factor_in(law, fields, E.dtype)], axis=1)
+        return Spread(numerics.lower_factor(_wide(both)), None)
+
+    def condition(self, image, law, fields, here, innovation, before):
+        E, X = image.deviations, image.spread
+        m, n = len(fields), X.shape[0]
+        array = jnp.block([[E, _masked_factor(law, fields, here, E.dtype)], [X, jnp.zeros((n, m), E.dtype)]])
+        whole = numerics.lower_factor(_wide(array))
+        factor, gain = whole[:m, :m], whole[m:, :m]
+        white = numerics.solve_lower(factor, innovation)
+        return Conditioned(factor, white, times(gain, white), Spread(whole[m:, m:], None))
+
+
+class SingularValues(AbstractForm):
+    """The factor U sqrt(D) of the covariance's singular value decomposition U D U^T, as federated-ckf takes its points.
+
+    The decomposition is of deviations, never of the covariance. Where singular values coincide their vectors are not defined,
+    and with them the points of nonlinear functions and the derivatives: this form cannot be differentiated.
+    """
+
+    needs_positive: ClassVar[bool] = True
+
+    def start(self, covariance):
+        return Spread(_principal(numerics.cholesky(covariance)), None)
+
+    def add(self, image, law, fields):
+        E = image.deviations
+        both = E if law is None else jnp.concatenate([E, factor_in(law, fields, E.dtype)], axis=1)
+        return Spread(_principal(_wide(both)), None)
+
+    def condition(self, image, law, fields, here, innovation, before):
+        E, X = image.deviations, image.spread
+        noise = _masked_factor(law, fields, here, E.dtype)
+        factor = numerics.lower_factor(jnp.concatenate([E, noise], axis=1))
+        gain = numerics.solve_lower_transposed(factor, numerics.solve_lower(factor, product(E, X, None))).T
+        white = numerics.solve_lower(factor, innovation)
+        # Joseph's form: (X - K E) (X - K E)^T + K R K^T.
+        after = jnp.concatenate([X - times(gain, E), times(gain, noise)], axis=1)
+        return Conditioned(factor, white, times(gain, innovation), Spread(_principal(_wide(after)), None))
+
+
+def _masked_factor(law, fields, here, dtype):
+    """A lower factor (m, m) of the measurement noise, of unit variance and independent where a channel is missing."""
+    both = here[:, None] & here[None, :]
+    return numerics.cholesky(jnp.where(both, covariance_in(law, fields, dtype), jnp.eye(len(fields), dtype=dtype)))
+
+
+def _wide(matrix):
+    """At least as many columns as rows, by columns of zeros."""
+    short = matrix.shape[0] - matrix.shape[1]
+    return matrix if short <= 0 else jnp.pad(matrix, ((0, 0), (0, short)))
+
+
+def _principal(matrix):
+    """U D (n, n) of A = U D V^T."""
+    vectors, values, _ = jnp.linalg.svd(matrix, full_matrices=False)
+    return vectors * values

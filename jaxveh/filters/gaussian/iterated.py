@@ -1,0 +1,70 @@
+"""The update again and again, linearised where the last one ended."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, corrected, with_spread
+from jaxveh.filters.gaussian.forms import Spread
+from jaxveh.filters.gaussian.rules import Image, product, times
+
+
+class Iterated(AbstractGaussianFilter):
+    """`filter`, whose update is repeated with the observation linearised under the last posterior.
+
+    With `Extended` the iterated extended Kalman filter, Gauss-Newton for the most probable state (B. Bell & F. Cathey 1993);
+    with points iterated posterior linearisation (A. Garcia-Fernandez, L. Svensson, M. Morelande & S. Sarkka 2015): the
+    observation becomes `A x + b` with an error of covariance Lambda, which the points see. Innovation, NIS and
+    log-likelihood stay those of the prediction. A linear observation is left alone by every iteration.
+    """
+
+    filter: AbstractGaussianFilter
+    iterations: int = eqx.field(static=True, default=4)
+
+    def __check_init__(self):
+        if not isinstance(self.iterations, int) or self.iterations < 1:
+            raise InputError(f"iterations = {self.iterations}: must be a whole number of at least 1.")
+
+    @property
+    def form(self):
+        return self.filter.form
+
+    def rule(self, n):
+        return self.filter.rule(n)
+
+    def update(self, model, belief, row):
+        posterior, info = corrected(self.form, model, belief, row, self.observe(model, belief, row))
+
+        def again(gaussian, _):
+            vector, spread = gaussian
+            seen = self.observe(model, with_spread(belief, vector, spread), row)
+            line = linearised(seen, vector, spread.factor, belief)
+            found, _ = corrected(self.form, model, belief, row, line)
+            return (found.vector, Spread(found.factor, found.matrix)), None
+
+        start = posterior.vector, Spread(posterior.factor, posterior.matrix)
+        (vector, spread), _ = jax.lax.scan(again, start, length=self.iterations)
+        return with_spread(posterior, vector, spread), info
+
+
+def linearised(image: Image, vector: Any, factor: Any, belief: Any) -> Image:
+    """The image under `belief` of the line `A x + b`, with error, that an image under the Gaussian (vector, factor) stands for.
+
+        A = E W X^T P^-1,    Lambda = (E - A X) W (E - A X)^T
+    """
+    E, X = image.deviations, image.spread
+    lower = numerics.lower_factor(factor)
+    slope = numerics.solve_psd(lower, product(X, E, image.signs)).T
+    rest = E - times(slope, X)
+    mean = image.mean + times(slope, belief.vector - vector)
+    deviations = jnp.concatenate([times(slope, belief.factor), rest], axis=1)
+    spread = jnp.concatenate([belief.factor, jnp.zeros_like(X)], axis=1)
+    signs = None if image.signs is None else np.concatenate([np.ones(X.shape[0]), image.signs])
+    return Image(mean, deviations, spread, signs)

@@ -1,0 +1,54 @@
+"""Whether a model is linear, as the exact Kalman filter needs."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.names import record
+from jaxveh.filters.gaussian.belief import rows_of
+from jaxveh.statespace import StateSpace
+
+
+def check_linear(who: str, model: StateSpace) -> None:
+    """Raise `InputError` naming the first value that is no linear function of the state.
+
+    Each function is compared with its tangent at ten times the prior's spread, for inputs of 0 and of 1; where it is not
+    finite there is nothing to compare. Tracers pass.
+    """
+    if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
+        return
+    for value in (0.0, 1.0):
+        for what, names, f in _functions(model, value):
+            name = _first_curved(f, model, names)
+            if name is not None:
+                raise InputError(f"{who}: {what} {name} is no linear function of the state. Use Extended or Unscented.")
+
+
+def _functions(model: StateSpace, value: float):
+    dtype = model.prior.mean[0].dtype
+    t0, t1 = jnp.zeros((), dtype), jnp.asarray(0.01, dtype)
+    u = record("Inputs", {name: jnp.asarray(value, dtype) for name in model.inputs})
+    kind = type(model.prior.mean)
+    move = lambda rows: rows_of(model.transition(t0, t1, kind(*rows), model.step_inputs(t0, t1, u, u)), rows)
+
+    def see(rows):
+        observed = model.observation(t0, kind(*rows), u)
+        return rows_of([getattr(observed, name) for name in model.channels], rows)
+
+    return ("state", model.states, move), ("channel", model.channels, see)
+
+
+def _first_curved(f, model: StateSpace, names) -> str | None:
+    start = jnp.stack(model.prior.mean)
+    reach = 10.0 * jnp.sqrt(jnp.diagonal(model.prior.covariance()))
+    # One direction of mixed signs, which no sum of squares or products survives by chance.
+    step = reach * jnp.asarray(np.cos(1.0 + 2.0 * np.arange(len(start))), start.dtype)
+    here, slope = jax.jvp(f, (start,), (step,))
+    there = f(start + step)
+    size = jnp.abs(here) + jnp.abs(slope) + jnp.abs(there)
+    curved = jnp.abs(there - here - slope) > 1e3 * jnp.finfo(start.dtype).eps * size
+    curved = np.asarray(curved & jnp.isfinite(size))
+    return names[int(np.argmax(curved))] if curved.any() else None

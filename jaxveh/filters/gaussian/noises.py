@@ -1,0 +1,33 @@
+"""The noises' laws as matrices in the order of given fields."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh.filters.gaussian.rules import times
+from jaxveh.statespace import AbstractNoise, Gaussian
+
+
+def covariance_in(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
+    """A law's covariance in the order of `fields`, with zeros for fields that carry no noise: (n, n)."""
+    if isinstance(law, Gaussian):
+        std = law.std._asdict()
+        variances = jnp.stack([std[name] ** 2 if name in std else jnp.zeros((), dtype) for name in fields])
+        return jnp.where(jnp.eye(len(fields), dtype=bool), variances[:, None], jnp.zeros((), dtype))
+    embed = _embedding(law, fields, dtype)
+    return times(times(embed, law.covariance()), embed.T)
+
+
+def factor_in(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
+    """A factor N (n, q) of that covariance, N N^T, with a column for each of the q fields that carry noise."""
+    embed = _embedding(law, fields, dtype)
+    if isinstance(law, Gaussian):
+        return embed * jnp.stack(law.std)
+    return times(embed, numerics.cholesky(law.covariance()))
+
+
+def _embedding(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
+    return jnp.asarray([[name == other for other in law.names] for name in fields], dtype)

@@ -1,0 +1,98 @@
+"""How a function of a Gaussian is approximated: by its slopes at the mean, or by its values at sigma points."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh.numerics.sigma_points import SigmaPoints
+
+
+class Image(NamedTuple):
+    """A function's values under a Gaussian, as deviations whose products are covariances.
+
+    `mean` (m,); `deviations` E (m, k) and those of the argument, `spread` X (n, k), such that with the signs W of the rule's
+    weights (k,), None where all are positive,
+
+        cov(y) = E W E^T,    cov(x, y) = X W E^T,    P = X W X^T.
+    """
+
+    mean: Any
+    deviations: Any
+    spread: Any
+    signs: np.ndarray | None
+
+
+class AbstractRule(eqx.Module):
+    """`image(f, mean, factor)`: what becomes of the Gaussian with this mean (n,) and P = F F^T, F = `factor` (n, n).
+
+    `f` takes the coordinates as rows (n, ...) to values as rows (m, ...), elementwise in what follows the first axis.
+    """
+
+    # Not an `eqx.AbstractVar`: under postponed annotations that would be a field of the dataclass.
+    @property
+    @abc.abstractmethod
+    def positive(self) -> bool:
+        """Whether all weights of covariances are positive, as square-root forms need."""
+
+    @abc.abstractmethod
+    def image(self, f: Callable, mean: Any, factor: Any) -> Image:
+        """The function's mean and deviations."""
+
+
+class Slopes(AbstractRule):
+    """The first-order Taylor polynomial at the mean: E = (df/dx) F, X = F (S. Sarkka, 2013, eq 5.26)."""
+
+    @property
+    def positive(self):
+        return True
+
+    def image(self, f, mean, factor):
+        value, slope = jax.linearize(f, mean)
+        return Image(value, jax.vmap(slope, in_axes=1, out_axes=1)(factor), factor, None)
+
+
+class Points(AbstractRule):
+    """Sigma points `mean + F xi_j`, with E_j = sqrt|w_j| (f_j - mean f) (S. Sarkka, 2013, eq 5.84).
+
+    Two of equal numbers are equal, so that jit sees one structure.
+    """
+
+    points: SigmaPoints = eqx.field(static=True)
+
+    @property
+    def positive(self):
+        return self._signs is None
+
+    @property
+    def _signs(self):
+        weights = np.asarray(self.points.covariance_weights)
+        return None if (weights >= 0).all() else np.sign(weights)
+
+    def image(self, f, mean, factor):
+        dtype, points = mean.dtype, self.points
+        root = jnp.asarray(np.sqrt(np.abs(points.covariance_weights)), dtype)
+        steps = times(factor, jnp.asarray(points.directions, dtype))
+        values = f(mean[:, None] + steps)
+        average = times(values, jnp.asarray(points.mean_weights, dtype))
+        return Image(average, (values - average[:, None]) * root, steps * root, self._signs)
+
+
+def times(a: Any, b: Any) -> Any:
+    """The matrix product (n, k) (k, m) or (n, k) (k,) as a sum that XLA fuses.
+
+    Its library's products round differently with the place of the operands in memory, so that a live loop would not give
+    the scan's bits; for few states they are slower, too.
+    """
+    return jnp.sum(a * b, axis=-1) if b.ndim == 1 else jnp.sum(a[:, None, :] * b.T[None], axis=-1)
+
+
+def product(a: Any, b: Any, signs: np.ndarray | None) -> Any:
+    """A W B^T (n, m) of deviations A (n, k) and B (m, k) and the signs W."""
+    return times(a if signs is None else a * jnp.asarray(signs, a.dtype), b.T)

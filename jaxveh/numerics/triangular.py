@@ -1,0 +1,61 @@
+"""Triangular factors of A A^T without forming it: what square-root filters are made of."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jaxveh.numerics.linear_algebra import solve_lower
+from jaxveh.numerics.platform import barrier
+
+
+@jax.custom_jvp
+def lower_factor(matrix: Array) -> Array:
+    """Lower triangular L (n, n) with a diagonal >= 0 and L L^T = A A^T, for a matrix A (n, k).
+
+    The transposed R of a QR decomposition of A^T, by the modified Gram-Schmidt process, whose R is as accurate as
+    Householder's (A. Bjorck, Numerical Methods for Least Squares Problems, sec. 2.4.4): no covariance is formed, so that
+    L has the digits that a Cholesky factor of A A^T loses.
+
+    The derivative is that of the equation L L^T = A A^T: with A = L Q^T and Z = L^-1 dA Q,
+
+        dL = L low(Z + Z^T),    low: the lower triangle with half of the diagonal.
+
+    Where A has a lower rank, L has zeros on its diagonal, and there the derivative leaves out what is not defined.
+    """
+    return _orthogonalised(matrix)[0]
+
+
+@lower_factor.defjvp
+def _lower_factor_jvp(primals, tangents):
+    (matrix,), (change,) = primals, tangents
+    factor, turned = _orthogonalised(matrix)
+    diagonal = jnp.diagonal(factor)
+    # A row that depends on those before has nothing of its own to divide by.
+    regular = factor + jnp.diag(jnp.where(diagonal > 0, 0, 1).astype(factor.dtype))
+    inner = solve_lower(regular, _times(change, turned.T))
+    both = inner + inner.T
+    low = jnp.tril(both, -1) + jnp.diag(0.5 * jnp.diagonal(both))
+    return factor, jnp.tril(_times(factor, low))
+
+
+def _orthogonalised(matrix: Array) -> tuple[Array, Array]:
+    """L (n, n) and Q^T (n, k) with A = L Q^T; rows of Q^T are orthonormal, or zero where A's depend on those before."""
+    n = matrix.shape[0]
+    columns, directions, rest = [], [], matrix
+    for i in range(n):
+        squared = jnp.sum(rest[0] * rest[0])
+        some = squared > 0
+        length = jnp.where(some, jnp.sqrt(jnp.where(some, squared, 1)), 0)
+        direction = rest[0] * jnp.where(some, 1 / jnp.where(some, length, 1), 0)
+        along = jnp.sum(rest[1:] * direction, axis=-1)
+        columns.append(jnp.concatenate([jnp.zeros(i, matrix.dtype), length[None], along]))
+        directions.append(direction)
+        rest = barrier(rest[1:] - along[:, None] * direction)
+    return jnp.stack(columns, axis=-1), jnp.stack(directions)
+
+
+def _times(a: Array, b: Array) -> Array:
+    """(n, k) (k, m) as a sum that XLA fuses: its library's products round with the place of the operands in memory."""
+    return jnp.sum(a[:, None, :] * b.T[None], axis=-1)
