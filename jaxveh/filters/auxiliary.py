@@ -74,7 +74,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
             log_first = jnp.where(resampled, log_first, -jnp.log(n))
         weights, log_second, alive_second = numerics.normalise(drawn)
         log_likelihood = log_first + jnp.log(n) + log_second
-        after = ParticleBelief(moved, weights, belief.key, row.t, row.u, belief.count + 1)
+        after = ParticleBelief(moved, weights, ancestors, belief.key, row.t, row.u, belief.count + 1)
         alive = alive_first & alive_second
         info = make_info(model, row, log_likelihood, residual, present, (belief.weights, weights), alive)
         return after, info

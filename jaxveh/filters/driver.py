@@ -64,22 +64,27 @@ def run(filter, model: StateSpace, recording: Recording, *, key=None, throw: boo
 @eqx.filter_jit
 def scan(filter: AbstractFilter, model: StateSpace, rows: Row, key=None) -> Estimate:
     """The compiled part of `run`, over rows with (T,) leaves."""
+    return scan_and_keep(filter, model, rows, key, lambda belief: None)[0]
+
+
+def scan_and_keep(filter: AbstractFilter, model: StateSpace, rows: Row, key, keep) -> tuple[Estimate, Any]:
+    """The estimate, and `keep(belief)` of every row, with (T, ...) leaves."""
     first, rest = jax.tree.map(lambda leaf: leaf[0], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
     belief, info = filter.init(model, first, key)
-    start = (*belief.moments(model), info)
+    start = (*belief.moments(model), info, keep(belief))
 
     def body(belief, row):
         belief, info = filter.step(model, belief, row)
-        return belief, (*belief.moments(model), info)
+        return belief, (*belief.moments(model), info, keep(belief))
 
     body = jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(KEPT))
     belief, rest = jax.lax.scan(body, belief, rest)
-    mean, std, info = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
+    mean, std, info, kept = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
     result, failed_at = first_failure(info.result)
     chosen = model.chosen
     show = lambda report: None if chosen is None else parameter_view(model.system, chosen, report)
     total = jnp.sum(info.log_likelihood)
-    return Estimate(rows.t, mean, std, total, info, result, failed_at, belief, show(mean), show(std))
+    return Estimate(rows.t, mean, std, total, info, result, failed_at, belief, show(mean), show(std)), kept
 
 
 def raise_failure(estimate: Estimate, filter, model: StateSpace, recording: Recording) -> None:

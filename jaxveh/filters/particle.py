@@ -29,10 +29,14 @@ from jaxveh.statespace import StateSpace
 
 
 class ParticleBelief(AbstractBelief):
-    """Weighted particles: the state's NamedTuple with (N,) in each field, and normalised weights (N,)."""
+    """Weighted particles: the state's NamedTuple with (N,) in each field, and normalised weights (N,).
+
+    `ancestors` (N,): which particle of the belief before each came from.
+    """
 
     particles: Any
     weights: jax.Array
+    ancestors: jax.Array
     key: Any
     t: Any
     u: Any
@@ -189,7 +193,8 @@ class ParticleFilter(AbstractParticleFilter):
     def _init(self, model, row, key):
         particles, key = start_particles(self, model, row, key)
         uniform = jnp.full((self.particles,), 1 / self.particles, particles[0].dtype)
-        return self._weigh(model, row, particles, uniform, key, jnp.int32(0))
+        ancestors = jnp.arange(self.particles, dtype=jnp.int32)
+        return self._weigh(model, row, particles, (uniform, ancestors), key, jnp.int32(0))
 
     def step(self, model, belief, row):
         return apart(self._step, belief.count >= 0, model, belief, row)
@@ -203,13 +208,14 @@ class ParticleFilter(AbstractParticleFilter):
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved = model.transition(belief.t, row.t, particles, u)
         moved = numerics.barrier(add_noise(model, noise, moved, row.t - belief.t))
-        return self._weigh(model, row, moved, weights, belief.key, belief.count)
+        return self._weigh(model, row, moved, (weights, ancestors), belief.key, belief.count)
 
-    def _weigh(self, model, row, particles, before, key, count):
+    def _weigh(self, model, row, particles, drawn, key, count):
+        before, ancestors = drawn
         measured, present = presence(model, row)
         logs, residual = log_prob(model, row, particles, measured, present)
         weights, log_mean, alive = numerics.normalise(logs + log_of(before))
-        belief = ParticleBelief(particles, weights, key, row.t, row.u, count + 1)
+        belief = ParticleBelief(particles, weights, ancestors, key, row.t, row.u, count + 1)
         # normalise gives the log of the mean over N of what sums to the likelihood.
         log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
         return belief, make_info(model, row, log_likelihood, residual, present, (before, weights), alive)

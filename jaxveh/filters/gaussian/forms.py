@@ -30,6 +30,21 @@ class Conditioned(NamedTuple):
     spread: Spread
 
 
+class Later(NamedTuple):
+    """The smoothed Gaussian after a transition: `shift` (n,), its mean less the predicted one, and its `spread`."""
+
+    shift: Any
+    spread: Spread
+
+
+class Smoothed(NamedTuple):
+    """The mean's `shift` (n,) by what came later, the smoothed `spread`, and the `gain` (n, n) from one to the other."""
+
+    shift: Any
+    spread: Spread
+    gain: Any
+
+
 class AbstractForm(eqx.Module):
     """The algebra of covariances of a filter. `needs_positive`: no weight of a rule may be negative."""
 
@@ -49,6 +64,14 @@ class AbstractForm(eqx.Module):
 
         A missing channel counts as independent with unit variance and zero innovation: it changes nothing. The image's
         deviations are zero there.
+        """
+
+
+    @abc.abstractmethod
+    def smooth(self, image: Image, law: AbstractNoise | None, fields: tuple[str, ...], before: Spread, later: Later) -> Smoothed:
+        """The Gaussian `before` a transition with this image, given what is known `later`, of the state after it.
+
+        (H. Rauch, F. Tung & C. Striebel 1965; S. Sarkka, 2013, eqs 8.6 and 10.1.)
         """
 
 
@@ -79,6 +102,14 @@ class Covariance(AbstractForm):
         covariance = before.matrix - times(gain.T, gain)
         return Conditioned(factor, white, times(gain.T, white), self.start(covariance))
 
+    def smooth(self, image, law, fields, before, later):
+        predicted = self.add(image, law, fields)
+        cross = product(image.deviations, image.spread, image.signs)
+        gain = numerics.solve_psd(predicted.factor, cross).T
+        change = later.spread.matrix - predicted.matrix
+        covariance = before.matrix + times(times(gain, change), gain.T)
+        return Smoothed(times(gain, later.shift), self.start(numerics.symmetric(covariance)), gain)
+
 
 class SquareRoot(AbstractForm):
     """A lower triangular factor, never the covariance: it stays positive definite whatever the rounding, in float32 too.
@@ -96,9 +127,7 @@ class SquareRoot(AbstractForm):
         return Spread(numerics.cholesky(covariance), None)
 
     def add(self, image, law, fields):
-        E = image.deviations
-        both = E if law is None else jnp.concatenate([E, factor_in(law, fields, E.dtype)], axis=1)
-        return Spread(numerics.lower_factor(_wide(both)), None)
+        return Spread(numerics.lower_factor(_wide(_with_noise(image.deviations, law, fields))), None)
 
     def condition(self, image, law, fields, here, innovation, before):
         E, X = image.deviations, image.spread
@@ -108,6 +137,17 @@ class SquareRoot(AbstractForm):
         factor, gain = whole[:m, :m], whole[m:, :m]
         white = numerics.solve_lower(factor, innovation)
         return Conditioned(factor, white, times(gain, white), Spread(whole[m:, m:], None))
+
+    def smooth(self, image, law, fields, before, later):
+        X = image.spread
+        n = X.shape[0]
+        above = _with_noise(image.deviations, law, fields)
+        below = jnp.pad(X, ((0, 0), (0, above.shape[1] - X.shape[1])))
+        # Conditioned on the later state, as by a measurement: what it leaves open, and what it passes on.
+        whole = numerics.lower_factor(_wide(jnp.concatenate([above, below])))
+        gain = numerics.solve_lower_transposed(whole[:n, :n], whole[n:, :n].T).T
+        factor = numerics.lower_factor(jnp.concatenate([whole[n:, n:], times(gain, later.spread.factor)], axis=1))
+        return Smoothed(times(gain, later.shift), Spread(factor, None), gain)
 
 
 class SingularValues(AbstractForm):
@@ -123,9 +163,7 @@ class SingularValues(AbstractForm):
         return Spread(_principal(numerics.cholesky(covariance)), None)
 
     def add(self, image, law, fields):
-        E = image.deviations
-        both = E if law is None else jnp.concatenate([E, factor_in(law, fields, E.dtype)], axis=1)
-        return Spread(_principal(_wide(both)), None)
+        return Spread(_principal(_wide(_with_noise(image.deviations, law, fields))), None)
 
     def condition(self, image, law, fields, here, innovation, before):
         E, X = image.deviations, image.spread
@@ -136,6 +174,22 @@ class SingularValues(AbstractForm):
         # Joseph's form: (X - K E) (X - K E)^T + K R K^T.
         after = jnp.concatenate([X - times(gain, E), times(gain, noise)], axis=1)
         return Conditioned(factor, white, times(gain, innovation), Spread(_principal(_wide(after)), None))
+
+    def smooth(self, image, law, fields, before, later):
+        E, X = image.deviations, image.spread
+        both = _with_noise(E, law, fields)
+        lower = numerics.lower_factor(_wide(both))
+        gain = numerics.solve_psd(lower, product(E, X, None)).T
+        noise = times(gain, both[:, E.shape[1] :])
+        after = jnp.concatenate([X - times(gain, E), noise, times(gain, later.spread.factor)], axis=1)
+        return Smoothed(times(gain, later.shift), Spread(_principal(_wide(after)), None), gain)
+
+
+def _with_noise(deviations, law, fields):
+    """The deviations (n, k) beside the noise's factor, a column for each field that carries noise."""
+    if law is None:
+        return deviations
+    return jnp.concatenate([deviations, factor_in(law, fields, deviations.dtype)], axis=1)
 
 
 def _masked_factor(law, fields, here, dtype):

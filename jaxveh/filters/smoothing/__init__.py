@@ -1,0 +1,6 @@
+"""Smoothers: what all rows say of each."""
+
+from jaxveh.filters.smoothing.driver import BackwardSampling, Genealogy, smooth
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate
+
+__all__ = ["BackwardSampling", "Genealogy", "SmoothedEstimate", "smooth"]

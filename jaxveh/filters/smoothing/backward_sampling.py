@@ -1,0 +1,59 @@
+"""Paths drawn backwards through the particles of a filter."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh.filters.driver import scan_and_keep
+from jaxveh.filters.particle import AbstractParticleFilter, log_of
+from jaxveh.filters.smoothing.genealogy import path_moments
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
+from jaxveh.statespace import Row, StateSpace
+
+
+def check_density(model: StateSpace) -> None:
+    """Raise `InputError` naming the states without process noise, whose transition has no density."""
+    names = () if model.process_noise is None else model.process_noise.law.names
+    still = [name for name in model.states if name not in names]
+    if still:
+        raise InputError(
+            f"BackwardSampling needs process noise on every state; none is on {', '.join(still)}. Use Genealogy()."
+        )
+
+
+@eqx.filter_jit
+def sample_backwards(
+    filter: AbstractParticleFilter, model: StateSpace, rows: Row, key, count: int
+) -> SmoothedEstimate:
+    """`count` paths over rows with (T,) leaves, each drawn from the smoothing distribution (S. Godsill, A. Doucet & M. West 2004).
+
+    The last row's states by their weights; then each row's by weight times the transition's density to the state after it.
+    """
+    forward_key, last_key, back_key = jax.random.split(key, 3)
+    filtered, kept = scan_and_keep(filter, model, rows, forward_key, lambda b: (b.particles, b.weights))
+    particles, weights = kept
+    chosen = jax.random.categorical(last_key, log_of(weights[-1]), shape=(count,))
+    last = jax.tree.map(lambda field: field[-1][chosen], particles)
+    before = jax.tree.map(lambda leaf: leaf[:-1], (particles, weights, rows))
+    after = jax.tree.map(lambda leaf: leaf[1:], rows)
+    keys = jax.random.split(back_key, rows.t.shape[0] - 1)
+
+    def back(later, given):
+        ((particles, weights, row), following), key = given
+        u = model.step_inputs(row.t, following.t, row.u, following.u)
+        moved = model.transition(row.t, following.t, particles, u)
+        law = model.process_noise.over(following.t - row.t)
+        names = model.process_noise.law.names
+        residual = {name: getattr(later, name)[:, None] - getattr(moved, name) for name in names}
+        density = law.log_prob(residual, dict.fromkeys(names, jnp.asarray(True)))
+        chosen = jax.random.categorical(key, density + log_of(weights), axis=1)
+        found = jax.tree.map(lambda field: field[chosen], particles)
+        return found, found
+
+    _, earlier = jax.lax.scan(back, last, ((before, after), keys), reverse=True)
+    paths = with_last(earlier, last)
+    uniform = jnp.full((count,), 1 / count, weights.dtype)
+    return smoothed_estimate(model, filtered, path_moments(model, rows, paths, uniform), paths, uniform)

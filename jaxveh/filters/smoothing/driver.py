@@ -1,0 +1,80 @@
+"""Smoothing a recording: one function for every filter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.recording import Recording
+from jaxveh.filters.base import AbstractFilter
+from jaxveh.filters.driver import raise_failure
+from jaxveh.filters.gaussian import AbstractGaussianFilter
+from jaxveh.filters.particle import AbstractParticleFilter, need_key
+from jaxveh.filters.smoothing.backward_sampling import check_density, sample_backwards
+from jaxveh.filters.smoothing.genealogy import trace_genealogy
+from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate
+from jaxveh.statespace import StateSpace
+
+
+class BackwardSampling(eqx.Module):
+    """Paths drawn backwards from the smoothing distribution, `trajectories` of them: for particle filters whose every state
+    carries process noise."""
+
+    trajectories: int = eqx.field(static=True, default=200)
+
+    def __check_init__(self):
+        if not isinstance(self.trajectories, int) or self.trajectories < 2:
+            raise InputError(f"trajectories = {self.trajectories}: must be a whole number of at least 2.")
+
+
+class Genealogy(eqx.Module):
+    """The ancestors of the last particles: for any particle filter, good for some ten rows before the end."""
+
+
+def smooth(
+    filter: AbstractFilter,
+    model: StateSpace,
+    recording: Recording,
+    *,
+    key=None,
+    method: BackwardSampling | Genealogy | None = None,
+    throw: bool = True,
+) -> SmoothedEstimate:
+    """Each row's state given the whole recording: the filter forwards, and what suits it backwards.
+
+    **Arguments**: as `run`. A Gaussian filter gets the Rauch-Tung-Striebel smoother of its own rule and form; a particle filter
+    `method`, by default `BackwardSampling()` where every state carries process noise, else `Genealogy()`.
+
+    Gradients with respect to array leaves of `model` work for Gaussian filters.
+
+    **Raises** as `run`, and `InputError` for a method that does not go with filter or model.
+    """
+    filter.check(model)
+    rows = model.rows(recording)
+    if isinstance(filter, AbstractParticleFilter):
+        found = _particles(filter, model, rows, need_key(filter, key), method)
+    elif method is not None:
+        raise InputError(f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has its own.")
+    elif isinstance(filter, AbstractGaussianFilter):
+        found = rauch_tung_striebel(filter, model, rows)
+    else:
+        raise InputError(f"{type(filter).__name__} has no smoother: take a Gaussian filter, or a particle filter.")
+    found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
+    if throw:
+        raise_failure(found.filtered, filter, model, recording)
+    return found
+
+
+def _particles(filter: AbstractParticleFilter, model: StateSpace, rows: Any, key, method) -> SmoothedEstimate:
+    if method is None:
+        noisy = () if model.process_noise is None else model.process_noise.law.names
+        method = BackwardSampling() if set(noisy) == set(model.states) else Genealogy()
+    if isinstance(method, Genealogy):
+        return trace_genealogy(filter, model, rows, key)
+    if not isinstance(method, BackwardSampling):
+        raise InputError(f"method = {method!r}: must be BackwardSampling(), Genealogy() or None.")
+    check_density(model)
+    return sample_backwards(filter, model, rows, key, method.trajectories)

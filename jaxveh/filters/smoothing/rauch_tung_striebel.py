@@ -1,0 +1,45 @@
+"""Backwards through what a Gaussian filter found: each belief given all rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+
+from jaxveh.filters.driver import scan_and_keep
+from jaxveh.filters.gaussian import AbstractGaussianFilter
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.filter import transition_image, with_spread
+from jaxveh.filters.gaussian.forms import Later, Spread
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
+from jaxveh.statespace import Row, StateSpace
+
+
+@eqx.filter_jit
+def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows: Row) -> SmoothedEstimate:
+    """The smoother of a Gaussian filter's kind over rows with (T,) leaves (Sarkka 2013, eqs 8.6, 9.17 and 10.1)."""
+    filtered, beliefs = scan_and_keep(filter, model, rows, None, lambda belief: belief)
+    last = jax.tree.map(lambda leaf: leaf[-1], beliefs)
+    before = jax.tree.map(lambda leaf: leaf[:-1], beliefs)
+    after = jax.tree.map(lambda leaf: leaf[1:], (rows.t, rows.u))
+
+    def back(later: GaussianBelief, pair):
+        belief, (t, u) = pair
+        found = given_later(filter, model, belief, t, u, later)
+        return found, found.moments(model)
+
+    back = jax.checkpoint(back, prevent_cse=False)
+    _, moments = jax.lax.scan(back, last, (before, after), reverse=True)
+    return smoothed_estimate(model, filtered, with_last(moments, last.moments(model)))
+
+
+def given_later(
+    filter: AbstractGaussianFilter, model: StateSpace, belief: GaussianBelief, t: Any, u: Any, later: GaussianBelief
+) -> GaussianBelief:
+    """The belief, given the smoothed one `later` at the next row's time `t` with the inputs `u`."""
+    image = transition_image(model, belief, t, u)
+    law = None if model.process_noise is None else model.process_noise.over(t - belief.t)
+    known = Later(later.vector - image.mean, Spread(later.factor, later.matrix))
+    found = filter.form.smooth(image, law, model.states, Spread(belief.factor, belief.matrix), known)
+    return with_spread(belief, belief.vector + found.shift, found.spread)
