@@ -3,6 +3,7 @@
 from jaxveh.filters.auxiliary import AuxiliaryParticleFilter
 from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info
 from jaxveh.filters.driver import Estimate, run, scan
+from jaxveh.filters.ensemble import Ensemble, EnsembleBelief
 from jaxveh.filters.gaussian import (
     AbstractForm,
     AbstractGaussianFilter,
@@ -20,6 +21,7 @@ from jaxveh.filters.gaussian import (
     Unscented,
 )
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, ParticleFilter
+from jaxveh.filters.smoothing import BackwardSampling, Genealogy, SmoothedEstimate, smooth
 
 __all__ = [
     "AbstractBelief",
@@ -28,12 +30,16 @@ __all__ = [
     "AbstractGaussianFilter",
     "AbstractParticleFilter",
     "AuxiliaryParticleFilter",
+    "BackwardSampling",
     "Covariance",
     "Cubature",
+    "Ensemble",
+    "EnsembleBelief",
     "Estimate",
     "Extended",
     "GaussHermite",
     "GaussianBelief",
+    "Genealogy",
     "Info",
     "Iterated",
     "Kalman",
@@ -42,8 +48,10 @@ __all__ = [
     "SigmaPointFilter",
     "Simplex",
     "SingularValues",
+    "SmoothedEstimate",
     "SquareRoot",
     "Unscented",
     "run",
     "scan",
+    "smooth",
 ]

@@ -21,7 +21,7 @@ from jaxveh.filters.base import (
     wrap_angle,
 )
 from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
-from jaxveh.filters.gaussian.forms import AbstractForm, Conditioned, Spread
+from jaxveh.filters.gaussian.forms import AbstractForm, Spread
 from jaxveh.filters.gaussian.rules import AbstractRule, Image
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.noise import LOG_2PI
@@ -106,12 +106,13 @@ def corrected(
     """The belief after a row whose measurement has this image under it."""
     measured, present = presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])
-    innovation = jnp.stack([measured[name] for name in model.channels]) - image.mean
-    innovation = jnp.where(here, _wrapped(model, innovation), 0)
+    given = jnp.stack([measured[name] for name in model.channels])
+    innovation = wrapped_innovation(model, given - image.mean, here)
     before = Spread(belief.factor, belief.matrix)
     found = form.condition(image, model.measurement_noise, model.channels, here, innovation, before)
     after = with_spread(belief, belief.vector + found.shift, found.spread, t=row.t, u=row.u, count=belief.count + 1)
-    return after, _info(model, row, (belief, after), image, innovation, found)
+    result = _result(model, row, (belief, after), image, found.innovation_factor)
+    return after, innovation_info(model, row, innovation, found.white, found.innovation_factor, result)
 
 
 def check_covariances(name: str, model: StateSpace) -> None:
@@ -163,19 +164,21 @@ def observation_image(model: StateSpace, belief: GaussianBelief, row: Row, prese
     return belief.rule.image(see, belief.vector, belief.factor)
 
 
-def _wrapped(model, innovation):
-    if not model.angles:
-        return innovation
-    wraps = jnp.asarray([name in model.angles for name in model.channels])
-    return jnp.where(wraps, wrap_angle(innovation), innovation)
+def wrapped_innovation(model: StateSpace, innovation: Any, here: Any) -> Any:
+    """Innovations (m, ...), angles in [-pi, pi), zero where a channel is not `here` (m, ...)."""
+    if model.angles:
+        wraps = jnp.asarray([name in model.angles for name in model.channels])
+        wraps = wraps.reshape(-1, *[1] * (innovation.ndim - 1))
+        innovation = jnp.where(wraps, wrap_angle(innovation), innovation)
+    return jnp.where(here, innovation, 0)
 
 
-def _info(model, row, beliefs, image: Image, innovation, found: Conditioned) -> Info:
+def innovation_info(model: StateSpace, row: Row, innovation: Any, white: Any, factor: Any, result: Any) -> Info:
+    """The info of innovations (m,) with a covariance of this lower factor (m, m), by which `white` is whitened."""
     _, present = presence(model, row)
     dtype = innovation.dtype
     count = jnp.sum(jnp.stack([present[name] for name in model.channels]).astype(dtype))
-    nis, factor = jnp.sum(found.white**2), found.innovation_factor
-    variances = jnp.sum(jnp.square(factor), axis=-1)
+    nis, variances = jnp.sum(white**2), jnp.sum(jnp.square(factor), axis=-1)
     named = lambda values: record("Measurements", dict(zip(model.channels, values, strict=True)))
     return Info(
         log_likelihood=-0.5 * (nis + numerics.log_det(factor) + count * LOG_2PI),
@@ -183,9 +186,9 @@ def _info(model, row, beliefs, image: Image, innovation, found: Conditioned) -> 
         innovation_std=by_channel(model, jnp.sqrt(variances), present),
         nis=nis,
         ess=jnp.full((), jnp.nan, dtype),
-        whitened=named(found.white),
+        whitened=named(white),
         log_scale=named(jnp.log(jnp.diagonal(factor))),
-        result=_result(model, row, beliefs, image, factor),
+        result=result,
     )
 
 

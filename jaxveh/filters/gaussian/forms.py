@@ -4,7 +4,6 @@ import abc
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
@@ -59,16 +58,19 @@ class AbstractForm(eqx.Module):
         """E W E^T + Q, with the noise of `law` on some of the `fields` of the image's values."""
 
     @abc.abstractmethod
-    def condition(self, image: Image, law: AbstractNoise, fields: tuple[str, ...], here: Any, innovation: Any, before: Spread) -> Conditioned:
+    def condition(
+        self, image: Image, law: AbstractNoise, fields: tuple[str, ...], here: Any, innovation: Any, before: Spread
+    ) -> Conditioned:
         """The Gaussian `before`, given an innovation (m,) of the `fields`, those that are `here` (m,).
 
         A missing channel counts as independent with unit variance and zero innovation: it changes nothing. The image's
         deviations are zero there.
         """
 
-
     @abc.abstractmethod
-    def smooth(self, image: Image, law: AbstractNoise | None, fields: tuple[str, ...], before: Spread, later: Later) -> Smoothed:
+    def smooth(
+        self, image: Image, law: AbstractNoise | None, fields: tuple[str, ...], before: Spread, later: Later
+    ) -> Smoothed:
         """The Gaussian `before` a transition with this image, given what is known `later`, of the state after it.
 
         (H. Rauch, F. Tung & C. Striebel 1965; S. Sarkka, 2013, eqs 8.6 and 10.1.)
@@ -78,7 +80,7 @@ class AbstractForm(eqx.Module):
 class Covariance(AbstractForm):
     """The covariance itself, with its Cholesky factor for the points: the fastest.
 
-        S = E W E^T + R,    K = X W E^T S^-1,    P+ = P - K S K^T
+    S = E W E^T + R,    K = X W E^T S^-1,    P+ = P - K S K^T
     """
 
     needs_positive: ClassVar[bool] = False
@@ -132,7 +134,7 @@ class SquareRoot(AbstractForm):
     def condition(self, image, law, fields, here, innovation, before):
         E, X = image.deviations, image.spread
         m, n = len(fields), X.shape[0]
-        array = jnp.block([[E, _masked_factor(law, fields, here, E.dtype)], [X, jnp.zeros((n, m), E.dtype)]])
+        array = jnp.block([[E, masked_factor(law, fields, here, E.dtype)], [X, jnp.zeros((n, m), E.dtype)]])
         whole = numerics.lower_factor(_wide(array))
         factor, gain = whole[:m, :m], whole[m:, :m]
         white = numerics.solve_lower(factor, innovation)
@@ -167,7 +169,7 @@ class SingularValues(AbstractForm):
 
     def condition(self, image, law, fields, here, innovation, before):
         E, X = image.deviations, image.spread
-        noise = _masked_factor(law, fields, here, E.dtype)
+        noise = masked_factor(law, fields, here, E.dtype)
         factor = numerics.lower_factor(jnp.concatenate([E, noise], axis=1))
         gain = numerics.solve_lower_transposed(factor, numerics.solve_lower(factor, product(E, X, None))).T
         white = numerics.solve_lower(factor, innovation)
@@ -192,7 +194,7 @@ def _with_noise(deviations, law, fields):
     return jnp.concatenate([deviations, factor_in(law, fields, deviations.dtype)], axis=1)
 
 
-def _masked_factor(law, fields, here, dtype):
+def masked_factor(law, fields, here, dtype):
     """A lower factor (m, m) of the measurement noise, of unit variance and independent where a channel is missing."""
     both = here[:, None] & here[None, :]
     return numerics.cholesky(jnp.where(both, covariance_in(law, fields, dtype), jnp.eye(len(fields), dtype=dtype)))

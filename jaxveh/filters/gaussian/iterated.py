@@ -55,16 +55,21 @@ class Iterated(AbstractGaussianFilter):
 
 
 def linearised(image: Image, vector: Any, factor: Any, belief: Any) -> Image:
-    """The image under `belief` of the line `A x + b`, with error, that an image under the Gaussian (vector, factor) stands for.
-
-        A = E W X^T P^-1,    Lambda = (E - A X) W (E - A X)^T
-    """
-    E, X = image.deviations, image.spread
-    lower = numerics.lower_factor(factor)
-    slope = numerics.solve_psd(lower, product(X, E, image.signs)).T
-    rest = E - times(slope, X)
+    """The image under `belief` of the line, with error, that an image under the Gaussian (vector, factor) stands for."""
+    slope, rest = line_through(image, factor)
+    X = image.spread
     mean = image.mean + times(slope, belief.vector - vector)
     deviations = jnp.concatenate([times(slope, belief.factor), rest], axis=1)
     spread = jnp.concatenate([belief.factor, jnp.zeros_like(X)], axis=1)
     signs = None if image.signs is None else np.concatenate([np.ones(X.shape[0]), image.signs])
     return Image(mean, deviations, spread, signs)
+
+
+def line_through(image: Image, factor: Any) -> tuple[Any, Any]:
+    """The slope A (m, n) of the line that an image under a Gaussian with this factor stands for, and its error's deviations.
+
+    A = E W X^T P^-1,    Lambda = (E - A X) W (E - A X)^T
+    """
+    E, X = image.deviations, image.spread
+    slope = numerics.solve_psd(numerics.lower_factor(factor), product(X, E, image.signs)).T
+    return slope, E - times(slope, X)

@@ -25,10 +25,8 @@ def check_density(model: StateSpace) -> None:
 
 
 @eqx.filter_jit
-def sample_backwards(
-    filter: AbstractParticleFilter, model: StateSpace, rows: Row, key, count: int
-) -> SmoothedEstimate:
-    """`count` paths over rows with (T,) leaves, each drawn from the smoothing distribution (S. Godsill, A. Doucet & M. West 2004).
+def sample_backwards(filter: AbstractParticleFilter, model: StateSpace, rows: Row, key, count: int) -> SmoothedEstimate:
+    """`count` paths over rows with (T,) leaves, from the smoothing distribution (S. Godsill, A. Doucet & M. West 2004).
 
     The last row's states by their weights; then each row's by weight times the transition's density to the state after it.
     """

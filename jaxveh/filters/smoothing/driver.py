@@ -57,7 +57,9 @@ def smooth(
     if isinstance(filter, AbstractParticleFilter):
         found = _particles(filter, model, rows, need_key(filter, key), method)
     elif method is not None:
-        raise InputError(f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has its own.")
+        raise InputError(
+            f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has its own."
+        )
     elif isinstance(filter, AbstractGaussianFilter):
         found = rauch_tung_striebel(filter, model, rows)
     else:

@@ -1,0 +1,77 @@
+"""Filter and smoother in parallel over time."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
+from jaxveh._core.recording import Recording
+from jaxveh._core.result import first_failure
+from jaxveh.filters.driver import Estimate, raise_failure
+from jaxveh.filters.gaussian import AbstractGaussianFilter, Iterated
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.family import Kalman
+from jaxveh.filters.gaussian.forms import Covariance
+from jaxveh.filters.gaussian.parallel import infos_of, pass_over
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
+from jaxveh.statespace import Row, StateSpace, parameter_view
+
+
+def smooth_parallel(
+    filter: AbstractGaussianFilter, model: StateSpace, recording: Recording, *, throw: bool = True
+) -> SmoothedEstimate:
+    """What `smooth` says, by associative scans over the rows: for accelerators, and for long linear problems on many cores.
+
+    `Kalman()`: exact, as in a loop (S. Sarkka & A. Garcia-Fernandez 2021). `Iterated(filter, n)`: n passes, each linearising
+    every row by the filter's rule about the smoothed path of the last (F. Yaghoobi, A. Corenflos, S. Hassan & S. Sarkka 2021);
+    the first about the prior. It converges to the fixed point of iterated smoothing, which no loop forwards gives; where the
+    prior is far away it may not. The filtered estimate and the log-likelihood are those of the last pass's lines.
+
+    On a processor with few cores the loop is faster: about twice the work a row is done, in matrix products.
+
+    **Raises** as `run`, and `InputError` for other filters and forms.
+    """
+    if not isinstance(filter, (Kalman, Iterated)) or not isinstance(filter.form, Covariance):
+        raise InputError(
+            f"smooth_parallel: {type(filter).__name__} with {type(filter.form).__name__}: must be Kalman() or Iterated(...) with "
+            "Covariance()."
+        )
+    filter.check(model)
+    found = _smooth(filter, model, model.rows(recording))
+    found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
+    if throw:
+        raise_failure(found.filtered, filter, model, recording)
+    return found
+
+
+@eqx.filter_jit
+def _smooth(filter, model, rows: Row) -> SmoothedEstimate:
+    rule = filter.rule(len(model.states))
+    wide = lambda leaf: jnp.broadcast_to(leaf, (*rows.t.shape, *leaf.shape))
+    path = wide(jnp.stack(model.prior.mean)), wide(model.prior.covariance())
+
+    def again(path, _):
+        return pass_over(rule, model, rows, *path).smoothed, None
+
+    passes = filter.iterations - 1 if isinstance(filter, Iterated) else 0
+    path, _ = jax.lax.scan(jax.checkpoint(again), path, length=passes)
+    passed = pass_over(rule, model, rows, *path)
+    infos = infos_of(model, rows, passed)
+    beliefs = lambda gaussians: jax.vmap(lambda row, m, P: _belief(model, rule, row, m, P))(rows, *gaussians)
+    filtered, smoothed = beliefs(passed.filtered), beliefs(passed.smoothed)
+    moments = jax.vmap(lambda belief: belief.moments(model))
+    mean, std = moments(filtered)
+    result, failed_at = first_failure(infos.result)
+    show = lambda report: None if model.chosen is None else parameter_view(model.system, model.chosen, report)
+    last = jax.tree.map(lambda leaf: leaf[-1], filtered)
+    total = jnp.sum(infos.log_likelihood)
+    estimate = Estimate(rows.t, mean, std, total, infos, result, failed_at, last, show(mean), show(std))
+    return smoothed_estimate(model, estimate, moments(smoothed))
+
+
+def _belief(model, rule, row: Row, mean, covariance) -> GaussianBelief:
+    factor = numerics.cholesky(covariance)
+    return GaussianBelief(mean, factor, covariance, row.t, row.u, jnp.int32(0), type(model.prior.mean), rule)
