@@ -46,6 +46,12 @@ class GaussianBelief(AbstractBelief):
         """(n, n) in the order of the state's fields."""
         return self.matrix if self.matrix is not None else times(self.factor, self.factor.T)
 
+    def inflated(self, factor: Any) -> GaussianBelief:
+        """The belief with `factor` times its covariance."""
+        matrix = None if self.matrix is None else factor * self.matrix
+        root = numerics.sqrt(factor) * self.factor
+        return GaussianBelief(self.vector, root, matrix, self.t, self.u, self.count, self.state_type, self.rule)
+
     def moments(self, model):
         if model.report_function is None:
             return self.mean, self.std

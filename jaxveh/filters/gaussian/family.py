@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import equinox as eqx
 
-from jaxveh.filters.gaussian.filter import AbstractRuleFilter
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_covariances
 from jaxveh.filters.gaussian.forms import AbstractForm, Covariance
 from jaxveh.filters.gaussian.linear import check_linear
 from jaxveh.filters.gaussian.rules import Points, Slopes
@@ -25,7 +25,7 @@ class Kalman(AbstractRuleFilter):
         return Slopes()
 
     def check(self, model):
-        super().check(model)
+        check_covariances(type(self).__name__, model)
         check_linear(type(self).__name__, model)
 
 

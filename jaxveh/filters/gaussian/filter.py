@@ -11,6 +11,7 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.base import (
+    AbstractBelief,
     AbstractFilter,
     Info,
     always,
@@ -30,27 +31,31 @@ from jaxveh.statespace.noise import LOG_2PI
 class AbstractGaussianFilter(AbstractFilter):
     """A filter whose belief is a Gaussian, with additive noises that have covariances (S. Sarkka, 2013, ch. 5 and 6).
 
-    `rule(n)` says how functions of it are approximated, `form` in which its covariance is kept. `predict` and `update` are
-    public, for sensors of different rates; points are drawn anew after the prediction, so that the update sees the process
-    noise (on linear models this is the exact Kalman filter). Differentiable with respect to every array leaf of the model.
+    A step is `predict_between`, then `update`; both are public, for sensors of different rates, as is `observe`, what a
+    measurement would be. Wrappers go around these. Differentiable with respect to every array leaf of the model.
     """
 
     whitens: ClassVar[bool] = True
-    # No postponed annotations in this file: they would make a field of it.
-    form: eqx.AbstractVar[AbstractForm]
 
     @abc.abstractmethod
-    def rule(self, n: int) -> AbstractRule:
-        """The rule for n states."""
+    def prior(self, model: StateSpace, row: Row) -> AbstractBelief:
+        """The model's prior as a belief at the row's time, before its measurement."""
 
-    def check(self, model):
-        name, form = type(self).__name__, type(self.form)
-        check_covariances(name, model)
-        if form.needs_positive and not self.rule(len(model.states)).positive:
-            raise InputError(
-                f"{name}: a weight is negative for {len(model.states)} states, which {form.__name__} cannot take. "
-                "Use weights without (alpha = 1, kappa >= 0), or Covariance()."
-            )
+    @abc.abstractmethod
+    def predict_between(self, model: StateSpace, belief: Any, t, u_next) -> Any:
+        """The belief at time `t`, with the inputs `u_next` there (where the model's inputs run linearly)."""
+
+    @abc.abstractmethod
+    def observe(self, model: StateSpace, belief: Any, row: Row) -> Image:
+        """What the row's measurement would be under the belief, without noise, as rows in the order of the channels."""
+
+    @abc.abstractmethod
+    def update(self, model: StateSpace, belief: Any, row: Row) -> tuple[Any, Info]:
+        """The belief after the row's measurement, at the belief's own time (row.t is taken over, not propagated to)."""
+
+    @abc.abstractmethod
+    def adapted(self, model: StateSpace, belief: Any) -> StateSpace:
+        """The model with the noises that this filter takes for true, given what it has seen."""
 
     def init(self, model, row, key=None):
         del key
@@ -59,32 +64,9 @@ class AbstractGaussianFilter(AbstractFilter):
     def _init(self, model, row):
         return self.update(model, self.prior(model, row), row)
 
-    def prior(self, model: StateSpace, row: Row) -> GaussianBelief:
-        """The model's prior as a belief at the row's time, before its measurement."""
-        spread = self.form.start(model.prior.covariance())
-        mean = jnp.stack(model.prior.mean)
-        return GaussianBelief(
-            mean, *spread, row.t, row.u, jnp.int32(0), type(model.prior.mean), self.rule(len(model.states))
-        )
-
-    def predict(self, model: StateSpace, belief: GaussianBelief, t) -> GaussianBelief:
+    def predict(self, model: StateSpace, belief: Any, t) -> Any:
         """The belief at time `t`, propagated with the inputs that the belief carries (held)."""
         return self.predict_between(model, belief, t, belief.u)
-
-    def predict_between(self, model: StateSpace, belief: GaussianBelief, t, u_next) -> GaussianBelief:
-        """The belief at time `t`, with the inputs `u_next` there (where the model's inputs run linearly)."""
-        image = transition_image(model, belief, t, u_next)
-        law = None if model.process_noise is None else model.process_noise.over(t - belief.t)
-        return with_spread(belief, image.mean, self.form.add(image, law, model.states), t=t)
-
-    def observe(self, model: StateSpace, belief: GaussianBelief, row: Row) -> Image:
-        """What the row's measurement would be under the belief, without noise, as rows in the order of the channels."""
-        _, present = presence(model, row)
-        return observation_image(model, belief, row, present)
-
-    @abc.abstractmethod
-    def update(self, model: StateSpace, belief: GaussianBelief, row: Row) -> tuple[GaussianBelief, Info]:
-        """The belief after the row's measurement, at the belief's own time (row.t is taken over, not propagated to)."""
 
     def step(self, model, belief, row):
         return apart(self._step, belief.count >= 0, model, belief, row)
@@ -94,10 +76,52 @@ class AbstractGaussianFilter(AbstractFilter):
 
 
 class AbstractRuleFilter(AbstractGaussianFilter):
-    """A Gaussian filter whose update applies its rule once."""
+    """A Gaussian filter by a `rule(n)` that approximates functions, and the `form` in which it keeps its covariance.
+
+    Points are drawn anew after the prediction, so that the update sees the process noise (on linear models this is the exact
+    Kalman filter).
+    """
+
+    # No postponed annotations in this file: they would make a field of it.
+    form: eqx.AbstractVar[AbstractForm]
+
+    @abc.abstractmethod
+    def rule(self, n: int) -> AbstractRule:
+        """The rule for n states."""
+
+    def check(self, model):
+        check_covariances(type(self).__name__, model)
+        check_weights(self, model)
+
+    def prior(self, model, row):
+        spread = self.form.start(model.prior.covariance())
+        mean = jnp.stack(model.prior.mean)
+        rule = self.rule(len(model.states))
+        return GaussianBelief(mean, *spread, row.t, row.u, jnp.int32(0), type(model.prior.mean), rule)
+
+    def predict_between(self, model, belief, t, u_next):
+        image = transition_image(model, belief, t, u_next)
+        law = None if model.process_noise is None else model.process_noise.over(t - belief.t)
+        return with_spread(belief, image.mean, self.form.add(image, law, model.states), t=t)
+
+    def observe(self, model, belief, row):
+        return observation_image(model, belief, row, presence(model, row)[1])
 
     def update(self, model, belief, row):
         return corrected(self.form, model, belief, row, self.observe(model, belief, row))
+
+    def adapted(self, model, belief):
+        return model
+
+
+def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
+    """Raise `InputError` where the form needs positive weights and the rule has others."""
+    form = type(filter.form)
+    if form.needs_positive and not filter.rule(len(model.states)).positive:
+        raise InputError(
+            f"{type(filter).__name__}: a weight is negative for {len(model.states)} states, which {form.__name__} cannot take. "
+            "Use weights without (alpha = 1, kappa >= 0), or Covariance()."
+        )
 
 
 def corrected(

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
-from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, corrected, with_spread
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, AbstractRuleFilter, corrected, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import Image, product, times
 
@@ -25,28 +25,36 @@ class Iterated(AbstractGaussianFilter):
     log-likelihood stay those of the prediction. A linear observation is left alone by every iteration.
     """
 
-    filter: AbstractGaussianFilter
+    filter: AbstractRuleFilter
     iterations: int = eqx.field(static=True, default=4)
 
     def __check_init__(self):
         if not isinstance(self.iterations, int) or self.iterations < 1:
             raise InputError(f"iterations = {self.iterations}: must be a whole number of at least 1.")
 
-    @property
-    def form(self):
-        return self.filter.form
+    def check(self, model):
+        self.filter.check(model)
 
-    def rule(self, n):
-        return self.filter.rule(n)
+    def prior(self, model, row):
+        return self.filter.prior(model, row)
+
+    def predict_between(self, model, belief, t, u_next):
+        return self.filter.predict_between(model, belief, t, u_next)
+
+    def observe(self, model, belief, row):
+        return self.filter.observe(model, belief, row)
+
+    def adapted(self, model, belief):
+        return model
 
     def update(self, model, belief, row):
-        posterior, info = corrected(self.form, model, belief, row, self.observe(model, belief, row))
+        posterior, info = corrected(self.filter.form, model, belief, row, self.observe(model, belief, row))
 
         def again(gaussian, _):
             vector, spread = gaussian
             seen = self.observe(model, with_spread(belief, vector, spread), row)
             line = linearised(seen, vector, spread.factor, belief)
-            found, _ = corrected(self.form, model, belief, row, line)
+            found, _ = corrected(self.filter.form, model, belief, row, line)
             return (found.vector, Spread(found.factor, found.matrix)), None
 
         start = posterior.vector, Spread(posterior.factor, posterior.matrix)

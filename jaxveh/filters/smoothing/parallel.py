@@ -11,7 +11,7 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import first_failure
 from jaxveh.filters.driver import Estimate, raise_failure
-from jaxveh.filters.gaussian import AbstractGaussianFilter, Iterated
+from jaxveh.filters.gaussian import Iterated
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.family import Kalman
 from jaxveh.filters.gaussian.forms import Covariance
@@ -21,7 +21,7 @@ from jaxveh.statespace import Row, StateSpace, parameter_view
 
 
 def smooth_parallel(
-    filter: AbstractGaussianFilter, model: StateSpace, recording: Recording, *, throw: bool = True
+    filter: Kalman | Iterated, model: StateSpace, recording: Recording, *, throw: bool = True
 ) -> SmoothedEstimate:
     """What `smooth` says, by associative scans over the rows: for accelerators, and for long linear problems on many cores.
 
@@ -34,10 +34,10 @@ def smooth_parallel(
 
     **Raises** as `run`, and `InputError` for other filters and forms.
     """
-    if not isinstance(filter, (Kalman, Iterated)) or not isinstance(filter.form, Covariance):
+    inner = filter.filter if isinstance(filter, Iterated) else filter
+    if not isinstance(filter, (Kalman, Iterated)) or not isinstance(inner.form, Covariance):
         raise InputError(
-            f"smooth_parallel: {type(filter).__name__} with {type(filter.form).__name__}: must be Kalman() or Iterated(...) with "
-            "Covariance()."
+            f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...), of the form Covariance()."
         )
     filter.check(model)
     found = _smooth(filter, model, model.rows(recording))
@@ -49,7 +49,7 @@ def smooth_parallel(
 
 @eqx.filter_jit
 def _smooth(filter, model, rows: Row) -> SmoothedEstimate:
-    rule = filter.rule(len(model.states))
+    rule = (filter.filter if isinstance(filter, Iterated) else filter).rule(len(model.states))
     wide = lambda leaf: jnp.broadcast_to(leaf, (*rows.t.shape, *leaf.shape))
     path = wide(jnp.stack(model.prior.mean)), wide(model.prior.covariance())
 

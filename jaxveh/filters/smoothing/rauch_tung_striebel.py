@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 
 from jaxveh.filters.driver import scan_and_keep
-from jaxveh.filters.gaussian import AbstractGaussianFilter
+from jaxveh.filters.gaussian import AbstractGaussianFilter, Iterated
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import transition_image, with_spread
 from jaxveh.filters.gaussian.forms import Later, Spread
@@ -41,5 +41,6 @@ def given_later(
     image = transition_image(model, belief, t, u)
     law = None if model.process_noise is None else model.process_noise.over(t - belief.t)
     known = Later(later.vector - image.mean, Spread(later.factor, later.matrix))
-    found = filter.form.smooth(image, law, model.states, Spread(belief.factor, belief.matrix), known)
+    form = filter.filter.form if isinstance(filter, Iterated) else filter.form
+    found = form.smooth(image, law, model.states, Spread(belief.factor, belief.matrix), known)
     return with_spread(belief, belief.vector + found.shift, found.spread)
