@@ -1,0 +1,24 @@
+"""Filters around filters: noises learned, outliers borne, sensors gated and shared out, models that change."""
+
+from jaxveh.filters.wrappers.considered import Consider, Dual
+from jaxveh.filters.wrappers.federated import Federated
+from jaxveh.filters.wrappers.gated import Gated
+from jaxveh.filters.wrappers.interacting import InteractingModels
+from jaxveh.filters.wrappers.measurement_noise import SageHusa, VariationalBayes
+from jaxveh.filters.wrappers.paused import Paused
+from jaxveh.filters.wrappers.robust import Huber, RobustStudentT
+from jaxveh.filters.wrappers.strong_tracking import StrongTracking
+
+__all__ = [
+    "Consider",
+    "Dual",
+    "Federated",
+    "Gated",
+    "Huber",
+    "InteractingModels",
+    "Paused",
+    "RobustStudentT",
+    "SageHusa",
+    "StrongTracking",
+    "VariationalBayes",
+]

@@ -1,0 +1,89 @@
+"""States whose uncertainty counts, but which are not estimated; and states estimated apart from each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import check_names
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
+from jaxveh.filters.wrappers.base import AbstractStateless
+from jaxveh.statespace import StateSpace
+
+
+class Consider(AbstractStateless):
+    """`filter`, whose updates leave the states `names` as they are (S. F. Schmidt 1966: the consider filter).
+
+    Their mean and covariance stay those of the prediction; how the others depend on them is kept, so that the others' spreads
+    say what not knowing them costs:
+
+        K of the considered rows = 0,    P_cc+ = P_cc-
+
+    For parameters that the data cannot tell, such as a mass on a level road.
+    """
+
+    filter: AbstractRuleFilter
+    names: tuple[str, ...] = eqx.field(static=True)
+
+    def check(self, model):
+        check_names("Consider.names", self.names, model.states)
+        self.filter.check(model)
+
+    def update(self, model, belief, row):
+        after, info = self.filter.update(model, belief, row)
+        kept = _among(model, self.names)
+        vector = jnp.where(kept, belief.vector, after.vector)
+        both = kept[:, None] & kept[None, :]
+        return _with_covariance(self.filter, after, vector, jnp.where(both, belief.covariance, after.covariance)), info
+
+
+class Dual(AbstractStateless):
+    """`filter` of a joint model, with states and parameters estimated apart: dual estimation (E. Wan & A. Nelson 2001).
+
+    After every row the covariances between the blocks of `groups` (tuples of states; one for the rest is added) are forgotten, so
+    that each block is corrected by what a measurement says through this step's prediction alone. By default the blocks are the
+    model's own states and its chosen parameters. What the blocks say of each other over several rows is lost, and spreads come
+    out too small: the joint filter, without this wrapper, is better wherever it is stable.
+    """
+
+    filter: AbstractRuleFilter
+    groups: tuple[tuple[str, ...], ...] | None = eqx.field(static=True, default=None)
+
+    def check(self, model):
+        for group in self._blocks(model):
+            check_names("Dual.groups", group, model.states)
+        names = [name for group in self._blocks(model) for name in group]
+        if len(set(names)) < len(names):
+            raise InputError("Dual.groups: a state stands in more than one group.")
+        self.filter.check(model)
+
+    def update(self, model, belief, row):
+        after, info = self.filter.update(model, belief, row)
+        blocks = self._blocks(model)
+        place = np.array([next(i for i, group in enumerate(blocks) if name in group) for name in model.states])
+        together = place[:, None] == place[None, :]
+        return _with_covariance(self.filter, after, after.vector, jnp.where(together, after.covariance, 0)), info
+
+    def _blocks(self, model: StateSpace) -> tuple[tuple[str, ...], ...]:
+        given = self.groups
+        if given is None:
+            if model.chosen is None:
+                raise InputError("Dual: the model has no chosen parameters; name the blocks of states in `groups`.")
+            given = (model.chosen.states,)
+        rest = tuple(name for name in model.states if not any(name in group for group in given))
+        return (*given, rest) if rest else given
+
+
+def _among(model: StateSpace, names: tuple[str, ...]) -> Any:
+    return jnp.asarray([name in names for name in model.states])
+
+
+def _with_covariance(
+    filter: AbstractRuleFilter, belief: GaussianBelief, vector: Any, covariance: Any
+) -> GaussianBelief:
+    return with_spread(belief, vector, filter.form.start(covariance))

@@ -1,0 +1,215 @@
+"""Local filters, each with sensors of its own, and a master that fuses them."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check
+from jaxveh._core.names import check_names, record
+from jaxveh.filters.base import AbstractBelief, AbstractFilter, always, apart
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
+from jaxveh.filters.gaussian.forms import Spread
+from jaxveh.filters.gaussian.rules import times
+from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.process import AbstractProcessNoise
+
+
+class FederatedBelief(AbstractBelief):
+    """The `master`, a Gaussian; the `locals`; their `shares` (k,) of the information; and how they fared: `alarm` (k,), the
+    fading mean of NIS over its expected value."""
+
+    master: GaussianBelief
+    locals: tuple[GaussianBelief, ...]
+    shares: jax.Array
+    alarm: jax.Array
+
+    @property
+    def t(self):
+        """Time of the last row, s."""
+        return self.master.t
+
+    @property
+    def u(self):
+        """Inputs of the last row."""
+        return self.master.u
+
+    @property
+    def count(self):
+        """Rows so far."""
+        return self.master.count
+
+    @property
+    def mean(self):
+        """The master's mean."""
+        return self.master.mean
+
+    @property
+    def std(self):
+        """The master's standard deviations."""
+        return self.master.std
+
+    @property
+    def covariance(self):
+        """The master's (n, n)."""
+        return self.master.covariance
+
+    def moments(self, model):
+        return self.master.moments(model)
+
+
+class Federated(AbstractFilter):
+    """N. Carlson's federated filter (IEEE Trans. Aerospace and Electronic Systems 26, 1990) with `locals` of the same `filter`.
+
+    Every local has all states, the sensors of its own `groups` entry (tuples of channels), the prior's and the process noise's
+    covariance over its share, and so no information that another has:
+
+        P^-1 = sum P_i^-1,    x = P sum P_i^-1 x_i;    reset:  x_i = x, P_i = P / share_i
+
+    With `reset` (fusion-reset) on linear models this is the centralised filter; without, the locals go on by themselves, more
+    robust and less sharp. `shares`: fixed, by default equal; `by_trace`: in proportion to 1 / trace(P_i), over the prior's
+    variances. `isolate`: what locals measure whose fading mean NIS exceeds this multiple of its expected value is left out of
+    the fusion until it falls again (None: never); it is still watched.
+
+    Groups that share a channel count its information twice: `InputError`, unless `overlapping`. Infos are those of the fused
+    prediction with all sensors.
+    """
+
+    whitens: ClassVar[bool] = True
+    filter: AbstractRuleFilter
+    groups: tuple[tuple[str, ...], ...] = eqx.field(static=True)
+    shares: tuple[float, ...] | None = eqx.field(static=True, default=None)
+    by_trace: bool = eqx.field(static=True, default=False)
+    reset: bool = eqx.field(static=True, default=True)
+    isolate: float | None = eqx.field(static=True, default=None)
+    fading: float = eqx.field(static=True, default=0.9)
+    overlapping: bool = eqx.field(static=True, default=False)
+
+    def __check_init__(self):
+        if len(self.groups) < 2:
+            raise InputError(f"Federated.groups: {len(self.groups)}; must be at least two tuples of channels.")
+        names = [name for group in self.groups for name in group]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice and not self.overlapping:
+            raise InputError(
+                f"Federated.groups: {', '.join(twice)} in more than one group: its information would count twice. "
+                "overlapping=True allows it."
+            )
+        if self.shares is not None:
+            if len(self.shares) != len(self.groups):
+                raise InputError(f"Federated.shares: {len(self.shares)} for {len(self.groups)} groups.")
+            fine = abs(sum(self.shares) - 1) < 1e-9 and min(self.shares) > 0
+            check("Federated.shares", self.shares, lambda _: fine, "positive, with the sum 1")
+        check("Federated.isolate", self.isolate, lambda v: v > 1, "above 1")
+        check("Federated.fading", self.fading, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
+
+    def check(self, model):
+        self.filter.check(model)
+        names = [name for group in self.groups for name in group]
+        check_names("Federated.groups", names, model.channels)
+        left = [name for name in model.channels if name not in names]
+        if left:
+            raise InputError(f"Federated.groups: no group has {', '.join(left)}.")
+
+    def init(self, model, row, key=None):
+        del key
+        return apart(self._init, always(row.t), model, row)
+
+    def _init(self, model, row):
+        prior = self.filter.prior(model, row)
+        k = len(self.groups)
+        shares = self.shares or (1 / k,) * k
+        shares = jnp.asarray(shares, prior.vector.dtype)
+        start = FederatedBelief(prior, (prior,) * k, shares, jnp.ones_like(shares))
+        return self._measured(model, start, self._handed_out(prior, shares), row)
+
+    def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
+        before = self._handed_out(belief.master, belief.shares) if self.reset else belief.locals
+        ahead = tuple(
+            self.filter.predict_between(_with_process_noise_over(model, share), local, row.t, row.u)
+            for local, share in zip(before, belief.shares, strict=True)
+        )
+        return self._measured(model, belief, ahead, row)
+
+    def _handed_out(self, master: GaussianBelief, shares) -> tuple[GaussianBelief, ...]:
+        return tuple(master.inflated(1.0 / share) for share in shares)
+
+    def _measured(self, model, belief: FederatedBelief, ahead, row):
+        predicted = self._fused(ahead, belief.master)
+        _, info = self.filter.update(model, predicted, row)
+        rows = [_only(model, row, group) for group in self.groups]
+        found = [self.filter.update(model, local, own)[0] for local, own in zip(ahead, rows, strict=True)]
+        # A local's own prediction is wide, and seldom surprised: sensors are judged by the fused one.
+        surprise = jnp.stack([self.filter.update(model, predicted, own)[1].nis for own in rows])
+        counts = jnp.stack([_count(row, group) for group in self.groups])
+        ratio = surprise / jnp.maximum(counts, 1.0)
+        alarm = jnp.where(counts > 0, self.fading * belief.alarm + (1.0 - self.fading) * ratio, belief.alarm)
+        trusted = jnp.ones(len(rows), bool) if self.isolate is None else alarm < self.isolate
+        # Where every local is suspect there is nothing to judge by.
+        trusted = trusted | ~jnp.any(trusted)
+        believed = [_either(ok, after, before) for ok, after, before in zip(trusted, found, ahead, strict=True)]
+        master = self._fused(believed, belief.master)
+        master = with_spread(
+            master, master.vector, Spread(master.factor, master.matrix), row.t, row.u, belief.count + 1
+        )
+        return FederatedBelief(master, tuple(believed), self._new_shares(model, belief, believed), alarm), info
+
+    def _new_shares(self, model, belief, locals_):
+        if not self.by_trace:
+            return belief.shares
+        scale = jnp.diagonal(model.prior.covariance())
+        traces = jnp.stack([jnp.sum(local.variances / scale) for local in locals_])
+        return (1.0 / traces) / jnp.sum(1.0 / traces)
+
+    def _fused(self, beliefs, like: GaussianBelief) -> GaussianBelief:
+        """The Gaussian of all beliefs' information, with the time and inputs of `like`."""
+        informations = [numerics.inverse_psd(numerics.lower_factor(b.factor)) for b in beliefs]
+        pulls = [times(information, b.vector) for information, b in zip(informations, beliefs, strict=True)]
+        factor = numerics.cholesky(sum(informations[1:], informations[0]))
+        mean = numerics.solve_psd(factor, sum(pulls[1:], pulls[0]))
+        return with_spread(like, mean, self.filter.form.start(numerics.inverse_psd(factor)), t=beliefs[0].t)
+
+
+def _only(model: StateSpace, row: Row, group: tuple[str, ...]) -> Row:
+    """The row with the channels of a group; the others are missing."""
+    y = row.y._asdict()
+    return row._replace(
+        y=record("Measurements", {n: v if n in group else jnp.full_like(v, jnp.nan) for n, v in y.items()})
+    )
+
+
+def _count(row: Row, group: tuple[str, ...]) -> Any:
+    here = [jnp.isfinite(getattr(row.y, name)) for name in group]
+    return jnp.sum(jnp.stack(here).astype(row.t.dtype))
+
+
+def _either(condition, a: GaussianBelief, b: GaussianBelief) -> GaussianBelief:
+    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), a, b)
+
+
+class _Shared(AbstractProcessNoise):
+    """A process noise whose covariance is divided by a local's share."""
+
+    whole: AbstractProcessNoise
+    share: Any
+
+    @property
+    def law(self):
+        return self.whole.law
+
+    def over(self, dt):
+        return self.whole.over(dt).scaled(1.0 / jnp.sqrt(self.share))
+
+
+def _with_process_noise_over(model: StateSpace, share) -> StateSpace:
+    if model.process_noise is None:
+        return model
+    return eqx.tree_at(lambda m: m.process_noise, model, _Shared(model.process_noise, share))

@@ -1,0 +1,165 @@
+"""Several models at once: which one the car is in is estimated, too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check, float_array
+from jaxveh._core.result import first_failure
+from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info, always, apart, by_channel, presence
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
+from jaxveh.statespace import StateSpace
+
+
+class MixtureBelief(AbstractBelief):
+    """One Gaussian a mode, `modes`, and the modes' `probabilities` (r,)."""
+
+    modes: tuple[GaussianBelief, ...]
+    probabilities: jax.Array
+
+    @property
+    def t(self):
+        """Time of the last row, s."""
+        return self.modes[0].t
+
+    @property
+    def u(self):
+        """Inputs of the last row."""
+        return self.modes[0].u
+
+    @property
+    def count(self):
+        """Rows so far."""
+        return self.modes[0].count
+
+    @property
+    def mean(self):
+        """The mixture's mean, the state's NamedTuple."""
+        return _mixed(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[0]
+
+    @property
+    def std(self):
+        """The mixture's standard deviations, the state's NamedTuple."""
+        return _mixed(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[1]
+
+    def moments(self, model):
+        # A mode's own model reports its state: what differs are parameters, and the report is of states.
+        return _mixed(self.probabilities, [mode.moments(model) for mode in self.modes])
+
+
+class InteractingModels(AbstractFilter):
+    """The interacting multiple model filter (H. Blom & Y. Bar-Shalom 1988; Bar-Shalom, Li & Kirubarajan, sec. 11.6.6).
+
+    **Arguments**: `filter`, of the family that all modes share; `variants`: functions from the model to each mode's model, such
+    as `lambda model: eqx.tree_at(where_friction, model, 0.3)`, which must keep states and channels; `transition` (r, r): row i
+    has the probabilities of going from mode i to each within a step; `start` (r,): probabilities before the first row (equal).
+
+    Each step mixes the modes' Gaussians by the probabilities of having come from each other, moves every one by its own model,
+    and weighs them by their likelihoods. `belief.probabilities` are those after the last row. Innovations are the mixture's.
+    """
+
+    whitens: ClassVar[bool] = False
+    filter: AbstractRuleFilter
+    variants: tuple[Callable[[StateSpace], StateSpace], ...] = eqx.field(static=True)
+    transition: jax.Array = eqx.field(converter=lambda m: float_array(m if eqx.is_array(m) else np.asarray(m, float)))
+    start: jax.Array | None = eqx.field(
+        default=None,
+        converter=lambda v: None if v is None else float_array(v if eqx.is_array(v) else np.asarray(v, float)),
+    )
+
+    def __check_init__(self):
+        r = len(self.variants)
+        if r < 2:
+            raise InputError(f"InteractingModels.variants: {r}; must be at least two.")
+        for name, value, shape in (("transition", self.transition, (r, r)), ("start", self.start, (r,))):
+            if value is not None and value.shape != shape:
+                raise InputError(f"InteractingModels.{name} has shape {value.shape}: must be {shape} for {r} variants.")
+            stochastic = lambda p: (p >= 0).all() and bool(np.all(np.abs(np.sum(p, -1) - 1) < 1e-6))
+            check(f"InteractingModels.{name}", value, stochastic, "probabilities whose rows sum to 1")
+
+    def check(self, model):
+        for variant in self.variants:
+            mode = variant(model)
+            self.filter.check(mode)
+            if (mode.states, mode.channels, mode.inputs) != (model.states, model.channels, model.inputs):
+                raise InputError("InteractingModels: a variant changes the model's states, channels or inputs.")
+
+    def init(self, model, row, key=None):
+        del key
+        return apart(self._init, always(row.t), model, row)
+
+    def _init(self, model, row):
+        r, dtype = len(self.variants), row.t.dtype
+        before = jnp.full((r,), 1 / r, dtype) if self.start is None else self.start.astype(dtype)
+        found = [self.filter.update(mode, self.filter.prior(mode, row), row) for mode in self._modes(model)]
+        return self._weighed(model, row, before, found)
+
+    def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
+        joint = self.transition.astype(row.t.dtype) * belief.probabilities[:, None]
+        ahead = jnp.sum(joint, axis=0)
+        from_each = joint / jnp.where(ahead > 0, ahead, 1)
+        found = []
+        for j, mode in enumerate(self._modes(model)):
+            mixed = self._mix(belief, from_each[:, j], j)
+            found.append(self.filter.update(mode, self.filter.predict_between(mode, mixed, row.t, row.u), row))
+        return self._weighed(model, row, ahead, found)
+
+    def _modes(self, model):
+        return [variant(model) for variant in self.variants]
+
+    def _mix(self, belief: MixtureBelief, weights, j: int) -> GaussianBelief:
+        """The Gaussian with the mixture's moments, for mode j."""
+        vectors = jnp.stack([mode.vector for mode in belief.modes])
+        mean = jnp.sum(weights[:, None] * vectors, axis=0)
+        deviations = vectors - mean
+        outer = deviations[:, :, None] * deviations[:, None, :]
+        whole = jnp.stack([mode.covariance for mode in belief.modes]) + outer
+        covariance = jnp.sum(weights[:, None, None] * whole, axis=0)
+        return with_spread(belief.modes[j], mean, self.filter.form.start(covariance))
+
+    def _weighed(self, model, row, before, found):
+        beliefs, infos = zip(*found, strict=True)
+        logs = jnp.stack([info.log_likelihood for info in infos])
+        top = jnp.max(logs)
+        weights = before * jnp.exp(logs - top)
+        total = jnp.sum(weights)
+        info = _mixture_info(model, row, before, infos, top + jnp.log(total))
+        return MixtureBelief(tuple(beliefs), weights / total), info
+
+
+def _mixed(weights, moments):
+    """Mean and standard deviation, NamedTuples, of a mixture of such pairs."""
+    means, stds = zip(*moments, strict=True)
+    mean = jax.tree.map(lambda *values: sum(w * v for w, v in zip(weights, values, strict=True)), *means)
+
+    def spread(centre, *both):
+        values, widths = both[: len(means)], both[len(means) :]
+        parts = zip(weights, values, widths, strict=True)
+        return numerics.sqrt(sum(w * (jnp.square(s) + jnp.square(v - centre)) for w, v, s in parts))
+
+    return mean, jax.tree.map(spread, mean, *means, *stds)
+
+
+def _mixture_info(model, row, weights, infos, log_likelihood) -> Info:
+    _, present = presence(model, row)
+    mean, std = _mixed(weights, [(info.innovation, info.innovation_std) for info in infos])
+    nothing = jnp.full_like(log_likelihood, jnp.nan)
+    return Info(
+        log_likelihood=log_likelihood,
+        innovation=by_channel(model, mean, present),
+        innovation_std=by_channel(model, std, present),
+        nis=nothing,
+        ess=nothing,
+        result=first_failure(jnp.stack([info.result for info in infos]))[0],
+    )

@@ -1,0 +1,91 @@
+"""Measurements with outliers: the noise counts for larger where a residual is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError, check_positive
+from jaxveh.filters.base import presence
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
+from jaxveh.filters.wrappers.base import AbstractStateless, check_independent, variances_of, with_variances
+from jaxveh.filters.wrappers.innovation import innovation, spread_of
+
+
+def _check_iterations(iterations: int) -> None:
+    if not isinstance(iterations, int) or iterations < 1:
+        raise InputError(f"iterations = {iterations}: must be a whole number of at least 1.")
+
+
+class Huber(AbstractStateless):
+    """`filter` with Huber's loss of the innovations: linear beyond `threshold` standard deviations of the prediction.
+
+    Each channel's noise variance is divided by the weight `min(1, threshold / |e|)`, e the innovation over its predicted
+    spread (P. Huber 1964; one step of the reweighting of C. Karlgaard & H. Schaub 2007). The noise must be Gaussian, a standard
+    deviation a channel.
+    """
+
+    filter: AbstractGaussianFilter
+    threshold: float = eqx.field(static=True, default=1.345)
+
+    def __check_init__(self):
+        check_positive("Huber.threshold", self.threshold)
+
+    def check(self, model):
+        check_independent("Huber", model)
+        self.filter.check(model)
+
+    def update(self, model, belief, row):
+        found = innovation(self.filter, model, belief, row)
+        squared = jnp.square(found.error) / (found.expected + found.noise)
+        large = squared > self.threshold**2
+        weight = jnp.where(large, self.threshold / jnp.sqrt(jnp.where(large, squared, 1)), 1)
+        return self.filter.update(with_variances(model, variances_of(model) / weight), belief, row)
+
+
+class RobustStudentT(AbstractStateless):
+    """`filter` for noise of Student's t law with `dof` degrees of freedom and the model's standard deviations as scales.
+
+    A t law is a Gaussian whose precision is itself random; variational Bayes finds the precision and the state in turns, with
+    y - h the residual under the state's belief and H P H^T what it spreads (R. Piche, S. Sarkka & J. Hartikainen 2012):
+
+        variance / scale^2 = (dof + E[(y - h)^2] / scale^2) / (dof + 1)
+
+    Each channel is judged by itself. The log-likelihood is that of the Gaussian with the last variances: no density of the
+    t law. The noise must be Gaussian, a standard deviation a channel.
+    """
+
+    filter: AbstractGaussianFilter
+    dof: float = eqx.field(static=True, default=4.0)
+    iterations: int = eqx.field(static=True, default=3)
+
+    def __check_init__(self):
+        check_positive("RobustStudentT.dof", self.dof)
+        _check_iterations(self.iterations)
+
+    def check(self, model):
+        check_independent("RobustStudentT", model)
+        self.filter.check(model)
+
+    def update(self, model, belief, row):
+        scale = variances_of(model)
+
+        def again(variances, _):
+            after, _ = self.filter.update(with_variances(model, variances), belief, row)
+            expected = expected_squares(self.filter, model, after, row)
+            return scale * (self.dof + expected / scale) / (self.dof + 1.0), None
+
+        variances, _ = jax.lax.scan(jax.checkpoint(again), scale, length=self.iterations)
+        return self.filter.update(with_variances(model, variances), belief, row)
+
+
+def expected_squares(filter: AbstractGaussianFilter, model: Any, belief: Any, row: Any) -> Any:
+    """E[(y - h)^2] (m,) under a belief after the row: the residual's square, and what the belief spreads."""
+    image = filter.observe(model, belief, row)
+    measured, present = presence(model, row)
+    here = jnp.stack([present[name] for name in model.channels])
+    residual = jnp.stack([measured[name] for name in model.channels]) - image.mean
+    return jnp.square(wrapped_innovation(model, residual, here)) + spread_of(image)

@@ -1,0 +1,57 @@
+"""A fading factor where the innovations are larger than the filter expects."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxveh._core.errors import check
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
+from jaxveh.filters.wrappers.base import AbstractRemembering, Remembering
+from jaxveh.filters.wrappers.innovation import innovation
+
+
+class StrongTracking(AbstractRemembering):
+    """`filter` whose predicted covariance is inflated where innovations exceed it (D. Zhou & P. Frank 1996).
+
+        V <- (rho V + e e^T) / (1 + rho),    lambda = max(1, trace(V - beta R) / trace(H P H^T))
+
+    with each channel over its noise's standard deviation, so that units do not matter; rho = `memory`, beta = `softening`. It
+    follows sudden changes that the model does not know of, and takes outliers for such.
+    """
+
+    filter: AbstractGaussianFilter
+    memory: float = eqx.field(static=True, default=0.95)
+    softening: float = eqx.field(static=True, default=1.0)
+    ceiling: float = eqx.field(static=True, default=100.0)
+
+    def __check_init__(self):
+        check("StrongTracking.memory", self.memory, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
+        check("StrongTracking.softening", self.softening, lambda v: v >= 1, "at least 1")
+        check("StrongTracking.ceiling", self.ceiling, lambda v: v >= 1, "at least 1")
+
+    def check(self, model):
+        self.filter.check(model)
+
+    def start(self, model):
+        dtype = model.prior.mean[0].dtype
+        # The innovations' mean square over the noise, and how much of it has been seen.
+        return jnp.zeros(len(model.channels), dtype), jnp.zeros(len(model.channels), dtype)
+
+    def believed(self, model, memory):
+        return model
+
+    def update(self, model, belief, row):
+        found = innovation(self.filter, model, belief.inside, row)
+        squared = jnp.square(found.error) / found.noise
+        sums, counts = (
+            jnp.where(found.here, self.memory * old + new, old)
+            for old, new in zip(belief.memory, (squared, jnp.ones_like(squared)), strict=True)
+        )
+        excess = jnp.where(found.here, sums / jnp.maximum(counts, 1.0) - self.softening, 0.0)
+        expected = jnp.sum(jnp.where(found.here, found.expected / found.noise, 0.0))
+        some = expected > 0
+        factor = jnp.where(some, jnp.sum(excess) / jnp.where(some, expected, 1.0), 1.0)
+        factor = jnp.clip(factor, 1.0, self.ceiling)
+        after, info = self.filter.update(model, belief.inside.inflated(factor), row)
+        return Remembering(after, (sums, counts)), info
