@@ -1,4 +1,4 @@
-"""Lane changes between cones: the lanes of ISO 3888, where the cones stand, and whether a car hits them."""
+"""Driving between cones: the lanes of ISO 3888, a slalom, where the cones stand, and whether a car hits them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ CONE_DIAMETER = 0.3
 
 
 class Lane(NamedTuple):
-    """A straight lane between cones, from `start` to `end` (m along x), between `right` and `left` (m along y)."""
+    """A straight lane between cones, from `start` to `end` (m along x), between `right` and `left` (m along y).
+
+    A side is infinite where the lane has no limit there.
+    """
 
     start: float
     end: float
@@ -79,6 +82,32 @@ def iso_3888_2(width: float, start: float = 30.0) -> Course:
     return Course("ISO 3888-2", lanes)
 
 
+def slalom_cones(spacing: float = 18.0, count: int = 6, start: float = 30.0, diameter: float = CONE_DIAMETER) -> Course:
+    """The cones of a `slalom_course` with the same `spacing` (m), `count` and `start` (m): lanes of no length, open to one side.
+
+    Cone k (from 0) stands at x = start + (1.5 + k) spacing, y = 0; it is passed on its right where k is even, else on its
+    left, beyond its base of a `diameter` (m), whose extent along x is left out.
+
+    **Raises** `InputError` for a spacing or diameter that is not positive, or fewer than 2 cones.
+    """
+    check_slalom(spacing, count, start)
+    check_positive("diameter", diameter, "m")
+    lanes = []
+    for k in range(count):
+        x = start + (1.5 + k) * spacing
+        sides = (-math.inf, -diameter / 2) if k % 2 == 0 else (diameter / 2, math.inf)
+        lanes.append(Lane(x, x, *sides))
+    return Course("slalom", tuple(lanes))
+
+
+def check_slalom(spacing, count, start) -> None:
+    """Raise `InputError` unless these are those of a slalom's cones."""
+    check_positive("spacing", spacing, "m")
+    check_finite("start", start)
+    if count < 2:
+        raise InputError(f"count = {count}: must be at least 2 cones.")
+
+
 def centre_line(course: Course, lead: float) -> LaneChanges:
     """A smooth path through the middle of a course of three lanes that starts along x.
 
@@ -107,7 +136,7 @@ def cones(course: Course, spacing: float = 3.0, diameter: float = CONE_DIAMETER)
     """Centres of the cones, (n, 2) of x and y in m: along both limits of each lane, its ends included.
 
     The limits touch the cones' bases (of a `diameter`, m) from inside, as in ISO 3888. They stand evenly, at most `spacing`
-    (m) apart: that is ours.
+    (m) apart: that is ours. Sides without a limit have no cones.
 
     **Raises** `InputError` for a spacing or diameter that is not positive.
     """
@@ -116,7 +145,8 @@ def cones(course: Course, spacing: float = 3.0, diameter: float = CONE_DIAMETER)
     places = []
     for lane in course.lanes:
         count = math.ceil((lane.end - lane.start) / spacing) + 1
-        for side in (lane.right - diameter / 2, lane.left + diameter / 2):
+        sides = (lane.right - diameter / 2, lane.left + diameter / 2)
+        for side in filter(math.isfinite, sides):
             places += [(x, side) for x in np.linspace(lane.start, lane.end, count)]
     return np.array(places)
 
