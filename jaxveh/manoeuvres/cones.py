@@ -44,9 +44,12 @@ def iso_3888_1(width: float, start: float = 30.0) -> Course:
     """The double lane change of ISO 3888-1 for a car of a `width` (m, without mirrors), from `start` (m) on.
 
     Sections of 15, 30, 25, 25, 15 and 15 m, 125 m in all (the last two are one lane). Lane widths 1.1 w + 0.25, 1.2 w +
-    0.25 and 1.3 w + 0.25 m. The second lane's right limit lies 3.5 m left of the first's; the third's is in line with
-    the first's. y = 0 is the first lane's centre line. Figures: ISO 3888-1:2018, figure 1 and table 1, from secondary
-    sources that agree.
+    0.25 and 1.3 w + 0.25 m. y = 0 is the first lane's centre line.
+
+    Figures: ISO 3888-1:2018, figure 1 and table 1, from secondary sources; the standard itself was not at hand. Assumed is that
+    the offset of 3.5 m is that of right limits, from the first lane's to the second's, and that the third lane's right limit is
+    in line with the first's, so that it is wider on the left alone. If the offset were meant otherwise (of centre lines, say) the
+    second lane would lie 0.05 w further right.
 
     **Raises** `InputError` for a width that is not positive.
     """
@@ -65,9 +68,11 @@ def iso_3888_2(width: float, start: float = 30.0) -> Course:
     """The obstacle avoidance of ISO 3888-2 for a car of a `width` (m, without mirrors), from `start` (m) on.
 
     Sections of 12, 13.5, 11, 12.5 and 12 m, 61 m in all. Lane widths 1.1 w + 0.25, w + 1 and 1.3 w + 0.25 m, the last at
-    least 3 m. The second lane's right limit lies 1 m left of the first's left limit; the third's left limit is in line
-    with the first's. y = 0 is the first lane's centre line. Figures: ISO 3888-2:2011, figure 1 and table 1, from
-    secondary sources that agree.
+    least 3 m. y = 0 is the first lane's centre line.
+
+    Figures: ISO 3888-2:2011, figure 1 and table 1, from secondary sources; the standard itself was not at hand. Assumed is that
+    the offset of 1 m is the gap from the first lane's left limit to the second's right limit, and that the third lane's left
+    limit is in line with the first's, so that it is wider on the right alone, and the way back into it as far as the way out.
 
     **Raises** `InputError` for a width that is not positive.
     """
