@@ -58,9 +58,12 @@ def crossing(time: np.ndarray, values: np.ndarray, level: float, after: float = 
 
 
 def peak(time: np.ndarray, values: np.ndarray) -> tuple[float, float]:
-    """Instant (s) and height of the greatest value: the top of the parabola through it and its neighbours."""
+    """Instant (s) and height of the greatest value: the top of the parabola through it and its neighbours.
+
+    The row itself where it has no finite neighbour on one side: values that do not count are minus infinity.
+    """
     k = int(np.argmax(values))
-    if k in (0, values.size - 1):
+    if k in (0, values.size - 1) or not np.isfinite(values[k - 1 : k + 2]).all():
         return float(time[k]), float(values[k])
     a, b, c = np.polyfit(time[k - 1 : k + 2] - time[k], values[k - 1 : k + 2], 2)
     if a >= 0:

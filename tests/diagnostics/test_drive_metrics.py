@@ -91,6 +91,13 @@ def test_what_was_there_before_the_step_does_not_count():
     np.testing.assert_allclose(step_response(offset), step_response(clean), atol=1e-12)
 
 
+def test_a_peak_in_the_first_row_after_the_reference_is_seen():
+    """The rows before do not count, and so there is no parabola: the row itself is the peak."""
+    found = step_response(stepped(lambda t: 0.2 + 0.1 * np.exp(-t / 0.3)))
+    np.testing.assert_allclose([found.peak, found.overshoot], [0.3, 0.5], rtol=1e-6)
+    np.testing.assert_allclose(found.peak_response_time, 0.005, atol=1e-9)
+
+
 def test_the_truth_is_looked_at_first_and_gaps_are_bridged():
     rows = np.arange(10.0)
     gaps = np.where(np.arange(10) % 2 == 0, rows, np.nan)
