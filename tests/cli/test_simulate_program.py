@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from programs import error_line, run, write_car
 
-from jaxveh import io, roads, vehicles
+from jaxveh import Recording, io, roads, vehicles
 from jaxveh.cli.devices import DEVICES, Noise, devices_of
+from jaxveh.cli.drive_report import numbers_of, print_numbers, steer_at_03g
 from jaxveh.cli.manoeuvre import USUAL, asked, course_of, make
 from jaxveh.cli.vehicle import AS_PRINTED, BUILT_IN, FIDELITIES, vehicle_of
 from jaxveh.manoeuvres import MANOEUVRES
@@ -57,7 +58,7 @@ def test_every_manoeuvre_has_usual_values_and_can_be_made():
     for name in MANOEUVRES:
         one = asked(name, None, None, None, (), car)
         assert make(one, jax.random.key(0)).duration > 0
-        assert (course_of(one) is not None) == name.startswith("iso-")
+        assert (course_of(one) is not None) == (name.startswith("iso-") or name == "slalom-course")
 
 
 def test_what_the_manoeuvre_wants_of_the_car_comes_from_the_car():
@@ -69,7 +70,32 @@ def test_what_the_manoeuvre_wants_of_the_car_comes_from_the_car():
     assert 0.003 < understeer < 0.008
     assert path.options == {"wheelbase": 3.0, "width": 2.0, "understeer_gradient": understeer}
     assert course_of(path).lanes[0].left == pytest.approx((1.1 * 2 + 0.25) / 2)
-    assert asked("slalom-course", None, None, None, ("count=4",), car).options["count"] == 4
+    slalom = asked("slalom-course", None, None, None, ("count=4", "spacing=20"), car)
+    assert slalom.options["count"] == 4 and [lane.start for lane in course_of(slalom).lanes] == [60, 80, 100, 120]
+
+
+def straight_drive():
+    time = np.linspace(0.0, 10.0, 501)
+    return Recording(time, {"x": 20 * time, "y": 0 * time, "yaw": 0 * time})
+
+
+@pytest.mark.parametrize(("name", "title"), [("iso-lane-change", "ISO 3888-1"), ("slalom-course", "slalom")])
+def test_the_clearance_says_of_what_body_it_is(name, title):
+    car = vehicle_of("passenger_car", "single-track")
+    found = numbers_of(straight_drive(), asked(name, None, None, None, (), car), car)
+    where = f"{title} (body of 4.5 m x 1.8 m centred on the centre of gravity)"
+    assert found[where]["clearance"] < 0
+
+
+def test_the_sine_with_dwell_is_judged_by_the_cars_own_steer_at_03g(capsys):
+    car = vehicle_of("passenger_car", "single-track")
+    linear = vehicles.linear_single_track(car)
+    assert steer_at_03g(car) == pytest.approx(
+        0.3 * 9.80665 / float(linear.lateral_acceleration_gain(80 / 3.6)), rel=1e-6
+    )
+    assert steer_at_03g(vehicle_of("passenger_car", "longitudinal")) is None
+    print_numbers({"sine with dwell": {"amplitude": 3.5, "stable": True, "responsive": None, "displacement": math.nan}})
+    assert capsys.readouterr().out.strip().endswith("sine with dwell: amplitude 3.5, stable yes, responsive not judged")
 
 
 @pytest.mark.parametrize("fidelity", [name for name in FIDELITIES if name != "kinematic-trailer"])
