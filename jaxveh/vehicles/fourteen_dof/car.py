@@ -194,7 +194,7 @@ class FourteenDOF(AbstractVehicle):
             each(lambda how: how.moves, stand.touches),
             forces,
         )
-        shown = body_outputs(x, x.v_x, felt.x, felt.y, yaw, u.steer, push)
+        shown = body_outputs(self.motion(x, u), felt.x, felt.y, yaw, u.steer, push)
         shown |= attitude_outputs(x, roll, pitch, felt.z)
         shown |= wheel_outputs(stand.contacts, forces, omegas) | moments(forces)
         shown |= by_wheel(
