@@ -20,6 +20,7 @@ from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
 WHEELS = ("fl", "fr", "rl", "rr")
 _SPEEDS = tuple(f"wheel_speed_{wheel}" for wheel in WHEELS)
 _SPINS = tuple(f"omega_{wheel}" for wheel in WHEELS)
+_SEEN = {f"omega_{wheel}": f"omega_to_body_{wheel}" for wheel in WHEELS}
 _TEETH_TAG, _START_TAG = 100, 101
 _LONG = 1e3
 """Seconds since the last edge of a wheel that stands at the start."""
@@ -47,7 +48,8 @@ class WheelSpeeds(AbstractInstrument):
     - `lowest`: below it (in the channel's unit) `below` is said, "zero" or "nan".
     - `signed`: whether the sensors know the direction; most do not and say the magnitude.
 
-    The way between two samples is taken from their mean spin, and the wheel is taken to have turned steadily before
+    The sensors sit on the body: where the car says `omega_to_body_fl` ..., which differ from `omega_fl` ... by about the
+    pitch rate, they count those. The way between two samples is taken from their mean spin, and the wheel is taken to have turned steadily before
     the first. Where in a pitch a wheel starts is random (without a key: in the middle).
 
     **Raises** `InputError` for numbers out of range, unknown channels, speeds without a radius.
@@ -92,8 +94,8 @@ class WheelSpeeds(AbstractInstrument):
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """Nothing else."""
-        return ()
+        """The same as seen from the body."""
+        return tuple(_SEEN[name] for name in self.needs)
 
     @property
     def pitch(self) -> float:
@@ -102,7 +104,7 @@ class WheelSpeeds(AbstractInstrument):
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
         """Wheel speeds by channel."""
-        omega = jnp.stack([outputs[name] for name in self.needs], axis=-1)
+        omega = jnp.stack([outputs.get(_SEEN[name], outputs[name]) for name in self.needs], axis=-1)
         counted = dict(zip(self.needs, self._count(omega, key).T, strict=True))
         true = dict(counted)
         for name in self.needs:
