@@ -32,7 +32,8 @@ class Position(eqx.Module):
 class SensorSet(eqx.Module):
     """Sensors that speak together: the channels that `noise` names, each a vehicle output.
 
-    - `noise`: standard deviations by channel name, white, of the recorded values (after the low-pass).
+    - `noise`: standard deviations by channel name, white, of the recorded values (after the low-pass). It is one law,
+      drawn at once: with another channel the draws of all are others (not so with the devices of a `Suite`).
     - `position`: of the accelerometers. On a rigid body that turns in the plane, a sensor at (x, y) feels
       `a_x - yaw_acceleration y - yaw_rate^2 x` and `a_y + yaw_acceleration x - yaw_rate^2 y`. Speeds are those of the
       centre of gravity, as loggers convert them.

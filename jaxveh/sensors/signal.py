@@ -95,9 +95,9 @@ def check_signals(name: str, signals: Mapping[str, Signal], allowed: Iterable[st
 
 
 def apply_all(signals: Mapping[str, Signal], order: Iterable[str], values: Mapping, period: float, key: Any) -> dict:
-    """What is sent of the true values by channel; the key's part of a channel is its place in `order`."""
+    """What is sent of the true values by channel, in this order; the key's part of a channel is by its name."""
     return {
-        channel: signals[channel].apply(values[channel], period, subkey(key, place))
-        for place, channel in enumerate(order)
+        channel: signals[channel].apply(values[channel], period, subkey(key, channel))
+        for channel in order
         if channel in signals
     }

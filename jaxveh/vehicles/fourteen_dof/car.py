@@ -77,8 +77,8 @@ class FourteenDOF(AbstractVehicle):
 
     **Outputs** beside those of `SevenDOF`: `z`, `v_z`, `roll`, `pitch`, their rates and accelerations, `a_z`, `camber_fl`,
     `travel_fl` (m, up), `travel_rate_fl`, `suspension_force_fl` (N), `omega_to_body_fl` (rad/s), `M_x_fl`, `M_y_fl` ..., and the
-    powers (W) that leave the car: `tyre_dissipation` (slip, moments, rolling, tyre damping), `damper_dissipation`, `brake_dissipation`,
-    `drag_dissipation`. With `drive_power` they balance the energy.
+    powers (W) that leave the car: `tyre_dissipation` (slip, moments, rolling, tyre damping), `damper_dissipation`,
+    `brake_dissipation`, `drag_dissipation`. With `drive_power` they balance the energy.
 
     **Raises** `InputError` for parameters outside their domain, an inertia that is not positive definite, tyres too soft to
     carry the car, or a tyre that is none.
