@@ -30,7 +30,7 @@ class Event(eqx.Module):
             # diffrax compares it with a number of the default precision, whatever that of the car is.
             return jnp.asarray(self.condition(args, t, y), float)
 
-        return diffrax.Event(crossing, Falling(tolerance), direction=False)
+        return diffrax.Event(crossing, Falling(tolerance=tolerance), direction=False)
 
 
 def standstill(speed: float = 0.1) -> Event:

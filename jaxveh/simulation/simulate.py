@@ -67,8 +67,8 @@ def simulate(
     included. `until`: an event that ends the simulation early (`simulation.standstill()`); later rows are cut off.
 
     **Channels** with a `SensorSet` (or none): each measured channel by its name, with the sensors' noise, and the car's inputs
-    (`steer`, `v_x`, ...) exact unless the sensors measure them. With a `Suite` of devices (or one device): what they say, when they say it
-    (its rows instead of `dt`'s, NaN where a device was silent). In both the truth, every output of the car, as `true.<name>`.
+    (`steer`, `v_x`, ...) exact unless the sensors measure them. With a `Suite` of devices (or one device): what they say, when
+    they say it (its rows instead of `dt`'s, NaN where a device was silent). In both the truth, every output of the car, as `true.<name>`.
     `key` draws all randomness; without a key the measurements carry none.
 
     **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened to what the car's

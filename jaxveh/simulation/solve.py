@@ -90,7 +90,8 @@ def solve(
 
 def _check_distinct(what: str, instants: np.ndarray, dtype) -> None:
     """Raise where two instants that follow each other are no longer apart in the car's dtype."""
-    same = np.diff(instants.astype(dtype)) <= 0
+    rounded = instants.astype(dtype)
+    same = rounded[1:] <= rounded[:-1]
     if same.any():
         first, second = instants[np.argmax(same) :][:2]
         raise InputError(
