@@ -62,13 +62,15 @@ def simulate(
     """Drive `car` through `manoeuvre` and record it: rows at 0, dt, 2 dt, ... up to the manoeuvre's duration.
 
     **The drive**: `manoeuvre` is open-loop, or a driver who sees the car. A car with engine and brakes whose manoeuvre says a
-    speed gets a driver who holds it (`manoeuvres.SpeedControl`). `road` (`jaxveh.roads`) has friction and slopes along the way
-    (None: level). `start`: state fields that differ from straight running, by name (`{"yaw": 0.05}`), world position `x`, `y`
-    included. `until`: an event that ends the simulation early (`simulation.standstill()`); later rows are cut off.
+    speed and no pedals of its own gets a driver who holds it (`manoeuvres.SpeedControl`). `road` (`jaxveh.roads`) has friction
+    and slopes along the way (None: level). `start`: state fields that differ from straight running, by name (`{"yaw": 0.05}`),
+    world position `x`, `y` included. `until`: an event that ends the simulation early (`simulation.standstill()`); later rows
+    are cut off.
 
     **Channels** with a `SensorSet` (or none): each measured channel by its name, with the sensors' noise, and the car's inputs
     (`steer`, `v_x`, ...) exact unless the sensors measure them. With a `Suite` of devices (or one device): what they say, when
-    they say it (its rows instead of `dt`'s, NaN where a device was silent). In both the truth, every output of the car, as `true.<name>`.
+    they say it (its rows instead of `dt`'s, NaN where a device was silent). In both the truth, every output of the car, as
+    `true.<name>`.
     `key` draws all randomness; without a key the measurements carry none.
 
     **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened to what the car's

@@ -156,6 +156,16 @@ def test_devices_speak_at_their_own_rates(tmp_path):
     assert satellites
 
 
+def test_a_cruise_holds_its_speed(tmp_path):
+    drive = tmp_path / "drive.csv"
+    named = ("--manoeuvre", "cruise", "--fidelity", "longitudinal", "--speed", "20", "--duration", "30")
+    result = simulate(*named, "--set", "speed_std=0", "--rate", "10", "--devices", "none", "-o", drive)
+    assert result.exit_code == 0, result.output
+    recording = io.read_recording(drive)
+    np.testing.assert_allclose(recording["true.v_x"], 20.0, atol=0.3)
+    assert np.ptp(np.asarray(recording["drive_torque"])) > 50.0
+
+
 def test_braking_ends_at_standstill(tmp_path):
     drive = tmp_path / "drive.csv"
     settings = ("--set", "brake_at=0.1", "--set", "brake_ramp=0.1", "--speed", "6", "--duration", "3")
