@@ -32,7 +32,7 @@ SAME = 1e-9
 """s: instants that differ by less are one."""
 
 ROUNDS = 3
-"""Runs at most until the steps hold the fastest motion of what they show."""
+"""Runs at most until equal steps hold the fastest motion of what they show; after them the implicit method."""
 
 
 REMEDY = (
@@ -73,11 +73,12 @@ def simulate(
     `true.<name>`.
     `key` draws all randomness; without a key the measurements carry none.
 
-    **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened to what the car's
-    fastest motion asks for (the spins of wheels at low speed), or Kvaerno's implicit method where they would become too short;
-    "explicit" and "implicit" insist, and a warning says where equal steps were too long for what happened. A diffrax solver
-    takes equal steps, or its own with a `stepsize_controller`. Under jit, vmap or grad nothing can be looked at: "auto" is then
-    "explicit". `adjoint`: diffrax's way to differentiate; the default serves reverse mode, `diffrax.ForwardMode()` forward mode.
+    **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened to what the fastest
+    motion asks for (the spins of wheels at low speed, a sensor's low-pass, the driver), or Kvaerno's implicit method where
+    they would become too short; "explicit" and "implicit" insist, and a warning says where equal steps were too long for what
+    happened. A diffrax solver takes equal steps, or its own with a `stepsize_controller`. Under jit, vmap or grad nothing can
+    be looked at: "auto" is then "explicit". `adjoint`: diffrax's way to differentiate; the default serves reverse mode,
+    `diffrax.ForwardMode()` forward mode.
     `progress` hears how far it is (single runs).
 
     It may be jitted, vmapped over keys, cars and manoeuvres, and differentiated with respect to any of their leaves.
@@ -186,7 +187,7 @@ def _choice(solver, controller, max_step) -> Choice | None:
 
 def _run(driven: Driven, values: dict, run, asked: Choice | None, times: np.ndarray, max_step: float) -> Solution:
     """Run as asked; on "auto" look at the fastest motion before and after, and run again where steps were too long."""
-    looks = is_concrete(driven, values) and stiffness.may_be_stiff(driven)
+    looks = is_concrete(driven, values) and stiffness.may_be_stiff(driven, max_step)
     if asked is not None or not looks:
         choice = stiffness.explicit(max_step) if asked is None else asked
         found = run(choice)
@@ -197,18 +198,19 @@ def _run(driven: Driven, values: dict, run, asked: Choice | None, times: np.ndar
     for _ in range(ROUNDS):
         found = run(choice)
         if choice.controller is not None:
-            break
-        pole, _ = stiffness.worst(driven, times, found.x)
-        if pole * choice.max_step <= stiffness.LIMIT:
-            break
+            return found
+        pole, _ = stiffness.worst(driven, times, found.x, found.u)
+        if not pole * choice.max_step > stiffness.LIMIT:
+            return found
         choice = stiffness.choose(pole, max_step)
-    return found
+    # Shorter and shorter steps have shown faster and faster motions: no guess is left.
+    return run(stiffness.implicit(max_step))
 
 
 def _warn_of_long_steps(driven: Driven, found: Solution, choice: Choice, times: np.ndarray) -> None:
     if not isinstance(choice.solver, (RK4, RolledRK4)):
         return
-    pole, time = stiffness.worst(driven, times, found.x)
+    pole, time = stiffness.worst(driven, times, found.x, found.u)
     if pole * choice.max_step > stiffness.LIMIT:
         warnings.warn(
             f"simulate: steps of {choice.max_step:g} s are too long for a motion of {pole:.0f} 1/s at t = {time:g} s, so what is "
