@@ -1,10 +1,25 @@
-"""Tests run in float64 and strict dtype promotion; float32 tests ask for their dtype, or switch x64 off themselves."""
+"""Tests run in float64 and strict dtype promotion; float32 tests ask for their dtype, or switch x64 off themselves.
+
+The default run takes XLA's older code generator for the CPU, which compiles in about 60 % of the time: compiling is nearly all
+that the tests do. `-m full`, `-m peers` and the benchmarks take the one that users have.
+"""
+
+import os
+from importlib.metadata import version
 
 import jax
 import pytest
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+OLDER_CODE = "--xla_cpu_use_fusion_emitters=false"
+
+
+def pytest_configure(config):
+    """An unknown flag ends the process, so it is set for versions only that are known to have it."""
+    if config.getoption("markexpr") == "not full" and version("jaxlib").startswith("0.10."):
+        os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {OLDER_CODE}".strip()
 
 
 @pytest.fixture

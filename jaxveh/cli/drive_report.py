@@ -10,13 +10,17 @@ import numpy as np
 from jaxveh import InputError, Recording, diagnostics
 from jaxveh.cli.console import number, results
 from jaxveh.cli.failure import say
-from jaxveh.cli.manoeuvre import Asked, course_of, width_of
+from jaxveh.cli.manoeuvre import Asked, course_of, understeer_of, width_of
 from jaxveh.cli.output import make_folder
 from jaxveh.diagnostics.drive_channels import channel, has
 from jaxveh.manoeuvres import clearance
+from jaxveh.vehicles.base import GRAVITY
 
 BODY = 4.5
-"""m: length of the car between cones; its width is the one that the course was made for."""
+"""m: length of the car between cones, assumed; its width is the one that the course was made for."""
+
+SPEED = 80 / 3.6
+"""m/s: at which FMVSS 126 takes the steer at 0.3 g."""
 
 
 def wheelbase_of(car: Any) -> float | None:
@@ -26,10 +30,24 @@ def wheelbase_of(car: Any) -> float | None:
     return float(car.front_axle_to_cg) + float(car.rear_axle_to_cg)
 
 
+def steer_at_03g(car: Any) -> float | None:
+    """Steer of the car with its tyres' slopes in a steady turn at 0.3 g and `SPEED`, rad; None for a car that has none."""
+    wheelbase, gradient = wheelbase_of(car), understeer_of(car)
+    if wheelbase is None or gradient is None:
+        return None
+    steer = 0.3 * GRAVITY * (wheelbase / SPEED**2 + float(gradient))
+    return steer if steer > 0 else None
+
+
+def _commanded(asked: Asked, car: Any) -> float | None:
+    """The steer at 0.3 g where the manoeuvre's steer is counted in it."""
+    return steer_at_03g(car) if asked.name == "sine-with-dwell" else None
+
+
 def numbers_of(recording: Recording, asked: Asked, car: Any) -> dict[str, dict[str, Any]]:
     """Numbers by title and name, SI; where the drive does not carry its standard's, the peaks alone and a warning why."""
     try:
-        found = diagnostics.drive_numbers(recording, asked.name, wheelbase_of(car))
+        found = diagnostics.drive_numbers(recording, asked.name, wheelbase_of(car), steer_at_03g=_commanded(asked, car))
     except InputError as error:
         say("warning", "yellow", f"no numbers of {asked.name}: {error}")
         found = diagnostics.drive_numbers(recording)
@@ -37,7 +55,9 @@ def numbers_of(recording: Recording, asked: Asked, car: Any) -> dict[str, dict[s
     course = course_of(asked)
     if course is not None and has(recording, "x", "y", "yaw"):
         x, y, yaw = (channel(recording, name) for name in ("x", "y", "yaw"))
-        shown[course.name] = {"clearance": float(clearance(x, y, yaw, width_of(asked), BODY, course))}
+        width = width_of(asked)
+        body = f"body of {BODY:g} m x {width:g} m centred on the centre of gravity"
+        shown[f"{course.name} ({body})"] = {"clearance": float(clearance(x, y, yaw, width, BODY, course))}
     return shown
 
 
@@ -51,11 +71,13 @@ def print_numbers(found: dict[str, dict[str, Any]]) -> None:
 
 
 def _word(value: Any) -> str:
+    if value is None:
+        return "not judged"
     return ("yes" if value else "no") if isinstance(value, bool | np.bool_) else number(value)
 
 
 def _missing(value: Any) -> bool:
-    return not isinstance(value, bool | np.bool_) and np.isnan(value)
+    return value is not None and not isinstance(value, bool | np.bool_) and np.isnan(value)
 
 
 def draw(recording: Recording, asked: Asked, car: Any, out: Path) -> list[Path]:
@@ -66,7 +88,9 @@ def draw(recording: Recording, asked: Asked, car: Any, out: Path) -> list[Path]:
     figures: dict[str, Any] = {}
     course = course_of(asked)
     try:
-        figures["drive"] = plots.drive(recording, asked.name, course=course, car=car)
+        figures["drive"] = plots.drive(
+            recording, asked.name, course=course, car=car, steer_at_03g=_commanded(asked, car)
+        )
     except InputError as error:
         say("warning", "yellow", f"no figure of {asked.name}, what the car does instead: {error}")
         figures["drive"] = plots.overview(recording)

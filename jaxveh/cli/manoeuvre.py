@@ -69,16 +69,18 @@ def make(one: Asked, key: jax.Array) -> Any:
 
 def course_of(one: Asked) -> Course | None:
     """The cones that the manoeuvre goes through, None where there are none."""
+    options = {**manoeuvre_options(one.name), **one.options}
+    if one.name == "slalom-course":
+        return manoeuvres.slalom_cones(options["spacing"], options["count"], options["start"])
     makers = {"iso-lane-change": manoeuvres.iso_3888_1, "iso-obstacle-avoidance": manoeuvres.iso_3888_2}
     if one.name not in makers:
         return None
-    options = {**manoeuvre_options(one.name), **one.options}
     return makers[one.name](width_of(one), options["start"])
 
 
 def width_of(one: Asked) -> float:
-    """The width of the car that the course is made for, m."""
-    return {**manoeuvre_options(one.name), **one.options}["width"]
+    """The width of the car that the course is made for, m; where it has none of its own, that of the ISO lane change."""
+    return {**manoeuvre_options("iso-lane-change"), **manoeuvre_options(one.name), **one.options}["width"]
 
 
 def _of_car(name: str, car: Any) -> dict[str, float]:
@@ -89,11 +91,11 @@ def _of_car(name: str, car: Any) -> dict[str, float]:
     if hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg"):
         found["wheelbase"] = car.front_axle_to_cg + car.rear_axle_to_cg
     if "understeer_gradient" in known:
-        found["understeer_gradient"] = _understeer(car)
+        found["understeer_gradient"] = understeer_of(car)
     return {part: float(value) for part, value in found.items() if part in known and value is not None}
 
 
-def _understeer(car: Any) -> Any:
+def understeer_of(car: Any) -> Any:
     """Understeer gradient of the car on its tyres' slopes, rad s^2/m; None for a car without tyres."""
     if isinstance(car, vehicles.LinearSingleTrack):
         return car.understeer_gradient

@@ -85,14 +85,15 @@ def simulate(
     _check(product, vehicle, road, force, out, numbers, solver, until, rate)
     car = vehicle_of(vehicle, fidelity)
     asked = driving.asked(manoeuvre, speed, steer_deg, duration, settings or (), car)
-    key = jax.random.key(seed)
-    driver = driving.make(asked, jax.random.fold_in(key, 1))
-    ground = None if road == "level" else roads.named_road(road)
+    # The devices fold their numbers into a key: it must not be one of which the driver's or the road's is made.
+    drive_key, road_key, sensor_key = jax.random.split(jax.random.key(seed), 3)
+    driver = driving.make(asked, drive_key)
+    ground = None if road == "level" else roads.named_road(road, road_key)
     fitted = devices_of(devices, car, Noise(yaw_rate_std, a_y_std))
     with progress("simulate") as report:
         report(0, 1, f"{manoeuvre} (compiling)")
         recording = simulation.simulate(
-            car, driver, fitted, key, road=ground, dt=1 / rate, solver=solver, progress=report,
+            car, driver, fitted, sensor_key, road=ground, dt=1 / rate, solver=solver, progress=report,
             until=None if until is None else EVENTS[until](),
         )  # fmt: skip
     found = numbers_of(recording, asked, car)

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel, crossing, has, seconds
+from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, has, seconds
 
 PRESSED = 0.01
 """Share of the greatest brake torque from which on the brake is pressed; without that channel, share of the initial speed
@@ -40,7 +40,8 @@ def braking_test(recording: Recording) -> BrakingTest:
 
     The way is the integral of `v_x`. Slip ratios count while the car is faster than a tenth of its initial speed.
 
-    **Raises** `InputError` where `v_x` is missing, or the car does not brake.
+    **Raises** `InputError` where `v_x` is missing, the car does not brake, or a channel has a gap of more than `LONGEST_GAP`
+    (0.5 s) where the brake is pressed or while the car brakes.
     """
     time, v_x = seconds(recording), channel(recording, "v_x")
     begins = _begins(recording, time, v_x)
@@ -49,9 +50,13 @@ def braking_test(recording: Recording) -> BrakingTest:
     place = lambda at: float(np.interp(at, time, way)) if np.isfinite(at) else float("nan")
     v_b, v_e = (share * speed for share in BETWEEN)
     at_b, at_e = (crossing(time, -v_x, -v, begins) for v in (v_b, v_e))
+    end = at_e if np.isfinite(at_e) else float(time[-1])
+    check_gaps(recording, "v_x", begins, end, "braking_test")
     rate = -np.gradient(v_x, time)
     braked = (time >= begins) & (v_x > v_e)
     slips = [f"slip_ratio_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has(recording, f"slip_ratio_{wheel}")]
+    for name in slips:
+        check_gaps(recording, name, begins, end, "braking_test")
     most = max((float(np.max(np.abs(channel(recording, name)[braked]))) for name in slips), default=float("nan"))
     return BrakingTest(
         begins, speed, (v_b**2 - v_e**2) / (2 * (place(at_e) - place(at_b))), place(at_e) - place(begins),
@@ -67,4 +72,5 @@ def _begins(recording: Recording, time: np.ndarray, v_x: np.ndarray) -> float:
         begins = crossing(time, v_x[0] - v_x, PRESSED * v_x[0])
     if not np.isfinite(begins) or not begins < time[-1]:
         raise InputError("braking_test: the car does not brake in this drive.")
+    check_gaps(recording, "brake_torque" if has(recording, "brake_torque") else "v_x", begins, begins, "braking_test")
     return begins

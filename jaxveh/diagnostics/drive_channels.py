@@ -7,6 +7,9 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import TRUTH, Recording
 
+LONGEST_GAP = 0.5
+"""s: gaps that are bridged where a standard's number is taken; ours. Satellite navigation of 5 Hz passes, an outage does not."""
+
 
 def has(recording: Recording, *names: str) -> bool:
     """Whether the recording has all of these channels, as truth or as measured."""
@@ -16,14 +19,16 @@ def has(recording: Recording, *names: str) -> bool:
 def channel(recording: Recording, name: str) -> np.ndarray:
     """A channel (T,) in SI units: a simulation's truth where there is one, else what was measured.
 
-    Rows without a sample are filled along lines between their neighbours (devices of several rates leave such gaps).
+    Rows without a sample are filled along lines between their neighbours (devices of several rates leave such gaps), however
+    long the gap is, and rows before the first and after the last sample with that: so figures show them. Numbers are not
+    taken from long gaps: `check_gaps`, `within_gaps`.
 
     **Raises** `InputError` for a channel that is not there, or that has no finite sample.
     """
     if not has(recording, name):
         names = ", ".join(dict.fromkeys(one.removeprefix(TRUTH) for one in recording.names))
         raise InputError(f"recording: no channel {name!r} to look at; there are: {names}.")
-    values = np.asarray(recording[TRUTH + name if TRUTH + name in recording else name], np.float64)
+    values = _samples(recording, name)
     known = np.isfinite(values)
     if not known.any():
         raise InputError(f"recording: {name} has no finite sample.")
@@ -33,9 +38,53 @@ def channel(recording: Recording, name: str) -> np.ndarray:
     return np.interp(time, time[known], values[known])
 
 
+def check_gaps(recording: Recording, name: str, start: float, end: float, asked_by: str) -> None:
+    """Raise `InputError` where a channel has no sample for longer than `LONGEST_GAP` between `start` and `end` (s, own time)."""
+    for before, after in _gaps(recording, name):
+        if before < end and after > start:
+            ended = "from the beginning" if np.isneginf(before) else f"after {before:.3f} s"
+            begins = "until the end" if np.isposinf(after) else f"until {after:.3f} s"
+            raise InputError(
+                f"{asked_by}: {name} has no sample {ended} {begins}; where a number is taken from, here between {start:.3f} and "
+                f"{end:.3f} s, a gap must be at most {LONGEST_GAP:g} s. Cut the recording beside it (`recording.between`)."
+            )
+
+
+def within_gaps(recording: Recording, name: str) -> np.ndarray:
+    """Whether each row (T,) lies in a gap of a channel that is longer than `LONGEST_GAP`."""
+    time = seconds(recording)
+    rows = np.zeros(time.size, bool)
+    for before, after in _gaps(recording, name):
+        rows |= (time > before) & (time < after)
+    return rows
+
+
+def _gaps(recording: Recording, name: str) -> list[tuple[float, float]]:
+    """The last sample before and the first after each gap that is too long (s); infinite where there is none."""
+    time = seconds(recording)
+    known = time[np.isfinite(_samples(recording, name))]
+    too_long = LONGEST_GAP + 1e-6  # Rows half a second apart are within it, whatever their rounding.
+    inner = np.flatnonzero(np.diff(known) > too_long)
+    gaps = [(float(known[k]), float(known[k + 1])) for k in inner]
+    if known.size == 0 or known[0] - time[0] > too_long:
+        gaps.insert(0, (-np.inf, float(known[0]) if known.size else np.inf))
+    if known.size and time[-1] - known[-1] > too_long:
+        gaps.append((float(known[-1]), np.inf))
+    return gaps
+
+
+def _samples(recording: Recording, name: str) -> np.ndarray:
+    return np.asarray(recording[TRUTH + name if TRUTH + name in recording else name], np.float64)
+
+
 def seconds(recording: Recording) -> np.ndarray:
     """The recording's own time, s."""
     return np.asarray(recording.time, np.float64)
+
+
+def sideslip_channels(recording: Recording) -> tuple[str, ...]:
+    """What the sideslip is taken from: the channel, else `v_x` and `v_y`."""
+    return ("sideslip",) if has(recording, "sideslip") else ("v_x", "v_y")
 
 
 def sideslip(recording: Recording) -> np.ndarray:
@@ -58,9 +107,12 @@ def crossing(time: np.ndarray, values: np.ndarray, level: float, after: float = 
 
 
 def peak(time: np.ndarray, values: np.ndarray) -> tuple[float, float]:
-    """Instant (s) and height of the greatest value: the top of the parabola through it and its neighbours."""
+    """Instant (s) and height of the greatest value: the top of the parabola through it and its neighbours.
+
+    The row itself where it has no finite neighbour on one side: values that do not count are minus infinity.
+    """
     k = int(np.argmax(values))
-    if k in (0, values.size - 1):
+    if k in (0, values.size - 1) or not np.isfinite(values[k - 1 : k + 2]).all():
         return float(time[k]), float(values[k])
     a, b, c = np.polyfit(time[k - 1 : k + 2] - time[k], values[k - 1 : k + 2], 2)
     if a >= 0:

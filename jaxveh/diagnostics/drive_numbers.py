@@ -38,7 +38,7 @@ class LowestFrequency(NamedTuple):
 
 
 def peaks(recording: Recording) -> Peaks:
-    """The greatest sizes in a drive; NaN for what the recording does not have."""
+    """The greatest sizes in a drive, of the samples that there are; NaN for what the recording does not have."""
     loads = [f"load_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has(recording, f"load_{wheel}")]
     size = lambda values: float(np.max(np.abs(values)))
     of = lambda name: size(channel(recording, name)) if has(recording, name) else float("nan")
@@ -51,25 +51,39 @@ def peaks(recording: Recording) -> Peaks:
     )
 
 
-def drive_numbers(recording: Recording, manoeuvre: str | None = None, wheelbase: float | None = None) -> dict[str, Any]:
+class _Car(NamedTuple):
+    """What the numbers need to know of the car: `wheelbase` (m) and `steer_at_03g` (rad); None where nobody knows."""
+
+    wheelbase: float | None = None
+    steer_at_03g: float | None = None
+
+
+def drive_numbers(
+    recording: Recording,
+    manoeuvre: str | None = None,
+    wheelbase: float | None = None,
+    *,
+    steer_at_03g: float | None = None,
+) -> dict[str, Any]:
     """Named tuples of numbers by title: what a drive of a `manoeuvre` (its name in `jaxveh.manoeuvres.MANOEUVRES`) is made for.
 
-    `wheelbase` (m) serves the understeer gradient. Other manoeuvres, and those without a name, have their peaks alone.
+    `wheelbase` (m) serves the understeer gradient, `steer_at_03g` (rad at the road wheels) the `sine_with_dwell`. Other
+    manoeuvres, and those without a name, have their peaks alone.
 
     **Raises** `InputError` where the drive does not carry the numbers: too short, or a channel is missing.
     """
-    return {"peaks": peaks(recording), **_NUMBERS.get(manoeuvre or "", _none)(recording, wheelbase)}
+    return {"peaks": peaks(recording), **_NUMBERS.get(manoeuvre or "", _none)(recording, _Car(wheelbase, steer_at_03g))}
 
 
-def _none(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+def _none(recording: Recording, car: _Car) -> dict[str, Any]:
     return {}
 
 
-def _step(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+def _step(recording: Recording, car: _Car) -> dict[str, Any]:
     return {f"step response of {name} (ISO 7401)": step_response(recording, name) for name in OUTPUTS}
 
 
-def _sweep(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+def _sweep(recording: Recording, car: _Car) -> dict[str, Any]:
     return {f"frequency response of {name} (ISO 7401)": _lowest(recording, name) for name in OUTPUTS}
 
 
@@ -80,21 +94,21 @@ def _lowest(recording: Recording, name: str) -> LowestFrequency:
     return LowestFrequency(float(found.frequency[0]), float(np.abs(found.response[0])), at)
 
 
-def _turns(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
-    if wheelbase is None:
+def _turns(recording: Recording, car: _Car) -> dict[str, Any]:
+    if car.wheelbase is None:
         return {}
-    return {"steady turns (ISO 4138)": understeer(steady_turns(recording, wheelbase))}
+    return {"steady turns (ISO 4138)": understeer(steady_turns(recording, car.wheelbase))}
 
 
-def _dwell(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
-    return {"sine with dwell (FMVSS 126)": sine_with_dwell(recording)}
+def _dwell(recording: Recording, car: _Car) -> dict[str, Any]:
+    return {"sine with dwell (FMVSS 126)": sine_with_dwell(recording, steer_at_03g=car.steer_at_03g)}
 
 
-def _braking(recording: Recording, wheelbase: float | None) -> dict[str, Any]:
+def _braking(recording: Recording, car: _Car) -> dict[str, Any]:
     return {"braking (UN R13-H)": braking_test(recording)}
 
 
-_NUMBERS: dict[str, Callable[[Recording, float | None], dict[str, Any]]] = {
+_NUMBERS: dict[str, Callable[[Recording, _Car], dict[str, Any]]] = {
     "step-steer": _step,
     "swept-sine": _sweep,
     "random-steering": _sweep,

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel, seconds
+from jaxveh.diagnostics.drive_channels import channel, check_gaps, seconds
 
 LONGEST = 20.0
 """Seconds of a segment at most unless told: a resolution of 0.05 Hz."""
@@ -43,7 +43,8 @@ def frequency_response(
     segments of any other the mean is taken. An uneven time base is made even along lines. The response is biased where it bends
     within `1 / segment` Hz.
 
-    **Raises** `InputError` for missing channels, an input that does not move, or a segment that is out of range.
+    **Raises** `InputError` for missing channels or gaps in them of more than `LONGEST_GAP` (0.5 s), an input that does not move,
+    or a segment that is out of range.
     """
     time = seconds(recording)
     length = float(time[-1] - time[0])
@@ -52,6 +53,8 @@ def frequency_response(
     check("segment", segment, lambda v: v <= length, f"at most the drive's length, {length:g} s")
     step = float(np.median(np.diff(time))) if time.size > 1 else 1.0
     even = time[0] + step * np.arange(int(length / step + 0.5) + 1)
+    for name in (input, output):
+        check_gaps(recording, name, time[0], time[-1], "frequency_response")
     u, y = (np.interp(even, time, channel(recording, name)) for name in (input, output))
     rows = min(round(segment / step), even.size)
     if rows < 8:

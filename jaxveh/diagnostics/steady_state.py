@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel, seconds, sideslip
+from jaxveh.diagnostics.drive_channels import LONGEST_GAP, channel, seconds, sideslip, sideslip_channels, within_gaps
 
 LINEAR = 4.0
 """m/s^2: the lateral acceleration up to which passenger cars are taken as linear."""
@@ -48,17 +48,22 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
     """The quasi-steady rows of a drive: a slow ramp of steer, a circle at slowly rising speed.
 
     Left out are rows below `SLOWEST`, those about which the lateral acceleration changes by more than `steady` (m/s^3) within
-    a second, and what follows them within `SETTLED`. Curvature is `yaw_rate / v_x`.
+    a second, what follows them within `SETTLED`, and those in gaps of more than `LONGEST_GAP` (0.5 s) of a channel that they
+    are made of. Curvature is `yaw_rate / v_x`.
 
     **Raises** `InputError` for a channel that is not there, a wheelbase that is not positive, or where no row is steady.
     """
     check_positive("steady", steady, "m/s^3")
     v_x = channel(recording, "v_x")
     moves = (v_x >= SLOWEST) & _settled(seconds(recording), channel(recording, "a_y"), steady)
+    used = {"v_x", "a_y", "steer", *sideslip_channels(recording)} | ({"yaw_rate"} if wheelbase is not None else set())
+    for name in sorted(used):
+        moves &= ~within_gaps(recording, name)
     if not moves.any():
         raise InputError(
             f"steady_turns: in no row the car is faster than {SLOWEST:g} m/s and its lateral acceleration changes by less than "
-            f"{steady:g} m/s^3: drive more slowly into the turn."
+            f"{steady:g} m/s^3, outside gaps of more than {LONGEST_GAP:g} s in {', '.join(sorted(used))}: drive more slowly into "
+            "the turn."
         )
     geometric = None
     if wheelbase is not None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel, crossing, peak, seconds
+from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, peak, seconds
 
 RISEN = 0.9
 """Share of the steady value at which the response time is taken."""
@@ -36,12 +36,16 @@ def step_response(recording: Recording, output: str = "yaw_rate", *, average: fl
     """The numbers of ISO 7401 of one `output` in a drive whose `steer` is a step.
 
     The steady value is the mean over the last `average` seconds, values before the step are those of the first row. All
-    are of what the recording says: filter a noisy log first (`sensors.low_pass`).
+    are of what the recording says: filter a noisy log first. `sensors.low_pass` is causal, and so makes late what it filters:
+    times are right only where `steer` is filtered alike.
 
-    **Raises** `InputError` where a channel is missing, there is no step, or the averaging begins before the steer is held.
+    **Raises** `InputError` where a channel is missing or has a gap of more than `LONGEST_GAP` (0.5 s), there is no step, or
+    the averaging begins before the steer is held.
     """
     check_positive("average", average, "s")
     time, steer, values = seconds(recording), channel(recording, "steer"), channel(recording, output)
+    for name in ("steer", output):
+        check_gaps(recording, name, time[0], time[-1], "step_response")
     last = time >= time[-1] - average
     steer, values = steer - steer[0], values - values[0]
     height, steady = float(np.mean(steer[last])), float(np.mean(values[last]))

@@ -120,7 +120,8 @@ class ReportOutputs(eqx.Module):
         shown = x._asdict()
         if self.names == ("sideslip",):
             # By far the most common report needs no tyre force.
-            shown["sideslip"] = numerics.arctan2(x.v_y, jnp.broadcast_to(u.v_x, jnp.shape(x.v_y)))
+            moves = system.vehicle.motion(system.split(x)[0], u)
+            shown["sideslip"] = numerics.arctan2(moves.v_y, jnp.broadcast_to(moves.v_x, jnp.shape(moves.v_y)))
         elif self.names:
             outputs = system.outputs(t, x, u)
             shown |= {name: getattr(outputs, name) for name in self.names}

@@ -25,6 +25,7 @@ CANONICAL: dict[str, CanonicalChannel] = {
         ("speed", "m/s", "magnitude of the velocity over ground"),
         ("sideslip", "rad", "atan2(v_y, v_x)"),
         ("yaw", "rad", "heading, positive to the left, unwrapped"),
+        ("course", "rad", "direction of the velocity over ground, positive to the left"),
         ("yaw_rate", "rad/s", "positive to the left"),
         ("roll", "rad", "positive when the left side rises"),
         ("roll_rate", "rad/s", "about the x axis"),

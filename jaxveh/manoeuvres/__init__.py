@@ -11,6 +11,7 @@ from jaxveh.manoeuvres.cones import (
     iso_3888_1,
     iso_3888_2,
     passes,
+    slalom_cones,
 )
 from jaxveh.manoeuvres.courses import iso_lane_change, iso_obstacle_avoidance, slalom_course, steady_circle
 from jaxveh.manoeuvres.cruise import Cruise, cruise
@@ -51,6 +52,7 @@ __all__ = [
     "as_driver", "braking_in_a_turn", "centre_line", "clearance", "cones", "cruise", "double_lane_change",
     "iso_3888_1", "iso_3888_2", "iso_lane_change", "iso_obstacle_avoidance", "manoeuvre_options", "mu_jump_braking",
     "named_manoeuvre",
-    "passes", "ramp_steer", "random_steering", "replay", "sine_with_dwell", "slalom", "slalom_course", "smooth_step",
+    "passes", "ramp_steer", "random_steering", "replay", "sine_with_dwell", "slalom", "slalom_cones", "slalom_course",
+    "smooth_step",
     "steady_circle", "step_steer", "swept_sine", "wavering_speed",
 ]  # fmt: skip

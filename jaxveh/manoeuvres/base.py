@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import math
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -36,9 +36,13 @@ class PedalInputs(NamedTuple):
 
 
 class AbstractManoeuvre(eqx.Module):
-    """A function of time: what the driver does from t = 0 to `duration` (s). Array leaves are its parameters."""
+    """A function of time: what the driver does from t = 0 to `duration` (s). Array leaves are its parameters.
+
+    `adds_to_pedals`: its torques are no pedals of their own, but come on top of those that hold its speed.
+    """
 
     duration: eqx.AbstractVar[float]
+    adds_to_pedals: ClassVar[bool] = False
 
     @abc.abstractmethod
     def inputs(self, t: Any) -> Any:

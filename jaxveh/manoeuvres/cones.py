@@ -1,4 +1,4 @@
-"""Lane changes between cones: the lanes of ISO 3888, where the cones stand, and whether a car hits them."""
+"""Driving between cones: the lanes of ISO 3888, a slalom, where the cones stand, and whether a car hits them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ CONE_DIAMETER = 0.3
 
 
 class Lane(NamedTuple):
-    """A straight lane between cones, from `start` to `end` (m along x), between `right` and `left` (m along y)."""
+    """A straight lane between cones, from `start` to `end` (m along x), between `right` and `left` (m along y).
+
+    A side is infinite where the lane has no limit there.
+    """
 
     start: float
     end: float
@@ -41,9 +44,12 @@ def iso_3888_1(width: float, start: float = 30.0) -> Course:
     """The double lane change of ISO 3888-1 for a car of a `width` (m, without mirrors), from `start` (m) on.
 
     Sections of 15, 30, 25, 25, 15 and 15 m, 125 m in all (the last two are one lane). Lane widths 1.1 w + 0.25, 1.2 w +
-    0.25 and 1.3 w + 0.25 m. The second lane's right limit lies 3.5 m left of the first's; the third's is in line with
-    the first's. y = 0 is the first lane's centre line. Figures: ISO 3888-1:2018, figure 1 and table 1, from secondary
-    sources that agree.
+    0.25 and 1.3 w + 0.25 m. y = 0 is the first lane's centre line.
+
+    Figures: ISO 3888-1:2018, figure 1 and table 1, from secondary sources; the standard itself was not at hand. Assumed is that
+    the offset of 3.5 m is that of right limits, from the first lane's to the second's, and that the third lane's right limit is
+    in line with the first's, so that it is wider on the left alone. If the offset were meant otherwise (of centre lines, say) the
+    second lane would lie 0.05 w further right.
 
     **Raises** `InputError` for a width that is not positive.
     """
@@ -62,9 +68,11 @@ def iso_3888_2(width: float, start: float = 30.0) -> Course:
     """The obstacle avoidance of ISO 3888-2 for a car of a `width` (m, without mirrors), from `start` (m) on.
 
     Sections of 12, 13.5, 11, 12.5 and 12 m, 61 m in all. Lane widths 1.1 w + 0.25, w + 1 and 1.3 w + 0.25 m, the last at
-    least 3 m. The second lane's right limit lies 1 m left of the first's left limit; the third's left limit is in line
-    with the first's. y = 0 is the first lane's centre line. Figures: ISO 3888-2:2011, figure 1 and table 1, from
-    secondary sources that agree.
+    least 3 m. y = 0 is the first lane's centre line.
+
+    Figures: ISO 3888-2:2011, figure 1 and table 1, from secondary sources; the standard itself was not at hand. Assumed is that
+    the offset of 1 m is the gap from the first lane's left limit to the second's right limit, and that the third lane's left
+    limit is in line with the first's, so that it is wider on the right alone, and the way back into it as far as the way out.
 
     **Raises** `InputError` for a width that is not positive.
     """
@@ -77,6 +85,32 @@ def iso_3888_2(width: float, start: float = 30.0) -> Course:
         Lane(start + 49.0, start + 61.0, left - third, left),
     )
     return Course("ISO 3888-2", lanes)
+
+
+def slalom_cones(spacing: float = 18.0, count: int = 6, start: float = 30.0, diameter: float = CONE_DIAMETER) -> Course:
+    """The cones of a `slalom_course` with the same `spacing` (m), `count` and `start` (m): lanes of no length, open to one side.
+
+    Cone k (from 0) stands at x = start + (1.5 + k) spacing, y = 0; it is passed on its right where k is even, else on its
+    left, beyond its base of a `diameter` (m), whose extent along x is left out.
+
+    **Raises** `InputError` for a spacing or diameter that is not positive, or fewer than 2 cones.
+    """
+    check_slalom(spacing, count, start)
+    check_positive("diameter", diameter, "m")
+    lanes = []
+    for k in range(count):
+        x = start + (1.5 + k) * spacing
+        sides = (-math.inf, -diameter / 2) if k % 2 == 0 else (diameter / 2, math.inf)
+        lanes.append(Lane(x, x, *sides))
+    return Course("slalom", tuple(lanes))
+
+
+def check_slalom(spacing, count, start) -> None:
+    """Raise `InputError` unless these are those of a slalom's cones."""
+    check_positive("spacing", spacing, "m")
+    check_finite("start", start)
+    if count < 2:
+        raise InputError(f"count = {count}: must be at least 2 cones.")
 
 
 def centre_line(course: Course, lead: float) -> LaneChanges:
@@ -107,7 +141,7 @@ def cones(course: Course, spacing: float = 3.0, diameter: float = CONE_DIAMETER)
     """Centres of the cones, (n, 2) of x and y in m: along both limits of each lane, its ends included.
 
     The limits touch the cones' bases (of a `diameter`, m) from inside, as in ISO 3888. They stand evenly, at most `spacing`
-    (m) apart: that is ours.
+    (m) apart: that is ours. Sides without a limit have no cones.
 
     **Raises** `InputError` for a spacing or diameter that is not positive.
     """
@@ -116,7 +150,8 @@ def cones(course: Course, spacing: float = 3.0, diameter: float = CONE_DIAMETER)
     places = []
     for lane in course.lanes:
         count = math.ceil((lane.end - lane.start) / spacing) + 1
-        for side in (lane.right - diameter / 2, lane.left + diameter / 2):
+        sides = (lane.right - diameter / 2, lane.left + diameter / 2)
+        for side in filter(math.isfinite, sides):
             places += [(x, side) for x in np.linspace(lane.start, lane.end, count)]
     return np.array(places)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -20,8 +20,10 @@ class Cruise(AbstractManoeuvre):
 
     The pedals carry the noise alone, drive where it is positive and brake where it is negative (within a tenth of its
     spread about zero both, their difference being the noise): what holds the speed is `SpeedControl`, which adds them.
+    `jaxveh.simulate` puts one around it where the car is driven by torques.
     """
 
+    adds_to_pedals: ClassVar[bool] = True
     speed: AbstractSpeed
     duration: float = eqx.field(static=True)
     pedal_noise: jax.Array = parameter("N m", scale=100.0)

@@ -27,6 +27,11 @@ class AbstractDriver(eqx.Module):
     def state_names(self) -> tuple[str, ...]:
         """The fields of the state."""
 
+    @property
+    def fastest_rate(self) -> Any:
+        """About how fast the quickest of his loops is, 1/s; None where nobody has said, so that a simulation has to look."""
+        return None
+
     @abc.abstractmethod
     def start(self, t: Any, motion: Motion) -> Any:
         """The state that has settled at a motion."""
@@ -57,6 +62,10 @@ class OpenLoop(AbstractDriver):
     @property
     def state_names(self):
         return ()
+
+    @property
+    def fastest_rate(self):
+        return 0.0
 
     def start(self, t: Any, motion: Motion) -> Any:
         return driver_state(())()

@@ -70,6 +70,10 @@ class PathDriver(AbstractDriver):
     def state_names(self):
         return ("steer",)
 
+    @property
+    def fastest_rate(self):
+        return self.gain / self.reaction_lag
+
     def start(self, t: Any, motion: Motion) -> Any:
         """The steer that the arc to the point ahead needs in steady state."""
         curvature, needed = self._arc(motion)

@@ -116,8 +116,8 @@ class LaneChanges(AbstractGraph):
 class Sine(AbstractGraph):
     """A sine of `amplitude` (m, left first) and `wavelength` (m) from `start` (m) on, over `periods` wavelengths.
 
-    It fades in over the first half wavelength and out over the last: with a slalom's cones at a distance of half a
-    wavelength the path passes them on alternating sides.
+    It fades in over the first half wavelength and out over the last, where its first and its last peak have half the amplitude:
+    with a slalom's cones at the peaks between them, half a wavelength apart, the path passes them on alternating sides.
 
     **Raises** `InputError` for a wavelength that is not positive, or less than one period.
     """

@@ -73,6 +73,11 @@ class SpeedControl(AbstractDriver):
     def state_names(self):
         return (*self.driver.state_names, "speed_integral")
 
+    @property
+    def fastest_rate(self):
+        own = jnp.maximum(self.gain, 1.0 / self.integral_time)
+        return None if self.driver.fastest_rate is None else jnp.maximum(own, self.driver.fastest_rate)
+
     def start(self, t: Any, motion: Motion) -> Any:
         return driver_state(self.state_names)(*self.driver.start(t, motion), 0.0 * motion.v_x)
 

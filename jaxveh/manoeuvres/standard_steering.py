@@ -96,6 +96,9 @@ def sine_with_dwell(
     `edge` (s): over which the phase starts and stops; of the dwell, `dwell - edge` is exact and the rest within
     2e-4 of the peak at the default values.
 
+    The standard lets the car coast (S7.9); here a constant speed is asked for, which `simulate` holds by a driver with pedals
+    (`SpeedControl`) in a car under torques.
+
     **Raises** `InputError` for values out of range, or a sine that does not end within the duration.
     """
     check_drive(speed, duration, steer)

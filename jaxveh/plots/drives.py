@@ -34,6 +34,7 @@ class Seen(NamedTuple):
     course: Course | None
     car: Any
     wheelbase: float | None
+    steer_at_03g: float | None
     figure: Any
 
 
@@ -44,6 +45,7 @@ def drive(
     course: Course | None = None,
     car: Any = None,
     wheelbase: float | None = None,
+    steer_at_03g: float | None = None,
     figure: Any = None,
 ) -> Any:
     """The figure of a drive by its `manoeuvre`'s name in `jaxveh.manoeuvres.MANOEUVRES`.
@@ -52,7 +54,7 @@ def drive(
     linear), slow turns the handling diagram,
     the sine with dwell its criteria, braking speeds and slips, and lane changes and slaloms a view from above over what the
     car does; others, and drives without a name, what the car does alone. `course`, `car` and `wheelbase` (m; by default the
-    car's) as in `top_view` and `handling_diagram`.
+    car's) as in `top_view` and `handling_diagram`, `steer_at_03g` (rad) as in `sine_with_dwell`.
 
     **Returns** the figure. **Raises** `InputError` for an unknown name, or where the drive does not carry its figure.
     """
@@ -61,7 +63,7 @@ def drive(
     if wheelbase is None and car is not None:
         feet = footprint(recording, car, None, None)
         wheelbase = feet.front + feet.rear
-    return _FIGURES.get(manoeuvre or "", _overview)(Seen(recording, course, car, wheelbase, figure))
+    return _FIGURES.get(manoeuvre or "", _overview)(Seen(recording, course, car, wheelbase, steer_at_03g, figure))
 
 
 def _overview(seen: Seen) -> Any:
@@ -111,7 +113,7 @@ _FIGURES: dict[str, Callable[[Seen], Any]] = {
     "random-steering": _frequency,
     "ramp-steer": lambda seen: handling_diagram(seen.recording, seen.wheelbase, figure=seen.figure),
     "steady-circle": lambda seen: handling_diagram(seen.recording, seen.wheelbase, figure=seen.figure),
-    "sine-with-dwell": lambda seen: sine_with_dwell(seen.recording, figure=seen.figure),
+    "sine-with-dwell": lambda seen: sine_with_dwell(seen.recording, steer_at_03g=seen.steer_at_03g, figure=seen.figure),
     "braking-in-a-turn": lambda seen: braking(seen.recording, figure=seen.figure),
     "mu-jump-braking": lambda seen: braking(seen.recording, figure=seen.figure),
     "double-lane-change": _path,

@@ -9,23 +9,33 @@ import numpy as np
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import SineWithDwellTest, drive_channels
 from jaxveh.diagnostics import sine_with_dwell as measure
-from jaxveh.diagnostics.sine_with_dwell import DISPLACED_AFTER, DISPLACEMENT, LIMITS
+from jaxveh.diagnostics.sine_with_dwell import DISPLACED_AFTER, DISPLACED_FROM, DISPLACEMENT, LIMITS
 from jaxveh.plots.panels import GREY, line, note, stack
 from jaxveh.plots.style import CYCLE, SHADE, label_above, legend, style
 
 ALLOWED, FORBIDDEN = CYCLE[2], CYCLE[1]
 
 
-def sine_with_dwell(recording: Recording, *, steering_ratio: float = 16.0, figure: Any = None) -> Any:
+def sine_with_dwell(
+    recording: Recording,
+    *,
+    steering_ratio: float = 16.0,
+    steer_at_03g: float | None = None,
+    displacement_limit: float = DISPLACEMENT,
+    figure: Any = None,
+) -> Any:
     """Steer, yaw rate and, where the recording has a position, the lateral way, with the criteria of FMVSS 126 in words.
 
     Marked are the yaw rate 1.0 s and 1.75 s after the completion of steer with its limits (35 % and 20 % of the peak), and the
-    lateral displacement 1.07 s after the beginning of steer with its limit (1.83 m). The numbers are those of
-    `jaxveh.diagnostics.sine_with_dwell` (which see for `steering_ratio`).
+    lateral displacement 1.07 s after the beginning of steer, with its limit where it has one. The numbers are those of
+    `jaxveh.diagnostics.sine_with_dwell` (which see for the arguments); curves and marks are as recorded, the offsets that it
+    takes out still in them.
 
     **Returns** the figure. **Raises** `InputError` where the steer is no sine with dwell, or the drive ends too early.
     """
-    found = measure(recording, steering_ratio=steering_ratio)
+    found = measure(
+        recording, steering_ratio=steering_ratio, steer_at_03g=steer_at_03g, displacement_limit=displacement_limit
+    )
     placed = drive_channels.has(recording, "x", "y", "yaw")
     with style():
         figure, axes = stack(figure, 3 if placed else 2, 1.7)
@@ -37,7 +47,7 @@ def sine_with_dwell(recording: Recording, *, steering_ratio: float = 16.0, figur
         line(axes[1], recording, "yaw_rate")
         _mark_yaw(axes[1], recording, found)
         if placed:
-            _way(axes[2], recording, found)
+            _way(axes[2], recording, found, displacement_limit)
         note(axes[0], f"FMVSS 126: {_words(found)}")
         legend(figure, axes)
     return figure
@@ -45,8 +55,10 @@ def sine_with_dwell(recording: Recording, *, steering_ratio: float = 16.0, figur
 
 def _words(found: SineWithDwellTest) -> str:
     if found.passed:
-        return "passed"
-    failed = ["yaw rate left too high"] * (not found.stable) + ["displacement too small"] * (not found.responsive)
+        return "passed" if found.responsive else f"passed (no limit of displacement below {DISPLACED_FROM:g} A)"
+    if found.passed is None:
+        return "yaw rate within its limits; displacement not judged without the steer at 0.3 g"
+    failed = ["yaw rate left too high"] * (not found.stable) + ["displacement too small"] * (found.responsive is False)
     return f"failed ({', '.join(failed)})"
 
 
@@ -74,7 +86,7 @@ def _dot(ax: Any, at: float, value: float, allowed: bool) -> None:
     ax.plot([at], [value], "o", color=shade, markersize=5, label=words)
 
 
-def _way(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
+def _way(ax: Any, recording: Recording, found: SineWithDwellTest, limit: float) -> None:
     """How far the car is left of its initial straight path."""
     time, yaw = drive_channels.seconds(recording), drive_channels.channel(recording, "yaw")[0]
     x, y = (drive_channels.channel(recording, name) for name in ("x", "y"))
@@ -85,11 +97,16 @@ def _way(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
     side = np.sign(there) * np.sign(found.displacement) or 1.0
     ax.plot(time, left, color=CYCLE[0], linewidth=1.2)
     ax.axvspan(found.begins, at, color=SHADE, linewidth=0, zorder=0)
-    ax.plot([at - 0.12, at + 0.12], [side * DISPLACEMENT] * 2, color=FORBIDDEN, linewidth=1.8, label="limit")
-    _dot(ax, at, there, found.responsive)
+    asked = found.responsive is not None
+    if asked:
+        ax.plot([at - 0.12, at + 0.12], [side * limit] * 2, color=FORBIDDEN, linewidth=1.8, label="limit")
+        _dot(ax, at, there, bool(found.responsive))
+    else:
+        ax.plot([at], [there], "o", color=GREY, markersize=5, label="not judged")
     label_above(ax, "lateral displacement [m]")
     # What happens long after the instant would hide it.
-    reach = 3.0 * max(abs(there), DISPLACEMENT)
+    reach = 3.0 * max(abs(there), limit)
     low, high = ax.get_ylim()
     ax.set_ylim(max(low, -reach), min(high, reach))
-    note(ax, f"{found.displacement:.2f} m {DISPLACED_AFTER:g} s after the steer begins (at least {DISPLACEMENT:g} m)")
+    words = f"at least {limit:g} m" if asked else "not judged"
+    note(ax, f"{found.displacement:.2f} m {DISPLACED_AFTER:g} s after the steer begins ({words})")

@@ -98,7 +98,8 @@ def _rows(x: np.ndarray, y: np.ndarray, course: Course | None, car: Footprint) -
     """The parts of the ground (left, right, low, high; m) that each row shows, and the figure's height in inches."""
     margin = max(car.front, car.rear) + 2.0
     left, right = float(np.min(x)) - margin, float(np.max(x)) + margin
-    sides = [*y, *([lane.left for lane in course.lanes] + [lane.right for lane in course.lanes] if course else [])]
+    limits = [side for lane in course.lanes for side in (lane.left, lane.right)] if course else []
+    sides = [*y, *filter(math.isfinite, limits)]
     low, high = float(np.min(sides)) - 3.0, float(np.max(sides)) + 3.0
     inches = lambda count: count * ((WIDTH - BESIDE) * (high - low) * count / (right - left) + EACH)
     count = 1
@@ -115,6 +116,8 @@ def _course(ax: Any, course: Course | None) -> None:
     from matplotlib.patches import Rectangle
 
     for lane in course.lanes:
+        if not (math.isfinite(lane.left) and math.isfinite(lane.right)):
+            continue
         corner, size = (lane.start, lane.right), (lane.end - lane.start, lane.left - lane.right)
         ax.add_patch(Rectangle(corner, *size, facecolor=SHADE, edgecolor="none", zorder=0.5))
     places = cones(course)

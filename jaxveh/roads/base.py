@@ -24,7 +24,11 @@ class Surface(NamedTuple):
 
 
 class AbstractRoad(eqx.Module):
-    """A road along the world's x axis; array leaves are its parameters."""
+    """A road along the world's x axis; array leaves are its parameters.
+
+    Slopes are quasi-static: they tilt gravity where the car is. That the car turns with a road whose grade or bank changes,
+    and what its curvature does to loads, is left out, by vehicles and by devices.
+    """
 
     @abc.abstractmethod
     def at(self, s: Any, y: Any = 0.0) -> Surface:

@@ -19,14 +19,15 @@ from jaxveh.roads.slopes import Banked
 
 
 class NamedRoad(NamedTuple):
-    """How to make a road, and what to say about it."""
+    """How to make a road, what to say about it, and whether it is random: then it may be made from a key."""
 
-    make: Callable[[], AbstractRoad]
+    make: Callable[..., AbstractRoad]
     help: str
+    random: bool = False
 
 
-def _hills() -> RandomRoad:
-    return RandomRoad(grade=gauss_markov(0.03, 150.0, jax.random.key(0)))
+def _hills(key: jax.Array | None = None) -> RandomRoad:
+    return RandomRoad(grade=gauss_markov(0.03, 150.0, jax.random.key(0) if key is None else key))
 
 
 ROADS: dict[str, NamedRoad] = {
@@ -35,7 +36,7 @@ ROADS: dict[str, NamedRoad] = {
     "ice": NamedRoad(lambda: Level(0.15), "level, 0.15 of that friction"),
     "split-mu": NamedRoad(lambda: SplitMu(1.0, 0.3), "level, 0.3 of that friction right of the centre line"),
     "mu-jump": NamedRoad(lambda: MuJump(1.0, 0.4, 50.0), "level, 0.4 of that friction from 50 m on"),
-    "hills": NamedRoad(_hills, "random grade: standard deviation 3 %, correlation length 150 m"),
+    "hills": NamedRoad(_hills, "random grade: standard deviation 3 %, correlation length 150 m", random=True),
     "banked": NamedRoad(lambda: Banked(0.05), "tilts to 0.05 rad (left side higher) within 50 m"),
 }
 """Roads by name; their numbers are ours, of the size that is usual."""
@@ -50,13 +51,16 @@ def from_specification(spec: Any) -> AbstractRoad:
     )
 
 
-def named_road(name: str | os.PathLike) -> AbstractRoad:
+def named_road(name: str | os.PathLike, key: jax.Array | None = None) -> AbstractRoad:
     """A road by its name in `ROADS`, or from a file ending in .toml (`jaxveh.io.road.SCHEMA`).
+
+    `key` draws a random road ("hills"; default `jax.random.key(0)`).
 
     **Raises** `InputError` for another name (listing those there are), or a file that is no road.
     """
     if str(name) in ROADS:
-        return ROADS[str(name)].make()
+        road = ROADS[str(name)]
+        return road.make(key) if road.random else road.make()
     if Path(name).suffix.lower() == ".toml":
         return from_specification(read_road(name))
     raise InputError(f"road = {str(name)!r}: must be one of {', '.join(ROADS)}, or a file that ends in .toml.")

@@ -30,7 +30,8 @@ class AbstractDevice(eqx.Module):
     Vehicle outputs are of ISO 8855's intermediate axes (road-parallel, turned with the car's yaw), SI units: `v_x`,
     `v_y`, `yaw`, `yaw_rate`, `yaw_acceleration`, `a_x`, `a_y`, `a_z` (specific force at the centre of gravity: what an
     ideal accelerometer there shows), `x`, `y` (world), `roll` (left side up), `pitch` (nose down), their rates and
-    accelerations (of these two angles), `omega_fl` ... (wheel spins), `steer`, `drive_torque` and so on.
+    accelerations (of these two angles), `omega_fl` ... (wheel spins; `omega_to_body_fl` ... as seen from a body that
+    pitches), `steer`, `drive_torque` and so on.
 
     Array leaves are the errors' sizes: readings may be jitted, vmapped over keys and differentiated.
     """

@@ -120,8 +120,7 @@ class Spikes(AbstractFault):
         """The channels with their spikes."""
         if key is None:
             return said
-        keys = {name: subkey(key, self.channels.index(name)) for name in said}
-        return {name: value + self._spikes(keys[name], value) for name, value in said.items()}
+        return {name: value + self._spikes(subkey(key, name), value) for name, value in said.items()}
 
     def _spikes(self, key: Any, like: jax.Array) -> jax.Array:
         u = numerics.uniform(key, like.shape, like.dtype)

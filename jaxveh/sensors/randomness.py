@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from typing import Any
 
 import jax
@@ -11,9 +12,13 @@ import jax.numpy as jnp
 from jaxveh import numerics
 
 
-def subkey(key: Any, tag: int) -> Any:
-    """A key of its own for each tag; None stays None."""
-    return None if key is None else jax.random.fold_in(key, tag)
+def subkey(key: Any, tag: int | str) -> Any:
+    """A key of its own for each tag, a number or a name; None stays None.
+
+    A name counts by its CRC-32, which is the same everywhere and always.
+    """
+    number = zlib.crc32(tag.encode()) if isinstance(tag, str) else tag
+    return None if key is None else jax.random.fold_in(key, number)
 
 
 def white(key: Any, n: int, dtype: Any) -> jax.Array:

@@ -21,6 +21,10 @@ POSES = ("roll", "pitch", "roll_rate", "pitch_rate")
 """The outputs that say how the body stands on the road; zero where a car does not have them."""
 
 
+INERTIAL = ("a_x", "a_y", "a_z", "roll_rate", "pitch_rate", "yaw_rate")
+"""What accelerometers and gyroscopes say, in this order."""
+
+
 def into_axes(v: Vector, roll: Any, pitch: Any, yaw: Any = None) -> Vector:
     """The vector in axes that are turned by yaw about z, then pitch about y, then roll about x."""
     x, y, z = v
@@ -78,6 +82,13 @@ def specific_force(outputs: Mapping[str, jax.Array], position: Any, rates: Vecto
     force = outputs["a_x"], outputs["a_y"], outputs["a_z"] if "a_z" in outputs else _normal_gravity(outputs)
     r = (position.x, position.y, position.z)
     return add(into_axes(force, roll, pitch), cross(accelerations, r), cross(rates, cross(rates, r)))
+
+
+def inertial(outputs: Mapping[str, jax.Array], position: Any) -> dict[str, jax.Array]:
+    """What ideal accelerometers (m/s^2) and gyroscopes (rad/s) at `position` on the body say, by channel (`INERTIAL`)."""
+    rates, accelerations = turning(outputs)
+    force = specific_force(outputs, position, rates, accelerations)
+    return dict(zip(INERTIAL, (*force, *rates), strict=True))
 
 
 def velocity(outputs: Mapping[str, jax.Array], position: Any) -> tuple[Any, Any]:

@@ -11,11 +11,12 @@ from jaxveh._core.errors import InputError, check_finite
 from jaxveh._core.names import check_names, record_type
 from jaxveh._core.parameter import parameter
 from jaxveh.sensors.low_pass import LowPass
+from jaxveh.sensors.rigid_body import INERTIAL, inertial
 from jaxveh.statespace import Gaussian
 
 
 class Position(eqx.Module):
-    """Where the accelerometers sit, from the centre of gravity: `x` forward, `y` left, `z` up, in m.
+    """Where a device sits, from the centre of gravity: `x` forward, `y` left, `z` up, in m, in the body's axes.
 
     The height counts only for vehicles that roll or pitch.
     """
@@ -32,10 +33,12 @@ class Position(eqx.Module):
 class SensorSet(eqx.Module):
     """Sensors that speak together: the channels that `noise` names, each a vehicle output.
 
-    - `noise`: standard deviations by channel name, white, of the recorded values (after the low-pass).
+    - `noise`: standard deviations by channel name, white, of the recorded values (after the low-pass). It is one law,
+      drawn at once: with another channel the draws of all are others (not so with the devices of a `Suite`).
     - `position`: of the accelerometers. On a rigid body that turns in the plane, a sensor at (x, y) feels
-      `a_x - yaw_acceleration y - yaw_rate^2 x` and `a_y + yaw_acceleration x - yaw_rate^2 y`. Speeds are those of the
-      centre of gravity, as loggers convert them.
+      `a_x - yaw_acceleration y - yaw_rate^2 x` and `a_y + yaw_acceleration x - yaw_rate^2 y`. In a car that rolls or
+      pitches, accelerometers and gyroscopes lean with the body and feel what an ideal `IMU` there does: gravity through
+      roll and pitch, and its height. Speeds are those of the centre of gravity, as loggers convert them.
     - `low_pass`: a `LowPass` in every channel, or None.
     """
 
@@ -70,10 +73,13 @@ class SensorSet(eqx.Module):
         """What reaches the sensors: a NamedTuple by channel, before low-pass and noise.
 
         `outputs` has the channels' names as attributes, and yaw_rate and yaw_acceleration where accelerations are
-        measured.
+        measured; of a car that leans a_x, a_y, yaw_rate and yaw_acceleration wherever one of `rigid_body.INERTIAL` is.
         """
         check_names("sensors measure a channel the vehicle does not have", self.channels, outputs._fields)
-        return record_type("Measurements", self.channels)(*[self._at_position(c, outputs) for c in self.channels])
+        leans = {"roll", "pitch"} & set(outputs._fields) and set(INERTIAL) & set(self.channels)
+        felt = inertial(outputs._asdict(), self.position) if leans else {}
+        values = [felt[name] if name in felt else self._at_position(name, outputs) for name in self.channels]
+        return record_type("Measurements", self.channels)(*values)
 
     def start(self, outputs: Any) -> Any:
         """Low-pass states that have settled at these outputs."""
@@ -118,7 +124,8 @@ def esc(
     """The sensors of a stability control: yaw rate and lateral acceleration, and more where asked for.
 
     Each channel has its noise's standard deviation (rad/s, m/s^2, m/s), or None: not fitted. `low_pass`: in every
-    channel, such as `LowPass(20.0)`. `position`: of the accelerometers from the centre of gravity (x, y, z), m.
+    channel, such as `LowPass(20.0)`. `position`: of the accelerometers from the centre of gravity (x, y, z), m. In a car
+    that rolls or pitches they lean with its body, and feel gravity.
 
     **Raises** `InputError` for a standard deviation that is not positive, or where nothing is fitted.
     """

@@ -18,7 +18,7 @@ _NOISE, _DRIFT = 0, 1
 
 
 class Signal(eqx.Module):
-    """What one channel makes of its true value: `(1 + scale) value + bias + drift + noise`, limited, then rounded.
+    """What one channel makes of its true value: `(1 + scale) value + bias + drift + noise`, limited and rounded.
 
     In the channel's unit unless said otherwise; an error that is absent is None. A gyroscope's or accelerometer's
     model as in Groves, Principles of GNSS, Inertial and Multisensor Integrated Navigation Systems, 2nd ed., chapter 4.
@@ -27,8 +27,8 @@ class Signal(eqx.Module):
     - `bias`: constant. `scale`: relative error of the gain.
     - `drift` (unit per root second): the bias walks from 0 at the first sample, with variance `drift^2 t`. With
       `drift_time` (s) it is a Gauss-Markov process, whose standard deviation ends at `drift sqrt(drift_time / 2)`.
-    - `saturation`: the most the channel can say, of either sign. `quantisation`: its step; the derivative of a rounded
-      number with respect to everything but the step is zero.
+    - `saturation`: the most the channel can say, of either sign. `quantisation`: its step; the most is then the largest
+      multiple within `saturation`. The derivative of a rounded number with respect to everything but the step is zero.
 
     **Raises** `InputError` for a number out of range, or a `drift_time` without `drift`.
     """
@@ -53,11 +53,19 @@ class Signal(eqx.Module):
             said = said + self._drift(subkey(key, _DRIFT), value.shape[0], period, value.dtype)
         if self.noise is not None:
             said = said + self.noise * white(subkey(key, _NOISE), value.shape[0], value.dtype)
-        if self.saturation is not None:
-            said = jnp.clip(said, -self.saturation, self.saturation)
         if self.quantisation is not None:
-            said = self.quantisation * jnp.round(said / self.quantisation)
-        return said
+            return self.quantisation * self._limited(jnp.round(said / self.quantisation), self.quantisation)
+        return self._limited(said, None)
+
+    def _limited(self, said, step):
+        """Within the saturation, where there is one; of numbers of steps, within as many whole ones as are in it."""
+        if self.saturation is None:
+            return said
+        most = self.saturation
+        if step is not None:
+            # A ratio of decimal numbers that should be whole may lie just below.
+            most = jnp.floor(self.saturation / step * (1 + 4 * jnp.finfo(said.dtype).eps))
+        return jnp.clip(said, -most, most)
 
     def _drift(self, key, n, period, dtype):
         if self.drift_time is None:
@@ -87,9 +95,9 @@ def check_signals(name: str, signals: Mapping[str, Signal], allowed: Iterable[st
 
 
 def apply_all(signals: Mapping[str, Signal], order: Iterable[str], values: Mapping, period: float, key: Any) -> dict:
-    """What is sent of the true values by channel; the key's part of a channel is its place in `order`."""
+    """What is sent of the true values by channel, in this order; the key's part of a channel is by its name."""
     return {
-        channel: signals[channel].apply(values[channel], period, subkey(key, place))
-        for place, channel in enumerate(order)
+        channel: signals[channel].apply(values[channel], period, subkey(key, channel))
+        for channel in order
         if channel in signals
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -14,6 +15,9 @@ from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import as_mapping
 from jaxveh.sensors.device import AbstractDevice, check_outputs, name_of
 from jaxveh.sensors.randomness import subkey
+from jaxveh.sensors.wrapper import innermost
+
+_NAME = "jaxveh.sensors.Suite"
 
 _SAME = 1e-9
 """Instants closer than this, in s, are one."""
@@ -87,7 +91,8 @@ class Suite(eqx.Module):
         `truth_times` (N,): increasing, known outside jit, with every instant of `look_times` among them (to 1e-9 s:
         nothing is interpolated). `outputs`: a mapping or NamedTuple of the vehicle's outputs there, (N,) each; they
         set the dtype, to which the devices' numbers are converted. `key`: one for all, each device has its own part of
-        it; without a key nothing is random.
+        it, which devices of other classes, their channels and faults do not change; two of a class differ by their order.
+        Without a key nothing is random.
 
         It may be jitted, vmapped over keys, outputs and devices' numbers, and differentiated. A jitted function sees
         `truth_times` as a constant.
@@ -100,19 +105,32 @@ class Suite(eqx.Module):
         if not times.size:
             raise InputError(f"Suite.record: no device speaks in the duration = {duration} s: make it longer.")
         channels = {}
-        for place, device in enumerate(self.devices):
+        for device, own in zip(self.devices, device_keys(self.devices, key), strict=True):
             check_outputs(device, outputs)
             spoken, looked = device.sample_times(duration), device.look_times(duration)
             rows = _locate(truth_times, looked, name_of(device))
             seen = {name: outputs[name] for name in (*device.needs, *device.may_use) if name in outputs}
             if spoken.size:
-                said = _read(device, spoken, {n: v[rows] for n, v in seen.items()}, subkey(key, place))
+                said = _read(device, spoken, {n: v[rows] for n, v in seen.items()}, own)
                 to = np.searchsorted(times, spoken - _SAME)
                 channels |= {n: jnp.full(times.shape, jnp.nan, v.dtype).at[to].set(v) for n, v in said.items()}
             else:
                 silent = jnp.full(times.shape, jnp.nan, next(iter(seen.values())).dtype)
                 channels |= dict.fromkeys(device.channels, silent)
         return Measured(times, {name: channels[name] for name in self.channels}, self.units)
+
+
+def device_keys(devices: tuple[AbstractDevice, ...], key: Any) -> list:
+    """The key of each device: by its class (that within all wrappers) and how many of that class come before it.
+
+    They are behind a name of their own, so that whoever folds small numbers into `key` meets none of them.
+    """
+    own, before, keys = subkey(key, _NAME), Counter(), []
+    for device in devices:
+        kind = name_of(innermost(device))
+        keys.append(subkey(own, f"{kind} {before[kind]}"))
+        before[kind] += 1
+    return keys
 
 
 def _as_tuple(devices) -> tuple:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -20,6 +20,7 @@ from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
 WHEELS = ("fl", "fr", "rl", "rr")
 _SPEEDS = tuple(f"wheel_speed_{wheel}" for wheel in WHEELS)
 _SPINS = tuple(f"omega_{wheel}" for wheel in WHEELS)
+_SEEN = {f"omega_{wheel}": f"omega_to_body_{wheel}" for wheel in WHEELS}
 _TEETH_TAG, _START_TAG = 100, 101
 _LONG = 1e3
 """Seconds since the last edge of a wheel that stands at the start."""
@@ -47,8 +48,9 @@ class WheelSpeeds(AbstractInstrument):
     - `lowest`: below it (in the channel's unit) `below` is said, "zero" or "nan".
     - `signed`: whether the sensors know the direction; most do not and say the magnitude.
 
-    The way between two samples is taken from their mean spin, and the wheel is taken to have turned steadily before
-    the first. Where in a pitch a wheel starts is random (without a key: in the middle).
+    The sensors sit on the body: where the car says `omega_to_body_fl` ..., which differ from `omega_fl` ... by about the
+    pitch rate, they count those. The way between two samples is taken from their mean spin, and the wheel is taken
+    to have turned steadily before the first. Where in a pitch a wheel starts is random (without a key: in the middle).
 
     **Raises** `InputError` for numbers out of range, unknown channels, speeds without a radius.
     """
@@ -92,8 +94,8 @@ class WheelSpeeds(AbstractInstrument):
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """Nothing else."""
-        return ()
+        """The same as seen from the body."""
+        return tuple(_SEEN[name] for name in self.needs)
 
     @property
     def pitch(self) -> float:
@@ -102,7 +104,7 @@ class WheelSpeeds(AbstractInstrument):
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
         """Wheel speeds by channel."""
-        omega = jnp.stack([outputs[name] for name in self.needs], axis=-1)
+        omega = jnp.stack([outputs.get(_SEEN[name], outputs[name]) for name in self.needs], axis=-1)
         counted = dict(zip(self.needs, self._count(omega, key).T, strict=True))
         true = dict(counted)
         for name in self.needs:
@@ -121,17 +123,21 @@ class WheelSpeeds(AbstractInstrument):
         teeth = jnp.abs(spin) * (self.period / self.pitch)
         errors = jnp.zeros_like(teeth)
         if self.tooth_error is not None and key is not None:
-            errors = self.tooth_error * numerics.normal(subkey(key, _TEETH_TAG), teeth.shape, teeth.dtype)
+            errors = self.tooth_error * self._by_wheel(numerics.normal, subkey(key, _TEETH_TAG), teeth[:, 0])
         _, counted = jax.lax.scan(lambda ring, row: self._next(ring, row), self._start(teeth[0], key), (teeth, errors))
         return counted * jnp.sign(spin) if self.signed else counted
 
     def _start(self, teeth: jax.Array, key: Any) -> _Ring:
         way = jnp.full_like(teeth, 0.5)
         if key is not None:
-            way = numerics.uniform(subkey(key, _START_TAG), teeth.shape, teeth.dtype)
+            way = self._by_wheel(numerics.uniform, subkey(key, _START_TAG), teeth[0])
         turns = teeth > 0
         since = jnp.where(turns, jnp.minimum(way * self.period / jnp.where(turns, teeth, 1.0), _LONG), _LONG)
         return _Ring(way, since, self.pitch / self.period * teeth)
+
+    def _by_wheel(self, draw: Callable, key: Any, like: jax.Array) -> jax.Array:
+        """Numbers of the shape of `like` for each wheel (last axis), which the other wheels do not change."""
+        return jnp.stack([draw(subkey(key, name), like.shape, like.dtype) for name in self.needs], axis=-1)
 
     def _next(self, ring: _Ring, row: tuple) -> tuple[_Ring, jax.Array]:
         """One period: `teeth` is the way in it, `error` how far the last edge in it is from its place."""

@@ -93,5 +93,10 @@ def check_device(wrapper: AbstractWrapper) -> None:
         raise InputError(f"{name_of(wrapper)}.device = {wrapper.device!r}: must be a device, such as IMU(rate=100.0).")
 
 
+def innermost(device: AbstractDevice) -> AbstractDevice:
+    """The device within all wrappers."""
+    return innermost(device.device) if isinstance(device, AbstractWrapper) else device
+
+
 def _depth(device: AbstractDevice) -> int:
     return 1 + _depth(device.device) if isinstance(device, AbstractWrapper) else 0

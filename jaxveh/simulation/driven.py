@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
-from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre, SpeedControl, as_driver
+from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre, OpenLoop, SpeedControl, as_driver
 from jaxveh.manoeuvres.speed_control import AIR_DENSITY
 from jaxveh.sensors import Instrumented
 from jaxveh.statespace import cast
@@ -146,12 +146,14 @@ def driver_name(driver: Any) -> str:
 
 
 def with_pedals(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: AbstractVehicle) -> AbstractDriver:
-    """The driver of a manoeuvre, who works the pedals where the car has them and the manoeuvre says a speed alone."""
+    """The driver of a manoeuvre, who works the pedals where the car has them and the manoeuvre says a speed alone, or pedals
+    that come on top."""
     driver = as_driver(manoeuvre)
     moves = _still(vehicle)
     given = eqx.filter_eval_shape(lambda: driver.inputs(0.0, moves, driver.start(0.0, moves)))._fields
     torques = {"drive_torque", *named("torque")}
-    if not torques & set(vehicle.inputs) or torques & set(given) or "v_x" not in given:
+    own = torques & set(given) and not _adds_to_pedals(driver)
+    if not torques & set(vehicle.inputs) or own or "v_x" not in given:
         return driver
     car = car_itself(vehicle)
     control = SpeedControl(
@@ -162,6 +164,10 @@ def with_pedals(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: Abstract
         rolling_resistance=jnp.maximum(car.rolling_resistance, LEAST),
     )
     return cast(control, dtype_of(vehicle))
+
+
+def _adds_to_pedals(driver: AbstractDriver) -> bool:
+    return isinstance(driver, OpenLoop) and driver.manoeuvre.adds_to_pedals
 
 
 def car_itself(vehicle: Any) -> Any:

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import diffrax
 import equinox as eqx
 import jax.numpy as jnp
-import optimistix as optx
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.simulation.driven import Driven
+from jaxveh.simulation.falling import Falling
 from jaxveh.vehicles.wheels import named
 
 
@@ -27,9 +27,10 @@ class Event(eqx.Module):
         """The same for diffrax; the instant is found to `tolerance` (s)."""
 
         def crossing(t, y, args, **_):
-            return self.condition(args, t, y)
+            # diffrax compares it with a number of the default precision, whatever that of the car is.
+            return jnp.asarray(self.condition(args, t, y), float)
 
-        return diffrax.Event(crossing, optx.Bisection(rtol=0.0, atol=tolerance), direction=False)
+        return diffrax.Event(crossing, Falling(tolerance=tolerance), direction=False)
 
 
 def standstill(speed: float = 0.1) -> Event:

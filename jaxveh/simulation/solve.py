@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import check, check_positive
+from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.result import Result, code
 from jaxveh.simulation.driven import Driven, dtype_of
 from jaxveh.simulation.events import Event
@@ -24,7 +24,8 @@ ADAPTIVE_STEPS_A_ROW = 64
 
 class Solution(NamedTuple):
     """What a simulation gives by row, each leaf (T,): states, inputs, outputs, noise-free measurements; and as scalars the
-    `result` code (`Result`) and the time `end` (s) at which it ended. Rows after the end are NaN."""
+    `result` code (`Result`), the time `end` (s) at which it ended, whether an `event` ended it, and how many rows it `reached`.
+    Rows after an event are NaN."""
 
     x: Any
     u: Any
@@ -32,6 +33,8 @@ class Solution(NamedTuple):
     measured: Any
     result: Any
     end: Any
+    event: Any
+    reached: Any
 
 
 class Grid(NamedTuple):
@@ -71,13 +74,30 @@ def solve(
     adjoint: diffrax.AbstractAdjoint | None = None,
     meter: diffrax.AbstractProgressMeter | None = None,
 ) -> Solution:
-    """Simulate the driven car over the grid. It may be jitted, vmapped and differentiated."""
+    """Simulate the driven car over the grid. It may be jitted, vmapped and differentiated.
+
+    **Raises** `InputError` for instants that are one in the car's dtype.
+    """
     dtype = dtype_of(driven.car.vehicle)
+    _check_distinct("rows", grid.rows, dtype)
+    _check_distinct("steps", grid.steps, dtype)
     rows, steps = jnp.asarray(grid.rows, dtype), jnp.asarray(grid.steps, dtype)
     if adjoint is None:
         adjoint = diffrax.RecursiveCheckpointAdjoint()
     meter = diffrax.NoProgressMeter() if meter is None else meter
     return _solve(driven, start, rows, steps, choice.solver, choice.controller, until, adjoint, meter)
+
+
+def _check_distinct(what: str, instants: np.ndarray, dtype) -> None:
+    """Raise where two instants that follow each other are no longer apart in the car's dtype."""
+    rounded = instants.astype(dtype)
+    same = rounded[1:] <= rounded[:-1]
+    if same.any():
+        first, second = instants[np.argmax(same) :][:2]
+        raise InputError(
+            f"simulate: the {what} at t = {first:.9g} s and {(second - first):.3g} s later are one instant in {np.dtype(dtype)}: "
+            "take a car in float64 (jax_enable_x64), longer steps, or rates and delays whose instants lie farther apart."
+        )
 
 
 def _rates(t, x, driven: Driven):
@@ -105,16 +125,19 @@ def _solve(driven: Driven, start, rows, steps, solver, controller, until, adjoin
     )
     ys: Any = solution.ys
     x, (end,) = ys
+    event = solution.result == diffrax.RESULTS.event_occurred
+    # The last row is reached where nothing stopped the solver, whatever rounding makes of the end.
+    reached = (rows <= end) | (solution.result == diffrax.RESULTS.successful)
     if until is not None:
-        reached = rows <= end
         x = jax.tree.map(lambda leaf: jnp.where(reached, leaf, jnp.nan), x)
     # Row by row, not as a batch: as quick for some hundred rows, and compiled in a third of the time.
     u, outputs, measured = jax.lax.map(lambda at: driven.see(*at), (rows, x))
-    return Solution(x, u, outputs, measured, _result(solution.result, x, outputs, rows <= end), end)
+    result = _result(solution.result, event, x, outputs, reached)
+    return Solution(x, u, outputs, measured, result, end, event, jnp.sum(reached))
 
 
-def _result(result, x, outputs, reached):
+def _result(result, event, x, outputs, reached):
     finite = jnp.all(jnp.stack([jnp.all(jnp.isfinite(v) | ~reached) for v in jax.tree.leaves((x, outputs))]))
-    ended = (result == diffrax.RESULTS.successful) | (result == diffrax.RESULTS.event_occurred)
+    ended = (result == diffrax.RESULTS.successful) | event
     failed = jnp.where(ended, code(Result.non_finite_state), code(Result.too_stiff))
     return jnp.where(finite & ended, code(Result.successful), failed)

@@ -10,7 +10,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh.simulation.driven import Driven, dtype_of
+from jaxveh.sensors import Instrumented
+from jaxveh.simulation.driven import Driven, DrivenState, dtype_of
 from jaxveh.statespace import RolledRK4
 
 STABLE = 2.5
@@ -35,7 +36,10 @@ SLOW = {
     *("x", "y", "z", "yaw", "roll", "pitch", "v_x", "v_y", "v_z", "yaw_rate", "roll_rate", "pitch_rate", "sideslip"),
     *("a_x_felt", "a_y_felt", "steer", "speed", "hitch"),
 }
-"""States whose poles stay below some hundred 1/s in any car; spins, wheel travels and tyre deflections may not."""
+"""States whose poles stay below `SLOW_POLE` in any car; spins, wheel travels and tyre deflections may not."""
+
+SLOW_POLE = 1000.0
+"""1/s: some hundred at walking speed, and room."""
 
 
 class Choice(NamedTuple):
@@ -47,14 +51,14 @@ class Choice(NamedTuple):
 
 
 def fastest_pole(driven: Driven, t: Any, x: Any) -> jax.Array:
-    """The spectral radius of the car's Jacobian at one instant, its driver's inputs held, 1/s, within a few per cent.
+    """The spectral radius of the Jacobian of car, driver and sensors at one instant, 1/s, within a few per cent.
 
     By power iteration with Jacobian-vector products: the mean growth over its second half, which is that of the largest
-    eigenvalue, real or a complex pair.
+    eigenvalue, real or a complex pair. The sensors' low-pass listens and acts on nothing: its poles are its own.
     """
-    car, _ = driven.car.split(x.car)
-    u = driven.inputs(t, x)
-    along = lambda v: jax.jvp(lambda y: driven.car.vehicle.derivatives(t, y, u), (car,), (v,))[1]
+    bare = Driven(Instrumented(driven.car.vehicle), driven.driver)
+    moving = DrivenState(driven.car.split(x.car)[0], x.driver)
+    along = lambda v: jax.jvp(lambda y: bare.derivatives(t, y), (moving,), (v,))[1]
 
     def step(i, carry):
         v, grown = carry
@@ -64,14 +68,26 @@ def fastest_pole(driven: Driven, t: Any, x: Any) -> jax.Array:
         return jax.tree.map(lambda leaf: leaf / size, v), grown
 
     # A start with a share in every direction.
-    start = jax.tree.map(lambda leaf: jnp.cos(1.0 + jnp.abs(leaf)), car)
-    _, grown = jax.lax.fori_loop(0, 2 * SETTLING, step, (start, jnp.zeros_like(start[0])))
-    return jnp.exp(grown / SETTLING)
+    start = jax.tree.map(lambda leaf: jnp.cos(1.0 + jnp.abs(leaf)), moving)
+    _, grown = jax.lax.fori_loop(0, 2 * SETTLING, step, (start, jnp.zeros_like(start.car[0])))
+    return jnp.maximum(jnp.exp(grown / SETTLING), jnp.asarray(sensors_pole(driven), grown.dtype))
 
 
-def may_be_stiff(driven: Driven) -> bool:
-    """Whether the car has states of which it cannot be told by name that they are slow."""
-    return not set(driven.car.vehicle.state_type._fields) <= SLOW
+def sensors_pole(driven: Driven) -> Any:
+    """The poles of the sensors' low-pass, all of one size, 1/s; 0 without."""
+    sensors = driven.car.sensors
+    return 0.0 if sensors is None or sensors.low_pass is None else sensors.low_pass.omega
+
+
+def may_be_stiff(driven: Driven, max_step: float) -> bool:
+    """Whether steps of `max_step` (s) may be too long for something: the car has states of which it cannot be told by name that
+    they are slow enough, or its sensors or its driver are not."""
+    rate = driven.driver.fastest_rate
+    if rate is None or not set(driven.car.vehicle.state_type._fields) <= SLOW:
+        return True
+    # The driver's rate is a rough one, and the car's answer is in it.
+    known = max(SLOW_POLE, float(np.max(sensors_pole(driven))), 2.0 * float(np.max(rate)))
+    return known * max_step > LIMIT
 
 
 def at_start(driven: Driven, values: dict, times: np.ndarray) -> float:
@@ -87,29 +103,31 @@ def at_start(driven: Driven, values: dict, times: np.ndarray) -> float:
 def fastest_poles(driven: Driven, t: Any, x: Any) -> jax.Array:
     """The fastest pole at each row: t (n,), the leaves of x (n,).
 
-    Beside the row's state also at straight rolling with the row's speed: there tyres are at their stiffest. Where equal steps
-    were too long, the wheels ring up to where the tyres slide, and a look at the sliding state alone would find nothing.
+    Beside the row's state also at straight rolling with the row's speed (the driver's, of a car that is told it): there tyres
+    are at their stiffest. Where equal steps were too long, the wheels ring up to where the tyres slide, and a look at the
+    sliding state alone would find nothing.
     """
     # In turn, not as a batch: a few rows are quick, and it compiles in half the time.
     pole = lambda t, x: jax.lax.map(lambda at: fastest_pole(driven, *at), (t, x))
-    if "v_x" not in x.car._fields:
-        return pole(t, x)
-    v_x = x.car.v_x
-    rolling = jax.lax.map(lambda at: driven.start(at[0], v_x.dtype, v_x=at[1]), (t, v_x))
+    dtype = x.car[0].dtype
+    if "v_x" in x.car._fields:
+        rolling = jax.lax.map(lambda at: driven.start(at[0], dtype, v_x=at[1]), (t, x.car.v_x))
+    else:
+        rolling = jax.lax.map(lambda at: driven.start(at, dtype), t)
     both = pole(jnp.concatenate([t, t]), jax.tree.map(lambda a, b: jnp.concatenate([a, b]), x, rolling))
     return jnp.maximum(both[: len(t)], both[len(t) :])
 
 
-def looked_at(x: Any) -> np.ndarray:
+def looked_at(x: Any, u: Any) -> np.ndarray:
     """The rows of a simulation that are looked at: evenly from first to last, and the slowest."""
-    speed = np.abs(np.asarray(getattr(x.car, "v_x", x.car[0])))
+    speed = np.abs(np.asarray(getattr(x.car, "v_x", getattr(u, "v_x", x.car[0]))))
     even = np.linspace(0, len(speed) - 1, LOOKS).round().astype(int)
     return np.append(even, np.argmin(np.where(np.isfinite(speed), speed, np.inf)))
 
 
-def worst(driven: Driven, times: np.ndarray, x: Any) -> tuple[float, float]:
+def worst(driven: Driven, times: np.ndarray, x: Any, u: Any) -> tuple[float, float]:
     """The fastest pole (1/s) over some rows of a simulation, and its time (s); rows that are not finite are left out."""
-    some = looked_at(x)
+    some = looked_at(x, u)
     at = jax.tree.map(lambda leaf: leaf[some], x)
     found = np.asarray(fastest_poles(driven, jnp.asarray(times[some], dtype_of(driven.car.vehicle)), at))
     finite = np.all([np.isfinite(np.asarray(leaf)) for leaf in jax.tree.leaves(at)], axis=0) & np.isfinite(found)

@@ -28,6 +28,12 @@ class Contact(NamedTuple):
       ISO-W's sign; laws without it ignore it.
     - `lateral_slip` (-): tan(slip_angle), from whoever has it at hand, as a vehicle does: laws that want the tangent need no
       trigonometry then. None: they take it themselves. Who replaces a slip angle replaces this too.
+    - `slip_speed` (m/s): what the slips are relative to, so that `slip_ratio` and tan(slip_angle) times it are the speeds with
+      which the contact point slides, at standstill too. Vehicles regularise their slips at low speed and say by what; None: by
+      the speed itself.
+    - `direction` (-): 1 where the wheel travels forwards, -1 backwards, and smooth between in a vehicle. The pneumatic trail lies
+      behind the wheel's centre as seen in this direction; laws of an aligning moment multiply it by this, sgn V_cx of the book.
+      All else of a law is that of travelling forwards, rolling resistance too, which vehicles turn round themselves.
     """
 
     slip_angle: Any = 0.0
@@ -39,6 +45,8 @@ class Contact(NamedTuple):
     pressure: Any = None
     turn_slip: Any = 0.0
     lateral_slip: Any = None
+    slip_speed: Any = None
+    direction: Any = 1.0
 
 
 class Forces(NamedTuple):
@@ -92,6 +100,11 @@ def need_speed(contact: Contact, tyre: str):
     if contact.speed is None:
         raise InputError(f"contact.speed = None: {tyre} needs the wheel's forward speed in m/s.")
     return contact.speed
+
+
+def need_slip_speed(contact: Contact, tyre: str):
+    """What the slips are relative to; raises `InputError` where the contact does not say."""
+    return need_speed(contact, tyre) if contact.slip_speed is None else contact.slip_speed
 
 
 def need_static(name: str, tyre) -> None:

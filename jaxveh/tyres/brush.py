@@ -44,4 +44,4 @@ class Brush(AbstractTyre):
         share = jnp.where(sticks, 1 - g + g**2 / 3, limit / jnp.where(wish > 0, wish, 1.0))
         F_x, F_y = share * wish_x, share * wish_y
         trail = self.half_length / 3 * (1 - g) ** 3 / (1 - g + g**2 / 3)
-        return Forces(F_x=F_x, F_y=F_y, M_z=-trail * F_y)
+        return Forces(F_x=F_x, F_y=F_y, M_z=-contact.direction * trail * F_y)

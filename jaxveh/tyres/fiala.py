@@ -47,4 +47,4 @@ class Fiala(AbstractTyre):
         q = jnp.where(sticks, q, 3.0)
         F_y = jnp.where(sticks, wish * (1 - q / 3 + q**2 / 27), jnp.sign(wish) * left)
         M_z = -self.half_length * wish / 3 * jnp.where(sticks, (1 - q / 3) ** 3, 0.0)
-        return Forces(F_x=F_x, F_y=F_y, M_z=M_z)
+        return Forces(F_x=F_x, F_y=F_y, M_z=contact.direction * M_z)

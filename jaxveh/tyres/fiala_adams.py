@@ -54,7 +54,7 @@ class FialaADAMS(AbstractTyre):
         # mu F_z (1 - H^3) and mu F_z (1 - H), where `wish` is 3 mu F_z (1 - H).
         F_y = jnp.where(sticks, wish * (1 + H + H**2) / 3, jnp.sign(wish) * limit)
         M_z = -2 * self.half_width * wish / 3 * H**3
-        return Forces(F_x=F_x, F_y=F_y, M_z=M_z)
+        return Forces(F_x=F_x, F_y=F_y, M_z=contact.direction * M_z)
 
     def _friction(self, kappa, tangent):
         if self.sliding_friction is None:

@@ -60,7 +60,8 @@ class FialaPolynomial(AbstractTyre):
         if not self.as_printed:
             F_x = jnp.clip(F_x, -limit, limit)
         wish = self.cornering_stiffness * numerics.tan(contact.slip_angle + 0.0 * limit)
-        return Forces(F_x=F_x, F_y=self._lateral(wish, limit), M_z=self._moment(wish, limit))
+        M_z = contact.direction * self._moment(wish, limit)
+        return Forces(F_x=F_x, F_y=self._lateral(wish, limit), M_z=M_z)
 
     def _lateral(self, wish, limit):
         branch, most = (1.54, 1.0063) if self.as_printed else (PEAK, PEAK * _polynomial(FORCE, PEAK))

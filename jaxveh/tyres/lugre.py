@@ -13,7 +13,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_at_least, check_positive
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.numerics import polynomials
-from jaxveh.tyres.base import AbstractDynamicTyre, Contact, Forces, need_load, need_speed
+from jaxveh.tyres.base import AbstractDynamicTyre, Contact, Forces, need_load, need_slip_speed, need_speed
 from jaxveh.tyres.slip import LOCKED, practical
 
 LEAST_FRICTION = 1e-3
@@ -35,8 +35,8 @@ class LuGre(AbstractDynamicTyre):
     """The average lumped LuGre tyre for combined slip (Velenis, Tsiotras, Canudas-de-Wit & Sorine, Vehicle System Dynamics
     43, 2005; longitudinal: Canudas-de-Wit, Tsiotras, Velenis, Basset & Gissinger, VSD 39, 2003), uniform pressure.
 
-    With sliding velocities `v_rx = |v| kappa`, `v_ry = |v| tan(alpha)`, rolling speed `omega r = |v| |1 + kappa|` (the wheel
-    rolls the way it travels), for each direction i:
+    With the sliding velocities v_rx = omega r - v_x and v_ry = -v_y, which are kappa and tan(alpha) times the contact's
+    `slip_speed` (|v|, where it is None), and the rolling speed |omega r| = |v_x + v_rx|, for each direction i:
 
         dz_i/dt = v_ri - (c_i + kappa_i omega r) z_i,    c_i = sigma_0i |v_r| / g
         g       = mu_k + (mu_s - mu_k) exp(-(|v_r| / v_s)^gamma)
@@ -49,7 +49,9 @@ class LuGre(AbstractDynamicTyre):
 
     `kappa_i`, between 1 / L and 2 / L, makes the settled state that of the distributed bristles exactly: with
     `p = c_i L / (omega r)` it is `(1 - e^-p) / (L (1 - (1 - e^-p) / p))`. Settled, without viscous friction, the force is
-    within `mu_s F_z`. At standstill the bristles hold; where speed is zero the settled state is the limit of slow rolling.
+    within `mu_s F_z`. At standstill bristles hold what they have and take up all sliding, up to friction's limit. The settled
+    state is that of the contact's slips; where nothing moves it is zero, of a contact without a `slip_speed` the limit of slow
+    rolling.
 
     The poles are `-(c_i + kappa_i omega r)`, fast in sliding: RK4 needs steps below `2.78 / (sigma_0 |v_r| / g + 2 omega r / L)`,
     at 1 ms with sigma_0 = 180, g = 0.8: sliding speeds below 9 m/s at 60 m/s with L = 0.2 m.
@@ -78,10 +80,10 @@ class LuGre(AbstractDynamicTyre):
     def start(self, contact: Contact) -> LuGreState:
         s_x, s_y = practical(contact)
         fading_x, fading_y = self._fading(contact, s_x, s_y)
-        return LuGreState(s_x / fading_x, s_y / fading_y)
+        return LuGreState(_settled(s_x, fading_x), _settled(s_y, fading_y))
 
     def derivatives(self, contact: Contact, state: Any) -> LuGreState:
-        speed = need_speed(contact, "LuGre")
+        speed = need_slip_speed(contact, "LuGre")
         s_x, s_y = practical(contact)
         fading_x, fading_y = self._fading(contact, s_x, s_y)
         return LuGreState(speed * (s_x - fading_x * state.z_x), speed * (s_y - fading_y * state.z_y))
@@ -90,7 +92,7 @@ class LuGre(AbstractDynamicTyre):
         """F_x and F_y, N."""
         if state is None:
             raise InputError("state = None: LuGre has states of its own; `start(contact)` gives the settled ones.")
-        load, speed = need_load(contact, "LuGre"), need_speed(contact, "LuGre")
+        load, speed = need_load(contact, "LuGre"), need_slip_speed(contact, "LuGre")
         s_x, s_y = practical(contact)
         rates = self.derivatives(contact, state)
         mu_x = self.stiffness_x * state.z_x + self.damping_x * rates.z_x + self.viscous * speed * s_x
@@ -98,10 +100,10 @@ class LuGre(AbstractDynamicTyre):
         return Forces(F_x=load * mu_x, F_y=load * mu_y)
 
     def _fading(self, contact: Contact, s_x, s_y):
-        """Share of a deflection that is lost for each metre travelled, 1/m, in both directions: without a speed in it."""
+        """Rate at which a deflection is lost, over the slips' speed, 1/m, in both directions."""
         slides = numerics.hypot(s_x, s_y)
-        g = self._friction(need_speed(contact, "LuGre") * slides) * jnp.maximum(contact.friction, LEAST_FRICTION)
-        rolls = jnp.abs(1 + s_x)
+        g = self._friction(need_slip_speed(contact, "LuGre") * slides) * jnp.maximum(contact.friction, LEAST_FRICTION)
+        rolls = jnp.abs(_travels(contact) + s_x)
 
         def fading(stiffness):
             lost = stiffness * slides / g
@@ -115,6 +117,18 @@ class LuGre(AbstractDynamicTyre):
         slides = speed > 0
         power = jnp.where(slides, (jnp.where(slides, speed, 1.0) / self.stribeck_speed) ** self.exponent, 0.0)
         return self.kinetic_friction + (self.static_friction - self.kinetic_friction) * jnp.exp(-power)
+
+
+def _travels(contact: Contact):
+    """v_x over the speed that the slips are relative to, with its sign."""
+    forwards = jnp.sign(contact.direction)
+    return forwards if contact.slip_speed is None else forwards * need_speed(contact, "LuGre") / contact.slip_speed
+
+
+def _settled(slip, fading):
+    """The deflection that stays; zero where nothing moves."""
+    moves = fading > 0
+    return slip / jnp.where(moves, fading, 1.0)
 
 
 def _inflow(p):

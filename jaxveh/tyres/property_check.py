@@ -66,6 +66,7 @@ def check_property_file(source: str | Path | PropertyFile) -> list[Finding]:
     """
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
     tyre = from_property_file(file)
+    freely = _freely(tyre)
     return [
         *_model(file, tyre.version),
         *_missing(file, tyre),
@@ -74,8 +75,8 @@ def check_property_file(source: str | Path | PropertyFile) -> list[Finding]:
         *_scaling(tyre),
         *_body(tyre),
         *_shapes(tyre),
-        *_usual(tyre),
-        *_friction_over_range(tyre),
+        *_usual(tyre, freely),
+        *_friction_over_range(freely),
         *_curvature(tyre),
         *_aligning(tyre),
         *_combined(tyre),
@@ -193,12 +194,35 @@ def _shapes(tyre: MFTyre) -> Iterator[Finding]:
             yield Finding(key, f"gives a shape factor C of {float(shape):g}: usual are 1 to 2; {what}")
 
 
-def _usual(tyre: MFTyre) -> Iterator[Finding]:
+class _Freely(NamedTuple):
+    """A tyre without limits that rolls freely: first at its nominal load, then at every load, camber and pressure of the ranges.
+
+    One evaluation, so that one program is compiled for it.
+    """
+
+    load: np.ndarray
+    camber: np.ndarray
+    pressure: np.ndarray
+    found: dict[str, Any]
+
+
+def _freely(tyre: MFTyre) -> _Freely:
+    r, s = tyre.ranges, tyre.structure
+    own = float(s.INFLPRES)
+    pressures = [max(float(r.PRESMIN), own / 2), own, min(float(r.PRESMAX), own * 2)]
+    grid = np.meshgrid(_loads(tyre), [float(r.CAMMIN), 0.0, float(r.CAMMAX)], pressures)
+    nominal = float(s.FNOMIN * tyre.scaling.LFZO), 0.0, own
+    load, camber, pressure = (np.append(at, values) for at, values in zip(nominal, grid, strict=True))
+    at = Contact(load=jnp.asarray(load), camber=jnp.asarray(camber), pressure=jnp.asarray(pressure))
+    # Limits would make friction positive in the outputs whatever the coefficients say.
+    return _Freely(load, camber, pressure, _outputs(dataclasses.replace(tyre, limits=False), at))
+
+
+def _usual(tyre: MFTyre, freely: _Freely) -> Iterator[Finding]:
     """The tyre that rolls freely at its nominal load, against what tyres do."""
     s = tyre.structure
-    found = _outputs(_signed(tyre), Contact(load=s.FNOMIN * tyre.scaling.LFZO))
     for field, (what, least, most, unit) in USUAL.items():
-        value = float(getattr(found, field))
+        value = float(np.broadcast_to(freely.found[field], freely.load.shape)[0])
         if field in PER_LOAD:
             value /= float(s.FNOMIN * tyre.scaling.LFZO)
         elif field in PER_RADIUS:
@@ -208,19 +232,13 @@ def _usual(tyre: MFTyre) -> Iterator[Finding]:
             yield Finding(what, f"is {value:.3g}{unit} at nominal load; usual are {least:g} to {most:g}{advice}")
 
 
-def _friction_over_range(tyre: MFTyre) -> Iterator[Finding]:
+def _friction_over_range(freely: _Freely) -> Iterator[Finding]:
     """D > 0 at every load, camber and pressure of the ranges, where it is so at nominal load."""
-    r, s = tyre.ranges, tyre.structure
-    own = float(s.INFLPRES)
-    pressures = [max(float(r.PRESMIN), own / 2), own, min(float(r.PRESMAX), own * 2)]
-    load, camber, pressure = np.meshgrid(_loads(tyre), [float(r.CAMMIN), 0.0, float(r.CAMMAX)], pressures)
-    at = Contact(load=jnp.asarray(load), camber=jnp.asarray(camber), pressure=jnp.asarray(pressure))
-    tyre = _signed(tyre)
-    nominal, found = _outputs(tyre, Contact(load=s.FNOMIN * tyre.scaling.LFZO)), _outputs(tyre, at)
+    load, camber, pressure = freely.load, freely.camber, freely.pressure
     for field, what in (("mu_x", "friction along"), ("mu_y", "friction across")):
-        mu = np.asarray(getattr(found, field))
-        if float(getattr(nominal, field)) > 0 >= mu.min():
-            worst = np.unravel_index(mu.argmin(), mu.shape)
+        mu = np.broadcast_to(freely.found[field], load.shape)
+        if mu[0] > 0 >= mu.min():
+            worst = mu.argmin()
             place = (
                 f"{load[worst]:g} N, camber {math.degrees(camber[worst]):.3g} degrees, {pressure[worst] / 1e5:.3g} bar"
             )
@@ -268,7 +286,7 @@ def _combined(tyre: MFTyre) -> Iterator[Finding]:
     load, ratio, angle = np.meshgrid(
         _loads(tyre)[1:], np.linspace(0.05, 1, 2 * GRID) * slip_ratio, np.linspace(0.05, 1, 2 * GRID) * slip_angle
     )
-    force = lambda a, k: _outputs(
+    force = lambda a, k: _forces(
         tyre, Contact(slip_angle=jnp.asarray(a), slip_ratio=jnp.asarray(k), load=jnp.asarray(load))
     )
     brakes, turns = force(angle, -ratio), force(-angle, -ratio)
@@ -318,14 +336,16 @@ def _unread(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
         yield Finding(DEFLECTIONS, "is not read: the deflection follows VERTICAL_STIFFNESS")
 
 
-def _signed(tyre: MFTyre) -> MFTyre:
-    """Without limits, which make friction positive in the outputs whatever the coefficients say."""
-    return dataclasses.replace(tyre, limits=False)
+@eqx.filter_jit
+def _outputs(tyre: MFTyre, contact: Contact) -> dict[str, Any]:
+    found = tyre.outputs(contact)
+    return {field: getattr(found, field) for field in USUAL}
 
 
 @eqx.filter_jit
-def _outputs(tyre: MFTyre, contact: Contact) -> Any:
-    return tyre.outputs(contact)
+def _forces(tyre: MFTyre, contact: Contact) -> Any:
+    """Without the moments, which take most of the compiling."""
+    return tyre.forces(contact)._replace(M_x=0.0, M_y=0.0, M_z=0.0)
 
 
 def _loads(tyre: MFTyre) -> np.ndarray:

@@ -12,12 +12,23 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.names import record, record_type
 from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.tyres.base import AbstractDynamicTyre, AbstractTyre, Contact, Forces, need_speed, need_static
+from jaxveh.tyres.base import (
+    AbstractDynamicTyre,
+    AbstractTyre,
+    Contact,
+    Forces,
+    need_slip_speed,
+    need_speed,
+    need_static,
+)
 from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.slip import practical
 
 LEAST_LENGTH = 0.025
 """The least of a tyre's own relaxation lengths, m: they vanish with the load, and the lag's pole goes with 1 / length."""
+
+SLIDES = 0.1
+"""The slip that a sliding tyre's deflections do not exceed at standstill (-): about where forces are greatest."""
 
 STATES = {"slip": "deflection_", "force": "F_"}
 
@@ -28,21 +39,25 @@ class Relaxed(AbstractDynamicTyre):
     `of="slip"` (the default): the carcass deflects, and its deflections give the slips that the wrapped law sees
     (H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., sec. 7.2, the single contact point):
 
-        du/dt = |v| (kappa - u / sigma_x),         kappa' = u / sigma_x
-        dv/dt = |v| (tan(alpha) - v / sigma_y),    tan(alpha') = v / sigma_y
+        du/dt = v_sx - |v| u / sigma_x,    v_sx = omega r_e - v_x,    kappa' = u / sigma_x
+        dv/dt = v_sy - |v| v / sigma_y,    v_sy = -v_y,               tan(alpha') = v / sigma_y
 
     The states are the deflections `deflection_x`, `deflection_y` (m) and not the lagged slips: they are what cannot jump, so
     that with lengths that go with the load a sudden load changes the slip and not the force (a slip that lags would let the
-    force jump). The driving term is the sliding speed itself, |v| tan(alpha), which stays finite where tan(alpha) does not.
+    force jump). The driving term is the sliding speed itself, slip times the contact's `slip_speed` V (|v|, where it is None).
     At large slip the lag in slip is unchanged while the force, once saturated, follows at once.
 
-    `of="force"`: `sigma dF/dt = |v| (F_static - F)`, states `F_x`, `F_y` (N); at large slip the force then lags by the whole
+    `of="force"`: `sigma dF/dt = V (F_static - F)`, states `F_x`, `F_y` (N); at large slip the force then lags by the whole
     length, which is too slow. Moments follow the static law without lag: for the aligning moment use the lag in slip.
 
+    At standstill deflections hold what they have and take up all sliding. A tyre that slides on and on must not deflect without
+    bound (the book holds the deflection there, sec. 7.2.2): the speed that forgets is max(|v|, min(V, |v_s| / `SLIDES`)), which
+    is |v| wherever V is. So slow sliding ends at a slip of `SLIDES`, faster sliding at the static law's slip.
+
     A direction without a length does not lag and has no state. With neither length an `MFTyre` takes its own,
-    `outputs(contact).sigma_x` and `.sigma_y` (kept above `LEAST_LENGTH`), at the contact's load. Nothing moves at standstill,
-    where the settled state is the limit of slow rolling. The pole is `-|v| / sigma`: RK4 needs steps below `2.78 sigma / |v|`
-    (2.3 ms at 60 m/s with 0.05 m).
+    `outputs(contact).sigma_x` and `.sigma_y` (kept above `LEAST_LENGTH`), at the contact's load. `start` is the state settled at
+    the contact's slips; below a vehicle's crawl speed, where those are less than v_s / |v|, it goes on from there. The pole is
+    at most `-V / sigma`: RK4 needs steps below `2.78 sigma / V` (2.3 ms at 60 m/s with 0.05 m).
 
     **Raises** `InputError` for lengths that are not positive, no lengths for a tyre that has none of its own, a tyre with
     states, an unknown `of`, or (`derivatives`) a contact without a speed.
@@ -81,13 +96,28 @@ class Relaxed(AbstractDynamicTyre):
         return record_type("RelaxedState", self.state_names)(*[jnp.broadcast_to(value, shape) for value in settled])
 
     def derivatives(self, contact: Contact, state: Any):
-        speed = need_speed(contact, "Relaxed")
-        lengths, settled = self._lengths(contact), self._settled(contact)
+        slip_speed, lengths = need_slip_speed(contact, "Relaxed"), self._lengths(contact)
+        if self.of == "force":
+            rates = {
+                name: slip_speed * ((end - getattr(state, name)) / lengths[axis])
+                for name, axis, end in zip(self.state_names, self.lags, self._settled(contact), strict=True)
+            }
+            return record("RelaxedState", rates)
+        slips = dict(zip("xy", practical(contact), strict=True))
+        forgets = self._forgets(contact, slips)
         rates = {
-            name: speed * ((end - getattr(state, name)) / lengths[axis])
-            for name, axis, end in zip(self.state_names, self.lags, settled, strict=True)
+            name: slip_speed * slips[axis] - forgets * (getattr(state, name) / lengths[axis])
+            for name, axis in zip(self.state_names, self.lags, strict=True)
         }
         return record("RelaxedState", rates)
+
+    def _forgets(self, contact: Contact, slips: dict):
+        """The speed, m/s, at which deflections leave the contact."""
+        speed = need_speed(contact, "Relaxed")
+        if contact.slip_speed is None:
+            return speed
+        slides = contact.slip_speed * numerics.hypot(slips["x"], slips["y"])
+        return jnp.maximum(speed, jnp.minimum(contact.slip_speed, slides / SLIDES))
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """What the wrapped law gives at the slips that the deflections make, or its moments beside the lagged forces."""

@@ -131,7 +131,7 @@ class TMeasy(AbstractTyre):
         F_x, F_y = (limit * force for force in _combined(x, y, slip_x, slip_y))
         if self.trail is None:
             return Forces(F_x=F_x, F_y=F_y)
-        return Forces(F_x=F_x, F_y=F_y, M_z=-self.trail(slip_y) * F_y)
+        return Forces(F_x=F_x, F_y=F_y, M_z=-contact.direction * self.trail(slip_y) * F_y)
 
 
 def _combined(x: _Numbers, y: _Numbers, slip_x, slip_y):

@@ -11,9 +11,15 @@ from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic
-from jaxveh.vehicles.rolling_body import check_rolling_car, roll_accelerations, roll_loads, roll_outputs
+from jaxveh.vehicles.rolling_body import (
+    AbstractRollingTwoTrack,
+    check_rolling_car,
+    roll_accelerations,
+    roll_loads,
+    roll_outputs,
+    swing,
+)
 from jaxveh.vehicles.two_track import (
-    AbstractTwoTrack,
     body_outputs,
     filled,
     positions_of,
@@ -29,7 +35,7 @@ from jaxveh.vehicles.wheels import gravity, pushed
 STATES = ("v_y", "yaw", "yaw_rate", "roll", "roll_rate")
 
 
-class Roll3DOF(AbstractTwoTrack):
+class Roll3DOF(AbstractRollingTwoTrack):
     """`TwoTrack2DOF` with a body that rolls: lateral, yaw and roll at a given forward speed.
 
     Around the roll axis, which joins the roll centres, the sprung mass leans on springs and dampers; all else stays upright. The
@@ -42,9 +48,10 @@ class Roll3DOF(AbstractTwoTrack):
         I_z dr/dt - I_xz dp/dt                      = sum (x_i Y_i - y_i X_i + M_z,i)
         (I_x + m_s h^2) dp/dt - I_xz dr/dt - m_s h (dv_y/dt + v_x r - g_y) = (m_s g h - K) phi - C p
 
-    Speeds are those of the point on the roll axis below the centre of gravity at rest, which a road sees; `a_y` is what an
-    accelerometer at the moving centre of gravity of the whole car says. Wheels neither steer nor tilt with roll. Wheel loads are
-    those of `rolling_body.roll_loads`.
+    The state v_y is the speed of the point on the roll axis below the centre of gravity at rest, and v_x above the forward one
+    there. Inputs, outputs and `motion` (so the place, too) are of the moving centre of gravity of the whole car: its speeds
+    are `rolling_body.swing` ahead of those of the axis, `a_x` and `a_y` what an accelerometer there says. Wheels neither steer
+    nor tilt with roll. Wheel loads are those of `rolling_body.roll_loads`.
 
     **Parameters**: `mass`, `sprung_mass` (kg: the whole car's, and that of what rolls), `yaw_inertia` (kg m^2, whole car),
     `roll_inertia` (kg m^2: of the sprung mass about its own centre of gravity), `roll_yaw_product` (kg m^2: the integral
@@ -104,23 +111,28 @@ class Roll3DOF(AbstractTwoTrack):
         del t
         tyres = tyres_of(self)
         contacts, moves = self._contacts(x, u, ground)
-        states = tyres.states(x)
+        centre, states = self.motion(x, u), tyres.states(x)
         forces = tyres.forces(contacts, states)
         push = pushed(positions_of(self), moves, forces)
         g_x, g_y, g_z = gravity(ground)
-        a_x, a_y = longitudinal_acceleration(x, u, g_x), push.F_y / self.mass
-        found = roll_accelerations(self, x, None, push.F_y, push.M_z, g_z, a_x)
+        a_x, a_y = longitudinal_acceleration(centre, u, g_x), push.F_y / self.mass
+        # The force along the car is the one that the given speed takes.
+        found = roll_accelerations(self, x, self.mass * a_x, push.F_y, push.M_z, g_z)
         rates = (
-            found.a_y + g_y - u.v_x * x.yaw_rate, x.yaw_rate, found.yaw, x.roll_rate, found.roll,
+            found.a_y + g_y - self._v_x(x, u) * x.yaw_rate, x.yaw_rate, found.yaw, x.roll_rate, found.roll,
             *self.load_transfer.rates(x, a_x, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
-        shown = body_outputs(x, u.v_x, a_x, a_y, found.yaw, u.steer, push)
+        shown = body_outputs(centre, a_x, a_y, found.yaw, u.steer, push)
         shown |= roll_outputs(x, found.roll) | wheel_outputs(contacts, forces)
         return self.state_type(*rates), record("Roll3DOFOutputs", filled(shown, push.F_y))
 
+    def _v_x(self, x, u):
+        """Forward speed of the point on the roll axis, m/s."""
+        return u.v_x - swing(self, x)[0]
+
     def _contacts(self, x, u, ground: Ground):
-        moves = rolling_wheels(self, u.v_x, x.v_y, x.yaw_rate, u.steer)
+        moves = rolling_wheels(self, self._v_x(x, u), x.v_y, x.yaw_rate, u.steer)
         g_x, g_y, g_z = gravity(ground)
-        steady = longitudinal_acceleration(x, u, g_x), u.v_x * x.yaw_rate - g_y
+        steady = longitudinal_acceleration(self.motion(x, u), u, g_x), u.v_x * x.yaw_rate - g_y
         loads = roll_loads(self, x, *self.load_transfer.felt(x, u, steady), g_z)
         return touching(self, moves, loads, ground), moves

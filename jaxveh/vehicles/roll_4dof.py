@@ -11,10 +11,15 @@ from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, LaggedLoads
-from jaxveh.vehicles.rolling_body import check_rolling_car, roll_accelerations, roll_loads, roll_outputs
+from jaxveh.vehicles.rolling_body import (
+    AbstractRollingTwoTrack,
+    check_rolling_car,
+    roll_accelerations,
+    roll_loads,
+    roll_outputs,
+)
 from jaxveh.vehicles.traction import drive_power, driven_wheels, torque_acceleration
 from jaxveh.vehicles.two_track import (
-    AbstractTwoTrack,
     air_drag,
     body_outputs,
     filled,
@@ -31,7 +36,7 @@ from jaxveh.vehicles.wheels import gravity, pushed
 STATES = ("v_x", "v_y", "yaw", "yaw_rate", "roll", "roll_rate")
 
 
-class Roll4DOF(AbstractTwoTrack):
+class Roll4DOF(AbstractRollingTwoTrack):
     """`TwoTrack3DOF` with a body that rolls: longitudinal, lateral, yaw and roll.
 
     Around the roll axis, which joins the roll centres, the sprung mass leans on springs and dampers; all else stays upright. The
@@ -45,8 +50,9 @@ class Roll4DOF(AbstractTwoTrack):
         I_z dr/dt - I_xz dp/dt                      = sum (x_i Y_i - y_i X_i + M_z,i)
         (I_x + m_s h^2) dp/dt - I_xz dr/dt - m_s h (dv_y/dt + v_x r - g_y) = (m_s g h - K) phi - C p
 
-    Speeds are those of the point on the roll axis below the centre of gravity at rest, which a road sees; `a_x` and `a_y` are
-    what an accelerometer at the moving centre of gravity of the whole car says. Wheels neither steer nor tilt with roll.
+    The states v_x and v_y are speeds of the point on the roll axis below the centre of gravity at rest. Outputs and `motion` (so
+    the place, too) are of the moving centre of gravity of the whole car: its speeds `rolling_body.swing` ahead of the states',
+    `a_x` and `a_y` what an accelerometer there says. Wheels neither steer nor tilt with roll.
     Wheel loads are those of `rolling_body.roll_loads`, wheel forces those of the torques as in `TwoTrack3DOF`.
 
     **Parameters**: `mass`, `sprung_mass` (kg: the whole car's, and that of what rolls), `yaw_inertia` (kg m^2, whole car),
@@ -123,9 +129,10 @@ class Roll4DOF(AbstractTwoTrack):
         found = roll_accelerations(self, x, X, push.F_y, push.M_z, g_z)
         rates = (
             found.a_x + g_x + x.v_y * x.yaw_rate, found.a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, found.yaw,
-            x.roll_rate, found.roll, *self.load_transfer.rates(x, push.F_x / self.mass, a_y), *tyres.rates(contacts, states),
+            x.roll_rate, found.roll,
+            *self.load_transfer.rates(x, push.F_x / self.mass, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
-        shown = body_outputs(x, x.v_x, a_x, a_y, found.yaw, u.steer, push)
+        shown = body_outputs(self.motion(x, u), a_x, a_y, found.yaw, u.steer, push)
         shown |= roll_outputs(x, found.roll) | wheel_outputs(contacts, forces)
         shown["drive_power"] = drive_power(self, drive, moves)
         return self.state_type(*rates), record("Roll4DOFOutputs", filled(shown, push.F_y))

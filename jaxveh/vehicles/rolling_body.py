@@ -8,12 +8,21 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import check
-from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles.base import GRAVITY, Motion
 from jaxveh.vehicles.load_transfer import axle_loads
-from jaxveh.vehicles.two_track import check_car
+from jaxveh.vehicles.two_track import AbstractTwoTrack, check_car
 from jaxveh.vehicles.wheels import Wheels, clip_transfer
 
 NOT_NEGATIVE = ("roll_damping_front", "roll_damping_rear", "roll_centre_front", "roll_centre_rear")
+
+
+class AbstractRollingTwoTrack(AbstractTwoTrack):
+    """A two-track car whose body leans: its states are the speeds of a point on the roll axis, about which the wheels stay."""
+
+    def motion(self, x, u):
+        """That of the centre of gravity of the whole car, which leans out; a given speed is its speed already."""
+        ahead, aside = swing(self, x)
+        return Motion(0.0, 0.0, x.yaw, x.v_x + ahead if hasattr(x, "v_x") else u.v_x, x.v_y + aside, x.yaw_rate)
 
 
 def check_rolling_car(car: Any) -> None:
@@ -57,6 +66,16 @@ def roll_geometry(car: Any) -> RollGeometry:
     return RollGeometry(height, height - axis, unsprung)
 
 
+def swing(car: Any, x: Any) -> tuple[Any, Any]:
+    """Velocity (forward, left; m/s) of the whole car's centre of gravity, as seen from the point on the roll axis below it.
+
+    The leaning body takes it along by -h m_s / m sin(phi) to the left, where it stays while the car turns: in the car's axes
+    that is (h m_s / m) (r sin(phi), -p cos(phi)).
+    """
+    lever = roll_geometry(car).arm * car.sprung_mass / car.mass
+    return lever * x.yaw_rate * numerics.sin(x.roll), -lever * x.roll_rate * numerics.cos(x.roll)
+
+
 class RollAccelerations(NamedTuple):
     """What solves the equations of motion: `a_x`, `a_y` (m/s^2) of the point on the roll axis less gravity's, `yaw`, `roll`
     (rad/s^2)."""
@@ -67,7 +86,7 @@ class RollAccelerations(NamedTuple):
     roll: Any
 
 
-def roll_accelerations(car: Any, x: Any, X: Any, Y: Any, N: Any, g_z: Any, a_x: Any = None) -> RollAccelerations:
+def roll_accelerations(car: Any, x: Any, X: Any, Y: Any, N: Any, g_z: Any) -> RollAccelerations:
     """Solve the car's equations for the accelerations, under forces X, Y (N) and a moment N (N m) about the vertical.
 
     The kinetic energy, with phi the roll, p its rate, r the yaw rate, h the arm, S = m_s h, s and c the sine and cosine of phi,
@@ -81,8 +100,7 @@ def roll_accelerations(car: Any, x: Any, X: Any, Y: Any, N: Any, g_z: Any, a_x: 
         (I_z + S h s^2) dr/dt - I_xz dp/dt + 2 S h s c p r + S s a_x    = N
         (I_x + S h) dp/dt - I_xz dr/dt - S c a_y - S h s c r^2          = -S g_z s - K phi - C p
 
-    of which a_x and a_y go out, and two by two is left. With `a_x` given (a car at a given speed) the first one says the X
-    that the given speed takes.
+    of which a_x and a_y go out, and two by two is left. X / m and Y / m are the accelerations of the centre of gravity.
     """
     h = roll_geometry(car).arm
     S, s, c = car.sprung_mass * h, numerics.sin(x.roll), numerics.cos(x.roll)
@@ -92,20 +110,14 @@ def roll_accelerations(car: Any, x: Any, X: Any, Y: Any, N: Any, g_z: Any, a_x: 
     )
     side = Y - S * s * (p * p + r * r)
     rolling = -S * g_z * s - stiffness * x.roll - damping * p + S * h * s * c * r * r + S * c * side / car.mass
-    turning = N - 2.0 * S * h * s * c * p * r
-    I_r, I_p = car.yaw_inertia + S * h * s * s, car.roll_inertia + S * h - jnp.square(S * c) / car.mass
-    ahead = None
-    if a_x is None:
-        ahead = X - 2.0 * S * c * p * r
-        turning = turning - S * s * ahead / car.mass
-        I_r = I_r - jnp.square(S * s) / car.mass
-    else:
-        turning = turning - S * s * a_x
+    ahead = X - 2.0 * S * c * p * r
+    turning = N - 2.0 * S * h * s * c * p * r - S * s * ahead / car.mass
+    I_r = car.yaw_inertia + S * h * s * s - jnp.square(S * s) / car.mass
+    I_p = car.roll_inertia + S * h - jnp.square(S * c) / car.mass
     determinant = I_r * I_p - jnp.square(car.roll_yaw_product)
     yaw = (I_p * turning + car.roll_yaw_product * rolling) / determinant
     roll = (I_r * rolling + car.roll_yaw_product * turning) / determinant
-    a_y = (side + S * c * roll) / car.mass
-    return RollAccelerations(a_x if ahead is None else (ahead - S * s * yaw) / car.mass, a_y, yaw, roll)
+    return RollAccelerations((ahead - S * s * yaw) / car.mass, (side + S * c * roll) / car.mass, yaw, roll)
 
 
 def roll_loads(car: Any, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:

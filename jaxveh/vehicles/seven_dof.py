@@ -12,7 +12,7 @@ from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, LaggedLoads, planar_loads
 from jaxveh.vehicles.two_track import (
-    AbstractTwoTrack,
+    AbstractPlanarTwoTrack,
     air_drag,
     body_outputs,
     check_car,
@@ -31,7 +31,7 @@ SPINS = named("omega")
 STATES = ("v_x", "v_y", "yaw", "yaw_rate", *SPINS)
 
 
-class SevenDOF(AbstractTwoTrack):
+class SevenDOF(AbstractPlanarTwoTrack):
     """A rigid car on four wheels that spin: the truth of many papers and the work horse of simulations.
 
     With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) the wheels' places, T_i the torques and
@@ -114,7 +114,7 @@ class SevenDOF(AbstractTwoTrack):
             a_x + g_x + x.v_y * x.yaw_rate, a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration, *spins,
             *self.load_transfer.rates(x, push.F_x * inverse_mass, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
-        shown = body_outputs(x, x.v_x, a_x, a_y, yaw_acceleration, u.steer, push)
+        shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, u.steer, push)
         shown |= wheel_outputs(contacts, forces, omegas)
         shown["drive_power"] = total(each(lambda torque, omega: torque * omega, drive, omegas))
         return self.state_type(*rates), record("SevenDOFOutputs", filled(shown, push.F_y))

@@ -30,7 +30,7 @@ UNITS = {
 
 
 class AbstractTwoTrack(AbstractVehicle):
-    """A car on four wheels without a suspension of its own: what its kinds share. Each has the fields of `positions_of`."""
+    """A car on four wheels without wheel travel: what its kinds share. Each has the fields of `positions_of`."""
 
     @property
     def units(self):
@@ -39,6 +39,10 @@ class AbstractTwoTrack(AbstractVehicle):
     @property
     def wheel_positions(self):
         return tuple(positions_of(self))
+
+
+class AbstractPlanarTwoTrack(AbstractTwoTrack):
+    """A two-track car that stays upright: its states are the speeds of its centre of gravity."""
 
     def motion(self, x, u):
         # The speed is a state, or given.
@@ -120,17 +124,17 @@ def wheel_outputs(contacts: Wheels, forces: Wheels, omegas: Wheels | None = None
     return shown if omegas is None else shown | dict(zip(named("omega"), omegas, strict=True))
 
 
-def body_outputs(x: Any, v_x: Any, a_x: Any, a_y: Any, yaw_acceleration: Any, steer: Any, push: Pushed) -> dict:
+def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steer: Any, push: Pushed) -> dict:
     """What the body says: speeds, accelerations (of an ideal accelerometer), sideslip, and the wheels' forces on it."""
     return {
-        "v_x": v_x,
-        "v_y": x.v_y,
-        "yaw": x.yaw,
-        "yaw_rate": x.yaw_rate,
+        "v_x": moves.v_x,
+        "v_y": moves.v_y,
+        "yaw": moves.yaw,
+        "yaw_rate": moves.yaw_rate,
         "yaw_acceleration": yaw_acceleration,
         "a_x": a_x,
         "a_y": a_y,
-        "sideslip": numerics.arctan2(x.v_y, v_x),
+        "sideslip": numerics.arctan2(moves.v_y, moves.v_x),
         "steer": steer,
         "F_x": push.F_x,
         "F_y": push.F_y,

@@ -12,7 +12,7 @@ from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic, planar_loads
 from jaxveh.vehicles.two_track import (
-    AbstractTwoTrack,
+    AbstractPlanarTwoTrack,
     body_outputs,
     check_car,
     filled,
@@ -29,7 +29,7 @@ from jaxveh.vehicles.wheels import gravity, pushed
 STATES = ("v_y", "yaw", "yaw_rate")
 
 
-class TwoTrack2DOF(AbstractTwoTrack):
+class TwoTrack2DOF(AbstractPlanarTwoTrack):
     """A rigid car on four freely rolling wheels at a given forward speed: `SingleTrack` with tracks and lateral load transfer.
 
     With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) their places (R. Rajamani, Vehicle Dynamics and
@@ -93,7 +93,9 @@ class TwoTrack2DOF(AbstractTwoTrack):
             a_y + g_y - u.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration,
             *self.load_transfer.rates(x, a_x, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
-        shown = body_outputs(x, u.v_x, a_x, a_y, yaw_acceleration, u.steer, push) | wheel_outputs(contacts, forces)
+        shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, u.steer, push) | wheel_outputs(
+            contacts, forces
+        )
         return self.state_type(*rates), record("TwoTrack2DOFOutputs", filled(shown, push.F_y))
 
     def _contacts(self, x, u, ground: Ground):

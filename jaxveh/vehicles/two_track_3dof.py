@@ -13,7 +13,7 @@ from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, LaggedLoads, planar_loads
 from jaxveh.vehicles.traction import drive_power, driven_wheels, torque_acceleration
 from jaxveh.vehicles.two_track import (
-    AbstractTwoTrack,
+    AbstractPlanarTwoTrack,
     air_drag,
     body_outputs,
     check_car,
@@ -31,7 +31,7 @@ from jaxveh.vehicles.wheels import gravity, pushed
 STATES = ("v_x", "v_y", "yaw", "yaw_rate")
 
 
-class TwoTrack3DOF(AbstractTwoTrack):
+class TwoTrack3DOF(AbstractPlanarTwoTrack):
     """`SevenDOF` without its stiff spins: wheel forces follow at once from the torques.
 
     With X_i, Y_i the road's forces on the wheels in the car's axes, (x_i, y_i) their places, g_x, g_y gravity along a sloping
@@ -107,7 +107,9 @@ class TwoTrack3DOF(AbstractTwoTrack):
             a_x + g_x + x.v_y * x.yaw_rate, a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration,
             *self.load_transfer.rates(x, push.F_x / self.mass, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
-        shown = body_outputs(x, x.v_x, a_x, a_y, yaw_acceleration, u.steer, push) | wheel_outputs(contacts, forces)
+        shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, u.steer, push) | wheel_outputs(
+            contacts, forces
+        )
         shown["drive_power"] = drive_power(self, drive, moves)
         return self.state_type(*rates), record("TwoTrack3DOFOutputs", filled(shown, push.F_y))
 

@@ -105,7 +105,8 @@ def contact(
 
     Slip angle and slip ratio are those of ISO 8855, regularised below the `crawl` speed (m/s).
     """
-    inverse = 1.0 / regularised_speed(moves.along, crawl)
+    slip_speed = regularised_speed(moves.along, crawl)
+    inverse = 1.0 / slip_speed
     lateral_slip = -moves.across * inverse
     slip_ratio = 0.0 if wheel_speed is None else (wheel_speed - moves.along) * inverse
     # Read several times by every law of forces: 122 instead of 139 ns a step of 7-DOF cars (float64, 1000 runs).
@@ -118,6 +119,8 @@ def contact(
         camber=camber,
         friction=friction,
         speed=jnp.abs(moves.along),
+        slip_speed=slip_speed,
+        direction=opposing(moves.along),
     )
 
 

@@ -3,12 +3,14 @@
 import json
 import math
 
+import jax
 import numpy as np
 import pytest
 from programs import error_line, run, write_car
 
-from jaxveh import io, roads, vehicles
+from jaxveh import InputError, Recording, io, roads, simulation, vehicles
 from jaxveh.cli.devices import DEVICES, Noise, devices_of
+from jaxveh.cli.drive_report import numbers_of, print_numbers, steer_at_03g
 from jaxveh.cli.manoeuvre import USUAL, asked, course_of, make
 from jaxveh.cli.vehicle import AS_PRINTED, BUILT_IN, FIDELITIES, vehicle_of
 from jaxveh.manoeuvres import MANOEUVRES
@@ -50,14 +52,12 @@ def test_help_teaches_by_examples():
 
 
 def test_every_manoeuvre_has_usual_values_and_can_be_made():
-    import jax
-
     assert set(USUAL) == set(MANOEUVRES)
     car = vehicles.passenger_car()
     for name in MANOEUVRES:
         one = asked(name, None, None, None, (), car)
         assert make(one, jax.random.key(0)).duration > 0
-        assert (course_of(one) is not None) == name.startswith("iso-")
+        assert (course_of(one) is not None) == (name.startswith("iso-") or name == "slalom-course")
 
 
 def test_what_the_manoeuvre_wants_of_the_car_comes_from_the_car():
@@ -69,7 +69,32 @@ def test_what_the_manoeuvre_wants_of_the_car_comes_from_the_car():
     assert 0.003 < understeer < 0.008
     assert path.options == {"wheelbase": 3.0, "width": 2.0, "understeer_gradient": understeer}
     assert course_of(path).lanes[0].left == pytest.approx((1.1 * 2 + 0.25) / 2)
-    assert asked("slalom-course", None, None, None, ("count=4",), car).options["count"] == 4
+    slalom = asked("slalom-course", None, None, None, ("count=4", "spacing=20"), car)
+    assert slalom.options["count"] == 4 and [lane.start for lane in course_of(slalom).lanes] == [60, 80, 100, 120]
+
+
+def straight_drive():
+    time = np.linspace(0.0, 10.0, 501)
+    return Recording(time, {"x": 20 * time, "y": 0 * time, "yaw": 0 * time})
+
+
+@pytest.mark.parametrize(("name", "title"), [("iso-lane-change", "ISO 3888-1"), ("slalom-course", "slalom")])
+def test_the_clearance_says_of_what_body_it_is(name, title):
+    car = vehicle_of("passenger_car", "single-track")
+    found = numbers_of(straight_drive(), asked(name, None, None, None, (), car), car)
+    where = f"{title} (body of 4.5 m x 1.8 m centred on the centre of gravity)"
+    assert found[where]["clearance"] < 0
+
+
+def test_the_sine_with_dwell_is_judged_by_the_cars_own_steer_at_03g(capsys):
+    car = vehicle_of("passenger_car", "single-track")
+    linear = vehicles.linear_single_track(car)
+    assert steer_at_03g(car) == pytest.approx(
+        0.3 * 9.80665 / float(linear.lateral_acceleration_gain(80 / 3.6)), rel=1e-6
+    )
+    assert steer_at_03g(vehicle_of("passenger_car", "longitudinal")) is None
+    print_numbers({"sine with dwell": {"amplitude": 3.5, "stable": True, "responsive": None, "displacement": math.nan}})
+    assert capsys.readouterr().out.strip().endswith("sine with dwell: amplitude 3.5, stable yes, responsive not judged")
 
 
 @pytest.mark.parametrize("fidelity", [name for name in FIDELITIES if name != "kinematic-trailer"])
@@ -154,6 +179,48 @@ def test_devices_speak_at_their_own_rates(tmp_path):
     assert 90 <= spoke.sum() <= 101
     satellites = [name for name in recording.names if np.isfinite(np.asarray(recording[name])).sum() <= 6]
     assert satellites
+
+
+def test_a_cruise_holds_its_speed(tmp_path):
+    drive = tmp_path / "drive.csv"
+    named = ("--manoeuvre", "cruise", "--fidelity", "longitudinal", "--speed", "20", "--duration", "30")
+    result = simulate(*named, "--set", "speed_std=0", "--rate", "10", "--devices", "none", "-o", drive)
+    assert result.exit_code == 0, result.output
+    recording = io.read_recording(drive)
+    np.testing.assert_allclose(recording["true.v_x"], 20.0, atol=0.3)
+    assert np.ptp(np.asarray(recording["drive_torque"])) > 50.0
+
+
+def test_driver_road_and_devices_draw_from_keys_of_their_own(tmp_path, monkeypatch):
+    """Devices fold their place into their key: none of what they get may be the driver's or the road's key."""
+    from jaxveh.cli import manoeuvre
+
+    own, used = [], []
+    make, named_road = manoeuvre.make, roads.named_road
+    monkeypatch.setattr(manoeuvre, "make", lambda one, key: own.append(key) or make(one, key))
+    monkeypatch.setattr(roads, "named_road", lambda name, key: own.append(key) or named_road(name, key))
+
+    def stop(car, driver, fitted, key, **options):
+        used.extend([key, *[jax.random.fold_in(key, place) for place in range(64)]])
+        raise InputError("stop")
+
+    monkeypatch.setattr(simulation, "simulate", stop)
+    simulate(*QUICK, "--road", "hills", "--seed", "3", "-o", tmp_path / "out.csv")
+    words = lambda key: tuple(np.asarray(jax.random.key_data(key)).tolist())
+    drawn = [words(key) for key in (*own, *used)]
+    assert len(own) == 2 and len(set(drawn)) == len(drawn) == 67
+
+
+def test_the_seed_makes_the_hills(tmp_path):
+    grades = []
+    for seed in (0, 1, 1):
+        drive = tmp_path / "drive.csv"
+        options = ("--fidelity", "kinematic", "--devices", "none", "--road", "hills", "--seed", seed, "--force")
+        result = simulate(*QUICK, *options, "-o", drive)
+        assert result.exit_code == 0, result.output
+        grades.append(np.asarray(io.read_recording(drive)["true.grade"]))
+    assert np.max(np.abs(grades[1] - grades[0])) > 1e-3
+    np.testing.assert_array_equal(grades[1], grades[2])
 
 
 def test_braking_ends_at_standstill(tmp_path):

@@ -91,6 +91,13 @@ def test_what_was_there_before_the_step_does_not_count():
     np.testing.assert_allclose(step_response(offset), step_response(clean), atol=1e-12)
 
 
+def test_a_peak_in_the_first_row_after_the_reference_is_seen():
+    """The rows before do not count, and so there is no parabola: the row itself is the peak."""
+    found = step_response(stepped(lambda t: 0.2 + 0.1 * np.exp(-t / 0.3)))
+    np.testing.assert_allclose([found.peak, found.overshoot], [0.3, 0.5], rtol=1e-6)
+    np.testing.assert_allclose(found.peak_response_time, 0.005, atol=1e-9)
+
+
 def test_the_truth_is_looked_at_first_and_gaps_are_bridged():
     rows = np.arange(10.0)
     gaps = np.where(np.arange(10) % 2 == 0, rows, np.nan)
@@ -108,6 +115,68 @@ def test_crossings_and_peaks_lie_between_rows():
     assert crossing(time, np.array([0.0, 1.0, 3.0, 0.0]), 2.0) == 1.5
     assert math.isnan(crossing(time, np.zeros(4), 2.0))
     np.testing.assert_allclose(peak(time, 5.0 - (time - 1.3) ** 2), (1.3, 5.0))
+
+
+def without_samples(recording, name, start, end, every=1):
+    """The channel with a gap, and with one sample in `every` rows."""
+    values = np.array(recording[name])
+    values[np.abs(TIME - (start + end) / 2) < (end - start) / 2] = np.nan
+    return recording.replace(**{name: np.where(np.arange(TIME.size) % every == 0, values, np.nan)})
+
+
+@pytest.mark.parametrize(
+    ("gap", "words"),
+    [
+        ((4.0, 4.6), "yaw_rate has no sample after 4.000 s until 4.600 s"),
+        ((-1.0, 0.7), "yaw_rate has no sample from the beginning until 0.700 s"),
+        ((9.205, 11.0), "yaw_rate has no sample after 9.200 s until the end"),
+        ((-1.0, 11.0), "yaw_rate has no finite sample"),
+    ],
+)
+def test_numbers_are_not_taken_from_an_outage(gap, words):
+    drive = without_samples(stepped(lambda t: 0.2 * (1 - np.exp(-t / 0.4))), "yaw_rate", *gap)
+    with pytest.raises(InputError) as error:
+        step_response(drive)
+    assert words in str(error.value)
+    assert "no finite" in words or "a gap must be at most 0.5 s" in str(error.value)
+
+
+def test_slow_sensors_and_short_gaps_are_bridged():
+    answer = stepped(lambda t: 0.2 * (1 - np.exp(-t / 0.4)))
+    ten_hertz = without_samples(answer, "yaw_rate", 5.0, 5.4, every=10)
+    np.testing.assert_allclose(step_response(ten_hertz).steady, 0.2, rtol=1e-6)
+
+
+def test_each_number_looks_at_its_own_span():
+    shaken = Recording(TIME, {"steer": np.sin(4 * TIME), "yaw_rate": np.sin(4 * TIME)})
+    with pytest.raises(InputError, match="frequency_response: steer has no sample"):
+        frequency_response(without_samples(shaken, "steer", 4.0, 5.0))
+    brakes = Recording(
+        TIME, {"v_x": np.clip(20.0 - 8.0 * (TIME - 4.0), 0.0, 20.0), "brake_torque": 3e3 * (TIME >= 4.0)}
+    )
+    early = without_samples(brakes, "v_x", 1.0, 3.0)
+    np.testing.assert_allclose(braking_test(early), braking_test(brakes))
+    for name, gap in (("v_x", (4.5, 5.5)), ("brake_torque", (3.5, 4.5))):
+        with pytest.raises(InputError, match=f"braking_test: {name} has no sample"):
+            braking_test(without_samples(brakes, name, *gap))
+    dwell = without_samples(dwell_drive(), "yaw_rate", 8.0, 9.0)
+    np.testing.assert_allclose(sine_with_dwell(dwell)[:7], sine_with_dwell(dwell_drive())[:7])
+    for name in ("yaw_rate", "steer", "y"):
+        with pytest.raises(InputError, match=f"sine_with_dwell: {name} has no sample"):
+            sine_with_dwell(without_samples(dwell_drive(), name, 1.2, 1.8))
+
+
+def test_steady_turns_leave_gaps_out():
+    gap = (TIME > 4.0) & (TIME < 6.0)
+    drive = without_samples(turning().replace(steer=np.where(gap, 9.0, turning()["steer"])), "steer", 4.0, 6.0)
+    found, whole = steady_turns(drive, 2.5), steady_turns(turning(), 2.5)
+    assert found.a_y.size == whole.a_y.size - gap.sum()
+    np.testing.assert_allclose(found.steer, 0.01 * found.a_y)
+    slow = steady_turns(without_samples(turning(), "steer", 11.0, 12.0, every=100), 2.5)
+    np.testing.assert_allclose(slow.a_y, turning()["a_y"][::100])
+    late = without_samples(turning().replace(v_x=np.where(TIME < 5.0, 1.0, 20.0)), "steer", 4.9, 11.0)
+    with pytest.raises(InputError, match=r"outside gaps of more than 0\.5 s in a_y, sideslip, steer, v_x, yaw_rate"):
+        steady_turns(late, 2.5)
 
 
 def test_step_response_of_a_linear_car():
@@ -178,6 +247,49 @@ def dwell_drive(peak_yaw=0.4, left=(0.1, 0.05), y=3.0, side=1.0):
     return Recording(TIME, {name: side * values if name != "x" else values for name, values in channels.items()})
 
 
+@pytest.mark.parametrize("left", [0.7, 1.0])
+def test_offsets_of_the_sensors_are_taken_out(left):
+    """1 deg/s in the gyroscope, 2 degrees at the steering wheel and 0.3 m/s^2 say nothing of the car; also where less than a
+    second of straight driving is left."""
+    clean = (
+        dwell_drive().without("x", "y", "yaw").replace(a_y=np.where(TIME >= 1.1, 3.0, 0.0)).between(1.0 - left, 11.0)
+    )
+    shifts = {"yaw_rate": math.radians(1.0), "steer": math.radians(2.0) / 16, "a_y": 0.3}
+    for sign in (1.0, -1.0):
+        shifted = clean.replace(**{name: np.asarray(clean[name]) + sign * by for name, by in shifts.items()})
+        np.testing.assert_allclose(sine_with_dwell(shifted)[:7], sine_with_dwell(clean)[:7], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("y", "steer_at_03g", "amplitude", "responsive", "passed"),
+    [
+        (1.2, 0.02, 5.0, False, False),
+        (1.2, 0.021, 4.76, None, True),
+        (3.0, 0.021, 4.76, None, True),
+        (3.0, 0.02, 5.0, True, True),
+        (1.2, None, math.nan, None, None),
+        (3.0, None, math.nan, True, True),
+    ],
+)
+def test_the_displacement_has_a_limit_from_five_times_the_steer_at_03g_on(
+    y, steer_at_03g, amplitude, responsive, passed
+):
+    found = sine_with_dwell(dwell_drive(y=y), steer_at_03g=steer_at_03g)
+    np.testing.assert_allclose(found.amplitude, amplitude, rtol=1e-3)
+    assert found.responsive is responsive and found.passed is passed
+    assert drive_numbers(dwell_drive(y=y), "sine-with-dwell", steer_at_03g=steer_at_03g)[
+        "sine with dwell (FMVSS 126)"
+    ].responsive is responsive  # fmt: skip
+
+
+def test_heavier_cars_have_a_shorter_displacement_to_reach():
+    drive = dwell_drive(y=1.5)
+    limits = {limit: sine_with_dwell(drive, steer_at_03g=0.02, displacement_limit=limit) for limit in (1.83, 1.52)}
+    assert 1.52 < limits[1.52].displacement < 1.83
+    assert [found.responsive for found in limits.values()] == [False, True]
+    assert all(type(value) in (float, bool) for value in limits[1.52])
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_sine_with_dwell_by_hand(side):
     found = sine_with_dwell(dwell_drive(side=side))
@@ -199,13 +311,13 @@ def test_sine_with_dwell_by_hand(side):
     ],
 )
 def test_sine_with_dwell_beyond_each_limit(changes, stable, responsive):
-    found = sine_with_dwell(dwell_drive(**changes))
+    found = sine_with_dwell(dwell_drive(**changes), steer_at_03g=0.02)
     assert (found.stable, found.responsive, found.passed) == (stable, responsive, False)
 
 
 def test_displacement_without_a_position_is_integrated():
     drive = dwell_drive()
-    bare = drive.without("x", "y", "yaw").replace(a_y=np.full(TIME.size, 2.0))
+    bare = drive.without("x", "y", "yaw").replace(a_y=np.where(TIME >= 1.0, 2.0, 0.0))
     found = sine_with_dwell(bare)
     np.testing.assert_allclose(found.displacement, 0.5 * 2.0 * 1.07**2, rtol=0.02)
 
@@ -250,7 +362,10 @@ BAD = {
     "no wheelbase": (lambda: understeer(steady_turns(turning())), "give `steady_turns` the car's wheelbase"),
     "one turn": (lambda: understeer(steady_turns(turning(0.0), 2.5)), "over too small a range"),
     "wheelbase": (lambda: steady_turns(turning(), -2.5), "wheelbase = -2.5: must be positive"),
-    "no sine": (lambda: sine_with_dwell(stepped(lambda t: t)), "come back to zero"),
+    "no sine": (lambda: sine_with_dwell(stepped(lambda t: t)), "nowhere turns faster than 75 deg/s for 0.2 s"),
+    "held sine": (lambda: sine_with_dwell(dwell_drive().between(0.0, 2.7)), "come back to zero"),
+    "A": (lambda: sine_with_dwell(dwell_drive(), steer_at_03g=0.0), "steer_at_03g = 0.0: must be positive"),
+    "displacement": (lambda: sine_with_dwell(dwell_drive(), displacement_limit=-1.0), "displacement_limit = -1.0: must be"),
     "short sine": (lambda: sine_with_dwell(dwell_drive().between(0.0, 4.5)), "drive longer"),
     "ratio": (lambda: sine_with_dwell(dwell_drive(), steering_ratio=0.0), "steering_ratio = 0.0: must be positive"),
     "no braking": (lambda: braking_test(Recording(TIME, {"v_x": 20.0 + 0 * TIME})), "does not brake"),

@@ -93,17 +93,21 @@ def test_observability_tells_what_the_drive_can_teach(model, drive):
     assert np.all(loose.bounds >= report.bounds * (1 - 1e-9))
 
 
-def test_gradient_reaches_noise_and_start_of_the_parameters(model, drive):
+def test_gradient_reaches_noise_and_start_of_the_parameters(drive):
+    # With one parameter the filter's gradient compiles in a fraction of the time that it takes with four.
+    model = estimators.state_space(
+        vehicles.passenger_car(), sensors.esc(), estimate=lambda car: (car.front.B,), steps=2
+    )
     rows = model.rows(drive)
-    value = jax.jit(lambda m: filters.scan(filters.Unscented(), m, rows).log_likelihood)
-    slope = jax.jit(jax.grad(value))(model)
+    value = jax.jit(jax.value_and_grad(lambda m: filters.scan(filters.Unscented(), m, rows).log_likelihood))
+    slope = value(model)[1]
     h = 1e-5
 
     def shifted(sign):
         prior = model.prior.mean._replace(front_B=model.prior.mean.front_B + sign * h)
         import equinox as eqx
 
-        return value(eqx.tree_at(lambda m: m.prior.mean, model, prior))
+        return value(eqx.tree_at(lambda m: m.prior.mean, model, prior))[0]
 
     finite = (shifted(1) - shifted(-1)) / (2 * h)
     assert float(slope.prior.mean.front_B) == pytest.approx(float(finite), rel=1e-4)

@@ -62,8 +62,10 @@ def test_a_steady_circle_is_a_circle_whatever_the_driver_thinks_of_the_car(radiu
 def test_the_slalom_goes_round_its_cones_on_alternating_sides():
     driver = manoeuvres.slalom_course(12.0, 1.5, spacing=20.0, count=6, **KNOWN)
     motion, _ = drive(CAR, driver, rows(driver))
-    y = np.interp(30.0 + 20.0 * np.array([1.5, 2.5, 3.5, 4.5]), motion.x, motion.y)
-    assert (y * np.array([-1, 1, -1, 1]) > 0.9).all()
+    y = np.interp(30.0 + 20.0 * (1.5 + np.arange(6)), motion.x, motion.y)
+    assert (y * np.array([-1, 1, -1, 1, -1, 1]) > 1.1).all()
+    course = manoeuvres.slalom_cones(20.0, 6)
+    assert manoeuvres.clearance(motion.x, motion.y, motion.yaw, WIDTH, LENGTH, course) > 0
 
 
 def test_on_a_straight_the_driver_comes_back_to_the_line_and_turns_no_wheel():

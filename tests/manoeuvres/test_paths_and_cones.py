@@ -107,6 +107,38 @@ def test_sine_passes_cones_on_alternating_sides():
 # Courses
 
 
+@pytest.mark.parametrize("count", [2, 5, 6])
+def test_the_slaloms_path_passes_every_cone_at_its_whole_amplitude(count):
+    driver = manoeuvres.slalom_course(14.0, count=count)
+    course = manoeuvres.slalom_cones(count=count)
+    x = np.linspace(0.0, 14.0 * driver.duration, 5001)
+    y, slope = jax.vmap(jax.value_and_grad(driver.path.y))(jnp.asarray(x))
+    beside = driver.path.y(jnp.array([lane.start for lane in course.lanes]))
+    np.testing.assert_allclose(beside, -1.5 * (-1.0) ** np.arange(count), rtol=1e-12)
+    # A short body that follows the path exactly has what is left of the amplitude beside each cone.
+    for lane in course.lanes:
+        one = manoeuvres.Course("one", (lane,))
+        left = manoeuvres.clearance(x, y, np.arctan(slope), 1.8, 0.1, one)
+        np.testing.assert_allclose(left, 1.5 - 0.9 - 0.15, atol=2e-3)
+    assert driver.path.y(jnp.asarray(x[-1])) == 0
+
+
+def test_a_slalom_has_one_cone_in_each_place_and_both_sides_are_told_apart():
+    course = manoeuvres.slalom_cones(10.0, 3, 5.0)
+    np.testing.assert_allclose(manoeuvres.cones(course), [[20.0, 0.0], [30.0, 0.0], [40.0, 0.0]], atol=1e-12)
+    x, y, yaw = straight(-1.5)
+    first, second, third = (manoeuvres.Course("one", (lane,)) for lane in course.lanes)
+    np.testing.assert_allclose(manoeuvres.clearance(x, y, yaw, 1.8, 4.5, first), 0.45, rtol=1e-12)
+    np.testing.assert_allclose(manoeuvres.clearance(x, y, yaw, 1.8, 4.5, second), -1.5 - 0.9 - 0.15, rtol=1e-12)
+    assert manoeuvres.passes(x, y, yaw, 1.8, 4.5, third)
+
+
+def test_the_usual_steady_circle_asks_for_what_a_tyre_can_give():
+    driver = manoeuvres.steady_circle()
+    speeds = driver.speed.v_x(jnp.linspace(0.0, driver.duration, 101))
+    assert 5.0 < np.max(speeds) ** 2 / 40.0 < 7.5
+
+
 def test_iso_3888_1_has_its_sections_widths_and_offset():
     first, second, third = manoeuvres.iso_3888_1(2.0, start=10.0).lanes
     assert (first.start, first.end, second.start, second.end, third.start, third.end) == (10, 25, 55, 80, 105, 135)
@@ -206,6 +238,7 @@ def test_clearance_has_finite_gradients():
         (lambda: manoeuvres.centre_line(COURSE, 1.0), r"course = two gates: 2 lanes; there must be 3"),
         (lambda: manoeuvres.cones(COURSE, spacing=0.0), r"spacing = 0\.0: must be positive"),
         (lambda: manoeuvres.clearance(0.0, 0.0, 0.0, -1.0, 4.0, COURSE), r"width = -1\.0: must be positive"),
+        (lambda: manoeuvres.slalom_cones(diameter=0.0), r"diameter = 0\.0: must be positive"),
         (lambda: manoeuvres.slalom_course(15.0, count=1), r"count = 1: must be at least 2 cones"),
         (lambda: manoeuvres.iso_lane_change(0.0), r"speed = 0\.0: must be positive"),
     ],

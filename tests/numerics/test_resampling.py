@@ -48,7 +48,7 @@ def test_ancestors_are_ordered_in_range_and_alive(scheme, dtype, size, n):
 def test_a_single_living_particle_has_all_children(scheme, dtype, where):
     weights = np.zeros(100_000)
     weights[where] = 0.3
-    ancestors = scheme(jax.random.key(0), jnp.asarray(weights, dtype))
+    ancestors = jax.jit(scheme)(jax.random.key(0), jnp.asarray(weights, dtype))
     np.testing.assert_array_equal(ancestors, np.full(100_000, where % 100_000))
 
 
@@ -184,10 +184,10 @@ def test_all_dead(dtype, dead):
     assert log_mean == -np.inf
     assert not alive
     for output in (0, 1):
-        gradient = jax.jacrev(lambda values: numerics.normalise(values)[output])(log_weights)  # noqa: B023
+        gradient = jax.jit(jax.jacrev(lambda values: numerics.normalise(values)[output]))(log_weights)  # noqa: B023
         np.testing.assert_array_equal(gradient, jnp.zeros_like(gradient))
 
 
 def test_gradients_of_normalised_weights():
     log_weights = jnp.asarray([0.3, -2.0, 1.5, -40.0])
-    check_grads(lambda values: numerics.normalise(values)[:2], (log_weights,), order=2, modes=("fwd", "rev"))
+    check_grads(jax.jit(lambda values: numerics.normalise(values)[:2]), (log_weights,), order=2, modes=("fwd", "rev"))

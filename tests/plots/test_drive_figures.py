@@ -148,6 +148,15 @@ def test_sine_with_dwell_says_in_words_whether_it_passed():
     failed = plots.sine_with_dwell(dwell(0.2))
     assert failed.axes[0].get_title(loc="right") == "FMVSS 126: failed (yaw rate left too high)"
     assert lines(failed.axes[1], "beyond the limit")
+    slow = dwell().replace(y=0.4 * dwell()["y"])
+    titles = {A: plots.sine_with_dwell(slow, steer_at_03g=A).axes for A in (0.02, 0.03, None)}
+    assert [axes[0].get_title(loc="right") for axes in titles.values()] == [
+        "FMVSS 126: failed (displacement too small)",
+        "FMVSS 126: passed (no limit of displacement below 5 A)",
+        "FMVSS 126: yaw rate within its limits; displacement not judged without the steer at 0.3 g",
+    ]
+    assert lines(titles[0.02][2], "limit") and not lines(titles[0.03][2], "limit")
+    assert titles[0.03][2].get_title(loc="right").endswith("(not judged)")
     assert len(plots.sine_with_dwell(dwell().without("x", "y").replace(a_y=0 * TIME)).axes) == 2
 
 
@@ -187,6 +196,14 @@ def test_loads_shade_the_lift_of_a_wheel():
     np.testing.assert_allclose(line(figure.axes[0], "front left").get_ydata(), 4.0)
     axles = plots.loads(Recording(TIME, {"load_front": 7e3 + TIME, "load_rear": 6e3 + TIME})).axes[0]
     assert label(axles) == "axle loads [kN]" and len(axles.get_lines()) == 2
+
+
+def test_top_view_shows_the_cones_of_a_slalom_whose_lanes_are_open_to_one_side():
+    course = manoeuvres.slalom_cones(count=3)
+    figure = plots.top_view(with_forces(), course, every=2.0)
+    for ax in figure.axes[:-1]:
+        np.testing.assert_allclose(ax.get_lines()[0].get_xydata(), [[57.0, 0.0], [75.0, 0.0], [93.0, 0.0]], atol=1e-12)
+        assert np.isfinite([*ax.get_xlim(), *ax.get_ylim()]).all()
 
 
 def test_top_view_shows_path_cars_forces_and_cones():

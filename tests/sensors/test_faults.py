@@ -59,6 +59,12 @@ def test_spikes_come_as_often_and_as_large_as_they_should():
     assert not found["yaw_rate"].any()
 
 
+def test_spikes_of_a_channel_stay_where_they_are_with_another_channel_in_the_device():
+    alone = Spikes(IMU("a_y", rate=100.0), "a_y", 0.3, 1.0)
+    several = Spikes(IMU(("a_x", "a_y"), rate=100.0), ("a_x", "a_y"), 0.3, 1.0)
+    np.testing.assert_array_equal(heard(alone)[1]["a_y"], heard(several)[1]["a_y"])
+
+
 def test_faults_around_faults_draw_numbers_of_their_own():
     twice = Spikes(Renamed(Spikes(NOISY, "a_x", 0.3, 1.0), {}), "a_x", 0.3, 10.0)
     found = changes(twice)["a_x"]

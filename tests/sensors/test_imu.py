@@ -98,6 +98,13 @@ def test_a_flat_car_presses_on_a_slope_with_the_gravity_normal_to_it():
     assert read(imu, rest | {"bank": -0.2, "a_z": 9.0})["a_z"] == 9.0
 
 
+def test_gyroscopes_leave_out_that_the_road_turns():
+    """Roads are quasi-static: a bank that rises along the way is no roll rate."""
+    imu = IMU(("roll_rate", "pitch_rate"), rate=100.0)
+    said = imu.read(np.arange(3) / 100.0, rows(PLANAR) | {"bank": jnp.linspace(0.0, 0.05, 3)})
+    assert all((np.asarray(value) == 0).all() for value in said.values())
+
+
 def test_a_box_turned_by_a_right_angle_confuses_its_axes():
     said = read(IMU(alignment=Alignment(yaw=np.pi / 2), rate=100.0), PLANAR)
     np.testing.assert_allclose([said["a_x"], said["a_y"]], [2.0, -1.0], rtol=1e-12)

@@ -9,7 +9,7 @@ import pytest
 
 from jaxveh import InputError, sensors, vehicles
 from jaxveh.sensors import Instrumented, LowPass
-from jaxveh.vehicles import SingleTrackState
+from jaxveh.vehicles import GRAVITY, SingleTrackState
 
 
 class Outputs(NamedTuple):
@@ -42,6 +42,33 @@ def test_a_sensor_off_the_centre_feels_the_rigid_bodys_acceleration():
     expected = jax.jacfwd(jax.jacfwd(path))(0.0)
     np.testing.assert_allclose([felt.a_x, felt.a_y], expected, rtol=1e-12)
     assert felt.yaw_rate == 0.5
+
+
+class Leaning(NamedTuple):
+    a_x: Any = 1.0
+    a_y: Any = 2.0
+    yaw_rate: Any = 0.5
+    yaw_acceleration: Any = 3.0
+    roll: Any = 0.06
+    roll_rate: Any = -0.4
+    roll_acceleration: Any = 5.0
+
+
+def test_on_a_car_that_rolls_sensors_lean_with_the_body_and_their_height_counts():
+    """Against the second derivative of the sensor's path in space and its rotation, with the body's centre at a height of 0."""
+    at, outputs = np.array([0.7, -0.4, 0.5]), Leaning(*[jnp.asarray(value) for value in Leaning()])
+
+    def turn(t):
+        yaw, roll = 0.5 * t + 1.5 * t**2, 0.06 - 0.4 * t + 2.5 * t**2
+        c, s, cr, sr = jnp.cos(yaw), jnp.sin(yaw), jnp.cos(roll), jnp.sin(roll)
+        return jnp.array([[c, -s * cr, s * sr], [s, c * cr, -c * sr], [0.0, sr, cr]])
+
+    path = lambda t: jnp.stack([0.5 * t**2, t**2, 0.5 * GRAVITY * t**2]) + turn(t) @ at
+    expected = turn(0.0).T @ jax.jacfwd(jax.jacfwd(path))(0.0)
+    felt = sensors.esc(a_x=0.1, position=tuple(at)).feel(outputs)
+    np.testing.assert_allclose([felt.a_x, felt.a_y], expected[:2], rtol=1e-12)
+    np.testing.assert_allclose(felt.yaw_rate, 0.5 * np.cos(0.06), rtol=1e-12)
+    assert felt.a_y > 2.0 + 0.9 * GRAVITY * 0.06 - 5.0 * 0.5
 
 
 def test_the_default_set_measures_yaw_rate_and_lateral_acceleration():

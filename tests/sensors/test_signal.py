@@ -9,6 +9,7 @@ from jaxveh import InputError
 from jaxveh.sensors import Signal
 from jaxveh.sensors.randomness import gauss_markov, on_and_off, walk
 from jaxveh.sensors.spans import as_spans, check_spans, inside
+from jaxveh.statespace import cast
 
 PERIOD = 0.01
 RAMP = jnp.linspace(-2.0, 2.0, 401)
@@ -81,6 +82,15 @@ def test_quantisation_rounds_to_steps_last():
     np.testing.assert_allclose(said / 0.25, np.round(said / 0.25), atol=1e-12)
     assert np.max(np.abs(said - (RAMP + 0.03))) <= 0.125 + 1e-12
     assert len(np.unique(said)) == 17
+
+
+@pytest.mark.parametrize(("dtype", "slack"), [(jnp.float32, 1e-6), (jnp.float64, 1e-15)])
+@pytest.mark.parametrize(("saturation", "step", "most"), [(1.0, 0.6, 0.6), (1.7, 0.2, 1.6), (0.3, 0.1, 0.3)])
+def test_a_rounded_channel_says_at_most_the_largest_step_within_its_limit(saturation, step, most, dtype, slack):
+    signal = cast(Signal(saturation=saturation, quantisation=step), dtype)
+    said = np.asarray(signal.apply(RAMP.astype(dtype), PERIOD), np.float64)
+    np.testing.assert_allclose((said.min(), said.max()), (-most, most), rtol=slack)
+    assert abs(said).max() <= saturation * (1 + slack)
 
 
 def test_random_outages_begin_and_last_as_they_should():

@@ -10,7 +10,8 @@ import pytest
 from sensor_truth import truth
 
 from jaxveh import InputError, Recording, sensors
-from jaxveh.sensors import GNSS, IMU, OpticalSideslip, Renamed, Signal, SteeringAngle, Suite
+from jaxveh.sensors import GNSS, IMU, Dropout, OpticalSideslip, Renamed, Signal, SteeringAngle, Suite, WheelSpeeds
+from jaxveh.sensors.suite import device_keys
 
 KEY = jax.random.key(11)
 STEER = SteeringAngle(rate=10.0, delay=0.05)
@@ -58,7 +59,7 @@ def test_each_channel_says_the_truth_of_its_delay_ago_and_nothing_between():
 def test_a_device_is_read_as_it_would_be_alone():
     suite = Suite((STEER, SIDE))
     found = record(suite)
-    alone = SIDE.read(SIDE.sample_times(1.0), drive(SIDE.look_times(1.0)), jax.random.fold_in(KEY, 1))
+    alone = SIDE.read(SIDE.sample_times(1.0), drive(SIDE.look_times(1.0)), device_keys(suite.devices, KEY)[1])
     for name in ("a_x", "a_y"):
         np.testing.assert_allclose(found.channels[name][np.isfinite(found.channels[name])], alone[name], rtol=1e-12)
 
@@ -75,6 +76,45 @@ def test_two_equal_devices_have_noise_of_their_own():
     noisy = SteeringAngle(Signal(noise=0.1), rate=10.0)
     found = record(Suite((noisy, Renamed(noisy, {"steer": "second"}))))
     assert not np.any(found.channels["steer"] == found.channels["second"])
+
+
+def heard(devices, name):
+    """What the suite of these devices says of a channel, where it says something."""
+    value = record(Suite(devices)).channels[name]
+    return np.asarray(value[np.isfinite(value)])
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        lambda side: (STEER, side),
+        lambda side: (side, GNSS(0.1, rate=5.0), STEER),
+        lambda side: (Dropout(side, "a_x", probability=0.5), STEER),
+        lambda side: (IMU({"a_x": Signal(), **side.signals, "yaw_rate": Signal(noise=0.1)}, rate=4.0, phase=0.1),),
+    ],
+    ids=["before", "after", "fault", "channel"],
+)
+def test_other_devices_channels_and_faults_leave_a_devices_noise_as_it_is(others):
+    side = IMU({"a_y": Signal(noise=0.1)}, rate=4.0, phase=0.1)
+    several = others(IMU(dict.fromkeys(("a_x", "a_y"), Signal(noise=0.1)), rate=4.0, phase=0.1))
+    np.testing.assert_array_equal(heard((side,), "a_y"), heard(several, "a_y"))
+
+
+def test_a_wheel_more_leaves_the_noise_of_the_others():
+    wheels = lambda *names: WheelSpeeds(dict.fromkeys(names, Signal(noise=0.1)), tooth_error=0.05, rate=20.0)
+    alone = heard((wheels("omega_rl"),), "omega_rl")
+    np.testing.assert_allclose(heard((wheels("omega_fl", "omega_rl", "omega_rr"),), "omega_rl"), alone, rtol=1e-12)
+
+
+def test_no_devices_key_is_one_that_the_caller_may_fold():
+    keys = np.array([jax.random.key_data(key) for key in device_keys((STEER, SIDE, SIDE, GNSS(rate=5.0)), KEY)])
+    folded = np.array([jax.random.key_data(jax.random.fold_in(KEY, number)) for number in range(20)])
+    assert not (keys[:, None] == folded).all(axis=-1).any()
+    assert len(np.unique(keys, axis=0)) == 4
+
+
+def test_keys_by_name_are_the_same_without_64_bits(float32):
+    assert all(jax.random.key_data(key).dtype == np.uint32 for key in device_keys((STEER, SIDE), KEY))
 
 
 def test_a_table_becomes_a_recording():

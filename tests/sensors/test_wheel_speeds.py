@@ -112,6 +112,12 @@ def test_speeds_are_those_of_the_stored_radius_with_its_error():
     np.testing.assert_allclose(spin(device, np.full(20, 50.0)), 0.3 * 50 * 1.01, rtol=1e-9)
 
 
+def test_a_sensor_on_a_pitching_body_counts_what_turns_against_it():
+    device, n = ring(), 40
+    said = device.read(np.arange(n) / RATE, {"omega_fl": jnp.full(n, 65.0), "omega_to_body_fl": jnp.full(n, 64.7)})
+    np.testing.assert_allclose(said["omega_fl"], 64.7, rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [

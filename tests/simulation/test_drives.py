@@ -27,6 +27,19 @@ def test_a_car_with_pedals_holds_the_speed_of_a_manoeuvre_that_says_one():
     np.testing.assert_allclose(drive["true.x"][-1], 120.0, atol=0.3)
 
 
+def test_a_cruise_is_driven_at_its_speed_and_the_noise_of_the_foot_is_added():
+    car = vehicles.Longitudinal(1500.0, drag=0.4, rolling_resistance=0.012)
+    found = {}
+    for noise, error in ((0.0, 0.1), (50.0, 0.3)):
+        wanted = manoeuvres.cruise(20.0, KEY, speed_std=1.0, pedal_noise=noise, pedal_time=0.1, duration=30.0)
+        drive = simulate(car, wanted, dt=0.1)
+        np.testing.assert_allclose(drive["true.v_x"], wanted.speed.v_x(drive.time), atol=error)
+        found[noise] = np.asarray(drive["drive_torque"] - drive["brake_torque"])
+    own = wanted.inputs(drive.time)
+    foot = np.asarray(own.drive_torque - own.brake_torque)
+    assert np.corrcoef(found[50.0] - found[0.0], foot)[0, 1] > 0.8
+
+
 def test_braking_by_torque_slows_as_newton_says():
     brakes = manoeuvres.mu_jump_braking(
         20.0, deceleration=3.0, mass=1500.0, wheel_radius=0.32, brake_at=0.5, duration=3.0

@@ -108,7 +108,8 @@ def test_values_and_gradients_are_finite(tyre, point, load, speed, dtype):
         assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(backward(tyre, at, deflected)))
 
 
-def test_nothing_moves_at_standstill(tyre):
+def test_nothing_moves_without_speed(tyre):
+    """A contact without a speed of its slips slides by slip times speed: not at all."""
     at = contact(0.1, 0.05, speed=0.0)
     state = jax.tree.map(lambda value: value + 0.003, tyre.start(at))
     assert all(rate == 0 for rate in tyre.derivatives(at, state))

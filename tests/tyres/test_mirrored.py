@@ -25,7 +25,7 @@ ODD = {
 }
 """Coefficients that change sign in the mirror, read off the equations (4.E9 to 4.E78)."""
 
-EVEN_INPUTS = {"slip_ratio", "load", "friction", "speed", "pressure"}
+EVEN_INPUTS = {"slip_ratio", "load", "friction", "speed", "pressure", "slip_speed", "direction"}
 
 
 def in_full(version, angles):

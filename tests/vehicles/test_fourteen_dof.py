@@ -183,6 +183,18 @@ def test_ackermann_turns_all_wheels_about_one_point():
     assert float(parallel.rl.x) == 0
 
 
+def test_a_sensor_on_the_body_sees_a_wheel_turn_less_by_the_bodys_own_turning():
+    straight = dict.fromkeys(("toe_front", "toe_rear", "camber_front", "camber_rear", "ackermann"), 0.0)
+    car, steer, roll_rate, pitch_rate = make(**straight), 0.1, 0.4, 0.3
+    x = car.start(0.0, inputs(), v_x=20.0)._replace(
+        roll_rate=jnp.asarray(roll_rate), pitch_rate=jnp.asarray(pitch_rate)
+    )
+    shown = evaluate(car, x, inputs(steer=steer))[1]
+    front = np.cos(steer) * pitch_rate - np.sin(steer) * roll_rate
+    difference = wheels(shown, "omega") - wheels(shown, "omega_to_body")
+    np.testing.assert_allclose(difference, [front, front, pitch_rate, pitch_rate], rtol=1e-12)
+
+
 def test_a_batch_is_its_cars_one_by_one():
     car, n = make(AllMoments()), 3
     x = moving(car)

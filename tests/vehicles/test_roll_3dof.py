@@ -7,6 +7,7 @@ import pytest
 from four_wheel_cars import (
     BODY,
     ROLLING,
+    SLOPES,
     TRACKS,
     assert_finite,
     assert_symmetric,
@@ -19,11 +20,13 @@ from four_wheel_cars import (
     state,
 )
 
-from jaxveh import InputError, tyres, vehicles
+from jaxveh import InputError, estimators, sensors, tyres, vehicles
 from jaxveh._core.names import record
 from jaxveh.roads import LEVEL
-from jaxveh.vehicles import GRAVITY, Roll3DOF, TwoTrack2DOF
+from jaxveh.sensors import OpticalSideslip, Position
+from jaxveh.vehicles import GRAVITY, Roll3DOF, Roll4DOF, TwoTrack2DOF
 from jaxveh.vehicles.rolling_body import roll_accelerations
+from jaxveh.vehicles.wheels import gravity
 
 U = inputs(steer=0.04, v_x=22.0)
 M, M_S, M_U = BODY["mass"], ROLLING["sprung_mass"], BODY["mass"] - ROLLING["sprung_mass"]
@@ -31,6 +34,7 @@ H_U = 0.32
 AXIS = (1.55 * ROLLING["roll_centre_front"] + 1.15 * ROLLING["roll_centre_rear"]) / 2.7
 ARM = (M * BODY["cg_height"] - M_U * H_U) / M_S - AXIS
 STIFFNESS = ROLLING["roll_stiffness_front"] + ROLLING["roll_stiffness_rear"]
+LEVER = M_S / M * ARM
 DAMPING = ROLLING["roll_damping_front"] + ROLLING["roll_damping_rear"]
 
 
@@ -82,8 +86,56 @@ def test_accelerations_are_those_of_lagranges_equations(seed):
     car = car_of(Roll3DOF)
     found = roll_accelerations(car, x, X, Y, N, g[2])
     np.testing.assert_allclose(found, (a_x, a_y, *expected[2:]), rtol=1e-10)
-    given = roll_accelerations(car, x, None, Y, N, g[2], a_x)
-    np.testing.assert_allclose(given, found, rtol=1e-10)
+
+
+def leaning(kind):
+    """A car of either kind in a turn on slopes: rates, outputs, and velocity and its rate of the point on the roll axis."""
+    car = car_of(kind)
+    if kind is Roll4DOF:
+        x, u = turning(car, v_x=22.0), inputs(steer=0.04, drive_torque=400.0, brake_torque=0.0)
+        rates, out = evaluated(car, x, u, SLOPES)
+        return x, rates, out, (x.v_x, x.v_y), (rates.v_x, rates.v_y)
+    x, u = turning(car), U._replace(v_x=jnp.asarray(22.0))
+    rates, out = evaluated(car, x, u, SLOPES)
+    # The speed that is given, and constant, is that of the centre of gravity.
+    behind = lambda roll, yaw_rate: 22.0 - LEVER * jnp.sin(roll) * yaw_rate
+    v_x, v_x_rate = jax.jvp(behind, (x.roll, x.yaw_rate), (rates.roll, rates.yaw_rate))
+    return x, rates, out, (v_x, x.v_y), (v_x_rate, rates.v_y)
+
+
+@pytest.mark.parametrize("kind", [Roll3DOF, Roll4DOF])
+def test_speeds_and_accelerations_belong_to_the_centre_of_gravity(kind):
+    """Against the way in the world of the two bodies' common centre, drawn with the rates of the states."""
+    x, rates, out, speed, speed_rate = leaning(kind)
+    turn = np.array([[np.cos(x.yaw), -np.sin(x.yaw)], [np.sin(x.yaw), np.cos(x.yaw)]])
+    begins, bends = turn @ np.array(speed), turn @ (np.array(speed_rate) + x.yaw_rate * np.array([-speed[1], speed[0]]))
+
+    def way(t):
+        yaw = x.yaw + x.yaw_rate * t + rates.yaw_rate * t**2 / 2
+        roll = x.roll + x.roll_rate * t + rates.roll_rate * t**2 / 2
+        aside = -LEVER * jnp.sin(roll)
+        return begins * t + bends * t**2 / 2 + aside * jnp.stack([-jnp.sin(yaw), jnp.cos(yaw)])
+
+    moves = jax.jacfwd(way)
+    velocity, acceleration = turn.T @ moves(0.0), turn.T @ jax.jacfwd(moves)(0.0)
+    np.testing.assert_allclose((out.v_x, out.v_y), velocity, rtol=1e-10)
+    np.testing.assert_allclose((out.a_x, out.a_y), acceleration - np.array(gravity(SLOPES)[:2]), rtol=1e-10)
+    np.testing.assert_allclose(out.sideslip, np.arctan2(*velocity[::-1]), rtol=1e-10)
+    assert abs(out.v_y - x.v_y) > 0.05
+
+
+@pytest.mark.parametrize("kind", [Roll3DOF, Roll4DOF])
+def test_an_optical_sensor_on_the_roll_axis_sees_the_speeds_of_the_axis(kind):
+    _, _, out, speed, _ = leaning(kind)
+    device = OpticalSideslip(position=Position(0.0, 0.0, -LEVER), rate=10.0)
+    said = device.read(np.zeros(1), {name: jnp.stack([value]) for name, value in out._asdict().items()})
+    np.testing.assert_allclose((said["v_x"][0], said["v_y"][0]), speed, rtol=1e-10)
+
+
+def test_the_sideslip_that_estimates_report_is_the_cars():
+    car, x = car_of(Roll3DOF), turning(car_of(Roll3DOF))
+    found = estimators.state_space(car, sensors.esc(), report=("sideslip",)).report(0.0, x, U).sideslip
+    np.testing.assert_allclose(found, car.outputs(0.0, x, U).sideslip, rtol=1e-12)
 
 
 def test_small_motions_are_those_of_the_textbook():
@@ -141,12 +193,14 @@ def test_the_loads_of_a_steady_turn_hold_the_weight_and_its_moment():
     np.testing.assert_allclose(sum(loads), M * GRAVITY, rtol=1e-13)
     found = 0.5 * TRACKS["track_front"] * (out.load_fr - out.load_fl)
     found += 0.5 * TRACKS["track_rear"] * (out.load_rr - out.load_rl)
-    a_y, s, c = 25.0 * out.yaw_rate, np.sin(out.roll), np.cos(out.roll)
+    s, c = np.sin(out.roll), np.cos(out.roll)
+    # The speed is that of the centre of gravity; what leans out is faster, what does not is slower.
+    a_y = (25.0 - LEVER * s * out.yaw_rate) * out.yaw_rate
     sprung = a_y + ARM * s * out.yaw_rate**2
     moment = M_S * (sprung * (AXIS + ARM * c) + GRAVITY * ARM * s) + M_U * a_y * H_U
-    # What the loads feel leaves out the centripetal part of the leaning body, h phi r / v = 3e-4 of the axis' share.
+    # What the loads feel does not tell these apart, by h phi r / v = 3e-4 of the parts that do not come through the springs.
     np.testing.assert_allclose(found, moment, rtol=5e-5)
-    assert a_y > 4.0
+    assert a_y > 4.0 and sprung > 25.0 * out.yaw_rate
 
 
 def test_a_stiff_body_rolls_like_a_rigid_car():
@@ -192,7 +246,7 @@ def test_a_bank_pulls_the_body_to_its_lower_side():
     # The road holds the car (a force m g_y from the tyres) where it slips sideways; here it slides freely, and hangs free.
     slides = evaluated(car, state(car), straight, LEVEL._replace(bank=0.1))[0]
     np.testing.assert_allclose((slides.roll_rate, slides.v_y), (0.0, -GRAVITY * np.sin(0.1)), atol=1e-12)
-    held = roll_accelerations(car, state(car), None, M * GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1), 0.0)
+    held = roll_accelerations(car, state(car), 0.0, M * GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1))
     assert held.roll > 0.5
 
 

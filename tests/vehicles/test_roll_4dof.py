@@ -104,9 +104,8 @@ def test_without_torques_it_is_the_car_at_a_given_speed():
     static = vehicles.StaticLoads()
     car, given = car_of(Roll4DOF, load_transfer=static), car_of(Roll3DOF, load_transfer=static)
     x = turning(car)
-    rates = car.derivatives(0.0, x, COASTING)
-    a_x = rates.v_x - x.v_y * x.yaw_rate
-    found = given.derivatives(0.0, given.state_type(*x[1:]), inputs(steer=0.04, v_x=22.0, a_x=a_x))
+    rates, out = car.evaluate(0.0, x, COASTING)
+    found = given.derivatives(0.0, given.state_type(*x[1:]), inputs(steer=0.04, v_x=out.v_x, a_x=out.a_x))
     np.testing.assert_allclose(rates[1:], found, rtol=1e-10)
 
 

@@ -77,7 +77,7 @@ class Aligning(eqx.Module):
         return AligningParts(-trail * on_trail + residual + arm * F_x, trail, residual)
 
     def _trail(self, at, scaling, structure, slip):
-        """Pneumatic trail (4.E73 with A55, A58, A60), m."""
+        """Pneumatic trail (4.E73 with A55, A58, A60), m: the other way in backward travel (4.E42)."""
         c, camber = self, at.camber
         S_Ht = c.QHZ1 + c.QHZ2 * at.df_z + (c.QHZ3 + c.QHZ4 * at.df_z) * at.sine
         alpha = at.tangent + S_Ht
@@ -85,7 +85,7 @@ class Aligning(eqx.Module):
         B = B * _per_friction(scaling.LKY, at.mu_y)
         peak = (c.QDZ1 + c.QDZ2 * at.df_z) * (1 - c.PPZ1 * at.dp_i) * (1 + c.QDZ3 * camber + c.QDZ4 * camber**2)
         D = peak * at.moment_load * structure.UNLOADED_RADIUS / (structure.FNOMIN * scaling.LFZO) * scaling.LTR
-        D = D * at.spin.zeta_5
+        D = D * at.spin.zeta_5 * at.direction
         bend = c.QEZ1 + c.QEZ2 * at.df_z + c.QEZ3 * at.df_z**2
         side = 1 + (c.QEZ4 + c.QEZ5 * at.sine) * (2 / math.pi) * numerics.arctan(B * c.QCZ1 * alpha)
         E = curvature(bend * side, at)
@@ -94,7 +94,7 @@ class Aligning(eqx.Module):
         return D * curve * at.smooth * scaling.LFZO
 
     def _residual(self, at, scaling, structure, pure, slip, weight_y):
-        """Residual torque M_zr (4.E75 with A54), N m."""
+        """Residual torque M_zr (4.E75 with A54), N m: the other way in backward travel (4.E47)."""
         c = self
         alpha = at.tangent + pure.S_H + pure.S_V / not_zero(pure.stiffness)
         B = c.QBZ9 * _per_friction(scaling.LKY, at.mu_y) + c.QBZ10 * pure.B * pure.C
@@ -103,7 +103,7 @@ class Aligning(eqx.Module):
         spins = at.spin.coefficients is not None
         peak = (c.QDZ6 + c.QDZ7 * at.df_z) * scaling.LRES * at.spin.zeta_2
         peak = peak if spins else peak + camber * at.sine * scaling.LKZC
-        D = at.moment_load * structure.UNLOADED_RADIUS * peak * at.mu_y * numerics.cos(at.tangent)
+        D = at.moment_load * structure.UNLOADED_RADIUS * peak * at.mu_y * numerics.cos(at.tangent) * at.direction
         if not spins:
             return D * cosine_of_arctan(B * _equivalent(alpha, slip)) * at.smooth
         turning, shape = at.spin.parking(at, scaling, self, structure, pure.mu, weight_y)

@@ -13,8 +13,8 @@ class Operating(NamedTuple):
     `load` (N), `moment_load` (N; not below the range's least load, for moments), `slip_ratio` (-), `slip_angle`, `camber`
     (rad), `speed` (m/s), `pressure` (Pa), all within the tyre's ranges; `df_z`, `dp_i` (-) the increments of load and pressure
     (4.E2); `tangent`, `sine` the slip angle's tangent and the camber's sine, or the angles themselves in mode 1 (4.E3, 4.E4);
-    `mu_x`, `mu_y` (-) the friction scales with the road's in them; `smooth` (-) what is left of shifts at low speed; `spin`
-    what turn slip does; `bounded`: curvatures are held at 1.
+    `mu_x`, `mu_y` (-) the friction scales with the road's in them; `smooth` (-) what is left of shifts at low speed; `direction`
+    (-) that of travel, sgn V_cx of the book; `spin` what turn slip does; `bounded`: curvatures are held at 1.
     """
 
     load: Any
@@ -31,5 +31,6 @@ class Operating(NamedTuple):
     mu_x: Any
     mu_y: Any
     smooth: Any
+    direction: Any = 1.0
     spin: Spin = NO_SPIN
     bounded: bool = True

@@ -17,7 +17,7 @@ UNLIMITED = 1e10
 class Ranges(eqx.Module):
     """The ranges of a property file: slip ratio `KPUMIN`, `KPUMAX` (-), slip angle `ALPMIN`, `ALPMAX` and camber `CAMMIN`,
     `CAMMAX` (rad), load `FZMIN`, `FZMAX` (N), pressure `PRESMIN`, `PRESMAX` (Pa), and the speed `VXLOW` (m/s) below which slip
-    and shifts fade."""
+    (unless a vehicle has regularised it) and shifts fade."""
 
     KPUMIN: jax.Array = coefficient(-UNLIMITED)
     KPUMAX: jax.Array = coefficient(UNLIMITED)

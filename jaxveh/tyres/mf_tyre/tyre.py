@@ -60,11 +60,12 @@ class MFOutputs(NamedTuple):
 class MFTyre(AbstractTyre):
     """MF-Tyre 5.2, 6.1 or 6.2: the Magic Formula in full, pure and combined slip, camber, load and inflation pressure.
 
-    `version` 52, 61 or 62 chooses the equations (62 differs from 61 in the loaded radius alone). `limits`: hold slip,
-    camber, load and pressure within `ranges`, curvatures at 1, and let slip fade below `ranges.VXLOW`, as the reference
-    evaluator does; `angles`: work with tan(slip angle) and sin(camber) as the book does (False: with the angles); `spins`: the
-    contact's turn slip counts, and camber's share of it, by `turn_slip`. Every coefficient is a leaf, such as
-    `lambda tyre: tyre.lateral.PKY1`.
+    `version` 52, 61 or 62 chooses the equations (62 differs from 61 in the loaded radius alone). `limits`: hold slip, camber,
+    load and pressure within `ranges`, curvatures at 1, and let slip and shifts fade below `ranges.VXLOW`, as the reference
+    evaluator does (but not the slips of a contact with a `slip_speed`, which are regularised already: faded twice, a vehicle
+    that stands would have no forces); `angles`: work with tan(slip angle) and sin(camber) as the book does (False: with the
+    angles); `spins`: the contact's turn slip counts, and camber's share of it, by `turn_slip`. Every coefficient is a leaf,
+    such as `lambda tyre: tyre.lateral.PKY1`.
 
     The contact's load is needed; a speed that it does not tell is LONGVL, a pressure INFLPRES. Its friction multiplies
     LMUX and LMUY.
@@ -138,9 +139,13 @@ class MFTyre(AbstractTyre):
         pressure = structure.INFLPRES if contact.pressure is None else contact.pressure
         kappa, alpha, camber, smooth = contact.slip_ratio, -contact.slip_angle, contact.camber, jnp.ones_like(speed)
         if self.limits:
-            along, across, smooth = numerics.stored(r.fading(alpha, speed))
-            kappa = jnp.clip(kappa * along, r.KPUMIN, r.KPUMAX)
-            alpha = jnp.clip(alpha * across, r.ALPMIN, r.ALPMAX)
+            fading = r.fading(alpha, speed)
+            if contact.slip_speed is None:
+                along, across, smooth = numerics.stored(fading)
+                kappa, alpha = kappa * along, alpha * across
+            else:
+                smooth = numerics.stored(fading[2])
+            kappa, alpha = jnp.clip(kappa, r.KPUMIN, r.KPUMAX), jnp.clip(alpha, r.ALPMIN, r.ALPMAX)
             camber = jnp.clip(camber, r.CAMMIN, r.CAMMAX)
             load, pressure = jnp.minimum(load, r.FZMAX), jnp.clip(pressure, r.PRESMIN, r.PRESMAX)
         moment_load = jnp.where(load > 0, jnp.maximum(load, r.FZMIN), 0.0) if self.limits else load
@@ -160,6 +165,7 @@ class MFTyre(AbstractTyre):
             mu_x=self.scaling.LMUX * contact.friction,
             mu_y=self.scaling.LMUY * contact.friction,
             smooth=smooth,
+            direction=contact.direction,
             bounded=self.limits,
         )
         return at._replace(spin=self._spin(contact, at)) if self.spins else at

@@ -45,8 +45,8 @@ class FourteenDOF(AbstractVehicle):
     - A wheel's mass travels along a straight joint fixed in the body, inclined so that the contact point turns about the
       roll centre (`roll_centre`) and moves forward by `pitch_slope` in bump: in front positive is anti-dive, at the rear
       negative is anti-squat and anti-lift. Wheels keep their angle to the body: camber is that of the body and `camber`.
-    - `omega` is a wheel's whole spin about its axle (a sensor on the body reads it less the body's turning about the axle,
-      about the pitch rate). Spin momentum makes gyroscopic moments; a turning steer makes none.
+    - `omega` is a wheel's whole spin about its axle. A sensor on the body reads it less the body's turning about the axle,
+      about the pitch rate: the output `omega_to_body`. Spin momentum makes gyroscopic moments; a turning steer makes none.
     - A tyre is a spring and a damper in the wheel's plane that never pull; its contact point is where that plane, below the
       centre, meets the road.
       It rolls with the unloaded radius less a third of the compression, which is also the arm of its longitudinal force
@@ -76,9 +76,9 @@ class FourteenDOF(AbstractVehicle):
     **Inputs**: `steer` (rad at the road wheels) and those of `drive`.
 
     **Outputs** beside those of `SevenDOF`: `z`, `v_z`, `roll`, `pitch`, their rates and accelerations, `a_z`, `camber_fl`,
-    `travel_fl` (m, up), `travel_rate_fl`, `suspension_force_fl` (N), `M_x_fl`, `M_y_fl` ..., and the powers (W) that leave the
-    car: `tyre_dissipation` (slip, moments, rolling, tyre damping), `damper_dissipation`, `brake_dissipation`,
-    `drag_dissipation`. With `drive_power` they balance the energy.
+    `travel_fl` (m, up), `travel_rate_fl`, `suspension_force_fl` (N), `omega_to_body_fl` (rad/s), `M_x_fl`, `M_y_fl` ..., and the
+    powers (W) that leave the car: `tyre_dissipation` (slip, moments, rolling, tyre damping), `damper_dissipation`,
+    `brake_dissipation`, `drag_dissipation`. With `drive_power` they balance the energy.
 
     **Raises** `InputError` for parameters outside their domain, an inertia that is not positive definite, tyres too soft to
     carry the car, or a tyre that is none.
@@ -194,12 +194,13 @@ class FourteenDOF(AbstractVehicle):
             each(lambda how: how.moves, stand.touches),
             forces,
         )
-        shown = body_outputs(x, x.v_x, felt.x, felt.y, yaw, u.steer, push)
+        shown = body_outputs(self.motion(x, u), felt.x, felt.y, yaw, u.steer, push)
         shown |= attitude_outputs(x, roll, pitch, felt.z)
         shown |= wheel_outputs(stand.contacts, forces, omegas) | moments(forces)
         shown |= by_wheel(
             camber=each(lambda at: at.camber, stand.contacts), travel=of(x, "travel"),
             travel_rate=of(x, "travel_rate"), suspension_force=suspension,
+            omega_to_body=each(lambda shaft: shaft.turns, shafts),
         )  # fmt: skip
         shown |= {
             "drive_power": total(each(lambda shaft: shaft.drive_power, shafts)),
@@ -232,7 +233,7 @@ class FourteenDOF(AbstractVehicle):
         def one(axis, how, omega, driving, braking):
             turns = omega - dot(axis, stand.body.omega)
             slowing = braking * opposing(turns * how.radius)
-            return Shaft(driving - slowing, driving * turns, slowing * turns)
+            return Shaft(driving - slowing, turns, driving * turns, slowing * turns)
 
         return each(one, stand.axles, stand.touches, omegas, drive, brake)
 
@@ -269,9 +270,10 @@ class Stand(NamedTuple):
 
 
 class Shaft(NamedTuple):
-    """Torque on a wheel (N m), power of its motor and power lost in its brake (W)."""
+    """Torque on a wheel (N m), its spin as seen from the body (rad/s), power of its motor and power lost in its brake (W)."""
 
     torque: Any
+    turns: Any
     drive_power: Any
     brake_power: Any
 

@@ -13,7 +13,7 @@ UNITS = {
     **dict.fromkeys(("v_z", *named("travel_rate")), "m/s"),
     "a_z": "m/s^2",
     **dict.fromkeys(("roll", "pitch", *named("camber")), "rad"),
-    **dict.fromkeys(("roll_rate", "pitch_rate"), "rad/s"),
+    **dict.fromkeys(("roll_rate", "pitch_rate", *named("omega_to_body")), "rad/s"),
     **dict.fromkeys(("roll_acceleration", "pitch_acceleration"), "rad/s^2"),
     **dict.fromkeys(named("suspension_force"), "N"),
     **dict.fromkeys((*named("M_x"), *named("M_y")), "N m"),

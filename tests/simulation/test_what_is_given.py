@@ -1,0 +1,108 @@
+"""What `simulate` is given: sensors and events that are none, cars with a road, few rows, stamps that are one in float32."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import InputError, manoeuvres, roads, sensors, simulation, vehicles
+from jaxveh.simulation import simulate
+from jaxveh.statespace import cast
+from jaxveh.vehicles import Travelling
+
+STEER = manoeuvres.step_steer(25.0, 0.02, start=0.1, duration=0.5)
+
+
+def linear():
+    return vehicles.linear_single_track(vehicles.passenger_car())
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ("esc", "'esc'"),
+        ((sensors.IMU(rate=100.0),), "tuple"),
+        (jax.random.key(0), "PRNGKeyArray"),
+        (sensors.esc, "esc"),
+    ],
+)
+def test_sensors_that_are_none_are_refused(given, shown):
+    with pytest.raises(InputError, match=f"sensors = {shown}: must be a SensorSet .* a Suite .* one device, or None"):
+        simulate(linear(), STEER, given)
+
+
+def test_one_device_is_a_suite_of_one():
+    imu = sensors.IMU(rate=20.0)
+    alone, suite = (simulate(linear(), STEER, devices) for devices in (imu, sensors.Suite((imu,))))
+    assert len(alone) == 11 and alone.names == suite.names
+    np.testing.assert_array_equal(alone["yaw_rate"], suite["yaw_rate"])
+
+
+def test_an_event_that_is_none_is_refused():
+    with pytest.raises(InputError, match=r"until = standstill: must be an Event such as simulation\.standstill\(\)"):
+        simulate(linear(), STEER, until=simulation.standstill)
+
+
+def test_a_car_travels_on_one_road():
+    car = Travelling(linear(), roads.Level(0.8))
+    with pytest.raises(InputError, match="road = MuJump: the car already travels on a road, Level"):
+        simulate(car, STEER, road=roads.MuJump(1.0, 0.4, 10.0))
+    with pytest.raises(InputError, match="Travelling must be outermost"):
+        simulate(vehicles.Steered(car, 16.0), STEER)
+    placed = simulate(Travelling(linear()), STEER, road=roads.Level(0.8), dt=0.1)
+    np.testing.assert_allclose(placed["true.friction_fl"], 0.8, atol=1e-12)
+
+
+def test_a_device_that_speaks_once_makes_one_row():
+    slow = manoeuvres.step_steer(25.0, 0.02, duration=2.0)
+    drive = simulate(linear(), slow, sensors.Suite(sensors.GNSS(rate=0.1)))
+    np.testing.assert_array_equal(drive.time, [0.0])
+    np.testing.assert_allclose(drive["speed"], [25.0])
+
+
+@pytest.mark.parametrize("duration", [5.7, 6.2])
+@pytest.mark.usefixtures("float32")
+def test_an_event_that_did_not_happen_cuts_nothing_in_float32(duration):
+    """In float32 the last row's stamp lies beyond or before that of its double: neither may count as an early end."""
+    steady = manoeuvres.step_steer(25.0, 0.02, duration=duration)
+    drive = simulate(linear(), steady, until=simulation.standstill(), max_step=0.01)
+    assert len(drive) == round(100 * duration) + 1
+    assert "standstill" not in drive.source
+    assert drive["true.yaw_rate"].dtype == np.float32 and np.all(np.isfinite(drive["true.yaw_rate"]))
+
+
+def test_an_event_ends_the_rows_of_devices_too():
+    slowing = manoeuvres.mu_jump_braking(5.0, brake_at=0.1, deceleration=5.0, duration=2.0)
+    # The speed is 1.2 m/s where a step ends, within rounding.
+    suite = sensors.Suite(sensors.GNSS(rate=20.0, delay=0.03))
+    drive = simulate(linear(), slowing, suite, until=simulation.standstill(1.2))
+    assert "standstill (below 1.2 m/s) at t = 1.0" in drive.source
+    end = float(drive.source.split("t = ")[1].split(" ")[0])
+    assert end - 0.05 < drive.time[-1] <= end
+    assert np.all(np.isfinite(np.asarray(drive["true.v_x"])))
+
+
+def test_an_event_in_float32_is_found():
+    slowing = manoeuvres.mu_jump_braking(5.0, brake_at=0.1, deceleration=5.0, duration=2.0)
+    drive = simulate(*cast((linear(), slowing), np.float32), until=simulation.standstill(1.3))
+    assert "standstill (below 1.3 m/s) at t = 0.99" in drive.source
+    assert drive.time[-1] == 0.99
+
+
+def test_an_event_in_one_run_of_a_batch_leaves_the_others_whole():
+    def last(deceleration):
+        slowing = manoeuvres.mu_jump_braking(5.0, brake_at=0.1, deceleration=3.0, duration=1.5)
+        slowing = eqx.tree_at(lambda m: m.deceleration, slowing, deceleration)
+        return simulate(linear(), slowing, until=simulation.standstill(2.0), dt=0.1)["true.v_x"]
+
+    speeds = jax.vmap(last)(jnp.asarray([4.0, 1.0]))
+    assert np.isnan(speeds[0, -1]) and np.all(speeds[0, :8] > 2.0)
+    np.testing.assert_allclose(speeds[1, -1], 5.0 - 1.25, atol=1e-6)
+
+
+def test_stamps_that_are_one_in_float32_are_refused():
+    car, long = cast((linear(), manoeuvres.step_steer(25.0, 0.02, duration=40.0)), np.float32)
+    close = sensors.Suite((sensors.GNSS(rate=1.0), sensors.IMU(rate=1.0, phase=1e-6)))
+    with pytest.raises(InputError, match=r"rows at t = \d+ s and 1e-06 s later are one instant in float32"):
+        simulate(car, long, close, max_step=0.1)
