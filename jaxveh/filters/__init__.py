@@ -20,6 +20,8 @@ from jaxveh.filters.gaussian import (
     SquareRoot,
     Unscented,
 )
+from jaxveh.filters.guided import Guided
+from jaxveh.filters.kernels import LiuWest, Regularised
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, ParticleFilter
 from jaxveh.filters.smoothing import BackwardSampling, Genealogy, SmoothedEstimate, smooth
 from jaxveh.filters.smoothing.parallel import smooth_parallel
@@ -58,14 +60,17 @@ __all__ = [
     "GaussHermite",
     "GaussianBelief",
     "Genealogy",
+    "Guided",
     "Huber",
     "Info",
     "InteractingModels",
     "Iterated",
     "Kalman",
+    "LiuWest",
     "ParticleBelief",
     "ParticleFilter",
     "Paused",
+    "Regularised",
     "RobustStudentT",
     "SageHusa",
     "SigmaPointFilter",

@@ -18,6 +18,7 @@ from jaxveh.filters.particle import (
     check_particle_settings,
     choose_ancestors,
     gather,
+    log_chosen,
     log_of,
     log_prob,
     make_info,
@@ -33,20 +34,21 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
     ancestor draw). `lookahead(model, t0, t1, x, u) -> mu` is the characteristic of the transition, elementwise; by
     default its mean, the propagated state without noise, which then is not computed twice. Where the ESS of the
     first-stage weights stays above `threshold`, no ancestors are drawn and the step is a bootstrap step.
-
-    Gradients hold the ancestors fixed and are biased, as in `ParticleFilter`, for noise levels too.
     """
 
     particles: int = eqx.field(static=True)
     resampling: Callable = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     lookahead: Callable | None = eqx.field(static=True, default=None)
+    gradient: str = eqx.field(static=True, default="score")
 
     def __check_init__(self):
-        check_particle_settings(self.particles, self.threshold)
+        check_particle_settings(self.particles, self.threshold, self.gradient)
 
     def init(self, model, row, key=None):
-        return ParticleFilter(self.particles, self.resampling, self.threshold).init(model, row, need_key(self, key))
+        return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient).init(
+            model, row, need_key(self, key)
+        )
 
     def step(self, model, belief, row):
         return apart(self._step, belief.count >= 0, model, belief, row)
@@ -67,7 +69,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         logs, _ = log_prob(model, row, moved, measured, present)
         chosen_ahead = gather((ahead,), ancestors)[0]
         n = jnp.asarray(self.particles, logs.dtype)
-        drawn = logs - chosen_ahead
+        drawn = logs - chosen_ahead + log_chosen(self, log_of(first), ancestors)
         if resampled is not None:
             # Without a draw: an ordinary importance step from the weights that were there.
             drawn = jnp.where(resampled, drawn, logs + log_of(belief.weights) + jnp.log(n))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -86,22 +86,28 @@ def _std(weights, deviation):
 
 
 class AbstractParticleFilter(AbstractFilter):
-    """Shared by particle filters: `particles` (at least 2), `resampling` scheme, `threshold` of the ESS.
+    """Shared by particle filters: `particles` (at least 2), `resampling` scheme, `threshold` of the ESS, `gradient`.
 
     `resampling(key, weights, n) -> ancestors` (see `numerics.systematic`, `stratified`, `multinomial`, `residual`).
     `threshold`: resample where the ESS falls below this share of the particles; 1 (the default) resamples every step.
+    `gradient`: `"score"` (the default) adds the derivative of the choice of ancestors, so that the gradient of the
+    log-likelihood is right in the limit of many particles; its spread grows with the length of the recording. `"held"` leaves
+    it out: a smooth gradient with a **bias** that no number of particles cures, for parameters and noise levels alike.
     """
 
     particles: eqx.AbstractVar[int]
     resampling: eqx.AbstractVar[Callable]
     threshold: eqx.AbstractVar[float]
+    gradient: eqx.AbstractVar[str]
 
     def check(self, model):
         del model
 
 
-def check_particle_settings(particles: int, threshold: float) -> None:
-    """Raise `InputError` for fewer than two particles or a threshold outside [0, 1]."""
+def check_particle_settings(particles: int, threshold: float, gradient: str = "score") -> None:
+    """Raise `InputError` for fewer than two particles, a threshold outside [0, 1] or another gradient."""
+    if gradient not in ("score", "held"):
+        raise InputError(f"gradient = {gradient!r}: must be 'score' or 'held'.")
     if not isinstance(particles, int) or particles < 2:
         raise InputError(f"particles = {particles}: must be a whole number of at least 2.")
     if not 0 <= threshold <= 1:
@@ -128,8 +134,31 @@ def add_noise(model: StateSpace, key, particles, dt):
     return particles._replace(**{name: getattr(particles, name) + value for name, value in noise.items()})
 
 
+@jax.custom_jvp
+def score(log_probability):
+    """Zero, with the derivative of a draw's log-probability: what makes gradients through a choice right.
+
+    A draw j of a category i of probability p_i counts with p_i over the same p_i without derivative, a factor of 1, so that the
+    expectation's derivative has the share that comes from choosing (A. Scibior & F. Wood, Differentiable particle filtering
+    without modifying the forward pass, 2021; G. Poyiadjis, A. Doucet & S. Singh 2011).
+    """
+    return jnp.zeros_like(log_probability)
+
+
+@score.defjvp
+def _score_jvp(primals, tangents):
+    return jnp.zeros_like(primals[0]), tangents[0]
+
+
+def log_chosen(filter_, log_probabilities, ancestors):
+    """The log weights (N,) of drawn particles, over their mean: zero, with the derivative of the choice unless it is `held`."""
+    if filter_.gradient == "held":
+        return jnp.zeros_like(log_probabilities)
+    return score(log_probabilities[ancestors])
+
+
 def gather(particles, ancestors):
-    """The ancestors' states; the draw is held fixed under differentiation."""
+    """The ancestors' states; the draw itself is held fixed under differentiation."""
     take = lambda field: field.at[ancestors].get(mode="promise_in_bounds", indices_are_sorted=True)
     return jax.tree.map(take, particles)
 
@@ -173,19 +202,24 @@ def make_info(model, row, log_likelihood, residual, present, weights, alive):
     )
 
 
-class ParticleFilter(AbstractParticleFilter):
-    """The bootstrap particle filter (Gordon, Salmond & Smith 1993; Sarkka 2013, algorithm 7.4 with the transition as proposal).
+class Drawn(NamedTuple):
+    """Particles before their measurement: where they came from, their weights and the logarithms of these, with derivatives."""
 
-    Gradients of the log-likelihood hold the ancestors fixed: the dependence of the resampling on the parameters is left
-    out, so that they are **biased**, for the dynamics' parameters and for noise levels too.
-    """
+    ancestors: Any
+    weights: Any
+    log_weights: Any
+
+
+class ParticleFilter(AbstractParticleFilter):
+    """The bootstrap particle filter (Gordon, Salmond & Smith 1993; Sarkka 2013, algorithm 7.4, the transition as proposal)."""
 
     particles: int = eqx.field(static=True)
     resampling: Callable = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
+    gradient: str = eqx.field(static=True, default="score")
 
     def __check_init__(self):
-        check_particle_settings(self.particles, self.threshold)
+        check_particle_settings(self.particles, self.threshold, self.gradient)
 
     def init(self, model, row, key=None):
         return apart(self._init, always(row.t), model, row, need_key(self, key))
@@ -194,7 +228,8 @@ class ParticleFilter(AbstractParticleFilter):
         particles, key = start_particles(self, model, row, key)
         uniform = jnp.full((self.particles,), 1 / self.particles, particles[0].dtype)
         ancestors = jnp.arange(self.particles, dtype=jnp.int32)
-        return self._weigh(model, row, particles, (uniform, ancestors), key, jnp.int32(0))
+        drawn = Drawn(ancestors, uniform, log_of(uniform))
+        return self._weigh(model, row, particles, drawn, key, jnp.int32(0))
 
     def step(self, model, belief, row):
         return apart(self._step, belief.count >= 0, model, belief, row)
@@ -204,21 +239,26 @@ class ParticleFilter(AbstractParticleFilter):
         ancestors, resampled = choose_ancestors(self, draw, belief.weights)
         particles = gather(belief.particles, ancestors)
         uniform = jnp.full_like(belief.weights, 1 / self.particles)
-        weights = uniform if resampled is None else jnp.where(resampled, uniform, belief.weights)
+        logs = log_of(belief.weights)
+        chosen = log_of(uniform) + log_chosen(self, logs, ancestors)
+        weights, chosen = (
+            (uniform, chosen)
+            if resampled is None
+            else (jnp.where(resampled, uniform, belief.weights), jnp.where(resampled, chosen, logs))
+        )
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved = model.transition(belief.t, row.t, particles, u)
         moved = numerics.barrier(add_noise(model, noise, moved, row.t - belief.t))
-        return self._weigh(model, row, moved, (weights, ancestors), belief.key, belief.count)
+        return self._weigh(model, row, moved, Drawn(ancestors, weights, chosen), belief.key, belief.count)
 
     def _weigh(self, model, row, particles, drawn, key, count):
-        before, ancestors = drawn
         measured, present = presence(model, row)
         logs, residual = log_prob(model, row, particles, measured, present)
-        weights, log_mean, alive = numerics.normalise(logs + log_of(before))
-        belief = ParticleBelief(particles, weights, ancestors, key, row.t, row.u, count + 1)
+        weights, log_mean, alive = numerics.normalise(logs + drawn.log_weights)
+        belief = ParticleBelief(particles, weights, drawn.ancestors, key, row.t, row.u, count + 1)
         # normalise gives the log of the mean over N of what sums to the likelihood.
         log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
-        return belief, make_info(model, row, log_likelihood, residual, present, (before, weights), alive)
+        return belief, make_info(model, row, log_likelihood, residual, present, (drawn.weights, weights), alive)
 
 
 def log_of(weights):

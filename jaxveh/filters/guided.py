@@ -1,0 +1,148 @@
+"""The guided particle filter: particles move to where the measurement says they should be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
+from jaxveh.filters.base import always, apart, presence
+from jaxveh.filters.gaussian.filter import check_covariances, wrapped_innovation
+from jaxveh.filters.gaussian.forms import Covariance, Spread
+from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes
+from jaxveh.filters.particle import (
+    AbstractParticleFilter,
+    ParticleBelief,
+    ParticleFilter,
+    check_particle_settings,
+    choose_ancestors,
+    gather,
+    log_chosen,
+    log_of,
+    log_prob,
+    make_info,
+    need_key,
+)
+from jaxveh.numerics import sigma_points
+from jaxveh.statespace import StateSpace
+from jaxveh.statespace.noise import LOG_2PI
+
+RULES = ("extended", "unscented")
+
+
+class Proposal(NamedTuple):
+    """From where a particle's noise is drawn: N(mean, F F^T) with `mean` (q,), `factor` F (q, q); `log_ahead`, how likely the
+    measurement is from this particle."""
+
+    mean: Any
+    factor: Any
+    log_ahead: Any
+
+
+class Guided(AbstractParticleFilter):
+    """Particles whose noise is drawn given the measurement, by a Kalman update of each (Sarkka 2013, sec. 7.4).
+
+    `rule`: `"extended"` (A. Doucet, S. Godsill & C. Andrieu 2000) or `"unscented"`, the unscented particle filter (R. van der
+    Merwe, A. Doucet, N. de Freitas & E. Wan 2001). With e the process noise of a step, Gaussian on the fields that carry it,
+    x = f(x_{k-1}) + e, the measurement's image under N(0, Q) gives a proposal q(e), and the weight is
+
+        w_{k-1} p(y | x) p(e) / q(e)
+
+    `auxiliary`: ancestors are chosen by what each predicts of the measurement, too; with a linear observation this is the fully
+    adapted filter (M. Pitt & N. Shephard 1999), whose weights are all equal. It pays where the measurement is sharper than the
+    process noise; each particle costs a small Kalman update. The process noise must be Gaussian, and measurement noise have a
+    covariance.
+    """
+
+    particles: int = eqx.field(static=True)
+    rule: str = eqx.field(static=True, default="extended")
+    auxiliary: bool = eqx.field(static=True, default=False)
+    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    threshold: float = eqx.field(static=True, default=1.0)
+    gradient: str = eqx.field(static=True, default="score")
+
+    def __check_init__(self):
+        check_particle_settings(self.particles, self.threshold, self.gradient)
+        if self.rule not in RULES:
+            raise InputError(f"rule = {self.rule!r}: must be one of {', '.join(RULES)}.")
+
+    def check(self, model):
+        if model.process_noise is None:
+            raise InputError("Guided: the model has no process noise, which is what it guides. Use ParticleFilter.")
+        check_covariances("Guided", model)
+
+    def init(self, model, row, key=None):
+        first = ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)
+        return apart(first.init, always(row.t), model, row, need_key(self, key))
+
+    def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
+        draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
+        measured, present = presence(model, row)
+        u = model.step_inputs(belief.t, row.t, belief.u, row.u)
+        moved = model.transition(belief.t, row.t, belief.particles, u)
+        moved = jax.tree.map(lambda field: jnp.broadcast_to(field, (self.particles,)), moved)
+        law = model.process_noise.over(row.t - belief.t)
+        covariance = law.covariance()
+        prior = Spread(numerics.cholesky(covariance), covariance)
+        rule = _rule_of(self.rule, len(law.names))
+        propose = jax.vmap(lambda x: _proposal(model, rule, row, x, law.names, prior))
+        proposals = numerics.barrier(propose(moved))
+        logs = log_of(belief.weights)
+        first, log_first, alive_first = numerics.normalise(logs + proposals.log_ahead if self.auxiliary else logs)
+        ancestors, resampled = choose_ancestors(self, draw, first)
+        taken = lambda tree: jax.tree.map(lambda leaf: leaf[ancestors], tree)
+        chosen, start = taken(proposals), gather(moved, ancestors)
+        white = numerics.normal(noise, (len(law.names), self.particles), logs.dtype)
+        e = chosen.mean.T + jnp.einsum("iqr,ri->qi", chosen.factor, white)
+        x = start._replace(**{name: getattr(start, name) + e[i] for i, name in enumerate(law.names)})
+        after, _ = log_prob(model, row, x, measured, present)
+        _, residual = log_prob(model, row, moved, measured, present)
+        ratio = _log_normal(numerics.solve_lower(prior.factor, e), prior.factor) - _log_normal(white, chosen.factor)
+        kept = log_chosen(self, log_of(first), ancestors)
+        n = jnp.log(jnp.asarray(self.particles, logs.dtype))
+        drawn = after + ratio + kept - (chosen.log_ahead if self.auxiliary else 0.0)
+        if resampled is not None:
+            drawn = jnp.where(resampled, drawn, after + ratio + logs + n)
+            log_first = jnp.where(resampled, log_first, -n)
+        weights, log_second, alive = numerics.normalise(drawn)
+        found = ParticleBelief(x, weights, ancestors, belief.key, row.t, row.u, belief.count + 1)
+        alive = alive & alive_first
+        info = make_info(model, row, log_first + n + log_second, residual, present, (belief.weights, weights), alive)
+        return found, info
+
+
+def _rule_of(name: str, count: int) -> AbstractRule:
+    return Slopes() if name == "extended" else Points(sigma_points.unscented(count))
+
+
+def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: Spread) -> Proposal:
+    """The proposal of one particle that the transition took to `moved`, for the noise on `names`."""
+    measured, present = presence(model, row)
+    here = jnp.stack([present[name] for name in model.channels])
+
+    def see(e):
+        x = moved._replace(**{name: getattr(moved, name) + e[i] for i, name in enumerate(names)})
+        observed = model.observation(row.t, x, row.u)
+        rows = [jnp.broadcast_to(getattr(observed, name), e.shape[1:]) for name in model.channels]
+        return jnp.stack([jnp.where(present[name], r, 0) for name, r in zip(model.channels, rows, strict=True)])
+
+    image = rule.image(see, jnp.zeros(len(names), prior.matrix.dtype), prior.factor)
+    given = jnp.stack([measured[name] for name in model.channels])
+    innovation = wrapped_innovation(model, given - image.mean, here)
+    found = Covariance().condition(image, model.measurement_noise, model.channels, here, innovation, prior)
+    count = jnp.sum(here.astype(innovation.dtype))
+    distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
+    return Proposal(found.shift, found.spread.factor, -0.5 * (distance + count * LOG_2PI))
+
+
+def _log_normal(white, factor):
+    """Log-density (N,) of draws whose whitened values are `white` (q, N), less the part that a dimension makes."""
+    return -0.5 * (jnp.sum(jnp.square(white), axis=0) + numerics.log_det(factor))

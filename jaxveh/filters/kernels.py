@@ -1,0 +1,128 @@
+"""Particles smeared by a kernel, so that what carries no noise does not degenerate."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import check
+from jaxveh._core.names import check_names
+from jaxveh.filters.base import AbstractFilter, apart
+from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
+from jaxveh.statespace import StateSpace
+
+KERNEL = 0x6B65726E
+"""Folded into the step's key for the kernel's draws, so that they are none of the filter's."""
+
+
+class AbstractKernel(AbstractFilter):
+    """A particle filter whose particles are replaced, before each step, by draws from kernels about them."""
+
+    @property
+    @abc.abstractmethod
+    def inside(self) -> AbstractParticleFilter:
+        """The particle filter."""
+
+    @abc.abstractmethod
+    def smeared(self, model: StateSpace) -> tuple[str, ...]:
+        """The states that the kernel acts on."""
+
+    @abc.abstractmethod
+    def kernel(self, dimension: int) -> tuple[float, float]:
+        """How far each particle keeps its distance from the mean, and the kernel's spread over the particles'."""
+
+    def init(self, model, row, key=None):
+        return self.inside.init(model, row, key)
+
+    def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
+        names = self.smeared(model)
+        if names:
+            belief = eqx.tree_at(lambda b: b.particles, belief, self._drawn(belief, names))
+        return self.inside.step(model, belief, row)
+
+    def _drawn(self, belief: ParticleBelief, names: tuple[str, ...]) -> Any:
+        keeps, spread = self.kernel(len(names))
+        values = jnp.stack([getattr(belief.particles, name) for name in names])
+        mean = jnp.sum(belief.weights * values, axis=1, keepdims=True)
+        factor = numerics.lower_factor((values - mean) * numerics.sqrt(belief.weights))
+        key = jax.random.fold_in(jax.random.fold_in(belief.key, KERNEL), belief.count)
+        draws = numerics.normal(key, values.shape, values.dtype)
+        moved = mean + keeps * (values - mean) + spread * (factor @ draws)
+        return belief.particles._replace(**dict(zip(names, moved, strict=True)))
+
+
+class LiuWest(AbstractKernel):
+    """`filter` with parameters drawn from a mixture of kernels about them, shrunk so that mean and covariance stay.
+
+        theta <- a theta_i + (1 - a) mean + N(0, (1 - a^2) V),    a = (3 discount - 1) / (2 discount)
+
+    (J. Liu & M. West 2001, around any particle filter; with `AuxiliaryParticleFilter` it is theirs.) `names`: the states that are
+    parameters, by default those without process noise. Their posterior is smeared with each step, and no time is long enough
+    for it to become sharp: compare discounts.
+    """
+
+    filter: AbstractParticleFilter
+    discount: float = eqx.field(static=True, default=0.98)
+    names: tuple[str, ...] | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self):
+        check("LiuWest.discount", self.discount, lambda d: (d > 1 / 3) & (d < 1), "above 1/3 and below 1")
+
+    @property
+    def inside(self):
+        return self.filter
+
+    def check(self, model):
+        self.filter.check(model)
+        check_names("LiuWest.names", self.names or (), model.states)
+
+    def smeared(self, model):
+        if self.names is not None:
+            return self.names
+        noisy = () if model.process_noise is None else model.process_noise.law.names
+        return tuple(name for name in model.states if name not in noisy)
+
+    def kernel(self, dimension):
+        keeps = (3.0 * self.discount - 1.0) / (2.0 * self.discount)
+        return keeps, (1.0 - keeps**2) ** 0.5
+
+
+class Regularised(AbstractKernel):
+    """`filter` whose particles are drawn from Gaussian kernels about them (C. Musso, N. Oudjane & F. Le Gland 2001).
+
+    `bandwidth`: the kernel's spread over the particles'; None: the best for a Gaussian of n states and N particles,
+    (4 / (n + 2))^(1 / (n + 4)) N^(-1 / (n + 4)), times `share`. Nothing is shrunk, so that covariances grow by the bandwidth's
+    square in each step.
+    """
+
+    filter: AbstractParticleFilter
+    bandwidth: float | None = eqx.field(static=True, default=None)
+    share: float = eqx.field(static=True, default=0.5)
+
+    def __check_init__(self):
+        check("Regularised.bandwidth", self.bandwidth, lambda v: v > 0, "positive")
+        check("Regularised.share", self.share, lambda v: v > 0, "positive")
+
+    @property
+    def inside(self):
+        return self.filter
+
+    def check(self, model):
+        self.filter.check(model)
+
+    def smeared(self, model):
+        return model.states
+
+    def kernel(self, dimension):
+        if self.bandwidth is not None:
+            return 1.0, self.bandwidth
+        power = 1.0 / (dimension + 4.0)
+        return 1.0, self.share * (4.0 / (dimension + 2.0)) ** power * self.filter.particles**-power

@@ -1,0 +1,303 @@
+"""What holds for every filter, each in turn: a new one is a line in `FILTERS` that says what it can.
+
+Each filter and model are one program, which the tests share: log-likelihood, estimate and gradient of a batch of two recordings
+with irregular steps, missing channels and rows without any measurement. float32, and the filters' nonlinear models that say
+nothing new, are left to `pytest -m full`.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from filter_systems import kalman, linear_model, linear_recording
+
+from jaxveh import InputError, Recording, filters
+from jaxveh import statespace as ss
+from jaxveh._core.names import record_type
+from jaxveh.filters import Covariance, SingularValues, SquareRoot
+
+N = 200
+
+
+class Line(NamedTuple):
+    """A filter and what it can: `exact` on linear models; `linear` models only; `differentiable`, with gradients that are slopes
+    of its value; `drawn` with a key."""
+
+    make: Callable[[], filters.AbstractFilter]
+    exact: bool = True
+    linear: bool = False
+    differentiable: bool = True
+    drawn: bool = False
+
+
+def same(model):
+    return model
+
+
+def noisier(model):
+    return eqx.tree_at(lambda m: m.measurement_noise.std, model, type(model.measurement_noise.std)(1.0, 1.0))
+
+
+GROUPS = (("y0",), ("y1",))
+PARTICLES = filters.ParticleFilter(N)
+CHANGES = ((0.95, 0.05), (0.1, 0.9))
+FILTERS = {
+    "Kalman": Line(lambda: filters.Kalman(), linear=True),
+    "Kalman, square root": Line(lambda: filters.Kalman(SquareRoot()), linear=True),
+    "Extended": Line(lambda: filters.Extended()),
+    "Extended, square root": Line(lambda: filters.Extended(SquareRoot())),
+    "Unscented": Line(lambda: filters.Unscented()),
+    "Unscented, negative weight": Line(lambda: filters.Unscented(alpha=0.5)),
+    "Unscented, square root": Line(lambda: filters.Unscented(form=SquareRoot())),
+    "Simplex": Line(lambda: filters.Simplex()),
+    "Cubature": Line(lambda: filters.Cubature()),
+    "Cubature, square root": Line(lambda: filters.Cubature(form=SquareRoot())),
+    "Cubature, singular values": Line(lambda: filters.Cubature(form=SingularValues()), differentiable=False),
+    "Cubature of degree 5": Line(lambda: filters.Cubature(degree=5)),
+    "Gauss-Hermite": Line(lambda: filters.GaussHermite()),
+    "Iterated Extended": Line(lambda: filters.Iterated(filters.Extended())),
+    "Iterated Cubature": Line(lambda: filters.Iterated(filters.Cubature(form=SquareRoot()), 2)),
+    "Ensemble": Line(lambda: filters.Ensemble(N), exact=False, drawn=True),
+    "Ensemble, perturbed": Line(lambda: filters.Ensemble(N, perturbed=True), exact=False, drawn=True),
+    "Gated": Line(lambda: filters.Gated(filters.Cubature(), 50.0)),
+    "Huber": Line(lambda: filters.Huber(filters.Cubature(), 50.0)),
+    "Student-t": Line(lambda: filters.RobustStudentT(filters.Cubature(), 4.0), exact=False),
+    "Sage-Husa": Line(lambda: filters.SageHusa(filters.Cubature()), exact=False),
+    "variational Bayes": Line(lambda: filters.VariationalBayes(filters.Cubature()), exact=False),
+    "strong tracking": Line(lambda: filters.StrongTracking(filters.Cubature()), exact=False),
+    "federated": Line(lambda: filters.Federated(filters.Cubature(), GROUPS)),
+    "federated by trace": Line(lambda: filters.Federated(filters.Cubature(form=SquareRoot()), GROUPS, by_trace=True)),
+    "interacting, equal": Line(lambda: filters.InteractingModels(filters.Cubature(), (same, same), CHANGES)),
+    "interacting": Line(lambda: filters.InteractingModels(filters.Cubature(), (same, noisier), CHANGES), exact=False),
+    "consider": Line(lambda: filters.Consider(filters.Cubature(), ("x1",)), exact=False),
+    "dual": Line(lambda: filters.Dual(filters.Cubature(), (("x0",),)), exact=False),
+    "guided": Line(lambda: filters.Guided(N), exact=False, differentiable=False, drawn=True),
+    "guided, fully adapted": Line(
+        lambda: filters.Guided(N, "unscented", auxiliary=True), exact=False, differentiable=False, drawn=True
+    ),
+    "Liu-West": Line(lambda: filters.LiuWest(PARTICLES, names=("x2",)), exact=False, differentiable=False, drawn=True),
+    "regularised": Line(lambda: filters.Regularised(PARTICLES), exact=False, differentiable=False, drawn=True),
+    "bootstrap": Line(lambda: PARTICLES, exact=False, differentiable=False, drawn=True),
+    "auxiliary": Line(lambda: filters.AuxiliaryParticleFilter(N), exact=False, differentiable=False, drawn=True),
+}
+
+
+def linear(seed=3):
+    """Independent noises, so that every filter takes them."""
+    model = linear_model(3, 2, seed=seed)
+    return eqx.tree_at(lambda m: m.measurement_noise, model, ss.Gaussian({"y0": 0.4, "y1": 0.3}))
+
+
+def swing(system, t0, t1, x, u):
+    """A pendulum under a force, by Heun's method."""
+    dt, (angle, rate) = t1 - t0, (x.x0, x.x1)
+    pull = lambda angle, rate: u.force - system["pull"] * jnp.sin(angle) - 0.1 * rate
+    half_angle, half_rate = angle + 0.5 * dt * rate, rate + 0.5 * dt * pull(angle, rate)
+    return type(x)(angle + dt * half_rate, rate + dt * pull(half_angle, half_rate), x.x2)
+
+
+def see_swing(system, t, x, u):
+    return record_type("Y", ("y0", "y1"))(jnp.sin(x.x0) + x.x2, jnp.cos(x.x0))
+
+
+def pendulum():
+    names = ("x0", "x1", "x2")
+    return ss.StateSpace(
+        system={"pull": jnp.asarray(9.0)},
+        transition=swing,
+        observation=see_swing,
+        process_noise=ss.Continuous(ss.Gaussian({"x0": 0.1, "x1": 0.5, "x2": 0.05})),
+        measurement_noise=ss.Gaussian({"y0": 0.1, "y1": 0.2}),
+        prior=ss.Prior(record_type("X", names)(0.5, 0.0, 0.1), dict(zip(names, (0.3, 0.5, 0.1), strict=True))),
+        inputs=("force",),
+    )
+
+
+MODELS = {"linear": linear, "pendulum": pendulum}
+
+
+@functools.cache
+def recordings(name):
+    """Two drawn from the model itself, with steps of 0.02 to 0.2 s, channels missing and two rows without any."""
+    model, made = MODELS[name](), []
+    for seed in (1, 2):
+        recording = linear_recording(model, rows=25, seed=seed)
+        rows, keys = model.rows(recording), jax.random.split(jax.random.key(seed), 3)
+        x = model.prior.sample(keys[0])
+        values = {channel: np.array(recording[channel]) for channel in model.channels}
+        for k in range(25):
+            row = jax.tree.map(lambda leaf, k=k: leaf[k], rows)
+            if k:
+                noise = model.process_noise.over(row.t - last.t).sample(jax.random.fold_in(keys[1], k))  # noqa: F821
+                x = model.transition(last.t, row.t, x, last.u)  # noqa: F821
+                x = x._replace(**{n: getattr(x, n) + v for n, v in noise.items()})
+            y = model.observation(row.t, x, row.u)._asdict()
+            error = model.measurement_noise.sample(jax.random.fold_in(keys[2], k))
+            for channel, value in values.items():
+                value[k] = np.where(np.isfinite(value[k]), y[channel] + error[channel], np.nan)
+            last = row  # noqa: F841
+        made.append(Recording(np.array(recording.time), {**values, "force": np.array(recording["force"])}))
+    return made
+
+
+@eqx.filter_jit
+def whole(filter_, model, rows, keys):
+    """Values, estimates and gradients of a batch of recordings."""
+
+    def value(model, rows, key):
+        estimate = filters.scan(filter_, model, rows, key)
+        return estimate.log_likelihood, estimate
+
+    leaves, rest = eqx.partition(model, eqx.is_inexact_array)
+    grad = jax.value_and_grad(lambda leaves, rows, key: value(eqx.combine(leaves, rest), rows, key), has_aux=True)
+    return jax.vmap(grad, in_axes=(None, 0, 0))(leaves, rows, keys)
+
+
+def batch(name, dtype=None):
+    model = MODELS[name]()
+    rows = [model.rows(r) for r in recordings(name)]
+    rows = jax.tree.map(lambda *leaves: jnp.stack(leaves), *rows)
+    if dtype is None:
+        return model, rows
+    rows = rows._replace(t=rows.t - rows.t[:, :1])
+    return ss.cast(model, dtype), ss.cast(rows, dtype)
+
+
+KEYS = jax.random.split(jax.random.key(7), 2)
+
+
+@functools.cache
+def found(filter_name, model_name):
+    model, rows = batch(model_name)
+    return whole(FILTERS[filter_name].make(), model, rows, KEYS)
+
+
+def cases(condition=lambda line: True):
+    return [
+        pytest.param(name, model, marks=[] if model == "linear" else pytest.mark.full)
+        if line.exact and model == "pendulum" and name not in ("Extended", "Cubature", "Iterated Extended")
+        else (name, model)
+        for name, line in FILTERS.items()
+        for model in MODELS
+        if condition(line) and not (line.linear and model != "linear")
+    ]
+
+
+@pytest.mark.parametrize("name", [name for name, line in FILTERS.items() if line.exact])
+def test_on_linear_models_it_is_the_exact_answer(name):
+    (value, estimate), _ = found(name, "linear")
+    for i, recording in enumerate(recordings("linear")):
+        exact = kalman_of(recording)
+        np.testing.assert_allclose(value[i], exact["log_likelihood"].sum(), rtol=1e-9)
+        np.testing.assert_allclose(np.stack(estimate.mean)[:, i].T, exact["mean"], rtol=1e-9, atol=1e-9)
+        variances = np.diagonal(exact["covariance"], axis1=1, axis2=2)
+        np.testing.assert_allclose(np.stack(estimate.std)[:, i].T ** 2, variances, rtol=1e-9)
+
+
+def kalman_of(recording):
+    model = linear()
+    matrix = ss.MultivariateGaussian(model.channels, np.diag(np.square([0.4, 0.3])))
+    return kalman(eqx.tree_at(lambda m: m.measurement_noise, model, matrix), recording)
+
+
+@pytest.mark.parametrize(("name", "model"), cases())
+def test_it_succeeds_and_a_row_without_measurements_says_nothing(name, model):
+    (value, estimate), gradient = found(name, model)
+    assert not np.asarray(estimate.result).any()
+    for leaf in jax.tree.leaves((value, estimate.mean, estimate.std, gradient)):
+        assert np.isfinite(leaf).all()
+    np.testing.assert_allclose(estimate.info.log_likelihood[:, 7:9], 0.0, atol=1e-12)
+    assert np.isnan(np.stack(estimate.info.innovation)[:, :, 7:9]).all()
+    # Uncertainty grows while nothing is heard.
+    total = sum(np.square(np.asarray(s)) for s in estimate.std)
+    assert (total[:, 8] > total[:, 6]).all() or name == "dual"
+
+
+@pytest.mark.parametrize(("name", "model"), cases(lambda line: not line.exact))
+def test_it_stays_near_the_best_answer(name, model):
+    (value, estimate), _ = found(name, model)
+    (best, reference), _ = found("Cubature", model)
+    spread = np.stack(reference.std)
+    error = (np.stack(estimate.mean) - np.stack(reference.mean)) / spread
+    assert np.sqrt(np.mean(np.square(error))) < 1.0
+    assert (np.abs(value - best) < 0.3 * np.abs(best) + 10.0).all()
+
+
+@pytest.mark.parametrize(("name", "model"), cases(lambda line: line.differentiable))
+def test_its_gradient_is_that_of_differences(name, model):
+    _, gradient = found(name, model)
+    leaves, rest = eqx.partition(MODELS[model](), eqx.is_inexact_array)
+    rng = np.random.default_rng(5)
+    flat, tree = jax.tree.flatten(leaves)
+    # Of matrices the symmetric part.
+    steps = [jnp.asarray(rng.normal(size=leaf.shape)) * (1e-2 + jnp.abs(leaf)) for leaf in flat]
+    steps = [0.5 * (s + s.T) if s.ndim == 2 and s.shape[0] == s.shape[1] else s for s in steps]
+    slope = sum(
+        np.sum(np.asarray(g) * np.asarray(s), axis=tuple(range(1, g.ndim)))
+        for g, s in zip(jax.tree.leaves(gradient), steps, strict=True)
+    )
+    h, values = 1e-5, []
+    _, rows = batch(model)
+    for sign in (1, -1):
+        moved = jax.tree.unflatten(tree, [leaf + sign * h * s for leaf, s in zip(flat, steps, strict=True)])
+        values.append(whole(FILTERS[name].make(), eqx.combine(moved, rest), rows, KEYS)[0][0])
+    np.testing.assert_allclose(slope, (values[0] - values[1]) / (2 * h), rtol=2e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", [name for name, line in FILTERS.items() if not line.drawn])
+def test_a_live_loop_gives_the_scan_s_answer(name):
+    filter_, (model, rows) = FILTERS[name].make(), batch("linear")
+    (value, estimate), _ = found(name, "linear")
+    step = eqx.filter_jit(filter_.step)
+    one = jax.tree.map(lambda leaf: leaf[0], rows)
+    row = lambda k: jax.tree.map(lambda leaf: leaf[k], one)
+    belief, info = filter_.init(model, row(0))
+    total = info.log_likelihood
+    for k in range(1, 25):
+        belief, info = step(model, belief, row(k))
+        total = total + info.log_likelihood
+    np.testing.assert_allclose(total, value[0], rtol=1e-12)
+    np.testing.assert_allclose(belief.moments(model)[0], [leaf[0, -1] for leaf in estimate.mean], rtol=1e-10)
+
+
+FLOAT32 = (
+    "Extended",
+    "Unscented, square root",
+    "Iterated Cubature",
+    "Ensemble",
+    "federated",
+    "variational Bayes",
+    "auxiliary",
+)
+
+
+@pytest.mark.parametrize("name", [n if n in FLOAT32 else pytest.param(n, marks=pytest.mark.full) for n in FILTERS])
+def test_float32_stays_float32_and_says_the_same(name):
+    (value, estimate), _ = found(name, "linear")
+    model, rows = batch("linear", jnp.float32)
+    (single, short), gradient = whole(FILTERS[name].make(), model, rows, KEYS)
+    assert {leaf.dtype for leaf in (single, *short.mean, *short.std, *jax.tree.leaves(gradient))} == {
+        np.dtype("float32")
+    }
+    assert not np.asarray(short.result).any()
+    if not FILTERS[name].drawn:
+        np.testing.assert_allclose(single, value, rtol=2e-4)
+        np.testing.assert_allclose(np.stack(short.mean), np.stack(estimate.mean), atol=2e-3)
+
+
+@pytest.mark.parametrize("name", [name for name, line in FILTERS.items() if line.linear])
+def test_what_is_for_linear_models_refuses_others(name):
+    with pytest.raises(InputError, match="state x1 is no linear function"):
+        FILTERS[name].make().check(pendulum())
+
+
+@pytest.mark.parametrize("form", [SquareRoot(), SingularValues()])
+def test_forms_that_need_positive_weights_say_so(form):
+    with pytest.raises(InputError, match="a weight is negative for 3 states"):
+        filters.Unscented(alpha=0.5, form=form).check(pendulum())
+    filters.Unscented(alpha=0.5, form=Covariance()).check(pendulum())
