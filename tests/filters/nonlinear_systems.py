@@ -1,0 +1,107 @@
+"""Nonlinear systems of one state, and a dense grid filter in NumPy that answers them."""
+
+from collections import namedtuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import Recording
+from jaxveh import statespace as ss
+from jaxveh._core.names import record_type
+
+X = namedtuple("X", "x")
+Y = namedtuple("Y", "y")
+
+
+class LogChiSquared(ss.AbstractNoise):
+    """The logarithm of the square of a standard normal number, on the channel y: not Gaussian, and not of mean zero."""
+
+    has_covariance = False
+    names = ("y",)
+
+    def sample(self, key, shape=()):
+        return {"y": jnp.log(jnp.square(jax.random.normal(key, shape)))}
+
+    def log_prob(self, residual, present):
+        z = jnp.where(present["y"], residual["y"], 0.0)
+        return jnp.where(present["y"], 0.5 * (z - jnp.exp(z)) - 0.5 * jnp.log(2 * jnp.pi), 0.0)
+
+    def covariance(self):
+        raise NotImplementedError
+
+    def scaled(self, factor):
+        raise NotImplementedError
+
+
+def volatility():
+    """Stochastic volatility: log y^2 = log beta^2 + x + log chi^2 (S. Kim, N. Shephard & S. Chib 1998)."""
+    return ss.StateSpace(
+        system={"phi": jnp.asarray(0.95), "level": jnp.asarray(-0.7)},
+        transition=lambda s, t0, t1, x, u: X(s["phi"] * x.x),
+        observation=lambda s, t, x, u: Y(s["level"] + x.x),
+        process_noise=ss.Discrete(ss.Gaussian({"x": 0.3})),
+        measurement_noise=LogChiSquared(),
+        prior=ss.Prior(X(0.0), {"x": 0.3 / (1 - 0.95**2) ** 0.5}),
+    )
+
+
+def growth():
+    """The univariate nonstationary growth model, whose posterior has two peaks (N. Gordon, D. Salmond & A. Smith 1993)."""
+    return ss.StateSpace(
+        transition=lambda s, t0, t1, x, u: X(0.5 * x.x + 25 * x.x / (1 + x.x**2) + 8 * jnp.cos(1.2 * t0)),
+        observation=lambda s, t, x, u: Y(x.x**2 / 20),
+        process_noise=ss.Discrete(ss.Gaussian({"x": 10.0**0.5})),
+        measurement_noise=ss.Gaussian({"y": 1.0}),
+        prior=ss.Prior(X(0.1), {"x": 2.0**0.5}),
+    )
+
+
+def simulate(model, key, rows):
+    """A draw of the model: states (T,) and measurements (T,) at the times 0, 1, 2, ..."""
+    keys = jax.random.split(key, 2 * rows).reshape(rows, 2)
+    first = model.prior.sample(keys[0, 0])
+    see = lambda x, t, key: model.observation(t, x, None).y + model.measurement_noise.sample(key)["y"]
+
+    def step(x, given):
+        t, (one, two) = given
+        noise = model.process_noise.over(1.0).sample(one)
+        x = X(model.transition(t - 1.0, t, x, None).x + noise["x"])
+        return x, (x.x, see(x, t, two))
+
+    times = jnp.arange(1.0, rows)
+    _, (states, measured) = jax.lax.scan(step, first, (times, keys[1:]))
+    start = see(first, jnp.asarray(0.0), keys[0, 1])
+    return jnp.concatenate([first.x[None], states]), jnp.concatenate([start[None], measured])
+
+
+def as_recording(measured):
+    return Recording(np.arange(float(len(measured))), {"y": np.asarray(measured)})
+
+
+def rows_of(measured):
+    """The same for a batch of measurements (..., T), as rows."""
+    time = jnp.broadcast_to(jnp.arange(float(measured.shape[-1])), measured.shape)
+    return ss.Row(time, record_type("Inputs", ())(), record_type("Measurements", ("y",))(measured))
+
+
+def grid_filter(model, measured, low, high, points=2000):
+    """Log-likelihood and posterior means (T,) by sums over a grid of states from `low` to `high`."""
+    grid = np.linspace(low, high, points)
+    width = grid[1] - grid[0]
+    spread = float(model.process_noise.law.std[0])
+    density = lambda z, s: np.exp(-0.5 * (z / s) ** 2) / (s * np.sqrt(2 * np.pi))
+    here = {"y": jnp.asarray(True)}
+    weights = density(grid - float(model.prior.mean.x), float(model.prior.law.std[0]))
+    total, means = 0.0, []
+    for k, y in enumerate(np.asarray(measured)):
+        if k:
+            moved = np.asarray(model.transition(float(k - 1), float(k), X(jnp.asarray(grid)), None).x)
+            weights = density(grid[:, None] - moved[None], spread) @ weights * width
+        seen = model.observation(float(k), X(jnp.asarray(grid)), None).y
+        likely = np.exp(np.asarray(model.measurement_noise.log_prob({"y": y - seen}, here)))
+        weights = weights * likely
+        part = weights.sum() * width
+        weights, total = weights / part, total + np.log(part)
+        means.append((weights * grid).sum() * width)
+    return total, np.array(means)

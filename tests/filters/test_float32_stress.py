@@ -1,0 +1,61 @@
+"""Square-root forms in float32 where a covariance loses its digits: sharp sensors, little process noise, a wide prior."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from filter_systems import linear_model, linear_recording
+
+from jaxveh import Recording, filters
+from jaxveh import statespace as ss
+from jaxveh.filters import SingularValues, SquareRoot
+
+
+def stressed():
+    """R x 1e-6, Q x 1e-4, P0 x 100."""
+    model = linear_model(4, 2, seed=11)
+    times = lambda law, factor: law.scaled(jnp.asarray(factor**0.5))
+    return eqx.tree_at(
+        lambda m: (m.measurement_noise, m.process_noise.law, m.prior.law),
+        model,
+        (
+            times(model.measurement_noise, 1e-6),
+            times(model.process_noise.law, 1e-4),
+            times(model.prior.law, 1e2),
+        ),
+    )
+
+
+def drawn(model):
+    """A recording of the model itself, so that innovations have the size that the filter expects."""
+    recording = linear_recording(model, rows=200, seed=4)
+    exact = filters.run(filters.Kalman(SquareRoot()), model, recording, throw=False)
+    rng, values = np.random.default_rng(6), {}
+    for name in model.channels:
+        prediction = np.asarray(recording[name]) - np.asarray(getattr(exact.info.innovation, name))
+        values[name] = prediction + rng.normal(size=200) * np.asarray(getattr(exact.info.innovation_std, name))
+    return Recording(np.asarray(recording.time), {**values, "force": np.asarray(recording["force"])})
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda form: filters.Extended(form),
+        lambda form: filters.Unscented(form=form),
+        lambda form: filters.Cubature(form=form),
+        lambda form: filters.Cubature(degree=5, form=form),
+        lambda form: filters.Iterated(filters.Extended(form), 2),
+    ],
+    ids=["Extended", "Unscented", "Cubature", "degree 5", "Iterated"],
+)
+@pytest.mark.parametrize("form", [SquareRoot(), SingularValues()], ids=["square root", "singular values"])
+def test_it_stays_within_a_thousandth_of_float64(make, form):
+    model = stressed()
+    recording = drawn(model)
+    exact = filters.run(filters.Kalman(SquareRoot()), model, recording)
+    single = filters.run(make(form), ss.cast(model, jnp.float32), recording.astype(jnp.float32))
+    spread = np.stack(exact.std)
+    assert np.isfinite(single.log_likelihood) and not int(single.result)
+    np.testing.assert_allclose(np.stack(single.std), spread, rtol=1e-3)
+    error = np.abs(np.stack(single.mean) - np.stack(exact.mean)) / (np.abs(np.stack(exact.mean)) + spread)
+    assert np.max(error) < 1e-3

@@ -1,0 +1,124 @@
+"""Particle filters on nonlinear models against a dense grid, and their calibration: ranks, NEES."""
+
+import functools
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from filter_systems import linear_model
+from nonlinear_systems import as_recording, grid_filter, growth, rows_of, simulate, volatility
+from scipy import stats
+
+from jaxveh import filters, numerics
+from jaxveh import statespace as ss
+
+ROWS, SEEDS, N = 40, 30, 2000
+MODELS = {"volatility": (volatility, -9.0, 9.0), "growth": (growth, -45.0, 45.0)}
+PARTICLE = {
+    "bootstrap": filters.ParticleFilter(N),
+    "auxiliary": filters.AuxiliaryParticleFilter(N),
+    "multinomial, by ESS": filters.ParticleFilter(N, numerics.multinomial, threshold=0.5),
+    "guided": filters.Guided(N),
+    "guided, unscented, auxiliary": filters.Guided(N, "unscented", auxiliary=True),
+}
+
+
+@functools.cache
+def answer(name):
+    make, low, high = MODELS[name]
+    model = make()
+    _, measured = simulate(model, jax.random.key(3), ROWS)
+    return model, measured, *grid_filter(model, measured, low, high)
+
+
+@eqx.filter_jit
+def runs(filter_, model, rows, keys):
+    of = lambda key: filters.scan(filter_, model, rows, key)
+    found = jax.vmap(of)(keys)
+    return found.log_likelihood, found.mean.x, found.result
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("name", PARTICLE)
+def test_likelihood_and_means_are_the_grid_s_within_their_scatter(name, model):
+    if "guided" in name and model == "volatility":
+        pytest.skip("its measurement noise has no covariance")
+    system, measured, total, means = answer(model)
+    rows = system.rows(as_recording(measured))
+    logs, found, results = runs(PARTICLE[name], system, rows, jax.random.split(jax.random.key(5), SEEDS))
+    assert not np.asarray(results).any()
+    # The likelihood itself is unbiased, its logarithm half a variance low.
+    spread = np.std(logs)
+    assert abs(np.mean(logs) + 0.5 * spread**2 - total) < 4.0 * spread / np.sqrt(SEEDS) + 1e-3
+    scatter = np.std(found, axis=0) / np.sqrt(SEEDS)
+    assert (np.abs(np.mean(found, axis=0) - means) < 5.0 * scatter + 2e-2).all()
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_truth_s_rank_among_the_particles_is_uniform(model):
+    """Simulation-based calibration (S. Talts and others 2018): over draws of the model no rank is more likely than another."""
+    system = MODELS[model][0]()
+    filter_, count, bins = filters.ParticleFilter(200), 800, 10
+
+    @jax.jit
+    def rank(key):
+        draw, run, choose = jax.random.split(key, 3)
+        states, measured = simulate(system, draw, 12)
+        belief = filters.scan(filter_, system, rows_of(measured), run).belief
+        # Equally weighted draws of the belief.
+        drawn = belief.particles.x[jax.random.categorical(choose, jnp.log(belief.weights), shape=(99,))]
+        return jnp.sum(drawn < states[-1])
+
+    ranks = np.asarray(jax.vmap(rank)(jax.random.split(jax.random.key(8), count)))
+    counts = np.bincount(ranks * bins // 100, minlength=bins)
+    assert stats.chisquare(counts).pvalue > 0.01
+
+
+GAUSSIAN = {
+    "Kalman": filters.Kalman(),
+    "Unscented, square root": filters.Unscented(form=filters.SquareRoot()),
+    "Cubature": filters.Cubature(),
+    "Iterated": filters.Iterated(filters.Cubature()),
+    "federated": filters.Federated(filters.Cubature(), (("y0",), ("y1",))),
+}
+
+
+@pytest.mark.parametrize("name", GAUSSIAN)
+def test_nees_is_in_its_band_where_the_model_is_linear(name):
+    """Errors over their covariance are chi-squared with as many degrees of freedom as states (Bar-Shalom, sec. 5.4)."""
+    model = linear_model(3, 2, seed=3)
+    law = ss.Gaussian({"y0": 0.4, "y1": 0.3})
+    model = eqx.tree_at(lambda m: m.measurement_noise, model, law)
+    runs_, rows = 400, 15
+
+    @jax.jit
+    def nees(key):
+        keys = jax.random.split(key, 2 * rows).reshape(rows, 2)
+        force = ss.model.record("Inputs", {"force": jnp.asarray(0.3)})
+        first = model.prior.sample(keys[0, 0])
+
+        def see(x, t, key):
+            error = law.sample(key)
+            return {n: v + error[n] for n, v in model.observation(t, x, force)._asdict().items()}
+
+        def step(x, given):
+            t, (one, two) = given
+            noise = model.process_noise.over(0.1).sample(one)
+            x = model.transition(t - 0.1, t, x, force)
+            x = x._replace(**{n: getattr(x, n) + v for n, v in noise.items()})
+            return x, see(x, t, two)
+
+        times = 0.1 * jnp.arange(rows)
+        last, y = jax.lax.scan(step, first, (times[1:], keys[1:]))
+        y = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), see(first, times[0], keys[0, 1]), y)
+        inputs = jax.tree.map(lambda value: jnp.full((rows,), value), force)
+        measured = ss.model.record("Measurements", y)
+        belief = filters.scan(GAUSSIAN[name], model, ss.Row(times, inputs, measured)).belief
+        error = jnp.stack(last) - jnp.stack(belief.mean)
+        return error @ jnp.linalg.solve(belief.covariance, error)
+
+    found = np.asarray(jax.vmap(nees)(jax.random.split(jax.random.key(2), runs_)))
+    low, high = stats.chi2.ppf((0.025, 0.975), 3 * runs_) / runs_
+    assert low < np.mean(found) < high

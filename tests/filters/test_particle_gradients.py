@@ -1,0 +1,39 @@
+"""Gradients of particle filters' log-likelihood: right with the share of choosing, biased without."""
+
+import equinox as eqx
+import jax
+import numpy as np
+import pytest
+from test_every_filter import batch
+
+from jaxveh import filters
+
+SEEDS = 40
+
+
+def gradients(filter_, seeds=SEEDS):
+    """(seeds, k): with respect to the dynamics, the observation and the noise levels of both kinds."""
+    model, rows = batch("linear")
+    one = jax.tree.map(lambda leaf: leaf[0], rows)
+    leaves, rest = eqx.partition(model, eqx.is_inexact_array)
+    of = lambda leaves, key: filters.scan(filter_, eqx.combine(leaves, rest), one, key).log_likelihood
+    found = jax.jit(jax.vmap(jax.grad(of), in_axes=(None, 0)))(leaves, jax.random.split(jax.random.key(1), seeds))
+    chosen = (found.system["A"], found.system["H"], *found.measurement_noise.std, found.process_noise.law.matrix)
+    return np.concatenate([np.asarray(leaf).reshape(seeds, -1) for leaf in chosen], axis=1)
+
+
+@pytest.mark.parametrize("make", [filters.ParticleFilter, filters.AuxiliaryParticleFilter, filters.Guided])
+def test_scores_give_the_exact_gradient_within_their_scatter(make):
+    exact = gradients(filters.Kalman(), 1)[0]
+    found = gradients(make(1000))
+    scatter = found.std(axis=0) / np.sqrt(SEEDS)
+    off = np.abs(found.mean(axis=0) - exact)
+    # A few hundredths are the bias of a finite number of particles.
+    assert (off < 4.0 * scatter + 0.03 * np.abs(exact) + 0.02).all()
+
+
+def test_ancestors_that_are_held_bias_it():
+    exact = gradients(filters.Kalman(), 1)[0]
+    found = gradients(filters.ParticleFilter(1000, gradient="held"))
+    scatter = found.std(axis=0) / np.sqrt(SEEDS)
+    assert np.max(np.abs(found.mean(axis=0) - exact) / scatter) > 20.0

@@ -1,0 +1,136 @@
+"""Smoothers against the exact answer on linear models: every rule and form, in parallel, by particles; gradients."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from filter_systems import kalman, linear_model, linear_recording
+
+from jaxveh import InputError, filters
+from jaxveh import statespace as ss
+from jaxveh.filters import Covariance, SingularValues, SquareRoot
+
+MODEL = linear_model(3, 2, seed=3)
+RECORDING = linear_recording(MODEL)
+
+
+def exact():
+    """Rauch, Tung & Striebel in NumPy: means (T, n) and covariances (T, n, n)."""
+    found = kalman(MODEL, RECORDING)
+    A, B, Q = np.asarray(MODEL.system["A"]), np.asarray(MODEL.system["B"]), np.asarray(MODEL.process_noise.law.matrix)
+    t, u = np.asarray(RECORDING.time), np.asarray(RECORDING["force"])
+    means, covariances = [found["mean"][-1]], [found["covariance"][-1]]
+    for k in range(len(t) - 2, -1, -1):
+        dt, m, P = t[k + 1] - t[k], found["mean"][k], found["covariance"][k]
+        F = np.eye(len(m)) + dt * A
+        ahead, spread = F @ m + dt * B * u[k], F @ P @ F.T + Q * dt
+        G = P @ F.T @ np.linalg.inv(spread)
+        means.insert(0, m + G @ (means[0] - ahead))
+        covariances.insert(0, P + G @ (covariances[0] - spread) @ G.T)
+    return np.array(means), np.array(covariances)
+
+
+MEANS, COVARIANCES = exact()
+SPREADS = np.sqrt(np.diagonal(COVARIANCES, axis1=1, axis2=2))
+GAUSSIAN = {
+    "Kalman": filters.Kalman(),
+    "square root": filters.Extended(SquareRoot()),
+    "singular values": filters.Cubature(form=SingularValues()),
+    "Unscented, negative weight": filters.Unscented(alpha=0.5),
+    "Iterated": filters.Iterated(filters.Cubature(form=SquareRoot()), 1),
+}
+
+
+def assert_exact(found):
+    np.testing.assert_allclose(np.stack(found.mean, axis=1), MEANS, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(np.stack(found.std, axis=1), SPREADS, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", GAUSSIAN)
+def test_every_form_gives_the_exact_answer(name):
+    found = filters.smooth(GAUSSIAN[name], MODEL, RECORDING)
+    assert_exact(found)
+    np.testing.assert_array_equal(found.time, RECORDING.time)
+    np.testing.assert_allclose(found["x1"], MEANS[:, 1], rtol=1e-9, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    "filter_", [filters.Kalman(), filters.Iterated(filters.Cubature(), 2)], ids=["Kalman", "iterated"]
+)
+def test_in_parallel_over_time_it_is_the_same(filter_):
+    found = filters.smooth_parallel(filter_, MODEL, RECORDING)
+    assert_exact(found)
+    loop = filters.run(filters.Kalman(), MODEL, RECORDING)
+    np.testing.assert_allclose(np.stack(found.filtered.mean), np.stack(loop.mean), rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(found.filtered.info.log_likelihood, loop.info.log_likelihood, rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(found.filtered.info.nis, loop.info.nis, rtol=1e-8, atol=1e-10)
+
+
+@pytest.mark.parametrize(("method", "most"), [(filters.BackwardSampling(1000), 0.15), (filters.Genealogy(), 0.6)])
+def test_particles_find_it_within_their_scatter(method, most):
+    found = filters.smooth(filters.ParticleFilter(4000), MODEL, RECORDING, key=jax.random.key(1), method=method)
+    error = (np.stack(found.mean, axis=1) - MEANS) / SPREADS
+    assert np.sqrt(np.mean(np.square(error))) < most
+    assert found.trajectories.x0.shape[0] == len(RECORDING.time)
+    np.testing.assert_allclose(np.sum(found.weights), 1.0)
+    # Rows near the end, where paths have not fallen together.
+    assert np.sqrt(np.mean(np.square(error[-5:]))) < 0.15
+
+
+def test_its_gradient_is_that_of_differences():
+    leaf = lambda scale: filters.smooth(
+        filters.Kalman(SquareRoot()), ss.cast(_scaled(scale), jnp.float64), RECORDING, throw=False
+    )
+    total = jax.jit(lambda scale: jnp.sum(jnp.sin(leaf(scale).mean.x0) + leaf(scale).std.x1))
+    difference = (total(1.0 + 1e-6) - total(1.0 - 1e-6)) / 2e-6
+    np.testing.assert_allclose(jax.jit(jax.grad(total))(1.0), difference, rtol=1e-6)
+
+
+def _scaled(scale):
+    system = {**MODEL.system, "A": MODEL.system["A"] * scale}
+    return jax.tree.map(
+        lambda leaf: leaf,
+        MODEL.__class__(
+            system=system,
+            transition=MODEL.transition_function,
+            observation=MODEL.observation_function,
+            process_noise=MODEL.process_noise,
+            measurement_noise=MODEL.measurement_noise,
+            prior=MODEL.prior,
+            inputs=MODEL.inputs,
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda: filters.smooth(filters.Kalman(), MODEL, RECORDING, method=filters.Genealogy()),
+            "is for particle filters",
+        ),
+        (
+            lambda: filters.smooth(filters.Ensemble(10), MODEL, RECORDING, key=jax.random.key(0)),
+            "Ensemble has no smoother",
+        ),
+        (lambda: filters.smooth(filters.ParticleFilter(10), MODEL, RECORDING), "give it a key"),
+        (lambda: filters.smooth_parallel(filters.Cubature(), MODEL, RECORDING), r"must be Kalman\(\) or Iterated"),
+        (lambda: filters.BackwardSampling(1), "trajectories = 1"),
+    ],
+)
+def test_bad_input_is_named(call, message):
+    with pytest.raises(InputError, match=message):
+        call()
+
+
+def test_a_state_without_noise_has_no_density_to_sample_by():
+    law = ss.Continuous(ss.Gaussian({"x0": 0.1}))
+    model = MODEL.__class__(
+        system=MODEL.system, transition=MODEL.transition_function, observation=MODEL.observation_function,
+        process_noise=law, measurement_noise=MODEL.measurement_noise, prior=MODEL.prior, inputs=MODEL.inputs,
+    )  # fmt: skip
+    with pytest.raises(InputError, match="none is on x1, x2"):
+        filters.smooth(
+            filters.ParticleFilter(10), model, RECORDING, key=jax.random.key(0), method=filters.BackwardSampling()
+        )
+    assert isinstance(Covariance(), filters.AbstractForm)
