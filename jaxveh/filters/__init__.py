@@ -2,8 +2,10 @@
 
 from jaxveh.filters.auxiliary import AuxiliaryParticleFilter
 from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info
+from jaxveh.filters.checkpoint import load_belief, save_belief
 from jaxveh.filters.driver import Estimate, run, scan
 from jaxveh.filters.ensemble import Ensemble, EnsembleBelief
+from jaxveh.filters.export import export_filter
 from jaxveh.filters.gaussian import (
     AbstractForm,
     AbstractGaussianFilter,
@@ -81,7 +83,10 @@ __all__ = [
     "StrongTracking",
     "Unscented",
     "VariationalBayes",
+    "export_filter",
+    "load_belief",
     "run",
+    "save_belief",
     "scan",
     "smooth",
     "smooth_parallel",

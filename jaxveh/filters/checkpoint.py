@@ -1,0 +1,71 @@
+"""Beliefs in files: stop, and go on with the same bits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh.filters.base import AbstractBelief
+
+B = TypeVar("B", bound=AbstractBelief)
+
+
+def save_belief(path: str | Path, belief: AbstractBelief) -> Path:
+    """Write a belief to a NumPy archive (.npz): every array by its place in the belief, keys as their words.
+
+    `load_belief` reads it; steps from there are those of an unbroken run, bit for bit. An existing file is replaced only once
+    the new one is whole. Returns the path.
+    """
+    path = Path(path)
+    if path.suffix != ".npz":
+        raise InputError(f"path = {path}: must end in .npz.")
+    arrays = {name: np.asarray(_words(leaf)) for name, leaf in _named(belief).items()}
+    partial = path.with_name(path.name + ".part")
+    with partial.open("wb") as file:
+        np.savez(file, **arrays)
+    partial.replace(path)
+    return path
+
+
+def load_belief(path: str | Path, like: B) -> B:
+    """Read a belief that `save_belief` wrote; `like` is one of the same filter and model, such as that after the first row.
+
+    **Raises** `InputError` naming what the file has otherwise: another filter, number of particles, model or precision.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"path = {path}: there is no such file.")
+    expected = _named(like)
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    for name in sorted(set(arrays) ^ set(expected)):
+        where = "the file has" if name in arrays else "the file lacks"
+        raise InputError(f"{path}: {where} {name}: it is of another filter or model.")
+    leaves = []
+    for name, leaf in expected.items():
+        words, found = _words(leaf), arrays[name]
+        if found.shape != words.shape or found.dtype != words.dtype:
+            raise InputError(
+                f"{path}: {name} is {found.dtype}{list(found.shape)}, expected {words.dtype}{list(words.shape)}: "
+                "it is of another size or precision."
+            )
+        value = jnp.asarray(found)
+        leaves.append(jax.random.wrap_key_data(value, impl=jax.random.key_impl(leaf)) if _is_key(leaf) else value)
+    return jax.tree.unflatten(jax.tree.structure(like), leaves)
+
+
+def _named(belief: Any) -> dict[str, Any]:
+    return {jax.tree_util.keystr(path): leaf for path, leaf in jax.tree_util.tree_leaves_with_path(belief)}
+
+
+def _is_key(leaf: Any) -> bool:
+    return jnp.issubdtype(jnp.result_type(leaf), jax.dtypes.prng_key)
+
+
+def _words(leaf: Any) -> Any:
+    return jax.random.key_data(leaf) if _is_key(leaf) else jnp.asarray(leaf)

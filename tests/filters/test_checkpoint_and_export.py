@@ -1,0 +1,103 @@
+"""Stop and go on with the same bits; steps in a process that knows nothing of this package."""
+
+import json
+import subprocess
+import sys
+import textwrap
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from filter_systems import linear_model, linear_recording
+
+from jaxveh import InputError, filters
+
+MODEL = linear_model(3, 2, seed=3)
+RECORDING = linear_recording(MODEL, rows=20)
+ROWS = MODEL.rows(RECORDING)
+KINDS = {
+    "UKF": filters.Unscented(),
+    "square root": filters.Cubature(form=filters.SquareRoot()),
+    "APF": filters.AuxiliaryParticleFilter(100),
+}
+
+
+def row(k):
+    return jax.tree.map(lambda leaf: leaf[k], ROWS)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_broken_run_goes_on_bit_for_bit(name, tmp_path):
+    filter_, key = KINDS[name], jax.random.key(4)
+    step = eqx.filter_jit(filter_.step)
+    first, _ = filter_.init(MODEL, row(0), key)
+    whole = first
+    for k in range(1, 20):
+        whole, _ = step(MODEL, whole, row(k))
+        if k == 9:
+            path = filters.save_belief(tmp_path / "belief.npz", whole)
+    again = filters.load_belief(path, first)
+    for k in range(10, 20):
+        again, _ = step(MODEL, again, row(k))
+    for a, b in zip(jax.tree.leaves(whole), jax.tree.leaves(again), strict=True):
+        a, b = (jax.random.key_data(v) if jnp.issubdtype(v.dtype, jax.dtypes.prng_key) else v for v in (a, b))
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_file_of_another_filter_is_refused(tmp_path):
+    belief, _ = KINDS["APF"].init(MODEL, row(0), jax.random.key(0))
+    path = filters.save_belief(tmp_path / "a.npz", belief)
+    fewer, _ = filters.AuxiliaryParticleFilter(50).init(MODEL, row(0), jax.random.key(0))
+    with pytest.raises(InputError, match=r"particles.*\[100\], expected float64\[50\]"):
+        filters.load_belief(path, fewer)
+    gaussian, _ = KINDS["UKF"].init(MODEL, row(0))
+    with pytest.raises(InputError, match="it is of another filter or model"):
+        filters.load_belief(path, gaussian)
+    with pytest.raises(InputError, match="there is no such file"):
+        filters.load_belief(tmp_path / "b.npz", gaussian)
+    with pytest.raises(InputError, match=r"must end in \.npz"):
+        filters.save_belief(tmp_path / "b.txt", gaussian)
+
+
+LIVE = """
+    import json, sys
+    import jax, jax.export, numpy as np
+    jax.config.update("jax_enable_x64", True)
+    folder, data = sys.argv[1:]
+    init, step = (
+        jax.export.deserialize(bytearray(open(f"{folder}/{name}.jaxexport", "rb").read())) for name in ("init", "step")
+    )
+    rows = np.load(data)
+    total = 0.0
+    for k, (t, u, y) in enumerate(zip(rows["t"], rows["u"], rows["y"])):
+        state, mean, std, numbers = init.call(t, u, y) if k == 0 else step.call(state, t, u, y)
+        total += float(numbers[0])
+    assert not any(name == "jaxveh" or name.startswith("jaxveh.") for name in sys.modules)
+    print(json.dumps([total, list(map(float, mean)), list(map(float, std))]))
+"""
+
+
+@pytest.mark.parametrize("name", ["square root", "APF"])
+def test_an_exported_filter_runs_without_this_package(name, tmp_path):
+    filter_, key = KINDS[name], jax.random.key(4)
+    folder = filters.export_filter(tmp_path / "filter", filter_, MODEL, key=key)
+    described = json.loads((folder / "names.json").read_text())
+    assert described["inputs"] == ["force"] and described["channels"] == ["y0", "y1"]
+    assert described["report"] == ["x0", "x1", "x2"]
+    data = tmp_path / "rows.npz"
+    np.savez(data, t=ROWS.t, u=np.stack(ROWS.u, axis=1), y=np.stack(ROWS.y, axis=1))
+    script = tmp_path / "live.py"
+    script.write_text(textwrap.dedent(LIVE))
+    done = subprocess.run(
+        [sys.executable, "-I", str(script), str(folder), str(data)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    total, mean, std = json.loads(done.stdout)
+    expected = filters.run(filter_, MODEL, RECORDING, key=key)
+    np.testing.assert_allclose(total, expected.log_likelihood, rtol=1e-12)
+    np.testing.assert_allclose(mean, [leaf[-1] for leaf in expected.mean], rtol=1e-10)
+    np.testing.assert_allclose(std, [leaf[-1] for leaf in expected.std], rtol=1e-10)
+    with pytest.raises(InputError, match="exists already"):
+        filters.export_filter(folder, filter_, MODEL, key=key)
