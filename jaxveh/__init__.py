@@ -1,12 +1,11 @@
 """jaxveh: estimate what a car cannot measure, in JAX, differentiable end to end."""
 
-from jaxveh import estimators, filters, fitting, manoeuvres, roads, sensors, statespace, tyres, vehicles
+from jaxveh import estimators, filters, fitting, manoeuvres, observers, roads, sensors, statespace, tyres, vehicles
 from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
-from jaxveh.filters import Estimate, run
 from jaxveh.simulation import simulate
-from jaxveh.statespace import cast
+from jaxveh.statespace import Estimate, cast, run
 
 __version__ = "0.1.0"
 
@@ -23,6 +22,7 @@ __all__ = [
     "filters",
     "fitting",
     "manoeuvres",
+    "observers",
     "roads",
     "run",
     "sensors",

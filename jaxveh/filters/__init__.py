@@ -1,9 +1,7 @@
 """Filters as `lax.scan` loops behind one contract: `init`, `step`, and the driver `run`."""
 
 from jaxveh.filters.auxiliary import AuxiliaryParticleFilter
-from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info
 from jaxveh.filters.checkpoint import load_belief, save_belief
-from jaxveh.filters.driver import Estimate, run, scan
 from jaxveh.filters.ensemble import Ensemble, EnsembleBelief
 from jaxveh.filters.export import export_filter
 from jaxveh.filters.gaussian import (
@@ -32,6 +30,7 @@ from jaxveh.filters.wrappers import (
     Dual,
     Federated,
     Gated,
+    HInfinity,
     Huber,
     InteractingModels,
     Paused,
@@ -40,6 +39,8 @@ from jaxveh.filters.wrappers import (
     StrongTracking,
     VariationalBayes,
 )
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info
+from jaxveh.statespace.driver import Estimate, run, scan
 
 __all__ = [
     "AbstractBelief",
@@ -63,6 +64,7 @@ __all__ = [
     "GaussianBelief",
     "Genealogy",
     "Guided",
+    "HInfinity",
     "Huber",
     "Info",
     "InteractingModels",

@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh.filters.base import apart, presence
 from jaxveh.filters.particle import (
     AbstractParticleFilter,
     ParticleBelief,
@@ -24,6 +23,7 @@ from jaxveh.filters.particle import (
     make_info,
     need_key,
 )
+from jaxveh.statespace.contract import apart, presence
 
 
 class AuxiliaryParticleFilter(AbstractParticleFilter):

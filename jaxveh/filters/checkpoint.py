@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh.filters.base import AbstractBelief
+from jaxveh.statespace.contract import AbstractBelief
 
 B = TypeVar("B", bound=AbstractBelief)
 

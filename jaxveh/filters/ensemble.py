@@ -11,12 +11,12 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
-from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info, always, apart, input_result, presence
 from jaxveh.filters.gaussian.filter import check_covariances, innovation_info, wrapped_innovation
 from jaxveh.filters.gaussian.forms import masked_factor
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.filters.particle import add_noise, need_key
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info, always, apart, input_result, presence
 
 
 class EnsembleBelief(AbstractBelief):

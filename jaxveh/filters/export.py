@@ -13,8 +13,8 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
-from jaxveh.filters.base import AbstractFilter
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import AbstractFilter
 
 NUMBERS = ("log_likelihood", "nis", "ess", "result")
 

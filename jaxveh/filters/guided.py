@@ -11,7 +11,6 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
-from jaxveh.filters.base import always, apart, presence
 from jaxveh.filters.gaussian.filter import check_covariances, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes
@@ -30,6 +29,7 @@ from jaxveh.filters.particle import (
 )
 from jaxveh.numerics import sigma_points
 from jaxveh.statespace import StateSpace
+from jaxveh.statespace.contract import always, apart, presence
 from jaxveh.statespace.noise import LOG_2PI
 
 RULES = ("extended", "unscented")

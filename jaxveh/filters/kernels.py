@@ -12,9 +12,9 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import check
 from jaxveh._core.names import check_names
-from jaxveh.filters.base import AbstractFilter, apart
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
 from jaxveh.statespace import StateSpace
+from jaxveh.statespace.contract import AbstractFilter, apart
 
 KERNEL = 0x6B65726E
 """Folded into the step's key for the kernel's draws, so that they are none of the filter's."""

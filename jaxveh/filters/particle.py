@@ -13,7 +13,8 @@ from jax.ad_checkpoint import checkpoint_name
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
-from jaxveh.filters.base import (
+from jaxveh.statespace import StateSpace
+from jaxveh.statespace.contract import (
     KEPT,
     AbstractBelief,
     AbstractFilter,
@@ -25,7 +26,6 @@ from jaxveh.filters.base import (
     presence,
     wrap_angle,
 )
-from jaxveh.statespace import StateSpace
 
 
 class ParticleBelief(AbstractBelief):

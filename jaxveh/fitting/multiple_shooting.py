@@ -13,10 +13,10 @@ import optimistix as optx
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.filters.base import wrap_angle
 from jaxveh.fitting.result import Fit, make_fit, raise_unfinished
 from jaxveh.fitting.segments import Segments, cut
 from jaxveh.statespace import StateSpace, start_from
+from jaxveh.statespace.contract import wrap_angle
 from jaxveh.statespace.noise import whiten
 
 LARGEST_RESIDUAL = 1e6

@@ -1,5 +1,6 @@
 """The one contract that a filter sees: models by name, noise laws, discretisation, chosen parameters as states."""
 
+from jaxveh.statespace.driver import Estimate, run, scan
 from jaxveh.statespace.model import LinearInput, PerPoint, Prior, Row, StateSpace, cast
 from jaxveh.statespace.noise import (
     AbstractNoise,
@@ -20,6 +21,7 @@ __all__ = [
     "CauchyGaussianMixture",
     "Continuous",
     "Discrete",
+    "Estimate",
     "Gaussian",
     "Heun",
     "Independent",
@@ -35,6 +37,8 @@ __all__ = [
     "cast",
     "parameter_view",
     "put_parameters",
+    "run",
+    "scan",
     "start_from",
     "with_parameters",
 ]

@@ -74,6 +74,8 @@ FILTERS = {
     "federated by trace": Line(lambda: filters.Federated(filters.Cubature(form=SquareRoot()), GROUPS, by_trace=True)),
     "interacting, equal": Line(lambda: filters.InteractingModels(filters.Cubature(), (same, same), CHANGES)),
     "interacting": Line(lambda: filters.InteractingModels(filters.Cubature(), (same, noisier), CHANGES), exact=False),
+    "H-infinity, no bound": Line(lambda: filters.HInfinity(filters.Cubature(), 0.0, {})),
+    "H-infinity": Line(lambda: filters.HInfinity(filters.Cubature(), 0.1, {"x0": 1.0, "x2": 1.0}), exact=False),
     "consider": Line(lambda: filters.Consider(filters.Cubature(), ("x1",)), exact=False),
     "dual": Line(lambda: filters.Dual(filters.Cubature(), (("x0",),)), exact=False),
     "guided": Line(lambda: filters.Guided(N), exact=False, differentiable=False, drawn=True),

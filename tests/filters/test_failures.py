@@ -10,6 +10,7 @@ from nile import NILE
 
 from jaxveh import FilterError, InputError, Recording, Result, filters, numerics
 from jaxveh import statespace as ss
+from jaxveh.statespace import driver
 
 PF = filters.ParticleFilter(50)
 APF = filters.AuxiliaryParticleFilter(50)
@@ -64,7 +65,7 @@ class TestEveryFilter:
             rf"{type(filter_).__name__} failed in row 5 \(t = 1\.25 s; flow = 1234\.5\): an input or a measurement"
         )
         with pytest.raises(FilterError, match=expected):
-            filters.driver.raise_failure(failed, filter_, self.model, recording)
+            driver.raise_failure(failed, filter_, self.model, recording)
 
     def test_gradients_stay_finite_with_missing_data(self, filter_):
         flow = _with_flow(3, np.nan)
@@ -123,7 +124,7 @@ def test_all_particles_dead(filter_):
     assert np.isfinite(estimate.mean.level).all()
     assert (np.asarray(estimate.info.result)[5:] == 0).all()
     with pytest.raises(FilterError, match=r"row 4 .*flow = 100000\): every particle has zero weight"):
-        filters.driver.raise_failure(estimate, filter_, model, recording)
+        driver.raise_failure(estimate, filter_, model, recording)
 
 
 def _scalar_model(transition, observation=see_level, **kwargs):

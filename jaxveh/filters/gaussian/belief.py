@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh.filters.base import AbstractBelief
 from jaxveh.filters.gaussian.rules import AbstractRule, times
+from jaxveh.statespace.contract import AbstractBelief
 
 
 class GaussianBelief(AbstractBelief):

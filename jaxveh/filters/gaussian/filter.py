@@ -10,7 +10,11 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
-from jaxveh.filters.base import (
+from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
+from jaxveh.filters.gaussian.forms import AbstractForm, Spread
+from jaxveh.filters.gaussian.rules import AbstractRule, Image
+from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import (
     AbstractBelief,
     AbstractFilter,
     Info,
@@ -21,10 +25,6 @@ from jaxveh.filters.base import (
     presence,
     wrap_angle,
 )
-from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
-from jaxveh.filters.gaussian.forms import AbstractForm, Spread
-from jaxveh.filters.gaussian.rules import AbstractRule, Image
-from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.noise import LOG_2PI
 
 

@@ -9,7 +9,6 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.result import Result, code
-from jaxveh.filters.base import input_result, presence
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import innovation_info, observation_image, transition_image, wrapped_innovation
 from jaxveh.filters.gaussian.forms import masked_factor
@@ -17,6 +16,7 @@ from jaxveh.filters.gaussian.iterated import line_through
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.gaussian.rules import AbstractRule, product
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import input_result, presence
 
 
 class Lines(NamedTuple):

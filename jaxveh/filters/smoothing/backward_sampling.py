@@ -7,11 +7,11 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
-from jaxveh.filters.driver import scan_and_keep
 from jaxveh.filters.particle import AbstractParticleFilter, log_of
 from jaxveh.filters.smoothing.genealogy import path_moments
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.driver import scan_and_keep
 
 
 def check_density(model: StateSpace) -> None:

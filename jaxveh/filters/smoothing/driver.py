@@ -8,8 +8,6 @@ import equinox as eqx
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
-from jaxveh.filters.base import AbstractFilter
-from jaxveh.filters.driver import raise_failure
 from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.particle import AbstractParticleFilter, need_key
 from jaxveh.filters.smoothing.backward_sampling import check_density, sample_backwards
@@ -17,6 +15,8 @@ from jaxveh.filters.smoothing.genealogy import trace_genealogy
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate
 from jaxveh.statespace import StateSpace
+from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.statespace.driver import raise_failure
 
 
 class BackwardSampling(eqx.Module):

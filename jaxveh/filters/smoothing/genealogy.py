@@ -6,10 +6,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh.filters.driver import scan_and_keep
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.driver import scan_and_keep
 
 
 @eqx.filter_jit

@@ -10,7 +10,6 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import first_failure
-from jaxveh.filters.driver import Estimate, raise_failure
 from jaxveh.filters.gaussian import Iterated
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.family import Kalman
@@ -18,6 +17,7 @@ from jaxveh.filters.gaussian.forms import Covariance
 from jaxveh.filters.gaussian.parallel import infos_of, pass_over
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.statespace import Row, StateSpace, parameter_view
+from jaxveh.statespace.driver import Estimate, raise_failure
 
 
 def smooth_parallel(

@@ -7,13 +7,13 @@ from typing import Any
 import equinox as eqx
 import jax
 
-from jaxveh.filters.driver import scan_and_keep
 from jaxveh.filters.gaussian import AbstractGaussianFilter, Iterated
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import transition_image, with_spread
 from jaxveh.filters.gaussian.forms import Later, Spread
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.driver import scan_and_keep
 
 
 @eqx.filter_jit

@@ -8,8 +8,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh.filters.driver import Estimate
 from jaxveh.statespace import StateSpace, parameter_view
+from jaxveh.statespace.driver import Estimate
 
 
 class SmoothedEstimate(eqx.Module):

@@ -3,6 +3,7 @@
 from jaxveh.filters.wrappers.considered import Consider, Dual
 from jaxveh.filters.wrappers.federated import Federated
 from jaxveh.filters.wrappers.gated import Gated
+from jaxveh.filters.wrappers.h_infinity import HInfinity
 from jaxveh.filters.wrappers.interacting import InteractingModels
 from jaxveh.filters.wrappers.measurement_noise import SageHusa, VariationalBayes
 from jaxveh.filters.wrappers.paused import Paused
@@ -14,6 +15,7 @@ __all__ = [
     "Dual",
     "Federated",
     "Gated",
+    "HInfinity",
     "Huber",
     "InteractingModels",
     "Paused",

@@ -7,9 +7,9 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
-from jaxveh.filters.base import AbstractBelief, Info
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.statespace import Gaussian, Row, StateSpace
+from jaxveh.statespace.contract import AbstractBelief, Info
 
 
 class AbstractStateless(AbstractGaussianFilter):

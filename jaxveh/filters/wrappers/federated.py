@@ -11,12 +11,12 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
 from jaxveh._core.names import check_names, record
-from jaxveh.filters.base import AbstractBelief, AbstractFilter, always, apart
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, always, apart
 from jaxveh.statespace.process import AbstractProcessNoise
 
 

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jaxveh.filters.base import presence
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.gaussian.rules import Image
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import presence
 
 
 class Innovation(NamedTuple):

@@ -13,10 +13,10 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, float_array
 from jaxveh._core.result import first_failure
-from jaxveh.filters.base import AbstractBelief, AbstractFilter, Info, always, apart, by_channel, presence
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
 from jaxveh.statespace import StateSpace
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info, always, apart, by_channel, presence
 
 
 class MixtureBelief(AbstractBelief):

@@ -11,9 +11,9 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import check_names
-from jaxveh.filters.base import AbstractFilter, always, apart
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
 from jaxveh.statespace import StateSpace
+from jaxveh.statespace.contract import AbstractFilter, always, apart
 
 
 class Paused(AbstractFilter):

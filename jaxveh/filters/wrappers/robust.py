@@ -9,10 +9,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_positive
-from jaxveh.filters.base import presence
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
 from jaxveh.filters.wrappers.base import AbstractStateless, check_independent, variances_of, with_variances
 from jaxveh.filters.wrappers.innovation import innovation, spread_of
+from jaxveh.statespace.contract import presence
 
 
 def _check_iterations(iterations: int) -> None:

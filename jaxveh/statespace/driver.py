@@ -12,8 +12,9 @@ import numpy as np
 from jaxveh._core.errors import FilterError, is_concrete
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
-from jaxveh.filters.base import KEPT, AbstractFilter, Info
-from jaxveh.statespace import Row, StateSpace, parameter_view
+from jaxveh.statespace.contract import KEPT, AbstractFilter, Info
+from jaxveh.statespace.model import Row, StateSpace
+from jaxveh.statespace.parameters import parameter_view
 
 
 class Estimate(eqx.Module):

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
-from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.model import Row, StateSpace
 
 KEPT = "kept for the backward pass"
 """Name (`jax.ad_checkpoint.checkpoint_name`) of what a step keeps for its gradient: small, and long to compute again."""

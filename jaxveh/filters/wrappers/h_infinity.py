@@ -1,0 +1,47 @@
+"""The worst case instead of the mean square."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import numerics
+from jaxveh._core.errors import check, float_array
+from jaxveh._core.names import check_names
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
+from jaxveh.filters.wrappers.base import AbstractStateless
+
+
+class HInfinity(AbstractStateless):
+    """`filter` that bounds the worst ratio of the estimate's error to all disturbances by 1 / `bound` (D. Simon, Optimal State
+    Estimation, 2006, eq 11.89).
+
+        P~ = (P^-1 - bound S)^-1,    then the Kalman update with P~
+
+    S has 1 / scale^2 of each state in `scales` on its diagonal: what of the error is to be small, and its unit. Noises are no
+    laws here but weights of disturbances. A larger bound trusts measurements more; beyond what is possible P~ is not positive
+    definite, and the result says so. With bound 0 it is the Kalman filter. Log-likelihoods are those of the wider prediction.
+    """
+
+    filter: AbstractRuleFilter
+    bound: jax.Array = eqx.field(converter=lambda v: float_array(v if eqx.is_array(v) else np.asarray(v, float)))
+    scales: tuple[tuple[str, float], ...] = eqx.field(static=True, converter=lambda v: tuple(dict(v).items()))
+
+    def __check_init__(self):
+        check("HInfinity.bound", self.bound, lambda b: b >= 0, "at least 0")
+        for name, scale in self.scales:
+            check(f"HInfinity.scales of {name}", scale, lambda s: s > 0, "positive")
+
+    def check(self, model):
+        self.filter.check(model)
+        check_names("HInfinity.scales", [name for name, _ in self.scales], model.states)
+
+    def update(self, model, belief, row):
+        scales, dtype = dict(self.scales), belief.vector.dtype
+        weights = jnp.asarray([1.0 / scales[n] ** 2 if n in scales else 0.0 for n in model.states], dtype)
+        information = numerics.inverse_psd(numerics.lower_factor(belief.factor))
+        information = information - jnp.diag(self.bound.astype(dtype) * weights)
+        wider = numerics.inverse_psd(numerics.cholesky(information))
+        return self.filter.update(model, with_spread(belief, belief.vector, self.filter.form.start(wider)), row)

@@ -1,0 +1,124 @@
+"""What an observer is: a model that is pulled towards the measurements, without a covariance."""
+
+import abc
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.result import Result, code
+from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import (
+    AbstractBelief,
+    AbstractFilter,
+    Info,
+    always,
+    apart,
+    by_channel,
+    input_result,
+    presence,
+    wrap_angle,
+)
+
+
+class PointBelief(AbstractBelief):
+    """A state without a spread: `vector` (n,) in the order of the state's fields, and what the observer remembers, `memory`."""
+
+    vector: jax.Array
+    memory: Any
+    t: Any
+    u: Any
+    count: Any
+    state_type: Any = eqx.field(static=True)
+
+    @property
+    def mean(self):
+        """The state, its NamedTuple."""
+        return self.state_type(*self.vector)
+
+    def moments(self, model):
+        shown = model.report(self.t, self.mean, self.u)
+        dtype = self.vector.dtype
+        return jax.tree.map(lambda value: jnp.asarray(value, dtype), shown), jax.tree.map(
+            lambda value: jnp.full_like(jnp.asarray(value, dtype), jnp.nan), shown
+        )
+
+
+class AbstractObserver(AbstractFilter):
+    """An observer moves its state by the model's transition, then by a correction of what the measurement says against it:
+
+        x- = f(x, u),    e = y - h(x-, u),    x = x- + correction(e)
+
+    Missing channels have e = 0. Spreads, NIS and log-likelihoods are NaN: an observer does not know them. `init` starts at the
+    prior's mean and corrects it, `run` is that of filters.
+    """
+
+    # No postponed annotations in this file: they would make a field of it.
+
+    @abc.abstractmethod
+    def start(self, model: StateSpace) -> Any:
+        """The memory before the first row."""
+
+    @abc.abstractmethod
+    def correct(self, model: StateSpace, belief: PointBelief, row: Row, error: Any, here: Any) -> tuple[Any, Any]:
+        """The state's correction (n,) by the errors (m,) of the channels that are `here` (m,), and the memory after it."""
+
+    def init(self, model, row, key=None):
+        del key
+        return apart(self._init, always(row.t), model, row)
+
+    def _init(self, model, row):
+        vector, kind = jnp.stack(model.prior.mean), type(model.prior.mean)
+        return self._measured(model, PointBelief(vector, self.start(model), row.t, row.u, jnp.int32(0), kind), row)
+
+    def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
+        u = model.step_inputs(belief.t, row.t, belief.u, row.u)
+        moved = model.transition(belief.t, row.t, belief.mean, u)
+        vector = jnp.stack([jnp.asarray(value, belief.vector.dtype) for value in moved])
+        return self._measured(model, eqx.tree_at(lambda b: b.vector, belief, vector), row)
+
+    def _measured(self, model, belief: PointBelief, row: Row):
+        measured, present = presence(model, row)
+        here = jnp.stack([present[name] for name in model.channels])
+        error = jnp.stack([measured[name] for name in model.channels]) - observed(model, row, belief.vector)
+        wraps = jnp.asarray([name in model.angles for name in model.channels])
+        error = jnp.where(here, jnp.where(wraps, wrap_angle(error), error), 0)
+        correction, memory = self.correct(model, belief, row, error, here)
+        vector = belief.vector + correction
+        after = PointBelief(vector, memory, row.t, row.u, belief.count + 1, belief.state_type)
+        return after, _info(model, row, error, present, vector)
+
+
+def observed(model: StateSpace, row: Row, vector: Any) -> Any:
+    """What the sensors would say of a state (n,): (m,), in the order of the channels."""
+    found = model.observation(row.t, type(model.prior.mean)(*vector), row.u)
+    return jnp.stack([jnp.asarray(getattr(found, name), vector.dtype) for name in model.channels])
+
+
+def _info(model, row, error, present, vector) -> Info:
+    nothing = jnp.full((), jnp.nan, vector.dtype)
+    result = input_result(model, row)
+    lost = ~jnp.all(jnp.isfinite(vector))
+    return Info(
+        log_likelihood=nothing,
+        innovation=by_channel(model, error, present),
+        innovation_std=by_channel(model, jnp.full_like(error, jnp.nan), present),
+        nis=nothing,
+        ess=nothing,
+        result=jnp.where((result == 0) & lost, code(Result.non_finite_state), result),
+    )
+
+
+def check_gain(name: str, gain: Any, model: StateSpace) -> None:
+    """Raise `InputError` unless a gain is (states, channels)."""
+    expected = (len(model.states), len(model.channels))
+    if gain.shape != expected:
+        raise InputError(
+            f"{name} has shape {gain.shape}: must be {expected}, states {', '.join(model.states)} by channels "
+            f"{', '.join(model.channels)}."
+        )

@@ -1,0 +1,189 @@
+"""Observers on linear models: the poles that were asked for, switching, least squares against a batch, bad input."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import InputError, Recording, observers, run
+from jaxveh import statespace as ss
+from jaxveh._core.names import record_type
+
+DT = 0.01
+X, Y = record_type("X", ("place", "speed", "offset")), record_type("Y", ("place", "speed"))
+
+
+def move(system, t0, t1, x, u):
+    dt = t1 - t0
+    return X(x.place + dt * x.speed, x.speed + dt * (u.force - system["stiffness"] * x.place), x.offset)
+
+
+def see(system, t, x, u):
+    return Y(x.place, x.speed + x.offset)
+
+
+def model(stiffness=4.0):
+    """A mass on a spring, its place seen, and its speed with an unknown offset."""
+    return ss.StateSpace(
+        system={"stiffness": jnp.asarray(stiffness)},
+        transition=move,
+        observation=see,
+        process_noise=None,
+        measurement_noise=ss.Gaussian({"place": 0.01, "speed": 0.1}),
+        prior=ss.Prior(X(0.0, 0.0, 0.0), {"place": 1.0, "speed": 1.0, "offset": 1.0}),
+        inputs=("force",),
+    )
+
+
+def truth(rows=400, start=(1.0, -0.5, 0.3), stiffness=4.0):
+    system, x, states = model(stiffness), X(*start), []
+    force = np.sin(3.0 * DT * np.arange(rows))
+    for k in range(rows):
+        states.append(tuple(x))
+        u = record_type("U", ("force",))(force[k])
+        x = X(*[float(v) for v in move({"stiffness": stiffness}, 0.0, DT, x, u)])
+    states = np.array(states)
+    channels = {"place": states[:, 0], "speed": states[:, 1] + states[:, 2], "force": force}
+    return system, states, Recording(DT * np.arange(rows), channels)
+
+
+def test_the_error_dies_out_with_the_poles_that_were_asked_for():
+    system, states, recording = truth()
+    poles = np.array([-8.0, -5.0 + 3.0j, -5.0 - 3.0j])
+    gain = observers.place_poles(system, poles, dt=DT)
+    F, H = observers.linearised_step(system, DT)
+    found = np.sort_complex(np.linalg.eigvals((np.eye(3) - gain @ H) @ F))
+    np.testing.assert_allclose(found, np.sort_complex(np.exp(poles * DT)), rtol=1e-8)
+    estimate = run(observers.Luenberger(gain), system, recording)
+    error = np.stack(estimate.mean, axis=1) - states
+    expected = error[0]
+    for k in range(1, 50):
+        expected = (np.eye(3) - gain @ H) @ F @ expected
+        np.testing.assert_allclose(error[k], expected, rtol=1e-6, atol=1e-12)
+    assert np.max(np.abs(error[300:])) < 1e-5
+    assert np.isnan(estimate.std.place).all() and np.isnan(estimate.log_likelihood)
+
+
+def test_missing_rows_leave_the_model_to_itself():
+    system, _, recording = truth(20)
+    gain = observers.place_poles(system, [-8.0, -5.0, -6.0], dt=DT)
+    place, speed = np.array(recording["place"]), np.array(recording["speed"])
+    place[10:], speed[10:] = np.nan, np.nan
+    silent = Recording(recording.time, {"place": place, "speed": speed, "force": recording["force"]})
+    found = run(observers.Luenberger(gain), system, silent)
+    u = record_type("U", ("force",))(float(recording["force"][14]))
+    x = X(*[float(leaf[14]) for leaf in found.mean])
+    expected = move({"stiffness": 4.0}, 0.0, DT, x, u)
+    np.testing.assert_allclose([leaf[15] for leaf in found.mean], expected, rtol=1e-12)
+
+
+def test_switching_holds_what_a_wrong_model_adds():
+    # The observer's spring is half as stiff: the linear observer keeps an error that the switching one reduces.
+    _, states, recording = truth(stiffness=8.0)
+    system = model(4.0)
+    gain = observers.place_poles(system, [-3.0, -4.0, -5.0], dt=DT)
+    linear = run(observers.Luenberger(gain), system, recording)
+    switching = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    same = run(observers.SlidingMode(gain, switching, [0.02, 0.05]), system, recording)
+    np.testing.assert_allclose(np.stack(same.mean), np.stack(linear.mean), rtol=1e-12)
+    switching[0, 0], switching[1, 0] = 0.01, 0.05
+    robust = run(observers.SlidingMode(gain, switching, [0.02, 0.05]), system, recording)
+    rms = lambda estimate: np.sqrt(np.mean(np.square(np.asarray(estimate.mean.speed) - states[:, 1])[200:]))
+    assert rms(robust) < 0.5 * rms(linear)
+
+
+def test_gains_have_the_gradients_of_differences():
+    system, _, recording = truth(60)
+    gain = jnp.asarray(observers.place_poles(system, [-3.0, -4.0, -5.0], dt=DT))
+    total = jax.jit(lambda gain: jnp.sum(run(observers.Luenberger(gain), system, recording, throw=False).mean.speed))
+    step = jnp.zeros_like(gain).at[1, 0].set(1e-5)
+    difference = (total(gain + step) - total(gain - step)) / 2e-5
+    np.testing.assert_allclose(jax.grad(total)(gain)[1, 0], difference, rtol=1e-6)
+
+
+Theta, One = record_type("Theta", ("a", "b")), record_type("One", ("y",))
+
+
+def line(**prior):
+    return ss.StateSpace(
+        transition=lambda s, t0, t1, x, u: x,
+        observation=lambda s, t, x, u: One(x.a * u.p + x.b * u.q),
+        process_noise=None,
+        measurement_noise=ss.Gaussian({"y": 0.2}),
+        prior=ss.Prior(Theta(0.0, 0.0), prior or {"a": 10.0, "b": 10.0}),
+        inputs=("p", "q"),
+    )
+
+
+def regression(rows=80, jump=None):
+    rng = np.random.default_rng(0)
+    p, q = rng.normal(size=rows), rng.normal(size=rows)
+    a = np.where(np.arange(rows) < (rows if jump is None else jump), 2.0, 5.0)
+    y = a * p - 1.0 * q + 0.2 * rng.normal(size=rows)
+    return p, q, y, Recording(np.arange(float(rows)), {"p": p, "q": q, "y": y})
+
+
+@pytest.mark.parametrize("forgetting", [1.0, 0.95])
+def test_least_squares_are_those_of_the_batch(forgetting):
+    p, q, y, recording = regression()
+    found = run(observers.RecursiveLeastSquares(forgetting, ceiling=1e9), line(), recording)
+    rows = len(y)
+    A = np.stack([p, q], axis=1)
+    weights = forgetting ** np.arange(rows - 1, -1, -1) / 0.2**2
+    # The prior counts as a row that is forgotten with the others.
+    normal = A.T @ (weights[:, None] * A) + np.eye(2) / 10.0**2 * forgetting ** (rows - 1)
+    prior = np.eye(2) / 10.0**2
+    expected = np.linalg.solve(normal, A.T @ (weights * y))
+    np.testing.assert_allclose([found.mean.a[-1], found.mean.b[-1]], expected, rtol=1e-9)
+    assert prior[0, 0] > 0
+
+
+def test_several_factors_forget_apart_and_a_reset_follows_a_jump():
+    *_, recording = regression(jump=50)
+    last = lambda observer: float(run(observer, line(), recording).mean.a[55])
+    never = last(observers.RecursiveLeastSquares(1.0))
+    several = last(observers.RecursiveLeastSquares([0.8, 1.0]))
+    anew = last(observers.RecursiveLeastSquares(1.0, reset=6.0))
+    assert never < 3.0 < several < 5.2 and abs(anew - 5.0) < 0.5
+
+
+def test_what_is_not_excited_does_not_wind_up():
+    rows = 3000
+    recording = Recording(np.arange(float(rows)), {"p": np.ones(rows), "q": np.zeros(rows), "y": np.full(rows, 2.0)})
+    found = run(observers.RecursiveLeastSquares(0.9, ceiling=4.0), line(a=1.0, b=1.0), recording)
+    P = np.asarray(found.belief.memory)
+    assert np.isfinite(P).all() and P[1, 1] < 4.0 * 1.0001 and P[0, 0] < 0.1
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda: run(observers.Luenberger(np.zeros((2, 2))), model(), truth(5)[2]),
+            r"Luenberger.gain has shape \(2, 2\)",
+        ),
+        (lambda: observers.place_poles(model(), [-1.0, -2.0], dt=DT), r"poles have shape \(2,\): must be \(3,\)"),
+        (lambda: observers.place_poles(model(), [-1.0, -2.0, 1.0], dt=DT), "negative real parts"),
+        (lambda: observers.SlidingMode(np.zeros((3, 2)), np.zeros((3, 2)), [0.0, 1.0]), "SlidingMode.boundary"),
+        (lambda: observers.RecursiveLeastSquares(1.1), "RecursiveLeastSquares.forgetting"),
+        (
+            lambda: run(observers.RecursiveLeastSquares([0.9, 0.9, 0.9]), line(), regression(5)[3]),
+            "must be one, or one for each of a, b",
+        ),
+    ],
+)
+def test_bad_input_is_named(call, message):
+    with pytest.raises(InputError, match=message):
+        call()
+
+
+def test_an_unobservable_state_is_told():
+    blind = ss.StateSpace(
+        transition=lambda s, t0, t1, x, u: X(x.place, x.speed, x.offset),
+        observation=lambda s, t, x, u: Y(x.place, x.speed),
+        process_noise=None,
+        measurement_noise=ss.Gaussian({"place": 0.01, "speed": 0.1}),
+        prior=ss.Prior(X(0.0, 0.0, 0.0), {"place": 1.0, "speed": 1.0, "offset": 1.0}),
+    )
+    with pytest.raises(InputError, match="2 of 3 directions"):
+        observers.place_poles(blind, [-1.0, -2.0, -3.0], dt=DT)
