@@ -25,6 +25,7 @@ def test_slip_forces_are_those_of_the_whole_formula():
         np.testing.assert_array_equal(ours, theirs)
 
 
+@pytest.mark.full
 def test_both_fits_end_at_the_same_loss():
     pytest.importorskip("scipy")
     rig = fits.make_rig(400)

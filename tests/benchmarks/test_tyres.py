@@ -70,6 +70,7 @@ def test_limits_hold_a_few_contacts_and_every_coefficient_counts(given):
         assert (slope != 0) == (name in COEFFICIENTS), name
 
 
+@pytest.mark.full
 def test_gradient_in_blocks_is_the_plain_one(given):
     weights = [jax.numpy.asarray(w) for w in np.random.default_rng(1).standard_normal((5, len(given.load)))]
     arguments = tyres.tyre(np.float64), tyres.contact(given), weights

@@ -84,6 +84,7 @@ def test_bad_settings_are_named(settings, message):
         estimators.state_space(vehicles.passenger_car(), sensors.esc(), **settings)
 
 
+@pytest.mark.full
 def test_observability_tells_what_the_drive_can_teach(model, drive):
     report = estimators.observe(model, drive)
     assert report.names == ("front.B", "front.D", "rear.B", "rear.D")

@@ -39,6 +39,7 @@ def test_a_generic_start_comes_to_the_truth_through_noise():
     assert 55 <= fit.identified < len(fit.names)
 
 
+@pytest.mark.full
 def test_a_fit_to_the_reference_s_own_rows():
     """Both modes of the reference, as if they were rig data: its forces to 1 % of their peak."""
     data = io.read_rig_table(shared("mfeval_mf61.csv"))

@@ -46,7 +46,7 @@ def batch():
     return Motion(*[jnp.asarray(values) for values in zip(*MOTIONS, strict=True)])
 
 
-@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
+@pytest.mark.parametrize("dtype", [pytest.param(jnp.float32, marks=pytest.mark.full), jnp.float64])
 def test_values_and_gradients_are_finite_in_their_precision(driver, batch, dtype):
     driver, batch, t = cast(driver, dtype), cast(batch, dtype), jnp.asarray(5.0, dtype)
     state = driver.start(t, batch)

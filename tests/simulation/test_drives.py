@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from systems import light, peak, seven
 
-from jaxveh import InputError, JaxvehWarning, manoeuvres, roads, sensors, simulation, statespace, vehicles
+from jaxveh import InputError, JaxvehWarning, manoeuvres, roads, simulation, vehicles
 from jaxveh.simulation import simulate, stiffness
 
 KEY = jax.random.key(3)
@@ -75,34 +75,6 @@ def test_a_hill_slows_a_car_without_engine():
     np.testing.assert_allclose(drive["true.a_x"], 0.0, atol=1e-3)
 
 
-def test_devices_speak_at_their_own_instants_and_say_the_past():
-    imu = sensors.IMU(rate=100.0, delay=0.013)
-    optical = sensors.OpticalSideslip(rate=40.0)
-    steer = manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=1.0)
-    drive = simulate(light(), steer, sensors.Suite((imu, optical)))
-    exact = simulate(light(), steer, dt=0.001, max_step=0.001)
-    late = np.interp(np.maximum(drive.time - 0.013, 0.0), exact.time, exact["true.yaw_rate"])
-    spoken = np.isfinite(np.asarray(drive["yaw_rate"]))
-    np.testing.assert_allclose(np.flatnonzero(spoken).size, 101)
-    np.testing.assert_allclose(np.asarray(drive["yaw_rate"])[spoken], late[spoken], atol=1e-5)
-    np.testing.assert_allclose(
-        drive["true.yaw_rate"], np.interp(drive.time, exact.time, exact["true.yaw_rate"]), atol=1e-5
-    )
-    assert int(np.isfinite(np.asarray(drive["v_y"])).sum()) == 41
-    assert "steer" not in drive and "true.steer" in drive
-
-
-def test_production_devices_draw_from_the_key_and_may_be_vmapped():
-    suite = sensors.production_car()
-    steer = manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=0.5)
-    one = simulate(light(), steer, suite, KEY)
-    same = simulate(light(), steer, suite, KEY)
-    np.testing.assert_array_equal(one["yaw_rate"], same["yaw_rate"])
-    many = jax.vmap(lambda key: simulate(light(), steer, suite, key, solver="explicit"))(jax.random.split(KEY, 2))
-    assert many["yaw_rate"].shape == (2, len(one))
-    assert not np.allclose(np.nan_to_num(many["yaw_rate"][0]), np.nan_to_num(many["yaw_rate"][1]))
-
-
 def test_standstill_ends_a_braking():
     brakes = manoeuvres.mu_jump_braking(
         10.0, brake_at=0.2, deceleration=5.0, mass=1500.0, wheel_radius=0.32, duration=5.0
@@ -165,6 +137,7 @@ def test_steps_that_are_too_long_are_never_silent():
     assert peak(auto["true.omega_fl"] - exact["true.omega_fl"]) < 1e-4 * peak(exact["true.omega_fl"])
 
 
+@pytest.mark.full
 def test_the_implicit_solver_and_equal_steps_agree():
     steer = manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=0.6)
     found = [simulate(vehicles.passenger_car(), steer, solver=solver, dt=0.05) for solver in ("implicit", "explicit")]
@@ -185,29 +158,3 @@ def test_progress_is_told():
     simulate(light(), straight(duration=0.5), progress=lambda done, total, stage: heard.append(done / total))
     assert heard[0] == 0.0 and heard[-1] == 1.0
     assert len(heard) > 20 and heard == sorted(heard)
-
-
-def test_gradients_go_through_driver_road_and_car():
-    """Reverse mode through a closed-loop drive on a slippery road, against finite differences."""
-    steer = manoeuvres.step_steer(15.0, 0.04, start=0.1, duration=0.4)
-
-    def miss(at):
-        car = eqx.tree_at(lambda c: (c.front.cornering_stiffness, c.mass), light(), (at[0], at[1]))
-        road = roads.Level(at[2])
-        drive = simulate(car, steer, road=road, dt=0.02)
-        return jnp.sum(drive["true.yaw_rate"] ** 2) + 0.1 * jnp.sum((drive["true.y"]) ** 2)
-
-    at = jnp.asarray([80000.0, 1500.0, 0.5])
-    steps = np.asarray([10.0, 0.1, 1e-4])
-    expected = [(miss(at.at[i].add(s)) - miss(at.at[i].add(-s))) / (2 * s) for i, s in enumerate(steps)]
-    np.testing.assert_allclose(jax.grad(miss)(at), expected, rtol=1e-4)
-
-
-def test_float32_drives_are_float32():
-    car, steer = statespace.cast((light(), manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=0.5)), np.float32)
-    drive = simulate(car, steer, road=statespace.cast(roads.Level(0.8), np.float32), dt=0.05)
-    exact = simulate(
-        light(), manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=0.5), road=roads.Level(0.8), dt=0.05
-    )
-    assert {values.dtype for values in drive.channels.values()} == {np.dtype(np.float32)}
-    np.testing.assert_allclose(drive["true.yaw_rate"], exact["true.yaw_rate"], atol=1e-4)

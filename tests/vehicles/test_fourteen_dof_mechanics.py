@@ -165,7 +165,7 @@ def test_energy_stays_without_friction_and_dampers():
     np.testing.assert_allclose(energy, energy[0], rtol=0, atol=1e-8 * swing)
 
 
-@pytest.mark.parametrize("tyre", ["brush", "moments"])
+@pytest.mark.parametrize("tyre", [pytest.param("brush", marks=pytest.mark.full), "moments"])
 def test_energy_lost_is_what_the_outputs_say(tyre):
     car = make(AllMoments() if tyre == "moments" else None, **ODD)
     seconds = 1.5

@@ -156,18 +156,19 @@ class CarNumbers:
         axis = share * s.roll_centre_front + (1.0 - share) * s.roll_centre_rear
         arm, ahead = s.cg_height - axis, self.front_axle_to_cg - s.front_axle_to_cg
         found["roll_yaw_product"] = s.roll_yaw_product + s.sprung_mass * ahead * arm
-        stiff = [known.get(f"roll_stiffness_{axle}") for axle in ("front", "rear")]
-        if None in stiff or self.wheel_radius is None:
+        stiff_front, stiff_rear = known.get("roll_stiffness_front"), known.get("roll_stiffness_rear")
+        radius = self.wheel_radius
+        if stiff_front is None or stiff_rear is None or radius is None:
             return found
         leaning = s.sprung_mass * arm
         direct = [
-            part * s.sprung_mass * centre + 2.0 * unsprung * self.wheel_radius
+            part * s.sprung_mass * centre + 2.0 * unsprung * radius
             for part, centre, unsprung in (
                 (share, s.roll_centre_front, s.unsprung_mass_front),
                 (1.0 - share, s.roll_centre_rear, s.unsprung_mass_rear),
             )
         ]
-        front = leaning * stiff[0] / sum(stiff) + direct[0]
+        front = leaning * stiff_front / (stiff_front + stiff_rear) + direct[0]
         return found | {"front_roll_share": front / (leaning + sum(direct))}
 
     def _rolling(self, s: SuspensionNumbers) -> dict[str, Any]:
