@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.vehicles.wheels import Wheels, clip_transfer
+from jaxveh.vehicles.wheels import Wheels
 
 
 class AbstractLoadTransfer(eqx.Module):
@@ -120,16 +120,18 @@ def planar_loads(car: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     share = b / (a + b) if car.front_roll_share is None else car.front_roll_share
     lever = car.mass * car.cg_height
     front, rear = axle_loads(car, a_x, g_z)
+    half_front, half_rear = 0.5 * front, 0.5 * rear
     wish_front, wish_rear = share / car.track_front * lever * a_y, (1.0 - share) / car.track_rear * lever * a_y
-    fl, fr = clip_transfer(front, wish_front + _beyond(rear, wish_rear) * (car.track_rear / car.track_front))
-    rl, rr = clip_transfer(rear, wish_rear + _beyond(front, wish_front) * (car.track_front / car.track_rear))
-    return Wheels(fl, fr, rl, rr)
+    left_front = wish_front - _held(wish_front, half_front)
+    left_rear = wish_rear - _held(wish_rear, half_rear)
+    moved_front = _held(wish_front + left_rear * (car.track_rear / car.track_front), half_front)
+    moved_rear = _held(wish_rear + left_front * (car.track_front / car.track_rear), half_rear)
+    return Wheels(half_front - moved_front, half_front + moved_front, half_rear - moved_rear, half_rear + moved_rear)
 
 
-def _beyond(axle_load: Any, moved: Any) -> Any:
-    """The part of `moved` (N) that an axle cannot take: none before it stands on one wheel."""
-    half = 0.5 * axle_load
-    return moved - jnp.clip(moved, -half, half)
+def _held(moved: Any, half: Any) -> Any:
+    """What moves from the left to the right wheel, N, no more than `half` of the axle's load."""
+    return jnp.clip(moved, -half, half)
 
 
 def axle_loads(car: Any, a_x: Any, g_z: Any) -> tuple[Any, Any]:
