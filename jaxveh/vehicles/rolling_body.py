@@ -9,9 +9,9 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import check
 from jaxveh.vehicles.base import GRAVITY, Motion
-from jaxveh.vehicles.load_transfer import axle_loads
+from jaxveh.vehicles.load_transfer import axle_loads, held
 from jaxveh.vehicles.two_track import AbstractTwoTrack, check_car
-from jaxveh.vehicles.wheels import Wheels, clip_transfer
+from jaxveh.vehicles.wheels import Wheels
 
 NOT_NEGATIVE = ("roll_damping_front", "roll_damping_rear", "roll_centre_front", "roll_centre_rear")
 
@@ -134,14 +134,19 @@ def roll_loads(car: Any, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     unsprung = roll_geometry(car).unsprung_mass
     front, rear = axle_loads(car, a_x, g_z)
-    moved = []
-    for axle, share, track in (("front", b / (a + b), car.track_front), ("rear", a / (a + b), car.track_rear)):
+    loads = []
+    for axle, load, share, track in (
+        ("front", front, b / (a + b), car.track_front),
+        ("rear", rear, a / (a + b), car.track_rear),
+    ):
         stiffness, damping, centre = (
             getattr(car, f"roll_{name}_{axle}") for name in ("stiffness", "damping", "centre")
         )
         direct = share * (car.sprung_mass * centre + unsprung * car.unsprung_height) * a_y
-        moved.append((stiffness * x.roll + damping * x.roll_rate + direct) / track)
-    return Wheels(*clip_transfer(front, moved[0]), *clip_transfer(rear, moved[1]))
+        half = 0.5 * load
+        moved = held((stiffness * x.roll + damping * x.roll_rate + direct) / track, half)
+        loads += [half - moved, half + moved]
+    return Wheels(*loads)
 
 
 def roll_outputs(x: Any, acceleration: Any) -> dict:

@@ -30,7 +30,7 @@ UNITS = {
 
 
 class AbstractTwoTrack(AbstractVehicle):
-    """A car on four wheels without wheel travel: what its kinds share. Each has the fields of `positions_of`."""
+    """A car on four wheels: what its kinds share. Each has the fields of `positions_of`."""
 
     @property
     def units(self):

@@ -230,16 +230,6 @@ def pushed(positions: Wheels, moves: Wheels, forces: Wheels) -> Pushed:
     return Pushed(total(along), total(across), total(turning), along, across)
 
 
-def clip_transfer(axle_load: Any, moved: Any) -> tuple[Any, Any]:
-    """Loads of the left and the right wheel, N, of an axle: a wheel that lifts leaves all to the other.
-
-    `moved` (N) goes from the left to the right wheel.
-    """
-    half = 0.5 * jnp.maximum(axle_load, 0.0)
-    moved = jnp.clip(moved, -half, half)
-    return half - moved, half + moved
-
-
 STANDSTILL = 15 / 16
 """m/s: below it brakes and rolling resistance turn round smoothly, so that standstill is an ordinary point."""
 

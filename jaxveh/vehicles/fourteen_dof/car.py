@@ -13,7 +13,7 @@ from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.base import Motion
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
 from jaxveh.vehicles.fourteen_dof.checks import check_fourteen_dof
 from jaxveh.vehicles.fourteen_dof.dynamics import Accelerations, Inertia, accelerations
@@ -29,7 +29,14 @@ from jaxveh.vehicles.fourteen_dof.suspension import (
 )
 from jaxveh.vehicles.fourteen_dof.tyre_contact import ROLLING_SHARE, Touch, axles, reaction, touch
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, scaled
-from jaxveh.vehicles.two_track import air_drag, body_outputs, filled, positions_of, tyres_of, wheel_outputs
+from jaxveh.vehicles.two_track import (
+    AbstractTwoTrack,
+    air_drag,
+    body_outputs,
+    filled,
+    tyres_of,
+    wheel_outputs,
+)
 from jaxveh.vehicles.wheels import Wheels, each, frictions, gravity, named, of, opposing, pushed, total
 
 BODY = ("v_x", "v_y", "v_z", "z", "roll", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate")
@@ -37,7 +44,7 @@ SPINS = named("omega")
 STATES = (*BODY, *named("travel"), *named("travel_rate"), *SPINS)
 
 
-class FourteenDOF(AbstractVehicle):
+class FourteenDOF(AbstractTwoTrack):
     """A rigid body with all six degrees of freedom, four unsprung masses on springs, four wheels that spin: the truth.
 
     The equations are exact for this mechanism, for angles of any size (pitch below 90 degrees), and keep energy:
@@ -143,10 +150,6 @@ class FourteenDOF(AbstractVehicle):
     @property
     def units(self):
         return dict(UNITS)
-
-    @property
-    def wheel_positions(self):
-        return tuple(positions_of(self))
 
     def motion(self, x, u):
         return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
