@@ -17,6 +17,7 @@ class Result(IntEnum):
     non_finite_state = 4
     not_converged = 5
     too_stiff = 6
+    measurement_too_late = 7
 
     @property
     def message(self) -> str:
@@ -34,6 +35,7 @@ _MESSAGES = {
     Result.non_finite_state: "the state is no longer finite (the model diverged: check parameters, step and signs)",
     Result.not_converged: "the solver stopped before its tolerance was met (more steps, or better start values)",
     Result.too_stiff: "the step is too long for the model's fastest pole (shorten the step or choose an implicit solver)",
+    Result.measurement_too_late: "a measurement is older than the rows that are kept, and was left out (keep more: depth)",
 }
 
 

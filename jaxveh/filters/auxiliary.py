@@ -9,16 +9,17 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh.filters.choosing import log_of
 from jaxveh.filters.particle import (
     AbstractParticleFilter,
     ParticleBelief,
     ParticleFilter,
     add_noise,
     check_particle_settings,
+    check_scheme,
     choose_ancestors,
     gather,
     log_chosen,
-    log_of,
     log_prob,
     make_info,
     need_key,
@@ -44,6 +45,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
 
     def __check_init__(self):
         check_particle_settings(self.particles, self.threshold, self.gradient)
+        check_scheme(self)
 
     def init(self, model, row, key=None):
         return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient).init(
@@ -68,7 +70,8 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         moved = numerics.barrier(add_noise(model, noise, moved, row.t - belief.t))
         logs, _ = log_prob(model, row, moved, measured, present)
         chosen_ahead = gather((ahead,), ancestors)[0]
-        n = jnp.asarray(self.particles, logs.dtype)
+        # Of the particles before, of which a number that adapts may have left others than it takes.
+        n = jnp.asarray(belief.weights.shape[0], logs.dtype)
         drawn = logs - chosen_ahead + log_chosen(self, log_of(first), ancestors)
         if resampled is not None:
             # Without a draw: an ordinary importance step from the weights that were there.
@@ -86,5 +89,5 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
             moved = model.transition(belief.t, row.t, belief.particles, u)
         else:
             moved = self.lookahead(model, belief.t, row.t, belief.particles, u)
-        n = self.particles
+        n = belief.weights.shape[0]
         return numerics.barrier(jax.tree.map(lambda field: jnp.broadcast_to(field, (n,)), moved))

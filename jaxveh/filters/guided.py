@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
+from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.filter import check_covariances, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes
@@ -19,10 +20,10 @@ from jaxveh.filters.particle import (
     ParticleBelief,
     ParticleFilter,
     check_particle_settings,
+    check_scheme,
     choose_ancestors,
     gather,
     log_chosen,
-    log_of,
     log_prob,
     make_info,
     need_key,
@@ -68,6 +69,7 @@ class Guided(AbstractParticleFilter):
 
     def __check_init__(self):
         check_particle_settings(self.particles, self.threshold, self.gradient)
+        check_scheme(self)
         if self.rule not in RULES:
             raise InputError(f"rule = {self.rule!r}: must be one of {', '.join(RULES)}.")
 
@@ -88,7 +90,7 @@ class Guided(AbstractParticleFilter):
         measured, present = presence(model, row)
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved = model.transition(belief.t, row.t, belief.particles, u)
-        moved = jax.tree.map(lambda field: jnp.broadcast_to(field, (self.particles,)), moved)
+        moved = jax.tree.map(lambda field: jnp.broadcast_to(field, belief.weights.shape), moved)
         law = model.process_noise.over(row.t - belief.t)
         covariance = law.covariance()
         prior = Spread(numerics.cholesky(covariance), covariance)
@@ -107,7 +109,7 @@ class Guided(AbstractParticleFilter):
         _, residual = log_prob(model, row, moved, measured, present)
         ratio = _log_normal(numerics.solve_lower(prior.factor, e), prior.factor) - _log_normal(white, chosen.factor)
         kept = log_chosen(self, log_of(first), ancestors)
-        n = jnp.log(jnp.asarray(self.particles, logs.dtype))
+        n = jnp.log(jnp.asarray(belief.weights.shape[0], logs.dtype))
         drawn = after + ratio + kept - (chosen.log_ahead if self.auxiliary else 0.0)
         if resampled is not None:
             drawn = jnp.where(resampled, drawn, after + ratio + logs + n)

@@ -1,7 +1,5 @@
 """The bootstrap particle filter, and what every particle filter shares."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -13,6 +11,7 @@ from jax.ad_checkpoint import checkpoint_name
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
+from jaxveh.filters.choosing import Soft, Transport, log_of, score
 from jaxveh.statespace import StateSpace
 from jaxveh.statespace.contract import (
     KEPT,
@@ -88,13 +87,15 @@ def _std(weights, deviation):
 class AbstractParticleFilter(AbstractFilter):
     """Shared by particle filters: `particles` (at least 2), `resampling` scheme, `threshold` of the ESS, `gradient`.
 
-    `resampling(key, weights, n) -> ancestors` (see `numerics.systematic`, `stratified`, `multinomial`, `residual`).
+    `resampling(key, weights, n) -> ancestors` (see `numerics.systematic`, `stratified`, `multinomial`, `residual`), `Soft(...)`
+    around one of these, or, for `ParticleFilter`, `Transport(...)`.
     `threshold`: resample where the ESS falls below this share of the particles; 1 (the default) resamples every step.
     `gradient`: `"score"` (the default) adds the derivative of the choice of ancestors, so that the gradient of the
     log-likelihood is right in the limit of many particles; its spread grows with the length of the recording. `"held"` leaves
     it out: a smooth gradient with a **bias** that no number of particles cures, for parameters and noise levels alike.
     """
 
+    # No postponed annotations in this file: they would make fields of these.
     particles: eqx.AbstractVar[int]
     resampling: eqx.AbstractVar[Callable]
     threshold: eqx.AbstractVar[float]
@@ -112,6 +113,14 @@ def check_particle_settings(particles: int, threshold: float, gradient: str = "s
         raise InputError(f"particles = {particles}: must be a whole number of at least 2.")
     if not 0 <= threshold <= 1:
         raise InputError(f"threshold = {threshold}: must be from 0 (never resample) to 1 (every step).")
+
+
+def check_scheme(filter_: AbstractParticleFilter) -> None:
+    """Raise `InputError` for a scheme without ancestors, which this filter needs."""
+    if isinstance(filter_.resampling, Transport):
+        raise InputError(
+            f"{type(filter_).__name__}: Transport moves particles and has no ancestors: it is for ParticleFilter alone."
+        )
 
 
 def log_prob(model: StateSpace, row, particles, measured, present):
@@ -134,27 +143,16 @@ def add_noise(model: StateSpace, key, particles, dt):
     return particles._replace(**{name: getattr(particles, name) + value for name, value in noise.items()})
 
 
-@jax.custom_jvp
-def score(log_probability):
-    """Zero, with the derivative of a draw's log-probability: what makes gradients through a choice right.
-
-    A draw j of a category i of probability p_i counts with p_i over the same p_i without derivative, a factor of 1, so that the
-    expectation's derivative has the share that comes from choosing (A. Scibior & F. Wood, Differentiable particle filtering
-    without modifying the forward pass, 2021; G. Poyiadjis, A. Doucet & S. Singh 2011).
-    """
-    return jnp.zeros_like(log_probability)
-
-
-@score.defjvp
-def _score_jvp(primals, tangents):
-    return jnp.zeros_like(primals[0]), tangents[0]
-
-
 def log_chosen(filter_, log_probabilities, ancestors):
-    """The log weights (N,) of drawn particles, over their mean: zero, with the derivative of the choice unless it is `held`."""
-    if filter_.gradient == "held":
-        return jnp.zeros_like(log_probabilities)
-    return score(log_probabilities[ancestors])
+    """The log weights (n,) of particles drawn with these log-probabilities (N,), over 1 / n: zero but for `Soft`.
+
+    They carry the derivative of the choice unless it is `held`.
+    """
+    logs, chances = jnp.zeros_like(log_probabilities), log_probabilities
+    if isinstance(filter_.resampling, Soft):
+        logs, chances = filter_.resampling.split(log_probabilities)
+    logs = logs[ancestors]
+    return logs if filter_.gradient == "held" else logs + score(chances[ancestors])
 
 
 def gather(particles, ancestors):
@@ -165,7 +163,8 @@ def gather(particles, ancestors):
 
 def choose_ancestors(filter_, key, weights):
     """Ancestors (N,) int32 and whether resampling took place (None: always, known when compiling)."""
-    drawn = checkpoint_name(filter_.resampling(key, jax.lax.stop_gradient(weights), filter_.particles), KEPT)
+    drawn = filter_.resampling(key, jax.lax.stop_gradient(weights), filter_.particles)
+    drawn = checkpoint_name(drawn.astype(jnp.int32), KEPT)
     if filter_.threshold >= 1:
         return drawn, None
     resampled = numerics.ess(weights) < filter_.threshold * filter_.particles
@@ -236,20 +235,30 @@ class ParticleFilter(AbstractParticleFilter):
 
     def _step(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
-        ancestors, resampled = choose_ancestors(self, draw, belief.weights)
-        particles = gather(belief.particles, ancestors)
-        uniform = jnp.full_like(belief.weights, 1 / self.particles)
-        logs = log_of(belief.weights)
-        chosen = log_of(uniform) + log_chosen(self, logs, ancestors)
-        weights, chosen = (
-            (uniform, chosen)
-            if resampled is None
-            else (jnp.where(resampled, uniform, belief.weights), jnp.where(resampled, chosen, logs))
-        )
+        particles, drawn = self._drawn(draw, belief)
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved = model.transition(belief.t, row.t, particles, u)
         moved = numerics.barrier(add_noise(model, noise, moved, row.t - belief.t))
-        return self._weigh(model, row, moved, Drawn(ancestors, weights, chosen), belief.key, belief.count)
+        return self._weigh(model, row, moved, drawn, belief.key, belief.count)
+
+    def _drawn(self, key, belief):
+        """The next particles before they move."""
+        uniform = jnp.full((self.particles,), 1 / self.particles, belief.weights.dtype)
+        logs = log_of(belief.weights)
+        if isinstance(self.resampling, Transport):
+            particles, chosen = self.resampling.moved(belief.particles, belief.weights), log_of(uniform)
+            ancestors = jnp.arange(self.particles, dtype=jnp.int32)
+            resampled = None if self.threshold >= 1 else numerics.ess(belief.weights) < self.threshold * self.particles
+        else:
+            ancestors, resampled = choose_ancestors(self, key, belief.weights)
+            particles = gather(belief.particles, ancestors)
+            chosen = log_of(uniform) + log_chosen(self, logs, ancestors)
+        weights = numerics.normalise(chosen)[0] if isinstance(self.resampling, Soft) else uniform
+        if resampled is not None:
+            particles = jax.tree.map(lambda new, old: jnp.where(resampled, new, old), particles, belief.particles)
+            weights = jnp.where(resampled, weights, belief.weights)
+            chosen = jnp.where(resampled, chosen, logs)
+        return particles, Drawn(ancestors, weights, chosen)
 
     def _weigh(self, model, row, particles, drawn, key, count):
         measured, present = presence(model, row)
@@ -259,12 +268,6 @@ class ParticleFilter(AbstractParticleFilter):
         # normalise gives the log of the mean over N of what sums to the likelihood.
         log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
         return belief, make_info(model, row, log_likelihood, residual, present, (drawn.weights, weights), alive)
-
-
-def log_of(weights):
-    """Log weights with -inf for zero, and zero instead of infinite gradients there."""
-    alive = weights > 0
-    return jnp.where(alive, jnp.log(jnp.where(alive, weights, 1)), -jnp.inf)
 
 
 def need_key(filter_, key):

@@ -13,6 +13,7 @@ from jaxveh.statespace.noise import (
 from jaxveh.statespace.parameters import parameter_view, put_parameters, start_from, with_parameters
 from jaxveh.statespace.process import AbstractProcessNoise, Continuous, Discrete
 from jaxveh.statespace.solvers import RK4, Heun, Propagate, RolledRK4
+from jaxveh.statespace.uncertain_inputs import uncertain_inputs
 
 __all__ = [
     "RK4",
@@ -40,5 +41,6 @@ __all__ = [
     "run",
     "scan",
     "start_from",
+    "uncertain_inputs",
     "with_parameters",
 ]

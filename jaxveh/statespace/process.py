@@ -43,31 +43,29 @@ class Discrete(AbstractProcessNoise):
         return self.law
 
 
-class Both(AbstractProcessNoise):
-    """Continuous noise on some fields, and a law a step on others."""
+class Together(AbstractProcessNoise):
+    """Independent process noises over disjoint fields."""
 
-    continuous: Continuous
-    discrete: Discrete
+    parts: tuple[AbstractProcessNoise, ...]
 
     @property
     def law(self):
-        return combine(self.continuous.law, self.discrete.law)
+        return combine(*[part.law for part in self.parts])
 
     def over(self, dt):
-        return combine(self.continuous.over(dt), self.discrete.over(dt))
+        return combine(*[part.over(dt) for part in self.parts])
 
 
 def join(a: AbstractProcessNoise | None, b: AbstractProcessNoise | None) -> AbstractProcessNoise | None:
-    """One process noise of two over disjoint fields."""
-    parts = [p for p in (a, b) if p is not None]
+    """One process noise of two over disjoint fields; those in continuous time, and those a step, become one law each."""
+    given = [noise for noise in (a, b) if noise is not None]
+    flat = [part for noise in given for part in (noise.parts if isinstance(noise, Together) else (noise,))]
+    parts: list[AbstractProcessNoise] = []
+    for kind in (Continuous, Discrete):
+        law = combine(*[part.law for part in flat if isinstance(part, kind)])
+        if law is not None:
+            parts.append(kind(law))
+    parts += [part for part in flat if not isinstance(part, Continuous | Discrete)]
     if len(parts) < 2:
         return parts[0] if parts else None
-    split = [(p.continuous, p.discrete) if isinstance(p, Both) else (p,) for p in parts]
-    flat = [p for group in split for p in group]
-    continuous = combine(*[p.law for p in flat if isinstance(p, Continuous)])
-    discrete = combine(*[p.law for p in flat if isinstance(p, Discrete)])
-    if continuous is None:
-        return Discrete(discrete)
-    if discrete is None:
-        return Continuous(continuous)
-    return Both(Continuous(continuous), Discrete(discrete))
+    return Together(tuple(parts))

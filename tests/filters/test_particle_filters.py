@@ -152,7 +152,9 @@ def test_belief_s_summaries():
     particles, weights = rng.normal(3.0, 2.0, size=(2, 400)), rng.uniform(size=400)
     weights /= weights.sum()
     pair = namedtuple("Pair", "a b")(*jnp.asarray(particles))
-    belief = filters.ParticleBelief(pair, jnp.asarray(weights), jax.random.key(0), jnp.asarray(0.0), (), jnp.int32(0))
+    belief = filters.ParticleBelief(
+        pair, jnp.asarray(weights), jnp.arange(400), jax.random.key(0), jnp.asarray(0.0), (), jnp.int32(0)
+    )
     np.testing.assert_allclose(belief.mean, particles @ weights, rtol=1e-12)
     expected = np.cov(particles, aweights=weights, ddof=0)
     np.testing.assert_allclose(belief.covariance, expected, rtol=1e-12)
@@ -198,8 +200,8 @@ def _blind(key, weights, n):
 @pytest.mark.parametrize(
     "filter_",
     [
-        pytest.param(filters.ParticleFilter(25, _blind), id="PF-blind"),
-        pytest.param(filters.AuxiliaryParticleFilter(25, threshold=0.7), id="APF-systematic"),
+        pytest.param(filters.ParticleFilter(25, _blind, gradient="held"), id="PF-blind"),
+        pytest.param(filters.AuxiliaryParticleFilter(25, threshold=0.7, gradient="held"), id="APF-systematic"),
     ],
 )
 def test_gradient_equals_differences_with_frozen_ancestors(filter_):

@@ -36,4 +36,6 @@ def test_ancestors_that_are_held_bias_it():
     exact = gradients(filters.Kalman(), 1)[0]
     found = gradients(filters.ParticleFilter(1000, gradient="held"))
     scatter = found.std(axis=0) / np.sqrt(SEEDS)
-    assert np.max(np.abs(found.mean(axis=0) - exact) / scatter) > 20.0
+    # Of the dynamics nothing but the bias is left: a smooth gradient that is another.
+    off = np.abs(found.mean(axis=0) - exact)
+    assert np.max(off / np.where(scatter > 0, scatter, np.inf)) > 20.0

@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
-from jaxveh.filters.particle import AbstractParticleFilter, log_of
+from jaxveh.filters.choosing import log_of
+from jaxveh.filters.particle import AbstractParticleFilter
 from jaxveh.filters.smoothing.genealogy import path_moments
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
 from jaxveh.statespace import Row, StateSpace

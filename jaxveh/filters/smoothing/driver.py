@@ -8,11 +8,12 @@ import equinox as eqx
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
-from jaxveh.filters.gaussian import AbstractGaussianFilter
+from jaxveh.filters.choosing import Transport
 from jaxveh.filters.particle import AbstractParticleFilter, need_key
 from jaxveh.filters.smoothing.backward_sampling import check_density, sample_backwards
+from jaxveh.filters.smoothing.fixed_lag import check_lag, smooth_with_lag
 from jaxveh.filters.smoothing.genealogy import trace_genealogy
-from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
+from jaxveh.filters.smoothing.rauch_tung_striebel import has_smoother, rauch_tung_striebel
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate
 from jaxveh.statespace import StateSpace
 from jaxveh.statespace.contract import AbstractFilter
@@ -41,9 +42,10 @@ def smooth(
     *,
     key=None,
     method: BackwardSampling | Genealogy | None = None,
+    lag: int | None = None,
     throw: bool = True,
 ) -> SmoothedEstimate:
-    """Each row's state given the whole recording: the filter forwards, and what suits it backwards.
+    """Each row's state given the whole recording, or the rows up to `lag` behind it: the filter forwards, its smoother back.
 
     **Arguments**: as `run`. A Gaussian filter gets the Rauch-Tung-Striebel smoother of its own rule and form; a particle filter
     `method`, by default `BackwardSampling()` where every state carries process noise, else `Genealogy()`.
@@ -54,13 +56,18 @@ def smooth(
     """
     filter.check(model)
     rows = model.rows(recording)
-    if isinstance(filter, AbstractParticleFilter):
+    if lag is not None:
+        check_lag(filter, lag)
+        if method is not None:
+            raise InputError("smooth: a lag has a method of its own; give one of both.")
+        found = smooth_with_lag(filter, model, rows, key, lag)
+    elif isinstance(filter, AbstractParticleFilter):
         found = _particles(filter, model, rows, need_key(filter, key), method)
     elif method is not None:
         raise InputError(
             f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has its own."
         )
-    elif isinstance(filter, AbstractGaussianFilter):
+    elif has_smoother(filter):
         found = rauch_tung_striebel(filter, model, rows)
     else:
         raise InputError(f"{type(filter).__name__} has no smoother: take a Gaussian filter, or a particle filter.")
@@ -75,6 +82,8 @@ def _particles(filter: AbstractParticleFilter, model: StateSpace, rows: Any, key
         noisy = () if model.process_noise is None else model.process_noise.law.names
         method = BackwardSampling() if set(noisy) == set(model.states) else Genealogy()
     if isinstance(method, Genealogy):
+        if isinstance(filter.resampling, Transport):
+            raise InputError("Genealogy: particles of Transport have no ancestors. Use BackwardSampling().")
         return trace_genealogy(filter, model, rows, key)
     if not isinstance(method, BackwardSampling):
         raise InputError(f"method = {method!r}: must be BackwardSampling(), Genealogy() or None.")

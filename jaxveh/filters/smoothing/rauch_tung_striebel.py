@@ -7,9 +7,9 @@ from typing import Any
 import equinox as eqx
 import jax
 
-from jaxveh.filters.gaussian import AbstractGaussianFilter, Iterated
+from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.filter import transition_image, with_spread
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, transition_image, with_spread
 from jaxveh.filters.gaussian.forms import Later, Spread
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
 from jaxveh.statespace import Row, StateSpace
@@ -30,17 +30,42 @@ def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows:
         return found, found.moments(model)
 
     back = jax.checkpoint(back, prevent_cse=False)
-    _, moments = jax.lax.scan(back, last, (before, after), reverse=True)
+    _, moments = jax.lax.scan(back, gaussian_of(last), (before, after), reverse=True)
     return smoothed_estimate(model, filtered, with_last(moments, last.moments(model)))
 
 
 def given_later(
-    filter: AbstractGaussianFilter, model: StateSpace, belief: GaussianBelief, t: Any, u: Any, later: GaussianBelief
+    filter: AbstractGaussianFilter, model: StateSpace, belief: Any, t: Any, u: Any, later: GaussianBelief
 ) -> GaussianBelief:
-    """The belief, given the smoothed one `later` at the next row's time `t` with the inputs `u`."""
-    image = transition_image(model, belief, t, u)
-    law = None if model.process_noise is None else model.process_noise.over(t - belief.t)
+    """The Gaussian of a belief, given the smoothed one `later` at the next row's time `t` with the inputs `u`.
+
+    Of a wrapped filter with the process noise that it held for true then.
+    """
+    own, gaussian = filter.adapted(model, belief), gaussian_of(belief)
+    image = transition_image(own, gaussian, t, u)
+    law = None if own.process_noise is None else own.process_noise.over(t - gaussian.t)
     known = Later(later.vector - image.mean, Spread(later.factor, later.matrix))
-    form = filter.filter.form if isinstance(filter, Iterated) else filter.form
-    found = form.smooth(image, law, model.states, Spread(belief.factor, belief.matrix), known)
-    return with_spread(belief, belief.vector + found.shift, found.spread)
+    before = Spread(gaussian.factor, gaussian.matrix)
+    found = rule_filter_of(filter).form.smooth(image, law, model.states, before, known)
+    return with_spread(gaussian, gaussian.vector + found.shift, found.spread)
+
+
+def gaussian_of(belief: Any) -> GaussianBelief:
+    """The Gaussian inside a wrapped filter's belief."""
+    while not isinstance(belief, GaussianBelief):
+        belief = belief.inside
+    return belief
+
+
+def rule_filter_of(filter: Any) -> AbstractRuleFilter:
+    """The filter that wrappers go around."""
+    while not isinstance(filter, AbstractRuleFilter):
+        filter = filter.filter
+    return filter
+
+
+def has_smoother(filter: Any) -> bool:
+    """Whether the filter, inside its wrappers, keeps one Gaussian by a rule."""
+    while isinstance(filter, AbstractGaussianFilter) and not isinstance(filter, AbstractRuleFilter):
+        filter = getattr(filter, "filter", None)
+    return isinstance(filter, AbstractRuleFilter)

@@ -7,8 +7,11 @@ from jaxveh.filters.wrappers.h_infinity import HInfinity
 from jaxveh.filters.wrappers.interacting import InteractingModels
 from jaxveh.filters.wrappers.measurement_noise import SageHusa, VariationalBayes
 from jaxveh.filters.wrappers.paused import Paused
+from jaxveh.filters.wrappers.process_noise import MatchedProcess, ShrinkingProcess
 from jaxveh.filters.wrappers.robust import Huber, RobustStudentT
 from jaxveh.filters.wrappers.strong_tracking import StrongTracking
+from jaxveh.filters.wrappers.varying_noise import VaryingNoise
+from jaxveh.filters.wrappers.wavelet import HaarNoise
 
 __all__ = [
     "Consider",
@@ -16,11 +19,15 @@ __all__ = [
     "Federated",
     "Gated",
     "HInfinity",
+    "HaarNoise",
     "Huber",
     "InteractingModels",
+    "MatchedProcess",
     "Paused",
     "RobustStudentT",
     "SageHusa",
+    "ShrinkingProcess",
     "StrongTracking",
     "VariationalBayes",
+    "VaryingNoise",
 ]

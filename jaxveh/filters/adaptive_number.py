@@ -1,0 +1,121 @@
+"""As many particles as the belief's spread asks for."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check, check_positive
+from jaxveh._core.names import check_names
+from jaxveh.filters.choosing import Transport
+from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, gather
+from jaxveh.statespace.contract import AbstractFilter
+
+BINS = 0x62696E73
+"""Folded into the step's key for the draw that counts bins."""
+
+# An odd number of 32 bits, for each state another power of it: a multiplicative hash.
+HASH = np.uint32(2654435761)
+
+
+class AdaptiveNumber(AbstractFilter):
+    """`filter`, each step with one of the `sizes` of particles, by how many `bins` the belief fills (D. Fox 2003: KLD-sampling).
+
+    So many particles that, with the `confidence` (-), the Kullback-Leibler distance between the drawn and the true distribution
+    over the k filled bins is below `error`, with z the normal quantile:
+
+        n = (k - 1) / (2 error) (1 - 2 / (9 (k - 1)) + z sqrt(2 / (9 (k - 1))))^3
+
+    `bins`: their widths by state, in its unit (parameters on the real line). The largest size is the filter's own number, with
+    which it starts; it resamples in every step. Shapes are fixed when compiling: one branch a size, of which one runs, and
+    beliefs of the largest size with weights of zero behind. Under `vmap` all branches run, and nothing is saved.
+    """
+
+    filter: AbstractParticleFilter
+    bins: tuple[tuple[str, float], ...] = eqx.field(static=True)
+    sizes: tuple[int, ...] = eqx.field(static=True)
+    error: float = eqx.field(static=True)
+    confidence: float = eqx.field(static=True)
+
+    def __init__(
+        self,
+        filter: AbstractParticleFilter,
+        bins: Mapping[str, float],
+        sizes: tuple[int, ...] | None = None,
+        error: float = 0.05,
+        confidence: float = 0.99,
+    ):
+        n = filter.particles
+        self.filter, self.error, self.confidence = filter, error, confidence
+        self.bins = tuple(sorted(dict(bins).items()))
+        self.sizes = tuple(sizes) if sizes is not None else tuple(max(2, n // part) for part in (8, 4, 2, 1))
+
+    def __check_init__(self):
+        for name, width in self.bins:
+            check_positive(f"AdaptiveNumber.bins of {name}", width)
+        check("AdaptiveNumber.error", self.error, lambda v: v > 0, "positive")
+        check("AdaptiveNumber.confidence", self.confidence, lambda v: (v > 0) & (v < 1), "between 0 and 1")
+        if not self.bins:
+            raise InputError("AdaptiveNumber.bins is empty: give the width of at least one state's bins.")
+        if sorted(set(self.sizes)) != list(self.sizes) or self.sizes[-1] != self.filter.particles or self.sizes[0] < 2:
+            raise InputError(
+                f"AdaptiveNumber.sizes = {self.sizes}: must rise from at least 2 to the filter's {self.filter.particles}."
+            )
+        if self.filter.threshold < 1 or isinstance(self.filter.resampling, Transport):
+            raise InputError("AdaptiveNumber: its filter must resample in every step (threshold = 1) by a draw.")
+
+    def check(self, model):
+        self.filter.check(model)
+        check_names("AdaptiveNumber.bins", [name for name, _ in self.bins], model.states)
+
+    def init(self, model, row, key=None):
+        return self.filter.init(model, row, key)
+
+    def step(self, model, belief, row):
+        needed = self.number(belief)
+        place = jnp.sum(needed > jnp.asarray(self.sizes[:-1], needed.dtype))
+        return jax.lax.switch(place, [self._branch(size) for size in self.sizes], model, belief, row)
+
+    def number(self, belief: ParticleBelief) -> Any:
+        """How many particles the belief asks for, before they are rounded up to one of the sizes."""
+        dtype = belief.weights.dtype
+        # Of one filled bin nothing can be told; two ask for few.
+        k = jnp.maximum(self.filled(belief), 2).astype(dtype) - 1.0
+        z = jax.scipy.special.ndtri(jnp.asarray(self.confidence, dtype))
+        part = 2.0 / (9.0 * k)
+        return k / (2.0 * self.error) * (1.0 - part + z * jnp.sqrt(part)) ** 3
+
+    def filled(self, belief: ParticleBelief) -> Any:
+        """How many bins draws from the belief fill."""
+        key = jax.random.fold_in(jax.random.fold_in(belief.key, BINS), belief.count)
+        ancestors = numerics.systematic(key, jax.lax.stop_gradient(belief.weights), self.filter.particles)
+        drawn = jax.lax.stop_gradient(gather(belief.particles, ancestors))
+        hashed = jnp.zeros(self.filter.particles, jnp.uint32)
+        for name, width in self.bins:
+            index = jnp.floor(getattr(drawn, name) / width).astype(jnp.int32).astype(jnp.uint32)
+            hashed = (hashed ^ index) * HASH
+        ordered = jnp.sort(hashed)
+        return 1 + jnp.sum(ordered[1:] != ordered[:-1])
+
+    def _branch(self, size: int):
+        inside = dataclasses.replace(self.filter, particles=size)
+        more = self.filter.particles - size
+
+        def run(model, belief, row):
+            after, info = inside.step(model, belief, row)
+            # Copies of the first, without weight: any number that the model can take.
+            longer = lambda field: jnp.concatenate([field, jnp.broadcast_to(field[:1], (more,))])
+            particles = jax.tree.map(longer, after.particles)
+            weights = jnp.pad(after.weights, (0, more))
+            return ParticleBelief(
+                particles, weights, longer(after.ancestors), after.key, after.t, after.u, after.count
+            ), info
+
+        return run

@@ -1,0 +1,120 @@
+"""How the choice of particles lets derivatives through: by a score, by softened weights, or by moving them all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check
+
+
+@jax.custom_jvp
+def score(log_probability):
+    """Zero, with the derivative of a draw's log-probability: what makes gradients through a choice right.
+
+    A draw j of a category i of probability p_i counts with p_i over the same p_i without derivative, a factor of 1, so that the
+    expectation's derivative has the share that comes from choosing (A. Scibior & F. Wood, Differentiable particle filtering
+    without modifying the forward pass, 2021; G. Poyiadjis, A. Doucet & S. Singh 2011).
+    """
+    return jnp.zeros_like(log_probability)
+
+
+@score.defjvp
+def _score_jvp(primals, tangents):
+    return jnp.zeros_like(primals[0]), tangents[0]
+
+
+def log_of(weights):
+    """Log weights with -inf for zero, and zero instead of infinite gradients there."""
+    alive = weights > 0
+    return jnp.where(alive, jnp.log(jnp.where(alive, weights, 1)), -jnp.inf)
+
+
+class Soft(eqx.Module):
+    """A resampling scheme that draws from softened weights, `share` w + (1 - share) / N (P. Karkus, D. Hsu & W. Lee 2018).
+
+    Drawn particles keep the weight w over the softened one, through which derivatives pass; the log-likelihood stays right for
+    any share, only noisier. With `gradient="held"` the derivative of the draw itself is left out: a **bias** that falls with
+    the share (0: no choice at all, weights degenerate). With `gradient="score"` there is none.
+    """
+
+    share: float = eqx.field(static=True, default=0.5)
+    scheme: Callable = eqx.field(static=True, default=numerics.systematic)
+
+    def __check_init__(self):
+        check("Soft.share", self.share, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
+
+    def __call__(self, key, weights, n):
+        return self.scheme(key, self.share * weights + (1.0 - self.share) / weights.shape[0], n)
+
+    def split(self, logs: Any) -> tuple[Any, Any]:
+        """Of normalised log weights (N,): the log weights after the draw, and the log-probabilities of the draw."""
+        soft = jnp.log(self.share * jnp.exp(logs) + (1.0 - self.share) / logs.shape[0])
+        return logs - soft, soft
+
+
+class Transport(eqx.Module):
+    """Instead of a draw, every particle moves: optimal transport from the weighted to equal weights, smoothed by entropy.
+
+        x_i <- N sum_j T_ij x_j,    T = argmin sum T_ij |x_i - x_j|^2 - epsilon entropy(T),    rows 1/N, columns w
+
+    (A. Corenflos, J. Thornton, G. Deligiannidis & A. Doucet, Differentiable particle filtering via entropy-regularized optimal
+    transport, 2021; by Sinkhorn's iterations.) Fields count over their spread. The step is a smooth function of all it is
+    given, so that likelihoods of one key are smooth, too, and their gradient is exactly theirs. The **bias** is in the value:
+    particles are drawn together, the more the larger `epsilon`, and only as N grows and epsilon falls does it vanish. It costs
+    N^2 `iterations` exponentials a step: for some hundred particles.
+    """
+
+    epsilon: float = eqx.field(static=True, default=0.1)
+    iterations: int = eqx.field(static=True, default=60)
+
+    def __check_init__(self):
+        check("Transport.epsilon", self.epsilon, lambda v: v > 0, "positive")
+        if not isinstance(self.iterations, int) or self.iterations < 1:
+            raise InputError(f"Transport.iterations = {self.iterations}: must be a whole number of at least 1.")
+
+    def __call__(self, key, weights, n):
+        raise InputError("Transport moves particles and has no ancestors: it is for ParticleFilter alone.")
+
+    def moved(self, particles: Any, weights: Any) -> Any:
+        """The particles, (N,) in each field, moved to where equal weights say the same."""
+        fields = jnp.stack(particles)
+        mean = jnp.sum(weights * fields, axis=1, keepdims=True)
+        spread = numerics.sqrt(jnp.sum(weights * jnp.square(fields - mean), axis=1, keepdims=True))
+        # A field that does not vary says nothing of distances. The scale is no part of the gradient, as in the paper.
+        scale = jax.lax.stop_gradient(jnp.where(spread > 0, spread, 1.0))
+        cost = distances(fields / scale)
+        plan = transport_plan(cost, log_of(weights), self.epsilon, self.iterations)
+        return type(particles)(*jnp.sum(plan[None] * fields[:, None, :], axis=-1))
+
+
+def distances(points: Any) -> Any:
+    """Squared distances (N, N) between points (n, N), per dimension."""
+    return jnp.mean(jnp.square(points[:, :, None] - points[:, None, :]), axis=0)
+
+
+def transport_plan(cost: Any, log_weights: Any, epsilon: float, iterations: int) -> Any:
+    """N T (N, N), its rows sum to one, its columns nearly to N w: Sinkhorn's iterations in logarithms.
+
+    The smoothing falls from the largest cost to `epsilon` on the way, halving.
+    """
+    n = cost.shape[0]
+    uniform = -jnp.log(jnp.asarray(n, cost.dtype))
+    start = jnp.maximum(jax.lax.stop_gradient(jnp.max(cost)), epsilon)
+    falling = jnp.maximum(start * 0.5 ** jnp.arange(iterations, dtype=cost.dtype), epsilon)
+
+    def rows(g, eps):
+        return -eps * jax.nn.logsumexp(log_weights[None, :] + (g[None, :] - cost) / eps, axis=1)
+
+    def iterate(g, eps):
+        f = rows(g, eps)
+        return -eps * jax.nn.logsumexp(uniform + (f[:, None] - cost) / eps, axis=0), None
+
+    g, _ = jax.lax.scan(jax.checkpoint(iterate), jnp.zeros(n, cost.dtype), falling)
+    f = rows(g, epsilon)
+    return jnp.exp(log_weights[None, :] + (f[:, None] + g[None, :] - cost) / epsilon)

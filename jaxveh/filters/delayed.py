@@ -1,0 +1,204 @@
+"""Measurements that come late, and rows that come out of their order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.names import check_names
+from jaxveh._core.result import Result, code
+from jaxveh.statespace import Discrete, Row, StateSpace
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info
+from jaxveh.statespace.process import Together
+
+
+class DelayedBelief(AbstractBelief):
+    """The newest belief `inside`; the last rows in the order of their times, `rows` with (depth,) leaves, those that are `real`
+    (depth,), and the belief `base` before the first of them; `said`: the log-likelihood of all rows so far; `began`: the first
+    row's time."""
+
+    inside: Any
+    base: Any
+    rows: Row
+    real: jax.Array
+    base_said: jax.Array
+    said: jax.Array
+    began: Any
+
+    @property
+    def mean(self):
+        """The newest belief's mean."""
+        return self.inside.mean
+
+    @property
+    def t(self):
+        """The newest time, s."""
+        return self.inside.t
+
+    @property
+    def u(self):
+        """The inputs there."""
+        return self.inside.u
+
+    @property
+    def count(self):
+        """Rows and late measurements so far."""
+        return self.inside.count
+
+    def moments(self, model):
+        return self.inside.moments(model)
+
+
+class Delayed(AbstractFilter):
+    """Any `filter`, with measurements taken in the order of their own times, not of their arrival (Y. Bar-Shalom, X. Li & T.
+    Kirubarajan 2001, on out-of-sequence measurements: by going back and filtering anew, which is exact).
+
+    `delays`: by channel, how long before the row's time its value was measured (s): `{"gnss_speed": 0.12}`. And `step` takes rows
+    with times before the newest one's. The last `depth` rows and late measurements are kept: what is older than these is left
+    out, with the result code `measurement_too_late`; a delayed value from before the first row is ignored.
+
+    A row in order costs two steps of the filter, one that is late `depth` of them. Its info has the log-likelihood that the
+    rows' arrival adds to the sum, and the innovations of the row's own values. Delayed values take the inputs of the row before
+    their time. Process noise must be continuous in time: an extra row in a step must not be an extra draw.
+    """
+
+    filter: AbstractFilter
+    delays: tuple[tuple[str, float], ...] = eqx.field(static=True)
+    depth: int = eqx.field(static=True)
+
+    def __init__(self, filter: AbstractFilter, delays: Mapping[str, float] | None = None, depth: int = 20):
+        self.filter, self.delays, self.depth = filter, tuple(sorted((delays or {}).items())), depth
+
+    def __check_init__(self):
+        for name, delay in self.delays:
+            check_positive(f"Delayed.delays of {name}", delay)
+        if not isinstance(self.depth, int) or self.depth < 1 + len(self.delays):
+            raise InputError(
+                f"Delayed.depth = {self.depth}: must be a whole number of at least {1 + len(self.delays)}, one more than delays."
+            )
+
+    def check(self, model):
+        check_names("Delayed.delays", [name for name, _ in self.delays], model.channels)
+        noise = model.process_noise
+        parts = noise.parts if isinstance(noise, Together) else (noise,)
+        if any(isinstance(part, Discrete) for part in parts):
+            raise InputError("Delayed: the process noise is a law a step (Discrete): it must be Continuous.")
+        if model.input_path != "held":
+            raise InputError(f"Delayed: the model's inputs run {model.input_path}: input_path must be 'held'.")
+        self.filter.check(model)
+
+    def init(self, model, row, key=None):
+        inside, info = self.filter.init(model, self._prompt(row), key)
+        rows = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (self.depth, *jnp.shape(leaf))), row)
+        said = info.log_likelihood
+        return DelayedBelief(inside, inside, rows, jnp.zeros(self.depth, bool), said, said, row.t), _bare(info)
+
+    def step(self, model, belief, row):
+        before, too_late = belief, jnp.asarray(False)
+        in_order = row.t >= before.inside.t
+        pieces = [self._late(belief, row, name, delay) for name, delay in self.delays]
+        for _, real in pieces:
+            in_order = in_order & ~real
+        prompt = self._prompt(row)
+        for piece, real in [*pieces, (prompt, jnp.asarray(True))]:
+            late = real & (piece.t < belief.base.t)
+            too_late = too_late | (late & (piece.t >= belief.began))
+            belief = self._kept(model, belief, piece, real & ~late)
+        inside, said, info = jax.lax.cond(in_order, self._onward, self._anew, model, before, belief, prompt)
+        result = jnp.where((info.result == 0) & too_late, code(Result.measurement_too_late), info.result)
+        info = info._replace(log_likelihood=said - before.said, result=result)
+        after = DelayedBelief(inside, belief.base, belief.rows, belief.real, belief.base_said, said, belief.began)
+        return after, info
+
+    def _onward(self, model, before, belief, row) -> tuple[Any, Any, Info]:
+        """One step from the newest belief."""
+        inside, info = self.filter.step(model, before.inside, row)
+        return inside, before.said + info.log_likelihood, _bare(info)
+
+    def _anew(self, model, before, belief, row) -> tuple[Any, Any, Info]:
+        """From the base through all rows that are kept."""
+
+        def forward(carry, given):
+            inside, said = carry
+            row, real = given
+            after, info = self.filter.step(model, inside, row)
+            inside, more = _choose(real, (after, info.log_likelihood), (inside, jnp.zeros_like(said)))
+            new = real & ((row.t == newest) | _among(row.t, times))
+            return (inside, said + more), (_bare(info), real, new)
+
+        newest = row.t
+        times = [row.t - delay for _, delay in self.delays]
+        start = belief.base, belief.base_said
+        (inside, said), (infos, real, new) = jax.lax.scan(forward, start, (belief.rows, belief.real))
+        return inside, said, _merged(infos, real, new)
+
+    def _prompt(self, row: Row) -> Row:
+        """The row without what is delayed."""
+        late = {name for name, _ in self.delays}
+        kept = {n: jnp.full_like(v, jnp.nan) if n in late else v for n, v in row.y._asdict().items()}
+        return row._replace(y=type(row.y)(**kept))
+
+    def _late(self, belief: DelayedBelief, row: Row, name: str, delay: float) -> tuple[Row, Any]:
+        """The delayed value of a channel as a row of its own time, and whether there is one."""
+        kept = {n: v if n == name else jnp.full_like(v, jnp.nan) for n, v in row.y._asdict().items()}
+        t = row.t - delay
+        earlier = belief.real & (belief.rows.t <= t)
+        place = jnp.argmax(jnp.where(earlier, belief.rows.t, -jnp.inf))
+        u = jax.tree.map(
+            lambda rows, base: jnp.where(jnp.any(earlier), rows[place], base), belief.rows.u, belief.base.u
+        )
+        return Row(t, u, type(row.y)(**kept)), ~jnp.isnan(getattr(row.y, name))
+
+    def _kept(self, model: StateSpace, belief: DelayedBelief, piece: Row, real) -> DelayedBelief:
+        """The belief with the piece among its rows; the oldest of them goes into the base."""
+        longer = lambda rows, one: jnp.concatenate([rows, one[None]])
+        rows, reals = jax.tree.map(longer, (belief.rows, belief.real), (piece, real))
+        order = jnp.argsort(jnp.where(reals, rows.t, -jnp.inf), stable=True)
+        rows, reals = jax.tree.map(lambda leaf: leaf[order], (rows, reals))
+        oldest = jax.tree.map(lambda leaf: leaf[0], rows)
+
+        def absorb(base, said):
+            after, info = self.filter.step(model, base, oldest)
+            return after, said + info.log_likelihood
+
+        base, said = jax.lax.cond(reals[0], absorb, lambda base, said: (base, said), belief.base, belief.base_said)
+        rows, reals = jax.tree.map(lambda leaf: leaf[1:], (rows, reals))
+        return DelayedBelief(belief.inside, base, rows, reals, said, belief.said, belief.began)
+
+
+def _bare(info: Info) -> Info:
+    """Without what has no meaning for several rows at once."""
+    return info._replace(whitened=None, log_scale=None)
+
+
+def _among(t: Any, times: list) -> Any:
+    found = jnp.asarray(False)
+    for other in times:
+        found = found | (t == other)
+    return found
+
+
+def _choose(condition: Any, a: Any, b: Any) -> Any:
+    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), a, b)
+
+
+def _merged(infos: Info, real: Any, new: Any) -> Info:
+    """One info of all rows filtered anew: innovations and NIS of the new ones, the first failure of all."""
+    pick = lambda values: jnp.sum(jnp.where(new & jnp.isfinite(values), values, 0), axis=0)
+    seen = lambda values: jnp.any(new & jnp.isfinite(values), axis=0)
+    by_channel = lambda tree: jax.tree.map(lambda v: jnp.where(seen(v), pick(v), jnp.nan), tree)
+    failed = real & (infos.result != 0)
+    result = jnp.where(jnp.any(failed), infos.result[jnp.argmax(failed)], code(Result.successful))
+    return Info(
+        log_likelihood=jnp.sum(infos.log_likelihood),
+        innovation=by_channel(infos.innovation),
+        innovation_std=by_channel(infos.innovation_std),
+        nis=jnp.where(jnp.any(jnp.isfinite(infos.nis)), pick(infos.nis), jnp.nan),
+        ess=infos.ess[-1],
+        result=result,
+    )

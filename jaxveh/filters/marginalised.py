@@ -1,0 +1,287 @@
+"""The Rao-Blackwellised particle filter: what is linear given the rest is left to a Kalman filter for each particle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.names import check_names, record
+from jaxveh.filters.choosing import log_of
+from jaxveh.filters.gaussian.filter import check_covariances, wrapped_innovation
+from jaxveh.filters.gaussian.forms import Covariance, Spread
+from jaxveh.filters.gaussian.noises import covariance_in
+from jaxveh.filters.gaussian.rules import Image, times
+from jaxveh.filters.particle import (
+    AbstractParticleFilter,
+    check_particle_settings,
+    check_scheme,
+    choose_ancestors,
+    log_chosen,
+    make_info,
+    need_key,
+)
+from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import AbstractBelief, always, apart, presence
+from jaxveh.statespace.noise import LOG_2PI
+
+
+class MarginalisedBelief(AbstractBelief):
+    """Weighted particles, each with a Gaussian over the linear states.
+
+    `particles`: the state's NamedTuple with (N,) in each field, of the linear states the conditional means; `covariances`
+    (N, l, l) of the linear states given each particle, in the order of the filter's `linear`; `weights` (N,), `ancestors` (N,).
+    """
+
+    particles: Any
+    covariances: jax.Array
+    weights: jax.Array
+    ancestors: jax.Array
+    key: Any
+    t: Any
+    u: Any
+    count: Any
+    linear: tuple[str, ...] = eqx.field(static=True)
+
+    @property
+    def mean(self):
+        """The state's mean."""
+        return jax.tree.map(lambda field: numerics.total(self.weights * field), self.particles)
+
+    @property
+    def covariance(self):
+        """(n, n) in the order of the state's fields: between particles, and within them."""
+        names = self.particles._fields
+        centred = jnp.stack([field - m for field, m in zip(self.particles, self.mean, strict=True)])
+        place = np.array([names.index(name) for name in self.linear])
+        within = jnp.sum(self.weights[:, None, None] * self.covariances, axis=0)
+        between = times(centred * self.weights, centred.T)
+        return between.at[np.ix_(place, place)].add(within)
+
+    @property
+    def std(self):
+        """The state's standard deviations."""
+        return type(self.particles)(*numerics.sqrt(jnp.diagonal(self.covariance)))
+
+    def moments(self, model):
+        kinds = []
+
+        def shown(values, point):
+            x = point._replace(**dict(zip(self.linear, values, strict=True)))
+            report = model.report(self.t, x, self.u)
+            kinds.append(type(report))
+            return jnp.stack([jnp.asarray(value, values.dtype) for value in report])
+
+        def of(point, covariance):
+            values = jnp.stack([getattr(point, name) for name in self.linear])
+            seen, slope = jax.linearize(lambda v: shown(v, point), values)
+            J = jax.vmap(slope, out_axes=1)(jnp.eye(len(values), dtype=values.dtype))
+            return seen, jnp.sum(times(J, covariance) * J, axis=1)
+
+        seen, within = jax.vmap(of)(self.particles, self.covariances)
+        weights = self.weights[:, None]
+        mean = jnp.sum(weights * seen, axis=0)
+        variance = jnp.sum(weights * (within + jnp.square(seen - mean)), axis=0)
+        return kinds[0](*mean), kinds[0](*numerics.sqrt(variance))
+
+
+class Marginalised(AbstractParticleFilter):
+    """The Rao-Blackwellised, or marginalised, particle filter (T. Schon, F. Gustafsson & P.-J. Nordlund 2005).
+
+    Given the path of the other states, the states `linear` have transition and observation linear in them and Gaussian noises:
+    each particle carries their exact Gaussian. With J the slopes of the transition by them, z the other states, x the linear
+
+        (z, x)_{k+1} ~ N(f, J P J^T + Q),   z is drawn, x is given z:   what z's draw says of x is used
+        weights: N(y; h, H P H^T + R),      and x is given y
+
+    It takes fewer particles than a filter that draws all states, by as much as the linear ones vary. Every other state must
+    carry process noise, all noises need covariances. A model that is not linear in `linear` raises `InputError`.
+    """
+
+    particles: int = eqx.field(static=True)
+    linear: tuple[str, ...] = eqx.field(static=True)
+    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    threshold: float = eqx.field(static=True, default=1.0)
+    gradient: str = eqx.field(static=True, default="score")
+
+    def __check_init__(self):
+        check_particle_settings(self.particles, self.threshold, self.gradient)
+        check_scheme(self)
+        if not self.linear:
+            raise InputError("Marginalised.linear is empty: name the states that are linear given the others.")
+
+    def check(self, model):
+        check_names("Marginalised.linear", self.linear, model.states)
+        check_covariances("Marginalised", model)
+        noisy = () if model.process_noise is None else model.process_noise.law.names
+        still = [name for name in _others(self, model) if name not in noisy]
+        if still:
+            raise InputError(
+                f"Marginalised: the drawn states {', '.join(still)} carry no process noise, which the conditional Gaussians "
+                "need. Make them linear states, or use ParticleFilter."
+            )
+        _check_linear_in(self.linear, model)
+
+    def init(self, model, row, key=None):
+        return apart(self._init, always(row.t), model, row, need_key(self, key))
+
+    def _init(self, model, row, key):
+        draw, key = jax.random.split(key)
+        dtype = model.prior.mean[0].dtype
+        n, others = self.particles, _others(self, model)
+        order = np.array([model.states.index(name) for name in (*others, *self.linear)])
+        joint = model.prior.covariance()[order][:, order]
+        mean = jnp.stack(model.prior.mean)[order]
+        white = numerics.normal(draw, (len(others), n), dtype)
+        drawn = jax.vmap(lambda w: _given_first(mean, joint, w), in_axes=1)(white)
+        weights = jnp.full((n,), 1 / n, dtype)
+        start = Cloud(_named(self, model, drawn.z.T, drawn.x.T), drawn.P)
+        ancestors = jnp.arange(n, dtype=jnp.int32)
+        return self._weigh(model, row, start, Prior(ancestors, weights, log_of(weights)), key, jnp.int32(0))
+
+    def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
+        draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
+        ancestors, resampled = choose_ancestors(self, draw, belief.weights)
+        uniform = jnp.full((self.particles,), 1 / self.particles, belief.weights.dtype)
+        logs = log_of(belief.weights)
+        chosen = log_of(uniform) + log_chosen(self, logs, ancestors)
+        weights = uniform
+        if resampled is not None:
+            weights = jnp.where(resampled, uniform, belief.weights)
+            chosen = jnp.where(resampled, chosen, logs)
+        taken = jax.tree.map(lambda leaf: leaf[ancestors], (belief.particles, belief.covariances))
+        u = model.step_inputs(belief.t, row.t, belief.u, row.u)
+        law = model.process_noise.over(row.t - belief.t)
+        others = _others(self, model)
+        Q = covariance_in(law, (*others, *self.linear), weights.dtype)
+        white = numerics.normal(noise, (len(others), self.particles), weights.dtype)
+
+        def move(point, P, white):
+            f = lambda x: model.transition(belief.t, row.t, x, u)
+            mean, J = _slopes(self.linear, point, lambda x: [getattr(f(x), n) for n in (*others, *self.linear)])
+            return _given_first(mean, times(times(J, P), J.T) + Q, white)
+
+        moved = jax.vmap(move, in_axes=(0, 0, 1))(*taken, white)
+        moved = numerics.barrier(moved)
+        cloud = Cloud(_named(self, model, moved.z.T, moved.x.T), moved.P)
+        return self._weigh(model, row, cloud, Prior(ancestors, weights, chosen), belief.key, belief.count)
+
+    def _weigh(self, model, row: Row, cloud, prior, key, count):
+        measured, present = presence(model, row)
+        here = jnp.stack([present[name] for name in model.channels])
+        given = jnp.stack([measured[name] for name in model.channels])
+
+        def see(point, P):
+            observe = lambda x: [getattr(model.observation(row.t, x, row.u), name) for name in model.channels]
+            mean, H = _slopes(self.linear, point, observe)
+            root = numerics.cholesky(P)
+            image = Image(mean, jnp.where(here[:, None], times(H, root), 0), root, None)
+            innovation = wrapped_innovation(model, given - mean, here)
+            found = Covariance().condition(
+                image, model.measurement_noise, model.channels, here, innovation, Spread(root, P)
+            )
+            present_ = jnp.sum(here.astype(innovation.dtype))
+            distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
+            return -0.5 * (distance + present_ * LOG_2PI), innovation, found.shift, found.spread.matrix
+
+        logs, residual, shift, P = jax.vmap(see)(cloud.particles, cloud.covariances)
+        linear = {name: getattr(cloud.particles, name) + shift[:, i] for i, name in enumerate(self.linear)}
+        particles = cloud.particles._replace(**linear)
+        weights, log_mean, alive = numerics.normalise(logs + prior.log_weights)
+        log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
+        belief = MarginalisedBelief(particles, P, weights, prior.ancestors, key, row.t, row.u, count + 1, self.linear)
+        by_name = dict(zip(model.channels, residual.T, strict=True))
+        info = make_info(model, row, log_likelihood, by_name, present, (prior.weights, weights), alive)
+        return belief, info
+
+
+class Cloud(NamedTuple):
+    """Particles before their measurement: the state's NamedTuple with (N,) fields, covariances (N, l, l)."""
+
+    particles: Any
+    covariances: Any
+
+
+class Prior(NamedTuple):
+    """Ancestors, weights, and the weights' logarithms with the derivative of the choice, before a measurement."""
+
+    ancestors: Any
+    weights: Any
+    log_weights: Any
+
+
+class Drawn(NamedTuple):
+    """Drawn states z (q,), and the Gaussian (x, P) of the linear ones given them."""
+
+    z: Any
+    x: Any
+    P: Any
+
+
+def _given_first(mean, covariance, white) -> Drawn:
+    """The first q = len(white) of jointly Gaussian numbers drawn by `white` (q,), and the others given them."""
+    q = white.shape[0]
+    if q == 0:
+        return Drawn(white, mean, covariance)
+    factor = numerics.cholesky(covariance[:q, :q])
+    gain = numerics.solve_lower(factor, covariance[:q, q:])
+    P = covariance[q:, q:] - times(gain.T, gain)
+    return Drawn(mean[:q] + times(factor, white), mean[q:] + times(gain.T, white), P)
+
+
+def _slopes(linear: tuple[str, ...], point, function) -> tuple[Any, Any]:
+    """Values (m,) of a function of the state at `point`, and their slopes (m, l) by the linear states."""
+    values = jnp.stack([getattr(point, name) for name in linear])
+
+    def rows(values):
+        x = point._replace(**dict(zip(linear, values, strict=True)))
+        return jnp.stack([jnp.asarray(value, values.dtype) for value in function(x)])
+
+    seen, slope = jax.linearize(rows, values)
+    return seen, jax.vmap(slope, out_axes=1)(jnp.eye(len(linear), dtype=values.dtype))
+
+
+def _others(filter_: Marginalised, model: StateSpace) -> tuple[str, ...]:
+    return tuple(name for name in model.states if name not in filter_.linear)
+
+
+def _named(filter_: Marginalised, model: StateSpace, z, x) -> Any:
+    """The state's NamedTuple of rows z (q, N) and x (l, N)."""
+    values = dict(zip((*_others(filter_, model), *filter_.linear), (*z, *x), strict=True))
+    return type(model.prior.mean)(**values)
+
+
+def _check_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
+    """Raise `InputError` naming the first value that is not linear in the states `linear`. Tracers pass."""
+    if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
+        return
+    dtype = model.prior.mean[0].dtype
+    t0, t1 = jnp.zeros((), dtype), jnp.asarray(0.01, dtype)
+    u = record("Inputs", {name: jnp.asarray(1.0, dtype) for name in model.inputs})
+    spread = dict(zip(model.states, 10.0 * jnp.sqrt(jnp.diagonal(model.prior.covariance())), strict=True))
+    # Not at the others' means, where a product with one that is zero would seem linear.
+    point = type(model.prior.mean)(**{n: m + 0.1 * spread[n] for n, m in model.prior.mean._asdict().items()})
+    move = lambda x: model.transition(t0, t1, x, model.step_inputs(t0, t1, u, u))
+    see = lambda x: model.observation(t0, x, u)
+    for what, names, f in (("state", model.states, move), ("channel", model.channels, see)):
+        seen, slopes = _slopes(linear, point, lambda x, f=f, names=names: [getattr(f(x), n) for n in names])
+        step = jnp.stack([spread[name] * np.cos(1.0 + 2.0 * i) for i, name in enumerate(linear)])
+        moved = point._replace(**{n: getattr(point, n) + step[i] for i, n in enumerate(linear)})
+        there = jnp.stack([jnp.asarray(getattr(f(moved), n), dtype) for n in names])
+        slope = times(slopes, step)
+        size = jnp.abs(seen) + jnp.abs(slope) + jnp.abs(there)
+        curved = np.asarray(jnp.abs(there - seen - slope) > 1e3 * jnp.finfo(dtype).eps * size)
+        if curved.any():
+            raise InputError(
+                f"Marginalised: {what} {names[int(np.argmax(curved))]} is not linear in {', '.join(linear)}. "
+                "Name fewer states in `linear`, or use Guided."
+            )

@@ -1,0 +1,141 @@
+"""Each row given those up to a lag behind it: live, or over a recording."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh.filters.choosing import Transport
+from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
+from jaxveh.filters.smoothing.rauch_tung_striebel import gaussian_of, given_later, has_smoother
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
+from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter
+from jaxveh.statespace.driver import scan_and_keep
+
+
+class LaggedBelief(AbstractBelief):
+    """The newest belief `inside`; the last beliefs as one with (lag + 1, ...) leaves, oldest first, in `past`; and what the
+    report says of the oldest, given the newest: `shown`, mean and standard deviation."""
+
+    inside: Any
+    past: Any
+    shown: Any
+
+    @property
+    def t(self):
+        """Time of the newest row, s."""
+        return self.inside.t
+
+    @property
+    def u(self):
+        """Inputs of the newest row."""
+        return self.inside.u
+
+    @property
+    def count(self):
+        """Rows so far."""
+        return self.inside.count
+
+    def moments(self, model):
+        return self.shown
+
+
+class FixedLag(AbstractFilter):
+    """`filter`, whose estimate is that of the row `lag` rows back, given all up to now; in the first rows, of the first.
+
+    A live smoother of constant memory: for what may come late, by `lag` rows, and should be good. Gaussian filters go back by
+    their own Rauch-Tung-Striebel steps, particle filters by their ancestors (G. Kitagawa 1996), whose lines are still many over
+    a short lag. Infos are those of the filter. A step costs `lag` steps back.
+
+    `smooth(filter, model, recording, lag=...)` does the same with each row's estimate in its own place.
+    """
+
+    filter: AbstractFilter
+    lag: int = eqx.field(static=True)
+
+    def __check_init__(self):
+        check_lag(self.filter, self.lag)
+
+    def check(self, model):
+        self.filter.check(model)
+
+    def init(self, model, row, key=None):
+        belief, info = self.filter.init(model, row, key)
+        past = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (self.lag + 1, *jnp.shape(leaf))), belief)
+        return LaggedBelief(belief, past, belief.moments(model)), info
+
+    def step(self, model, belief, row):
+        inside, info = self.filter.step(model, belief.inside, row)
+        longer = lambda past, new: jnp.concatenate([past[1:], new[None]])
+        past = jax.tree.map(longer, belief.past, inside)
+        # Before there are so many rows the oldest are copies of the first.
+        real = jnp.arange(self.lag, dtype=jnp.int32) >= self.lag + 1 - inside.count
+        return LaggedBelief(inside, past, first_of(self.filter, model, past, real)), info
+
+
+def check_lag(filter: Any, lag: int) -> None:
+    """Raise `InputError` for a lag that is no whole number of at least 1, or a filter without a smoother."""
+    if not isinstance(lag, int) or lag < 1:
+        raise InputError(f"lag = {lag}: must be a whole number of at least 1.")
+    if isinstance(filter, AbstractParticleFilter):
+        if isinstance(filter.resampling, Transport):
+            raise InputError("FixedLag: particles of Transport have no ancestors.")
+    elif not has_smoother(filter):
+        raise InputError(
+            f"{type(filter).__name__} has no fixed-lag smoother: take a Gaussian filter, or a particle filter."
+        )
+
+
+def first_of(filter: Any, model: StateSpace, past: Any, real: Any) -> tuple[Any, Any]:
+    """Mean and spread of the report of the first of `past` beliefs, (L + 1, ...) leaves, given the last.
+
+    A belief that is not `real` (L,) is passed over: it is a copy of the one after it.
+    """
+    if isinstance(filter, AbstractParticleFilter):
+        return _traced(model, past, real)
+    last = jax.tree.map(lambda leaf: leaf[-1], past)
+    before = jax.tree.map(lambda leaf: leaf[:-1], past)
+    after = past.t[1:], jax.tree.map(lambda leaf: leaf[1:], past.u)
+
+    def back(later, given):
+        belief, (t, u), counts = given
+        found = given_later(filter, model, belief, t, u, later)
+        return jax.tree.map(lambda a, b: jnp.where(counts, a, b), found, later), None
+
+    first, _ = jax.lax.scan(jax.checkpoint(back), gaussian_of(last), (before, after, real), reverse=True)
+    return first.moments(model)
+
+
+def _traced(model: StateSpace, past: ParticleBelief, real: Any) -> tuple[Any, Any]:
+    """The same by the ancestors of the last particles."""
+    weights = past.weights[-1]
+    lines = jnp.arange(weights.shape[0], dtype=past.ancestors.dtype)
+
+    def back(lines, given):
+        parents, counts = given
+        return jnp.where(counts, parents[lines], lines), None
+
+    lines, _ = jax.lax.scan(back, lines, (past.ancestors[1:], real), reverse=True)
+    particles = jax.tree.map(lambda field: field[0][lines], past.particles)
+    first = jax.tree.map(lambda leaf: leaf[0], (past.t, past.u))
+    return ParticleBelief(particles, weights, None, None, *first, None).moments(model)
+
+
+@eqx.filter_jit
+def smooth_with_lag(filter: Any, model: StateSpace, rows: Row, key, lag: int) -> SmoothedEstimate:
+    """Each row given those up to `lag` rows behind it, over rows with (T,) leaves."""
+    filtered, beliefs = scan_and_keep(filter, model, rows, key, lambda belief: belief)
+    count = rows.t.shape[0]
+
+    def window(k):
+        # Behind the end stand copies of the last row, which say nothing more of the ones before.
+        place = jnp.minimum(k + jnp.arange(lag + 1), count - 1)
+        past = jax.tree.map(lambda leaf: leaf[place], beliefs)
+        return first_of(filter, model, past, k + jnp.arange(lag) < count - 1)
+
+    return smoothed_estimate(model, filtered, jax.lax.map(window, jnp.arange(count)))

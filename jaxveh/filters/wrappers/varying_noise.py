@@ -1,0 +1,86 @@
+"""Noise that a channel of the recording tells: a receiver's own accuracy, a road's roughness."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import check_names
+from jaxveh.statespace import Continuous, Gaussian, StateSpace
+from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.statespace.process import Discrete
+
+
+class VaryingNoise(AbstractFilter):
+    """Any `filter`, with standard deviations that inputs of the model say, row by row.
+
+    `measurement`: the input that is a channel's standard deviation (its unit), by channel (`{"gnss_speed":
+    "gnss_speed_accuracy"}`), that of the same row. `process`: the input that is a state's process noise (unit per root second,
+    or a step, as the model has it), by state, that of the step's first row. The model's noises must be Gaussian, a standard
+    deviation a field; the fields not named keep theirs. Numbers that are not positive end in a result code.
+    """
+
+    filter: AbstractFilter
+    measurement: tuple[tuple[str, str], ...] = eqx.field(static=True)
+    process: tuple[tuple[str, str], ...] = eqx.field(static=True)
+
+    def __init__(
+        self,
+        filter: AbstractFilter,
+        measurement: Mapping[str, str] | None = None,
+        process: Mapping[str, str] | None = None,
+    ):
+        self.filter = filter
+        self.measurement, self.process = (
+            tuple(sorted((measurement or {}).items())),
+            tuple(sorted((process or {}).items())),
+        )
+
+    def __check_init__(self):
+        if not self.measurement and not self.process:
+            raise InputError("VaryingNoise: name a channel in `measurement` or a state in `process`.")
+
+    def check(self, model):
+        check_names("VaryingNoise.measurement", [name for name, _ in self.measurement], model.channels)
+        noisy = () if model.process_noise is None else model.process_noise.law.names
+        check_names("VaryingNoise.process (of states with process noise)", [name for name, _ in self.process], noisy)
+        check_names("VaryingNoise: inputs", [name for _, name in (*self.measurement, *self.process)], model.inputs)
+        laws = [("measurement noise", model.measurement_noise)] if self.measurement else []
+        if self.process:
+            kind = type(model.process_noise).__name__
+            if not isinstance(model.process_noise, Continuous | Discrete):
+                raise InputError(f"VaryingNoise: the process noise is {kind}: must be Continuous or Discrete.")
+            laws.append(("process noise", model.process_noise.law))
+        for what, law in laws:
+            if not isinstance(law, Gaussian):
+                kind = type(law).__name__
+                raise InputError(f"VaryingNoise: the {what} is {kind}: must be Gaussian, a standard deviation a field.")
+        self.filter.check(model)
+
+    def init(self, model, row, key=None):
+        return self.filter.init(self._told(model, row.u, row.u), row, key)
+
+    def step(self, model, belief, row):
+        return self.filter.step(self._told(model, row.u, belief.u), belief, row)
+
+    def _told(self, model: StateSpace, now: Any, before: Any) -> StateSpace:
+        """The model with what the inputs `now` say of the measurement, and those `before` of the process."""
+        if self.measurement:
+            law = _with(model.measurement_noise, self.measurement, now)
+            model = eqx.tree_at(lambda m: m.measurement_noise, model, law)
+        if self.process:
+            law = _with(model.process_noise.law, self.process, before)
+            model = eqx.tree_at(lambda m: m.process_noise.law, model, law)
+        return model
+
+
+def _with(law: Gaussian, told: tuple[tuple[str, str], ...], u: Any) -> Gaussian:
+    stds = dict(told)
+    # A number that is none must not be taken for one: NaN ends in a result code.
+    positive = lambda value: jnp.where(value > 0, value, jnp.nan)
+    new = {name: positive(getattr(u, stds[name])) if name in stds else std for name, std in law.std._asdict().items()}
+    return eqx.tree_at(lambda l: l.std, law, type(law.std)(**new))

@@ -1,0 +1,126 @@
+"""Inputs that are measured with noise of their own: their errors become states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.names import check_names, record_type
+from jaxveh.statespace.model import LinearInput, Prior, StateSpace
+from jaxveh.statespace.noise import Gaussian, combine
+from jaxveh.statespace.process import AbstractProcessNoise, join
+
+
+def uncertain_inputs(
+    model: StateSpace, std: Mapping[str, float], correlation: Mapping[str, float] | None = None
+) -> StateSpace:
+    """The model with inputs known up to an error, which counts in transition and observation alike: u + e.
+
+    `std`: the error's standard deviation by input, in its unit. White from row to row, unless `correlation` gives its time
+    constant (s): then `e` is a Gauss-Markov process of this spread, as of a sensor whose offset wanders. Each error is a state
+    `<input>_error`, reported with the rest where the model has no report of its own. With inputs that run linearly the error
+    of a step's first row holds throughout it.
+
+    Leaving input noise out makes a filter too sure of itself: half a degree of hand wheel is as much as a gyroscope's noise.
+
+    **Raises** `InputError` for an input that the model lacks, a number that is not positive, a model with chosen parameters
+    (do this before choosing).
+    """
+    times = dict(correlation or {})
+    check_names("uncertain_inputs", std, model.inputs)
+    check_names("uncertain_inputs: correlation", times, std)
+    for name, value in (*std.items(), *times.items()):
+        check_positive(f"uncertain_inputs: {name}", value)
+    if not std:
+        raise InputError("uncertain_inputs: std is empty: give the standard deviation of at least one input's error.")
+    if model.chosen is not None:
+        raise InputError("uncertain_inputs: parameters are chosen already; make the inputs uncertain first.")
+    errors = Errors(tuple(std), tuple(float(times.get(name, 0.0)) for name in std), type(model.prior.mean))
+    like = model.prior.mean[0]
+    spreads = Gaussian({f"{name}_error": jnp.asarray(value, like.dtype) for name, value in std.items()})
+    mean = errors.state_type(*model.prior.mean, *[jnp.zeros_like(like)] * len(errors.inputs))
+    return StateSpace(
+        system=model.system,
+        transition=Moved(model.transition_function, errors),
+        observation=Observed(model.observation_function, errors),
+        process_noise=join(model.process_noise, Wandering(spreads, errors.times)),
+        measurement_noise=model.measurement_noise,
+        prior=Prior(mean, combine(model.prior.law, spreads)),
+        inputs=model.inputs,
+        report=None if model.report_function is None else Observed(model.report_function, errors),
+        angles=model.angles,
+        input_path=model.input_path,
+    )
+
+
+class Errors(eqx.Module):
+    """The errors' inputs, their time constants (s; 0: white), and the state that the model had before."""
+
+    inputs: tuple[str, ...] = eqx.field(static=True)
+    times: tuple[float, ...] = eqx.field(static=True)
+    inside: Any = eqx.field(static=True)
+
+    @property
+    def state_type(self):
+        """The model's state followed by the errors."""
+        return record_type("State", (*self.inside._fields, *[f"{name}_error" for name in self.inputs]))
+
+    def split(self, x):
+        """The model's own state, and the errors in a list."""
+        n = len(self.inside._fields)
+        return self.inside(*x[:n]), list(x[n:])
+
+    def added(self, u, errors):
+        """The inputs with their errors, at an instant or along a step."""
+        if isinstance(u, LinearInput):
+            return LinearInput(u.t0, u.t1, self.added(u.u0, errors), self.added(u.u1, errors))
+        return u._replace(**{n: getattr(u, n) + error for n, error in zip(self.inputs, errors, strict=True)})
+
+
+class Moved(eqx.Module):
+    """Moves the model's own state with inputs that are off by the errors, which fade."""
+
+    function: Callable = eqx.field(static=True)
+    errors: Errors = eqx.field(static=True)
+
+    def __call__(self, system, t0, t1, x, u):
+        state, errors = self.errors.split(x)
+        state = self.function(system, t0, t1, state, self.errors.added(u, errors))
+        kept = [_kept(t1 - t0, time) * error for time, error in zip(self.errors.times, errors, strict=True)]
+        return self.errors.state_type(*state, *kept)
+
+
+class Observed(eqx.Module):
+    """What the sensors say, or a report shows, of the model's own state with inputs that are off by the errors."""
+
+    function: Callable = eqx.field(static=True)
+    errors: Errors = eqx.field(static=True)
+
+    def __call__(self, system, t, x, u):
+        state, errors = self.errors.split(x)
+        return self.function(system, t, state, self.errors.added(u, errors))
+
+
+class Wandering(AbstractProcessNoise):
+    """What a Gauss-Markov process of the spread `law` and these time constants (s; 0: white) gets anew in a step."""
+
+    law: Gaussian
+    times: tuple[float, ...] = eqx.field(static=True)
+
+    def over(self, dt):
+        fresh = [numerics.sqrt(1.0 - _kept(dt, time) ** 2) for time in self.times]
+        return eqx.tree_at(
+            lambda law: law.std,
+            self.law,
+            type(self.law.std)(*[std * share for std, share in zip(self.law.std, fresh, strict=True)]),
+        )
+
+
+def _kept(dt, time: float):
+    """How much of an error is left after `dt` (s)."""
+    return jnp.exp(-dt / time) if time else jnp.zeros_like(dt)
