@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.rounds < 1:
         parser.error(f"--rounds is {options.rounds}; it must be at least 1")
     try:
-        core = machine.prepare(options.core)
+        core = machine.prepare(options.core, options.smoke)
     except ValueError as error:
         parser.error(str(error))
     cases = _cases(options.smoke, options.only)
