@@ -1,6 +1,17 @@
 """Filters as `lax.scan` loops behind one contract: `init`, `step`, and the driver `run`."""
 
 from jaxveh.filters.auxiliary import AuxiliaryParticleFilter
+from jaxveh.filters.calibration import (
+    Accuracy,
+    Calibration,
+    LogLikelihoodSpread,
+    Runs,
+    log_likelihood_spread,
+    monte_carlo,
+    rmse_beside_bound,
+    run_and_keep,
+    simulation_based_calibration,
+)
 from jaxveh.filters.checkpoint import load_belief, save_belief
 from jaxveh.filters.ensemble import Ensemble, EnsembleBelief
 from jaxveh.filters.export import export_filter
@@ -48,8 +59,10 @@ __all__ = [
     "AbstractForm",
     "AbstractGaussianFilter",
     "AbstractParticleFilter",
+    "Accuracy",
     "AuxiliaryParticleFilter",
     "BackwardSampling",
+    "Calibration",
     "Consider",
     "Covariance",
     "Cubature",
@@ -71,11 +84,13 @@ __all__ = [
     "Iterated",
     "Kalman",
     "LiuWest",
+    "LogLikelihoodSpread",
     "ParticleBelief",
     "ParticleFilter",
     "Paused",
     "Regularised",
     "RobustStudentT",
+    "Runs",
     "SageHusa",
     "SigmaPointFilter",
     "Simplex",
@@ -87,9 +102,14 @@ __all__ = [
     "VariationalBayes",
     "export_filter",
     "load_belief",
+    "log_likelihood_spread",
+    "monte_carlo",
+    "rmse_beside_bound",
     "run",
+    "run_and_keep",
     "save_belief",
     "scan",
+    "simulation_based_calibration",
     "smooth",
     "smooth_parallel",
 ]

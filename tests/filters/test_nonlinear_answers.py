@@ -1,4 +1,4 @@
-"""Particle filters on nonlinear models against a dense grid, and their calibration: ranks, NEES."""
+"""Particle filters on nonlinear models against a dense grid, and NEES of Gaussian filters."""
 
 import functools
 
@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from filter_systems import linear_model
-from nonlinear_systems import as_recording, grid_filter, growth, rows_of, simulate, volatility
+from nonlinear_systems import as_recording, grid_filter, growth, simulate, volatility
 from scipy import stats
 
 from jaxveh import filters, numerics
@@ -54,26 +54,6 @@ def test_likelihood_and_means_are_the_grid_s_within_their_scatter(name, model):
     assert abs(np.mean(logs) + 0.5 * spread**2 - total) < 4.0 * spread / np.sqrt(SEEDS) + 1e-3
     scatter = np.std(found, axis=0) / np.sqrt(SEEDS)
     assert (np.abs(np.mean(found, axis=0) - means) < 5.0 * scatter + 2e-2).all()
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_the_truth_s_rank_among_the_particles_is_uniform(model):
-    """Simulation-based calibration (S. Talts and others 2018): over draws of the model no rank is more likely than another."""
-    system = MODELS[model][0]()
-    filter_, count, bins = filters.ParticleFilter(200), 800, 10
-
-    @jax.jit
-    def rank(key):
-        draw, run, choose = jax.random.split(key, 3)
-        states, measured = simulate(system, draw, 12)
-        belief = filters.scan(filter_, system, rows_of(measured), run).belief
-        # Equally weighted draws of the belief.
-        drawn = belief.particles.x[jax.random.categorical(choose, jnp.log(belief.weights), shape=(99,))]
-        return jnp.sum(drawn < states[-1])
-
-    ranks = np.asarray(jax.vmap(rank)(jax.random.split(jax.random.key(8), count)))
-    counts = np.bincount(ranks * bins // 100, minlength=bins)
-    assert stats.chisquare(counts).pvalue > 0.01
 
 
 GAUSSIAN = {
