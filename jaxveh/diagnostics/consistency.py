@@ -104,7 +104,8 @@ def nees(error: Any, covariance: Any, confidence: float = 0.95, skip: int = 0) -
     A row's mean over R runs has R n degrees of freedom (Bar-Shalom, Li & Kirubarajan 2001, sec. 5.4.2). Rows of one run are
     **not** independent: from 10 runs on, the mean over all rows has the effective degrees of freedom that the scatter between
     runs tells (F. Satterthwaite 1946: 2 mean^2 / variance, of each run's mean), never fewer than a row's; with fewer runs it
-    has a row's, a wider band than need be.
+    has a row's, a wider band than need be. Beliefs that are no Gaussians, and particle filters whose covariance rests on a few
+    particles, are better judged by `filters.simulation_based_calibration`.
 
     **Raises** `InputError` for shapes that do not agree, or a covariance that is not positive definite.
     """

@@ -21,6 +21,7 @@ class PosteriorBound(NamedTuple):
 
     `time` (T,); `std`: the state's NamedTuple with (T,) in each field, of the model's states as they are (parameters on the real
     line); `covariance` (T, n, n): no estimate's mean square error matrix is below it; `runs`: over which expectations were taken.
+    NaN for states of which nothing is said (see `posterior_cramer_rao`).
     """
 
     time: np.ndarray
@@ -65,8 +66,9 @@ def posterior_cramer_rao(model: StateSpace, schedule: Recording, key, runs: int 
             raise FilterError(
                 f"posterior_cramer_rao: a Jacobian of the {what} is not finite in row {k}; a draw diverges."
             )
-    _check_linear(model, noisy, terms)
-    covariance = _recursion(model.states, noisy, start, terms)
+    kept = _with_recursion(model, noisy, terms)
+    covariance = np.full(terms.seen.shape, np.nan)
+    covariance[:, kept[:, None], kept] = _recursion([model.states[i] for i in kept], noisy, *_only(kept, start, terms))
     variances = np.einsum("tii->ti", covariance)
     std = type(model.prior.mean)(*np.sqrt(variances).T)
     return PosteriorBound(np.asarray(schedule.time), std, covariance, runs)
@@ -74,11 +76,12 @@ def posterior_cramer_rao(model: StateSpace, schedule: Recording, key, runs: int 
 
 class _Terms(NamedTuple):
     """Expectations of each row: `seen` (T, n, n) E[H^T R^-1 H]; of each step, (T - 1, ...): `F` E[F], `spread` of F over the
-    draws (largest deviation), `pull` E[F^T Q^-1 F] over noisy rows, `Q` (q, q)."""
+    draws (largest deviation), `largest` |F|, `pull` E[F^T Q^-1 F] over noisy rows, `Q` (q, q)."""
 
     seen: Any
     F: Any
     spread: Any
+    largest: Any
     pull: Any
     Q: Any
 
@@ -117,34 +120,47 @@ def _seen(model: StateSpace, row, states):
 
 
 def _step(model: StateSpace, row, after, states):
-    """E[F], the largest deviation from it, E[F^T Q^-1 F] over noisy states, and Q, of states (R,)."""
+    """E[F], the largest deviation from it, the largest |F|, E[F^T Q^-1 F] over noisy states, and Q, of states (R,)."""
     kind = type(model.prior.mean)
     u = model.step_inputs(row.t, after.t, row.u, after.u)
     move = lambda vector: jnp.stack(moved(model, row.t, after.t, kind(*vector), u))
     F = jax.vmap(jax.jacfwd(move))(jnp.stack(states, axis=1))
     mean = jnp.mean(F, axis=0)
-    spread = jnp.max(jnp.abs(F - mean), axis=0)
+    spread, largest = jnp.max(jnp.abs(F - mean), axis=0), jnp.max(jnp.abs(F), axis=0)
     if model.process_noise is None:
-        return mean, spread, jnp.zeros_like(mean), jnp.zeros((0, 0), mean.dtype)
+        return mean, spread, largest, jnp.zeros_like(mean), jnp.zeros((0, 0), mean.dtype)
     Q = location_covariance(model.process_noise.over(after.t - row.t))
     noisy = F[:, np.asarray([model.states.index(name) for name in model.process_noise.law.names])]
-    return mean, spread, jnp.mean(jnp.swapaxes(noisy, 1, 2) @ jnp.linalg.solve(Q, noisy), axis=0), Q
+    return mean, spread, largest, jnp.mean(jnp.swapaxes(noisy, 1, 2) @ jnp.linalg.solve(Q, noisy), axis=0), Q
 
 
-def _check_linear(model: StateSpace, noisy: tuple[str, ...], terms: _Terms) -> None:
-    """Raise `InputError` where a state without process noise moves nonlinearly: where its Jacobian differs between draws."""
+def _with_recursion(model: StateSpace, noisy: tuple[str, ...], terms: _Terms) -> np.ndarray:
+    """Places of the states that have a recursion: all but those without process noise whose Jacobian differs between draws.
+
+    **Raises** `InputError` where one that has none matters for the others, or none has one.
+    """
     rounding = 1e3 * np.finfo(model.prior.mean[0].dtype).eps
-    for i, name in enumerate(model.states):
-        if name in noisy or not terms.F.size:
-            continue
-        if (terms.spread[:, i] > rounding * (1 + np.abs(terms.F[:, i]))).any():
+    bent = (terms.spread > rounding * (1 + np.abs(terms.F))).any(axis=(0, 2))
+    without = np.array([bent[i] and name not in noisy for i, name in enumerate(model.states)])
+    kept = np.flatnonzero(~without)
+    for i in np.flatnonzero(without):
+        name = model.states[i]
+        if kept.size == 0 or terms.largest[:, kept, i].any() or terms.seen[:, i, i].any():
             raise InputError(
                 f"posterior_cramer_rao: {name} carries no process noise and its transition is not linear, for which there is no "
-                "recursion. Give it a little noise, or leave it out of the state."
+                "recursion, and what is measured depends on it. Give it a little noise."
             )
+    return kept
 
 
-def _recursion(states: tuple[str, ...], noisy: tuple[str, ...], start: np.ndarray, terms: _Terms) -> np.ndarray:
+def _only(kept: np.ndarray, start: np.ndarray, terms: _Terms) -> tuple[np.ndarray, _Terms]:
+    """The prior's covariance and the expectations of some states."""
+    block = lambda matrices: matrices[..., kept[:, None], kept]
+    seen, F, spread, largest, pull = (block(matrices) for matrices in terms[:-1])
+    return block(start), _Terms(seen, F, spread, largest, pull, terms.Q)
+
+
+def _recursion(states: list[str], noisy: tuple[str, ...], start: np.ndarray, terms: _Terms) -> np.ndarray:
     """Covariance bounds (T, n, n), from the prior's (n, n)."""
     n, q = len(states), len(noisy)
     moving = [states.index(name) for name in noisy]

@@ -76,7 +76,7 @@ def riccati(model, recording):
 @pytest.mark.parametrize("noise", [("drift", "speed", "place"), ("speed",), ()])
 def test_on_linear_models_the_bound_is_the_kalman_filter_s_covariance(noise):
     model, recording = car(noise), schedule()
-    bound = ss.posterior_cramer_rao(model, recording, jax.random.key(0), runs=3)
+    bound = ss.posterior_cramer_rao(model, recording, jax.random.key(0), runs=7)
     exact = riccati(model, recording)
     scale = np.sqrt(np.einsum("tii->ti", exact))
     np.testing.assert_allclose(
@@ -136,6 +136,38 @@ def test_states_without_noise_that_move_nonlinearly_are_refused():
         ss.posterior_cramer_rao(curve(None, {"y": 0.3}), Recording(np.arange(4.0), {}), jax.random.key(0))
 
 
+def test_states_without_a_recursion_are_left_out_where_nothing_depends_on_them():
+    """A heading and a place, as odometry has them: the speed is as well known as without them."""
+    State = namedtuple("State", "heading speed place")
+
+    def move(system, t0, t1, x, u):
+        turn = 0.1 * x.speed * x.speed
+        return State(x.heading + turn, 0.9 * x.speed + jnp.sin(x.speed), x.place + x.speed * jnp.cos(x.heading))
+
+    def make(seen):
+        return ss.StateSpace(
+            transition=move,
+            observation=lambda s, t, x, u: Seen(x.heading, x.speed),
+            process_noise=ss.Discrete(ss.Gaussian({"speed": 0.2})),
+            measurement_noise=seen,
+            prior=ss.Prior(State(0.0, 1.0, 0.0), {"place": 1.0, "speed": 0.3, "heading": 0.2}),
+        )
+
+    alone = ss.StateSpace(
+        transition=lambda s, t0, t1, x, u: X(0.9 * x.x + jnp.sin(x.x)),
+        observation=lambda s, t, x, u: Y(x.x),
+        process_noise=ss.Discrete(ss.Gaussian({"x": 0.2})),
+        measurement_noise={"y": 0.3},
+        prior=ss.Prior(X(1.0), {"x": 0.3}),
+    )
+    given, key = Recording(np.arange(8.0), {}), jax.random.key(0)
+    bound = ss.posterior_cramer_rao(make({"v": 0.3}), given, key, 4000)
+    assert np.isnan([bound.std.heading, bound.std.place]).all()
+    np.testing.assert_allclose(bound.std.speed, ss.posterior_cramer_rao(alone, given, key, 4000).std.x, rtol=0.01)
+    with pytest.raises(InputError, match="heading carries no process noise"):
+        ss.posterior_cramer_rao(make({"at": 0.1, "v": 0.3}), given, key)
+
+
 def test_laws_without_a_known_information_are_refused():
     mixture = ss.CauchyGaussianMixture(0.3, {"y": 0.1}, {"y": 0.1})
     model = curve(ss.Discrete(ss.Gaussian({"x": 0.3})), mixture)
@@ -183,3 +215,12 @@ def test_draws_have_the_model_s_moments():
             np.cov(y[:, :, k] - x[:2, :, k]), model.measurement_noise.matrix, rtol=0.04, atol=0.01
         )
         np.testing.assert_allclose(np.mean(y[0, :, k] - x[0, :, k]), 0.5 * force, atol=0.015)
+
+
+def test_float32_stays_so_and_comes_near(float32):
+    model, given = ss.cast(car(), jnp.float32), schedule()
+    drawn = ss.draw(model, given, jax.random.key(1))
+    assert {leaf.dtype for leaf in (*drawn.states, *drawn.recording.channels.values())} == {jnp.dtype("float32")}
+    bound = ss.posterior_cramer_rao(model, given, jax.random.key(0), runs=7)
+    exact = riccati(model, given)
+    np.testing.assert_allclose(np.stack(bound.std, axis=1), np.sqrt(np.einsum("tii->ti", exact)), rtol=1e-4)
