@@ -1,37 +1,54 @@
-"""Diagnoses: whether a log is fit to estimate from, what a recording can tell about parameters at all, and the numbers that
-standards take from a drive."""
+"""Diagnoses: whether a log is fit to estimate from, what a recording can tell about parameters at all, whether an estimate is as
+good as it says, and the numbers that standards take from a drive."""
 
 from jaxveh.diagnostics.braking_test import BrakingTest, braking_test
+from jaxveh.diagnostics.chi_squared import chi_squared_band, chi_squared_quantile, chi_squared_tails
+from jaxveh.diagnostics.consistency import Consistency, nees, nis, nis_by_channel
 from jaxveh.diagnostics.drive_numbers import Peaks, drive_numbers, peaks
 from jaxveh.diagnostics.frequency_response import FrequencyResponse, frequency_response
 from jaxveh.diagnostics.log_check import check_log
 from jaxveh.diagnostics.log_findings import SEVERITIES, Finding
 from jaxveh.diagnostics.log_plausibility import check_car
 from jaxveh.diagnostics.observability import Observability, from_sensitivities
+from jaxveh.diagnostics.particles import Ancestry, ParticleHealth, ancestry, particle_health
 from jaxveh.diagnostics.sine_with_dwell import SineWithDwellTest, sine_with_dwell
 from jaxveh.diagnostics.steady_state import SteadyTurns, Understeer, steady_turns, understeer
 from jaxveh.diagnostics.step_response import StepResponse, step_response
+from jaxveh.diagnostics.whiteness import Whiteness, whiteness
 
 __all__ = [
     "SEVERITIES",
+    "Ancestry",
     "BrakingTest",
+    "Consistency",
     "Finding",
     "FrequencyResponse",
     "Observability",
+    "ParticleHealth",
     "Peaks",
     "SineWithDwellTest",
     "SteadyTurns",
     "StepResponse",
     "Understeer",
+    "Whiteness",
+    "ancestry",
     "braking_test",
     "check_car",
     "check_log",
+    "chi_squared_band",
+    "chi_squared_quantile",
+    "chi_squared_tails",
     "drive_numbers",
     "frequency_response",
     "from_sensitivities",
+    "nees",
+    "nis",
+    "nis_by_channel",
+    "particle_health",
     "peaks",
     "sine_with_dwell",
     "steady_turns",
     "step_response",
     "understeer",
+    "whiteness",
 ]

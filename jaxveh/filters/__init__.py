@@ -2,6 +2,17 @@
 
 from jaxveh.filters.adaptive_number import AdaptiveNumber
 from jaxveh.filters.auxiliary import AuxiliaryParticleFilter
+from jaxveh.filters.calibration import (
+    Accuracy,
+    Calibration,
+    LogLikelihoodSpread,
+    Runs,
+    log_likelihood_spread,
+    monte_carlo,
+    rmse_beside_bound,
+    run_and_keep,
+    simulation_based_calibration,
+)
 from jaxveh.filters.checkpoint import load_belief, save_belief
 from jaxveh.filters.choosing import Soft, Transport
 from jaxveh.filters.delayed import Delayed, DelayedBelief
@@ -56,9 +67,11 @@ __all__ = [
     "AbstractForm",
     "AbstractGaussianFilter",
     "AbstractParticleFilter",
+    "Accuracy",
     "AdaptiveNumber",
     "AuxiliaryParticleFilter",
     "BackwardSampling",
+    "Calibration",
     "Consider",
     "Covariance",
     "Cubature",
@@ -84,6 +97,7 @@ __all__ = [
     "Iterated",
     "Kalman",
     "LiuWest",
+    "LogLikelihoodSpread",
     "Marginalised",
     "MarginalisedBelief",
     "MatchedProcess",
@@ -92,6 +106,7 @@ __all__ = [
     "Paused",
     "Regularised",
     "RobustStudentT",
+    "Runs",
     "SageHusa",
     "ShrinkingProcess",
     "SigmaPointFilter",
@@ -107,9 +122,14 @@ __all__ = [
     "VaryingNoise",
     "export_filter",
     "load_belief",
+    "log_likelihood_spread",
+    "monte_carlo",
+    "rmse_beside_bound",
     "run",
+    "run_and_keep",
     "save_belief",
     "scan",
+    "simulation_based_calibration",
     "smooth",
     "smooth_parallel",
 ]

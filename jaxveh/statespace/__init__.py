@@ -1,5 +1,7 @@
 """The one contract that a filter sees: models by name, noise laws, discretisation, chosen parameters as states."""
 
+from jaxveh.statespace.cramer_rao import PosteriorBound, posterior_cramer_rao
+from jaxveh.statespace.draw import Drawn, draw
 from jaxveh.statespace.driver import Estimate, run, scan
 from jaxveh.statespace.model import LinearInput, PerPoint, Prior, Row, StateSpace, cast
 from jaxveh.statespace.noise import (
@@ -22,6 +24,7 @@ __all__ = [
     "CauchyGaussianMixture",
     "Continuous",
     "Discrete",
+    "Drawn",
     "Estimate",
     "Gaussian",
     "Heun",
@@ -29,6 +32,7 @@ __all__ = [
     "LinearInput",
     "MultivariateGaussian",
     "PerPoint",
+    "PosteriorBound",
     "Prior",
     "Propagate",
     "RolledRK4",
@@ -36,7 +40,9 @@ __all__ = [
     "StateSpace",
     "StudentT",
     "cast",
+    "draw",
     "parameter_view",
+    "posterior_cramer_rao",
     "put_parameters",
     "run",
     "scan",

@@ -8,7 +8,6 @@ import numpy as np
 
 from jaxveh import Recording
 from jaxveh import statespace as ss
-from jaxveh._core.names import record_type
 
 X = namedtuple("X", "x")
 Y = namedtuple("Y", "y")
@@ -77,12 +76,6 @@ def simulate(model, key, rows):
 
 def as_recording(measured):
     return Recording(np.arange(float(len(measured))), {"y": np.asarray(measured)})
-
-
-def rows_of(measured):
-    """The same for a batch of measurements (..., T), as rows."""
-    time = jnp.broadcast_to(jnp.arange(float(measured.shape[-1])), measured.shape)
-    return ss.Row(time, record_type("Inputs", ())(), record_type("Measurements", ("y",))(measured))
 
 
 def grid_filter(model, measured, low, high, points=2000):

@@ -1,17 +1,15 @@
-"""Particle filters on nonlinear models against a dense grid, and their calibration: ranks, NEES."""
+"""Particle filters on nonlinear models against a dense grid, and NEES of Gaussian filters."""
 
 import functools
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from filter_systems import linear_model
-from nonlinear_systems import as_recording, grid_filter, growth, rows_of, simulate, volatility
-from scipy import stats
+from nonlinear_systems import as_recording, grid_filter, growth, simulate, volatility
 
-from jaxveh import filters, numerics
+from jaxveh import Recording, diagnostics, filters, numerics
 from jaxveh import statespace as ss
 
 ROWS, SEEDS, N = 40, 30, 2000
@@ -56,26 +54,6 @@ def test_likelihood_and_means_are_the_grid_s_within_their_scatter(name, model):
     assert (np.abs(np.mean(found, axis=0) - means) < 5.0 * scatter + 2e-2).all()
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_the_truth_s_rank_among_the_particles_is_uniform(model):
-    """Simulation-based calibration (S. Talts and others 2018): over draws of the model no rank is more likely than another."""
-    system = MODELS[model][0]()
-    filter_, count, bins = filters.ParticleFilter(200), 800, 10
-
-    @jax.jit
-    def rank(key):
-        draw, run, choose = jax.random.split(key, 3)
-        states, measured = simulate(system, draw, 12)
-        belief = filters.scan(filter_, system, rows_of(measured), run).belief
-        # Equally weighted draws of the belief.
-        drawn = belief.particles.x[jax.random.categorical(choose, jnp.log(belief.weights), shape=(99,))]
-        return jnp.sum(drawn < states[-1])
-
-    ranks = np.asarray(jax.vmap(rank)(jax.random.split(jax.random.key(8), count)))
-    counts = np.bincount(ranks * bins // 100, minlength=bins)
-    assert stats.chisquare(counts).pvalue > 0.01
-
-
 GAUSSIAN = {
     "Kalman": filters.Kalman(),
     "Unscented, square root": filters.Unscented(form=filters.SquareRoot()),
@@ -87,38 +65,10 @@ GAUSSIAN = {
 
 @pytest.mark.parametrize("name", GAUSSIAN)
 def test_nees_is_in_its_band_where_the_model_is_linear(name):
-    """Errors over their covariance are chi-squared with as many degrees of freedom as states (Bar-Shalom, sec. 5.4)."""
     model = linear_model(3, 2, seed=3)
-    law = ss.Gaussian({"y0": 0.4, "y1": 0.3})
-    model = eqx.tree_at(lambda m: m.measurement_noise, model, law)
-    runs_, rows = 400, 15
-
-    @jax.jit
-    def nees(key):
-        keys = jax.random.split(key, 2 * rows).reshape(rows, 2)
-        force = ss.model.record("Inputs", {"force": jnp.asarray(0.3)})
-        first = model.prior.sample(keys[0, 0])
-
-        def see(x, t, key):
-            error = law.sample(key)
-            return {n: v + error[n] for n, v in model.observation(t, x, force)._asdict().items()}
-
-        def step(x, given):
-            t, (one, two) = given
-            noise = model.process_noise.over(0.1).sample(one)
-            x = model.transition(t - 0.1, t, x, force)
-            x = x._replace(**{n: getattr(x, n) + v for n, v in noise.items()})
-            return x, see(x, t, two)
-
-        times = 0.1 * jnp.arange(rows)
-        last, y = jax.lax.scan(step, first, (times[1:], keys[1:]))
-        y = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), see(first, times[0], keys[0, 1]), y)
-        inputs = jax.tree.map(lambda value: jnp.full((rows,), value), force)
-        measured = ss.model.record("Measurements", y)
-        belief = filters.scan(GAUSSIAN[name], model, ss.Row(times, inputs, measured)).belief
-        error = jnp.stack(last) - jnp.stack(belief.mean)
-        return error @ jnp.linalg.solve(belief.covariance, error)
-
-    found = np.asarray(jax.vmap(nees)(jax.random.split(jax.random.key(2), runs_)))
-    low, high = stats.chi2.ppf((0.025, 0.975), 3 * runs_) / runs_
-    assert low < np.mean(found) < high
+    model = eqx.tree_at(lambda m: m.measurement_noise, model, ss.Gaussian({"y0": 0.4, "y1": 0.3}))
+    schedule = Recording(0.1 * np.arange(15), {"force": np.full(15, 0.3)})
+    runs = filters.monte_carlo(GAUSSIAN[name], model, schedule, jax.random.key(2), 400)
+    found = diagnostics.nees(runs.error, runs.covariance)
+    assert found.row_low[-1] < found.by_row[-1] < found.row_high[-1]
+    assert found.consistent

@@ -50,6 +50,11 @@ class MixtureBelief(AbstractBelief):
         """The mixture's standard deviations, the state's NamedTuple."""
         return _mixed(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[1]
 
+    @property
+    def covariance(self):
+        """(n, n) of the mixture, in the order of the state's fields."""
+        return _mixed_covariance(self.probabilities, self.modes)[1]
+
     def moments(self, model):
         # A mode's own model reports its state: what differs are parameters, and the report is of states.
         return _mixed(self.probabilities, [mode.moments(model) for mode in self.modes])
@@ -120,12 +125,7 @@ class InteractingModels(AbstractFilter):
 
     def _mix(self, belief: MixtureBelief, weights, j: int) -> GaussianBelief:
         """The Gaussian with the mixture's moments, for mode j."""
-        vectors = jnp.stack([mode.vector for mode in belief.modes])
-        mean = jnp.sum(weights[:, None] * vectors, axis=0)
-        deviations = vectors - mean
-        outer = deviations[:, :, None] * deviations[:, None, :]
-        whole = jnp.stack([mode.covariance for mode in belief.modes]) + outer
-        covariance = jnp.sum(weights[:, None, None] * whole, axis=0)
+        mean, covariance = _mixed_covariance(weights, belief.modes)
         return with_spread(belief.modes[j], mean, self.filter.form.start(covariance))
 
     def _weighed(self, model, row, before, found):
@@ -136,6 +136,16 @@ class InteractingModels(AbstractFilter):
         total = jnp.sum(weights)
         info = _mixture_info(model, row, before, infos, top + jnp.log(total))
         return MixtureBelief(tuple(beliefs), weights / total), info
+
+
+def _mixed_covariance(weights, modes):
+    """Mean (n,) and covariance (n, n) of a mixture of Gaussians."""
+    vectors = jnp.stack([mode.vector for mode in modes])
+    mean = jnp.sum(weights[:, None] * vectors, axis=0)
+    deviations = vectors - mean
+    outer = deviations[:, :, None] * deviations[:, None, :]
+    whole = jnp.stack([mode.covariance for mode in modes]) + outer
+    return mean, jnp.sum(weights[:, None, None] * whole, axis=0)
 
 
 def _mixed(weights, moments):

@@ -1,0 +1,19 @@
+"""Whether a filter is right on a model: many runs on draws of it, ranks of the truth, scatter of the log-likelihood."""
+
+from jaxveh.filters.calibration.accuracy import Accuracy, rmse_beside_bound
+from jaxveh.filters.calibration.kept import run_and_keep
+from jaxveh.filters.calibration.log_likelihood import LogLikelihoodSpread, log_likelihood_spread
+from jaxveh.filters.calibration.monte_carlo import Runs, monte_carlo
+from jaxveh.filters.calibration.simulation_based import Calibration, simulation_based_calibration
+
+__all__ = [
+    "Accuracy",
+    "Calibration",
+    "LogLikelihoodSpread",
+    "Runs",
+    "log_likelihood_spread",
+    "monte_carlo",
+    "rmse_beside_bound",
+    "run_and_keep",
+    "simulation_based_calibration",
+]

@@ -1,0 +1,30 @@
+"""Running a filter and keeping something of every row's belief."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+
+from jaxveh._core.recording import Recording
+from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.statespace.driver import Estimate, raise_failure, scan_and_keep
+from jaxveh.statespace.model import StateSpace
+
+_scan_and_keep = eqx.filter_jit(scan_and_keep)
+
+
+def run_and_keep(
+    filter: AbstractFilter, model: StateSpace, recording: Recording, keep: Callable, *, key=None, throw: bool = True
+) -> tuple[Estimate, Any]:
+    """`run`, and `keep(belief)` of every row with (T, ...) leaves: `lambda belief: belief.covariance`, or its `ancestors`.
+
+    A new lambda compiles anew. **Raises** as `run`.
+    """
+    filter.check(model)
+    estimate, kept = _scan_and_keep(filter, model, model.rows(recording), key, keep)
+    estimate = eqx.tree_at(lambda e: e.time, estimate, recording.time)
+    if throw:
+        raise_failure(estimate, filter, model, recording)
+    return estimate, kept

@@ -1,0 +1,131 @@
+"""Simulation-based calibration: the truth's rank among draws of the belief is uniform if filter and model are right."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError, check
+from jaxveh._core.progress import Progress, silent
+from jaxveh._core.recording import Recording
+from jaxveh.diagnostics.chi_squared import chi_squared_tails
+from jaxveh.filters.calibration.batches import check_count, check_truth, in_batches
+from jaxveh.filters.calibration.monte_carlo import raise_failed
+from jaxveh.filters.ensemble import EnsembleBelief
+from jaxveh.filters.particle import ParticleBelief, log_of
+from jaxveh.filters.wrappers.interacting import MixtureBelief
+from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.statespace.draw import draw_rows, schedule_rows
+from jaxveh.statespace.driver import scan
+from jaxveh.statespace.model import StateSpace
+
+
+class Calibration(NamedTuple):
+    """Ranks of the truth: the state's NamedTuple with (R,) whole numbers from 0 to `draws` in each field."""
+
+    ranks: Any
+    draws: int
+
+    def histogram(self, bins: int = 10) -> Any:
+        """How many runs fell into each bin of ranks: the state's NamedTuple with (bins,) in each field.
+
+        A hump in the middle: the belief is too wide; heaps at both ends: too narrow; a slope: biased.
+
+        **Raises** `InputError` unless `bins` divides draws + 1.
+        """
+        if not isinstance(bins, int) or bins < 2 or (self.draws + 1) % bins:
+            raise InputError(
+                f"bins = {bins}: must be a whole number of at least 2 that divides draws + 1 = {self.draws + 1}."
+            )
+        width = (self.draws + 1) // bins
+        return type(self.ranks)(*[np.bincount(rank // width, minlength=bins) for rank in self.ranks])
+
+    def p_values(self, bins: int = 10) -> Any:
+        """Pearson's chi-squared test of uniform ranks: the probability of at least so uneven a histogram, by state.
+
+        **Raises** `InputError` as `histogram`, and for fewer than five runs a bin, where the test's law does not hold.
+        """
+        runs = len(self.ranks[0])
+        if runs < 5 * bins:
+            raise InputError(f"bins = {bins}: must be at most {runs // 5}, a fifth of the runs.")
+        expected = runs / bins
+        p_value = lambda counts: chi_squared_tails(float(np.sum((counts - expected) ** 2) / expected), bins - 1)[1]
+        return type(self.ranks)(*[p_value(counts) for counts in self.histogram(bins)])
+
+    def calibrated(self, level: float = 0.01, bins: int = 10) -> bool:
+        """Whether no state's test rejects, so that a right filter is rejected with probability `level` at most (Bonferroni)."""
+        check("level", level, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
+        return min(self.p_values(bins)) >= level / len(self.ranks)
+
+
+def simulation_based_calibration(
+    filter: AbstractFilter,
+    model: StateSpace,
+    schedule: Recording,
+    key,
+    runs: int = 500,
+    draws: int = 99,
+    *,
+    truth: StateSpace | None = None,
+    batch: int | None = None,
+    progress: Progress = silent,
+    throw: bool = True,
+) -> Calibration:
+    """Rank the true last state among `draws` of the belief after the last row, over `runs` draws of the model.
+
+    Over draws from prior and model, truth and belief are exchangeable, so that all ranks are equally likely, whatever the model,
+    if the filter is exact (S. Talts, M. Betancourt, D. Simpson, A. Vehtari & A. Gelman 2018). A particle filter is only with
+    many particles; a Gaussian filter only where beliefs are Gaussian.
+
+    **Arguments**: as `monte_carlo`. **Raises** likewise.
+    """
+    truth = model if truth is None else truth
+    check_count("runs", runs)
+    check_count("draws", draws)
+    check_truth(model, truth)
+    filter.check(model)
+    rows = schedule_rows(truth, schedule)
+    one_batch = lambda keys: _ranks(filter, model, truth, rows, keys, draws)
+    ranks, results = in_batches(one_batch, key, runs, batch, progress, "simulation-based calibration")
+    if throw:
+        raise_failed(filter, results)
+    return Calibration(ranks, draws)
+
+
+@eqx.filter_jit
+def _ranks(filter: AbstractFilter, model: StateSpace, truth: StateSpace, rows, keys, draws: int):
+    def one(key):
+        draw_key, filter_key, belief_key = jax.random.split(key, 3)
+        states, measured = draw_rows(truth, rows, draw_key)
+        estimate = scan(filter, model, measured, filter_key)
+        drawn = draw_belief(estimate.belief, belief_key, draws)
+        rank = lambda values, path: jnp.sum(values < path[-1])
+        return jax.tree.map(rank, drawn, states), estimate.result
+
+    return jax.vmap(one)(keys)
+
+
+def draw_belief(belief: Any, key, draws: int) -> Any:
+    """Draws of a belief: the state's NamedTuple with (draws,) in each field. Whatever has no samples is taken for a Gaussian."""
+    if isinstance(belief, ParticleBelief):
+        chosen = jax.random.categorical(key, log_of(belief.weights), shape=(draws,))
+        return jax.tree.map(lambda field: field[chosen], belief.particles)
+    if isinstance(belief, EnsembleBelief):
+        chosen = jax.random.randint(key, (draws,), 0, belief.members[0].shape[0])
+        return jax.tree.map(lambda field: field[chosen], belief.members)
+    if isinstance(belief, MixtureBelief):
+        key, mode_key = jax.random.split(key)
+        chosen = jax.random.categorical(mode_key, log_of(belief.probabilities), shape=(draws,))
+        modes = [
+            draw_belief(mode, k, draws)
+            for mode, k in zip(belief.modes, jax.random.split(key, len(belief.modes)), strict=True)
+        ]
+        return jax.tree.map(lambda *fields: jnp.stack(fields)[chosen, jnp.arange(draws)], *modes)
+    mean = jnp.stack(belief.mean)
+    white = numerics.normal(key, (mean.shape[0], draws), mean.dtype)
+    return type(belief.mean)(*(mean[:, None] + numerics.cholesky(belief.covariance) @ white))
