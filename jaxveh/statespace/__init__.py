@@ -1,5 +1,6 @@
 """The one contract that a filter sees: models by name, noise laws, discretisation, chosen parameters as states."""
 
+from jaxveh.statespace.disturbances import with_disturbances
 from jaxveh.statespace.driver import Estimate, run, scan
 from jaxveh.statespace.model import LinearInput, PerPoint, Prior, Row, StateSpace, cast
 from jaxveh.statespace.noise import (
@@ -40,5 +41,6 @@ __all__ = [
     "run",
     "scan",
     "start_from",
+    "with_disturbances",
     "with_parameters",
 ]
