@@ -84,7 +84,7 @@ STARTS = {
     "line": lambda: (regression(), Theta(2.0, -1.0)),
     "curve": lambda: (regression(see_curve, spread=1.0), Theta(0.7, -1.0)),
 }
-FULL = (("adaptive", "pendulum"), ("least squares, several", "line"))
+FULL = (("adaptive", "pendulum"), ("least squares", "curve"), ("least squares, several", "line"))
 """What another line says as well."""
 
 
@@ -94,6 +94,8 @@ def case(name, model, full=False):
 
 CASES = [case(name, model) for name, line in OBSERVERS.items() for model in line.models]
 # On its second model these say nothing new.
+LIVE = [case(name, OBSERVERS[name].models[0]) for name in ("Luenberger", "adaptive", "least squares")]
+"""A memory of each kind."""
 FIRST = [case(name, model, model != line.models[0]) for name, line in OBSERVERS.items() for model in line.models]
 
 
@@ -195,7 +197,7 @@ def test_its_gradient_is_that_of_differences(name, model_name):
     np.testing.assert_allclose(slope, (values[0] - values[1]) / (2 * h), rtol=1e-5, atol=1e-7)
 
 
-@pytest.mark.parametrize(("name", "model_name"), FIRST)
+@pytest.mark.parametrize(("name", "model_name"), LIVE)
 def test_a_live_loop_gives_the_scan_s_answer(name, model_name):
     (_, estimate), _ = found(name, model_name)
     observer, model, rows, _ = batch(name, model_name)

@@ -128,3 +128,27 @@ def test_chains_of_several_channels_place_every_pole():
 def test_bad_input_is_named(call, message):
     with pytest.raises(InputError, match=message):
         call()
+
+
+def test_without_float64_gains_and_estimates_are_good_enough(float32):
+    model, time = pushed(mass(channels=("place",))), DT * np.arange(600)
+    states, recording = drive(model, (0.3, -0.5, 0.7), time, {"force": np.sin(3.0 * time)})
+    found = run(observers.extended_state(model, 6.0, dt=DT), model, recording).mean
+    assert found.speed.dtype == np.float32
+    np.testing.assert_allclose(np.stack(found, axis=1)[-100:], states[-100:], atol=2e-2)
+    with pytest.raises(InputError, match="1 of 2 directions.*in speed"):
+        observers.place_poles(mass_unseen(), [-3.0, -4.0], dt=DT)
+
+
+def mass_unseen():
+    """Two states that nothing couples; one is seen."""
+    stays = lambda system, t0, t1, x, u: x
+    still = mass(channels=("place",))
+    return ss.StateSpace(
+        transition=stays,
+        observation=still.observation_function,
+        process_noise=None,
+        measurement_noise=still.measurement_noise,
+        prior=still.prior,
+        inputs=("force",),
+    )

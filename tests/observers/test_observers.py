@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from observer_systems import regression as line
 
 from jaxveh import InputError, Recording, observers, run
 from jaxveh import statespace as ss
@@ -134,21 +135,11 @@ def test_gains_have_the_gradients_of_differences():
     np.testing.assert_allclose(jax.grad(total)(gain)[1, 0], difference, rtol=1e-6)
 
 
-Theta, One = record_type("Theta", ("a", "b")), record_type("One", ("y",))
+ROWS = 1200
 
 
-def line(**prior):
-    return ss.StateSpace(
-        transition=lambda s, t0, t1, x, u: x,
-        observation=lambda s, t, x, u: One(x.a * u.p + x.b * u.q),
-        process_noise=None,
-        measurement_noise=ss.Gaussian({"y": 0.2}),
-        prior=ss.Prior(Theta(0.0, 0.0), prior or {"a": 10.0, "b": 10.0}),
-        inputs=("p", "q"),
-    )
-
-
-def regression(rows=80, jump=None):
+def regression(rows=ROWS, jump=None):
+    """What y = a p - q is, a jumping from 2 to 5."""
     rng = np.random.default_rng(0)
     p, q = rng.normal(size=rows), rng.normal(size=rows)
     a = np.where(np.arange(rows) < (rows if jump is None else jump), 2.0, 5.0)
@@ -159,7 +150,7 @@ def regression(rows=80, jump=None):
 @pytest.mark.parametrize("forgetting", [1.0, 0.95])
 def test_least_squares_are_those_of_the_batch(forgetting):
     p, q, y, recording = regression()
-    found = run(observers.RecursiveLeastSquares(forgetting, ceiling=1e9), line(), recording)
+    found = run(observers.RecursiveLeastSquares(forgetting), line(), recording)
     rows = len(y)
     A = np.stack([p, q], axis=1)
     weights = forgetting ** np.arange(rows - 1, -1, -1) / 0.2**2
@@ -193,14 +184,14 @@ def vahidi(p, q, y, forgetting, start):
 def test_separate_variances_are_those_of_the_paper():
     p, q, y, recording = regression()
     factors = np.array([0.9, 0.99])
-    found = run(observers.RecursiveLeastSquares(factors, ceiling=1e9, separate=True), line(), recording)
+    found = run(observers.RecursiveLeastSquares(factors, separate=True), line(), recording)
     expected = vahidi(p, q, y, factors, np.full(2, (10.0 / 0.2) ** 2))
     np.testing.assert_allclose(np.stack(found.mean, axis=1), expected, rtol=1e-9)
 
 
 def test_several_factors_follow_what_is_fast_beside_what_is_slow():
     # Mass and grade: a stays, b swings. One slow factor smears b, one fast factor shakes a.
-    rng, rows = np.random.default_rng(2), 1200
+    rng, rows = np.random.default_rng(2), ROWS
     p, q = 1.0 + 0.5 * rng.normal(size=rows), rng.normal(size=rows)
     b = np.sin(0.02 * np.arange(rows))
     recording = Recording(np.arange(float(rows)), {"p": p, "q": q, "y": 2.0 * p + b * q + 0.2 * rng.normal(size=rows)})
@@ -219,7 +210,7 @@ def test_several_factors_follow_what_is_fast_beside_what_is_slow():
 def test_what_is_not_excited_does_not_wind_up():
     rows = 3000
     recording = Recording(np.arange(float(rows)), {"p": np.ones(rows), "q": np.zeros(rows), "y": np.full(rows, 2.0)})
-    found = run(observers.RecursiveLeastSquares(0.9, ceiling=4.0), line(a=1.0, b=1.0), recording)
+    found = run(observers.RecursiveLeastSquares(0.9, ceiling=4.0), line(spread=1.0), recording)
     P = np.asarray(found.belief.memory)
     assert np.isfinite(P).all() and P[1, 1] < 4.0 * 1.0001 and P[0, 0] < 0.1
 
