@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_finite
 from jaxveh._core.result import Result, code
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import (
@@ -51,8 +51,8 @@ class AbstractObserver(AbstractFilter):
 
         x- = f(x, u),    e = y - h(x-, u),    x = x- + correction(e)
 
-    Missing channels have e = 0. Spreads, NIS and log-likelihoods are NaN: an observer does not know them. `init` starts at the
-    prior's mean and corrects it, `run` is that of filters.
+    Missing channels have e = 0 and correct nothing. Spreads, NIS and log-likelihoods are NaN: an observer does not know them.
+    `init` starts at the prior's mean and corrects it, `run` is that of filters.
     """
 
     # No postponed annotations in this file: they would make a field of it.
@@ -62,8 +62,15 @@ class AbstractObserver(AbstractFilter):
         """The memory before the first row."""
 
     @abc.abstractmethod
+    def predict(self, model: StateSpace, belief: PointBelief, row: Row) -> tuple[Any, Any]:
+        """The state (n,) at the row's time before its measurement, most often `advanced`, and the memory then."""
+
+    @abc.abstractmethod
     def correct(self, model: StateSpace, belief: PointBelief, row: Row, error: Any, here: Any) -> tuple[Any, Any]:
-        """The state's correction (n,) by the errors (m,) of the channels that are `here` (m,), and the memory after it."""
+        """The state's correction (n,) by the errors (m,) of the channels that are `here` (m,), and the memory after it.
+
+        The belief holds the predicted state and memory; its `t` is still the last row's (at the first row, this one's).
+        """
 
     def init(self, model, row, key=None):
         del key
@@ -77,10 +84,9 @@ class AbstractObserver(AbstractFilter):
         return apart(self._step, belief.count >= 0, model, belief, row)
 
     def _step(self, model, belief, row):
-        u = model.step_inputs(belief.t, row.t, belief.u, row.u)
-        moved = model.transition(belief.t, row.t, belief.mean, u)
-        vector = jnp.stack([jnp.asarray(value, belief.vector.dtype) for value in moved])
-        return self._measured(model, eqx.tree_at(lambda b: b.vector, belief, vector), row)
+        vector, memory = self.predict(model, belief, row)
+        predicted = PointBelief(vector, memory, belief.t, belief.u, belief.count, belief.state_type)
+        return self._measured(model, predicted, row)
 
     def _measured(self, model, belief: PointBelief, row: Row):
         measured, present = presence(model, row)
@@ -92,6 +98,13 @@ class AbstractObserver(AbstractFilter):
         vector = belief.vector + correction
         after = PointBelief(vector, memory, row.t, row.u, belief.count + 1, belief.state_type)
         return after, _info(model, row, error, present, vector)
+
+
+def advanced(model: StateSpace, belief: PointBelief, row: Row, vector: Any) -> Any:
+    """Where a state (n,) at the belief's time is at the row's time: (n,)."""
+    u = model.step_inputs(belief.t, row.t, belief.u, row.u)
+    moved = model.transition(belief.t, row.t, belief.state_type(*vector), u)
+    return jnp.stack([jnp.asarray(value, vector.dtype) for value in moved])
 
 
 def observed(model: StateSpace, row: Row, vector: Any) -> Any:
@@ -114,11 +127,13 @@ def _info(model, row, error, present, vector) -> Info:
     )
 
 
-def check_gain(name: str, gain: Any, model: StateSpace) -> None:
-    """Raise `InputError` unless a gain is (states, channels)."""
-    expected = (len(model.states), len(model.channels))
+def check_gain(name: str, gain: Any, model: StateSpace, states: tuple[str, ...] | None = None) -> None:
+    """Raise `InputError` unless a gain is finite and (states, channels); `states` are the model's unless given."""
+    states = model.states if states is None else states
+    expected = (len(states), len(model.channels))
     if gain.shape != expected:
         raise InputError(
-            f"{name} has shape {gain.shape}: must be {expected}, states {', '.join(model.states)} by channels "
+            f"{name} has shape {gain.shape}: must be {expected}, states {', '.join(states)} by channels "
             f"{', '.join(model.channels)}."
         )
+    check_finite(name, gain)

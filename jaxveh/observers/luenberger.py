@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import check, float_array
-from jaxveh.observers.base import AbstractObserver, check_gain
+from jaxveh._core.errors import InputError, check, float_array
+from jaxveh.observers.base import AbstractObserver, advanced, check_gain
 
 
 def array(value: Any) -> jax.Array:
@@ -19,7 +19,10 @@ def array(value: Any) -> jax.Array:
 class Luenberger(AbstractObserver):
     """`x = x- + gain e`, a constant `gain` (n, m) a step (D. Luenberger 1964). `place_poles` makes one.
 
-    The estimate's error obeys `(I - gain H) F`: with poles inside the unit circle it dies out on the model that is linear there.
+    The estimate's error obeys `(I - gain H) F`: on a linear model it dies out with these poles. On another it dies out as long as
+    one quadratic form falls wherever the car may be (`contraction_rate`). With gains from `a_y` to `v_y` this is the observer of
+    lateral velocity of L. Imsland et al. (Automatica 42, 2006), whose acceleration is the measured one and which is drawn to
+    where the tyres' forces agree with it: their condition is that those forces fall with v_y, so not beyond the tyres' peak.
     """
 
     gain: jax.Array = eqx.field(converter=array)
@@ -30,15 +33,21 @@ class Luenberger(AbstractObserver):
     def start(self, model):
         return ()
 
+    def predict(self, model, belief, row):
+        return advanced(model, belief, row, belief.vector), ()
+
     def correct(self, model, belief, row, error, here):
-        return self.gain @ error, ()
+        return self.gain.astype(error.dtype) @ error, ()
 
 
 class SlidingMode(AbstractObserver):
     """`x = x- + gain e + switching s(e / boundary)`, s(z) = z / (1 + |z|) for the sign, without its chatter.
 
     (J.-J. Slotine, J. Hedrick & E. Misawa 1987.) The switching gain (n, m) bounds what a wrong model may add in a step; within
-    the `boundary` (m,), in each channel's unit, the observer is linear.
+    the `boundary` (m,), in each channel's unit, the observer is close to linear with `gain + switching / boundary`: a boundary of
+    at least H switching, or the steps chatter. With one channel that is the state and without `gain`, what adds d a step is
+    rejected for |d| < switching: the error is within the boundary in finite time and ends at `boundary q / (1 - q)`,
+    q = |d| / switching.
     """
 
     gain: jax.Array = eqx.field(converter=array)
@@ -49,13 +58,22 @@ class SlidingMode(AbstractObserver):
         check("SlidingMode.boundary", self.boundary, lambda b: b > 0, "positive")
 
     def check(self, model):
+        if self.boundary.ndim > 1 or (self.boundary.ndim == 1 and len(self.boundary) != len(model.channels)):
+            raise InputError(
+                f"SlidingMode.boundary has shape {self.boundary.shape}: must be one, or one for each of "
+                f"{', '.join(model.channels)}."
+            )
         check_gain("SlidingMode.gain", self.gain, model)
         check_gain("SlidingMode.switching", self.switching, model)
 
     def start(self, model):
         return ()
 
+    def predict(self, model, belief, row):
+        return advanced(model, belief, row, belief.vector), ()
+
     def correct(self, model, belief, row, error, here):
-        scaled = error / self.boundary
-        smooth = scaled / (1.0 + jnp.abs(scaled))
-        return self.gain @ error + self.switching @ smooth, ()
+        dtype = error.dtype
+        scaled = error / self.boundary.astype(dtype)
+        smooth = scaled / (1 + jnp.abs(scaled))
+        return self.gain.astype(dtype) @ error + self.switching.astype(dtype) @ smooth, ()

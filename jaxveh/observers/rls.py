@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check
-from jaxveh.observers.base import AbstractObserver, observed
+from jaxveh.observers.base import AbstractObserver, advanced, observed
 from jaxveh.observers.luenberger import array
 
 
@@ -14,17 +14,20 @@ class RecursiveLeastSquares(AbstractObserver):
 
         K = P phi / (R + phi^T P phi),    theta += K e,    P <- (P - K phi^T P) / forgetting
 
-    `forgetting`: one factor, or one a state (A. Vahidi, A. Stefanopoulou & H. Peng 2005: mass slowly, grade fast), then
-    `P <- Lambda^-1/2 (P - K phi^T P) Lambda^-1/2`. R: the measurement noise's variances, weights of the channels. P starts as the
-    prior's covariance. `ceiling`: no state's variance grows beyond this multiple of its prior's, for what is not excited winds up
-    under forgetting. `reset`: where a channel's innovation exceeds this many of its predicted spreads, P starts anew: what is
-    estimated has jumped (None: never). The phi of each row is the observation's slope at the estimate; with one that is not
-    linear this is the recursive prediction error method.
+    `forgetting`: one factor, or one a state, then `P <- Lambda^-1/2 (P - K phi^T P) Lambda^-1/2` (S. Saelid & B. Foss 1983).
+    `separate`: each state has a variance of its own, P stays diagonal, updated as if the others were known (A. Vahidi,
+    A. Stefanopoulou & H. Peng, Vehicle System Dynamics 43, 2005: mass slowly, grade fast), which keeps one that is slow from
+    taking up what a fast one did. R: the measurement noise's variances, weights of the channels. P starts as the prior's
+    covariance. `ceiling`: no state's variance grows beyond this multiple of its prior's, for what is not excited winds up under
+    forgetting. `reset`: where a channel's innovation exceeds this many of its predicted spreads, P starts anew: what is estimated
+    has jumped (None: never). The phi of each row is the observation's slope at the estimate; with one that is not linear this
+    is the recursive prediction error method.
     """
 
     forgetting: jax.Array = eqx.field(converter=array, default=0.99)
     ceiling: float = eqx.field(static=True, default=100.0)
     reset: float | None = eqx.field(static=True, default=None)
+    separate: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
         check(
@@ -43,24 +46,43 @@ class RecursiveLeastSquares(AbstractObserver):
             raise InputError("RecursiveLeastSquares: the measurement noise has no variances, which weigh the channels.")
 
     def start(self, model):
-        return model.prior.covariance()
+        P = model.prior.covariance()
+        return jnp.diag(jnp.diagonal(P)) if self.separate else P
+
+    def predict(self, model, belief, row):
+        return advanced(model, belief, row, belief.vector), belief.memory
 
     def correct(self, model, belief, row, error, here):
-        P, start = belief.memory, model.prior.covariance()
+        P, start = belief.memory, self.start(model)
         slope = jax.jacfwd(lambda vector: observed(model, row, vector))(belief.vector)
         slope = jnp.where(here[:, None], slope, 0)
         noise = model.measurement_noise.covariance()
         noise = jnp.where(here[:, None] & here[None, :], noise, jnp.eye(len(here), dtype=noise.dtype))
-        spread = slope @ P @ slope.T + noise
         if self.reset is not None:
-            jumped = jnp.any(here & (jnp.square(error) > self.reset**2 * jnp.diagonal(spread)))
+            spread = jnp.diagonal(slope @ P @ slope.T + noise)
+            jumped = jnp.any(here & (jnp.square(error) > self.reset**2 * spread))
             P = jnp.where(jumped, start, P)
-            spread = slope @ P @ slope.T + noise
-        gain = jnp.linalg.solve(spread, slope @ P).T
-        after = P - gain @ slope @ P
-        root = jnp.sqrt(1.0 / jnp.broadcast_to(self.forgetting.astype(P.dtype), P.shape[:1]))
+        gain = _gain(P, slope, noise)
+        after = self._alone(P, slope, noise) if self.separate else _updated(P, gain, slope, noise)
+        root = jnp.sqrt(1 / jnp.broadcast_to(self.forgetting.astype(P.dtype), P.shape[:1]))
         after = jnp.where(jnp.any(here), after * root[:, None] * root[None, :], P)
         # Scaled back where a variance has grown beyond its ceiling; correlations stay.
         limit = jnp.sqrt(self.ceiling * jnp.diagonal(start) / jnp.diagonal(after))
-        shrink = jnp.minimum(limit, 1.0)
-        return gain @ error, 0.5 * (after + after.T) * shrink[:, None] * shrink[None, :]
+        shrink = jnp.minimum(limit, 1)
+        return gain @ error, after * shrink[:, None] * shrink[None, :]
+
+    def _alone(self, P, slope, noise):
+        """Each state's variance after the row as if the others were known."""
+        columns = slope.T[:, :, None]
+        single = jnp.diagonal(P)[:, None, None]
+        return jnp.diag(jax.vmap(lambda p, s: _updated(p, _gain(p, s, noise), s, noise)[0, 0])(single, columns))
+
+
+def _gain(P, slope, noise):
+    return jnp.linalg.solve(slope @ P @ slope.T + noise, slope @ P).T
+
+
+def _updated(P, gain, slope, noise):
+    """P - K phi^T P in Joseph's form, which stays symmetric and positive definite in float32."""
+    left = jnp.eye(len(P), dtype=P.dtype) - gain @ slope
+    return left @ P @ left.T + gain @ noise @ gain.T

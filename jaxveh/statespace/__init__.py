@@ -1,6 +1,7 @@
 """The one contract that a filter sees: models by name, noise laws, discretisation, chosen parameters as states."""
 
 from jaxveh.statespace.cramer_rao import PosteriorBound, posterior_cramer_rao
+from jaxveh.statespace.disturbances import with_disturbances
 from jaxveh.statespace.draw import Drawn, draw
 from jaxveh.statespace.driver import Estimate, run, scan
 from jaxveh.statespace.model import LinearInput, PerPoint, Prior, Row, StateSpace, cast
@@ -48,5 +49,6 @@ __all__ = [
     "scan",
     "start_from",
     "uncertain_inputs",
+    "with_disturbances",
     "with_parameters",
 ]

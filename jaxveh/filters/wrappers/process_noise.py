@@ -12,8 +12,8 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import check_names
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
-from jaxveh.filters.wrappers.base import AbstractRemembering, Remembering
 from jaxveh.filters.gaussian.noises import covariance_in
+from jaxveh.filters.wrappers.base import AbstractRemembering, Remembering
 from jaxveh.statespace import AbstractNoise, Gaussian, MultivariateGaussian, StateSpace
 from jaxveh.statespace.process import AbstractProcessNoise
 

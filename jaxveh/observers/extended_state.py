@@ -1,0 +1,38 @@
+"""The extended-state observer: disturbances estimated beside the states, all poles at one bandwidth."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_positive
+from jaxveh.observers.luenberger import Luenberger
+from jaxveh.observers.poles import place_poles
+from jaxveh.statespace import StateSpace
+from jaxveh.statespace.disturbances import PREFIX
+
+
+def extended_state(
+    model: StateSpace, bandwidth: float, *, dt: float, x: Any = None, u: Any = None, leave: tuple[str, ...] = ()
+) -> Luenberger:
+    """The linear extended-state observer of a model `with_disturbances`: every pole at `-bandwidth` (1/s).
+
+    (J. Han, From PID to active disturbance rejection control, IEEE Trans. Ind. Electron. 56, 2009; one bandwidth for all gains:
+    Z. Gao, Scaling and bandwidth-parameterization based controller tuning, ACC 2003; the poles of a step of `dt` s are
+    exp(-bandwidth dt).) The other arguments are those of `place_poles`. On a linear model a constant disturbance is found
+    exactly, its error falling as t^k exp(-bandwidth t); one that changes is followed about k / bandwidth seconds late, k the
+    number of poles on the way from it to a channel. A larger bandwidth follows faster and passes more noise.
+
+        banked = statespace.with_disturbances(model, {"v_y": 1.0})
+        estimate = run(observers.extended_state(banked, 10.0, dt=0.01, u={"v_x": 25.0}, leave=("yaw",)), banked, drive)
+        estimate.mean.disturbance_v_y                                   # m/s^2: -g sin(bank)
+
+    **Raises** `InputError` for a model without disturbances, a bandwidth that is not positive, and what `place_poles` raises
+    for: a disturbance needs a channel that it reaches, and no more of them than channels can be told apart.
+    """
+    if not any(name.startswith(PREFIX) for name in model.states):
+        raise InputError("extended_state: the model has no disturbances; statespace.with_disturbances adds them.")
+    check_positive("bandwidth", bandwidth, "1/s")
+    poles = np.full(len(model.states) - len(set(leave)), -float(bandwidth))
+    return Luenberger(place_poles(model, poles, dt=dt, x=x, u=u, leave=leave))

@@ -1,0 +1,128 @@
+"""Unknown accelerations as states: what pushes a model from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.names import check_names, record_type
+from jaxveh.statespace.model import Prior, StateSpace
+from jaxveh.statespace.noise import Gaussian, combine
+from jaxveh.statespace.process import Continuous, join
+
+PREFIX = "disturbance_"
+"""A disturbance's state is called this and the state that it pushes."""
+
+
+class Disturbances(eqx.Module):
+    """Which states are pushed, and which channels feel it: pairs of names."""
+
+    states: tuple[str, ...] = eqx.field(static=True)
+    felt: tuple[tuple[str, str], ...] = eqx.field(static=True)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The disturbances' own states."""
+        return tuple(PREFIX + name for name in self.states)
+
+    def split(self, x, kind):
+        """The model's own state, and each disturbance by the state that it pushes."""
+        n = len(x) - len(self.states)
+        return kind(*x[:n]), dict(zip(self.states, x[n:], strict=True))
+
+
+class DisturbedTransition(eqx.Module):
+    """Half of the push before the model's own step and half after: exact to second order in the step."""
+
+    function: Callable = eqx.field(static=True)
+    disturbances: Disturbances = eqx.field(static=True)
+    state_type: Any = eqx.field(static=True)
+
+    def __call__(self, system, t0, t1, x, u):
+        state, rates = self.disturbances.split(x, self.state_type)
+        half = 0.5 * (t1 - t0)
+        push = lambda state: state._replace(**{name: getattr(state, name) + half * d for name, d in rates.items()})
+        state = push(self.function(system, t0, t1, push(state), u))
+        return type(x)(*state, *rates.values())
+
+
+class DisturbedObservation(eqx.Module):
+    """The model's own observation, with what its channels feel of the disturbances."""
+
+    function: Callable = eqx.field(static=True)
+    disturbances: Disturbances = eqx.field(static=True)
+    state_type: Any = eqx.field(static=True)
+
+    def __call__(self, system, t, x, u):
+        state, rates = self.disturbances.split(x, self.state_type)
+        found = self.function(system, t, state, u)
+        for name, channel in self.disturbances.felt:
+            found = found._replace(**{channel: getattr(found, channel) + rates[name]})
+        return found
+
+
+class DisturbedReport(eqx.Module):
+    """The model's own report followed by the disturbances."""
+
+    function: Callable = eqx.field(static=True)
+    disturbances: Disturbances = eqx.field(static=True)
+    state_type: Any = eqx.field(static=True)
+
+    def __call__(self, system, t, x, u):
+        state, rates = self.disturbances.split(x, self.state_type)
+        own = self.function(system, t, state, u)
+        return record_type("Report", (*own._fields, *self.disturbances.names))(*own, *rates.values())
+
+
+def with_disturbances(
+    model: StateSpace,
+    prior: Mapping[str, float],
+    walk: Mapping[str, float] | None = None,
+    felt: Mapping[str, str] | None = None,
+) -> StateSpace:
+    """The model with an unknown, slowly changing push on chosen states: `disturbance_v_y`, in the state's unit per second.
+
+    **Arguments**: `prior`, the spread of each push at the start by the state that it acts on, its mean is zero; `walk`, the
+    spread of its random walk per root second by the same names (none: constant, as observers have it; a Kalman filter then stops
+    following it); `felt`, channels to which a push adds, by the state (`{"v_y": "a_y"}`: an accelerometer feels a crosswind,
+    but no gravity on a banked road).
+
+    The push acts whatever the model does with its state: below a speed at which a car's states are held, it moves them still.
+
+    **Raises** `InputError` for names that are no states or channels, and spreads that are not positive.
+    """
+    walk, felt = dict(walk or {}), dict(felt or {})
+    if not prior:
+        raise InputError("with_disturbances: prior is empty; name at least one state that is pushed.")
+    check_names("prior", prior, model.states)
+    check_names("walk", walk, prior)
+    check_names("felt", felt, prior)
+    check_names("felt", felt.values(), model.channels)
+    for what, spreads in (("prior", prior), ("walk", walk)):
+        for name, value in spreads.items():
+            check_positive(f"{what} of {name}", value, "the state's unit per second")
+    disturbances = Disturbances(tuple(prior), tuple(felt.items()))
+    kind, dtype = type(model.prior.mean), model.prior.mean[0].dtype
+    scalar = lambda value: jnp.asarray(value, dtype)
+    joint = record_type("State", (*model.states, *disturbances.names))
+    law = combine(model.prior.law, Gaussian({PREFIX + name: scalar(value) for name, value in prior.items()}))
+    walking = Continuous(Gaussian({PREFIX + name: scalar(value) for name, value in walk.items()})) if walk else None
+    report = model.report_function
+    wrap = lambda form, function: form(function, disturbances, kind)
+    return StateSpace(
+        system=model.system,
+        transition=wrap(DisturbedTransition, model.transition_function),
+        observation=wrap(DisturbedObservation, model.observation_function),
+        report=None if report is None else wrap(DisturbedReport, report),
+        process_noise=join(model.process_noise, walking),
+        measurement_noise=model.measurement_noise,
+        prior=Prior(joint(*model.prior.mean, *[scalar(0.0)] * len(prior)), law),
+        inputs=model.inputs,
+        angles=model.angles,
+        input_path=model.input_path,
+        chosen=model.chosen,
+    )
