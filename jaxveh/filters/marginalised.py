@@ -158,7 +158,9 @@ class Marginalised(AbstractParticleFilter):
         if resampled is not None:
             weights = jnp.where(resampled, uniform, belief.weights)
             chosen = jnp.where(resampled, chosen, logs)
-        taken = jax.tree.map(lambda leaf: leaf[ancestors], (belief.particles, belief.covariances))
+        points, covariances = (
+            jax.tree.map(lambda leaf: leaf[ancestors], t) for t in (belief.particles, belief.covariances)
+        )
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         law = model.process_noise.over(row.t - belief.t)
         others = _others(self, model)
@@ -170,7 +172,7 @@ class Marginalised(AbstractParticleFilter):
             mean, J = _slopes(self.linear, point, lambda x: [getattr(f(x), n) for n in (*others, *self.linear)])
             return _given_first(mean, times(times(J, P), J.T) + Q, white)
 
-        moved = jax.vmap(move, in_axes=(0, 0, 1))(*taken, white)
+        moved = jax.vmap(move, in_axes=(0, 0, 1))(points, covariances, white)
         moved = numerics.barrier(moved)
         cloud = Cloud(_named(self, model, moved.z.T, moved.x.T), moved.P)
         return self._weigh(model, row, cloud, Prior(ancestors, weights, chosen), belief.key, belief.count)

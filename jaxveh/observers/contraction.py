@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+
+# SciPy comes with JAX.
 from scipy import linalg
 
 from jaxveh._core.errors import InputError, check_positive

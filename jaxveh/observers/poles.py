@@ -8,6 +8,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+
+# SciPy comes with JAX.
 from scipy import signal
 
 from jaxveh._core.errors import InputError, check_positive

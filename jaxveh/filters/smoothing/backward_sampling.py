@@ -31,6 +31,8 @@ def sample_backwards(filter: AbstractParticleFilter, model: StateSpace, rows: Ro
 
     The last row's states by their weights; then each row's by weight times the transition's density to the state after it.
     """
+    noise = model.process_noise
+    assert noise is not None  # `check_density` has seen to it
     forward_key, last_key, back_key = jax.random.split(key, 3)
     filtered, kept = scan_and_keep(filter, model, rows, forward_key, lambda b: (b.particles, b.weights))
     particles, weights = kept
@@ -44,8 +46,8 @@ def sample_backwards(filter: AbstractParticleFilter, model: StateSpace, rows: Ro
         ((particles, weights, row), following), key = given
         u = model.step_inputs(row.t, following.t, row.u, following.u)
         moved = model.transition(row.t, following.t, particles, u)
-        law = model.process_noise.over(following.t - row.t)
-        names = model.process_noise.law.names
+        law = noise.over(following.t - row.t)
+        names = noise.law.names
         residual = {name: getattr(later, name)[:, None] - getattr(moved, name) for name in names}
         density = law.log_prob(residual, dict.fromkeys(names, jnp.asarray(True)))
         chosen = jax.random.categorical(key, density + log_of(weights), axis=1)

@@ -122,8 +122,8 @@ def _traced(model: StateSpace, past: ParticleBelief, real: Any) -> tuple[Any, An
 
     lines, _ = jax.lax.scan(back, lines, (past.ancestors[1:], real), reverse=True)
     particles = jax.tree.map(lambda field: field[0][lines], past.particles)
-    first = jax.tree.map(lambda leaf: leaf[0], (past.t, past.u))
-    return ParticleBelief(particles, weights, None, None, *first, None).moments(model)
+    t, u = past.t[0], jax.tree.map(lambda leaf: leaf[0], past.u)
+    return ParticleBelief(particles, weights, None, None, t, u, None).moments(model)
 
 
 @eqx.filter_jit

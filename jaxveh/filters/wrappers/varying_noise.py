@@ -73,8 +73,9 @@ class VaryingNoise(AbstractFilter):
             law = _with(model.measurement_noise, self.measurement, now)
             model = eqx.tree_at(lambda m: m.measurement_noise, model, law)
         if self.process:
-            law = _with(model.process_noise.law, self.process, before)
-            model = eqx.tree_at(lambda m: m.process_noise.law, model, law)
+            noise = model.process_noise
+            assert noise is not None  # `check` has seen to it
+            model = eqx.tree_at(lambda m: m.process_noise.law, model, _with(noise.law, self.process, before))
         return model
 
 
