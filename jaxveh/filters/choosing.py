@@ -66,8 +66,10 @@ class Transport(eqx.Module):
     (A. Corenflos, J. Thornton, G. Deligiannidis & A. Doucet, Differentiable particle filtering via entropy-regularized optimal
     transport, 2021; by Sinkhorn's iterations.) Fields count over their spread. The step is a smooth function of all it is
     given, so that likelihoods of one key are smooth, too, and their gradient is exactly theirs. The **bias** is in the value:
-    particles are drawn together, the more the larger `epsilon`, and only as N grows and epsilon falls does it vanish. It costs
-    N^2 `iterations` exponentials a step: for some hundred particles.
+    particles are drawn together, the more the larger `epsilon`, and only as N grows and epsilon falls does it vanish. Measured on
+    a linear model of three states and 25 rows, 200 particles: log-likelihood 48, 6.2, 1.9, 1.0 too low with epsilon 1, 0.3,
+    0.1, 0.03, where the bootstrap filter's scatter costs 1.2. A step takes N^2 `iterations` exponentials: for some hundred
+    particles.
     """
 
     epsilon: float = eqx.field(static=True, default=0.1)
@@ -86,8 +88,8 @@ class Transport(eqx.Module):
         fields = jnp.stack(particles)
         mean = jnp.sum(weights * fields, axis=1, keepdims=True)
         spread = numerics.sqrt(jnp.sum(weights * jnp.square(fields - mean), axis=1, keepdims=True))
-        # A field that does not vary says nothing of distances. The scale is no part of the gradient, as in the paper.
-        scale = jax.lax.stop_gradient(jnp.where(spread > 0, spread, 1.0))
+        # A field that does not vary says nothing of distances.
+        scale = jnp.where(spread > 0, spread, 1.0)
         cost = distances(fields / scale)
         plan = transport_plan(cost, log_of(weights), self.epsilon, self.iterations)
         return type(particles)(*jnp.sum(plan[None] * fields[:, None, :], axis=-1))
@@ -105,7 +107,7 @@ def transport_plan(cost: Any, log_weights: Any, epsilon: float, iterations: int)
     """
     n = cost.shape[0]
     uniform = -jnp.log(jnp.asarray(n, cost.dtype))
-    start = jnp.maximum(jax.lax.stop_gradient(jnp.max(cost)), epsilon)
+    start = jnp.maximum(jnp.max(cost), epsilon)
     falling = jnp.maximum(start * 0.5 ** jnp.arange(iterations, dtype=cost.dtype), epsilon)
 
     def rows(g, eps):

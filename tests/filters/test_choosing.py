@@ -1,0 +1,174 @@
+"""Choosing particles in ways that let derivatives through, in numbers that adapt, and beside Kalman filters of their own."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from filter_systems import linear_model
+from test_every_filter import batch, kalman_of, pendulum, recordings
+
+from jaxveh import InputError, filters
+from jaxveh import statespace as ss
+from jaxveh._core.names import record_type
+from jaxveh.filters.choosing import distances, log_of, transport_plan
+
+SEEDS = 60
+
+
+def runs(filter_, model, rows, seeds=SEEDS):
+    """Log-likelihoods (seeds,) and last means (seeds, n)."""
+    of = lambda key: filters.scan(filter_, model, rows, key)
+    found = jax.jit(jax.vmap(of))(jax.random.split(jax.random.key(3), seeds))
+    return np.asarray(found.log_likelihood), np.stack(found.mean, axis=-1)[:, -1]
+
+
+def one():
+    model, rows = batch("linear")
+    return model, jax.tree.map(lambda leaf: leaf[0], rows), kalman_of(recordings("linear")[0])
+
+
+class TestTransport:
+    def test_the_plan_s_margins_are_the_weights(self):
+        rng = np.random.default_rng(0)
+        points, weights = jnp.asarray(rng.normal(size=(2, 40))), jnp.asarray(rng.dirichlet(np.ones(40)))
+        plan = transport_plan(distances(points), log_of(weights), 0.05, 200)
+        np.testing.assert_allclose(jnp.sum(plan, axis=1), 1.0, rtol=1e-12)
+        np.testing.assert_allclose(jnp.sum(plan, axis=0) / 40, weights, atol=1e-5)
+
+    def test_with_little_smoothing_it_is_the_transport_in_order(self):
+        """In one dimension the optimal map keeps the order: quantiles go to quantiles."""
+        rng = np.random.default_rng(1)
+        x = np.sort(rng.normal(size=20))
+        # Whole numbers of twentieths: particle i takes the place of as many.
+        counts = rng.multinomial(20, np.full(20, 1 / 20))
+        particles = record_type("P", ("x",))(jnp.asarray(x))
+        moved = filters.Transport(1e-4, 3000).moved(particles, jnp.asarray(counts / 20))
+        np.testing.assert_allclose(moved.x, np.repeat(x, counts), atol=0.02)
+
+    def test_the_mean_stays_and_a_field_that_does_not_vary_is_left_alone(self):
+        rng = np.random.default_rng(2)
+        particles = record_type("P", ("x", "y"))(jnp.asarray(rng.normal(size=30)), jnp.full(30, 7.0))
+        weights = jnp.asarray(rng.dirichlet(np.ones(30)))
+        moved = filters.Transport(0.2, 300).moved(particles, weights)
+        np.testing.assert_allclose(jnp.mean(moved.x), jnp.sum(weights * particles.x), atol=1e-4)
+        np.testing.assert_allclose(moved.y, 7.0, rtol=1e-12)
+
+    def test_its_bias_falls_with_the_smoothing(self):
+        model, rows, exact = one()
+        total = exact["log_likelihood"].sum()
+        bias = {}
+        for epsilon in (2.0, 0.1):
+            logs, _ = runs(filters.ParticleFilter(60, filters.Transport(epsilon, 40)), model, rows, 40)
+            bias[epsilon] = abs(np.mean(logs) - total)
+        assert bias[0.1] < 0.25 * bias[2.0]
+
+    def test_it_is_for_the_bootstrap_filter_alone(self):
+        for make in (
+            filters.AuxiliaryParticleFilter,
+            filters.Guided,
+            lambda n, resampling: filters.Marginalised(n, ("x",), resampling),
+        ):
+            with pytest.raises(InputError, match="it is for ParticleFilter alone"):
+                make(10, resampling=filters.Transport())
+
+
+class TestSoft:
+    def test_the_likelihood_stays_unbiased(self):
+        model, rows, exact = one()
+        logs, _ = runs(filters.ParticleFilter(800, filters.Soft(0.7)), model, rows)
+        ratio = np.exp(logs - exact["log_likelihood"].sum())
+        assert abs(ratio.mean() - 1.0) < 3.0 * ratio.std() / np.sqrt(SEEDS)
+
+    def test_with_scores_its_gradient_is_exact_within_scatter_and_held_it_is_biased_less_than_no_share(self):
+        model, rows, _ = one()
+        leaves, rest = eqx.partition(model, eqx.is_inexact_array)
+
+        def slopes(filter_, seeds):
+            of = lambda leaves, key: filters.scan(filter_, eqx.combine(leaves, rest), rows, key).log_likelihood
+            found = jax.jit(jax.vmap(jax.grad(of), in_axes=(None, 0)))(
+                leaves, jax.random.split(jax.random.key(1), seeds)
+            )
+            return np.asarray(found.system["A"]).reshape(seeds, -1)
+
+        exact = slopes(filters.Kalman(), 1)[0]
+        scored = slopes(filters.ParticleFilter(800, filters.Soft(0.7)), SEEDS)
+        scatter = scored.std(axis=0) / np.sqrt(SEEDS)
+        assert (np.abs(scored.mean(axis=0) - exact) < 4.0 * scatter + 0.05 * np.abs(exact) + 0.05).all()
+        off = lambda filter_: np.linalg.norm(slopes(filter_, SEEDS).mean(axis=0) - exact)
+        held = off(filters.ParticleFilter(800, gradient="held"))
+        soft = off(filters.ParticleFilter(800, filters.Soft(0.5), gradient="held"))
+        assert soft < 0.9 * held
+
+    @pytest.mark.parametrize("share", [-0.1, 1.0])
+    def test_a_share_outside_its_range_is_refused(self, share):
+        with pytest.raises(InputError, match="Soft.share"):
+            filters.Soft(share)
+
+
+class TestAdaptiveNumber:
+    def test_a_wide_belief_takes_more_than_a_sharp_one_as_fox_says(self):
+        filter_ = filters.AdaptiveNumber(filters.ParticleFilter(2000), {"x0": 0.1}, sizes=(100, 500, 2000))
+        key = jax.random.key(0)
+
+        def belief(spread):
+            x = record_type("P", ("x0",))(spread * jax.random.normal(jax.random.key(1), (2000,)))
+            return filters.ParticleBelief(x, jnp.full(2000, 1 / 2000), jnp.arange(2000), key, 0.0, (), jnp.int32(1))
+
+        sharp, wide = belief(0.02), belief(3.0)
+        assert int(filter_.filled(sharp)) == 2 and int(filter_.filled(wide)) > 60
+        k = int(filter_.filled(wide)) - 1
+        part = 2 / (9 * k)
+        expected = k / 0.1 * (1 - part + 2.3263478740408408 * part**0.5) ** 3
+        np.testing.assert_allclose(filter_.number(wide), expected, rtol=1e-12)
+        assert float(filter_.number(sharp)) < 100 < float(filter_.number(wide))
+
+    @pytest.mark.parametrize("kind", [filters.ParticleFilter, filters.AuxiliaryParticleFilter])
+    def test_the_likelihood_stays_unbiased_while_the_number_changes(self, kind):
+        model, rows, exact = one()
+        filter_ = filters.AdaptiveNumber(kind(1000), {"x0": 0.4, "x1": 0.4}, sizes=(200, 500, 1000), error=0.1)
+        logs, _ = runs(filter_, model, rows)
+        ratio = np.exp(logs - exact["log_likelihood"].sum())
+        assert abs(ratio.mean() - 1.0) < 3.5 * ratio.std() / np.sqrt(SEEDS)
+        estimate = filters.scan(filter_, model, rows, jax.random.key(0))
+        alive = np.asarray(estimate.info.ess)
+        assert alive.max() <= 1000
+
+    def test_sizes_that_do_not_rise_to_the_filter_s_number_are_refused(self):
+        with pytest.raises(InputError, match=r"sizes = \(50, 20\)"):
+            filters.AdaptiveNumber(filters.ParticleFilter(50), {"x": 1.0}, sizes=(50, 20))
+        with pytest.raises(InputError, match="must resample in every step"):
+            filters.AdaptiveNumber(filters.ParticleFilter(50, threshold=0.5), {"x": 1.0})
+        with pytest.raises(InputError, match="bins is empty"):
+            filters.AdaptiveNumber(filters.ParticleFilter(50), {})
+
+
+class TestMarginalised:
+    def test_of_a_linear_model_only_the_drawn_states_scatter(self):
+        """With all but one state linear it is nearer to the exact answer than a filter that draws all."""
+        model, rows, exact = one()
+        total = exact["log_likelihood"].sum()
+        drawn, _ = runs(filters.ParticleFilter(100), model, rows)
+        marginal, means = runs(filters.Marginalised(100, ("x1", "x2")), model, rows)
+        assert np.std(marginal) < 0.5 * np.std(drawn)
+        ratio = np.exp(marginal - total)
+        assert abs(ratio.mean() - 1.0) < 3.5 * ratio.std() / np.sqrt(SEEDS)
+        scatter = means.std(axis=0) / np.sqrt(SEEDS)
+        spread = np.sqrt(np.diagonal(exact["covariance"][-1]))
+        assert (np.abs(means.mean(axis=0) - exact["mean"][-1]) < 4.0 * scatter + 0.02 * spread).all()
+
+    def test_what_is_not_linear_or_carries_no_noise_is_refused_by_name(self):
+        with pytest.raises(InputError, match="state x0 is not linear in x0"):
+            filters.Marginalised(10, ("x0",)).check(pendulum())
+        filters.Marginalised(10, ("x2",)).check(pendulum())
+        model = eqx.tree_at(lambda m: m.process_noise, linear_model(2, 1), ss.Continuous(ss.Gaussian({"x0": 0.1})))
+        with pytest.raises(InputError, match="the drawn states x1 carry no process noise"):
+            filters.Marginalised(10, ("x0",)).check(model)
+
+    def test_spreads_count_those_within_and_between_particles(self):
+        model, rows, exact = one()
+        belief = filters.scan(filters.Marginalised(2000, ("x2",)), model, rows, jax.random.key(5)).belief
+        np.testing.assert_allclose(belief.covariance, exact["covariance"][-1], rtol=0.35, atol=0.01)
+        np.testing.assert_allclose(
+            [float(s) for s in belief.moments(model)[1]], np.sqrt(np.diagonal(belief.covariance)), rtol=1e-9
+        )

@@ -1,0 +1,218 @@
+"""What data are like: late, out of order, with noise that varies and inputs that are noisy themselves."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from filter_systems import kalman, linear_model, linear_recording
+from test_every_filter import linear, recordings
+
+from jaxveh import FilterError, InputError, Recording, Result, filters
+from jaxveh import statespace as ss
+from jaxveh._core.names import record_type
+from jaxveh.statespace.process import Together
+
+MODEL = linear()
+RECORDING = linear_recording(MODEL, rows=30)
+ROWS = MODEL.rows(RECORDING)
+
+
+def taken(rows, order):
+    return jax.tree.map(lambda leaf: leaf[np.asarray(order)], rows)
+
+
+class TestDelayed:
+    def test_rows_out_of_order_give_what_rows_in_order_give(self):
+        order = list(range(30))
+        # Two rows late by one, one by three.
+        order[5], order[6] = order[6], order[5]
+        order[20], order[21] = order[21], order[20]
+        order.insert(14, order.pop(11))
+        exact = filters.scan(filters.Kalman(), MODEL, ROWS)
+        found = filters.scan(filters.Delayed(filters.Kalman(), depth=6), MODEL, taken(ROWS, order))
+        assert not int(found.result)
+        np.testing.assert_allclose(found.log_likelihood, exact.log_likelihood, rtol=1e-12)
+        np.testing.assert_allclose([m[-1] for m in found.mean], [m[-1] for m in exact.mean], rtol=1e-10)
+        np.testing.assert_allclose([s[-1] for s in found.std], [s[-1] for s in exact.std], rtol=1e-10)
+
+    def test_delayed_values_count_at_their_own_time(self):
+        """A sensor whose value comes 0.25 s late, against rows in which it stands in its own place."""
+        time = np.arange(24) * 0.1
+        rng = np.random.default_rng(3)
+        y0, y1, delay = rng.normal(size=24), rng.normal(size=24), 0.25
+        y1[::3] = np.nan
+        force = np.full(24, 0.7)
+        arriving = Recording(time, {"y0": y0, "y1": y1, "force": force})
+        stamps = np.concatenate([time, time - delay])
+        order = np.argsort(stamps, kind="stable")
+        nothing = np.full(24, np.nan)
+        whole = {
+            "y0": np.concatenate([y0, nothing])[order],
+            "y1": np.concatenate([nothing, y1])[order],
+            "force": np.full(48, 0.7),
+        }
+        # Rows without a value are no rows: the model's steps of Euler must be the same.
+        said = np.isfinite(whole["y0"]) | np.isfinite(whole["y1"])
+        keep = (stamps[order] >= 0) & said
+        own = Recording(stamps[order][keep], {name: values[keep] for name, values in whole.items()})
+        expected = filters.run(filters.Kalman(), MODEL, own)
+        found = filters.run(filters.Delayed(filters.Kalman(), {"y1": delay}, depth=8), MODEL, arriving)
+        np.testing.assert_allclose(found.log_likelihood, expected.log_likelihood, rtol=1e-11)
+        np.testing.assert_allclose([m[-1] for m in found.mean], [m[-1] for m in expected.mean], rtol=1e-9)
+        shown = np.asarray(found.info.innovation.y1)
+        np.testing.assert_array_equal(np.isfinite(shown[3:]), np.isfinite(y1[3:]))
+
+    def test_what_is_too_late_is_said_and_left_out(self):
+        order = [*range(1, 10), 0]
+        late = taken(ROWS, [0, *[k + 1 for k in order]])
+        found = filters.scan(filters.Delayed(filters.Kalman(), depth=3), MODEL, late)
+        assert Result(int(found.result)) is Result.measurement_too_late and int(found.failed_at) == 10
+        without = filters.scan(filters.Kalman(), MODEL, taken(ROWS, [0, *range(2, 11)]))
+        np.testing.assert_allclose(found.log_likelihood, without.log_likelihood, rtol=1e-12)
+        with pytest.raises(FilterError, match="older than the rows that are kept"):
+            filters.run(filters.Delayed(filters.Kalman(), {"y0": 1.0}, depth=3), MODEL, RECORDING)
+
+    def test_particles_too_may_come_late(self):
+        order = list(range(25))
+        order[9], order[10] = order[10], order[9]
+        filter_ = filters.ParticleFilter(2000)
+        rows = MODEL.rows(recordings("linear")[0])
+        found = filters.scan(filters.Delayed(filter_, depth=3), MODEL, taken(rows, order), jax.random.key(0))
+        exact = filters.scan(filters.Kalman(), MODEL, rows)
+        assert abs(float(found.log_likelihood - exact.log_likelihood)) < 1.0
+
+    @pytest.mark.parametrize(
+        ("make", "message"),
+        [
+            (lambda: filters.Delayed(filters.Kalman(), {"y1": -0.1}), "delays of y1 = -0.1"),
+            (lambda: filters.Delayed(filters.Kalman(), {"y1": 0.1}, depth=1), "depth = 1: must be .* at least 2"),
+            (lambda: filters.Delayed(filters.Kalman(), {"speed": 0.1}).check(MODEL), "unknown name.* speed"),
+            (
+                lambda: filters.Delayed(filters.Kalman()).check(
+                    eqx.tree_at(lambda m: m.process_noise, MODEL, ss.Discrete(MODEL.process_noise.law))
+                ),
+                "must be Continuous",
+            ),
+        ],
+    )
+    def test_bad_input_is_named(self, make, message):
+        with pytest.raises(InputError, match=message):
+            make()
+
+
+class TestVaryingNoise:
+    @staticmethod
+    def told(stds, **laws):
+        """The model with an input that tells a standard deviation, and the recording with it."""
+        model = ss.StateSpace(
+            system=MODEL.system, transition=MODEL.transition_function, observation=MODEL.observation_function,
+            process_noise=laws.get("process", MODEL.process_noise), measurement_noise=MODEL.measurement_noise,
+            prior=MODEL.prior, inputs=("force", "told"),
+        )  # fmt: skip
+        return model, RECORDING.replace(told=stds)
+
+    def test_the_filter_believes_what_the_input_says(self):
+        """A gap in the data and a standard deviation of a thousand times are nearly the same."""
+        stds = np.where(np.arange(30) % 2 == 0, 0.4, 400.0)
+        model, recording = self.told(stds)
+        found = filters.run(filters.VaryingNoise(filters.Kalman(), {"y0": "told"}), model, recording)
+        gaps = np.array(RECORDING["y0"])
+        gaps[1::2] = np.nan
+        missing = filters.run(filters.Kalman(), MODEL, RECORDING.replace(y0=gaps))
+        np.testing.assert_allclose(np.stack(found.mean), np.stack(missing.mean), atol=2e-3)
+        same, recording = self.told(np.full(30, 0.4))
+        found = filters.run(filters.VaryingNoise(filters.Kalman(), {"y0": "told"}), same, recording)
+        plain = filters.run(filters.Kalman(), MODEL, RECORDING)
+        np.testing.assert_allclose(found.log_likelihood, plain.log_likelihood, rtol=1e-12)
+
+    def test_process_noise_is_that_of_the_step_s_first_row(self):
+        law = ss.Continuous(ss.Gaussian({"x0": 0.3, "x1": 0.3, "x2": 0.3}))
+        stds = np.full(30, 0.3)
+        stds[12] = 5.0
+        model, recording = self.told(stds, process=law)
+        filter_ = filters.VaryingNoise(filters.Kalman(), process={"x1": "told"})
+        found = filters.run(filter_, model, recording)
+        plain = filters.run(filters.Kalman(), model, recording)
+        np.testing.assert_allclose(found.mean.x1[:13], plain.mean.x1[:13], rtol=1e-12)
+        assert float(found.std.x1[13]) > 1.2 * float(plain.std.x1[13])
+
+    def test_a_number_that_is_no_spread_is_a_code(self):
+        stds = np.full(30, 0.4)
+        stds[4] = -1.0
+        model, recording = self.told(stds)
+        estimate = filters.run(filters.VaryingNoise(filters.Kalman(), {"y0": "told"}), model, recording, throw=False)
+        assert int(estimate.failed_at) == 4 and int(estimate.result)
+
+    def test_bad_input_is_named(self):
+        with pytest.raises(InputError, match="name a channel"):
+            filters.VaryingNoise(filters.Kalman())
+        with pytest.raises(InputError, match="unknown name.* told"):
+            filters.VaryingNoise(filters.Kalman(), {"y0": "told"}).check(MODEL)
+        with pytest.raises(InputError, match="process noise is MultivariateGaussian"):
+            filters.VaryingNoise(filters.Kalman(), process={"x0": "force"}).check(MODEL)
+
+
+class TestUncertainInputs:
+    def test_white_errors_are_process_noise_through_the_input_s_gain(self):
+        """Of a linear model the exact answer has Q + (B dt s)^2, and R as it is where the input is not seen directly."""
+        blind = eqx.tree_at(lambda m: m.system["D"], linear_model(3, 2, seed=3), jnp.zeros(2))
+        recording = linear_recording(blind, rows=30)
+        found = filters.run(filters.Kalman(), ss.uncertain_inputs(blind, {"force": 0.8}), recording)
+        # The same by hand: a filter with the noise of each step added.
+        B, Q = np.asarray(blind.system["B"]), np.asarray(blind.process_noise.law.matrix)
+        time = np.asarray(recording.time)
+        steady = Recording(100.0 + 0.1 * np.arange(30), {n: recording[n] for n in recording.names})
+        found = filters.run(filters.Kalman(), ss.uncertain_inputs(blind, {"force": 0.8}), steady)
+        noisier = eqx.tree_at(lambda m: m.process_noise.law.matrix, blind, jnp.asarray(Q + 0.1 * 0.64 * np.outer(B, B)))
+        exact = kalman(noisier, steady)
+        np.testing.assert_allclose(found.log_likelihood, exact["log_likelihood"].sum(), rtol=1e-9)
+        np.testing.assert_allclose(np.stack(found.mean[:3], axis=1), exact["mean"], rtol=1e-7, atol=1e-9)
+        assert found.mean._fields == ("x0", "x1", "x2", "force_error") and len(time) == 30
+
+    def test_an_error_that_is_seen_directly_is_one_and_the_same(self):
+        """y = D (u + e): a sharp sensor of the input finds its error."""
+        model = ss.StateSpace(
+            transition=lambda s, t0, t1, x, u: x,
+            observation=lambda s, t, x, u: record_type("Y", ("y",))(u.force + 0.0 * x.x),
+            process_noise=None, measurement_noise={"y": 1e-3}, inputs=("force",),
+            prior=ss.Prior(record_type("X", ("x",))(0.0), {"x": 1.0}),
+        )  # fmt: skip
+        recording = Recording(np.arange(20.0), {"force": np.ones(20), "y": np.full(20, 1.3)})
+        found = filters.run(filters.Kalman(), ss.uncertain_inputs(model, {"force": 0.5}, {"force": 50.0}), recording)
+        np.testing.assert_allclose(found.mean.force_error[-1], 0.3, atol=1e-3)
+
+    def test_a_correlated_error_keeps_its_spread(self):
+        model = ss.uncertain_inputs(MODEL, {"force": 0.8}, {"force": 2.0})
+        blank = {name: np.full(30, np.nan) for name in ("y0", "y1")}
+        found = filters.run(filters.Kalman(), model, RECORDING.replace(**blank))
+        np.testing.assert_allclose(found.std.force_error, 0.8, rtol=1e-9)
+        assert isinstance(model.process_noise, Together)
+
+    def test_linear_inputs_are_off_by_the_error_throughout_a_step(self):
+        model = ss.StateSpace(
+            transition=lambda s, t0, t1, x, u: type(x)(x.x + (t1 - t0) * u.at(0.5 * (t0 + t1)).force),
+            observation=lambda s, t, x, u: record_type("Y", ("y",))(x.x),
+            process_noise=ss.Continuous(ss.Gaussian({"x": 1e-3})), measurement_noise={"y": 0.1},
+            inputs=("force",), input_path="linear", prior=ss.Prior(record_type("X", ("x",))(0.0), {"x": 1.0}),
+        )  # fmt: skip
+        moved = ss.uncertain_inputs(model, {"force": 0.5})
+        u = record_type("Inputs", ("force",))
+        path = ss.LinearInput(0.0, 2.0, u(jnp.asarray(1.0)), u(jnp.asarray(3.0)))
+        x = moved.transition(
+            jnp.asarray(0.0), jnp.asarray(2.0), moved.states and type(moved.prior.mean)(0.0, 0.25), path
+        )
+        np.testing.assert_allclose(x, (2 * 2.25, 0.0), rtol=1e-12)
+
+    @pytest.mark.parametrize(
+        ("arguments", "message"),
+        [
+            (({},), "std is empty"),
+            (({"torque": 1.0},), "unknown name.* torque"),
+            (({"force": -1.0},), "force = -1"),
+            (({"force": 1.0}, {"force": 0.0}), "force = 0"),
+        ],
+    )
+    def test_bad_input_is_named(self, arguments, message):
+        with pytest.raises(InputError, match=message):
+            ss.uncertain_inputs(MODEL, *arguments)

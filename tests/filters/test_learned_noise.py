@@ -1,0 +1,127 @@
+"""Noise that filters learn or are told: wavelet variances, process noise that shrinks or follows the corrections."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from filter_systems import nile_model
+
+from jaxveh import InputError, Recording, filters
+from jaxveh import statespace as ss
+
+
+def walk(rows, seed, noise, drift=0.1):
+    """A slow level, measured with standard deviations `noise` (rows,): the level, and the recording."""
+    rng = np.random.default_rng(seed)
+    level = np.cumsum(drift * rng.normal(size=rows))
+    return level, Recording(np.arange(float(rows)), {"flow": level + noise * rng.normal(size=rows)})
+
+
+def model(noise=1.0, drift=0.1):
+    return eqx.tree_at(
+        lambda m: (m.measurement_noise, m.process_noise),
+        nile_model(0.0, 1.0),
+        (ss.Gaussian({"flow": noise}), ss.Discrete(ss.Gaussian({"level": drift}))),
+    )
+
+
+def rmse(estimate, level, start=100):
+    return float(np.sqrt(np.mean((np.asarray(estimate.mean.level) - level)[start:] ** 2)))
+
+
+class TestHaarNoise:
+    def test_it_finds_the_sensor_s_noise_without_the_model(self):
+        stds = np.where(np.arange(1200) < 600, 0.5, 4.0)
+        _, recording = walk(1200, 0, stds)
+        belief = filters.run(filters.HaarNoise(filters.Kalman()), model(1.0), recording).belief
+        np.testing.assert_allclose(np.sqrt(belief.memory.variances[0]), 4.0, rtol=0.2)
+        half = Recording(recording.time[:600], {"flow": recording["flow"][:600]})
+        belief = filters.run(filters.HaarNoise(filters.Kalman()), model(1.0), half).belief
+        np.testing.assert_allclose(np.sqrt(belief.memory.variances[0]), 0.5, rtol=0.2)
+
+    def test_it_makes_good_a_noise_level_that_is_wrong(self):
+        found, plain, right = [], [], []
+        for seed in range(5):
+            level, recording = walk(600, seed, np.full(600, 5.0))
+            found.append(rmse(filters.run(filters.HaarNoise(filters.Kalman()), model(0.5), recording), level))
+            plain.append(rmse(filters.run(filters.Kalman(), model(0.5), recording), level))
+            right.append(rmse(filters.run(filters.Kalman(), model(5.0), recording), level))
+        assert np.mean(found) < 0.6 * np.mean(plain)
+        assert np.mean(found) < 1.1 * np.mean(right)
+
+    def test_the_window_is_the_last_values_that_were_there(self):
+        flow = np.arange(12.0) ** 2
+        flow[3:7] = np.nan
+        recording = Recording(np.arange(12.0), {"flow": flow})
+        belief = filters.run(filters.HaarNoise(filters.Kalman(), 4, 0.0, 1e-6, 1e9), model(), recording).belief
+        values = flow[np.isfinite(flow)][-4:]
+        np.testing.assert_array_equal(belief.memory.values[:, 0], values)
+        details = (values[1::2] - values[::2]) / np.sqrt(2)
+        expected = (np.median(np.abs(details)) / 0.6744897501960817) ** 2
+        np.testing.assert_allclose(belief.memory.variances[0], expected, rtol=1e-12)
+
+    @pytest.mark.parametrize(("window", "memory"), [(5, 0.9), (2, 0.9), (8, 1.0)])
+    def test_bad_settings_are_refused(self, window, memory):
+        with pytest.raises(InputError, match="HaarNoise"):
+            filters.HaarNoise(filters.Kalman(), window, memory)
+
+
+class TestShrinkingProcess:
+    def test_the_extra_noise_at_least_halves_whatever_the_data_say(self):
+        _, recording = walk(40, 1, np.ones(40))
+        filter_ = filters.ShrinkingProcess(filters.Kalman(), {"level": 3.0})
+        step, base = eqx.filter_jit(filter_.step), model()
+        rows = base.rows(recording)
+        row = lambda k: jax.tree.map(lambda leaf: leaf[k], rows)
+        belief, _ = filter_.init(base, row(0))
+        for k in range(1, 40):
+            after, _ = step(base, belief, row(k))
+            q, d = float(belief.memory[0]), float(after.mean.level - belief.mean.level) ** 2
+            np.testing.assert_allclose(after.memory[0], q * abs(q - 0.5 * (d + q)) / (q + d), rtol=1e-6, atol=1e-300)
+            assert float(after.memory[0]) <= 0.5 * q
+            belief = after
+
+    def test_it_amounts_to_a_larger_prior(self):
+        """A level that starts far off is found as by an honest prior, and not by the model's own."""
+        level = np.full(60, 8.0)
+        rng = np.random.default_rng(2)
+        recording = Recording(np.arange(60.0), {"flow": level + rng.normal(size=60)})
+        small = eqx.tree_at(lambda m: m.prior.law.std.level, model(drift=0.01), jnp.asarray(0.2))
+        honest = eqx.tree_at(lambda m: m.prior.law.std.level, small, jnp.asarray(8.0))
+        error = lambda f, m: abs(float(filters.run(f, m, recording).mean.level[-1]) - 8.0)
+        shrinking = filters.ShrinkingProcess(filters.Kalman(), {"level": 8.0})
+        assert error(filters.Kalman(), small) > 2.0
+        assert error(shrinking, small) < error(filters.Kalman(), honest) + 0.2
+
+
+class TestMatchedProcess:
+    def test_it_follows_a_jump_that_the_model_does_not_know(self):
+        level = np.where(np.arange(300) < 150, 0.0, 30.0)
+        rng = np.random.default_rng(3)
+        recording = Recording(np.arange(300.0), {"flow": level + rng.normal(size=300)})
+        plain = filters.run(filters.Kalman(), model(drift=0.05), recording)
+        found = filters.run(filters.MatchedProcess(filters.Kalman(), {"level": 10.0}), model(drift=0.05), recording)
+        after = slice(155, 200)
+        error = lambda e: np.abs(np.asarray(e.mean.level) - level)[after].mean()
+        assert error(found) < 0.2 * error(plain)
+
+    def test_the_first_row_teaches_nothing_and_most_is_the_most(self):
+        recording = Recording(np.arange(4.0), {"flow": np.array([500.0, 500.0, 900.0, 900.0])})
+        filter_ = filters.MatchedProcess(filters.Kalman(), {"level": 2.0}, forgetting=0.5)
+        base = model()
+        rows = base.rows(recording)
+        row = lambda k: jax.tree.map(lambda leaf: leaf[k], rows)
+        belief, _ = filter_.init(base, row(0))
+        np.testing.assert_array_equal(belief.memory, [0.0])
+        for k in range(1, 4):
+            belief, _ = filter_.step(base, belief, row(k))
+        np.testing.assert_allclose(belief.memory, [4.0], rtol=1e-12)
+
+    def test_bad_input_is_named(self):
+        with pytest.raises(InputError, match="most is empty"):
+            filters.MatchedProcess(filters.Kalman(), {})
+        with pytest.raises(InputError, match="unknown name.* speed"):
+            filters.MatchedProcess(filters.Kalman(), {"speed": 1.0}).check(model())
+        with pytest.raises(InputError, match="extra of level = -1"):
+            filters.ShrinkingProcess(filters.Kalman(), {"level": -1.0})
