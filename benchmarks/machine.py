@@ -22,6 +22,7 @@ PACKAGES = (
     "diffrax",
     "dynamax",
     "smcx",
+    "cuthbert",
     "filterpy",
     "particles",
 )
