@@ -183,7 +183,7 @@ def cases(smoke: bool) -> list[Case]:
 
 def _build(compared: Compared, peers: Sequence[str], runs: int, smoke: bool) -> Sequence[Contestant | Skipped]:
     problem = PROBLEMS[compared.problem]
-    rows = 12 if smoke else 1000 if runs == 1 else 200
+    rows = 12 if smoke else 3000 if runs == 1 else 300
     whole, short = problem.plain(rows, runs), problem.plain(min(rows, 60), 1)
     work = runs * (rows - 1)
     made: list[Contestant | Skipped] = [_ours(compared, problem, whole, work)]
