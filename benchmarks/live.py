@@ -9,6 +9,7 @@ loop in a car would be. On a machine with other work to do the extremes are thei
 from __future__ import annotations
 
 import argparse
+import functools
 import gc
 import itertools
 import json
@@ -103,8 +104,6 @@ def _latency(name: str, step: Callable, rows: Iterator, steps: int) -> Latency:
 
 def _contestants() -> Iterator[tuple[str, Callable[[], tuple[Callable, Iterator]]]]:
     """Names, and what makes a step and the rows that it is fed with."""
-    import functools
-
     import numpy as np
 
     from jaxveh import filters
@@ -113,6 +112,7 @@ def _contestants() -> Iterator[tuple[str, Callable[[], tuple[Callable, Iterator]
     for (kind, filter_), dtype in itertools.product(kinds.items(), (np.float64, np.float32)):
         name = f"{kind}, {np.dtype(dtype).name}"
         yield name, functools.partial(_stepper, filter_, dtype)
+        yield f"{name}, model held", functools.partial(_stepper, filter_, dtype, held=True)
         yield f"{name}, exported", functools.partial(_exported, filter_, dtype)
 
 
@@ -134,8 +134,9 @@ def _drive(dtype: type) -> tuple:
         return ours.single_track_model(problem, dtype), rows()
 
 
-def _stepper(filter_: object, dtype: type) -> tuple[Callable, Iterator]:
-    """`filter.step`, jitted, as a live loop calls it."""
+def _stepper(filter_: object, dtype: type, *, held: bool = False) -> tuple[Callable, Iterator]:
+    """`filter.step`, jitted, as a live loop calls it: with the model as an argument, which may change from step to step, or
+    `held`, the model's numbers being part of the program."""
     import equinox as eqx
     import jax
 
@@ -144,14 +145,17 @@ def _stepper(filter_: object, dtype: type) -> tuple[Callable, Iterator]:
     model, rows = _drive(dtype)
     with ours.precision(dtype):
         belief, _ = filter_.init(model, model.row(*next(rows)), jax.random.key(0))
-        step = eqx.filter_jit(filter_.step)
+        whole = eqx.filter_jit(filter_.step)
+        fixed = jax.jit(functools.partial(filter_.step, model))
+        step = fixed if held else functools.partial(whole, model)
 
     def call(row: tuple) -> Callable:
         nonlocal belief
-        belief, info = step(model, belief, model.row(*row))
+        belief, info = step(belief, model.row(*row))
         return lambda: jax.block_until_ready((belief, info))
 
-    return _in_precision(call, dtype), rows
+    _use_precision(dtype)
+    return call, rows
 
 
 def _exported(filter_: object, dtype: type) -> tuple[Callable, Iterator]:
@@ -182,16 +186,16 @@ def _exported(filter_: object, dtype: type) -> tuple[Callable, Iterator]:
         state, *shown = step(state, *arrays(row))
         return lambda: jax.block_until_ready((state, shown))
 
-    return _in_precision(call, dtype), rows
+    _use_precision(dtype)
+    return call, rows
 
 
-def _in_precision(call: Callable, dtype: type) -> Callable:
-    """The call where x64 is what the precision needs; entered once and left to the end of the process's next contestant."""
+def _use_precision(dtype: type) -> None:
+    """Where float32 is measured, x64 is off, as it is for a user who works in float32; for all that this process does next."""
     import jax
     import numpy as np
 
     jax.config.update("jax_enable_x64", np.dtype(dtype) == np.float64)
-    return call
 
 
 if __name__ == "__main__":

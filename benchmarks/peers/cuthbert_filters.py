@@ -137,10 +137,15 @@ def ensemble(plain: Plain, dtype: np.typing.DTypeLike, members: int) -> Callable
     return jax.jit(lambda y, key: (one if y.ndim == 2 else jax.vmap(one))(y, key))
 
 
-def particle_filter(problem: SingleTrack, count: int, *, dtype: np.typing.DTypeLike) -> Callable:
-    """The bootstrap filter, resampled before every step, as a function of measurements (rows, 2) and the key: weighted
-    means (rows, 11) and log-likelihood."""
+def particle_filter(
+    problem: SingleTrack, count: int, *, auxiliary: bool = False, dtype: np.typing.DTypeLike
+) -> Callable:
+    """The bootstrap filter, resampled before every step, as a function of the key, and of measurements (rows, 2) if not the
+    problem's: weighted means (rows, 11) and log-likelihood. There is no auxiliary one."""
+    if auxiliary:
+        raise ValueError("cuthbert has no auxiliary particle filter")
     p = problem
+    emissions = jnp.asarray(np.stack([p.yaw_rate, p.lateral_acceleration], axis=1), dtype)
     functions = single_track_functions(p)
     before = np.maximum(np.arange(p.rows) - 1, 0)
     inputs = jnp.asarray(np.stack([p.steer[before], p.speed[before], p.steer, p.speed], axis=1), dtype)
@@ -151,7 +156,7 @@ def particle_filter(problem: SingleTrack, count: int, *, dtype: np.typing.DTypeL
     weigh = lambda before, x, given: functions.log_likelihood(given[1], x, given[0][2], given[0][3])
     filter_ = smc.build_filter(start, move, weigh, count, systematic.resampling)
 
-    def one(y: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def one(key: jax.Array, y: jax.Array = emissions) -> tuple[jax.Array, jax.Array]:
         begin, rest = jax.random.split(key)
         state = filter_.init_prepare(key=begin)
         logs = jax.vmap(weigh, (None, 0, None))(None, state.particles, (inputs[0], y[0]))

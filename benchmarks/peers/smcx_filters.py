@@ -136,7 +136,8 @@ def unscented(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> Callable:
 
 
 def particle_filter(problem: SingleTrack, count: int, *, auxiliary: bool, dtype: np.typing.DTypeLike) -> Callable:
-    """A jitted function of the key: weighted means (rows, 11) and log-likelihood.
+    """A jitted function of the key, and of measurements (rows, 2) if not the problem's: weighted means (rows, 11) and
+    log-likelihood.
 
     Input row t holds what the step into t was driven with, and what the measurement at t sees.
     """
@@ -162,9 +163,9 @@ def particle_filter(problem: SingleTrack, count: int, *, auxiliary: bool, dtype:
     functions = (initial, transition, observe, look_ahead) if auxiliary else (initial, transition, observe)
     filter_ = smcx.auxiliary_filter if auxiliary else smcx.bootstrap_filter
 
-    def run(key: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def run(key: jax.Array, y: jax.Array = emissions) -> tuple[jax.Array, jax.Array]:
         # A threshold above one resamples before every step.
-        done = filter_(key, *functions, emissions, count, resampling_threshold=1.1, inputs=inputs)
+        done = filter_(key, *functions, y, count, resampling_threshold=1.1, inputs=inputs)
         return smcx.weighted_mean(done), done.marginal_loglik
 
     return jax.jit(run)

@@ -21,7 +21,9 @@ def check_linear(who: str, model: StateSpace) -> None:
     """
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
-    for curved in _curved(model):
+    with jax.ensure_compile_time_eval():  # inside jit, too, a model may be made of plain numbers
+        found = jax.tree.map(np.asarray, _curved(model))
+    for curved in found:
         for (what, names), values in zip((("state", model.states), ("channel", model.channels)), curved, strict=True):
             if np.any(values):
                 name = names[int(np.argmax(values))]
