@@ -190,7 +190,7 @@ def cubature(plain: Plain, *, regenerate: bool = False) -> Callable[[np.ndarray]
 
     def run(y: np.ndarray) -> Arrays:
         ckf = CubatureKalmanFilter(n, m, 1.0, hx=plain.seen, fx=lambda x, dt, u: plain.moved(x, u))
-        ckf.x, ckf.P, ckf.Q, ckf.R = plain.mean.copy(), plain.covariance.copy(), plain.process, plain.noise
+        ckf.x, ckf.P, ckf.Q, ckf.R = plain.mean[:, None].copy(), plain.covariance.copy(), plain.process, plain.noise
         means, covariances, total = np.empty((len(y), n)), np.empty((len(y), n, n)), 0.0
         for k, u in enumerate(plain.inputs):
             if k:
