@@ -2,7 +2,8 @@
 
 The single track with eight tyre coefficients, 11 states. A row of plain numbers goes through `model.row` into a jitted
 `filter.step`, whose results are waited for, one row after another. A step's time is split where the call returns: before it
-the host makes the row and hands the work over (dispatch), after it the host waits (computing). Pinned to one core, as a
+the host makes the row and hands the work over (dispatch), after it the host waits (computing). What is short JAX may compute
+within the call, on the processor's own thread: then it counts as dispatch. Pinned to one core, as a
 loop in a car would be. On a machine with other work to do the extremes are theirs.
 """
 

@@ -4,7 +4,8 @@ What the comparisons step around. dynamax adds 1e-9 to the diagonal of every mat
 tolerance); next to this linear problem's process noise of 1e-8 that is a tenth, so that its linear smoothers are left out,
 as is its parallel filter's log-likelihood. Its iterated filter uses the measurement in every iteration anew. filterpy's
 cubature filter updates with the points of before the process noise, which the test draws anew; its linear smoother knows no
-inputs, and its square-root and ensemble filters no likelihood. cuthbert's first state has no measurement: the
+inputs, its square-root and ensemble filters no likelihood, and the latter's first spread takes what the drawn members have
+learnt off the covariance that was given. cuthbert's first state has no measurement: the
 benchmark's adapter applies it first.
 """
 
@@ -115,4 +116,5 @@ def test_ensembles_agree_within_their_sampling_errors(peer):
         assert abs(float(total) - float(done.log_likelihood)) < 0.3
     spread = np.stack(done.std, axis=1)
     assert np.abs((mean - np.stack(done.mean, axis=1)) / spread).max() < 0.15
-    assert np.abs(std / spread - 1).max() < 0.1
+    first = 1 if peer == "filterpy" else 0
+    assert np.abs(std / spread - 1)[first:].max() < 0.1
