@@ -11,7 +11,16 @@ from pathlib import Path
 
 from . import machine
 
-EXPERIMENTS = ("particle_filters", "unscented", "simulation", "tyres", "fits", "gradients", "compile_times")
+EXPERIMENTS = (
+    "particle_filters",
+    "gaussian_filters",
+    "unscented",
+    "simulation",
+    "tyres",
+    "fits",
+    "gradients",
+    "compile_times",
+)
 
 
 def main(arguments: list[str] | None = None) -> int:

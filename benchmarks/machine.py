@@ -24,6 +24,7 @@ PACKAGES = (
     "diffrax",
     "dynamax",
     "smcx",
+    "cuthbert",
     "filterpy",
     "particles",
 )

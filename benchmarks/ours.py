@@ -1,4 +1,4 @@
-"""The two problems for the library, written as a user would write them: names, short formulas, the public interface."""
+"""The problems for the library, written as a user would write them: names, short formulas, the public interface."""
 
 from __future__ import annotations
 
@@ -14,10 +14,13 @@ import jaxveh
 from jaxveh import estimators, numerics, sensors, statespace, tyres, vehicles
 from jaxveh._core.bijectors import Real
 
+from .linear_problem import LinearTrack
 from .problems import SingleTrack, SpeedAndMass
 
 __all__ = [
     "blocked",
+    "linear_model",
+    "linear_recording",
     "precision",
     "single_track_model",
     "single_track_recording",
@@ -224,6 +227,63 @@ def speed_model(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> statespace
 def speed_recording(problem: SpeedAndMass, run: int = 0) -> jaxveh.Recording:
     """The measurements of one run."""
     channels = {"torque": problem.torque, "v": problem.speed[:, run]}
+    return jaxveh.Recording(problem.step * np.arange(problem.rows), channels)
+
+
+class Drifting(NamedTuple):
+    """Lateral velocity, yaw rate, and the errors of both sensors."""
+
+    v_y: object
+    yaw_rate: object
+    yaw_rate_error: object
+    a_y_error: object
+
+
+class Line(eqx.Module):
+    """The coefficients of the motion and of the lateral acceleration: of v_y, of the yaw rate and of the steer angle."""
+
+    v_y: tuple[jax.Array, jax.Array, jax.Array]
+    yaw_rate: tuple[jax.Array, jax.Array, jax.Array]
+    a_y: tuple[jax.Array, jax.Array, jax.Array]
+
+
+def _along(line, x, u):
+    return line[0] * x.v_y + line[1] * x.yaw_rate + line[2] * u.steer
+
+
+def _linear_transition(line, t0, t1, x, u):
+    return x._replace(v_y=_along(line.v_y, x, u), yaw_rate=_along(line.yaw_rate, x, u))
+
+
+def _linear_observation(line, t, x, u):
+    return Measured(x.yaw_rate + x.yaw_rate_error, _along(line.a_y, x, u) + x.a_y_error)
+
+
+def linear_model(problem: LinearTrack, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
+    """Lateral motion with linear tyres, the sensors' errors as states, noise on each."""
+    p = problem
+    F, B, H, D = p.matrices
+    rows = (*zip(F[:2, :2], B[:2], strict=True), (H[1, :2], D[1]))
+    line = Line(*(tuple(jnp.asarray(v, dtype) for v in (*row, b)) for row, b in rows))
+    model = statespace.StateSpace(
+        system=line,
+        transition=_linear_transition,
+        observation=_linear_observation,
+        process_noise=statespace.Discrete(statespace.Gaussian(_by_name(Drifting, p.process_std))),
+        measurement_noise=_by_name(Measured, p.measured_std),
+        prior=statespace.Prior(Drifting(*map(float, p.prior_mean)), _by_name(Drifting, p.prior_std)),
+        inputs=("steer",),
+    )
+    return statespace.cast(model, dtype)
+
+
+def linear_recording(problem: LinearTrack, run: int = 0) -> jaxveh.Recording:
+    """The measurements of one run."""
+    channels = {
+        "steer": problem.steer,
+        "yaw_rate": problem.yaw_rate[:, run],
+        "a_y": problem.lateral_acceleration[:, run],
+    }
     return jaxveh.Recording(problem.step * np.arange(problem.rows), channels)
 
 

@@ -1,21 +1,45 @@
-"""The unscented filter of `filterpy`: one run, a Python loop over rows and sigma points."""
+"""The filters of `filterpy`: one run, a Python loop over rows and sigma points."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
+from filterpy.kalman import (
+    CubatureKalmanFilter,
+    EnsembleKalmanFilter,
+    ExtendedKalmanFilter,
+    KalmanFilter,
+    MerweScaledSigmaPoints,
+    SquareRootKalmanFilter,
+    UnscentedKalmanFilter,
+)
+from filterpy.kalman.CubatureKalmanFilter import spherical_radial_sigmas
 
 from ..problems import SpeedAndMass
 from .numpy_filters import Result
 
-__all__ = ["unscented"]
+if TYPE_CHECKING:
+    from ..plain import Plain
+
+__all__ = [
+    "cubature",
+    "ensemble",
+    "extended",
+    "kalman",
+    "kalman_smoother",
+    "square_root",
+    "unscented",
+    "unscented_filter",
+]
+
+Arrays = tuple[np.ndarray, np.ndarray, float]
 
 
 def unscented(problem: SpeedAndMass) -> Callable[[], Result]:
-    """The filter of the first run."""
+    """The unscented filter of the first run."""
     p = problem
 
     def transition(x: np.ndarray, dt: float, torque: float) -> np.ndarray:
@@ -46,3 +70,168 @@ def unscented(problem: SpeedAndMass) -> Callable[[], Result]:
         return Result(means, np.array([log_likelihood]))
 
     return run
+
+
+def kalman(plain: Plain) -> Callable[[np.ndarray], Arrays]:
+    """The Kalman filter of measurements (rows, m): means, spreads, log-likelihood."""
+    return lambda y: _shown(_kalman_loop(plain, y)[1:])
+
+
+def kalman_smoother(plain: Plain) -> Callable[[np.ndarray], Arrays]:
+    """Its Rauch-Tung-Striebel smoother, which takes no inputs: it is given the motion that they leave, exactly the same
+    work, whose means are not the problem's."""
+
+    def run(y: np.ndarray) -> Arrays:
+        kf, means, covariances, total = _kalman_loop(plain, y)
+        means, covariances, *_ = kf.rts_smoother(means[:, :, None], covariances)
+        return _shown((means[:, :, 0], covariances, total))
+
+    return run
+
+
+def _kalman_loop(plain: Plain, y: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, float]:
+    F, B, H, D = plain.matrices
+    n, m = H.shape[1], H.shape[0]
+    kf = KalmanFilter(n, m, dim_u=B.shape[1])
+    kf.x, kf.P, kf.F, kf.B, kf.H = plain.mean[:, None].copy(), plain.covariance.copy(), F, B, H
+    kf.Q, kf.R = plain.process, plain.noise
+    means, covariances, total = np.empty((len(y), n)), np.empty((len(y), n, n)), 0.0
+    for k, u in enumerate(plain.inputs):
+        if k:
+            kf.predict(u[:, None])
+        kf.update((y[k] - D @ u)[:, None])
+        means[k], covariances[k] = kf.x[:, 0], kf.P
+        total += kf.log_likelihood
+    return kf, means, covariances, total
+
+
+def square_root(plain: Plain) -> Callable[[np.ndarray], Arrays]:
+    """The square-root Kalman filter, which knows no log-likelihood."""
+    F, B, H, D = plain.matrices
+    n, m = H.shape[1], H.shape[0]
+
+    def run(y: np.ndarray) -> Arrays:
+        kf = SquareRootKalmanFilter(n, m, dim_u=B.shape[1])
+        kf.x, kf.P, kf.F, kf.B, kf.H = plain.mean[:, None].copy(), plain.covariance, F, B, H
+        kf.Q, kf.R = plain.process, plain.noise
+        means, covariances = np.empty((len(y), n)), np.empty((len(y), n, n))
+        for k, u in enumerate(plain.inputs):
+            if k:
+                kf.predict(u[:, None])
+            kf.update((y[k] - D @ u)[:, None])
+            means[k], covariances[k] = kf.x[:, 0], kf.P
+        return _shown((means, covariances, math.nan))
+
+    return run
+
+
+class _Extended(ExtendedKalmanFilter):
+    """Moves the mean by a function, as the library asks one to override."""
+
+    def predict_x(self, u: Any = 0) -> None:
+        self.x = self.move(self.x, u)
+
+
+def extended(plain: Plain) -> Callable[[np.ndarray], Arrays]:
+    """The extended Kalman filter, with slopes by central differences: the library leaves them to the user."""
+    n, m = len(plain.mean), len(plain.noise)
+    reach = 1e-4 * np.sqrt(np.diag(plain.covariance))
+
+    def slope(f: Callable, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        step = np.diag(reach)
+        # All points at once, as columns: the functions are elementwise in what follows the first axis.
+        there = f(np.concatenate([x[:, None] + step, x[:, None] - step], axis=1), u)
+        return (there[:, :n] - there[:, n:]) / (2 * reach)
+
+    def run(y: np.ndarray) -> Arrays:
+        ekf = _Extended(n, m)
+        ekf.move = plain.moved
+        ekf.x, ekf.P, ekf.Q, ekf.R = plain.mean.copy(), plain.covariance.copy(), plain.process, plain.noise
+        means, covariances, total = np.empty((len(y), n)), np.empty((len(y), n, n)), 0.0
+        for k, u in enumerate(plain.inputs):
+            if k:
+                ekf.F = slope(plain.moved, ekf.x, u)
+                ekf.predict(u)
+            ekf.update(y[k], lambda x, u: slope(plain.seen, x, u), plain.seen, args=(u,), hx_args=(u,))
+            means[k], covariances[k] = ekf.x, ekf.P
+            total += ekf.log_likelihood
+        return _shown((means, covariances, total))
+
+    return run
+
+
+def unscented_filter(plain: Plain) -> Callable[[np.ndarray], Arrays]:
+    """The unscented filter with alpha = 1, beta = 2, kappa = 0."""
+    n, m = len(plain.mean), len(plain.noise)
+
+    def run(y: np.ndarray) -> Arrays:
+        points = MerweScaledSigmaPoints(n, 1.0, 2.0, 0.0)
+        ukf = UnscentedKalmanFilter(
+            n, m, 1.0, hx=lambda x, u: plain.seen(x, u), fx=lambda x, dt, u: plain.moved(x, u), points=points
+        )
+        ukf.x, ukf.P, ukf.Q, ukf.R = plain.mean.copy(), plain.covariance.copy(), plain.process, plain.noise
+        means, covariances, total = np.empty((len(y), n)), np.empty((len(y), n, n)), 0.0
+        for k, u in enumerate(plain.inputs):
+            if k:
+                ukf.predict(u=u)
+            else:
+                ukf.sigmas_f = points.sigma_points(ukf.x, ukf.P)
+            ukf.update(y[k], u=u)
+            means[k], covariances[k] = ukf.x, ukf.P
+            total += ukf.log_likelihood
+        return _shown((means, covariances, total))
+
+    return run
+
+
+def cubature(plain: Plain, *, regenerate: bool = False) -> Callable[[np.ndarray], Arrays]:
+    """The cubature filter. Its update keeps the points of before the process noise; ``regenerate`` draws them anew."""
+    n, m = len(plain.mean), len(plain.noise)
+
+    def run(y: np.ndarray) -> Arrays:
+        ckf = CubatureKalmanFilter(n, m, 1.0, hx=plain.seen, fx=lambda x, dt, u: plain.moved(x, u))
+        ckf.x, ckf.P, ckf.Q, ckf.R = plain.mean[:, None].copy(), plain.covariance.copy(), plain.process, plain.noise
+        means, covariances, total = np.empty((len(y), n)), np.empty((len(y), n, n)), 0.0
+        for k, u in enumerate(plain.inputs):
+            if k:
+                ckf.predict(fx_args=(u,))
+            if k == 0 or regenerate:
+                ckf.sigmas_f = spherical_radial_sigmas(ckf.x, ckf.P)
+            ckf.update(y[k][:, None], hx_args=(u,))
+            means[k], covariances[k] = ckf.x.ravel(), ckf.P
+            total += ckf.log_likelihood
+        return _shown((means, covariances, total))
+
+    return run
+
+
+def ensemble(plain: Plain, members: int) -> Callable[[np.ndarray], Arrays]:
+    """The ensemble filter with perturbed measurements; it draws from NumPy's global generator."""
+
+    def run(y: np.ndarray) -> Arrays:
+        now = [plain.inputs[0]]
+        enkf = EnsembleKalmanFilter(
+            plain.mean.copy(),
+            plain.covariance,
+            len(plain.noise),
+            1.0,
+            members,
+            hx=lambda x: plain.seen(x, now[0]),
+            fx=lambda x, dt: plain.moved(x, now[0]),
+        )
+        enkf.Q, enkf.R = plain.process, plain.noise
+        means, covariances = np.empty((len(y), len(plain.mean))), np.empty((len(y), *plain.covariance.shape))
+        for k, u in enumerate(plain.inputs):
+            now[0] = u
+            if k:
+                enkf.predict()
+            enkf.update(y[k])
+            means[k], covariances[k] = enkf.x, enkf.P
+        return _shown((means, covariances, math.nan))
+
+    return run
+
+
+def _shown(done: tuple[np.ndarray, np.ndarray, float]) -> Arrays:
+    means, covariances, total = done
+    return means, np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)), total

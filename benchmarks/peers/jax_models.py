@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,7 @@ import numpy as np
 
 from ..problems import SingleTrack, SpeedAndMass
 
-__all__ = ["gaussian_arrays", "single_track_functions", "speed_functions"]
+__all__ = ["TrackFunctions", "gaussian_arrays", "over_runs", "single_track_functions", "speed_functions"]
 
 
 def speed_functions(problem: SpeedAndMass) -> tuple[Callable, Callable]:
@@ -39,6 +40,11 @@ def speed_functions(problem: SpeedAndMass) -> tuple[Callable, Callable]:
     return transition, observation
 
 
+def over_runs(one: Callable) -> Callable:
+    """A jitted function of the measurements (rows, m) of one run, or of many (runs, rows, m)."""
+    return jax.jit(lambda measured, *rest: (one if measured.ndim == 2 else jax.vmap(one))(measured, *rest))
+
+
 def gaussian_arrays(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> dict[str, jax.Array]:
     """Mean, covariances and the torque that leads into each row, as arrays of ``dtype``."""
     p = problem
@@ -52,8 +58,17 @@ def gaussian_arrays(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> dict[s
     }
 
 
-def single_track_functions(problem: SingleTrack) -> tuple[Callable, Callable]:
-    """Transition without noise of one particle (11,), and log-likelihood of a measurement (yaw rate, a_y) given it."""
+class TrackFunctions(NamedTuple):
+    """``transition(x, steer, speed)`` (11,) without noise, ``observation(x, steer, speed)`` (2,): yaw rate and a_y, and
+    ``log_likelihood(y, x, steer, speed)`` of a measurement."""
+
+    transition: Callable
+    observation: Callable
+    log_likelihood: Callable
+
+
+def single_track_functions(problem: SingleTrack) -> TrackFunctions:
+    """The eleven-state problem as functions of one particle (11,)."""
     p = problem
 
     def magic_formula(slip, D, C, B, E):
@@ -80,10 +95,14 @@ def single_track_functions(problem: SingleTrack) -> tuple[Callable, Callable]:
 
     constant = float(np.log(2 * np.pi * p.yaw_rate_std * p.lateral_acceleration_std))
 
-    def log_likelihood(y, x, steer, speed):
+    def observation(x, steer, speed):
         front, rear = forces(x, x[0], x[2], steer, speed)
-        r = (x[2] - y[0]) / p.yaw_rate_std
-        a = ((front + rear) / p.mass - y[1]) / p.lateral_acceleration_std
+        return jnp.stack([x[2], (front + rear) / p.mass])
+
+    def log_likelihood(y, x, steer, speed):
+        yaw_rate, acceleration = observation(x, steer, speed)
+        r = (yaw_rate - y[0]) / p.yaw_rate_std
+        a = (acceleration - y[1]) / p.lateral_acceleration_std
         return -0.5 * (r * r + a * a) - constant
 
-    return transition, log_likelihood
+    return TrackFunctions(transition, observation, log_likelihood)

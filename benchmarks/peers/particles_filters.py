@@ -1,17 +1,41 @@
-"""Particle filters of the `particles` library (Chopin), with vectorised NumPy models on (N, 11) arrays."""
+"""Kalman and particle filters of the `particles` library (Chopin), the latter with vectorised NumPy models on (N, 11) arrays."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import particles
 from particles import collectors
+from particles import kalman as exact
 
 from ..problems import SingleTrack
 from .numpy_filters import Result
 
-__all__ = ["particle_filter"]
+if TYPE_CHECKING:
+    from ..plain import Plain
+
+__all__ = ["kalman", "particle_filter"]
+
+
+def kalman(plain: Plain) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, float]]:
+    """The Kalman filter of measurements (rows, m): means, spreads, log-likelihood; inputs are added between its steps."""
+    F, B, H, D = plain.matrices
+
+    def run(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        means, covariances = np.empty((len(y), len(F))), np.empty((len(y), *F.shape))
+        belief, total = exact.MeanAndCov(plain.mean, plain.covariance), 0.0
+        for k, u in enumerate(plain.inputs):
+            if k:
+                moved = exact.predict_step(F, plain.process, belief)
+                belief = exact.MeanAndCov(moved.mean + B @ u, moved.cov)
+            belief, log_likelihood = exact.filter_step(H, plain.noise, belief, y[k] - D @ u)
+            means[k], covariances[k] = belief.mean, belief.cov
+            total += float(log_likelihood)
+        return means, np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)), total
+
+    return run
 
 
 class _Bootstrap(particles.FeynmanKac):

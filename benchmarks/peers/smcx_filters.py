@@ -1,8 +1,9 @@
-"""The unscented and the particle filters of `smcx`, jitted."""
+"""The Gaussian and the particle filters of `smcx`, jitted."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -10,9 +11,103 @@ import numpy as np
 import smcx
 
 from ..problems import SingleTrack, SpeedAndMass
-from .jax_models import gaussian_arrays, single_track_functions, speed_functions
+from .jax_models import gaussian_arrays, over_runs, single_track_functions, speed_functions
 
-__all__ = ["particle_filter", "unscented"]
+if TYPE_CHECKING:
+    from ..plain import Plain
+
+__all__ = [
+    "extended",
+    "extended_smoother",
+    "kalman",
+    "kalman_smoother",
+    "particle_filter",
+    "unscented",
+    "unscented_filter",
+]
+
+
+def kalman(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
+    """The Kalman filter: means, spreads, log-likelihood."""
+    run = _linear(plain, dtype)
+    return over_runs(lambda y: _filtered(run(y)))
+
+
+def kalman_smoother(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
+    """The Rauch-Tung-Striebel smoother; what inputs do is in the forward pass's predictions, which it is handed."""
+    run, F = _linear(plain, dtype), jnp.asarray(plain.matrices[0], dtype)
+
+    def one(y: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+        done = smcx.rts_smoother(run(y), F)
+        return done.smoothed_means, _std(done.smoothed_covariances), done.marginal_loglik
+
+    return over_runs(one)
+
+
+def _linear(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
+    F, B, H, D = (jnp.asarray(a, dtype) for a in plain.matrices)
+    mean, covariance, process, noise, inputs = _arrays(plain, dtype)
+    return lambda y: smcx.kalman_filter(
+        mean,
+        covariance,
+        F,
+        process,
+        H,
+        noise,
+        y,
+        transition_input_matrix=B,
+        observation_input_matrix=D,
+        inputs=inputs,
+    )
+
+
+def extended(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
+    """The extended Kalman filter, with Jacobians by forward differentiation."""
+    mean, covariance, process, noise, inputs = _arrays(plain, dtype)
+    transition, observation = plain.transition, plain.observation
+    moves = (transition, jax.jacfwd(transition))
+    sees = (observation, jax.jacfwd(observation))
+    run = lambda y: smcx.extended_kalman_filter(mean, covariance, *moves, process, *sees, noise, y, inputs=inputs)
+    return over_runs(lambda y: _filtered(run(y)))
+
+
+def extended_smoother(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
+    """The extended Rauch-Tung-Striebel smoother: the linear one, given the Jacobian at every filtered mean."""
+    mean, covariance, process, noise, inputs = _arrays(plain, dtype)
+    transition, observation = plain.transition, plain.observation
+    slope = jax.jacfwd(transition)
+    sees = (observation, jax.jacfwd(observation))
+
+    def one(y: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+        done = smcx.extended_kalman_filter(mean, covariance, transition, slope, process, *sees, noise, y, inputs=inputs)
+        slopes = jax.vmap(slope)(done.filtered_means[:-1], inputs[1:])
+        done = smcx.rts_smoother(done, slopes)
+        return done.smoothed_means, _std(done.smoothed_covariances), done.marginal_loglik
+
+    return over_runs(one)
+
+
+def unscented_filter(plain: Plain, dtype: np.typing.DTypeLike) -> Callable:
+    """The unscented filter with alpha = 1, beta = 2, kappa = 0."""
+    mean, covariance, process, noise, inputs = _arrays(plain, dtype)
+    scaling = {"alpha": 1.0, "beta": 2.0, "kappa": 0.0}
+    run = lambda y: smcx.unscented_kalman_filter(
+        mean, covariance, plain.transition, process, plain.observation, noise, y, **scaling, inputs=inputs
+    )
+    return over_runs(lambda y: _filtered(run(y)))
+
+
+def _arrays(plain: Plain, dtype: np.typing.DTypeLike) -> list[jax.Array]:
+    given = (plain.mean, plain.covariance, plain.process, plain.noise, plain.inputs)
+    return [jnp.asarray(a, dtype) for a in given]
+
+
+def _filtered(done: Any) -> tuple[jax.Array, jax.Array, jax.Array]:
+    return done.filtered_means, _std(done.filtered_covariances), done.marginal_loglik
+
+
+def _std(covariances: jax.Array) -> jax.Array:
+    return jnp.sqrt(jnp.diagonal(covariances, axis1=-2, axis2=-1))
 
 
 def unscented(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> Callable:
@@ -41,12 +136,13 @@ def unscented(problem: SpeedAndMass, dtype: np.typing.DTypeLike) -> Callable:
 
 
 def particle_filter(problem: SingleTrack, count: int, *, auxiliary: bool, dtype: np.typing.DTypeLike) -> Callable:
-    """A jitted function of the key: weighted means (rows, 11) and log-likelihood.
+    """A jitted function of the key, and of measurements (rows, 2) if not the problem's: weighted means (rows, 11) and
+    log-likelihood.
 
     Input row t holds what the step into t was driven with, and what the measurement at t sees.
     """
     p = problem
-    move, log_likelihood = single_track_functions(p)
+    move, _, log_likelihood = single_track_functions(p)
     before = np.maximum(np.arange(p.rows) - 1, 0)
     inputs = jnp.asarray(np.stack([p.steer[before], p.speed[before], p.steer, p.speed], axis=1), dtype)
     emissions = jnp.asarray(np.stack([p.yaw_rate, p.lateral_acceleration], axis=1), dtype)
@@ -67,9 +163,9 @@ def particle_filter(problem: SingleTrack, count: int, *, auxiliary: bool, dtype:
     functions = (initial, transition, observe, look_ahead) if auxiliary else (initial, transition, observe)
     filter_ = smcx.auxiliary_filter if auxiliary else smcx.bootstrap_filter
 
-    def run(key: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def run(key: jax.Array, y: jax.Array = emissions) -> tuple[jax.Array, jax.Array]:
         # A threshold above one resamples before every step.
-        done = filter_(key, *functions, emissions, count, resampling_threshold=1.1, inputs=inputs)
+        done = filter_(key, *functions, y, count, resampling_threshold=1.1, inputs=inputs)
         return smcx.weighted_mean(done), done.marginal_loglik
 
     return jax.jit(run)

@@ -164,10 +164,11 @@ class StateSpace(eqx.Module):
         missing = [name for name in self.inputs if name not in u]
         if missing:
             raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
-        scalar = lambda value: jnp.asarray(value, dtype)
-        inputs = record("Inputs", {name: scalar(u[name]) for name in self.inputs})
-        measured = record("Measurements", {name: scalar(y.get(name, jnp.nan)) for name in self.channels})
-        return Row(scalar(t), inputs, measured)
+        numbers = [t, *(u[name] for name in self.inputs), *(y.get(name, np.nan) for name in self.channels)]
+        t, *others = _scalars(numbers, dtype)
+        inputs = record("Inputs", dict(zip(self.inputs, others, strict=False)))
+        measured = record("Measurements", dict(zip(self.channels, others[len(self.inputs) :], strict=True)))
+        return Row(t, inputs, measured)
 
     def transition(self, t0, t1, x, u):
         """The state at `t1` without noise, from the state `x` at `t0`."""
@@ -184,6 +185,18 @@ class StateSpace(eqx.Module):
     def step_inputs(self, t0, t1, u0, u1):
         """What `transition` gets as `u` between two rows."""
         return u0 if self.input_path == "held" or not self.inputs else LinearInput(t0, t1, u0, u1)
+
+
+def _scalars(numbers: list, dtype) -> tuple:
+    """Numbers as arrays. All at once: each on its own would take longer to hand over than a filter's step to compute."""
+    if is_concrete(*numbers) and not any(np.ndim(number) for number in numbers):
+        return _split(np.array(numbers, dtype))
+    return tuple(jnp.asarray(number, dtype) for number in numbers)
+
+
+@jax.jit
+def _split(vector):
+    return tuple(vector)
 
 
 def _channel(recording: Recording, name: str, dtype, is_input: bool):

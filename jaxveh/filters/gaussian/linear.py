@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -20,11 +21,20 @@ def check_linear(who: str, model: StateSpace) -> None:
     """
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
-    for value in (0.0, 1.0):
-        for what, names, f in _functions(model, value):
-            name = _first_curved(f, model, names)
-            if name is not None:
+    with jax.ensure_compile_time_eval():  # inside jit, too, a model may be made of plain numbers
+        found = jax.tree.map(np.asarray, _curved(model))
+    for curved in found:
+        for (what, names), values in zip((("state", model.states), ("channel", model.channels)), curved, strict=True):
+            if np.any(values):
+                name = names[int(np.argmax(values))]
                 raise InputError(f"{who}: {what} {name} is no linear function of the state. Use Extended or Unscented.")
+
+
+# Compiled: operation by operation it would take longer than filtering a short recording.
+@eqx.filter_jit
+def _curved(model: StateSpace):
+    """Which states and which channels are curved, (n,) and (m,), for inputs of 0 and for inputs of 1."""
+    return [[_is_curved(f, model) for f in _functions(model, value)] for value in (0.0, 1.0)]
 
 
 def _functions(model: StateSpace, value: float):
@@ -38,10 +48,10 @@ def _functions(model: StateSpace, value: float):
         observed = model.observation(t0, kind(*rows), u)
         return rows_of([getattr(observed, name) for name in model.channels], rows)
 
-    return ("state", model.states, move), ("channel", model.channels, see)
+    return move, see
 
 
-def _first_curved(f, model: StateSpace, names) -> str | None:
+def _is_curved(f, model: StateSpace):
     start = jnp.stack(model.prior.mean)
     reach = 10.0 * jnp.sqrt(jnp.diagonal(model.prior.covariance()))
     # One direction of mixed signs, which no sum of squares or products survives by chance.
@@ -49,6 +59,4 @@ def _first_curved(f, model: StateSpace, names) -> str | None:
     here, slope = jax.jvp(f, (start,), (step,))
     there = f(start + step)
     size = jnp.abs(here) + jnp.abs(slope) + jnp.abs(there)
-    curved = jnp.abs(there - here - slope) > 1e3 * jnp.finfo(start.dtype).eps * size
-    curved = np.asarray(curved & jnp.isfinite(size))
-    return names[int(np.argmax(curved))] if curved.any() else None
+    return (jnp.abs(there - here - slope) > 1e3 * jnp.finfo(start.dtype).eps * size) & jnp.isfinite(size)
