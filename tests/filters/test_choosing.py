@@ -63,6 +63,15 @@ class TestTransport:
             bias[epsilon] = abs(np.mean(logs) - total)
         assert bias[0.1] < 0.25 * bias[2.0]
 
+    def test_its_gradient_is_that_of_differences(self):
+        """Of one key the likelihood is smooth; with little smoothing so steep that differences do not tell."""
+        model, rows, _ = one()
+        filter_ = filters.ParticleFilter(40, filters.Transport(0.5, 20))
+        with_ = lambda scale: eqx.tree_at(lambda m: m.system["A"], model, scale * model.system["A"])
+        value = jax.jit(lambda scale: filters.scan(filter_, with_(scale), rows, jax.random.key(2)).log_likelihood)
+        difference = (value(1.0 + 1e-6) - value(1.0 - 1e-6)) / 2e-6
+        np.testing.assert_allclose(jax.jit(jax.grad(value))(1.0), difference, rtol=1e-5)
+
     def test_it_is_for_the_bootstrap_filter_alone(self):
         for make in (
             filters.AuxiliaryParticleFilter,
