@@ -4,8 +4,10 @@ The default run takes XLA's older code generator for the CPU without its slowest
 than half of the time: compiling is nearly all that the tests do. `-m full` and `-m peers` take the one that users have.
 """
 
+import gc
 import os
 from importlib.metadata import version
+from pathlib import Path
 
 import jax
 import pytest
@@ -15,11 +17,24 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 
 QUICKLY_COMPILED = "--xla_cpu_use_fusion_emitters=false --xla_llvm_disable_expensive_passes=true"
 
+MOST_MAPPINGS = 30000
+
 
 def pytest_configure(config):
     """An unknown flag ends the process, so they are set for versions only that are known to have them."""
     if config.getoption("markexpr") == "not full" and version("jaxlib").startswith("0.10."):
         os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {QUICKLY_COMPILED}".strip()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def room_for_programs():
+    """Compiled programs are forgotten before they are too many: each takes four memory mappings, of which Linux gives a process
+    65530, and one more ends it."""
+    yield
+    mappings = Path("/proc/self/maps")
+    if mappings.exists() and mappings.read_bytes().count(b"\n") > MOST_MAPPINGS:
+        jax.clear_caches()
+        gc.collect()
 
 
 @pytest.fixture
