@@ -9,7 +9,7 @@ import scipy.stats
 from jaxveh import InputError
 from jaxveh import statespace as ss
 from jaxveh.statespace.noise import combine, whiten
-from jaxveh.statespace.process import Both, join
+from jaxveh.statespace.process import Together, join
 
 MATRIX = np.array([[2.0, 0.6, -0.3], [0.6, 1.0, 0.2], [-0.3, 0.2, 0.5]])
 LAWS = {
@@ -203,7 +203,7 @@ def test_process_noise_over_time_and_joined():
     np.testing.assert_allclose(continuous.over(dt).std.a, 1.0)
     np.testing.assert_allclose(discrete.over(dt).scale.b, 3.0)
     both = join(continuous, discrete)
-    assert isinstance(both, Both)
+    assert isinstance(both, Together)
     assert set(both.law.names) == {"a", "b"}
     assert set(both.over(dt).names) == {"a", "b"}
     again = join(both, ss.Continuous(ss.Gaussian({"c": 4.0})))
