@@ -208,7 +208,7 @@ def test_process_noise_over_time_and_joined():
     assert set(both.over(dt).names) == {"a", "b"}
     again = join(both, ss.Continuous(ss.Gaussian({"c": 4.0})))
     assert set(again.law.names) == {"a", "b", "c"}
-    np.testing.assert_allclose(again.continuous.over(dt).std.c, 2.0)
+    np.testing.assert_allclose(again.over(dt).laws[0].std.c, 2.0)
     assert join(None, continuous) is continuous
     assert join(None, None) is None
     assert isinstance(join(continuous, ss.Continuous(ss.Gaussian({"c": 1.0}))), ss.Continuous)
