@@ -26,6 +26,27 @@ def pytest_configure(config):
         os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {QUICKLY_COMPILED}".strip()
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Tests that share compiled programs go to one worker: a file's, or a filter's where a file goes through all of them.
+
+    That is what `--dist loadgroup` is for; with pytest 9.2 it ignores the groups (pytest-xdist, issue 1386).
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class LoadPrograms(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            file, _, case = nodeid.partition("::")
+            return nodeid.replace(case, program_of(case)) if file.endswith("test_every_filter.py") else file
+
+    return LoadPrograms(config, log) if config.getvalue("dist") == "loadfile" else None
+
+
+def program_of(case):
+    """`Kalman` of `test_some_property[Kalman-linear]`."""
+    return case.partition("[")[2].rstrip("]").removesuffix("-linear").removesuffix("-pendulum")
+
+
 @pytest.fixture(scope="module", autouse=True)
 def room_for_programs():
     """Compiled programs are forgotten before they are too many: each takes four memory mappings, of which Linux gives a process
