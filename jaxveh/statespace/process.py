@@ -58,14 +58,12 @@ class Together(AbstractProcessNoise):
 
 def join(a: AbstractProcessNoise | None, b: AbstractProcessNoise | None) -> AbstractProcessNoise | None:
     """One process noise of two over disjoint fields; those in continuous time, and those a step, become one law each."""
-    given = [noise for noise in (a, b) if noise is not None]
-    flat = [part for noise in given for part in (noise.parts if isinstance(noise, Together) else (noise,))]
-    parts: list[AbstractProcessNoise] = []
-    for kind in (Continuous, Discrete):
+    if a is None or b is None:
+        return a if b is None else b
+    flat = [part for noise in (a, b) for part in (noise.parts if isinstance(noise, Together) else (noise,))]
+    parts = [part for part in flat if not isinstance(part, Continuous | Discrete)]
+    for kind in (Discrete, Continuous):
         law = combine(*[part.law for part in flat if isinstance(part, kind)])
         if law is not None:
-            parts.append(kind(law))
-    parts += [part for part in flat if not isinstance(part, Continuous | Discrete)]
-    if len(parts) < 2:
-        return parts[0] if parts else None
-    return Together(tuple(parts))
+            parts.insert(0, kind(law))
+    return parts[0] if len(parts) == 1 else Together(tuple(parts))
