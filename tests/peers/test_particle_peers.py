@@ -144,3 +144,22 @@ def test_paths_drawn_backwards_have_the_smoothers_answer(who):
     assert_means(mean, expected_mean, expected_std)
     assert_means(std, expected_std, expected_std)
     assert_likelihood(total, expected_total)
+
+
+def test_paths_are_drawn_by_the_same_transition_density():
+    # Means and spreads of paths hardly tell a wrong density from the right one.
+    particles_filters = pytest.importorskip("benchmarks.peers.particles_filters")
+    problem, row = PROBLEMS["linear"], 7
+    plain = problem.plain(ROWS, 1)
+    model, u = problem.model(plain.problem, np.float64), plain.inputs[row]
+    noise = np.sqrt(np.diag(plain.process))
+    x = np.sqrt(np.diag(plain.covariance)) * np.random.default_rng(0).standard_normal((5, len(noise)))
+    residual = noise * np.random.default_rng(1).standard_normal(x.shape)
+    new = plain.moved(x.T, u[:, None]).T + residual
+    law = model.process_noise.over(0.01)
+    named = dict(zip(model.states, residual.T, strict=True))
+    expected = law.log_prob({n: jnp.asarray(named[n]) for n in law.names}, dict.fromkeys(law.names, jnp.asarray(True)))
+    density = plain_particles.particle_functions(plain, np.float64).log_transition
+    np.testing.assert_allclose(jax.vmap(density, (0, 0, None))(new, x, jnp.asarray(u)), expected, rtol=1e-9)
+    theirs = particles_filters._Linear(plain, plain.measured[0], 0).logpt(row, x, new)
+    np.testing.assert_allclose(theirs, expected, rtol=1e-9)
