@@ -13,6 +13,7 @@ from . import machine
 
 EXPERIMENTS = (
     "particle_filters",
+    "further_particle_filters",
     "gaussian_filters",
     "unscented",
     "simulation",

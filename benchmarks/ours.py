@@ -19,6 +19,7 @@ from .problems import SingleTrack, SpeedAndMass
 
 __all__ = [
     "blocked",
+    "constant_parameters_model",
     "linear_model",
     "linear_recording",
     "precision",
@@ -124,6 +125,13 @@ def single_track_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> stat
         inputs=("steer", "v_x"),
     )
     return statespace.cast(model, dtype)
+
+
+def constant_parameters_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> statespace.StateSpace:
+    """The same with noise on the motion alone: the coefficients are constants."""
+    std = dict(zip(Motion._fields, map(float, problem.process_std[:3]), strict=True))
+    noise = statespace.cast(statespace.Discrete(statespace.Gaussian(std)), dtype)
+    return eqx.tree_at(lambda model: model.process_noise, single_track_model(problem, dtype), noise)
 
 
 def vehicle_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> statespace.StateSpace:

@@ -16,22 +16,27 @@ import numpy as np
 from cuthbert.ensemble_kalman import ensemble_kalman_filter
 from cuthbert.gaussian import kalman as exact
 from cuthbert.gaussian import moments
+from cuthbert.smc import backward_sampler
 from cuthbert.smc import particle_filter as smc
 from cuthbertlib.ensemble_kalman import filter_update
 from cuthbertlib.kalman import filtering
 from cuthbertlib.linearize import linearize_moments
-from cuthbertlib.resampling import systematic
+from cuthbertlib.resampling import multinomial, systematic
+from cuthbertlib.smc.smoothing import exact_sampling
 
 from ..problems import SingleTrack
 from .jax_models import over_runs, single_track_functions
+from .plain_particles import guide, over_keys, particle_functions
 
 if TYPE_CHECKING:
     from ..plain import Plain
 
 __all__ = [
+    "backward_sampling",
     "ensemble",
     "extended",
     "extended_smoother",
+    "guided",
     "kalman",
     "kalman_smoother",
     "parallel_smoother",
@@ -157,16 +162,61 @@ def particle_filter(
     filter_ = smc.build_filter(start, move, weigh, count, systematic.resampling)
 
     def one(key: jax.Array, y: jax.Array = emissions) -> tuple[jax.Array, jax.Array]:
-        begin, rest = jax.random.split(key)
-        state = filter_.init_prepare(key=begin)
-        logs = jax.vmap(weigh, (None, 0, None))(None, state.particles, (inputs[0], y[0]))
-        first = jax.nn.logsumexp(logs) - jnp.log(jnp.asarray(count, dtype))
-        state = state._replace(log_weights=logs, log_normalizing_constant=first)
-        states = cuthbert.filter(filter_, (inputs[1:], y[1:]), state, key=rest)
-        weights = jax.nn.softmax(states.log_weights, axis=-1)
-        return jnp.einsum("tn,tni->ti", weights, states.particles), states.log_normalizing_constant[-1]
+        return _weighted(_particles(filter_, weigh, inputs, y, key))
 
     return jax.jit(one)
+
+
+def guided(plain: Plain, dtype: np.typing.DTypeLike, count: int) -> Callable:
+    """The guided filter, resampled before every step, a function of measurements and keys: means and log-likelihood."""
+    functions, proposal = particle_functions(plain, dtype), guide(plain, dtype)
+    inputs = jnp.asarray(plain.inputs, dtype)
+    move = lambda key, x, given: proposal.draw(key, x, given[1], given[0])
+    first = lambda before, x, given: functions.log_likelihood(given[1], x, given[0])
+
+    def weigh(before: jax.Array, x: jax.Array, given: tuple[jax.Array, jax.Array]) -> jax.Array:
+        u, y = given
+        ratio = functions.log_transition(x, before, u) - proposal.log_density(y, x, before, u)
+        return functions.log_likelihood(y, x, u) + ratio
+
+    filter_ = smc.build_filter(functions.start, move, weigh, count, systematic.resampling)
+    return over_keys(lambda y, key: _weighted(_particles(filter_, first, inputs, y, key)))
+
+
+def backward_sampling(plain: Plain, dtype: np.typing.DTypeLike, count: int, paths: int) -> Callable:
+    """The bootstrap filter and paths drawn backwards through its particles, a function of measurements and keys: means and
+    spreads of the paths (rows, n) and the filter's log-likelihood."""
+    functions, inputs = particle_functions(plain, dtype), jnp.asarray(plain.inputs, dtype)
+    move = lambda key, x, given: functions.move(key, x, given[0])
+    weigh = lambda before, x, given: functions.log_likelihood(given[1], x, given[0])
+    filter_ = smc.build_filter(functions.start, move, weigh, count, systematic.resampling)
+    # The likelihood of the later state does not tell the earlier ones apart, so that the transition is enough.
+    density = lambda before, x, given: functions.log_transition(x, before, given[0])
+    smoother = backward_sampler.build_smoother(density, exact_sampling.simulate, multinomial.resampling, paths)
+
+    def one(y: jax.Array, key: jax.Array) -> Arrays:
+        forward, back = jax.random.split(key)
+        states = _particles(filter_, weigh, inputs, y, forward)
+        done = cuthbert.smoother(smoother, states, (inputs[1:], y[1:]), key=back)
+        spread = jnp.std(done.particles, axis=1)
+        return jnp.mean(done.particles, axis=1), spread, states.log_normalizing_constant[-1]
+
+    return over_keys(one)
+
+
+def _particles(filter_: Any, first: Callable, inputs: jax.Array, y: jax.Array, key: jax.Array) -> Any:
+    """The states of every row; `first(None, x, (inputs, y))` weighs the first row's particles."""
+    begin, rest = jax.random.split(key)
+    state = filter_.init_prepare(key=begin)
+    logs = jax.vmap(first, (None, 0, None))(None, state.particles, (inputs[0], y[0]))
+    total = jax.nn.logsumexp(logs) - jnp.log(jnp.asarray(len(logs), logs.dtype))
+    state = state._replace(log_weights=logs, log_normalizing_constant=total)
+    return cuthbert.filter(filter_, (inputs[1:], y[1:]), state, key=rest)
+
+
+def _weighted(states: Any) -> tuple[jax.Array, jax.Array]:
+    weights = jax.nn.softmax(states.log_weights, axis=-1)
+    return jnp.einsum("tn,tni->ti", weights, states.particles), states.log_normalizing_constant[-1]
 
 
 def _arrays(plain: Plain, dtype: np.typing.DTypeLike) -> list[jax.Array]:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from filterpy.hinfinity import HInfinityFilter
 from filterpy.kalman import (
     CubatureKalmanFilter,
     EnsembleKalmanFilter,
     ExtendedKalmanFilter,
+    FixedLagSmoother,
+    IMMEstimator,
     KalmanFilter,
     MerweScaledSigmaPoints,
     SquareRootKalmanFilter,
@@ -28,6 +32,9 @@ __all__ = [
     "cubature",
     "ensemble",
     "extended",
+    "fixed_lag",
+    "h_infinity",
+    "interacting",
     "kalman",
     "kalman_smoother",
     "square_root",
@@ -90,11 +97,8 @@ def kalman_smoother(plain: Plain) -> Callable[[np.ndarray], Arrays]:
 
 
 def _kalman_loop(plain: Plain, y: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, float]:
-    F, B, H, D = plain.matrices
-    n, m = H.shape[1], H.shape[0]
-    kf = KalmanFilter(n, m, dim_u=B.shape[1])
-    kf.x, kf.P, kf.F, kf.B, kf.H = plain.mean[:, None].copy(), plain.covariance.copy(), F, B, H
-    kf.Q, kf.R = plain.process, plain.noise
+    n, D = len(plain.mean), plain.matrices[3]
+    kf = _kalman_filter(plain)
     means, covariances, total = np.empty((len(y), n)), np.empty((len(y), n, n)), 0.0
     for k, u in enumerate(plain.inputs):
         if k:
@@ -103,6 +107,80 @@ def _kalman_loop(plain: Plain, y: np.ndarray) -> tuple[Any, np.ndarray, np.ndarr
         means[k], covariances[k] = kf.x[:, 0], kf.P
         total += kf.log_likelihood
     return kf, means, covariances, total
+
+
+def _kalman_filter(plain: Plain) -> KalmanFilter:
+    F, B, H, _ = plain.matrices
+    kf = KalmanFilter(H.shape[1], H.shape[0], dim_u=B.shape[1])
+    kf.x, kf.P, kf.F, kf.B, kf.H = plain.mean[:, None].copy(), plain.covariance.copy(), F, B, H
+    kf.Q, kf.R = plain.process, plain.noise
+    return kf
+
+
+def interacting(plain: Plain, levels: tuple[float, ...], stay: float) -> Callable[[np.ndarray], Arrays]:
+    """Interacting multiple models: Kalman filters whose process noise has these levels of standard deviation; each stays with
+    this probability, and else is any other."""
+    n, D, modes = len(plain.mean), plain.matrices[3], len(levels)
+    change = np.full((modes, modes), (1 - stay) / (modes - 1))
+    np.fill_diagonal(change, stay)
+
+    def run(y: np.ndarray) -> Arrays:
+        each = [_kalman_filter(plain) for _ in levels]
+        for kf, level in zip(each, levels, strict=True):
+            kf.Q = level**2 * plain.process
+        imm = IMMEstimator(each, np.full(modes, 1 / modes), change)
+        means, covariances, total = np.empty((len(y), n)), np.empty((len(y), n, n)), 0.0
+        for k, u in enumerate(plain.inputs):
+            if k:
+                imm.predict(u[:, None])
+            before = imm.cbar  # in the first row the modes' probabilities: they start equal
+            imm.update((y[k] - D @ u)[:, None])
+            means[k], covariances[k] = imm.x[:, 0], imm.P
+            total += math.log(before @ imm.likelihood)
+        return _shown((means, covariances, total))
+
+    return run
+
+
+def h_infinity(plain: Plain, bound: float, weights: list[float]) -> Callable[[np.ndarray], Arrays]:
+    """The H-infinity filter. The library warns of it: its prediction moves no covariance, and its update moves the state that
+    the prediction has moved. With F = 1 and no process noise the update is right, and the loop does the prediction."""
+    F, B, H, D = plain.matrices
+    n, m = H.shape[1], H.shape[0]
+
+    def run(y: np.ndarray) -> Arrays:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            found = HInfinityFilter(n, m, B.shape[1], bound)
+        found.x, found.P, found.H = plain.mean[:, None].copy(), plain.covariance, H
+        found.Q, found.V = np.diag(weights), plain.noise
+        means, covariances = np.empty((len(y), n)), np.empty((len(y), n, n))
+        for k, u in enumerate(plain.inputs):
+            if k:
+                found.x, found.P = F @ found.x + B @ u[:, None], F @ found.P @ F.T + plain.process
+            found.update((y[k] - D @ u)[:, None])
+            means[k], covariances[k] = found.x[:, 0], found.P
+        return _shown((means, covariances, math.nan))
+
+    return run
+
+
+def fixed_lag(plain: Plain, lag: int) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Means (rows, n) of the fixed-lag smoother, and those of the filter in it. The former are not the smoother's: its gains
+    are made of the covariance after the measurement, where that before it belongs."""
+    F, B, H, D = plain.matrices
+
+    def run(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        found = FixedLagSmoother(H.shape[1], H.shape[0])
+        found.F, found.B, found.H, found.Q, found.R = F, B, H, plain.process, plain.noise
+        # It predicts before the first measurement, too: this leads to the prior.
+        back = np.linalg.inv(F)
+        found.x = back @ (plain.mean - B @ plain.inputs[0])[:, None]
+        found.P = back @ (plain.covariance - plain.process) @ back.T
+        smoothed, filtered = found.smooth_batch((y - plain.inputs @ D.T)[:, :, None], lag, plain.inputs[:, :, None])
+        return smoothed[:, :, 0], filtered[:, :, 0]
+
+    return run
 
 
 def square_root(plain: Plain) -> Callable[[np.ndarray], Arrays]:

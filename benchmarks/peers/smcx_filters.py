@@ -12,6 +12,7 @@ import smcx
 
 from ..problems import SingleTrack, SpeedAndMass
 from .jax_models import gaussian_arrays, over_runs, single_track_functions, speed_functions
+from .plain_particles import guide, over_keys, particle_functions
 
 if TYPE_CHECKING:
     from ..plain import Plain
@@ -19,8 +20,10 @@ if TYPE_CHECKING:
 __all__ = [
     "extended",
     "extended_smoother",
+    "guided",
     "kalman",
     "kalman_smoother",
+    "liu_west",
     "particle_filter",
     "unscented",
     "unscented_filter",
@@ -169,3 +172,65 @@ def particle_filter(problem: SingleTrack, count: int, *, auxiliary: bool, dtype:
         return smcx.weighted_mean(done), done.marginal_loglik
 
     return jax.jit(run)
+
+
+def guided(plain: Plain, dtype: np.typing.DTypeLike, count: int) -> Callable:
+    """The guided filter, resampled before every step, a function of measurements and keys: means and log-likelihood."""
+    functions, proposal = particle_functions(plain, dtype), guide(plain, dtype)
+    inputs = jnp.asarray(plain.inputs, dtype)
+    start = lambda key, n, u: jax.vmap(functions.start)(jax.random.split(key, n))
+
+    def one(y: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
+        done = smcx.guided_filter(
+            key,
+            start,
+            proposal.draw,
+            proposal.log_density,
+            functions.log_transition,
+            functions.log_likelihood,
+            y,
+            count,
+            resampling_threshold=1.1,
+            inputs=inputs,
+        )
+        return smcx.weighted_mean(done), done.marginal_loglik
+
+    return over_keys(one)
+
+
+def liu_west(plain: Plain, dtype: np.typing.DTypeLike, count: int, shrinkage: float, states: int) -> Callable:
+    """The filter of Liu and West: the first `states` of the problem's states move, with noise, the others are parameters.
+
+    A function of measurements and keys: means (rows, n) in the problem's order and log-likelihood. The look-ahead is the
+    likelihood of the state that moved without noise.
+    """
+    mean, covariance, process, *_, inputs = _arrays(plain, dtype)
+    spread, noise = jnp.sqrt(jnp.diag(covariance)), jnp.sqrt(jnp.diag(process))[:states]
+    log_likelihood = particle_functions(plain, dtype).log_likelihood
+
+    def start(part: slice) -> Callable:
+        some, wide = mean[part], spread[part]
+        return lambda key, n, *u: some + wide * jax.random.normal(key, (n, len(some)), dtype)
+
+    def moved(x: jax.Array, parameters: jax.Array, u: jax.Array) -> jax.Array:
+        return plain.transition(jnp.concatenate([x, parameters]), u)
+
+    def one(y: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
+        done = smcx.liu_west_filter(
+            key,
+            start(slice(states)),
+            lambda key, x, p, u: moved(x, p, u)[:states] + noise * jax.random.normal(key, (states,), dtype),
+            lambda y, x, p, u: log_likelihood(y, jnp.concatenate([x, p]), u),
+            lambda y, x, p, u: log_likelihood(y, moved(x, p, u), u),
+            start(slice(states, None)),
+            y,
+            count,
+            shrinkage=shrinkage,
+            resampling_threshold=1.1,
+            parameter_moves="always",
+            inputs=inputs,
+        )
+        means = jnp.concatenate([smcx.weighted_mean(done), smcx.param_weighted_mean(done)], axis=-1)
+        return means, done.marginal_loglik
+
+    return over_keys(one)

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from benchmarks import gaussian_filters as compared
+from benchmarks.compared import LOOPS, PROBLEMS
 from jaxveh import filters
 
 pytestmark = pytest.mark.peers
@@ -41,6 +42,8 @@ NAMES = [
     "unscented-smoother-3",
     "cubature-3",
     "gauss-hermite-3",
+    "interacting",
+    "h-infinity",
 ]
 PAIRS = [(name, peer) for name in NAMES for peer in compared.COMPARED[name].peers if (name, peer) not in LEFT_OUT]
 
@@ -58,7 +61,7 @@ def ours():
     def of(name):
         if name not in found:
             entry = compared.COMPARED[name]
-            problem = compared.PROBLEMS[entry.problem]
+            problem = PROBLEMS[entry.problem]
             plain = problem.plain(ROWS, 1)
             model, recording = problem.model(plain.problem, np.float64), problem.recording(plain.problem)
             done = (entry.smoother or filters.run)(entry.filter, model, recording)
@@ -81,9 +84,10 @@ def assert_same(ours, theirs, tolerance):
 @pytest.mark.parametrize(("name", "peer"), PAIRS, ids=lambda value: value)
 def test_what_ours_says_a_peer_says(name, peer, ours):
     module, expected = adapter(peer), ours(name)
-    build, plain = getattr(module, compared.COMPARED[name].peers[peer]), expected[0]
-    if peer in compared.LOOPS:
-        theirs = build(plain)(plain.measured[0])
+    entry, plain = compared.COMPARED[name], expected[0]
+    build = getattr(module, entry.peers[peer])
+    if peer in LOOPS:
+        theirs = build(plain, **entry.settings)(plain.measured[0])
     else:
         with jax.numpy_dtype_promotion("standard"):
             theirs = build(plain, np.float64)(jnp.asarray(plain.measured[0]))
@@ -97,11 +101,21 @@ def test_filterpys_cubature_filter_with_points_drawn_anew(ours):
     assert_same(expected, theirs, EXACT)
 
 
+def test_filterpys_fixed_lag_smoother_is_right_as_a_filter_alone(ours):
+    plain, filtered, std, _ = ours("kalman")
+    _, exact, _, _ = ours("fixed-lag")
+    entry = compared.COMPARED["fixed-lag"]
+    smoothed, theirs = adapter("filterpy").fixed_lag(plain, **entry.settings)(plain.measured[0])
+    assert np.abs((theirs - filtered) / std).max() < 1e-6
+    # When this fails the library has been mended, and the comparison is one of equals.
+    assert np.abs((smoothed - exact) / std).max() > 0.1
+
+
 @pytest.mark.parametrize("peer", ["cuthbert", "filterpy"])
 def test_ensembles_agree_within_their_sampling_errors(peer):
     members = 3000
     module, entry = adapter(peer), compared.COMPARED["ensemble-11"]
-    problem = compared.PROBLEMS["speed"]
+    problem = PROBLEMS["speed"]
     plain = problem.plain(15, 1)
     filter_ = dataclasses.replace(entry.filter, members=members)
     model, recording = problem.model(plain.problem, np.float64), problem.recording(plain.problem)
