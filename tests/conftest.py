@@ -1,7 +1,7 @@
 """Tests run in float64 and strict dtype promotion; float32 tests ask for their dtype, or switch x64 off themselves.
 
 The default run takes XLA's older code generator for the CPU without its slowest optimisations, which together compile in less
-than half of the time: compiling is nearly all that the tests do. `-m full` and `-m peers` take the one that users have.
+than half of the time: compiling is nearly all that the tests do. `-m full` takes the one that users have.
 """
 
 import gc
@@ -15,16 +15,14 @@ import pytest
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 
-QUICKLY_COMPILED = (
-    "--xla_cpu_use_fusion_emitters=false --xla_llvm_disable_expensive_passes=true --xla_cpu_parallel_codegen_split_count=1"
-)
+QUICKLY_COMPILED = "--xla_cpu_use_fusion_emitters=false --xla_llvm_disable_expensive_passes=true --xla_cpu_parallel_codegen_split_count=1"
 
 MOST_MAPPINGS = 30000
 
 
 def pytest_configure(config):
     """An unknown flag ends the process, so they are set for versions only that are known to have them."""
-    if config.getoption("markexpr") == "not full" and version("jaxlib").startswith("0.10."):
+    if config.getoption("markexpr") in ("not full", "peers") and version("jaxlib").startswith("0.10."):
         os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {QUICKLY_COMPILED}".strip()
 
 

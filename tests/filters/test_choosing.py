@@ -132,7 +132,9 @@ class TestAdaptiveNumber:
         np.testing.assert_allclose(filter_.number(wide), expected, rtol=1e-12)
         assert float(filter_.number(sharp)) < 100 < float(filter_.number(wide))
 
-    @pytest.mark.parametrize("kind", [filters.ParticleFilter, filters.AuxiliaryParticleFilter])
+    @pytest.mark.parametrize(
+        "kind", [filters.ParticleFilter, pytest.param(filters.AuxiliaryParticleFilter, marks=pytest.mark.full)]
+    )
     def test_the_likelihood_stays_unbiased_while_the_number_changes(self, kind):
         model, rows, exact = one()
         filter_ = filters.AdaptiveNumber(kind(1000), {"x0": 0.4, "x1": 0.4}, sizes=(200, 500, 1000), error=0.1)

@@ -23,6 +23,7 @@ def start(rig):
     return fitting.starting_tyre("mf61", rig)
 
 
+@pytest.mark.full
 def test_a_generic_start_comes_to_the_truth_through_noise():
     columns, run = plan()
     clean = measured_of(truth(), columns, CHANNELS)

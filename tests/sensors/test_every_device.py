@@ -130,6 +130,7 @@ def test_it_runs_without_64_bits(entry, float32):
     assert all(value.dtype == jnp.float32 for value in heard(device, jax.random.key(0), dtype=jnp.float32).values())
 
 
+@pytest.mark.full
 def test_float32_readings_are_near_those_of_float64(device):
     exact, rough = heard(device), heard(statespace.cast(device, jnp.float32), dtype=jnp.float32)
     for name in device.channels:

@@ -30,6 +30,7 @@ def test_devices_speak_at_their_own_instants_and_say_the_past():
     assert "steer" not in drive and "true.steer" in drive
 
 
+@pytest.mark.full
 def test_production_devices_draw_from_the_key_and_may_be_vmapped():
     suite = sensors.production_car()
     steer = manoeuvres.step_steer(20.0, 0.03, start=0.1, duration=0.5)
