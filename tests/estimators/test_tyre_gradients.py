@@ -1,4 +1,4 @@
-"""The particle filters' gradient with respect to tyres and noise levels of a car: that of the exact or of the unscented filter."""
+"""The bootstrap filter's gradient with respect to tyres and noise levels of a car is the exact or the unscented filter's."""
 
 import equinox as eqx
 import jax
