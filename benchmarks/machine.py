@@ -13,7 +13,13 @@ __all__ = ["describe", "prepare"]
 
 VECTOR_WIDTH_FLAG = "--xla_cpu_prefer_vector_width=512"
 # Compiles in less than half of the time, what runs slower: for runs that measure nothing.
-QUICKLY_COMPILED = "--xla_cpu_use_fusion_emitters=false --xla_llvm_disable_expensive_passes=true --xla_cpu_parallel_codegen_split_count=1"
+QUICKLY_COMPILED = " ".join(
+    (
+        "--xla_cpu_use_fusion_emitters=false",
+        "--xla_llvm_disable_expensive_passes=true",
+        "--xla_cpu_parallel_codegen_split_count=1",
+    )
+)
 PACKAGES = (
     "jaxveh",
     "jax",

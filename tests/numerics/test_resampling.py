@@ -95,9 +95,7 @@ def test_numbers_of_children_are_bounded_as_each_scheme_promises(dtype):
 
 # 1 / 11 and 1 / 20 sum to more than 1 when rounded.
 @every_type
-@pytest.mark.parametrize(
-    "size", [11, 20, pytest.param(99_999, marks=pytest.mark.full)]
-)
+@pytest.mark.parametrize("size", [11, 20, pytest.param(99_999, marks=pytest.mark.full)])
 def test_residual_keeps_whole_expectations_exactly(dtype, size):
     uniform = jnp.full(size, 1.0 / size, dtype)
     np.testing.assert_array_equal(numerics.residual(jax.random.key(0), uniform), np.arange(size))
