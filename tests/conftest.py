@@ -1,7 +1,7 @@
 """Tests run in float64 and strict dtype promotion; float32 tests ask for their dtype, or switch x64 off themselves.
 
-The default run takes XLA's older code generator for the CPU without its slowest optimisations, which together compile in less
-than half of the time: compiling is nearly all that the tests do. `-m full` takes the one that users have.
+The default run takes XLA's older code generator for the CPU without its optimisations, which compiles in less than half
+of the time: compiling is nearly all that the tests do. `-m full` takes the one that users have.
 """
 
 import gc
@@ -19,6 +19,7 @@ QUICKLY_COMPILED = " ".join(
     (
         "--xla_cpu_use_fusion_emitters=false",
         "--xla_llvm_disable_expensive_passes=true",
+        "--xla_backend_optimization_level=0",
         "--xla_cpu_parallel_codegen_split_count=1",
     )
 )
@@ -30,6 +31,18 @@ def pytest_configure(config):
     """An unknown flag ends the process, so they are set for versions only that are known to have them."""
     if config.getoption("markexpr") in ("not full", "peers") and version("jaxlib").startswith("0.10."):
         os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {QUICKLY_COMPILED}".strip()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Of a `product` every other case is left to `-m full`, as on a chessboard: each value of a parameter meets half of the
+    others', and each test half of the cases."""
+    order: dict = {}
+    for item in items:
+        if item.get_closest_marker("product") and hasattr(item, "callspec"):
+            place = order.setdefault((item.path, item.originalname), len(order)) + sum(item.callspec.indices.values())
+            if place % 2:
+                item.add_marker(pytest.mark.full)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -45,7 +45,10 @@ def gradients(filter_, model, rows, coefficients, seeds):
     return np.stack([np.asarray(slope) * float(value) for slope, value in pairs], axis=-1)
 
 
-@pytest.mark.parametrize(("name", "gradient"), [*((name, "score") for name in CARS), ("linear, exact", "held")])
+@pytest.mark.parametrize(
+    ("name", "gradient"),
+    [*((name, "score") for name in CARS), pytest.param("linear, exact", "held", marks=pytest.mark.full)],
+)
 def test_scores_agree_with_the_kalman_filters_and_held_ancestors_do_not(name, gradient):
     car, noise, coefficients, reference = CARS[name]
     manoeuvre = manoeuvres.double_lane_change(speed=25.0, steer=0.05)

@@ -94,6 +94,7 @@ def test_observability_tells_what_the_drive_can_teach(model, drive):
     assert np.all(loose.bounds >= report.bounds * (1 - 1e-9))
 
 
+@pytest.mark.full
 def test_gradient_reaches_noise_and_start_of_the_parameters(drive):
     # With one parameter the filter's gradient compiles in a fraction of the time that it takes with four.
     model = estimators.state_space(

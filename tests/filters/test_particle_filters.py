@@ -14,6 +14,8 @@ from filter_systems import kalman, linear_model, linear_recording, nile_model
 from jaxveh import Recording, filters, numerics
 from jaxveh import statespace as ss
 
+pytestmark = pytest.mark.product
+
 RUNS = 300
 
 

@@ -11,6 +11,8 @@ from jaxveh import InputError, Recording, filters
 from jaxveh import statespace as ss
 from jaxveh.filters import Covariance, SingularValues, SquareRoot
 
+pytestmark = pytest.mark.product
+
 MODEL = linear_model(3, 2, seed=3)
 RECORDING = linear_recording(MODEL)
 KEY = jax.random.key(0)

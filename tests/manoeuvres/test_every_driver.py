@@ -10,6 +10,8 @@ from jaxveh import manoeuvres
 from jaxveh.manoeuvres import Motion, OpenLoop, SpeedControl
 from jaxveh.statespace import cast
 
+pytestmark = pytest.mark.product
+
 DRIVERS = {
     "ISO lane change": manoeuvres.iso_lane_change,
     "ISO obstacle avoidance": manoeuvres.iso_obstacle_avoidance,

@@ -13,6 +13,8 @@ from jaxveh import Recording, manoeuvres
 from jaxveh.manoeuvres import AbstractManoeuvre
 from jaxveh.statespace import cast
 
+pytestmark = pytest.mark.product
+
 KEY = jax.random.key(3)
 
 

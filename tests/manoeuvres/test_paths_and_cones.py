@@ -9,6 +9,8 @@ from jaxveh import InputError, manoeuvres
 from jaxveh.manoeuvres import Circle, LaneChanges, Sine, Straight
 from jaxveh.statespace import cast
 
+pytestmark = pytest.mark.product
+
 PATHS = {
     "Circle, left": lambda: Circle(30.0),
     "Circle, right": lambda: Circle(-30.0),

@@ -11,6 +11,8 @@ import pytest
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 
+pytestmark = pytest.mark.product
+
 
 class Rows(NamedTuple):
     x: Any

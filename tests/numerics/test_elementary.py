@@ -8,6 +8,8 @@ from jax.test_util import check_grads
 
 from jaxveh import numerics
 
+pytestmark = pytest.mark.product
+
 TYPES = [np.float32, np.float64]
 UNARY = ["sin", "cos", "tan", "arctan", "sqrt", "log"]
 

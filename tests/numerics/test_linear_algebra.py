@@ -13,6 +13,8 @@ from jax.test_util import check_grads
 from jaxveh import numerics
 from jaxveh.numerics.linear_algebra import WRITTEN_OUT
 
+pytestmark = pytest.mark.product
+
 every_type = pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
 SIZES = [1, 3, WRITTEN_OUT, WRITTEN_OUT + 1]
 BATCHES = [(), (2, 3)]

@@ -8,6 +8,8 @@ import pytest
 from jaxveh import numerics
 from jaxveh.numerics import platform
 
+pytestmark = pytest.mark.product
+
 
 def _with_barrier(x):
     first, second = numerics.barrier((x * x, jnp.sin(x)))

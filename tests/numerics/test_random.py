@@ -9,6 +9,8 @@ from scipy import stats
 from jaxveh import numerics
 from jaxveh.numerics import random
 
+pytestmark = pytest.mark.product
+
 TYPES = [jnp.float32, jnp.float64]
 COUNT = 400_000
 KEY = jax.random.key(20)

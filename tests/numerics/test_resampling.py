@@ -9,6 +9,8 @@ from jax.test_util import check_grads
 from jaxveh import numerics
 from jaxveh.numerics import resampling
 
+pytestmark = pytest.mark.product
+
 TYPES = [jnp.float32, jnp.float64]
 SCHEMES = [numerics.systematic, numerics.stratified, numerics.multinomial, numerics.residual]
 every_scheme = pytest.mark.parametrize("scheme", SCHEMES, ids=lambda scheme: scheme.__name__)

@@ -8,6 +8,8 @@ from scipy.interpolate import PchipInterpolator
 
 from jaxveh import numerics
 
+pytestmark = pytest.mark.product
+
 POINTS = jnp.array([0.0, 1.0, 3.0, 4.0, 7.0, 8.0])
 VALUES = jnp.array([1.0, 1.0, 0.4, 0.5, 2.0, 1.0])
 BOTH = pytest.mark.parametrize("between", [numerics.interpolate_linear, numerics.interpolate_smooth])

@@ -7,6 +7,8 @@ import pytest
 
 from jaxveh.numerics import lower_factor
 
+pytestmark = pytest.mark.product
+
 
 def random(n, k, seed=0):
     return jnp.asarray(np.random.default_rng(seed).normal(size=(n, k)))

@@ -18,6 +18,8 @@ from observer_systems import Swing, Theta, drive, mass, pendulum, regression, se
 from jaxveh import observers
 from jaxveh import statespace as ss
 
+pytestmark = pytest.mark.product
+
 DT, ROWS = 0.05, 60
 SILENT = slice(30, 33)
 

@@ -13,6 +13,8 @@ from jaxveh.plots.drives import _FIGURES
 from jaxveh.plots.panels import round_number
 from jaxveh.plots.wheel_loads import lifted
 
+pytestmark = pytest.mark.product
+
 TIME = 0.02 * np.arange(301)
 WHEELS = ("fl", "fr", "rl", "rr")
 

@@ -11,6 +11,8 @@ import pytest
 
 from jaxveh import roads, statespace
 
+pytestmark = pytest.mark.product
+
 KEY = jax.random.key(4)
 
 

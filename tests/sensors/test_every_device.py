@@ -14,6 +14,8 @@ from sensor_truth import truth
 from jaxveh import InputError, sensors, statespace
 from jaxveh.sensors import Alignment, LowPass, Position, Signal
 
+pytestmark = pytest.mark.product
+
 SMOOTH = Signal(noise=0.02, bias=0.01, scale=0.01, drift=0.01, drift_time=5.0)
 ROUND = Signal(noise=0.02, bias=0.01, saturation=400.0, quantisation=0.005)
 SPOT = Position(0.7, -0.4, 0.3)

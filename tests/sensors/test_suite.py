@@ -13,6 +13,8 @@ from jaxveh import InputError, Recording, sensors
 from jaxveh.sensors import GNSS, IMU, Dropout, OpticalSideslip, Renamed, Signal, SteeringAngle, Suite, WheelSpeeds
 from jaxveh.sensors.suite import device_keys
 
+pytestmark = pytest.mark.product
+
 KEY = jax.random.key(11)
 STEER = SteeringAngle(rate=10.0, delay=0.05)
 SIDE = IMU(dict.fromkeys(("a_x", "a_y"), Signal(noise=0.1)), rate=4.0, phase=0.1)

@@ -12,6 +12,8 @@ import pytest
 from jaxveh import simulation, statespace
 from jaxveh._core.errors import InputError
 
+pytestmark = pytest.mark.product
+
 
 class Spring(NamedTuple):
     place: object

@@ -12,6 +12,8 @@ from jaxveh.manoeuvres.paths import Straight
 from jaxveh.manoeuvres.speeds import SteadySpeed
 from jaxveh.simulation import simulate, stiffness
 
+pytestmark = pytest.mark.product
+
 STEER = manoeuvres.step_steer(25.0, 0.02, start=0.1, duration=0.4)
 
 

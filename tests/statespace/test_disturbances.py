@@ -8,6 +8,8 @@ from jaxveh import InputError, Recording, filters, run
 from jaxveh import statespace as ss
 from jaxveh._core.names import record_type
 
+pytestmark = pytest.mark.product
+
 Mass, Seen = record_type("Mass", ("place", "speed")), record_type("Seen", ("place", "acceleration"))
 
 

@@ -14,6 +14,8 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh.tyres import Contact
 
+pytestmark = pytest.mark.product
+
 LOAD = 4000.0
 
 

@@ -20,6 +20,8 @@ from jaxveh._core.bijectors import Positive
 from jaxveh._core.errors import InputError
 from jaxveh.tyres import Contact
 
+pytestmark = pytest.mark.product
+
 LOAD = 4000.0
 
 

@@ -14,6 +14,8 @@ from jaxveh import tyres
 from jaxveh.tyres import Contact
 from jaxveh.tyres.evaluation import evaluate
 
+pytestmark = pytest.mark.product
+
 FILES = {
     "mfeval_mf61.csv": "mfeval__MagicFormula61_Parameters.tir",
     "mfeval_pacejkabook.csv": "mfeval__PacejkaBook_Defaults.tir",

@@ -15,6 +15,8 @@ from jaxveh.io.property_file import parse_property_file, read_property_file
 from jaxveh.tyres import AbstractDynamicTyre, Contact
 from jaxveh.tyres.mirrored import ODD_INPUTS
 
+pytestmark = pytest.mark.product
+
 FILE = "mfeval__MagicFormula61_Parameters.tir"
 
 ODD = {

@@ -11,6 +11,8 @@ from jaxveh import InputError, vehicles
 from jaxveh.statespace import cast
 from jaxveh.tyres import Contact, Linear, MagicFormula, cornering_stiffness
 
+pytestmark = pytest.mark.product
+
 LAWS = {
     "linear": lambda: Linear(80e3),
     "magic": lambda: MagicFormula(B=10.0, C=1.4, D=5000.0, E=-0.8),

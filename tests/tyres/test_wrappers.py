@@ -12,6 +12,8 @@ from jaxveh import estimators, sensors, statespace, tyres, vehicles
 from jaxveh._core.errors import InputError
 from jaxveh.tyres import Contact
 
+pytestmark = pytest.mark.product
+
 LOAD = 4000.0
 PEAK_X, PEAK_Y = 1.1, 0.9
 

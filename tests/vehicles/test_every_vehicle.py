@@ -22,6 +22,8 @@ from jaxveh._core.names import record
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.simulation import simulate
 
+pytestmark = pytest.mark.product
+
 SPEED = 15.0
 ROUGH = Ground(0.9, 0.8, 1.1, 0.7, 0.02, 0.03)
 

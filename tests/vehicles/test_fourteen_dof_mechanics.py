@@ -12,6 +12,8 @@ from fourteen_dof_lagrange import CORNERS, Mechanism, body_to_world, rotation
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.wheels import gravity
 
+pytestmark = pytest.mark.product
+
 ODD = dict(toe_front=0.004, toe_rear=-0.003, camber_front=-0.02, camber_rear=0.015)
 
 

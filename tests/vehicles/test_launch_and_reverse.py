@@ -11,6 +11,8 @@ from jaxveh import tyres, vehicles
 from jaxveh.roads import LEVEL
 from jaxveh.vehicles.wheels import opposing
 
+pytestmark = pytest.mark.product
+
 LOAD = 3600.0
 
 STATIC = {

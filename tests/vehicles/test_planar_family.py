@@ -9,6 +9,8 @@ from planar_cars import MAKERS, made, point
 from jaxveh import InputError
 from jaxveh.roads import Ground
 
+pytestmark = pytest.mark.product
+
 ODD = (
     *(
         "v_y",

@@ -16,6 +16,8 @@ from jaxveh.vehicles import GRAVITY, CarNumbers, SuspensionNumbers, TyreNumbers,
 from jaxveh.vehicles.load_transfer import planar_loads
 from jaxveh.vehicles.rolling_body import roll_geometry, roll_loads
 
+pytestmark = pytest.mark.product
+
 WITH_MASS = [name for name in sets.CARS if name != "semi_trailer"]
 WITH_SUSPENSION = [name for name in WITH_MASS if name != "ferrari_250lm"]
 COMMONROAD = ("compact_car", "sedan", "van")

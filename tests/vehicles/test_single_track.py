@@ -15,6 +15,8 @@ from jaxveh.statespace import RK4, cast
 from jaxveh.tyres import AbstractDynamicTyre, Contact, Forces
 from jaxveh.vehicles import GRAVITY, SingleTrackState
 
+pytestmark = pytest.mark.product
+
 
 class Inputs(NamedTuple):
     steer: Any
