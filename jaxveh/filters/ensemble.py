@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
-from jaxveh.filters.gaussian.filter import check_covariances, innovation_info, wrapped_innovation
+from jaxveh.filters.gaussian.filter import check_covariances, innovation_info, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import masked_factor
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.filters.particle import add_noise, need_key
@@ -87,9 +87,10 @@ class Ensemble(AbstractFilter):
     def _predict(self, model, belief, t, u_next):
         u = model.step_inputs(belief.t, t, belief.u, u_next)
         moved = model.transition(belief.t, t, belief.members, u)
-        draw, _ = jax.random.split(jax.random.fold_in(belief.key, belief.count))
+        # Another key each time: between two rows there may be several predictions.
+        draw, key = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         moved = numerics.barrier(add_noise(model, draw, moved, t - belief.t))
-        return EnsembleBelief(moved, belief.key, t, belief.u, belief.count)
+        return EnsembleBelief(moved, key, t, belief.u, belief.count)
 
     def update(self, model: StateSpace, belief: EnsembleBelief, row: Row) -> tuple[EnsembleBelief, Info]:
         """The belief after the row's measurement, at the belief's own time."""
@@ -97,6 +98,7 @@ class Ensemble(AbstractFilter):
         here = jnp.stack([present[name] for name in model.channels])
         observed = model.observation(row.t, belief.members, row.u)
         rows = [jnp.broadcast_to(getattr(observed, name), belief.members[0].shape) for name in model.channels]
+        rows = [unwrapped(model, name, values) for name, values in zip(model.channels, rows, strict=True)]
         predicted = jnp.where(here[:, None], jnp.stack(rows), 0)
         states = jnp.stack(belief.members)
         X, E = _deviations(states), _deviations(predicted)

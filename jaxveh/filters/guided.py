@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh.filters.choosing import log_of
-from jaxveh.filters.gaussian.filter import check_covariances, wrapped_innovation
+from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes
 from jaxveh.filters.particle import (
@@ -77,6 +77,7 @@ class Guided(AbstractParticleFilter):
         if model.process_noise is None:
             raise InputError("Guided: the model has no process noise, which is what it guides. Use ParticleFilter.")
         check_covariances("Guided", model)
+        check_gaussian("Guided", "process noise", model.process_noise.law)
 
     def init(self, model, row, key=None):
         first = ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)
@@ -134,6 +135,7 @@ def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: S
         x = moved._replace(**{name: getattr(moved, name) + e[i] for i, name in enumerate(names)})
         observed = model.observation(row.t, x, row.u)
         rows = [jnp.broadcast_to(getattr(observed, name), e.shape[1:]) for name in model.channels]
+        rows = [unwrapped(model, name, r) for name, r in zip(model.channels, rows, strict=True)]
         return jnp.stack([jnp.where(present[name], r, 0) for name, r in zip(model.channels, rows, strict=True)])
 
     image = rule.image(see, jnp.zeros(len(names), prior.matrix.dtype), prior.factor)

@@ -14,7 +14,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import check_names, record
 from jaxveh.filters.choosing import log_of
-from jaxveh.filters.gaussian.filter import check_covariances, wrapped_innovation
+from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.gaussian.rules import Image, times
@@ -119,7 +119,12 @@ class Marginalised(AbstractParticleFilter):
     def check(self, model):
         check_names("Marginalised.linear", self.linear, model.states)
         check_covariances("Marginalised", model)
-        noisy = () if model.process_noise is None else model.process_noise.law.names
+        check_gaussian("Marginalised", "measurement noise", model.measurement_noise)
+        check_gaussian("Marginalised", "prior", model.prior.law)
+        if model.process_noise is None:
+            raise InputError("Marginalised: the model has no process noise, which its drawn states need. Use Kalman.")
+        check_gaussian("Marginalised", "process noise", model.process_noise.law)
+        noisy = model.process_noise.law.names
         still = [name for name in _others(self, model) if name not in noisy]
         if still:
             raise InputError(

@@ -113,10 +113,10 @@ class TestMatchedProcess:
         rows = base.rows(recording)
         row = lambda k: jax.tree.map(lambda leaf: leaf[k], rows)
         belief, _ = filter_.init(base, row(0))
-        np.testing.assert_array_equal(belief.memory, [0.0])
+        np.testing.assert_array_equal(belief.memory[0], [0.0])
         for k in range(1, 4):
             belief, _ = filter_.step(base, belief, row(k))
-        np.testing.assert_allclose(belief.memory, [4.0], rtol=1e-12)
+        np.testing.assert_allclose(belief.memory[0], [4.0], rtol=1e-12)
 
     def test_bad_input_is_named(self):
         with pytest.raises(InputError, match="most is empty"):

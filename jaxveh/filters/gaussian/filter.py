@@ -25,7 +25,7 @@ from jaxveh.statespace.contract import (
     presence,
     wrap_angle,
 )
-from jaxveh.statespace.noise import LOG_2PI
+from jaxveh.statespace.noise import LOG_2PI, AbstractNoise, Gaussian, Independent, MultivariateGaussian
 
 
 class AbstractGaussianFilter(AbstractFilter):
@@ -152,6 +152,13 @@ def check_covariances(name: str, model: StateSpace) -> None:
             )
 
 
+def check_gaussian(who: str, what: str, law: AbstractNoise) -> None:
+    """Raise `InputError` unless the law, or each part of it, is Gaussian."""
+    for part in law.laws if isinstance(law, Independent) else (law,):
+        if not isinstance(part, Gaussian | MultivariateGaussian):
+            raise InputError(f"{who}: the {what} {type(part).__name__} is not Gaussian. Use ParticleFilter.")
+
+
 def with_spread(belief: GaussianBelief, vector: Any, spread: Spread, t=None, u=None, count=None) -> GaussianBelief:
     """The belief with another Gaussian, and another time, inputs and count where given."""
     return GaussianBelief(
@@ -180,12 +187,17 @@ def observation_image(model: StateSpace, belief: GaussianBelief, row: Row, prese
         found = []
         for name in model.channels:
             values = jnp.broadcast_to(getattr(observed, name), rows.shape[1:])
-            if name in model.angles and values.ndim:
-                values = values[0] + wrap_angle(values - values[0])
-            found.append(jnp.where(present[name], values, 0))
+            found.append(jnp.where(present[name], unwrapped(model, name, values), 0))
         return jnp.stack(found)
 
     return belief.rule.image(see, belief.vector, belief.factor)
+
+
+def unwrapped(model: StateSpace, name: str, values: Any) -> Any:
+    """A channel's values (k, ...), angles among them within half a turn of the first; a single one as it is."""
+    if name not in model.angles or not values.ndim:
+        return values
+    return values[0] + wrap_angle(values - values[0])
 
 
 def wrapped_innovation(model: StateSpace, innovation: Any, here: Any) -> Any:

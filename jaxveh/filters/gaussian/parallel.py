@@ -61,6 +61,10 @@ def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, cova
     """
     moves, sees = _lines(rule, model, rows, means, covariances)
     y, R = _measured(model, rows)
+    if model.angles:
+        # A measured angle is the one of all its turns that is nearest to where its line was laid.
+        about = jnp.einsum("tmn,tn->tm", sees.slope, means) + sees.offset
+        y = about + wrapped_innovation(model, (y - about).T, jnp.ones((*y.shape[1:], 1), bool)).T
     R = R + sees.error
     prior = jnp.stack(model.prior.mean), model.prior.covariance()
     elements = _filtering_elements(moves, sees, y, R, prior)

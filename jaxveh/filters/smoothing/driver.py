@@ -14,7 +14,7 @@ from jaxveh.filters.smoothing.backward_sampling import check_density, sample_bac
 from jaxveh.filters.smoothing.fixed_lag import check_lag, smooth_with_lag
 from jaxveh.filters.smoothing.genealogy import trace_genealogy
 from jaxveh.filters.smoothing.rauch_tung_striebel import has_smoother, rauch_tung_striebel
-from jaxveh.filters.smoothing.smoothed import SmoothedEstimate
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, check_particles_alone
 from jaxveh.statespace import StateSpace
 from jaxveh.statespace.contract import AbstractFilter
 from jaxveh.statespace.driver import raise_failure
@@ -78,6 +78,7 @@ def smooth(
 
 
 def _particles(filter: AbstractParticleFilter, model: StateSpace, rows: Any, key, method) -> SmoothedEstimate:
+    check_particles_alone("smooth", filter)
     if method is None:
         noisy = () if model.process_noise is None else model.process_noise.law.names
         method = BackwardSampling() if set(noisy) == set(model.states) else Genealogy()

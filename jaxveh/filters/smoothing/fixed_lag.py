@@ -12,7 +12,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.filters.choosing import Transport
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
 from jaxveh.filters.smoothing.rauch_tung_striebel import gaussian_of, given_later, has_smoother
-from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, check_particles_alone, smoothed_estimate
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import AbstractBelief, AbstractFilter
 from jaxveh.statespace.driver import scan_and_keep
@@ -83,6 +83,7 @@ def check_lag(filter: Any, lag: int) -> None:
     if not isinstance(lag, int) or lag < 1:
         raise InputError(f"lag = {lag}: must be a whole number of at least 1.")
     if isinstance(filter, AbstractParticleFilter):
+        check_particles_alone("FixedLag", filter)
         if isinstance(filter.resampling, Transport):
             raise InputError("FixedLag: particles of Transport have no ancestors.")
     elif not has_smoother(filter):

@@ -30,6 +30,9 @@ def smooth_parallel(
     the first about the prior. It converges to the fixed point of iterated smoothing, which no loop forwards gives; where the
     prior is far away it may not. The filtered estimate and the log-likelihood are those of the last pass's lines.
 
+    A measured angle is taken as the one of all its turns that is nearest to where it is linearised; `Kalman`, which is
+    linearised nowhere, takes no angles.
+
     On a processor with few cores the loop is faster: about twice the work a row is done, in matrix products.
 
     **Raises** as `run`, and `InputError` for other filters and forms.
@@ -40,6 +43,11 @@ def smooth_parallel(
             f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...), of the form Covariance()."
         )
     filter.check(model)
+    if model.angles and isinstance(filter, Kalman):
+        raise InputError(
+            f"smooth_parallel: Kalman with the angle(s) {', '.join(model.angles)}: innovations are wrapped, which is no linear "
+            "update. Use Iterated(Extended(), 2), or smooth."
+        )
     found = _smooth(filter, model, model.rows(recording))
     found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
     if throw:

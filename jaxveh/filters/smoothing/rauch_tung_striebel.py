@@ -12,6 +12,9 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, transition_image, with_spread
 from jaxveh.filters.gaussian.forms import Later, Spread
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
+from jaxveh.filters.wrappers.considered import Consider
+from jaxveh.filters.wrappers.h_infinity import HInfinity
+from jaxveh.filters.wrappers.strong_tracking import StrongTracking
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.driver import scan_and_keep
 
@@ -65,7 +68,12 @@ def rule_filter_of(filter: Any) -> AbstractRuleFilter:
 
 
 def has_smoother(filter: Any) -> bool:
-    """Whether the filter, inside its wrappers, keeps one Gaussian by a rule."""
+    """Whether the filter, inside its wrappers, keeps one Gaussian by a rule, predicted as the smoother predicts.
+
+    `StrongTracking` and `HInfinity` update another covariance than the predicted one, `Consider` not all states.
+    """
     while isinstance(filter, AbstractGaussianFilter) and not isinstance(filter, AbstractRuleFilter):
+        if isinstance(filter, StrongTracking | HInfinity | Consider):
+            return False
         filter = getattr(filter, "filter", None)
     return isinstance(filter, AbstractRuleFilter)

@@ -1,7 +1,7 @@
 """What wrappers around Gaussian filters have in common."""
 
 import abc
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -82,6 +82,8 @@ class AbstractRemembering(AbstractGaussianFilter):
     """A filter around another that remembers what it has seen, and gives its filter a model with other noises."""
 
     filter: eqx.AbstractVar[AbstractGaussianFilter]
+    learns_variances: ClassVar[bool] = False
+    """Whether it replaces the measurement noise by one of its own."""
 
     @abc.abstractmethod
     def start(self, model: StateSpace) -> Any:
@@ -116,6 +118,17 @@ def check_independent(who: str, model: StateSpace) -> None:
     if not isinstance(model.measurement_noise, Gaussian):
         kind = type(model.measurement_noise).__name__
         raise InputError(f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation a channel.")
+
+
+def check_variances_count(who: str, filter: Any) -> None:
+    """Raise `InputError` where a filter inside takes measurement noise of its own for the one that it is given."""
+    while filter is not None:
+        if getattr(filter, "learns_variances", False):
+            kind = type(filter).__name__
+            raise InputError(
+                f"{who}: {kind} inside it would replace its variances. Put {who} inside: {kind}({who}(...))."
+            )
+        filter = getattr(filter, "filter", None)
 
 
 def variances_of(model: StateSpace) -> Any:

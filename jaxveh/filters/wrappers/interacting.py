@@ -113,7 +113,9 @@ class InteractingModels(AbstractFilter):
     def _step(self, model, belief, row):
         joint = self.transition.astype(row.t.dtype) * belief.probabilities[:, None]
         ahead = jnp.sum(joint, axis=0)
-        from_each = joint / jnp.where(ahead > 0, ahead, 1)
+        # A mode that cannot be is not mixed: it goes on from its own Gaussian, and counts for nothing.
+        alone = jnp.eye(len(self.variants), dtype=joint.dtype)
+        from_each = jnp.where(ahead > 0, joint / jnp.where(ahead > 0, ahead, 1), alone)
         found = []
         for j, mode in enumerate(self._modes(model)):
             mixed = self._mix(belief, from_each[:, j], j)
@@ -131,6 +133,7 @@ class InteractingModels(AbstractFilter):
     def _weighed(self, model, row, before, found):
         beliefs, infos = zip(*found, strict=True)
         logs = jnp.stack([info.log_likelihood for info in infos])
+        logs = jnp.where(before > 0, logs, -jnp.inf)
         top = jnp.max(logs)
         weights = before * jnp.exp(logs - top)
         total = jnp.sum(weights)
@@ -171,5 +174,5 @@ def _mixture_info(model, row, weights, infos, log_likelihood) -> Info:
         innovation_std=by_channel(model, std, present),
         nis=nothing,
         ess=nothing,
-        result=first_failure(jnp.stack([info.result for info in infos]))[0],
+        result=first_failure(jnp.where(weights > 0, jnp.stack([info.result for info in infos]), 0))[0],
     )

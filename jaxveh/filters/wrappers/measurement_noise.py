@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -31,6 +31,7 @@ class SageHusa(AbstractRemembering):
     predictions. Errors of the model count as noise of the sensor. The noise must be Gaussian, a standard deviation a channel.
     """
 
+    learns_variances: ClassVar[bool] = True
     filter: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)
     floor: float = eqx.field(static=True, default=0.01)
@@ -66,7 +67,8 @@ class SageHusa(AbstractRemembering):
 
 
 class Precisions(NamedTuple):
-    """Inverse-gamma laws of the variances (m,): `shape` (-) and `scale` (the channel's unit squared); mean scale / shape."""
+    """Inverse-gamma laws of the variances (m,): `shape` (-) and `scale` (the channel's unit squared). 1 / E[1 / variance] is
+    scale / shape."""
 
     shape: Any
     scale: Any
@@ -84,6 +86,7 @@ class VariationalBayes(AbstractRemembering):
     channel.
     """
 
+    learns_variances: ClassVar[bool] = True
     filter: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)
     weight: float = eqx.field(static=True, default=10.0)

@@ -63,11 +63,11 @@ class MatchedProcess(AbstractRemembering):
     """`filter` with an extra process noise on some states that matches the corrections (R. Mehra 1972; S. Akhlaghi, N. Zhou &
     Z. Huang 2017).
 
-        q <- b q + (1 - b) d^2,    b = `forgetting`
+        q <- b q + (1 - b) (d^2 - Q),    b = `forgetting`
 
-    with d what a row's measurement changed in the state's mean; q is the extra variance a step, from zero up to the square of
-    `most` (standard deviations a step by state). It grows in a manoeuvre that the model does not explain and falls again;
-    sensor noise goes through the gain into it, so that it never falls to zero.
+    with d what a row's measurement changed in the state's mean, whose mean square is all of a steady filter's process noise,
+    and Q the model's own variance over the step; the extra variance a step is q, from zero up to the square of `most` (standard
+    deviations a step by state). It grows in a manoeuvre that the model does not explain and falls again.
     """
 
     filter: AbstractGaussianFilter
@@ -86,18 +86,35 @@ class MatchedProcess(AbstractRemembering):
         self.filter.check(model)
 
     def start(self, model):
-        return jnp.zeros(len(self.most), model.prior.mean[0].dtype)
+        nothing = jnp.zeros(len(self.most), model.prior.mean[0].dtype)
+        # How far the corrections are above the model's own variances, and these over the last step.
+        return nothing, nothing
 
     def believed(self, model, memory):
-        return with_extra(model, {name: memory[i] for i, (name, _) in enumerate(self.most)})
+        extra = jnp.clip(memory[0], 0.0, self._most(memory[0].dtype))
+        return with_extra(model, {name: extra[i] for i, (name, _) in enumerate(self.most)})
+
+    def predict_between(self, model, belief, t, u_next):
+        own = jnp.zeros_like(belief.memory[1])
+        if model.process_noise is not None:
+            law, names = model.process_noise.over(t - belief.t), [name for name, _ in self.most]
+            own = jnp.stack(
+                [jnp.diagonal(covariance_in(law, model.states, own.dtype))[model.states.index(n)] for n in names]
+            )
+        moved = super().predict_between(model, belief, t, u_next)
+        return Remembering(moved.inside, (belief.memory[0], own))
 
     def update(self, model, belief, row):
         after, info = self.update_inside(model, belief, row)
         d = _squared_changes(belief.inside, after.inside, self.most)
-        most = jnp.asarray([std**2 for _, std in self.most], d.dtype)
-        learned = jnp.minimum(self.forgetting * belief.memory + (1.0 - self.forgetting) * d, most)
+        excess, own = belief.memory
+        learned = self.forgetting * excess + (1.0 - self.forgetting) * (d - own)
+        learned = jnp.minimum(learned, self._most(d.dtype))
         # Nothing is learned of the first row, whose correction is the prior's.
-        return Remembering(after.inside, jnp.where(belief.count > 0, learned, belief.memory)), info
+        return Remembering(after.inside, (jnp.where(belief.count > 0, learned, excess), own)), info
+
+    def _most(self, dtype):
+        return jnp.asarray([std**2 for _, std in self.most], dtype)
 
 
 def _check_levels(what: str, levels: tuple[tuple[str, float], ...]) -> None:

@@ -10,7 +10,13 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
-from jaxveh.filters.wrappers.base import AbstractStateless, check_independent, variances_of, with_variances
+from jaxveh.filters.wrappers.base import (
+    AbstractStateless,
+    check_independent,
+    check_variances_count,
+    variances_of,
+    with_variances,
+)
 from jaxveh.filters.wrappers.innovation import innovation, spread_of
 from jaxveh.statespace.contract import presence
 
@@ -24,8 +30,9 @@ class Huber(AbstractStateless):
     """`filter` with Huber's loss of the innovations: linear beyond `threshold` standard deviations of the prediction.
 
     Each channel's noise variance is divided by the weight `min(1, threshold / |e|)`, e the innovation over its predicted
-    spread (P. Huber 1964; one step of the reweighting of C. Karlgaard & H. Schaub 2007). The noise must be Gaussian, a standard
-    deviation a channel.
+    spread (P. Huber 1964; after the reweighting of C. Karlgaard & H. Schaub 2007, who scale by the noise's spread and repeat).
+    The log-likelihood is that of the Gaussian with the larger variances: no density of Huber's law. The noise must be Gaussian,
+    a standard deviation a channel. Not around a filter that learns variances: inside it.
     """
 
     filter: AbstractGaussianFilter
@@ -36,6 +43,7 @@ class Huber(AbstractStateless):
 
     def check(self, model):
         check_independent("Huber", model)
+        check_variances_count("Huber", self.filter)
         self.filter.check(model)
 
     def update(self, model, belief, row):
@@ -68,6 +76,7 @@ class RobustStudentT(AbstractStateless):
 
     def check(self, model):
         check_independent("RobustStudentT", model)
+        check_variances_count("RobustStudentT", self.filter)
         self.filter.check(model)
 
     def update(self, model, belief, row):

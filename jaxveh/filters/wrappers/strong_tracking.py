@@ -16,8 +16,9 @@ class StrongTracking(AbstractRemembering):
 
         V <- (rho V + e e^T) / (1 + rho),    lambda = max(1, trace(V - beta R) / trace(H P H^T))
 
-    with each channel over its noise's standard deviation, so that units do not matter; rho = `memory`, beta = `softening`. It
-    follows sudden changes that the model does not know of, and takes outliers for such.
+    with V = e e^T in a channel's first row, and each channel over its noise's standard deviation, so that units do not matter;
+    rho = `memory`, beta = `softening`, lambda at most `ceiling`. All of the predicted covariance is inflated, where the source
+    leaves out the process noise. It follows sudden changes that the model does not know of, and takes outliers for such.
     """
 
     filter: AbstractGaussianFilter
@@ -35,8 +36,8 @@ class StrongTracking(AbstractRemembering):
 
     def start(self, model):
         dtype = model.prior.mean[0].dtype
-        # The innovations' mean square over the noise, and how much of it has been seen.
-        return jnp.zeros(len(model.channels), dtype), jnp.zeros(len(model.channels), dtype)
+        # V over the noise; negative before a channel's first row.
+        return jnp.full(len(model.channels), -1.0, dtype)
 
     def believed(self, model, memory):
         return model
@@ -44,14 +45,13 @@ class StrongTracking(AbstractRemembering):
     def update(self, model, belief, row):
         found = innovation(self.filter, model, belief.inside, row)
         squared = jnp.square(found.error) / found.noise
-        sums, counts = (
-            jnp.where(found.here, self.memory * old + new, old)
-            for old, new in zip(belief.memory, (squared, jnp.ones_like(squared)), strict=True)
-        )
-        excess = jnp.where(found.here, sums / jnp.maximum(counts, 1.0) - self.softening, 0.0)
+        old = belief.memory
+        mixed = jnp.where(old < 0, squared, (self.memory * old + squared) / (1.0 + self.memory))
+        squares = jnp.where(found.here, mixed, old)
+        excess = jnp.where(found.here, squares - self.softening, 0.0)
         expected = jnp.sum(jnp.where(found.here, found.expected / found.noise, 0.0))
         some = expected > 0
         factor = jnp.where(some, jnp.sum(excess) / jnp.where(some, expected, 1.0), 1.0)
         factor = jnp.clip(factor, 1.0, self.ceiling)
         after, info = self.filter.update(model, belief.inside.inflated(factor), row)
-        return Remembering(after, (sums, counts)), info
+        return Remembering(after, squares), info

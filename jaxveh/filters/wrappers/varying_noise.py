@@ -10,6 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import check_names
+from jaxveh.filters.wrappers.base import check_variances_count
 from jaxveh.statespace import Continuous, Gaussian, StateSpace
 from jaxveh.statespace.contract import AbstractFilter
 from jaxveh.statespace.process import Discrete
@@ -59,6 +60,8 @@ class VaryingNoise(AbstractFilter):
             if not isinstance(law, Gaussian):
                 kind = type(law).__name__
                 raise InputError(f"VaryingNoise: the {what} is {kind}: must be Gaussian, a standard deviation a field.")
+        if self.measurement:
+            check_variances_count("VaryingNoise", self.filter)
         self.filter.check(model)
 
     def init(self, model, row, key=None):

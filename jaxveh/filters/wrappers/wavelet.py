@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -43,6 +43,7 @@ class HaarNoise(AbstractRemembering):
     must be Gaussian, a standard deviation a channel.
     """
 
+    learns_variances: ClassVar[bool] = True
     filter: AbstractGaussianFilter
     window: int = eqx.field(static=True, default=64)
     memory: float = eqx.field(static=True, default=0.9)
