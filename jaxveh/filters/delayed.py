@@ -12,9 +12,9 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.result import Result, code
-from jaxveh.statespace import Discrete, Row, StateSpace
+from jaxveh.filters.wrappers.process_noise import MatchedProcess, ShrinkingProcess
+from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info
-from jaxveh.statespace.process import Together
 
 
 class DelayedBelief(AbstractBelief):
@@ -85,9 +85,18 @@ class Delayed(AbstractFilter):
     def check(self, model):
         check_names("Delayed.delays", [name for name, _ in self.delays], model.channels)
         noise = model.process_noise
-        parts = noise.parts if isinstance(noise, Together) else (noise,)
-        if any(isinstance(part, Discrete) for part in parts):
-            raise InputError("Delayed: the process noise is a law a step (Discrete): it must be Continuous.")
+        if noise is not None and not noise.grows_with_time:
+            raise InputError(
+                "Delayed: a part of the process noise is a law a step (Discrete, or an input's white error), and a row put in "
+                "between would add it once more. It must be Continuous; give uncertain inputs a correlation time."
+            )
+        inner = self.filter
+        while inner is not None:
+            if isinstance(inner, ShrinkingProcess | MatchedProcess):
+                raise InputError(
+                    f"Delayed: {type(inner).__name__} inside it adds noise a step, and so once more a late row."
+                )
+            inner = getattr(inner, "filter", None)
         if model.input_path != "held":
             raise InputError(f"Delayed: the model's inputs run {model.input_path}: input_path must be 'held'.")
         self.filter.check(model)

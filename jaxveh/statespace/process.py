@@ -14,6 +14,11 @@ from jaxveh.statespace.noise import AbstractNoise, CauchyGaussianMixture, Indepe
 class AbstractProcessNoise(eqx.Module):
     """The noise that a step adds to the propagated state; `law` names its fields."""
 
+    @property
+    def grows_with_time(self) -> bool:
+        """Whether a step of some length adds what several shorter ones do, as white noise in continuous time."""
+        return False
+
     @abc.abstractmethod
     def over(self, dt) -> AbstractNoise:
         """The law of the noise gathered over `dt` seconds."""
@@ -29,6 +34,10 @@ class Continuous(AbstractProcessNoise):
         for law in laws:
             if isinstance(law, (StudentT, CauchyGaussianMixture)):
                 raise InputError(f"{type(law).__name__} as process noise is the law of one step: wrap it in Discrete.")
+
+    @property
+    def grows_with_time(self):
+        return True
 
     def over(self, dt):
         return self.law.scaled(jnp.sqrt(dt))
@@ -47,6 +56,10 @@ class Together(AbstractProcessNoise):
     """Independent process noises over disjoint fields."""
 
     parts: tuple[AbstractProcessNoise, ...]
+
+    @property
+    def grows_with_time(self):
+        return all(part.grows_with_time for part in self.parts)
 
     @property
     def law(self):

@@ -112,6 +112,10 @@ class Wandering(AbstractProcessNoise):
     law: Gaussian
     times: tuple[float, ...] = eqx.field(static=True)
 
+    @property
+    def grows_with_time(self):
+        return all(time > 0 for time in self.times)
+
     def over(self, dt):
         fresh = [numerics.sqrt(1.0 - _kept(dt, time) ** 2) for time in self.times]
         return eqx.tree_at(

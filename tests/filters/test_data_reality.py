@@ -94,6 +94,14 @@ class TestDelayed:
                 ),
                 "must be Continuous",
             ),
+            (
+                lambda: filters.Delayed(filters.Kalman()).check(ss.uncertain_inputs(MODEL, {"force": 0.1})),
+                "give uncertain inputs a correlation time",
+            ),
+            (
+                lambda: filters.Delayed(filters.ShrinkingProcess(filters.Kalman(), {"x0": 0.1})).check(MODEL),
+                "ShrinkingProcess inside it adds noise a step",
+            ),
         ],
     )
     def test_bad_input_is_named(self, make, message):

@@ -17,7 +17,8 @@ from jaxveh.statespace.contract import AbstractFilter, always, apart
 
 
 class Paused(AbstractFilter):
-    """`filter`, held while the input `channel` is above 0.5: no prediction, no measurement (mass-grade-aukf: while braking).
+    """`filter`, held while the input `channel` is above 0.5: no prediction, no measurement, as estimators of mass and
+    grade wait while braking.
 
     The state stays what it was. In the first row after a pause its spread grows by `widen`, standard deviations by state: what
     may have happened meanwhile (`{"v_x": 20.0}`: whatever it was, the next measurement says it anew). Infos of rows in a pause

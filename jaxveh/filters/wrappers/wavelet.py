@@ -31,7 +31,8 @@ class Window(NamedTuple):
 
 
 class HaarNoise(AbstractRemembering):
-    """`filter` with measurement variances from the Haar wavelet's highest band of the last `window` samples (model-adaptive-pf).
+    """`filter` with measurement variances from the Haar wavelet's highest band of the last `window` samples
+    (Qin et al. 2014).
 
         d_j = (y_{2j+1} - y_{2j}) / sqrt(2),    sigma = median |d| / 0.6745,    R <- memory R + (1 - memory) sigma^2
 
