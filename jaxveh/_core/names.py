@@ -37,6 +37,18 @@ def as_mapping(values, what: str = "values") -> dict:
     raise InputError(f"{what} = {type(values).__name__}: must be a NamedTuple or a mapping from names to values.")
 
 
+def as_names(values) -> tuple[str, ...] | None:
+    """Names as a tuple, which a static field must be; a single one is one name, not its letters."""
+    if values is None:
+        return None
+    return (values,) if isinstance(values, str) else tuple(values)
+
+
+def as_groups(values) -> tuple[tuple[str, ...], ...] | None:
+    """Groups of names as a tuple of tuples; a name that stands alone is a group."""
+    return None if values is None else tuple(as_names(group) for group in values)
+
+
 def check_names(what: str, names: Iterable[str], allowed: Iterable[str]) -> None:
     """Raise unless every one of `names` is among `allowed`; the message lists what there is."""
     allowed = tuple(allowed)

@@ -15,6 +15,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import check_names
 from jaxveh.filters.choosing import Transport
+from jaxveh.filters.marginalised import Marginalised
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, gather
 from jaxveh.statespace.contract import AbstractFilter
 
@@ -52,6 +53,10 @@ class AdaptiveNumber(AbstractFilter):
         error: float = 0.05,
         confidence: float = 0.99,
     ):
+        if not isinstance(filter, AbstractParticleFilter) or isinstance(filter, Marginalised):
+            raise InputError(
+                f"AdaptiveNumber: {type(filter).__name__} inside: must be ParticleFilter, AuxiliaryParticleFilter or Guided."
+            )
         n = filter.particles
         self.filter, self.error, self.confidence = filter, error, confidence
         self.bins = tuple(sorted(dict(bins).items()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -41,8 +42,11 @@ def load_belief(path: str | Path, like: B) -> B:
     if not path.is_file():
         raise InputError(f"path = {path}: there is no such file.")
     expected = _named(like)
-    with np.load(path) as archive:
-        arrays = dict(archive)
+    try:
+        with np.load(path) as archive:
+            arrays = dict(archive)
+    except (ValueError, OSError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: is no file that save_belief wrote ({error}).") from error
     for name in sorted(set(arrays) ^ set(expected)):
         where = "the file has" if name in arrays else "the file lacks"
         raise InputError(f"{path}: {where} {name}: it is of another filter or model.")

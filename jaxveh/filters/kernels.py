@@ -10,8 +10,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import check
-from jaxveh._core.names import check_names
+from jaxveh._core.errors import InputError, check
+from jaxveh._core.names import as_names, check_names
+from jaxveh.filters.marginalised import Marginalised
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
 from jaxveh.statespace import StateSpace
 from jaxveh.statespace.contract import AbstractFilter, apart
@@ -22,6 +23,13 @@ KERNEL = 0x6B65726E
 
 class AbstractKernel(AbstractFilter):
     """A particle filter whose particles are replaced, before each step, by draws from kernels about them."""
+
+    def __check_init__(self):
+        if not isinstance(self.inside, AbstractParticleFilter) or isinstance(self.inside, Marginalised):
+            raise InputError(
+                f"{type(self).__name__}: {type(self.inside).__name__} inside: must be ParticleFilter, AuxiliaryParticleFilter "
+                "or Guided."
+            )
 
     @property
     @abc.abstractmethod
@@ -71,7 +79,7 @@ class LiuWest(AbstractKernel):
 
     filter: AbstractParticleFilter
     discount: float = eqx.field(static=True, default=0.98)
-    names: tuple[str, ...] | None = eqx.field(static=True, default=None)
+    names: tuple[str, ...] | None = eqx.field(static=True, default=None, converter=as_names)
 
     def __check_init__(self):
         check("LiuWest.discount", self.discount, lambda d: (d > 1 / 3) & (d < 1), "above 1/3 and below 1")
@@ -83,6 +91,8 @@ class LiuWest(AbstractKernel):
     def check(self, model):
         self.filter.check(model)
         check_names("LiuWest.names", self.names or (), model.states)
+        if not self.smeared(model):
+            raise InputError("LiuWest: every state has process noise, so that none is a parameter. Give `names`.")
 
     def smeared(self, model):
         if self.names is not None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, is_concrete
-from jaxveh._core.names import check_names, record
+from jaxveh._core.names import as_names, check_names, record
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
@@ -105,7 +105,7 @@ class Marginalised(AbstractParticleFilter):
     """
 
     particles: int = eqx.field(static=True)
-    linear: tuple[str, ...] = eqx.field(static=True)
+    linear: tuple[str, ...] = eqx.field(static=True, converter=as_names)
     resampling: Callable = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     gradient: str = eqx.field(static=True, default="score")

@@ -207,3 +207,33 @@ def test_laws_that_are_not_gaussian_are_refused_where_they_must_be():
     for filter_ in (filters.Guided(10), filters.Marginalised(10, ("x2",))):
         with pytest.raises(InputError, match="process noise StudentT is not Gaussian"):
             filter_.check(base)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: filters.Gated(filters.ParticleFilter(10)), "Gated: ParticleFilter inside: must be a Gaussian filter"),
+        (
+            lambda: filters.Consider(filters.Gated(filters.Kalman()), ("x0",)),
+            "Consider: Gated inside: must be .* by itself",
+        ),
+        (lambda: filters.Iterated(filters.Gated(filters.Kalman())), "Iterated: Gated inside"),
+        (lambda: filters.Federated(filters.Ensemble(5), (("y0",), ("y1",))), "Federated: Ensemble inside"),
+        (lambda: filters.LiuWest(filters.Kalman()), "LiuWest: Kalman inside: must be ParticleFilter"),
+        (lambda: filters.Regularised(filters.Marginalised(5, ("x0",))), "Regularised: Marginalised inside"),
+        (
+            lambda: filters.AdaptiveNumber(filters.Marginalised(50, ("x0",)), {"x1": 1.0}),
+            "AdaptiveNumber: Marginalised inside",
+        ),
+        (lambda: filters.LiuWest(filters.ParticleFilter(5)).check(linear_model()), "none is a parameter. Give `names`"),
+    ],
+)
+def test_a_filter_of_the_wrong_kind_inside_is_named(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_names_may_be_lists_and_one_is_no_row_of_letters():
+    assert filters.Consider(filters.Kalman(), ["x0", "x1"]).names == ("x0", "x1")
+    assert filters.Marginalised(5, "x1").linear == ("x1",)
+    assert filters.Federated(filters.Kalman(), ["y0", ["y1"]]).groups == (("y0",), ("y1",))

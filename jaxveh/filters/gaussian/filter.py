@@ -152,6 +152,13 @@ def check_covariances(name: str, model: StateSpace) -> None:
             )
 
 
+def check_kind(who: str, filter: Any, kind: type) -> None:
+    """Raise `InputError` unless the filter is of the kind that a wrapper goes around."""
+    if not isinstance(filter, kind):
+        what = "a Gaussian filter by itself: wrappers go around" if kind is AbstractRuleFilter else "a Gaussian filter"
+        raise InputError(f"{who}: {type(filter).__name__} inside: must be {what} (Kalman, Extended, Unscented, ...).")
+
+
 def check_gaussian(who: str, what: str, law: AbstractNoise) -> None:
     """Raise `InputError` unless the law, or each part of it, is Gaussian."""
     for part in law.laws if isinstance(law, Independent) else (law,):

@@ -11,7 +11,13 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
-from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, AbstractRuleFilter, corrected, with_spread
+from jaxveh.filters.gaussian.filter import (
+    AbstractGaussianFilter,
+    AbstractRuleFilter,
+    check_kind,
+    corrected,
+    with_spread,
+)
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import Image, product, times
 
@@ -29,6 +35,7 @@ class Iterated(AbstractGaussianFilter):
     iterations: int = eqx.field(static=True, default=4)
 
     def __check_init__(self):
+        check_kind("Iterated", self.filter, AbstractRuleFilter)
         if not isinstance(self.iterations, int) or self.iterations < 1:
             raise InputError(f"iterations = {self.iterations}: must be a whole number of at least 1.")
 

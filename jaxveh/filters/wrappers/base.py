@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
-from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind
 from jaxveh.statespace import Gaussian, Row, StateSpace
 from jaxveh.statespace.contract import AbstractBelief, Info
 
@@ -17,6 +17,9 @@ class AbstractStateless(AbstractGaussianFilter):
 
     # No postponed annotations in this file: they would make a field of it.
     filter: eqx.AbstractVar[AbstractGaussianFilter]
+
+    def __check_init__(self):
+        check_kind(type(self).__name__, self.filter, AbstractGaussianFilter)
 
     def check(self, model):
         self.filter.check(model)
@@ -84,6 +87,9 @@ class AbstractRemembering(AbstractGaussianFilter):
     filter: eqx.AbstractVar[AbstractGaussianFilter]
     learns_variances: ClassVar[bool] = False
     """Whether it replaces the measurement noise by one of its own."""
+
+    def __check_init__(self):
+        check_kind(type(self).__name__, self.filter, AbstractGaussianFilter)
 
     @abc.abstractmethod
     def start(self, model: StateSpace) -> Any:

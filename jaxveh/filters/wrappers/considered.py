@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh._core.names import check_names
+from jaxveh._core.names import as_groups, as_names, check_names
 from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.wrappers.base import AbstractStateless
 from jaxveh.statespace import StateSpace
 
@@ -28,7 +28,10 @@ class Consider(AbstractStateless):
     """
 
     filter: AbstractRuleFilter
-    names: tuple[str, ...] = eqx.field(static=True)
+    names: tuple[str, ...] = eqx.field(static=True, converter=as_names)
+
+    def __check_init__(self):
+        check_kind("Consider", self.filter, AbstractRuleFilter)
 
     def check(self, model):
         check_names("Consider.names", self.names, model.states)
@@ -52,7 +55,10 @@ class Dual(AbstractStateless):
     """
 
     filter: AbstractRuleFilter
-    groups: tuple[tuple[str, ...], ...] | None = eqx.field(static=True, default=None)
+    groups: tuple[tuple[str, ...], ...] | None = eqx.field(static=True, default=None, converter=as_groups)
+
+    def __check_init__(self):
+        check_kind("Dual", self.filter, AbstractRuleFilter)
 
     def check(self, model):
         for group in self._blocks(model):

@@ -10,9 +10,9 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
-from jaxveh._core.names import check_names, record
+from jaxveh._core.names import as_groups, check_names, record
 from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.statespace import Row, StateSpace
@@ -82,7 +82,7 @@ class Federated(AbstractFilter):
 
     whitens: ClassVar[bool] = True
     filter: AbstractRuleFilter
-    groups: tuple[tuple[str, ...], ...] = eqx.field(static=True)
+    groups: tuple[tuple[str, ...], ...] = eqx.field(static=True, converter=as_groups)
     shares: tuple[float, ...] | None = eqx.field(static=True, default=None)
     by_trace: bool = eqx.field(static=True, default=False)
     reset: bool = eqx.field(static=True, default=True)
@@ -91,6 +91,7 @@ class Federated(AbstractFilter):
     overlapping: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
+        check_kind("Federated", self.filter, AbstractRuleFilter)
         if len(self.groups) < 2:
             raise InputError(f"Federated.groups: {len(self.groups)}; must be at least two tuples of channels.")
         names = [name for group in self.groups for name in group]

@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.errors import check, float_array
 from jaxveh._core.names import check_names
-from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.wrappers.base import AbstractStateless
 
 
@@ -30,6 +30,7 @@ class HInfinity(AbstractStateless):
     scales: tuple[tuple[str, float], ...] = eqx.field(static=True, converter=lambda v: tuple(dict(v).items()))
 
     def __check_init__(self):
+        check_kind("HInfinity", self.filter, AbstractRuleFilter)
         check("HInfinity.bound", self.bound, lambda b: b >= 0, "at least 0")
         for name, scale in self.scales:
             check(f"HInfinity.scales of {name}", scale, lambda s: s > 0, "positive")

@@ -14,7 +14,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, float_array
 from jaxveh._core.result import first_failure
 from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.statespace import StateSpace
 from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info, always, apart, by_channel, presence
 
@@ -81,6 +81,7 @@ class InteractingModels(AbstractFilter):
     )
 
     def __check_init__(self):
+        check_kind("InteractingModels", self.filter, AbstractRuleFilter)
         r = len(self.variants)
         if r < 2:
             raise InputError(f"InteractingModels.variants: {r}; must be at least two.")

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import check_names
-from jaxveh.filters.gaussian.filter import AbstractRuleFilter, with_spread
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.statespace import StateSpace
 from jaxveh.statespace.contract import AbstractFilter, always, apart
 
@@ -33,6 +33,7 @@ class Paused(AbstractFilter):
         self.filter, self.channel, self.widen = filter, channel, tuple(sorted(dict(widen).items()))
 
     def __check_init__(self):
+        check_kind("Paused", self.filter, AbstractRuleFilter)
         for name, spread in self.widen:
             check_positive(f"Paused.widen of {name}", spread)
 
