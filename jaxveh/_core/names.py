@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections import namedtuple
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from jaxveh._core.errors import InputError
 
@@ -37,15 +38,15 @@ def as_mapping(values, what: str = "values") -> dict:
     raise InputError(f"{what} = {type(values).__name__}: must be a NamedTuple or a mapping from names to values.")
 
 
-def as_names(values) -> tuple[str, ...] | None:
-    """Names as a tuple, which a static field must be; a single one is one name, not its letters."""
+def as_names(values) -> Any:
+    """Names as a tuple, which a static field must be; a single one is one name, not its letters. None stays None."""
     if values is None:
         return None
     return (values,) if isinstance(values, str) else tuple(values)
 
 
-def as_groups(values) -> tuple[tuple[str, ...], ...] | None:
-    """Groups of names as a tuple of tuples; a name that stands alone is a group."""
+def as_groups(values) -> Any:
+    """Groups of names as a tuple of tuples; a name that stands alone is a group. None stays None."""
     return None if values is None else tuple(as_names(group) for group in values)
 
 
