@@ -8,7 +8,7 @@ import pytest
 from jaxveh import estimators, filters, manoeuvres, sensors, simulate, vehicles
 from jaxveh.vehicles.linearisation import linear_single_track
 
-N, SEEDS = 2000, 40
+SEEDS = 40
 NOISE = {"yaw_rate": 0.02}
 
 
@@ -26,8 +26,15 @@ CARS = {
         {"sideslip": 0.004},
         of_a_linear_law,
         filters.Kalman(),
+        1000,
     ),
-    "Magic Formula, unscented": (vehicles.passenger_car(), {"v_y": 0.1}, of_a_magic_formula, filters.Unscented()),
+    "Magic Formula, unscented": (
+        vehicles.passenger_car(),
+        {"v_y": 0.1},
+        of_a_magic_formula,
+        filters.Unscented(),
+        300,
+    ),
 }
 
 
@@ -50,16 +57,16 @@ def gradients(filter_, model, rows, coefficients, seeds):
     [*((name, "score") for name in CARS), pytest.param("linear, exact", "held", marks=pytest.mark.full)],
 )
 def test_scores_agree_with_the_kalman_filters_and_held_ancestors_do_not(name, gradient):
-    car, noise, coefficients, reference = CARS[name]
+    car, noise, coefficients, reference, particles = CARS[name]
     manoeuvre = manoeuvres.double_lane_change(speed=25.0, steer=0.05)
     recording = simulate(vehicles.passenger_car(), manoeuvre, sensors.esc(), key=jax.random.key(0), dt=0.05)
     model = estimators.state_space(car, sensors.esc(), process_noise=noise | NOISE, minimum_speed=0.0, steps=2)
     # Noisier sensors than the drive's: the particles' likelihood then scatters by less than one.
     levels = model.measurement_noise.std
     model = eqx.tree_at(lambda m: m.measurement_noise.std, model, jax.tree.map(lambda level: 4.0 * level, levels))
-    rows = model.rows(recording.rows(slice(0, 50)))
+    rows = model.rows(recording.rows(slice(0, 30)))
     expected = gradients(reference, model, rows, coefficients, 1)[0]
-    found = gradients(filters.ParticleFilter(N, gradient=gradient), model, rows, coefficients, SEEDS)
+    found = gradients(filters.ParticleFilter(particles, gradient=gradient), model, rows, coefficients, SEEDS)
     scatter = found.std(axis=0) / np.sqrt(SEEDS)
     off = np.abs(found.mean(axis=0) - expected)
     if gradient == "score":

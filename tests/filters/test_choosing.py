@@ -89,6 +89,7 @@ class TestSoft:
         ratio = np.exp(logs - exact["log_likelihood"].sum())
         assert abs(ratio.mean() - 1.0) < 3.0 * ratio.std() / np.sqrt(SEEDS)
 
+    @pytest.mark.full
     def test_with_scores_its_gradient_is_exact_within_scatter_and_held_it_is_biased_less_than_no_share(self):
         model, rows, _ = one()
         leaves, rest = eqx.partition(model, eqx.is_inexact_array)
