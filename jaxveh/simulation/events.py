@@ -8,6 +8,7 @@ import diffrax
 import equinox as eqx
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.simulation.driven import Driven
 from jaxveh.simulation.falling import Falling
@@ -27,8 +28,9 @@ class Event(eqx.Module):
         """The same for diffrax; the instant is found to `tolerance` (s)."""
 
         def crossing(t, y, args, **_):
-            # diffrax compares it with a number of the default precision, whatever that of the car is.
-            return jnp.asarray(self.condition(args, t, y), float)
+            # diffrax compares it with a number of the default precision, whatever that of the car is. Looked at and kept for
+            # the next step it must be one number: rounded in two ways, a fall that ends a step would be seen by neither.
+            return numerics.kept(jnp.asarray(self.condition(args, t, y), float))
 
         return diffrax.Event(crossing, Falling(tolerance=tolerance), direction=False)
 

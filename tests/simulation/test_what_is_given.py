@@ -83,8 +83,6 @@ def test_an_event_ends_the_rows_of_devices_too():
     assert np.all(np.isfinite(np.asarray(drive["true.v_x"])))
 
 
-# By default compiled without optimisations, whose rounding lets this event pass unseen: `.ci/run` runs it with them.
-@pytest.mark.full
 def test_an_event_in_float32_is_found():
     slowing = manoeuvres.mu_jump_braking(5.0, brake_at=0.1, deceleration=5.0, duration=2.0)
     drive = simulate(*cast((linear(), slowing), np.float32), until=simulation.standstill(1.3))
