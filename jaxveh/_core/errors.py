@@ -54,6 +54,15 @@ def check_at_least(name: str, value, least, advice: str = "") -> None:
     check(name, value, lambda v: v >= least, f"at least {least}", advice)
 
 
+def check_whole(name: str, value, least: int = 1, advice: str = "") -> None:
+    """Raise unless `value` is a whole number of at least `least`: a Python or NumPy integer, no float and no truth value."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
+    if not whole or value < least:
+        raise InputError(
+            f"{name} = {value}: must be a whole number of at least {least}." + (f" {advice}" if advice else "")
+        )
+
+
 def check_one_of(name: str, value, allowed) -> None:
     """Raise unless `value` is one of `allowed`."""
     if value not in tuple(allowed):

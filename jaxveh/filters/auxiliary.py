@@ -18,13 +18,16 @@ from jaxveh.filters.particle import (
     check_particle_settings,
     check_scheme,
     choose_ancestors,
+    fate,
+    found_again,
     gather,
     log_chosen,
     log_prob,
     make_info,
     need_key,
+    without,
 )
-from jaxveh.statespace.contract import apart, presence
+from jaxveh.statespace.contract import apart, presence, wrap_angle
 
 
 class AuxiliaryParticleFilter(AbstractParticleFilter):
@@ -59,16 +62,17 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         measured, present = presence(model, row)
-        characteristic = self._look(model, belief, row, u)
+        characteristic, lost = self._look(model, belief, row, u)
         ahead, residual = log_prob(model, row, characteristic, measured, present)
-        first, log_first, alive_first = numerics.normalise(ahead + log_of(belief.weights))
+        first, log_first, alive_first = numerics.normalise(without(lost, ahead + log_of(belief.weights)))
         ancestors, resampled = choose_ancestors(self, draw, first)
         if self.lookahead is None:
-            moved = gather(characteristic, ancestors)
+            moved, lost = gather((characteristic, lost), ancestors)
         else:
-            moved = model.transition(belief.t, row.t, gather(belief.particles, ancestors), u)
-        moved = numerics.barrier(add_noise(model, noise, moved, row.t - belief.t))
-        logs, _ = log_prob(model, row, moved, measured, present)
+            chosen = gather(belief.particles, ancestors)
+            moved, lost = found_again(model.transition(belief.t, row.t, chosen, u), chosen)
+        moved, lost = numerics.barrier((add_noise(model, noise, moved, row.t - belief.t), lost))
+        logs, after = log_prob(model, row, moved, measured, present)
         chosen_ahead = gather((ahead,), ancestors)[0]
         # Of the particles before, of which a number that adapts may have left others than it takes.
         n = jnp.asarray(belief.weights.shape[0], logs.dtype)
@@ -77,17 +81,23 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
             # Without a draw: an ordinary importance step from the weights that were there.
             drawn = jnp.where(resampled, drawn, logs + log_of(belief.weights) + jnp.log(n))
             log_first = jnp.where(resampled, log_first, -jnp.log(n))
-        weights, log_second, alive_second = numerics.normalise(drawn)
+        weights, log_second, alive_second = numerics.normalise(without(lost, drawn))
         log_likelihood = log_first + jnp.log(n) + log_second
-        after = ParticleBelief(moved, weights, ancestors, belief.key, row.t, row.u, belief.count + 1)
-        alive = alive_first & alive_second
-        info = make_info(model, row, log_likelihood, residual, present, (belief.weights, weights), alive)
-        return after, info
+        found = ParticleBelief(moved, weights, ancestors, belief.key, row.t, row.u, belief.count + 1)
+        became = fate(alive_first & alive_second, lost)
+        within = _scatter(model, after, gather(residual, ancestors))
+        info = make_info(model, row, log_likelihood, residual, (belief.weights, weights), became, within)
+        return found, info
 
     def _look(self, model, belief, row, u):
         if self.lookahead is None:
             moved = model.transition(belief.t, row.t, belief.particles, u)
         else:
             moved = self.lookahead(model, belief.t, row.t, belief.particles, u)
-        n = belief.weights.shape[0]
-        return numerics.barrier(jax.tree.map(lambda field: jnp.broadcast_to(field, (n,)), moved))
+        return numerics.barrier(found_again(moved, belief.particles))
+
+
+def _scatter(model, residual, ahead):
+    """By channel, the variance that the step's noise makes: how far particles came from where their ancestors were to be."""
+    apart_ = {name: residual[name] - ahead[name] for name in model.channels}
+    return {name: jnp.mean(jnp.square(wrap_angle(d) if name in model.angles else d)) for name, d in apart_.items()}

@@ -13,6 +13,9 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh.statespace.contract import AbstractBelief
 
+STATES = "states"
+"""Where the file has their names: no path into a belief, which starts with a dot."""
+
 B = TypeVar("B", bound=AbstractBelief)
 
 
@@ -26,6 +29,7 @@ def save_belief(path: str | Path, belief: AbstractBelief) -> Path:
     if path.suffix != ".npz":
         raise InputError(f"path = {path}: must end in .npz.")
     arrays = {name: np.asarray(_words(leaf)) for name, leaf in _named(belief).items()}
+    arrays[STATES] = np.asarray(_states(belief))
     partial = path.with_name(path.name + ".part")
     with partial.open("wb") as file:
         np.savez(file, **arrays)
@@ -47,6 +51,11 @@ def load_belief(path: str | Path, like: B) -> B:
             arrays = dict(archive)
     except (ValueError, OSError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: is no file that save_belief wrote ({error}).") from error
+    states, own = tuple(map(str, arrays.pop(STATES, ()))), _states(like)
+    if states != own:
+        raise InputError(
+            f"{path}: its states are {', '.join(states)}, expected {', '.join(own)}: it is of another model."
+        )
     for name in sorted(set(arrays) ^ set(expected)):
         where = "the file has" if name in arrays else "the file lacks"
         raise InputError(f"{path}: {where} {name}: it is of another filter or model.")
@@ -61,6 +70,14 @@ def load_belief(path: str | Path, like: B) -> B:
         value = jnp.asarray(found)
         leaves.append(jax.random.wrap_key_data(value, impl=jax.random.key_impl(leaf)) if _is_key(leaf) else value)
     return jax.tree.unflatten(jax.tree.structure(like), leaves)
+
+
+def _states(belief: Any) -> tuple[str, ...]:
+    """The names of the states, where the belief has a mean."""
+    try:
+        return belief.mean._fields
+    except InputError:
+        return ()
 
 
 def _named(belief: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check
+from jaxveh._core.errors import InputError, check, check_whole
 
 
 @jax.custom_jvp
@@ -77,8 +77,7 @@ class Transport(eqx.Module):
 
     def __check_init__(self):
         check("Transport.epsilon", self.epsilon, lambda v: v > 0, "positive")
-        if not isinstance(self.iterations, int) or self.iterations < 1:
-            raise InputError(f"Transport.iterations = {self.iterations}: must be a whole number of at least 1.")
+        check_whole("Transport.iterations", self.iterations)
 
     def __call__(self, key, weights, n):
         raise InputError("Transport moves particles and has no ancestors: it is for ParticleFilter alone.")

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.names import check_names
 from jaxveh._core.result import Result, code
 from jaxveh.filters.wrappers.process_noise import MatchedProcess, ShrinkingProcess
@@ -50,6 +50,14 @@ class DelayedBelief(AbstractBelief):
         """Rows and late measurements so far."""
         return self.inside.count
 
+    @property
+    def covariance(self):
+        """(n, n) of the newest belief."""
+        return self.inside.covariance
+
+    def sample(self, key, draws):
+        return self.inside.sample(key, draws)
+
     def moments(self, model):
         return self.inside.moments(model)
 
@@ -77,10 +85,7 @@ class Delayed(AbstractFilter):
     def __check_init__(self):
         for name, delay in self.delays:
             check_positive(f"Delayed.delays of {name}", delay)
-        if not isinstance(self.depth, int) or self.depth < 1 + len(self.delays):
-            raise InputError(
-                f"Delayed.depth = {self.depth}: must be a whole number of at least {1 + len(self.delays)}, one more than delays."
-            )
+        check_whole("Delayed.depth", self.depth, 1 + len(self.delays), "There must be one more than delays.")
 
     def check(self, model):
         check_names("Delayed.delays", [name for name, _ in self.delays], model.channels)

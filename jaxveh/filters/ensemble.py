@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.filter import check_covariances, innovation_info, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import masked_factor
@@ -44,6 +44,10 @@ class EnsembleBelief(AbstractBelief):
         deviations = _deviations(jnp.stack(self.members))
         return times(deviations, deviations.T)
 
+    def sample(self, key, draws):
+        chosen = jax.random.randint(key, (draws,), 0, self.members[0].shape[0])
+        return jax.tree.map(lambda field: field[chosen], self.members)
+
     def moments(self, model):
         shown = model.report(self.t, self.members, self.u)
         shown = jax.tree.map(lambda field: jnp.broadcast_to(field, self.members[0].shape), shown)
@@ -66,8 +70,7 @@ class Ensemble(AbstractFilter):
     perturbed: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
-        if not isinstance(self.members, int) or self.members < 2:
-            raise InputError(f"members = {self.members}: must be a whole number of at least 2.")
+        check_whole("members", self.members, 2)
 
     def check(self, model):
         check_covariances(type(self).__name__, model)

@@ -14,19 +14,24 @@ from jaxveh._core.errors import InputError
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
-from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes
+from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes, product
 from jaxveh.filters.particle import (
+    SHORTEST,
     AbstractParticleFilter,
     ParticleBelief,
     ParticleFilter,
     check_particle_settings,
     check_scheme,
     choose_ancestors,
+    fate,
+    found_again,
     gather,
     log_chosen,
     log_prob,
     make_info,
+    mean_variances,
     need_key,
+    without,
 )
 from jaxveh.numerics import sigma_points
 from jaxveh.statespace import StateSpace
@@ -38,11 +43,12 @@ RULES = ("extended", "unscented")
 
 class Proposal(NamedTuple):
     """From where a particle's noise is drawn: N(mean, F F^T) with `mean` (q,), `factor` F (q, q); `log_ahead`, how likely the
-    measurement is from this particle."""
+    measurement is from this particle; `variances` (m,) that the noise gives the channels."""
 
     mean: Any
     factor: Any
     log_ahead: Any
+    variances: Any
 
 
 class Guided(AbstractParticleFilter):
@@ -91,14 +97,14 @@ class Guided(AbstractParticleFilter):
         measured, present = presence(model, row)
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved = model.transition(belief.t, row.t, belief.particles, u)
-        moved = jax.tree.map(lambda field: jnp.broadcast_to(field, belief.weights.shape), moved)
-        law = model.process_noise.over(row.t - belief.t)
+        moved, lost = found_again(moved, belief.particles)
+        law = model.process_noise.over(jnp.maximum(row.t - belief.t, SHORTEST))
         covariance = law.covariance()
         prior = Spread(numerics.cholesky(covariance), covariance)
         rule = _rule_of(self.rule, len(law.names))
         propose = jax.vmap(lambda x: _proposal(model, rule, row, x, law.names, prior))
         proposals = numerics.barrier(propose(moved))
-        logs = log_of(belief.weights)
+        logs = without(lost, log_of(belief.weights))
         first, log_first, alive_first = numerics.normalise(logs + proposals.log_ahead if self.auxiliary else logs)
         ancestors, resampled = choose_ancestors(self, draw, first)
         taken = lambda tree: jax.tree.map(lambda leaf: leaf[ancestors], tree)
@@ -106,6 +112,8 @@ class Guided(AbstractParticleFilter):
         white = numerics.normal(noise, (len(law.names), self.particles), logs.dtype)
         e = chosen.mean.T + jnp.einsum("iqr,ri->qi", chosen.factor, white)
         x = start._replace(**{name: getattr(start, name) + e[i] for i, name in enumerate(law.names)})
+        # A proposal, too, may have no value.
+        x, astray = found_again(x, start)
         after, _ = log_prob(model, row, x, measured, present)
         _, residual = log_prob(model, row, moved, measured, present)
         ratio = _log_normal(numerics.solve_lower(prior.factor, e), prior.factor) - _log_normal(white, chosen.factor)
@@ -115,10 +123,12 @@ class Guided(AbstractParticleFilter):
         if resampled is not None:
             drawn = jnp.where(resampled, drawn, after + ratio + logs + n)
             log_first = jnp.where(resampled, log_first, -n)
-        weights, log_second, alive = numerics.normalise(drawn)
+        weights, log_second, alive = numerics.normalise(without(astray, drawn))
         found = ParticleBelief(x, weights, ancestors, belief.key, row.t, row.u, belief.count + 1)
-        alive = alive & alive_first
-        info = make_info(model, row, log_first + n + log_second, residual, present, (belief.weights, weights), alive)
+        became = fate(alive & alive_first, lost)
+        within = mean_variances(model, belief.weights, proposals.variances)
+        total = log_first + n + log_second
+        info = make_info(model, row, total, residual, (belief.weights, weights), became, within)
         return found, info
 
 
@@ -144,7 +154,8 @@ def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: S
     found = Covariance().condition(image, model.measurement_noise, model.channels, here, innovation, prior)
     count = jnp.sum(here.astype(innovation.dtype))
     distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
-    return Proposal(found.shift, found.spread.factor, -0.5 * (distance + count * LOG_2PI))
+    variances = jnp.diagonal(product(image.deviations, image.deviations, image.signs))
+    return Proposal(found.shift, found.spread.factor, -0.5 * (distance + count * LOG_2PI), variances)
 
 
 def _log_normal(white, factor):

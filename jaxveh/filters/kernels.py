@@ -72,7 +72,8 @@ class LiuWest(AbstractKernel):
 
         theta <- a theta_i + (1 - a) mean + N(0, (1 - a^2) V),    a = (3 discount - 1) / (2 discount)
 
-    (J. Liu & M. West 2001, around any particle filter; with `AuxiliaryParticleFilter` it is theirs.) `names`: the states that are
+    (J. Liu & M. West 2001, around any particle filter. Theirs is an auxiliary filter that looks ahead with the shrunk parameters
+    and draws after its choice; here `AuxiliaryParticleFilter` looks ahead with the drawn ones.) `names`: the states that are
     parameters, by default those without process noise. Their posterior is smeared with each step, and no time is long enough
     for it to become sharp: compare discounts.
     """

@@ -17,15 +17,20 @@ from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.noises import covariance_in
-from jaxveh.filters.gaussian.rules import Image, times
+from jaxveh.filters.gaussian.rules import Image, product, times
 from jaxveh.filters.particle import (
+    SHORTEST,
     AbstractParticleFilter,
     check_particle_settings,
     check_scheme,
     choose_ancestors,
+    fate,
+    found_again,
     log_chosen,
     make_info,
+    mean_variances,
     need_key,
+    without,
 )
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import AbstractBelief, always, apart, presence
@@ -68,6 +73,14 @@ class MarginalisedBelief(AbstractBelief):
     def std(self):
         """The state's standard deviations."""
         return type(self.particles)(*numerics.sqrt(jnp.diagonal(self.covariance)))
+
+    def sample(self, key, draws):
+        which, inside = jax.random.split(key)
+        chosen = jax.random.categorical(which, log_of(self.weights), shape=(draws,))
+        points, P = jax.tree.map(lambda leaf: leaf[chosen], (self.particles, self.covariances))
+        white = numerics.normal(inside, (draws, len(self.linear)), self.weights.dtype)
+        moved = jax.vmap(lambda P, w: times(numerics.cholesky(P), w), out_axes=1)(P, white)
+        return points._replace(**{n: getattr(points, n) + moved[i] for i, n in enumerate(self.linear)})
 
     def moments(self, model):
         kinds = []
@@ -167,7 +180,7 @@ class Marginalised(AbstractParticleFilter):
             jax.tree.map(lambda leaf: leaf[ancestors], t) for t in (belief.particles, belief.covariances)
         )
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
-        law = model.process_noise.over(row.t - belief.t)
+        law = model.process_noise.over(jnp.maximum(row.t - belief.t, SHORTEST))
         others = _others(self, model)
         Q = covariance_in(law, (*others, *self.linear), weights.dtype)
         white = numerics.normal(noise, (len(others), self.particles), weights.dtype)
@@ -179,8 +192,12 @@ class Marginalised(AbstractParticleFilter):
 
         moved = jax.vmap(move, in_axes=(0, 0, 1))(points, covariances, white)
         moved = numerics.barrier(moved)
-        cloud = Cloud(_named(self, model, moved.z.T, moved.x.T), moved.P)
-        return self._weigh(model, row, cloud, Prior(ancestors, weights, chosen), belief.key, belief.count)
+        particles, lost = found_again(_named(self, model, moved.z.T, moved.x.T), points)
+        lost = lost | ~jnp.all(jnp.isfinite(moved.P), axis=(1, 2))
+        cloud = Cloud(particles, jnp.where(lost[:, None, None], covariances, moved.P))
+        return self._weigh(
+            model, row, cloud, Prior(ancestors, weights, without(lost, chosen)), belief.key, belief.count
+        )
 
     def _weigh(self, model, row: Row, cloud, prior, key, count):
         measured, present = presence(model, row)
@@ -198,16 +215,20 @@ class Marginalised(AbstractParticleFilter):
             )
             present_ = jnp.sum(here.astype(innovation.dtype))
             distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
-            return -0.5 * (distance + present_ * LOG_2PI), innovation, found.shift, found.spread.matrix
+            variances = jnp.diagonal(product(image.deviations, image.deviations, None))
+            return -0.5 * (distance + present_ * LOG_2PI), innovation, variances, found.shift, found.spread.matrix
 
-        logs, residual, shift, P = jax.vmap(see)(cloud.particles, cloud.covariances)
+        logs, residual, variances, shift, P = jax.vmap(see)(cloud.particles, cloud.covariances)
         linear = {name: getattr(cloud.particles, name) + shift[:, i] for i, name in enumerate(self.linear)}
-        particles = cloud.particles._replace(**linear)
-        weights, log_mean, alive = numerics.normalise(logs + prior.log_weights)
+        particles, astray = found_again(cloud.particles._replace(**linear), cloud.particles)
+        P = jnp.where(astray[:, None, None], cloud.covariances, P)
+        weights, log_mean, alive = numerics.normalise(without(astray, logs + prior.log_weights))
         log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
         belief = MarginalisedBelief(particles, P, weights, prior.ancestors, key, row.t, row.u, count + 1, self.linear)
         by_name = dict(zip(model.channels, residual.T, strict=True))
-        info = make_info(model, row, log_likelihood, by_name, present, (prior.weights, weights), alive)
+        within = mean_variances(model, prior.weights, variances)
+        became = fate(alive, jnp.isneginf(prior.log_weights))
+        info = make_info(model, row, log_likelihood, by_name, (prior.weights, weights), became, within)
         return belief, info
 
 
@@ -271,6 +292,11 @@ def _check_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
     """Raise `InputError` naming the first value that is not linear in the states `linear`. Tracers pass."""
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
+    with jax.ensure_compile_time_eval():  # inside jit, too, a model may be made of plain numbers
+        _check_each_linear_in(linear, model)
+
+
+def _check_each_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
     dtype = model.prior.mean[0].dtype
     t0, t1 = jnp.zeros((), dtype), jnp.asarray(0.01, dtype)
     u = record("Inputs", {name: jnp.asarray(1.0, dtype) for name in model.inputs})

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax.ad_checkpoint import checkpoint_name
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import Soft, Transport, log_of, score
 from jaxveh.statespace import StateSpace
@@ -25,6 +25,9 @@ from jaxveh.statespace.contract import (
     presence,
     wrap_angle,
 )
+
+SHORTEST = 1e-9
+"""Of two rows at one time, seconds for which the noise between them is taken where its covariance must have a factor."""
 
 
 class ParticleBelief(AbstractBelief):
@@ -66,6 +69,10 @@ class ParticleBelief(AbstractBelief):
             return field[order][jnp.argmax(reached)]
 
         return jax.tree.map(of, self.particles)
+
+    def sample(self, key, draws):
+        chosen = jax.random.categorical(key, log_of(self.weights), shape=(draws,))
+        return jax.tree.map(lambda field: field[chosen], self.particles)
 
     def moments(self, model):
         shown = model.report(self.t, self.particles, self.u)
@@ -109,8 +116,7 @@ def check_particle_settings(particles: int, threshold: float, gradient: str = "s
     """Raise `InputError` for fewer than two particles, a threshold outside [0, 1] or another gradient."""
     if gradient not in ("score", "held"):
         raise InputError(f"gradient = {gradient!r}: must be 'score' or 'held'.")
-    if not isinstance(particles, int) or particles < 2:
-        raise InputError(f"particles = {particles}: must be a whole number of at least 2.")
+    check_whole("particles", particles, 2)
     if not 0 <= threshold <= 1:
         raise InputError(f"threshold = {threshold}: must be from 0 (never resample) to 1 (every step).")
 
@@ -141,6 +147,25 @@ def add_noise(model: StateSpace, key, particles, dt):
         return particles
     noise = model.process_noise.over(dt).sample(key, particles[0].shape)
     return particles._replace(**{name: getattr(particles, name) + value for name, value in noise.items()})
+
+
+def found_again(moved, before):
+    """Particles of which those that the model lost, with a field that is not finite, stay as they were `before` the step, and
+    which these are, (N,): they must get no weight, and what has no weight must still be finite for a mean."""
+    n = moved[0].shape[-1]
+    lost = ~jnp.isfinite(sum((jnp.broadcast_to(field, (n,)) for field in moved[1:]), start=moved[0]))
+    return jax.tree.map(lambda new, old: jnp.where(lost, old, new), moved, before), lost
+
+
+def without(lost, logs):
+    """Log weights (N,) of which those of the particles `lost` are minus infinity."""
+    return jnp.where(lost, -jnp.inf, logs)
+
+
+def fate(alive, lost):
+    """The result code of a step after which some particle is `alive` or none, of particles that the model `lost` (N,)."""
+    reason = jnp.where(jnp.all(lost), code(Result.non_finite_state), code(Result.all_particles_dead))
+    return jnp.where(alive, code(Result.successful), reason)
 
 
 def log_chosen(filter_, log_probabilities, ancestors):
@@ -178,27 +203,40 @@ def start_particles(filter_, model, row, key):
     return particles, key
 
 
-def make_info(model, row, log_likelihood, residual, present, weights, alive):
-    """The info of one step; `weights`: those of the prediction, whose residuals are given, and those after the row."""
+def make_info(model, row, log_likelihood, residual, weights, became, within=None):
+    """The info of one step; `weights`: those of the prediction, whose residuals are given, and those after the row; `became`:
+    its result code where the input is right; `within`: the variance by channel that the residuals lack, but for R."""
     before, after = weights
+    # A particle that shows nothing finite has no say.
+    known = jnp.isfinite(sum(residual[name] for name in model.channels))
+    before = jnp.where(known, before, 0)
+    before = before / numerics.total(before)
+    residual = {name: jnp.where(known, residual[name], 0) for name in model.channels}
     mean = {name: numerics.total(before * residual[name]) for name in model.channels}
     spread = {name: numerics.total(before * (residual[name] - mean[name]) ** 2) for name in model.channels}
+    if within is not None:
+        spread = {name: spread[name] + within[name] for name in model.channels}
     law = model.measurement_noise
     noise = (
         jnp.diagonal(law.covariance()) if law.has_covariance else jnp.full((len(model.channels),), jnp.nan, after.dtype)
     )
     std = [numerics.sqrt(spread[name] + noise[i]) for i, name in enumerate(law.names)]
     result = input_result(model, row)
-    result = jnp.where((result == 0) & ~alive, code(Result.all_particles_dead), result)
     dtype = after.dtype
+    _, present = presence(model, row)
     return Info(
         log_likelihood=log_likelihood,
         innovation=by_channel(model, [mean[name] for name in model.channels], present),
         innovation_std=by_channel(model, std, present),
         nis=jnp.full((), jnp.nan, dtype),
         ess=numerics.ess(after),
-        result=result,
+        result=jnp.where(result == 0, became, result),
     )
+
+
+def mean_variances(model, weights, variances):
+    """By channel the weighted mean of the variances (N, m) that particles carry themselves, of those that are finite."""
+    return dict(zip(model.channels, weights @ jnp.where(jnp.isfinite(variances), variances, 0), strict=True))
 
 
 class Drawn(NamedTuple):
@@ -228,7 +266,8 @@ class ParticleFilter(AbstractParticleFilter):
         uniform = jnp.full((self.particles,), 1 / self.particles, particles[0].dtype)
         ancestors = jnp.arange(self.particles, dtype=jnp.int32)
         drawn = Drawn(ancestors, uniform, log_of(uniform))
-        return self._weigh(model, row, particles, drawn, key, jnp.int32(0))
+        none = jnp.zeros(self.particles, bool)
+        return self._weigh(model, row, particles, drawn, none, key, jnp.int32(0))
 
     def step(self, model, belief, row):
         return apart(self._step, belief.count >= 0, model, belief, row)
@@ -237,9 +276,9 @@ class ParticleFilter(AbstractParticleFilter):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         particles, drawn = self._drawn(draw, belief)
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
-        moved = model.transition(belief.t, row.t, particles, u)
-        moved = numerics.barrier(add_noise(model, noise, moved, row.t - belief.t))
-        return self._weigh(model, row, moved, drawn, belief.key, belief.count)
+        moved, lost = found_again(model.transition(belief.t, row.t, particles, u), particles)
+        moved, lost = numerics.barrier((add_noise(model, noise, moved, row.t - belief.t), lost))
+        return self._weigh(model, row, moved, drawn, lost, belief.key, belief.count)
 
     def _drawn(self, key, belief):
         """The next particles before they move."""
@@ -260,14 +299,15 @@ class ParticleFilter(AbstractParticleFilter):
             chosen = jnp.where(resampled, chosen, logs)
         return particles, Drawn(ancestors, weights, chosen)
 
-    def _weigh(self, model, row, particles, drawn, key, count):
+    def _weigh(self, model, row, particles, drawn, lost, key, count):
         measured, present = presence(model, row)
         logs, residual = log_prob(model, row, particles, measured, present)
-        weights, log_mean, alive = numerics.normalise(logs + drawn.log_weights)
+        weights, log_mean, alive = numerics.normalise(without(lost, logs + drawn.log_weights))
         belief = ParticleBelief(particles, weights, drawn.ancestors, key, row.t, row.u, count + 1)
         # normalise gives the log of the mean over N of what sums to the likelihood.
         log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
-        return belief, make_info(model, row, log_likelihood, residual, present, (drawn.weights, weights), alive)
+        became = fate(alive, lost)
+        return belief, make_info(model, row, log_likelihood, residual, (drawn.weights, weights), became)
 
 
 def need_key(filter_, key):

@@ -9,6 +9,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.statespace.model import Row, StateSpace
@@ -44,6 +46,25 @@ class AbstractBelief(eqx.Module):
     @abc.abstractmethod
     def moments(self, model: StateSpace) -> tuple[Any, Any]:
         """Mean and standard deviation of `model.report` under the belief: two NamedTuples of scalars."""
+
+    @property
+    def mean(self) -> Any:
+        """The state's mean (parameters on the real line), the state's NamedTuple."""
+        raise self._lacks("mean")
+
+    @property
+    def covariance(self) -> Any:
+        """(n, n) in the order of the state's fields."""
+        raise self._lacks("covariance")
+
+    def sample(self, key, draws: int) -> Any:
+        """Draws: the state's NamedTuple with (draws,) in each field; of a Gaussian, unless the belief is something else."""
+        mean = jnp.stack(self.mean)
+        white = numerics.normal(key, (mean.shape[0], draws), mean.dtype)
+        return type(self.mean)(*(mean[:, None] + numerics.cholesky(self.covariance) @ white))
+
+    def _lacks(self, what: str) -> InputError:
+        return InputError(f"{type(self).__name__} has no {what} of the state: take a filter whose belief has one.")
 
 
 class AbstractFilter(eqx.Module):

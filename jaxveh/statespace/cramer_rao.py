@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import FilterError, InputError
+from jaxveh._core.errors import FilterError, InputError, check_whole
 from jaxveh._core.recording import Recording
 from jaxveh.statespace.draw import draw_rows, moved, schedule_rows
 from jaxveh.statespace.location import location_covariance
@@ -53,8 +53,7 @@ def posterior_cramer_rao(model: StateSpace, schedule: Recording, key, runs: int 
     **Raises** `InputError` for laws whose information is not known, noise-free states as above, or fewer than one run;
     `FilterError` where a draw diverges.
     """
-    if not isinstance(runs, int) or runs < 1:
-        raise InputError(f"runs = {runs}: must be a whole number of at least 1.")
+    check_whole("runs", runs)
     rows = schedule_rows(model, schedule)
     noisy = () if model.process_noise is None else model.process_noise.law.names
     start, terms = jax.tree.map(

@@ -16,6 +16,9 @@ from jaxveh._core.recording import Recording
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
 from jaxveh.statespace.process import AbstractProcessNoise
 
+COARSEST = 0.05
+"""The coarsest resolution of a live loop's time, s: in float32 that of four days, and UNIX stamps have one of two minutes."""
+
 
 class Row(NamedTuple):
     """What a filter is given at one instant: time `t`, inputs `u` and measurements `y`, NaN where missing.
@@ -164,6 +167,7 @@ class StateSpace(eqx.Module):
         missing = [name for name in self.inputs if name not in u]
         if missing:
             raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
+        _check_stamp(t, dtype)
         numbers = [t, *(u[name] for name in self.inputs), *(y.get(name, np.nan) for name in self.channels)]
         t, *others = _scalars(numbers, dtype)
         inputs = record("Inputs", dict(zip(self.inputs, others, strict=False)))
@@ -172,11 +176,21 @@ class StateSpace(eqx.Module):
 
     def transition(self, t0, t1, x, u):
         """The state at `t1` without noise, from the state `x` at `t0`."""
-        return self.transition_function(self.system, t0, t1, x, u)
+        moved = self.transition_function(self.system, t0, t1, x, u)
+        if getattr(moved, "_fields", None) != x._fields:
+            raise InputError(f"transition returned {_shown(moved)}: must be the state, with {', '.join(x._fields)}.")
+        return moved
 
     def observation(self, t, x, u):
         """What the sensors would say without noise."""
-        return self.observation_function(self.system, t, x, u)
+        seen = self.observation_function(self.system, t, x, u)
+        lacks = [name for name in self.channels if name not in getattr(seen, "_fields", ())]
+        if lacks:
+            raise InputError(
+                f"observation returned {_shown(seen)}, without {', '.join(lacks)}: must have every channel of the "
+                f"measurement noise ({', '.join(self.channels)})."
+            )
+        return seen
 
     def report(self, t, x, u):
         """What an Estimate shows of a state (or of a batch of states), in physical units."""
@@ -185,6 +199,21 @@ class StateSpace(eqx.Module):
     def step_inputs(self, t0, t1, u0, u1):
         """What `transition` gets as `u` between two rows."""
         return u0 if self.input_path == "held" or not self.inputs else LinearInput(t0, t1, u0, u1)
+
+
+def _shown(value: Any) -> str:
+    """What a function of a model returned, in words."""
+    fields = getattr(value, "_fields", None)
+    return f"a {type(value).__name__}" if fields is None else f"a NamedTuple with {', '.join(fields)}"
+
+
+def _check_stamp(t, dtype) -> None:
+    """Raise `InputError` for a time so large that it has no digits left for a step."""
+    if is_concrete(t) and np.isfinite(t) and np.spacing(np.abs(np.asarray(t, dtype))) > COARSEST:
+        raise InputError(
+            f"row: t = {float(t)} s is known to {float(np.spacing(np.asarray(t, dtype))):.3g} s only in {np.dtype(dtype).name}: "
+            "count time from the first row, or use float64."
+        )
 
 
 def _scalars(numbers: list, dtype) -> tuple:

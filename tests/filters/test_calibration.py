@@ -14,7 +14,7 @@ from nonlinear_systems import growth, volatility
 from jaxveh import FilterError, InputError, Recording, diagnostics, filters
 from jaxveh import statespace as ss
 from jaxveh.filters.calibration.batches import in_batches
-from jaxveh.filters.calibration.simulation_based import draw_belief
+from jaxveh.filters.marginalised import MarginalisedBelief
 from jaxveh.filters.wrappers.interacting import MixtureBelief
 
 X = namedtuple("X", "a b")
@@ -111,6 +111,8 @@ SHORT = Recording(np.arange(12.0), {})
 CHECKED = {
     "particles": (filters.ParticleFilter(200), volatility, True),
     "particles, two peaks": (filters.ParticleFilter(200), growth, True),
+    "auxiliary": (filters.AuxiliaryParticleFilter(200), volatility, True),
+    "guided, two peaks": (filters.Guided(200), growth, True),
     "Gaussian where beliefs have two peaks": (filters.Unscented(), growth, False),
 }
 
@@ -151,8 +153,10 @@ def test_draws_of_beliefs_have_their_moments():
     members = X(jnp.asarray([1.0, 2.0, 4.0]), jnp.asarray([3.0, 2.0, 0.0]))
     weighted = filters.ParticleBelief(members, jnp.asarray([0.2, 0.3, 0.5]), None, None, None, None, None)
     ensemble = filters.EnsembleBelief(members, None, None, None, None)
-    for given, correction in ((one, 1), (both, 1), (weighted, 1), (ensemble, 2 / 3)):
-        drawn = np.stack(draw_belief(given, jax.random.key(3), 20_000))
+    within = jnp.asarray([[[0.5]], [[2.0]], [[0.1]]])
+    marginalised = MarginalisedBelief(members, within, jnp.asarray([0.2, 0.3, 0.5]), *[None] * 5, linear=("b",))
+    for given, correction in ((one, 1), (both, 1), (weighted, 1), (ensemble, 2 / 3), (marginalised, 1)):
+        drawn = np.stack(given.sample(jax.random.key(3), 20_000))
         covariance = correction * np.asarray(given.covariance)
         np.testing.assert_allclose(drawn.mean(axis=1), given.mean, atol=0.05)
         np.testing.assert_allclose(np.cov(drawn), covariance, atol=0.04 * np.max(covariance))
@@ -193,6 +197,8 @@ def test_what_is_kept_of_every_row():
 
 def test_mistakes_are_named():
     model, key = linear(), jax.random.key(0)
+    with pytest.raises(InputError, match="LaggedBelief has no mean of the state: take a filter whose belief has one"):
+        filters.monte_carlo(filters.FixedLag(filters.Kalman(), 2), model, schedule(), key, runs=2)
     with pytest.raises(InputError, match=r"truth: its states are x0, x1, x2, the filter's model's x0, x1"):
         filters.monte_carlo(filters.Kalman(), model, schedule(), key, truth=linear_model(3, 2))
     with pytest.raises(InputError, match=r"runs = 0: must be a whole number of at least 1"):

@@ -1,5 +1,6 @@
 """Stop and go on with the same bits; steps in a process that knows nothing of this package."""
 
+import dataclasses
 import json
 import subprocess
 import sys
@@ -11,8 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from filter_systems import linear_model, linear_recording
+from test_every_filter import CHANGES, GROUPS, linear, noisier, same
 
 from jaxveh import InputError, filters
+from jaxveh._core.names import record_type
 
 MODEL = linear_model(3, 2, seed=3)
 RECORDING = linear_recording(MODEL, rows=20)
@@ -22,25 +25,35 @@ KINDS = {
     "square root": filters.Cubature(form=filters.SquareRoot()),
     "APF": filters.AuxiliaryParticleFilter(100),
 }
+INDEPENDENT = linear()
+OTHERS = {
+    "Sage-Husa": filters.SageHusa(filters.Cubature()),
+    "interacting": filters.InteractingModels(filters.Kalman(), (same, noisier), CHANGES),
+    "delayed": filters.Delayed(filters.Kalman(), {"y1": 0.15}, depth=5),
+    "fixed lag": filters.FixedLag(filters.Kalman(), 2),
+    "marginalised": filters.Marginalised(50, ("x2",)),
+    "ensemble": filters.Ensemble(50),
+    "federated": filters.Federated(filters.Kalman(), GROUPS),
+}
 
 
 def row(k):
     return jax.tree.map(lambda leaf: leaf[k], ROWS)
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", [*KINDS, *OTHERS])
 def test_a_broken_run_goes_on_bit_for_bit(name, tmp_path):
-    filter_, key = KINDS[name], jax.random.key(4)
+    filter_, model = (KINDS[name], MODEL) if name in KINDS else (OTHERS[name], INDEPENDENT)
     step = eqx.filter_jit(filter_.step)
-    first, _ = filter_.init(MODEL, row(0), key)
+    first, _ = filter_.init(model, row(0), jax.random.key(4))
     whole = first
     for k in range(1, 20):
-        whole, _ = step(MODEL, whole, row(k))
+        whole, _ = step(model, whole, row(k))
         if k == 9:
             path = filters.save_belief(tmp_path / "belief.npz", whole)
     again = filters.load_belief(path, first)
     for k in range(10, 20):
-        again, _ = step(MODEL, again, row(k))
+        again, _ = step(model, again, row(k))
     for a, b in zip(jax.tree.leaves(whole), jax.tree.leaves(again), strict=True):
         a, b = (jax.random.key_data(v) if jnp.issubdtype(v.dtype, jax.dtypes.prng_key) else v for v in (a, b))
         np.testing.assert_array_equal(a, b)
@@ -55,6 +68,9 @@ def test_a_file_of_another_filter_is_refused(tmp_path):
     gaussian, _ = KINDS["UKF"].init(MODEL, row(0))
     with pytest.raises(InputError, match="it is of another filter or model"):
         filters.load_belief(path, gaussian)
+    other = dataclasses.replace(gaussian, state_type=record_type("Other", ("a", "b", "c")))
+    with pytest.raises(InputError, match="its states are x0, x1, x2, expected a, b, c: it is of another model"):
+        filters.load_belief(filters.save_belief(tmp_path / "g.npz", gaussian), other)
     with pytest.raises(InputError, match="there is no such file"):
         filters.load_belief(tmp_path / "b.npz", gaussian)
     with pytest.raises(InputError, match=r"must end in \.npz"):
@@ -79,10 +95,11 @@ LIVE = """
 """
 
 
-@pytest.mark.parametrize("name", ["square root", "APF"])
+@pytest.mark.parametrize("name", ["square root", "APF", "interacting"])
 def test_an_exported_filter_runs_without_this_package(name, tmp_path):
-    filter_, key = KINDS[name], jax.random.key(4)
-    folder = filters.export_filter(tmp_path / "filter", filter_, MODEL, key=key)
+    filter_, model = (KINDS[name], MODEL) if name in KINDS else (OTHERS[name], INDEPENDENT)
+    key = jax.random.key(4)
+    folder = filters.export_filter(tmp_path / "filter", filter_, model, key=key)
     described = json.loads((folder / "names.json").read_text())
     assert described["inputs"] == ["force"] and described["channels"] == ["y0", "y1"]
     assert described["report"] == ["x0", "x1", "x2"]
@@ -95,7 +112,7 @@ def test_an_exported_filter_runs_without_this_package(name, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     total, mean, std = json.loads(done.stdout)
-    expected = filters.run(filter_, MODEL, RECORDING, key=key)
+    expected = filters.run(filter_, model, RECORDING, key=key)
     np.testing.assert_allclose(total, expected.log_likelihood, rtol=1e-12)
     np.testing.assert_allclose(mean, [leaf[-1] for leaf in expected.mean], rtol=1e-10)
     np.testing.assert_allclose(std, [leaf[-1] for leaf in expected.std], rtol=1e-10)

@@ -73,6 +73,17 @@ class TestDelayed:
         with pytest.raises(FilterError, match="older than the rows that are kept"):
             filters.run(filters.Delayed(filters.Kalman(), {"y0": 1.0}, depth=3), MODEL, RECORDING)
 
+    @pytest.mark.parametrize(
+        "filter_", [filters.Guided(200), filters.Marginalised(200, ("x2",))], ids=["guided", "marginalised"]
+    )
+    def test_two_rows_at_one_time_leave_particles_alive(self, filter_):
+        rows = MODEL.rows(recordings("linear")[0])
+        twice = rows._replace(t=rows.t.at[6].set(rows.t[5]))
+        found = filters.scan(filters.Delayed(filter_, depth=4), MODEL, twice, jax.random.key(0))
+        exact = filters.scan(filters.Kalman(), MODEL, twice)
+        assert not int(found.result)
+        np.testing.assert_allclose(found.mean.x0[-1], exact.mean.x0[-1], atol=0.3)
+
     def test_particles_too_may_come_late(self):
         order = list(range(25))
         order[9], order[10] = order[10], order[9]

@@ -149,6 +149,31 @@ def test_heavy_tails_weigh_by_scipy_s_densities(law, density):
     np.testing.assert_allclose(info.ess, likelihoods.sum() ** 2 / (likelihoods**2).sum(), rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "filter_",
+    [
+        filters.ParticleFilter(4000),
+        filters.AuxiliaryParticleFilter(4000),
+        filters.AuxiliaryParticleFilter(4000, threshold=0.5),
+        filters.Guided(4000),
+        filters.Guided(4000, "unscented", auxiliary=True),
+        filters.Marginalised(4000, ("x1",)),
+    ],
+    ids=["bootstrap", "auxiliary", "auxiliary, seldom", "guided", "guided, auxiliary", "marginalised"],
+)
+def test_innovations_and_their_spread_are_the_kalman_filter_s(filter_):
+    """Process noise is most of what a step adds, so that a spread without it would be far off."""
+    model = linear_model(2, 2, seed=7)
+    model = eqx.tree_at(lambda m: m.measurement_noise, model, ss.Gaussian({"y0": 0.6, "y1": 0.5}))
+    recording = ss.draw(model, linear_recording(model, rows=12), jax.random.key(0)).recording
+    R = ss.MultivariateGaussian(("y0", "y1"), np.diag([0.36, 0.25]))
+    exact = kalman(eqx.tree_at(lambda m: m.measurement_noise, model, R), recording)
+    info = filters.run(filter_, model, recording, key=jax.random.key(1)).info
+    std = np.stack(info.innovation_std, axis=-1)
+    np.testing.assert_allclose(std, exact["innovation_std"], rtol=0.05)
+    np.testing.assert_allclose(np.stack(info.innovation, axis=-1), exact["innovation"], atol=0.12)
+
+
 def test_belief_s_summaries():
     rng = np.random.default_rng(0)
     particles, weights = rng.normal(3.0, 2.0, size=(2, 400)), rng.uniform(size=400)

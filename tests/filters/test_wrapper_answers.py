@@ -8,7 +8,7 @@ import pytest
 from filter_systems import Flow, linear_model, linear_recording, nile_model
 from test_learned_noise import model, rmse, walk
 
-from jaxveh import InputError, Recording, filters
+from jaxveh import InputError, Recording, Result, filters
 from jaxveh import statespace as ss
 
 ROWS = 400
@@ -166,6 +166,30 @@ def test_a_pause_holds_the_state_and_widens_it_after():
     np.testing.assert_array_equal(estimate.std.level[2:4], estimate.std.level[1])
     assert abs(float(estimate.mean.level[4]) - 7.0) < 0.01
     np.testing.assert_array_equal(estimate.info.log_likelihood[2:4], 0.0)
+
+
+def test_the_time_before_a_pause_is_predicted_and_the_pause_is_not():
+    """The level rises by one a second: from the row before the pause to its first row, and not within it."""
+    base = ss.StateSpace(
+        transition=lambda system, t0, t1, x, u: type(x)(x.level + (t1 - t0)),
+        observation=lambda system, t, x, u: Flow(x.level),
+        process_noise=None,
+        measurement_noise=ss.Gaussian({"flow": 1.0}),
+        prior=nile_model(0.0, 1.0).prior,
+        inputs=("braking",),
+    )
+    nothing = np.full(6, np.nan)
+    recording = Recording(np.arange(6.0), {"flow": nothing, "braking": np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0])})
+    estimate = filters.run(filters.Paused(filters.Kalman(), "braking", {"level": 1.0}), base, recording)
+    np.testing.assert_allclose(estimate.mean.level, [0.0, 1.0, 2.0, 2.0, 2.0, 3.0], atol=1e-12)
+    np.testing.assert_allclose(estimate.std.level, np.sqrt([1.0, 1.0, 1.0, 1.0, 2.0, 2.0]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("form", [filters.Covariance(), filters.SquareRoot()], ids=["covariance", "square root"])
+def test_a_bound_that_cannot_be_reached_is_told_from_a_model_that_diverges(form):
+    _, recording = walk(10, 0, np.full(10, 1.0))
+    found = filters.run(filters.HInfinity(filters.Kalman(form), 1e6, {"level": 1.0}), model(), recording, throw=False)
+    assert Result(int(found.result)) is Result.not_positive_definite and int(found.failed_at) == 0
 
 
 def test_a_mode_that_cannot_be_counts_for_nothing():

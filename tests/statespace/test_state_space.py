@@ -125,6 +125,26 @@ def test_missing_channels_and_inputs_are_named():
         make().row(0.0, {"force": 1.0}, {"z": 1.0})
 
 
+def test_what_the_functions_return_is_looked_at():
+    other = lambda system, t0, t1, x, u: Force(x.p)
+    with pytest.raises(InputError, match="transition returned a NamedTuple with force: must be the state, with p, v"):
+        make(transition=other).transition(0.0, 0.1, Pair(0.0, 0.0), Force(0.0))
+    plain = lambda system, t0, t1, x, u: (x.p, x.v)
+    with pytest.raises(InputError, match="transition returned a tuple: must be the state"):
+        make(transition=plain).transition(0.0, 0.1, Pair(0.0, 0.0), Force(0.0))
+    blind = lambda system, t, x, u: Force(x.p)
+    with pytest.raises(InputError, match=r"observation returned .* force, without y: must have every channel .*\(y\)"):
+        make(observation=blind).observation(0.0, Pair(0.0, 0.0), Force(0.0))
+
+
+def test_a_stamp_without_digits_left_for_a_step_is_refused():
+    model, given = ss.cast(make(), jnp.float32), ({"force": 1.0}, {"y": 0.1})
+    with pytest.raises(InputError, match=r"row: t = 1700000000\.0 s is known to 128 s only in float32: count time"):
+        model.row(1.7e9, *given)
+    assert float(model.row(86400.0, *given).t) == 86400.0
+    assert float(make().row(1.7e9, *given).t) == 1.7e9
+
+
 def test_per_point_is_the_function_at_each_point():
     def single(system, t0, t1, x, u):
         matrix = jnp.array([[1.0, 0.1], [-0.2, 0.9]])

@@ -9,15 +9,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.progress import Progress
 from jaxveh.statespace.model import StateSpace
-
-
-def check_count(name: str, value: int, least: int = 1) -> None:
-    """Raise `InputError` unless `value` is a whole number of at least `least`."""
-    if not isinstance(value, int) or value < least:
-        raise InputError(f"{name} = {value}: must be a whole number of at least {least}.")
 
 
 def check_truth(model: StateSpace, truth: StateSpace) -> None:
@@ -36,7 +30,7 @@ def in_batches(one_batch: Callable, key, runs: int, batch: int | None, progress:
     The last batch is filled up, so that there is one size and one compilation.
     """
     batch = runs if batch is None else batch
-    check_count("batch", batch)
+    check_whole("batch", batch)
     batch = min(batch, runs)
     keys = jax.random.split(key, runs)
     found = []

@@ -9,10 +9,10 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.filters.calibration.batches import check_count, in_batches
+from jaxveh.filters.calibration.batches import in_batches
 from jaxveh.filters.calibration.monte_carlo import raise_failed
 from jaxveh.statespace.contract import AbstractFilter
 from jaxveh.statespace.driver import scan
@@ -70,7 +70,7 @@ def log_likelihood_spread(
 
     **Raises** `InputError` where things do not go together or the filter draws nothing; `FilterError` where runs fail.
     """
-    check_count("runs", runs, 2)
+    check_whole("runs", runs, 2)
     filter.check(model)
     rows = model.rows(recording)
     found, results = in_batches(

@@ -8,11 +8,11 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jaxveh._core.errors import FilterError
+from jaxveh._core.errors import FilterError, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
-from jaxveh.filters.calibration.batches import check_count, check_truth, in_batches
+from jaxveh.filters.calibration.batches import check_truth, in_batches
 from jaxveh.statespace.contract import AbstractFilter, Info
 from jaxveh.statespace.draw import draw_rows, schedule_rows
 from jaxveh.statespace.driver import scan_and_keep
@@ -63,7 +63,7 @@ def monte_carlo(
     `throw=False`.
     """
     truth = model if truth is None else truth
-    check_count("runs", runs)
+    check_whole("runs", runs)
     check_truth(model, truth)
     filter.check(model)
     rows = schedule_rows(truth, schedule)

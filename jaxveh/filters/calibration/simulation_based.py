@@ -9,16 +9,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import numerics
-from jaxveh._core.errors import InputError, check
+from jaxveh._core.errors import InputError, check, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.chi_squared import chi_squared_tails
-from jaxveh.filters.calibration.batches import check_count, check_truth, in_batches
+from jaxveh.filters.calibration.batches import check_truth, in_batches
 from jaxveh.filters.calibration.monte_carlo import raise_failed
-from jaxveh.filters.ensemble import EnsembleBelief
-from jaxveh.filters.particle import ParticleBelief, log_of
-from jaxveh.filters.wrappers.interacting import MixtureBelief
 from jaxveh.statespace.contract import AbstractFilter
 from jaxveh.statespace.draw import draw_rows, schedule_rows
 from jaxveh.statespace.driver import scan
@@ -85,8 +81,8 @@ def simulation_based_calibration(
     **Arguments**: as `monte_carlo`. **Raises** likewise.
     """
     truth = model if truth is None else truth
-    check_count("runs", runs)
-    check_count("draws", draws)
+    check_whole("runs", runs)
+    check_whole("draws", draws)
     check_truth(model, truth)
     filter.check(model)
     rows = schedule_rows(truth, schedule)
@@ -103,29 +99,8 @@ def _ranks(filter: AbstractFilter, model: StateSpace, truth: StateSpace, rows, k
         draw_key, filter_key, belief_key = jax.random.split(key, 3)
         states, measured = draw_rows(truth, rows, draw_key)
         estimate = scan(filter, model, measured, filter_key)
-        drawn = draw_belief(estimate.belief, belief_key, draws)
+        drawn = estimate.belief.sample(belief_key, draws)
         rank = lambda values, path: jnp.sum(values < path[-1])
         return jax.tree.map(rank, drawn, states), estimate.result
 
     return jax.vmap(one)(keys)
-
-
-def draw_belief(belief: Any, key, draws: int) -> Any:
-    """Draws of a belief: the state's NamedTuple with (draws,) in each field. Whatever has no samples is taken for a Gaussian."""
-    if isinstance(belief, ParticleBelief):
-        chosen = jax.random.categorical(key, log_of(belief.weights), shape=(draws,))
-        return jax.tree.map(lambda field: field[chosen], belief.particles)
-    if isinstance(belief, EnsembleBelief):
-        chosen = jax.random.randint(key, (draws,), 0, belief.members[0].shape[0])
-        return jax.tree.map(lambda field: field[chosen], belief.members)
-    if isinstance(belief, MixtureBelief):
-        key, mode_key = jax.random.split(key)
-        chosen = jax.random.categorical(mode_key, log_of(belief.probabilities), shape=(draws,))
-        modes = [
-            draw_belief(mode, k, draws)
-            for mode, k in zip(belief.modes, jax.random.split(key, len(belief.modes)), strict=True)
-        ]
-        return jax.tree.map(lambda *fields: jnp.stack(fields)[chosen, jnp.arange(draws)], *modes)
-    mean = jnp.stack(belief.mean)
-    white = numerics.normal(key, (mean.shape[0], draws), mean.dtype)
-    return type(belief.mean)(*(mean[:, None] + numerics.cholesky(belief.covariance) @ white))

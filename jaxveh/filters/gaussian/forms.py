@@ -153,7 +153,8 @@ class SquareRoot(AbstractForm):
 
 
 class SingularValues(AbstractForm):
-    """The factor U sqrt(D) of the covariance's singular value decomposition U D U^T, as federated-ckf takes its points.
+    """The factor U sqrt(D) of the covariance's singular value decomposition U D U^T, as the federated cubature filter
+    of Ji, Li & Fan takes its points.
 
     The decomposition is of deviations, never of the covariance. Where singular values coincide their vectors are not defined,
     and with them the points of nonlinear functions and the derivatives: this form cannot be differentiated.

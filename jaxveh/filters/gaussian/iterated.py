@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import check_whole
 from jaxveh.filters.gaussian.filter import (
     AbstractGaussianFilter,
     AbstractRuleFilter,
@@ -36,8 +36,7 @@ class Iterated(AbstractGaussianFilter):
 
     def __check_init__(self):
         check_kind("Iterated", self.filter, AbstractRuleFilter)
-        if not isinstance(self.iterations, int) or self.iterations < 1:
-            raise InputError(f"iterations = {self.iterations}: must be a whole number of at least 1.")
+        check_whole("iterations", self.iterations)
 
     def check(self, model):
         self.filter.check(model)

@@ -6,7 +6,7 @@ from typing import Any
 
 import equinox as eqx
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.recording import Recording
 from jaxveh.filters.choosing import Transport
 from jaxveh.filters.particle import AbstractParticleFilter, need_key
@@ -27,8 +27,7 @@ class BackwardSampling(eqx.Module):
     trajectories: int = eqx.field(static=True, default=200)
 
     def __check_init__(self):
-        if not isinstance(self.trajectories, int) or self.trajectories < 2:
-            raise InputError(f"trajectories = {self.trajectories}: must be a whole number of at least 2.")
+        check_whole("trajectories", self.trajectories, 2)
 
 
 class Genealogy(eqx.Module):

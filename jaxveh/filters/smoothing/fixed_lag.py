@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_whole
 from jaxveh.filters.choosing import Transport
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
 from jaxveh.filters.smoothing.rauch_tung_striebel import gaussian_of, given_later, has_smoother
@@ -80,8 +80,7 @@ class FixedLag(AbstractFilter):
 
 def check_lag(filter: Any, lag: int) -> None:
     """Raise `InputError` for a lag that is no whole number of at least 1, or a filter without a smoother."""
-    if not isinstance(lag, int) or lag < 1:
-        raise InputError(f"lag = {lag}: must be a whole number of at least 1.")
+    check_whole("lag", lag)
     if isinstance(filter, AbstractParticleFilter):
         check_particles_alone("FixedLag", filter)
         if isinstance(filter.resampling, Transport):

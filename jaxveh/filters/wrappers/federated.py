@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
 from jaxveh._core.names import as_groups, check_names, record
+from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
@@ -87,7 +88,7 @@ class Federated(AbstractFilter):
     by_trace: bool = eqx.field(static=True, default=False)
     reset: bool = eqx.field(static=True, default=True)
     isolate: float | None = eqx.field(static=True, default=None)
-    fading: float = eqx.field(static=True, default=0.9)
+    forgetting: float = eqx.field(static=True, default=0.9)
     overlapping: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
@@ -107,7 +108,7 @@ class Federated(AbstractFilter):
             fine = abs(sum(self.shares) - 1) < 1e-9 and min(self.shares) > 0
             check("Federated.shares", self.shares, lambda _: fine, "positive, with the sum 1")
         check("Federated.isolate", self.isolate, lambda v: v > 1, "above 1")
-        check("Federated.fading", self.fading, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
+        check("Federated.forgetting", self.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
 
     def check(self, model):
         self.filter.check(model)
@@ -152,7 +153,7 @@ class Federated(AbstractFilter):
         surprise = jnp.stack([self.filter.update(model, predicted, own)[1].nis for own in rows])
         counts = jnp.stack([_count(row, group) for group in self.groups])
         ratio = surprise / jnp.maximum(counts, 1.0)
-        alarm = jnp.where(counts > 0, self.fading * belief.alarm + (1.0 - self.fading) * ratio, belief.alarm)
+        alarm = jnp.where(counts > 0, self.forgetting * belief.alarm + (1.0 - self.forgetting) * ratio, belief.alarm)
         trusted = jnp.ones(len(rows), bool) if self.isolate is None else alarm < self.isolate
         # Where every local is suspect there is nothing to judge by.
         trusted = trusted | ~jnp.any(trusted)
@@ -161,7 +162,10 @@ class Federated(AbstractFilter):
         master = with_spread(
             master, master.vector, Spread(master.factor, master.matrix), row.t, row.u, belief.count + 1
         )
-        return FederatedBelief(master, tuple(believed), self._new_shares(model, belief, believed), alarm), info
+        lost = ~(jnp.all(jnp.isfinite(master.factor)) & jnp.all(jnp.isfinite(master.vector)))
+        result = jnp.where((info.result == 0) & lost, code(Result.not_positive_definite), info.result)
+        found = FederatedBelief(master, tuple(believed), self._new_shares(model, belief, believed), alarm)
+        return found, info._replace(result=result)
 
     def _new_shares(self, model, belief, locals_):
         if not self.by_trace:

@@ -10,6 +10,7 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.errors import check, float_array
 from jaxveh._core.names import check_names
+from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.wrappers.base import AbstractStateless
 
@@ -22,7 +23,8 @@ class HInfinity(AbstractStateless):
 
     S has 1 / scale^2 of each state in `scales` on its diagonal: what of the error is to be small, and its unit. Noises are no
     laws here but weights of disturbances. A larger bound trusts measurements more; beyond what is possible P~ is not positive
-    definite, and the result says so. With bound 0 it is the Kalman filter. Log-likelihoods are those of the wider prediction.
+    definite, and the result says so (Simon's condition counts the row's own information, too, and is a little weaker). With
+    bound 0 it is the Kalman filter. Log-likelihoods are those of the wider prediction.
     """
 
     filter: AbstractRuleFilter
@@ -45,4 +47,7 @@ class HInfinity(AbstractStateless):
         information = numerics.inverse_psd(numerics.lower_factor(belief.factor))
         information = information - jnp.diag(self.bound.astype(dtype) * weights)
         wider = numerics.inverse_psd(numerics.cholesky(information))
-        return self.filter.update(model, with_spread(belief, belief.vector, self.filter.form.start(wider)), row)
+        after, info = self.filter.update(model, with_spread(belief, belief.vector, self.filter.form.start(wider)), row)
+        # What the bound has made of a finite covariance is no divergence of the model.
+        too_large = jnp.all(jnp.isfinite(belief.factor)) & ~jnp.all(jnp.isfinite(wider))
+        return after, info._replace(result=jnp.where(too_large, code(Result.not_positive_definite), info.result))

@@ -13,6 +13,7 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, float_array
 from jaxveh._core.result import first_failure
+from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.statespace import StateSpace
@@ -54,6 +55,13 @@ class MixtureBelief(AbstractBelief):
     def covariance(self):
         """(n, n) of the mixture, in the order of the state's fields."""
         return _mixed_covariance(self.probabilities, self.modes)[1]
+
+    def sample(self, key, draws):
+        which, inside = jax.random.split(key)
+        chosen = jax.random.categorical(which, log_of(self.probabilities), shape=(draws,))
+        keys = jax.random.split(inside, len(self.modes))
+        drawn = [mode.sample(k, draws) for mode, k in zip(self.modes, keys, strict=True)]
+        return jax.tree.map(lambda *fields: jnp.stack(fields)[chosen, jnp.arange(draws)], *drawn)
 
     def moments(self, model):
         # A mode's own model reports its state: what differs are parameters, and the report is of states.

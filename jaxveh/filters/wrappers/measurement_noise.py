@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import check
+from jaxveh._core.errors import check, check_whole
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.wrappers.base import (
     AbstractRemembering,
@@ -95,7 +95,7 @@ class VariationalBayes(AbstractRemembering):
     def __check_init__(self):
         check("VariationalBayes.forgetting", self.forgetting, lambda b: (b > 0) & (b <= 1), "above 0 and at most 1")
         check("VariationalBayes.weight", self.weight, lambda v: v > 0, "positive")
-        check("VariationalBayes.iterations", self.iterations, lambda v: v >= 1, "at least 1")
+        check_whole("VariationalBayes.iterations", self.iterations)
 
     def check(self, model):
         check_independent("VariationalBayes", model)

@@ -20,9 +20,10 @@ class Paused(AbstractFilter):
     """`filter`, held while the input `channel` is above 0.5: no prediction, no measurement, as estimators of mass and
     grade wait while braking.
 
-    The state stays what it was. In the first row after a pause its spread grows by `widen`, standard deviations by state: what
-    may have happened meanwhile (`{"v_x": 20.0}`: whatever it was, the next measurement says it anew). Infos of rows in a pause
-    have a log-likelihood of zero and no innovation.
+    As every input, the channel holds from its row to the next: the time before a pause's first row is still predicted, that
+    before the first row after it is not. Meanwhile the state stays what it was. In the first row after a pause its spread grows
+    by `widen`, standard deviations by state: what may have happened (`{"v_x": 20.0}`: whatever it was, the next measurement
+    says it anew). Infos of rows in a pause have a log-likelihood of zero and no innovation.
     """
 
     filter: AbstractRuleFilter
@@ -60,11 +61,10 @@ class Paused(AbstractFilter):
     def _step(self, model, belief, row):
         paused = getattr(row.u, self.channel) > 0.5
         was = getattr(belief.u, self.channel) > 0.5
-        released = was & ~paused
-        wide = self._widened(model, belief)
+        wide = eqx.tree_at(lambda b: b.t, self._widened(model, belief), row.t)
         ahead = self.filter.predict_between(model, belief, row.t, row.u)
         held = with_spread(belief, belief.vector, self.filter.form.start(belief.covariance), t=row.t)
-        start = _choose(paused | was, _choose(released, eqx.tree_at(lambda b: b.t, wide, row.t), held), ahead)
+        start = _choose(was, _choose(paused, held, wide), ahead)
         return self.filter.update(model, start, self._silent(model, row))
 
     def _silent(self, model, row):

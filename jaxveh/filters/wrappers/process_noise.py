@@ -19,7 +19,8 @@ from jaxveh.statespace.process import AbstractProcessNoise
 
 
 class ShrinkingProcess(AbstractRemembering):
-    """`filter` with an extra process noise a step on some states, which shrinks: the adaptive filter of mass-grade-aukf.
+    """`filter` with an extra process noise a step on some states, which shrinks: as an adaptive unscented filter of mass and
+    road grade has it (the experiment `mass-grade-aukf`).
 
     The variance of a state is q_c + q_v: the model's own, and q_v, at first the square of `extra` (standard deviations a step
     by state). With d the change of the state's mean in the last row (eq 24)

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import check_positive, check_whole
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
 from jaxveh.filters.wrappers.base import (
     AbstractStateless,
@@ -19,11 +19,6 @@ from jaxveh.filters.wrappers.base import (
 )
 from jaxveh.filters.wrappers.innovation import innovation, spread_of
 from jaxveh.statespace.contract import presence
-
-
-def _check_iterations(iterations: int) -> None:
-    if not isinstance(iterations, int) or iterations < 1:
-        raise InputError(f"iterations = {iterations}: must be a whole number of at least 1.")
 
 
 class Huber(AbstractStateless):
@@ -72,7 +67,7 @@ class RobustStudentT(AbstractStateless):
 
     def __check_init__(self):
         check_positive("RobustStudentT.dof", self.dof)
-        _check_iterations(self.iterations)
+        check_whole("RobustStudentT.iterations", self.iterations)
 
     def check(self, model):
         check_independent("RobustStudentT", model)

@@ -17,17 +17,17 @@ class StrongTracking(AbstractRemembering):
         V <- (rho V + e e^T) / (1 + rho),    lambda = max(1, trace(V - beta R) / trace(H P H^T))
 
     with V = e e^T in a channel's first row, and each channel over its noise's standard deviation, so that units do not matter;
-    rho = `memory`, beta = `softening`, lambda at most `ceiling`. All of the predicted covariance is inflated, where the source
-    leaves out the process noise. It follows sudden changes that the model does not know of, and takes outliers for such.
+    rho = `forgetting`, beta = `softening`, lambda at most `ceiling`. All of the predicted covariance is inflated, where the
+    source leaves out the process noise. It follows sudden changes that the model does not know of, and takes outliers for such.
     """
 
     filter: AbstractGaussianFilter
-    memory: float = eqx.field(static=True, default=0.95)
+    forgetting: float = eqx.field(static=True, default=0.95)
     softening: float = eqx.field(static=True, default=1.0)
     ceiling: float = eqx.field(static=True, default=100.0)
 
     def __check_init__(self):
-        check("StrongTracking.memory", self.memory, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
+        check("StrongTracking.forgetting", self.forgetting, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
         check("StrongTracking.softening", self.softening, lambda v: v >= 1, "at least 1")
         check("StrongTracking.ceiling", self.ceiling, lambda v: v >= 1, "at least 1")
 
@@ -46,7 +46,7 @@ class StrongTracking(AbstractRemembering):
         found = innovation(self.filter, model, belief.inside, row)
         squared = jnp.square(found.error) / found.noise
         old = belief.memory
-        mixed = jnp.where(old < 0, squared, (self.memory * old + squared) / (1.0 + self.memory))
+        mixed = jnp.where(old < 0, squared, (self.forgetting * old + squared) / (1.0 + self.forgetting))
         squares = jnp.where(found.here, mixed, old)
         excess = jnp.where(found.here, squares - self.softening, 0.0)
         expected = jnp.sum(jnp.where(found.here, found.expected / found.noise, 0.0))

@@ -34,9 +34,9 @@ class HaarNoise(AbstractRemembering):
     """`filter` with measurement variances from the Haar wavelet's highest band of the last `window` samples
     (Qin et al. 2014).
 
-        d_j = (y_{2j+1} - y_{2j}) / sqrt(2),    sigma = median |d| / 0.6745,    R <- memory R + (1 - memory) sigma^2
+        d_j = (y_{2j+1} - y_{2j}) / sqrt(2),    sigma = median |d| / 0.6745,    R <- b R + (1 - b) sigma^2
 
-    (D. Donoho & I. Johnstone 1994.) Channel by channel, of the rows where it is present. It asks nothing of the model, so that
+    with b = `forgetting` (D. Donoho & I. Johnstone 1994). Channel by channel, of the rows where it is present. It asks nothing of the model, so that
     the model's errors are no noise to it; but the signal must move less than the noise from row to row: of a fast manoeuvre or
     of coarse samples it makes noise, noise that is coloured it does not see, and of noise that jumps up it learns half a window
     late, trusting wild values meanwhile (gate them). Before a window is full the model's own variances hold; always they stay
@@ -47,14 +47,14 @@ class HaarNoise(AbstractRemembering):
     learns_variances: ClassVar[bool] = True
     filter: AbstractGaussianFilter
     window: int = eqx.field(static=True, default=64)
-    memory: float = eqx.field(static=True, default=0.9)
+    forgetting: float = eqx.field(static=True, default=0.9)
     floor: float = eqx.field(static=True, default=0.01)
     ceiling: float = eqx.field(static=True, default=1e4)
 
     def __check_init__(self):
         if not isinstance(self.window, int) or self.window < 4 or self.window % 2:
             raise InputError(f"HaarNoise.window = {self.window}: must be an even whole number of at least 4.")
-        check("HaarNoise.memory", self.memory, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
+        check("HaarNoise.forgetting", self.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
         check("HaarNoise.floor", self.floor, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
         check("HaarNoise.ceiling", self.ceiling, lambda v: v >= 1, "at least 1")
 
@@ -85,5 +85,5 @@ class HaarNoise(AbstractRemembering):
         found = jnp.square(jnp.median(jnp.abs(details), axis=0) / MEDIAN)
         own = variances_of(model)
         found = jnp.clip(found, self.floor * own, self.ceiling * own)
-        mixed = self.memory * memory.variances + (1.0 - self.memory) * found
+        mixed = self.forgetting * memory.variances + (1.0 - self.forgetting) * found
         return Window(values, count, jnp.where(here & (count >= self.window), mixed, memory.variances))
