@@ -36,12 +36,12 @@ class HaarNoise(AbstractRemembering):
 
         d_j = (y_{2j+1} - y_{2j}) / sqrt(2),    sigma = median |d| / 0.6745,    R <- b R + (1 - b) sigma^2
 
-    with b = `forgetting` (D. Donoho & I. Johnstone 1994). Channel by channel, of the rows where it is present. It asks nothing of the model, so that
-    the model's errors are no noise to it; but the signal must move less than the noise from row to row: of a fast manoeuvre or
-    of coarse samples it makes noise, noise that is coloured it does not see, and of noise that jumps up it learns half a window
-    late, trusting wild values meanwhile (gate them). Before a window is full the model's own variances hold; always they stay
-    between `floor` and `ceiling` times the model's own (a channel that is quantised, or stuck, has a median of zero). The noise
-    must be Gaussian, a standard deviation a channel.
+    with b = `forgetting` (D. Donoho & I. Johnstone 1994). Channel by channel, of the rows where it is present. It asks nothing of
+    the model, so that the model's errors are no noise to it; but the signal must move less than the noise from row to row: of a
+    fast manoeuvre or of coarse samples it makes noise, noise that is coloured it does not see, and of noise that jumps up it
+    learns half a window late, trusting wild values meanwhile (gate them). Before a window is full the model's own variances
+    hold; always they stay between `floor` and `ceiling` times the model's own (a channel that is quantised, or stuck, has a
+    median of zero). The noise must be Gaussian, a standard deviation a channel.
     """
 
     learns_variances: ClassVar[bool] = True
