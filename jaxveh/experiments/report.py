@@ -1,0 +1,42 @@
+"""What every experiment reports: tables for people, and criteria that hold or do not."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Check(NamedTuple):
+    """One criterion: what was found, the bound, and whether it holds (at or below the bound unless the name says)."""
+
+    name: str
+    value: float
+    bound: float
+    holds: bool
+
+
+class Table(NamedTuple):
+    """A table for people: a title that says what the numbers are, column heads, rows of cells."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple]
+
+
+def at_most(name: str, value, bound: float) -> Check:
+    """A criterion that holds at or below the bound; what is not a number does not hold."""
+    return Check(name, float(value), float(bound), bool(value <= bound))
+
+
+def above(name: str, value, bound: float) -> Check:
+    """A criterion that holds above the bound."""
+    return Check(name, float(value), float(bound), bool(value > bound))
+
+
+def spread(values, digits: int = 3, scale: float = 1.0) -> str:
+    """`median [lower quartile, upper quartile]` of the values, those that are not finite counted as the largest."""
+    values = scale * np.asarray(values, float)
+    low, mid, high = np.percentile(np.where(np.isnan(values), np.inf, values), [25, 50, 75], method="nearest")
+    shown = lambda v: "never" if np.isinf(v) else f"{v:.{digits}g}"
+    return f"{shown(mid)} [{shown(low)}, {shown(high)}]"
