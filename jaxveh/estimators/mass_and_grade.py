@@ -28,8 +28,9 @@ def mass_and_grade(
     mass_domain: AbstractBijector | None = None,
     grade_spread: float = 0.03,
     grade_walk: float = 0.0,
-    grade_rate_walk: float | None = 3e-4,
+    grade_rate_walk: float | None = 1e-3,
     speed_noise: float = 0.005,
+    input_path: str = "linear",
 ) -> StateSpace:
     """The state space [v_x, grade, (grade_rate), (bias), mass] of a car that goes straight, for any filter.
 
@@ -43,7 +44,8 @@ def mass_and_grade(
     prior's mean, known to 20 m/s; `mass_spread` (-) on the mass's logarithm, and its `mass_walk` (1/sqrt(s)); `mass_domain`:
     `Real()` for a mass that may become negative, as papers have it, its spreads relative still; `grade_spread` (rad);
     `grade_walk` (rad/sqrt(s)); `grade_rate_walk` (rad/s per sqrt(s)), None leaves the rate out; `speed_noise` (m/s per
-    sqrt(s)): what the model leaves out.
+    sqrt(s)): what the model leaves out. `input_path`: torques run `linear` between rows or are `held`; held ones are late by
+    half a step, which a lively pedal turns into a wrong mass.
 
     **Inputs** `drive_torque` and `brake_torque` (N m). **Channels** `v_x` and `a_x`. **Reported**: `v_x`, `grade` (rad), `mass` (kg)
     and what else is a state.
@@ -75,6 +77,7 @@ def mass_and_grade(
         measurement_noise=Gaussian({"v_x": v_x} | ({} if a_x is None else {ACCELEROMETER: a_x})),
         prior=Prior(kind(*(mean for mean, _ in states.values())), {name: std for name, (_, std) in states.items()}),
         inputs=car.inputs,
+        input_path=input_path,
     )
     return with_parameters(model, lambda car: (car.mass,), mass_spread, mass_walk, domain=mass_domain)
 

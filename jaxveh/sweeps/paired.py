@@ -55,7 +55,9 @@ def compare(a: np.ndarray, b: np.ndarray, *, axis: int = -1, level: float = 0.95
     medians = lambda v: _median(v)
     return Comparison(
         ratio=_interval(medians(ratios), medians(ratios[..., drawn]), level),
-        of_medians=_interval(_ratios(medians(a), medians(b)), _ratios(medians(a[..., drawn]), medians(b[..., drawn])), level),
+        of_medians=_interval(
+            _ratios(medians(a), medians(b)), _ratios(medians(a[..., drawn]), medians(b[..., drawn])), level
+        ),
         wins=wins,
     )
 

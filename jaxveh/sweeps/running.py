@@ -137,9 +137,7 @@ def _needed(program) -> float:
     analysis = program.memory_analysis()
     if analysis is None:
         return 0.0
-    return float(
-        analysis.temp_size_in_bytes + analysis.output_size_in_bytes + analysis.argument_size_in_bytes
-    )
+    return float(analysis.temp_size_in_bytes + analysis.output_size_in_bytes + analysis.argument_size_in_bytes)
 
 
 def _machine_memory() -> float:

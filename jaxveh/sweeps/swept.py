@@ -46,7 +46,9 @@ class Swept:
     def quantile(self, name: str, share: float) -> np.ndarray:
         """The quantile over seeds: (axes..., ...). Runs that are not finite count as the largest."""
         values = np.where(np.isnan(self[name]), np.inf, self[name])
-        return np.quantile(values, share, axis=len(self.design.axes), method="linear" if np.isfinite(values).all() else "nearest")
+        return np.quantile(
+            values, share, axis=len(self.design.axes), method="linear" if np.isfinite(values).all() else "nearest"
+        )
 
     def median(self, name: str) -> np.ndarray:
         """The median over seeds."""
@@ -58,7 +60,9 @@ class Swept:
 
     def compare(self, name: str, axis: str, a: Any, b: Any, *, level: float = 0.95) -> Comparison:
         """`a` against `b` along an axis, seed by seed, at every point of the others; see `sweeps.compare`."""
-        return compare(self.at(name, **{axis: a}), self.at(name, **{axis: b}), axis=len(self.design.axes) - 1, level=level)
+        return compare(
+            self.at(name, **{axis: a}), self.at(name, **{axis: b}), axis=len(self.design.axes) - 1, level=level
+        )
 
 
 def named_leaves(tree: Any) -> dict[str, Any]:

@@ -33,8 +33,8 @@ def drive(seed=0, duration=80.0):
     return Recording(found.time, channels), np.asarray(found["true.grade"])
 
 
-def estimate(recording, **options):
-    model = estimators.mass_and_grade(car(1100.0), start_speed=20.0, **options)
+def estimate(recording, grade_rate_walk=3e-3, **options):
+    model = estimators.mass_and_grade(car(1100.0), start_speed=20.0, grade_rate_walk=grade_rate_walk, **options)
     return filters.run(filters.Unscented(), model, recording)
 
 

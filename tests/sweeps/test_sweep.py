@@ -56,7 +56,9 @@ def test_chunks_make_the_same_and_report():
     whole, parts = sweeps.sweep(run, DESIGN, 4, KEY), sweeps.sweep(run, DESIGN, 4, KEY, batch=7, progress=report)
     for name in ("value", "deep.pair"):
         np.testing.assert_allclose(parts[name], whole[name], rtol=1e-14)
-    assert said[:6] == [(n, 48, f"law {law}") for law, n in (*[("double", n) for n in (0, 7, 14, 21, 24)], ("square", 24))]
+    assert said[:6] == [
+        (n, 48, f"law {law}") for law, n in (*[("double", n) for n in (0, 7, 14, 21, 24)], ("square", 24))
+    ]
     assert said[-1] == (48, 48, "law square")
 
 
@@ -87,7 +89,7 @@ def test_each_choice_is_compiled_once():
 
 
 def test_each_run_gets_its_own_part_of_the_data():
-    drives = {"a": np.arange(6.0).reshape(2, 3, 1) + np.zeros((2, 3, 5)), "b": np.arange(6).reshape(2, 3)}
+    drives = {"a": np.arange(6.0).reshape(2, 3, 1) + np.zeros((2, 3, 5)), "b": np.arange(6.0).reshape(2, 3)}
     design = sweeps.Design(law={"double": double, "square": square}, scale=[1.0, 10.0])
 
     def use(point, key, data):
@@ -136,11 +138,26 @@ def test_two_devices_make_what_one_makes():
         (lambda: sweeps.Design(a=["PF", "UKF"]), "axis a = .*must be a sequence of numbers, or a mapping from labels"),
         (lambda: sweeps.sweep(run, DESIGN, 0, KEY), "seeds = 0: must be a whole number of at least 1"),
         (lambda: sweeps.sweep(run, DESIGN, 1, KEY, batch=0), "batch = 0: must be a whole number"),
-        (lambda: sweeps.sweep(run, DESIGN, 1, KEY, memory=-1.0), r"memory = -1\.0: must be positive and finite \(bytes\)"),
-        (lambda: sweeps.sweep(lambda p, k: jnp.zeros(()), DESIGN, 1, KEY), "must be a mapping or a NamedTuple of arrays"),
-        (lambda: sweeps.sweep(run, DESIGN, 1, KEY)["rmse"], r"value: unknown name\(s\) rmse; there are: deep.pair, value"),
-        (lambda: sweeps.sweep(run, DESIGN, 1, KEY).at("value", law="cube"), "law = 'cube': the design has double, square"),
-        (lambda: sweeps.sweep(run, DESIGN, 1, KEY).at("value", lw="double"), "axis = 'lw': the design has scale, law, shift"),
+        (
+            lambda: sweeps.sweep(run, DESIGN, 1, KEY, memory=-1.0),
+            r"memory = -1\.0: must be positive and finite \(bytes\)",
+        ),
+        (
+            lambda: sweeps.sweep(lambda p, k: jnp.zeros(()), DESIGN, 1, KEY),
+            "must be a mapping or a NamedTuple of arrays",
+        ),
+        (
+            lambda: sweeps.sweep(run, DESIGN, 1, KEY)["rmse"],
+            r"value: unknown name\(s\) rmse; there are: deep.pair, value",
+        ),
+        (
+            lambda: sweeps.sweep(run, DESIGN, 1, KEY).at("value", law="cube"),
+            "law = 'cube': the design has double, square",
+        ),
+        (
+            lambda: sweeps.sweep(run, DESIGN, 1, KEY).at("value", lw="double"),
+            "axis = 'lw': the design has scale, law, shift",
+        ),
     ],
 )
 def test_mistakes_are_named(call, message):

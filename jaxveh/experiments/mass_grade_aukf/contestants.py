@@ -66,7 +66,7 @@ def _filtered(filter_, model: StateSpace, study: Study, drive: Drive) -> Found:
         model = StateSpace(
             system=model.system, transition=model.transition_function, observation=model.observation_function,
             process_noise=model.process_noise, measurement_noise=model.measurement_noise, prior=model.prior,
-            inputs=(*model.inputs, "braking"), report=model.report_function, chosen=model.chosen,
+            inputs=(*model.inputs, "braking"), report=model.report_function, chosen=model.chosen, input_path=model.input_path,
         )  # fmt: skip
         inputs["braking"] = drive.braking
     u = record_type("Inputs", inputs)(*inputs.values())
@@ -103,9 +103,7 @@ def _smooth(aided: bool = False, bias: float | None = None):
 
 def _adaptive(freeze: bool):
     def run(study, guess, drive):
-        model = _model(
-            study, guess, drive, mass_spread=0.4, mass_domain=Real(), grade_walk=WALK, grade_rate_walk=None
-        )
+        model = _model(study, guess, drive, mass_spread=0.4, mass_domain=Real(), grade_walk=WALK, grade_rate_walk=None)
         # Large at first, as the paper has it: a fifth of the truck's mass.
         inner = filters.ShrinkingProcess(filters.Unscented(), {"mass": 0.2 * study.mass})
         return _filtered(Frozen(inner) if freeze else inner, model, study, drive)

@@ -21,6 +21,9 @@ from jaxveh.vehicles import Longitudinal, SevenDOF, sets
 AIR = 0.5 * 1.22 * 0.32 * 2.25
 """N s^2/m^2: half of density, drag coefficient and area of the paper's car."""
 
+HARMONICS = 20
+"""Of which speeds, pedals and grades are made."""
+
 LENGTH_OF_A_TOUCH = 2.0
 """s."""
 
@@ -77,21 +80,24 @@ class Touching(AbstractManoeuvre):
 
 def manoeuvre_of(study: Study, pedals, key) -> tuple[Touching, Any]:
     """How the study is driven, with pedal noise of `pedals` m/s^2."""
-    car, (drive_key, touch_key) = model_car(study), jax.random.split(key)
+    car, (speed_key, drive_key, touch_key) = model_car(study), jax.random.split(key, 3)
     per_acceleration = study.mass * car.wheel_radius
-    cruise = manoeuvres.cruise(
-        study.speed, drive_key, speed_std=study.speed_std, speed_time=study.speed_time,
-        pedal_noise=1.0 * per_acceleration, pedal_time=study.pedal_time, duration=study.duration,
-    )  # fmt: skip
-    cruise = eqx.tree_at(lambda m: m.pedal_noise, cruise, jnp.asarray(pedals * per_acceleration))
-    if study.start_speed is not None:
+    if study.start_speed is None:
+        speed = manoeuvres.wavering_speed(
+            study.speed, study.speed_std, speed_key, time=study.speed_time, fastest=study.speed_time, count=HARMONICS
+        )
+    else:
         speed = ChangingSpeed(study.start_speed, study.speed, start=0.5, time=study.start_time)
-        cruise = eqx.tree_at(lambda m: m.speed, cruise, speed)
+    cruise = manoeuvres.cruise(
+        study.speed, drive_key, speed_std=0.0, pedal_noise=pedals * per_acceleration, pedal_time=study.pedal_time,
+        duration=study.duration, count=HARMONICS,
+    )  # fmt: skip
+    cruise = eqx.tree_at(lambda m: m.speed, cruise, speed)
     # One touch in each equal part of the seconds from 12 to 30.
     part = 18.0 / max(study.touches, 1)
     free = jax.random.uniform(touch_key, (study.touches,)) * (part - LENGTH_OF_A_TOUCH - 0.5)
     starts = 12.0 + part * jnp.arange(study.touches) + free
-    return Touching(cruise, starts, study.touch * per_acceleration, study.duration)
+    return Touching(manoeuvre=cruise, starts=starts, torque=study.touch * per_acceleration, duration=study.duration)
 
 
 def drive_once(study: Study, pedals, key) -> Drive:
@@ -99,7 +105,9 @@ def drive_once(study: Study, pedals, key) -> Drive:
     road_key, drive_key, sensor_key, bias_key = jax.random.split(key, 4)
     numbers = numbers_of(study)
     truth = vehicles.build(numbers, SevenDOF)
-    grade = roads.gauss_markov(study.grade_std, study.grade_length, road_key, shortest=study.grade_shortest, count=50)
+    grade = roads.gauss_markov(
+        study.grade_std, study.grade_length, road_key, shortest=study.grade_shortest, count=HARMONICS
+    )
     manoeuvre = manoeuvre_of(study, pedals, drive_key)
     speed = study.speed if study.start_speed is None else study.start_speed
     found = simulate(

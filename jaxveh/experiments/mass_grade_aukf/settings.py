@@ -40,10 +40,10 @@ class Study:
     guesses: tuple[float, ...] = (3000.0, 3500.0, 4500.0, 5000.0)
     duration: float = 560.0
     dt: float = 0.05
-    max_step: float = 0.002
+    max_step: float = 0.005
     speed: float = 62.5 / 3.6
     speed_std: float = 2.5
-    speed_time: float = 60.0
+    speed_time: float = 120.0
     start_speed: float | None = None
     start_time: float = 10.0
     pedals: float = 0.1

@@ -37,8 +37,8 @@ def race(
 ) -> Raced:
     """Every estimator (or `only` these) from every first guess on the same drives: for each pedal activity (m/s^2), one a seed."""
     check_whole("seeds", seeds, 2)
-    stage = lambda what, share, first: lambda done, total, said: progress(
-        first + share * done / total, 1.0, f"{what}: {said}"
+    stage = lambda what, share, first: (
+        lambda done, total, said: progress(first + share * done / total, 1.0, f"{what}: {said}")
     )
     drives = sweeps.sweep(
         lambda point, key: drive_once(study, point.pedals, key), sweeps.Design(pedals=pedals), seeds, key,

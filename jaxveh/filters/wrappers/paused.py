@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.statespace import StateSpace
@@ -20,7 +20,7 @@ class Paused(AbstractFilter):
     """`filter`, held while the input `channel` is above 0.5: no prediction, no measurement, as estimators of mass and
     grade wait while braking.
 
-    As every input, the channel holds from its row to the next: the time before a pause's first row is still predicted, that
+    The channel holds from its row to the next, whatever the model's `input_path`: the time before a pause's first row is still predicted, that
     before the first row after it is not. Meanwhile the state stays what it was. In the first row after a pause its spread grows
     by `widen`, standard deviations by state: what may have happened (`{"v_x": 20.0}`: whatever it was, the next measurement
     says it anew). Infos of rows in a pause have a log-likelihood of zero and no innovation.
@@ -42,10 +42,6 @@ class Paused(AbstractFilter):
         self.filter.check(model)
         check_names("Paused.channel", (self.channel,), model.inputs)
         check_names("Paused.widen", [name for name, _ in self.widen], model.states)
-        if model.input_path != "held":
-            raise InputError(
-                "Paused: the model's inputs run linearly; a pause begins and ends at a row: input_path must be 'held'."
-            )
 
     def init(self, model, row, key=None):
         del key
