@@ -47,8 +47,8 @@ def mass_and_grade(
     sqrt(s)): what the model leaves out. `input_path`: torques run `linear` between rows or are `held`; held ones are late by
     half a step, which a lively pedal turns into a wrong mass.
 
-    **Inputs** `drive_torque` and `brake_torque` (N m). **Channels** `v_x` and `a_x`. **Reported**: `v_x`, `grade` (rad), `mass` (kg)
-    and what else is a state.
+    **Inputs** `drive_torque` and `brake_torque` (N m). **Channels** `v_x` and `a_x`. **Reported**: `v_x`, `grade` (rad), `mass`
+    (kg) and what else is a state.
 
     **Raises** `InputError` for spreads out of range.
     """

@@ -74,7 +74,7 @@ def test_a_chunk_is_as_large_as_memory_holds():
     parts = sweeps.sweep(heavy, design, 20, KEY, memory=4e6, progress=report)
     np.testing.assert_allclose(parts["sum"], whole["sum"], rtol=1e-12)
     # A run takes at least its 20000 numbers of 8 bytes.
-    assert 2 < len(sizes) and max(np.diff(sizes)) <= 4e6 / 1.6e5
+    assert len(sizes) > 2 and max(np.diff(sizes)) <= 4e6 / 1.6e5
 
 
 def test_each_choice_is_compiled_once():

@@ -102,7 +102,7 @@ def manoeuvre_of(study: Study, pedals, key) -> tuple[Touching, Any]:
 
 def drive_once(study: Study, pedals, key) -> Drive:
     """One drive with pedal noise of `pedals` m/s^2; a pure function, for `vmap`."""
-    road_key, drive_key, sensor_key, bias_key = jax.random.split(key, 4)
+    road_key, drive_key, sensor_key, _bias_key = jax.random.split(key, 4)
     numbers = numbers_of(study)
     truth = vehicles.build(numbers, SevenDOF)
     grade = roads.gauss_markov(

@@ -30,8 +30,8 @@ class Study:
     `name`: `truck` or `car`; `mass` kg, the truth, and `guesses`, from which filters start; `duration` s, rows every `dt` s,
     `max_step` s of the simulation. `speed` m/s with a spread of `speed_std` over `speed_time` s, after a gentle start from
     `start_speed` (m/s) over `start_time` (s; None: none). Pedals: coloured noise of `pedals` m/s^2 over `pedal_time` s.
-    `grade_std` rad over `grade_length` m, no wave shorter than `grade_shortest` m. `touches`: how often the brake is touched in the
-    first 30 s, `touch` m/s^2 strongly. Sensors: `v_x` m/s, `a_x` m/s^2, `a_x_bias` m/s^2; `delay` s of the torque's signal,
+    `grade_std` rad over `grade_length` m, no wave shorter than `grade_shortest` m. `touches`: how often the brake is touched in
+    the first 30 s, `touch` m/s^2 strongly. Sensors: `v_x` m/s, `a_x` m/s^2, `a_x_bias` m/s^2; `delay` s of the torque's signal,
     `torque_scale` - its error.
     """
 

@@ -35,7 +35,7 @@ def race(
     only: tuple[str, ...] | None = None,
     progress: Progress = silent,
 ) -> Raced:
-    """Every estimator (or `only` these) from every first guess on the same drives: for each pedal activity (m/s^2), one a seed."""
+    """Every estimator (or `only` these) from every first guess on the same drives: one a seed for each pedal activity (m/s^2)."""
     check_whole("seeds", seeds, 2)
     stage = lambda what, share, first: (
         lambda done, total, said: progress(first + share * done / total, 1.0, f"{what}: {said}")

@@ -20,10 +20,10 @@ class Paused(AbstractFilter):
     """`filter`, held while the input `channel` is above 0.5: no prediction, no measurement, as estimators of mass and
     grade wait while braking.
 
-    The channel holds from its row to the next, whatever the model's `input_path`: the time before a pause's first row is still predicted, that
-    before the first row after it is not. Meanwhile the state stays what it was. In the first row after a pause its spread grows
-    by `widen`, standard deviations by state: what may have happened (`{"v_x": 20.0}`: whatever it was, the next measurement
-    says it anew). Infos of rows in a pause have a log-likelihood of zero and no innovation.
+    The channel holds from its row to the next, whatever the model's `input_path`: the time before a pause's first row is still
+    predicted, that before the first row after it is not. Meanwhile the state stays what it was. In the first row after a pause
+    its spread grows by `widen`, standard deviations by state: what may have happened (`{"v_x": 20.0}`: whatever it was, the
+    next measurement says it anew). Infos of rows in a pause have a log-likelihood of zero and no innovation.
     """
 
     filter: AbstractRuleFilter
