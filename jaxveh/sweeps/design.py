@@ -86,7 +86,8 @@ def _axis(name: str, values: Any) -> Axis:
     if isinstance(values, Mapping):
         axis = Axis(name, tuple(values), tuple(values.values()), choice=True)
     else:
-        axis = Axis(name, *2 * (_numbers(name, values),), choice=False)
+        numbers = _numbers(name, values)
+        axis = Axis(name, numbers, numbers, choice=False)
     if not axis.values:
         raise InputError(f"axis {name} is empty: give at least one value.")
     return axis
@@ -102,4 +103,4 @@ def _numbers(name: str, values: Any) -> tuple[float, ...]:
             f"axis {name} = {values!r}: must be a sequence of numbers, or a mapping from labels to what is to be chosen."
         )
     check_finite(f"axis {name}", array)
-    return tuple(array.tolist())
+    return tuple(float(number) for number in array)

@@ -39,9 +39,9 @@ def sweep(
     **Arguments**: `run`, a pure function of one point (a NamedTuple with the design's names) and one key, whose result is a
     mapping or NamedTuple of arrays (trees of them get dotted names); `seeds`, how many keys are split from `key`; `data`, a tree
     of arrays that begin with the axes of numbers and the seeds: then it is `run(point, key, data)` with each run's own part
-    (drives that several filters see); `batch`, runs at a time (default: all points of a choice, or as many as `memory`, bytes, holds:
-    half of the machine's); `devices`, over which a batch is split by `shard_map` (default: all of `jax.devices()`: on a CPU one,
-    unless `jax_num_cpu_devices` is set before jax starts); `progress(done, total, stage)` is called between chunks.
+    (drives that several filters see); `batch`, runs at a time (default: all points of a choice, or as many as `memory`, bytes,
+    holds: half of the machine's); `devices`, over which a batch is split by `shard_map` (default: all of `jax.devices()`: on a
+    CPU one, unless `jax_num_cpu_devices` is set before jax starts); `progress(done, total, stage)` is called between chunks.
 
     Every choice is compiled once, whatever the number of chunks.
 

@@ -155,10 +155,12 @@ def _least_squares(study: Study, guess, drive: Drive) -> Found:
     """
     car = model_car(study)
     n = round(OVER / study.dt)
-    mean = lambda x: jnp.convolve(x, jnp.ones(n) / n, mode="valid")
+    # Trapezia between the rows whose speeds are differenced.
+    running = lambda x: jnp.concatenate([jnp.zeros(1), jnp.cumsum(0.5 * (x[1:] + x[:-1]))])
+    mean = lambda x: (running(x)[n:] - running(x)[:-n]) / n
     rate = (drive.v_x[n:] - drive.v_x[:-n]) / OVER
-    force = mean(drive.torque / car.wheel_radius - car.drag * drive.v_x**2)[:-1]
-    braked = mean(drive.braking)[:-1] > 0
+    force = mean(drive.torque / car.wheel_radius - car.drag * drive.v_x**2)
+    braked = mean(drive.braking) > 1e-9
     wheels = 4.0 * car.wheel_inertia / car.wheel_radius**2
     fields = record_type("LeastSquaresState", ("per_tonne", "pull"))
     model = StateSpace(
@@ -177,7 +179,7 @@ def _least_squares(study: Study, guess, drive: Drive) -> Found:
     # Never negative, which the reciprocal would make of a wild first row.
     mass = 1000.0 / jnp.maximum(estimate.mean.per_tonne, 0.02) - wheels
     grade = estimate.mean.pull / GRAVITY - car.rolling_resistance
-    first = lambda x, value: jnp.concatenate([jnp.full((n,), value), x])
+    first = lambda x, value: jnp.where(jnp.arange(n + x.shape[0]) < n, value, jnp.pad(x, (n, 0), mode="edge"))
     return Found(first(mass, guess), first(grade, 0.0), estimate.result)
 
 

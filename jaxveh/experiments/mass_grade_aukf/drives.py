@@ -78,7 +78,7 @@ class Touching(AbstractManoeuvre):
         return self.torque * jnp.sum(up - down, axis=-1)
 
 
-def manoeuvre_of(study: Study, pedals, key) -> tuple[Touching, Any]:
+def manoeuvre_of(study: Study, pedals, key) -> Touching:
     """How the study is driven, with pedal noise of `pedals` m/s^2."""
     car, (speed_key, drive_key, touch_key) = model_car(study), jax.random.split(key, 3)
     per_acceleration = study.mass * car.wheel_radius
