@@ -29,7 +29,7 @@ def mass_and_grade(
     grade_spread: float = 0.03,
     grade_walk: float = 0.0,
     grade_rate_walk: float | None = 1e-3,
-    speed_noise: float = 0.005,
+    speed_noise: float = 0.002,
     input_path: str = "linear",
 ) -> StateSpace:
     """The state space [v_x, grade, (grade_rate), (bias), mass] of a car that goes straight, for any filter.
