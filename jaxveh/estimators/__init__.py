@@ -3,6 +3,7 @@
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.handling import Handling, handling_model
 from jaxveh.estimators.linear_baseline import open_loop
+from jaxveh.estimators.mass_and_grade import mass_and_grade
 from jaxveh.estimators.observability import observe, predict_measurements
 from jaxveh.estimators.sideslip import Calibration, calibrate, estimate, handling_car, score
 from jaxveh.estimators.state_space import PROCESS_NOISE, START_SPREAD, held_rows, state_space
@@ -18,6 +19,7 @@ __all__ = [
     "handling_car",
     "handling_model",
     "held_rows",
+    "mass_and_grade",
     "observe",
     "open_loop",
     "predict_measurements",

@@ -210,10 +210,10 @@ def make_info(model, row, log_likelihood, residual, weights, became, within=None
     # A particle that shows nothing finite has no say.
     known = jnp.isfinite(sum(residual[name] for name in model.channels))
     before = jnp.where(known, before, 0)
-    before = before / numerics.total(before)
     residual = {name: jnp.where(known, residual[name], 0) for name in model.channels}
-    mean = {name: numerics.total(before * residual[name]) for name in model.channels}
-    spread = {name: numerics.total(before * (residual[name] - mean[name]) ** 2) for name in model.channels}
+    whole = 1.0 / numerics.total(before)
+    mean = {name: numerics.total(before * residual[name]) * whole for name in model.channels}
+    spread = {name: numerics.total(before * (residual[name] - mean[name]) ** 2) * whole for name in model.channels}
     if within is not None:
         spread = {name: spread[name] + within[name] for name in model.channels}
     law = model.measurement_noise

@@ -7,17 +7,12 @@ slow; on an accelerator both are handled well. Everything in this package that d
 from typing import TypeVar
 
 import jax
-import jax.numpy as jnp
-import numpy as np
 from jax import lax
 
+from jaxveh._core.errors import is_concrete
+from jaxveh.numerics.held import held
+
 Tree = TypeVar("Tree")
-
-_MANY = 128
-"""From this size on computing a number twice costs more than storing it."""
-
-_CACHED = 2**15
-"""Bytes of an array of which a few dozen fit into a processor's own cache."""
 
 
 def on_cpu() -> bool:
@@ -51,11 +46,7 @@ def kept(tree: Tree) -> Tree:
     For rates of hundreds of operations, where computing them twice costs more than the branch that replaces the barrier before
     jax 0.12: with it 1000 7-DOF cars take 175 instead of 400 ns a step there, and one takes 7.3 instead of 9.6 us.
     """
-    leaves, structure = jax.tree.flatten(tree)
-    if not on_cpu() or not leaves:
-        return tree
-    hold = lax.optimization_barrier if barriers_hold() else _hold_by_branch
-    return jax.tree.unflatten(structure, hold(leaves))
+    return _held(tree, worth=False)
 
 
 def stored(tree: Tree) -> Tree:
@@ -65,34 +56,15 @@ def stored(tree: Tree) -> Tree:
     cotangents, and a whole batch, which would have to go to memory and back, is still fused. Unlike a `barrier`, it holds in
     every version of jax.
     """
+    return _held(tree, worth=True)
+
+
+def _held(tree: Tree, worth: bool) -> Tree:
     leaves, structure = jax.tree.flatten(tree)
-    some = [i for i, leaf in enumerate(leaves) if _worth_storing(leaf)]
-    if some and on_cpu():
-        hold = lax.optimization_barrier if barriers_hold() else _hold_by_branch
-        for i, leaf in zip(some, hold([leaves[i] for i in some]), strict=True):
+    # A plain number stays one, so that checks on the host can still look at it.
+    traced = [i for i, leaf in enumerate(leaves) if not is_concrete(leaf)]
+    if traced and on_cpu():
+        found = held([leaves[i] for i in traced], worth=worth, barrier=barriers_hold())
+        for i, leaf in zip(traced, found, strict=True):
             leaves[i] = leaf
     return jax.tree.unflatten(structure, leaves)
-
-
-def _worth_storing(leaf) -> bool:
-    size = np.size(leaf)
-    return size >= _MANY and size * leaf.dtype.itemsize <= _CACHED
-
-
-_UNUSED_NAN = {"float32": (np.uint32, 0x7FDA_57ED), "float64": (np.uint64, 0x7FFA_57ED_57ED_57ED)}
-"""Words of numbers that no calculation gives."""
-
-
-def _hold_by_branch(leaves: list) -> list:
-    """The same arrays, through a branch that is always taken but cannot be known to be: XLA fuses nothing across it.
-
-    On jax 0.10 the gradient of MF-Tyre in blocks takes 610 instead of 1130 ns a contact, and 9 instead of 15 s to compile; an
-    array that passes through costs 0.4 ns a number.
-    """
-    kinds = {str(leaf.dtype) for leaf in leaves}
-    if len(kinds) > 1 or not kinds <= set(_UNUSED_NAN):
-        return leaves
-    kind, unused = _UNUSED_NAN[kinds.pop()]
-    first = lax.bitcast_convert_type(lax.stop_gradient(leaves[0]).reshape(-1)[0], kind)
-    keep, never = (lambda leaves: leaves), (lambda leaves: [jnp.full_like(leaf, jnp.nan) for leaf in leaves])
-    return lax.cond(first != kind(unused), keep, never, leaves)

@@ -81,7 +81,7 @@ class RolledRK4(diffrax.AbstractSolver):
             k, y1 = carry
             reach, weight = given
             y = jax.tree.map(lambda y, d: y + reach * d, y0, k)
-            k = numerics.barrier(terms.vf_prod(t0 + reach * (t1 - t0), y, args, dt))
+            k = numerics.kept(terms.vf_prod(t0 + reach * (t1 - t0), y, args, dt))
             return (k, jax.tree.map(lambda y, d: y + weight * d, y1, k)), None
 
         reaches, weights = jnp.array([0, 0.5, 0.5, 1], dtype), jnp.array([1 / 6, 1 / 3, 1 / 3, 1 / 6], dtype)

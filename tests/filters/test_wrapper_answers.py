@@ -261,3 +261,26 @@ def test_names_may_be_lists_and_one_is_no_row_of_letters():
     assert filters.Consider(filters.Kalman(), ["x0", "x1"]).names == ("x0", "x1")
     assert filters.Marginalised(5, "x1").linear == ("x1",)
     assert filters.Federated(filters.Kalman(), ["y0", ["y1"]]).groups == (("y0",), ("y1",))
+
+
+def test_what_a_wrapped_filter_remembers_stays_in_a_pause():
+    """The extra noise of `ShrinkingProcess` halves with every row at least, but not while nothing is looked at."""
+    base = ss.StateSpace(
+        transition=lambda system, t0, t1, x, u: x,
+        observation=lambda system, t, x, u: Flow(x.level),
+        process_noise=None,
+        measurement_noise=ss.Gaussian({"flow": 1.0}),
+        prior=nile_model(0.0, 1.0).prior,
+        inputs=("braking",),
+    )
+    braking = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
+    recording = Recording(np.arange(6.0), {"flow": np.linspace(0.0, 1.0, 6), "braking": braking})
+    inner = filters.ShrinkingProcess(filters.Kalman(), {"level": 2.0})
+    keep = lambda belief: (belief.memory, belief.mean.level, belief.t)
+    _, (memory, level, time) = filters.run_and_keep(
+        filters.Paused(inner, "braking", {"level": 3.0}), base, recording, keep
+    )
+    np.testing.assert_array_equal(time, recording.time)
+    np.testing.assert_array_equal(memory[2:5], np.broadcast_to(memory[1], (3, 1)))
+    np.testing.assert_array_equal(level[2:5], level[1])
+    assert 0 < memory[5, 0] < memory[4, 0]

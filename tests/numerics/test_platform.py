@@ -11,6 +11,11 @@ from jaxveh.numerics import platform
 pytestmark = pytest.mark.product
 
 
+def holds(f, x, barriers):
+    """Whether the program of `f` holds something, by a barrier or by a branch."""
+    return ("optimization_barrier" if barriers else "stablehlo.case") in jax.jit(f).lower(x).as_text()
+
+
 def _with_barrier(x):
     first, second = numerics.barrier((x * x, jnp.sin(x)))
     return jnp.sum(first * second)
@@ -70,11 +75,32 @@ def test_stored_holds_what_fits_the_cache_alone(barriers, monkeypatch):
     monkeypatch.setattr(platform, "barriers_hold", lambda: barriers)
 
     def held(size):
-        shown = str(jax.make_jaxpr(lambda x: numerics.stored((x, 1.0)))(jnp.ones(size)))
-        return shown.count("optimization_barrier" if barriers else "cond[")
+        return holds(lambda x: numerics.stored((x, 1.0)), jnp.ones(size), barriers)
 
-    assert [held(size) for size in (127, 128, 4096, 4097)] == [0, 1, 1, 0]
+    assert [held(size) for size in (31, 32, 4096, 4097)] == [False, True, True, False]
     assert numerics.stored((2.0, None)) == (2.0, None)
+
+
+@pytest.mark.parametrize("barriers", [True, False])
+@pytest.mark.parametrize("hold", [numerics.stored, numerics.kept])
+def test_what_is_held_is_decided_of_the_whole_batch(barriers, hold, monkeypatch):
+    """A scalar that is one of forty is as long as an array of forty; and a branch stays one."""
+    monkeypatch.setattr(platform, "barriers_hold", lambda: barriers)
+    law = lambda x: jnp.prod(jnp.stack(hold((jnp.sin(x), x * x))))
+    assert holds(jax.vmap(law), jnp.ones(40), barriers)
+    assert holds(jax.vmap(jax.grad(law)), jnp.ones(40), barriers)
+    assert holds(law, jnp.asarray(1.0), barriers) == (hold is numerics.kept)
+    x = jnp.linspace(-2.0, 2.0, 40)
+    np.testing.assert_allclose(jax.vmap(jax.grad(law))(x), jnp.cos(x) * x**2 + 2 * x * jnp.sin(x), rtol=1e-13)
+    twice = jax.vmap(jax.vmap(law, in_axes=0), in_axes=1)(jnp.stack([x, 2 * x]))
+    np.testing.assert_allclose(twice[:, 1], jnp.sin(2 * x) * 4 * x**2, rtol=1e-13)
+
+
+def test_what_is_held_may_be_split_over_devices():
+    mesh, along = jax.sharding.Mesh(np.asarray(jax.devices()[:1]), ("runs",)), jax.sharding.PartitionSpec("runs")
+    for checked in (True, False):
+        split = jax.shard_map(jax.vmap(numerics.kept), mesh=mesh, in_specs=along, out_specs=along, check_vma=checked)
+        np.testing.assert_array_equal(jax.jit(split)(X), X)
 
 
 @pytest.mark.parametrize("barriers", [True, False])
@@ -113,7 +139,7 @@ def test_kept_holds_every_size_and_changes_no_number(size, barriers, monkeypatch
     law = lambda between: lambda x: jnp.sum(jnp.prod(jnp.stack(between((jnp.sin(x), x * x))), axis=0))
     ours, theirs = law(numerics.kept), law(lambda tree: tree)
     x = jnp.full(size, 0.3)
-    assert ("optimization_barrier" if barriers else "cond[") in str(jax.make_jaxpr(ours)(x))
+    assert holds(ours, x, barriers)
     for derivative in (lambda f: f, jax.grad, jax.jacfwd, lambda f: lambda x: jax.vmap(f)(jnp.stack([x, 2 * x]))):
         np.testing.assert_allclose(derivative(ours)(x), derivative(theirs)(x), rtol=1e-13)
 
@@ -127,6 +153,6 @@ def test_kept_leaves_alone_what_has_no_arrays(monkeypatch):
 def test_stored_of_several_types_at_once(monkeypatch):
     monkeypatch.setattr(platform, "barriers_hold", lambda: False)
     given = jnp.ones(200), jnp.ones(200, jnp.float32), jnp.ones(200, jnp.int32)
-    for one, other in zip(numerics.stored(given), given, strict=True):
+    for one, other in zip(jax.jit(numerics.stored)(given), given, strict=True):
         assert one.dtype == other.dtype
         np.testing.assert_array_equal(one, other)

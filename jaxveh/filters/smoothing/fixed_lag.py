@@ -11,8 +11,9 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh.filters.choosing import Transport
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
-from jaxveh.filters.smoothing.rauch_tung_striebel import gaussian_of, given_later, has_smoother
+from jaxveh.filters.smoothing.rauch_tung_striebel import given_later, has_smoother
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, check_particles_alone, smoothed_estimate
+from jaxveh.filters.wrappers.base import gaussian_of
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import AbstractBelief, AbstractFilter
 from jaxveh.statespace.driver import scan_and_keep

@@ -12,6 +12,7 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, transition_image, with_spread
 from jaxveh.filters.gaussian.forms import Later, Spread
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
+from jaxveh.filters.wrappers.base import gaussian_of, rule_filter_of
 from jaxveh.filters.wrappers.considered import Consider
 from jaxveh.filters.wrappers.h_infinity import HInfinity
 from jaxveh.filters.wrappers.strong_tracking import StrongTracking
@@ -51,20 +52,6 @@ def given_later(
     before = Spread(gaussian.factor, gaussian.matrix)
     found = rule_filter_of(filter).form.smooth(image, law, model.states, before, known)
     return with_spread(gaussian, gaussian.vector + found.shift, found.spread)
-
-
-def gaussian_of(belief: Any) -> GaussianBelief:
-    """The Gaussian inside a wrapped filter's belief."""
-    while not isinstance(belief, GaussianBelief):
-        belief = belief.inside
-    return belief
-
-
-def rule_filter_of(filter: Any) -> AbstractRuleFilter:
-    """The filter that wrappers go around."""
-    while not isinstance(filter, AbstractRuleFilter):
-        filter = filter.filter
-    return filter
 
 
 def has_smoother(filter: Any) -> bool:

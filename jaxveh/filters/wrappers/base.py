@@ -7,7 +7,8 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
-from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, AbstractRuleFilter, check_kind
 from jaxveh.statespace import Gaussian, Row, StateSpace
 from jaxveh.statespace.contract import AbstractBelief, Info
 
@@ -117,6 +118,27 @@ class AbstractRemembering(AbstractGaussianFilter):
         """The filter's own update with the noises that the memory says."""
         after, info = self.filter.update(self.believed(model, belief.memory), belief.inside, row)
         return Remembering(after, belief.memory), info
+
+
+def gaussian_of(belief: Any) -> GaussianBelief:
+    """The Gaussian inside a wrapped filter's belief."""
+    while not isinstance(belief, GaussianBelief):
+        belief = belief.inside
+    return belief
+
+
+def with_gaussian(belief: Any, gaussian: GaussianBelief) -> Any:
+    """A wrapped filter's belief with another Gaussian inside."""
+    if isinstance(belief, GaussianBelief):
+        return gaussian
+    return Remembering(with_gaussian(belief.inside, gaussian), belief.memory)
+
+
+def rule_filter_of(filter: Any) -> AbstractRuleFilter:
+    """The filter that wrappers go around."""
+    while not isinstance(filter, AbstractRuleFilter):
+        filter = filter.filter
+    return filter
 
 
 def check_independent(who: str, model: StateSpace) -> None:

@@ -9,9 +9,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
-from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind, with_spread
+from jaxveh.filters.gaussian.forms import Spread
+from jaxveh.filters.wrappers.base import gaussian_of, rule_filter_of, with_gaussian
 from jaxveh.statespace import StateSpace
 from jaxveh.statespace.contract import AbstractFilter, always, apart
 
@@ -20,21 +23,22 @@ class Paused(AbstractFilter):
     """`filter`, held while the input `channel` is above 0.5: no prediction, no measurement, as estimators of mass and
     grade wait while braking.
 
-    As every input, the channel holds from its row to the next: the time before a pause's first row is still predicted, that
-    before the first row after it is not. Meanwhile the state stays what it was. In the first row after a pause its spread grows
-    by `widen`, standard deviations by state: what may have happened (`{"v_x": 20.0}`: whatever it was, the next measurement
-    says it anew). Infos of rows in a pause have a log-likelihood of zero and no innovation.
+    The channel holds from its row to the next, whatever the model's `input_path`: the time before a pause's first row is still
+    predicted, that before the first row after it is not. Meanwhile the state, and what a wrapped filter remembers, stay. In the
+    first row after a pause the spread grows by `widen`, standard deviations by state: what may have happened (`{"v_x": 20.0}`:
+    whatever it was, the next measurement says it anew). Infos of rows in a pause have a log-likelihood of zero and no
+    innovation.
     """
 
-    filter: AbstractRuleFilter
+    filter: AbstractGaussianFilter
     channel: str = eqx.field(static=True)
     widen: tuple[tuple[str, float], ...] = eqx.field(static=True)
 
-    def __init__(self, filter: AbstractRuleFilter, channel: str, widen: Mapping[str, float]):
+    def __init__(self, filter: AbstractGaussianFilter, channel: str, widen: Mapping[str, float]):
         self.filter, self.channel, self.widen = filter, channel, tuple(sorted(dict(widen).items()))
 
     def __check_init__(self):
-        check_kind("Paused", self.filter, AbstractRuleFilter)
+        check_kind("Paused", self.filter, AbstractGaussianFilter)
         for name, spread in self.widen:
             check_positive(f"Paused.widen of {name}", spread)
 
@@ -42,10 +46,6 @@ class Paused(AbstractFilter):
         self.filter.check(model)
         check_names("Paused.channel", (self.channel,), model.inputs)
         check_names("Paused.widen", [name for name, _ in self.widen], model.states)
-        if model.input_path != "held":
-            raise InputError(
-                "Paused: the model's inputs run linearly; a pause begins and ends at a row: input_path must be 'held'."
-            )
 
     def init(self, model, row, key=None):
         del key
@@ -53,30 +53,46 @@ class Paused(AbstractFilter):
 
     def _init(self, model, row):
         prior = self.filter.prior(model, row)
-        return self.filter.update(model, prior, self._silent(model, row))
+        after, info = self.filter.update(model, prior, self._silent(model, row))
+        return _choose(self._waits(row.u), _at(prior, row), after), info
 
     def step(self, model, belief, row):
         return apart(self._step, belief.count >= 0, model, belief, row)
 
     def _step(self, model, belief, row):
-        paused = getattr(row.u, self.channel) > 0.5
-        was = getattr(belief.u, self.channel) > 0.5
-        wide = eqx.tree_at(lambda b: b.t, self._widened(model, belief), row.t)
+        waits, waited = self._waits(row.u), self._waits(belief.u)
         ahead = self.filter.predict_between(model, belief, row.t, row.u)
-        held = with_spread(belief, belief.vector, self.filter.form.start(belief.covariance), t=row.t)
-        start = _choose(was, _choose(paused, held, wide), ahead)
-        return self.filter.update(model, start, self._silent(model, row))
+        here = _choose(waits, belief, self._widened(model, belief))
+        start = _choose(waited, with_gaussian(here, with_time(gaussian_of(here), row.t)), ahead)
+        after, info = self.filter.update(model, start, self._silent(model, row))
+        return _choose(waits, _at(start, row), after), info
+
+    def _waits(self, u):
+        return getattr(u, self.channel) > 0.5
 
     def _silent(self, model, row):
         """The row, without measurements while paused."""
-        paused = getattr(row.u, self.channel) > 0.5
-        return row._replace(y=jax.tree.map(lambda value: jnp.where(paused, jnp.nan, value), row.y))
+        return row._replace(y=jax.tree.map(lambda value: jnp.where(self._waits(row.u), jnp.nan, value), row.y))
 
     def _widened(self, model: StateSpace, belief: Any) -> Any:
-        extra = dict(self.widen)
-        dtype = belief.vector.dtype
-        added = jnp.diag(jnp.asarray([extra.get(name, 0.0) ** 2 for name in model.states], dtype))
-        return with_spread(belief, belief.vector, self.filter.form.start(belief.covariance + added))
+        extra, gaussian = dict(self.widen), gaussian_of(belief)
+        added = jnp.diag(jnp.asarray([extra.get(name, 0.0) ** 2 for name in model.states], gaussian.vector.dtype))
+        spread = rule_filter_of(self.filter).form.start(gaussian.covariance + added)
+        return with_gaussian(belief, with_spread(gaussian, gaussian.vector, spread))
+
+
+def _at(belief: Any, row: Any) -> Any:
+    """The belief after a row of which nothing is taken."""
+    gaussian = gaussian_of(belief)
+    spread = Spread(gaussian.factor, gaussian.matrix)
+    return with_gaussian(
+        belief, with_spread(gaussian, gaussian.vector, spread, t=row.t, u=row.u, count=gaussian.count + 1)
+    )
+
+
+def with_time(gaussian: GaussianBelief, t: Any) -> GaussianBelief:
+    """The same Gaussian at another time."""
+    return with_spread(gaussian, gaussian.vector, Spread(gaussian.factor, gaussian.matrix), t=t)
 
 
 def _choose(condition: Any, a: Any, b: Any) -> Any:

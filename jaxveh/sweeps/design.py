@@ -1,0 +1,106 @@
+"""What a sweep goes through: named axes of numbers, and of choices."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_finite
+from jaxveh._core.names import record
+
+
+class Axis(NamedTuple):
+    """One name of a design: the `labels` that its results carry, the `values` that `run` gets, and whether it is a choice.
+
+    A choice (a filter, a manoeuvre, a function) is known when compiling: one program each. Numbers are one program for all.
+    """
+
+    name: str
+    labels: tuple[Any, ...]
+    values: tuple[Any, ...]
+    choice: bool
+
+
+class Design:
+    """Every combination of named axes.
+
+        Design(noise=[0.001, 0.005, 0.02], filter={"PF": filters.ParticleFilter(1000), "UKF": filters.Unscented()})
+
+    A sequence of numbers is an axis of numbers, which `run` gets as arrays of the default precision; a mapping from labels to
+    objects is an axis of choices. Without axes there is one point.
+
+    **Raises** `InputError` for an empty axis, numbers that are not finite, or a sequence of something else.
+    """
+
+    axes: tuple[Axis, ...]
+
+    def __init__(self, **axes: Sequence[float] | Mapping[str, Any]):
+        self.axes = tuple(_axis(name, values) for name, values in axes.items())
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """How many values each axis has."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def choices(self) -> tuple[Axis, ...]:
+        """The axes of choices."""
+        return tuple(axis for axis in self.axes if axis.choice)
+
+    @property
+    def numbers(self) -> tuple[Axis, ...]:
+        """The axes of numbers."""
+        return tuple(axis for axis in self.axes if not axis.choice)
+
+    def axis(self, name: str) -> Axis:
+        """The axis of this name, or an `InputError` that lists what there is."""
+        for axis in self.axes:
+            if axis.name == name:
+                return axis
+        there = ", ".join(axis.name for axis in self.axes) or "none"
+        raise InputError(f"axis = {name!r}: the design has {there}.")
+
+    def combinations(self) -> Iterator[tuple[tuple[int, ...], str, dict[str, Any]]]:
+        """Each combination of choices: its place along the axes of choices, a description and the objects by name."""
+        for place in itertools.product(*(range(len(axis.values)) for axis in self.choices)):
+            pairs = list(zip(self.choices, place, strict=True))
+            said = ", ".join(f"{axis.name} {axis.labels[i]}" for axis, i in pairs)
+            yield place, said, {axis.name: axis.values[i] for axis, i in pairs}
+
+    def grid(self) -> dict[str, np.ndarray]:
+        """Each axis of numbers at all their combinations, (P,); the last axis runs fastest."""
+        axes = self.numbers
+        meshes = np.meshgrid(*(np.asarray(axis.values, float) for axis in axes), indexing="ij") if axes else []
+        return {axis.name: mesh.ravel() for axis, mesh in zip(axes, meshes, strict=True)}
+
+    def point(self, numbers: Mapping[str, Any], choices: Mapping[str, Any]) -> Any:
+        """What `run` gets: a NamedTuple with the axes' names, in their order."""
+        both = {**numbers, **choices}
+        return record("Point", {axis.name: both[axis.name] for axis in self.axes})
+
+
+def _axis(name: str, values: Any) -> Axis:
+    if isinstance(values, Mapping):
+        axis = Axis(name, tuple(values), tuple(values.values()), choice=True)
+    else:
+        numbers = _numbers(name, values)
+        axis = Axis(name, numbers, numbers, choice=False)
+    if not axis.values:
+        raise InputError(f"axis {name} is empty: give at least one value.")
+    return axis
+
+
+def _numbers(name: str, values: Any) -> tuple[float, ...]:
+    try:
+        array = np.asarray(values, float)
+    except (TypeError, ValueError):
+        array = np.zeros((0, 0))
+    if array.ndim != 1:
+        raise InputError(
+            f"axis {name} = {values!r}: must be a sequence of numbers, or a mapping from labels to what is to be chosen."
+        )
+    check_finite(f"axis {name}", array)
+    return tuple(float(number) for number in array)

@@ -1,0 +1,159 @@
+"""The runs of a sweep: one compiled program for each choice, fed in chunks that fit memory, split over the devices."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.sharding import Mesh
+from jax.sharding import PartitionSpec as P
+
+from jaxveh._core.errors import InputError, check_positive, check_whole
+from jaxveh._core.progress import Progress, silent
+from jaxveh.sweeps.design import Design
+from jaxveh.sweeps.swept import Swept, named_leaves
+
+SHARE_OF_MEMORY = 0.5
+"""How much of the machine's memory a chunk may take, unless `memory` says otherwise."""
+
+
+def sweep(
+    run: Callable[..., Any],
+    design: Design,
+    seeds: int,
+    key,
+    *,
+    data: Any = None,
+    batch: int | None = None,
+    memory: float | None = None,
+    devices: list | None = None,
+    progress: Progress = silent,
+) -> Swept:
+    """`run(point, key)` at every point of the design, each with the same `seeds` keys, so that points can be compared in pairs.
+
+    **Arguments**: `run`, a pure function of one point (a NamedTuple with the design's names) and one key, whose result is a
+    mapping or NamedTuple of arrays (trees of them get dotted names); `seeds`, how many keys are split from `key`; `data`, a tree
+    of arrays that begin with the axes of numbers and the seeds: then it is `run(point, key, data)` with each run's own part
+    (drives that several filters see); `batch`, runs at a time (default: all points of a choice, or as many as `memory`, bytes,
+    holds: half of the machine's); `devices`, over which a batch is split by `shard_map` (default: all of `jax.devices()`: on a
+    CPU one, unless `jax_num_cpu_devices` is set before jax starts); `progress(done, total, stage)` is called between chunks.
+
+    Every choice is compiled once, whatever the number of chunks.
+
+    **Raises** `InputError` for bad counts, data of another shape, and for a `run` that returns nothing named.
+    """
+    check_whole("seeds", seeds)
+    devices = jax.devices() if devices is None else list(devices)
+    given = Given(design, seeds, key, data)
+    done, total = 0, given.runs * int(np.prod([len(axis.values) for axis in design.choices]))
+    found = []
+    for _, said, choices in design.combinations():
+        one = lambda numbers, *rest, choices=choices: run(design.point(numbers, choices), *rest)
+        report = lambda n, said=said, done=done: progress(done + n, total, said or "runs")
+        found.append(_all(one, given, batch, memory, devices, report))
+        done += given.runs
+    return Swept(design, seeds, _arranged(design, seeds, found))
+
+
+class Given:
+    """What the runs of one choice are given; they are ordered by point, then by seed."""
+
+    def __init__(self, design: Design, seeds: int, key, data: Any):
+        self.shape = (*(len(axis.values) for axis in design.numbers), seeds)
+        self.runs = int(np.prod(self.shape))
+        self.grid, self.keys, self.data = design.grid(), jax.random.split(key, seeds), data
+        for name, leaf in named_leaves(data).items():
+            if np.shape(leaf)[: len(self.shape)] != self.shape:
+                names = ", ".join([axis.name for axis in design.numbers] + ["seeds"])
+                raise InputError(f"data {name} has shape {np.shape(leaf)}: must begin with {self.shape} ({names}).")
+
+    def chunk(self, first: int, batch: int) -> tuple:
+        """Arguments of the runs from `first` on; behind the last one it is repeated."""
+        which = np.minimum(np.arange(first, first + batch), self.runs - 1)
+        place = np.unravel_index(which, self.shape)
+        point = which // self.shape[-1]
+        numbers = {name: jnp.asarray(values[point]) for name, values in self.grid.items()}
+        own = () if self.data is None else (jax.tree.map(lambda leaf: jnp.asarray(leaf[place]), self.data),)
+        return numbers, self.keys[jnp.asarray(place[-1])], *own
+
+
+def _all(one, given: Given, batch, memory, devices, report) -> dict[str, np.ndarray]:
+    """All runs of one choice: values by name with (R, ...)."""
+    batch = given.runs if batch is None else batch
+    check_whole("batch", batch)
+    program, batch = _program(one, given, min(batch, given.runs), memory, devices)
+    parts = []
+    for first in range(0, given.runs, batch):
+        report(first)
+        part = program(*given.chunk(first, batch))
+        parts.append({n: np.asarray(leaf)[: given.runs - first] for n, leaf in named_leaves(part).items()})
+    report(given.runs)
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _program(one, given: Given, batch, memory, devices):
+    """The compiled program of a chunk, and how many runs it takes: fewer than `batch` where they would not fit."""
+    memory = SHARE_OF_MEMORY * _machine_memory() if memory is None else memory
+    check_positive("memory", memory, "bytes")
+    width = len(devices)
+    while True:
+        batch = -(-batch // width) * width
+        program = _split_over(one, devices).lower(*given.chunk(0, batch)).compile()
+        needed = _needed(program)
+        if needed <= memory or batch == width:
+            return program, batch
+        batch = max(width, int(batch * memory / needed))
+
+
+def _split_over(one, devices):
+    many = jax.vmap(lambda *one_run: _arrays(one(*one_run)))
+    if len(devices) == 1:
+        return jax.jit(many)
+    mesh, along = Mesh(np.asarray(devices), ("runs",)), P("runs")
+    return jax.jit(jax.shard_map(many, mesh=mesh, in_specs=along, out_specs=along, check_vma=False))
+
+
+def _arrays(result):
+    """The result's arrays, or an `InputError`."""
+    named = named_leaves(result)
+    if not named or any(not name for name in named):
+        raise InputError(
+            f"run returned {type(result).__name__}: must be a mapping or a NamedTuple of arrays, such as "
+            '{"rmse": ..., "result": ...}.'
+        )
+    bad = [name for name, leaf in named.items() if not eqx.is_array_like(leaf)]
+    if bad:
+        raise InputError(f"run: {', '.join(bad)} of its result are no arrays.")
+    return {name: jnp.asarray(leaf) for name, leaf in named.items()}
+
+
+def _needed(program) -> float:
+    """Bytes that a compiled program takes while it runs; 0 where the backend does not say."""
+    analysis = program.memory_analysis()
+    if analysis is None:
+        return 0.0
+    return float(analysis.temp_size_in_bytes + analysis.output_size_in_bytes + analysis.argument_size_in_bytes)
+
+
+def _machine_memory() -> float:
+    return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+
+
+def _arranged(design: Design, seeds: int, found: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Values by name with one axis for each of the design's, in its order, then the seeds."""
+    chosen = tuple(len(axis.values) for axis in design.choices)
+    counted = tuple(len(axis.values) for axis in design.numbers)
+    order = [*design.choices, *design.numbers]
+    place = [order.index(axis) for axis in design.axes]
+    values = {}
+    for name in found[0]:
+        stacked = np.stack([part[name] for part in found])
+        rest = stacked.shape[2:]
+        whole = stacked.reshape(*chosen, *counted, seeds, *rest)
+        values[name] = np.transpose(whole, (*place, *range(len(order), whole.ndim)))
+    return values

@@ -1,0 +1,78 @@
+"""What a sweep found: arrays by name over the design's axes and the seeds."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import check_names
+from jaxveh.sweeps.design import Design
+from jaxveh.sweeps.paired import Comparison, compare
+
+
+@dataclasses.dataclass(frozen=True)
+class Swept:
+    """`values` by name, each with the design's axes, then the `seeds`, then what a run's own value has."""
+
+    design: Design
+    seeds: int
+    values: Mapping[str, np.ndarray]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """All values of this name: (axes..., seeds, ...)."""
+        check_names("value", (name,), self.values)
+        return self.values[name]
+
+    def at(self, name: str, **where: Any) -> np.ndarray:
+        """The values where axes have these labels: `found.at("rmse", filter="PF", noise=0.02)`; other axes are kept."""
+        values, index = self[name], []
+        for axis_name in where:
+            self.design.axis(axis_name)
+        for axis in self.design.axes:
+            if axis.name not in where:
+                index.append(slice(None))
+                continue
+            if where[axis.name] not in axis.labels:
+                there = ", ".join(map(str, axis.labels))
+                raise InputError(f"{axis.name} = {where[axis.name]!r}: the design has {there}.")
+            index.append(axis.labels.index(where[axis.name]))
+        return values[tuple(index)]
+
+    def quantile(self, name: str, share: float) -> np.ndarray:
+        """The quantile over seeds: (axes..., ...). Runs that are not finite count as the largest."""
+        values = np.where(np.isnan(self[name]), np.inf, self[name])
+        return np.quantile(
+            values, share, axis=len(self.design.axes), method="linear" if np.isfinite(values).all() else "nearest"
+        )
+
+    def median(self, name: str) -> np.ndarray:
+        """The median over seeds."""
+        return self.quantile(name, 0.5)
+
+    def quartiles(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """The lower and the upper quartile over seeds."""
+        return self.quantile(name, 0.25), self.quantile(name, 0.75)
+
+    def compare(self, name: str, axis: str, a: Any, b: Any, *, level: float = 0.95) -> Comparison:
+        """`a` against `b` along an axis, seed by seed, at every point of the others; see `sweeps.compare`."""
+        return compare(
+            self.at(name, **{axis: a}), self.at(name, **{axis: b}), axis=len(self.design.axes) - 1, level=level
+        )
+
+
+def named_leaves(tree: Any) -> dict[str, Any]:
+    """The leaves of a tree of mappings and NamedTuples by dotted names; a lone leaf's is empty."""
+    pairs = jax.tree_util.tree_leaves_with_path(tree)
+    return {".".join(_word(step) for step in path): leaf for path, leaf in pairs}
+
+
+def _word(step: Any) -> str:
+    for attribute in ("name", "key", "idx"):
+        if hasattr(step, attribute):
+            return str(getattr(step, attribute))
+    return str(step)
