@@ -286,7 +286,8 @@ def cubature(plain: Plain, *, regenerate: bool = False) -> Callable[[np.ndarray]
 def ensemble(plain: Plain, members: int) -> Callable[[np.ndarray], Arrays]:
     """The ensemble filter with perturbed measurements; it draws from NumPy's global generator."""
 
-    def run(y: np.ndarray) -> Arrays:
+    def run(y: np.ndarray, key: object = None) -> Arrays:
+        del key
         now = [plain.inputs[0]]
         enkf = EnsembleKalmanFilter(
             plain.mean.copy(),
