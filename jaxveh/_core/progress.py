@@ -13,3 +13,8 @@ class Progress(Protocol):
 
 def silent(done: float, total: float, stage: str) -> None:
     """The default: says nothing."""
+
+
+def part(report: Progress, first: float, last: float, name: str) -> Progress:
+    """The progress of a part of the work, told as the share from `first` to `last` of the whole."""
+    return lambda done, total, stage: report(first + (last - first) * done / total, 1.0, f"{name}: {stage}")

@@ -13,7 +13,7 @@ from jaxveh.cli.demo import demo
 from jaxveh.cli.estimate import estimate
 from jaxveh.cli.failure import flowing, program
 from jaxveh.cli.fit import fit
-from jaxveh.cli.reproduce import tyre_apf
+from jaxveh.cli.reproduce import mass_grade_aukf, tyre_apf
 from jaxveh.cli.schema import schema
 from jaxveh.cli.simulate import simulate
 from jaxveh.cli.tyre import evaluate_table, show
@@ -64,6 +64,7 @@ options.__doc__ = flowing(HELP)
 for command in (demo, check, simulate, estimate, fit, schema):
     app.command()(program(command))
 reproduce.command("tyre-apf")(program(tyre_apf))
+reproduce.command("mass-grade-aukf")(program(mass_grade_aukf))
 app.add_typer(reproduce, name="reproduce")
 tyre.command("show")(program(show))
 tyre.command("evaluate")(program(evaluate_table))

@@ -34,9 +34,9 @@ def above(name: str, value, bound: float) -> Check:
     return Check(name, float(value), float(bound), bool(value > bound))
 
 
-def spread(values, digits: int = 3, scale: float = 1.0) -> str:
-    """`median [lower quartile, upper quartile]` of the values, those that are not finite counted as the largest."""
+def spread(values, digits: int = 3, scale: float = 1.0, lost: str = "lost") -> str:
+    """`median [lower quartile, upper quartile]` of the values; those that are not finite count as the largest, and are `lost`."""
     values = scale * np.asarray(values, float)
     low, mid, high = np.percentile(np.where(np.isnan(values), np.inf, values), [25, 50, 75], method="nearest")
-    shown = lambda v: "never" if np.isinf(v) else f"{v:.{digits}g}"
+    shown = lambda v: lost if np.isinf(v) else f"{v:.{digits}g}"
     return f"{shown(mid)} [{shown(low)}, {shown(high)}]"

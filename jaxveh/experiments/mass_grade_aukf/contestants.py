@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -216,12 +215,11 @@ def metrics(study: Study, found: Found, drive: Drive) -> dict[str, Any]:
     }
 
 
-def jitted(study: Study, contestant: Contestant):
-    """The contestant's run of a design point: `sweeps.sweep`'s `run(point, key, data)`."""
+def of_a_point(study: Study, contestant: Contestant) -> Callable[[Any, Any, Drive], dict[str, Any]]:
+    """The contestant's run of a design's point: `run(point, key, drive)`, as `sweeps.sweep` calls it."""
 
-    def run(point, key, data):
+    def run(point, key, drive):
         del key
-        found = contestant.run(study, point.guess, data)
-        return metrics(study, found, data)
+        return metrics(study, contestant.run(study, point.guess, drive), drive)
 
-    return jax.named_call(run, name="contestant")
+    return run

@@ -124,14 +124,19 @@ def _seen(study: Study, found: Recording, manoeuvre: Touching, key) -> Drive:
     torque = found["drive_torque"] - found["brake_torque"] + pulses
     noise = Gaussian({"v_x": study.v_x, "a_x": study.a_x}).sample(key, t.shape)
     a_x = found["true.a_x"]
-    late = round(study.delay / study.dt)
-    told = jnp.concatenate([jnp.repeat(torque[:1], late), torque[: len(t) - late]]) * study.torque_scale
     return Drive(
         v_x=found["true.v_x"] + noise["v_x"],
-        a_x=a_x + study.a_x_bias + noise["a_x"],
-        torque=told,
+        a_x=a_x + noise["a_x"],
+        torque=torque,
         braking=(pulses > 0).astype(a_x.dtype),
         true_v_x=found["true.v_x"],
         true_grade=found["true.grade"],
         true_a_x=a_x,
     )
+
+
+def disturbed(drive: Drive, *, late: int = 0, offset: float = 0.0, scale: float = 1.0) -> Drive:
+    """Drives, (..., T), whose torque is told `late` rows late and `scale` times too large, and whose accelerometer has an
+    `offset` (m/s^2)."""
+    rows = np.maximum(np.arange(np.shape(drive.torque)[-1]) - late, 0)
+    return drive._replace(torque=scale * np.asarray(drive.torque)[..., rows], a_x=np.asarray(drive.a_x) + offset)

@@ -31,9 +31,9 @@ class Study:
     `max_step` s of the simulation. `speed` m/s with a spread of `speed_std` over `speed_time` s, after a gentle start from
     `start_speed` (m/s) over `start_time` (s; None: none). Pedals: coloured noise of `pedals` m/s^2 over `pedal_time` s.
     `grade_std` rad over `grade_length` m, no wave shorter than `grade_shortest` m. `touches`: how often the brake is touched in
-    the first 30 s, `touch` m/s^2 strongly. Sensors: `v_x` m/s, `a_x` m/s^2, `a_x_bias` m/s^2; `delay` s of the torque's signal,
-    `torque_scale` - its error. `grade_rate_walk` (rad/s per sqrt(s)) and `speed_noise` (m/s per sqrt(s)) of the filters: those of the
-    greatest likelihood on drives of other keys (so that the truth has no part in them), within a factor of three.
+    the first 30 s, `touch` m/s^2 strongly. Sensors: `v_x` m/s, `a_x` m/s^2. `grade_rate_walk` (rad/s per sqrt(s)) and
+    `speed_noise` (m/s per sqrt(s)) of the filters: those of the greatest likelihood on drives of other keys (so that the truth
+    has no part in them), within a factor of three.
     """
 
     name: str = "truck"
@@ -56,9 +56,6 @@ class Study:
     touch: float = 0.5
     v_x: float = 0.02
     a_x: float = 0.05
-    a_x_bias: float = 0.0
-    delay: float = 0.0
-    torque_scale: float = 1.0
     grade_rate_walk: float = 1e-3
     speed_noise: float = 0.002
 
@@ -74,7 +71,7 @@ def truck(**changes) -> Study:
 def car(**changes) -> Study:
     """The paper's test car: from standstill gently to 20 km/h, brake touches in the first 30 s."""
     settings = dict(
-        name="car", mass=1700.0, guesses=(1300.0,), duration=120.0, max_step=0.0005, grade_rate_walk=6e-4, speed=20.0 / 3.6, speed_std=0.0,
-        start_speed=0.5, pedals=0.05, grade_std=0.01, grade_length=150.0, grade_shortest=75.0, touches=3,
+        name="car", mass=1700.0, guesses=(1300.0,), duration=120.0, max_step=0.0005, grade_rate_walk=6e-4,
+        speed=20.0 / 3.6, speed_std=0.0, start_speed=0.5, pedals=0.05, grade_std=0.01, grade_length=150.0, grade_shortest=75.0, touches=3,
     )  # fmt: skip
     return Study(**{**settings, **changes})

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from jaxveh import sweeps
 from jaxveh._core.errors import check_whole
 from jaxveh._core.progress import Progress, silent
-from jaxveh.experiments.mass_grade_aukf.contestants import contestants, jitted
+from jaxveh.experiments.mass_grade_aukf.contestants import contestants, of_a_point
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, drive_once
 from jaxveh.experiments.mass_grade_aukf.settings import Study
 
@@ -26,40 +25,34 @@ class Raced(NamedTuple):
     found: sweeps.Swept
 
 
+def drives_of(
+    study: Study, pedals: tuple[float, ...], seeds: int, key, *, batch: int | None = None, progress: Progress = silent
+) -> Drive:
+    """Drives of the study with each pedal activity (m/s^2), one a seed: (pedals, seeds, T)."""
+    check_whole("seeds", seeds, 2)
+    run = lambda point, key: drive_once(study, point.pedals, key)
+    found = sweeps.sweep(run, sweeps.Design(pedals=pedals), seeds, key, batch=batch, progress=progress)
+    return Drive(**{name: found[name] for name in Drive._fields})
+
+
 def race(
     study: Study,
     pedals: tuple[float, ...],
-    seeds: int,
-    key,
+    drives: Drive,
     *,
     only: tuple[str, ...] | None = None,
     progress: Progress = silent,
 ) -> Raced:
-    """Every estimator (or `only` these) from every first guess on the same drives: one a seed for each pedal activity (m/s^2)."""
-    check_whole("seeds", seeds, 2)
-    stage = lambda what, share, first: (
-        lambda done, total, said: progress(first + share * done / total, 1.0, f"{what}: {said}")
-    )
-    drives = sweeps.sweep(
-        lambda point, key: drive_once(study, point.pedals, key), sweeps.Design(pedals=pedals), seeds, key,
-        progress=stage(f"{study.name}, drives", 0.3, 0.0),
-    )  # fmt: skip
-    drives = Drive(**{name: drives[name] for name in Drive._fields})
+    """Every estimator (or `only` these) on the same drives, (pedals, seeds, T), from every first guess."""
     every = contestants(study)
     chosen = {name: every[name] for name in (every if only is None else only)}
-    runs = {name: jitted(study, contestant) for name, contestant in chosen.items()}
+    runs = {name: of_a_point(study, contestant) for name, contestant in chosen.items()}
     design = sweeps.Design(estimator=runs, pedals=pedals, guess=study.guesses)
+    seeds = np.shape(drives.v_x)[1]
     # The drive is the same for every guess.
     shared = jax.tree.map(
         lambda leaf: np.broadcast_to(leaf[:, None], (len(pedals), len(study.guesses), *leaf.shape[1:])), drives
     )
-    found = sweeps.sweep(
-        lambda point, key, data: point.estimator(point, key, data), design, seeds, key, data=shared,
-        progress=stage(study.name, 0.7, 0.3),
-    )  # fmt: skip
+    run = lambda point, key, drive: point.estimator(point, key, drive)
+    found = sweeps.sweep(run, design, seeds, jax.random.key(0), data=shared, progress=progress)
     return Raced(study, tuple(pedals), drives, found)
-
-
-def with_changes(study: Study, **changes: Any) -> Study:
-    """The study with other settings."""
-    return dataclasses.replace(study, **changes)

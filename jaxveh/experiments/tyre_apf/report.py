@@ -11,28 +11,12 @@ from jaxveh import estimators, manoeuvres, sensors, vehicles
 from jaxveh._core.errors import check_at_least
 from jaxveh._core.progress import Progress, silent
 from jaxveh.diagnostics.observability import UNOBSERVABLE, Observability
+from jaxveh.experiments.report import Check, Table, above, at_most
 from jaxveh.experiments.tyre_apf.printed import Printed, PrintedOutcome, run_printed_seeds
 from jaxveh.experiments.tyre_apf.settings import STEP_STEER, TABLE_2, TABLE_3, Study, tyres
 from jaxveh.experiments.tyre_apf.staged import run_staged
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS, Outcome
 from jaxveh.simulation import simulate
-
-
-class Check(NamedTuple):
-    """One criterion: what was found, the bound, and whether it holds (at or below the bound unless the name says)."""
-
-    name: str
-    value: float
-    bound: float
-    holds: bool
-
-
-class Table(NamedTuple):
-    """A table for people: a title that says what the numbers are, column heads, rows of cells."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: list[tuple]
 
 
 class Reproduction(NamedTuple):
@@ -100,11 +84,7 @@ def _median(values) -> Any:
 def check(result: Reproduction) -> list[Check]:
     """The criteria, medians over seeds; no estimator of the honest study knew the truth."""
     checks = []
-
-    def add(name, value, bound, above=False):
-        holds = bool(value > bound) if above else bool(value <= bound)
-        checks.append(Check(name, float(value), float(bound), holds))
-
+    add = lambda name, value, bound: checks.append(at_most(name, value, bound))
     prior = _median(result.outcome.curve_error["prior"])
     for name in ("UKF", "MAP"):
         curve = _median(result.outcome.curve_error[name])
@@ -120,12 +100,8 @@ def check(result: Reproduction) -> list[Check]:
                     found[i] / before[i],
                     0.35,
                 )
-    add(
-        "lane change: condition number of eight parameters, above",
-        result.lane_change.condition_number,
-        UNOBSERVABLE,
-        True,
-    )
+    condition = result.lane_change.condition_number
+    checks.append(above("lane change: condition number of eight parameters, above", condition, UNOBSERVABLE))
     observable = result.sweep.observable()
     add("sweep of 15 degrees: D and B not observable, number", sum(n not in observable for n in result.sweep.names), 0)
     truth = np.asarray(result.printed.truth)[0]

@@ -1,0 +1,88 @@
+"""The mass-grade-aukf experiment at small size: the drives are those of the paper, estimators rank as they should."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh.experiments import mass_grade_aukf as experiment
+from jaxveh.experiments.mass_grade_aukf import drives as own_drives
+from jaxveh.experiments.mass_grade_aukf.contestants import Found, contestants, metrics
+from jaxveh.experiments.mass_grade_aukf.observed import mass_observability
+
+PEDALS = (0.0, 0.2)
+SMALL = experiment.truck(duration=60.0, dt=0.1, max_step=0.005, guesses=(4000.0,))
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return experiment.drives_of(SMALL, PEDALS, 3, jax.random.key(5))
+
+
+def test_the_drive_is_a_gentle_one(drives):
+    assert drives.v_x.shape == (2, 3, 601)
+    assert 40 / 3.6 < drives.true_v_x.min() < drives.true_v_x.max() < 85 / 3.6
+    noise = drives.v_x - drives.true_v_x
+    np.testing.assert_allclose(noise.std(), SMALL.v_x, rtol=0.05)
+    rate = np.gradient(drives.true_v_x, SMALL.dt, axis=-1)
+    # The accelerometer feels gravity along the slope, too; the truth's tyres and wheels leave a little.
+    felt = rate + 9.80665 * np.sin(drives.true_grade)
+    np.testing.assert_allclose(drives.true_a_x[..., 2:-2], felt[..., 2:-2], atol=0.02)
+    assert np.abs(np.diff(drives.torque[1])).mean() > 3 * np.abs(np.diff(drives.torque[0])).mean()
+
+
+def test_the_force_of_the_truth_is_that_of_the_filters_model(drives):
+    """Else no filter could find the mass to a per cent."""
+    car = own_drives.model_car(SMALL)
+    v = drives.true_v_x
+    force = drives.torque / car.wheel_radius - car.drag * v**2 - car.rolling_resistance * SMALL.mass * 9.80665
+    turning = 4 * car.wheel_inertia / car.wheel_radius**2
+    rate = np.gradient(v, SMALL.dt, axis=-1)
+    weight = SMALL.mass * (drives.true_a_x) + turning * rate
+    np.testing.assert_allclose(weight.mean(axis=-1), np.asarray(force).mean(axis=-1), atol=0.01 * SMALL.mass)
+
+
+def test_estimators_rank_as_their_knowledge(drives):
+    raced = experiment.race(
+        SMALL, PEDALS, drives, only=("first guess", "AUKF as printed", "grade rate", "accelerometer")
+    )
+    error = lambda name: np.median(raced.found.at("mass_error", estimator=name, pedals=0.2))
+    assert error("first guess") == pytest.approx(1 - 4000 / SMALL.mass, rel=1e-3)
+    assert error("accelerometer") < 0.01 < error("first guess")
+    assert error("grade rate") < 0.05
+    # Eq 25 as printed: the mass stays where it was, or the filter is lost.
+    frozen = error("AUKF as printed")
+    assert np.isnan(frozen) or frozen > 0.1
+
+
+def test_pedals_make_the_mass_observable(drives):
+    at = lambda i: own_drives.Drive(*(jnp.asarray(leaf[i, 0]) for leaf in drives))
+    still, lively = (mass_observability(SMALL, at(i)) for i in (0, 1))
+    assert lively.bounds[0] < 0.2 * still.bounds[0]
+    assert lively.names == ("mass", "grade")
+
+
+def test_numbers_of_a_known_course():
+    drive = own_drives.Drive(*(jnp.zeros(601),) * 7)
+    mass = jnp.where(jnp.arange(601) < 200, 5000.0, 1.01 * SMALL.mass)
+    found = metrics(SMALL, Found(mass, jnp.full(601, 0.01), jnp.int32(0)), drive)
+    np.testing.assert_allclose(found["mass_error"], 0.01, rtol=1e-9)
+    np.testing.assert_allclose(found["settled"], 20.0)
+    np.testing.assert_allclose(found["grade_rmse"], np.rad2deg(0.01))
+    never = metrics(SMALL, Found(jnp.full(601, 5000.0), jnp.zeros(601), jnp.int32(0)), drive)
+    assert never["settled"] == np.inf
+
+
+def test_disturbances_are_what_they_say():
+    given = own_drives.Drive(*(np.arange(5.0),) * 7)
+    found = own_drives.disturbed(given, late=2, offset=0.1, scale=2.0)
+    np.testing.assert_array_equal(found.torque, [0.0, 0.0, 0.0, 2.0, 4.0])
+    np.testing.assert_allclose(found.a_x, np.arange(5.0) + 0.1)
+    np.testing.assert_array_equal(found.v_x, given.v_x)
+
+
+def test_every_contestant_says_what_it_is():
+    for name, one in contestants(dataclasses.replace(SMALL, touches=3)).items():
+        assert name and one.what
