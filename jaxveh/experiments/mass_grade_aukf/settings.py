@@ -71,7 +71,8 @@ def truck(**changes) -> Study:
 def car(**changes) -> Study:
     """The paper's test car: from standstill gently to 20 km/h, brake touches in the first 30 s."""
     settings = dict(
-        name="car", mass=1700.0, guesses=(1300.0,), duration=120.0, max_step=0.0005, grade_rate_walk=6e-4,
-        speed=20.0 / 3.6, speed_std=0.0, start_speed=0.5, pedals=0.05, grade_std=0.01, grade_length=150.0, grade_shortest=75.0, touches=3,
+        name="car", mass=1700.0, guesses=(1300.0,), duration=120.0, max_step=0.0005,
+        speed=20.0 / 3.6, speed_std=0.0, start_speed=0.5, pedals=0.05, touches=3,
+        grade_std=0.01, grade_length=150.0, grade_shortest=75.0, grade_rate_walk=6e-4,
     )  # fmt: skip
     return Study(**{**settings, **changes})
