@@ -13,7 +13,7 @@ from jaxveh import filters, observers
 from jaxveh._core.bijectors import Real
 from jaxveh._core.names import record_type
 from jaxveh.estimators import mass_and_grade
-from jaxveh.experiments.mass_grade_aukf.drives import Drive, model_car
+from jaxveh.experiments.mass_grade_aukf.drives import Drive, model_car, times
 from jaxveh.experiments.mass_grade_aukf.settings import Study
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, with_spread
 from jaxveh.filters.wrappers.base import Remembering
@@ -58,7 +58,7 @@ def contestants(study: Study) -> dict[str, Contestant]:
 
 def _filtered(filter_, model: StateSpace, study: Study, drive: Drive) -> Found:
     """A filter over the drive, waiting while the brake is touched."""
-    time = jnp.arange(drive.v_x.shape[0]) * study.dt
+    time = times(study, drive.v_x.shape[0])
     inputs, values = {"drive_torque": drive.torque, "brake_torque": jnp.zeros_like(drive.torque)}, drive._asdict()
     if study.touches:
         filter_ = filters.Paused(filter_, "braking", {"v_x": 20.0, "grade": 0.01})
@@ -169,7 +169,7 @@ def _least_squares(study: Study, guess, drive: Drive) -> Found:
         prior=Prior(fields(1000.0 / (guess + wheels), 0.0), {"per_tonne": 0.4 * 1000.0 / 5758.0 * 2, "pull": 0.5}),
         inputs=("kilonewton",),
     )  # fmt: skip
-    time = (jnp.arange(rate.shape[0]) + n) * study.dt
+    time = times(study, rate.shape[0] + n)[n:]
     u = record_type("Inputs", ("kilonewton",))(force / 1000.0)
     # Averages overlap: every n-th row alone is new.
     fresh = (jnp.arange(rate.shape[0]) % n == 0) & ~braked
@@ -195,13 +195,13 @@ def metrics(study: Study, found: Found, drive: Drive) -> dict[str, Any]:
     """Final mass error (share), when it settled within 3 % (s; infinite: never), grade RMSE (degrees) over the whole drive and
     after its first minute (brake touches left out), the errors over time, and the result."""
     error = jnp.abs(found.mass / study.mass - 1.0)
-    time = jnp.arange(error.shape[0]) * study.dt
+    time = times(study, error.shape[0])
     # The last row outside ends the wait.
     outside = (error > 0.03) | ~jnp.isfinite(error)
     last = jnp.max(jnp.where(outside, time, -study.dt))
     settled = jnp.where(outside[-1], jnp.inf, last + study.dt)
     wrong = jnp.rad2deg(found.grade - drive.true_grade)
-    rms = lambda rows: jnp.sqrt(jnp.sum(jnp.where(rows, wrong**2, 0.0)) / jnp.sum(rows))
+    rms = lambda rows: jnp.sqrt(jnp.sum(jnp.where(rows, wrong**2, 0.0)) / jnp.sum(rows.astype(wrong.dtype)))
     free = drive.braking < 0.5
     every = round(1.0 / study.dt)
     return {

@@ -44,6 +44,11 @@ class Drive(NamedTuple):
     true_a_x: Any
 
 
+def times(study: Study, rows: int) -> jax.Array:
+    """The times of the first rows, s."""
+    return jnp.asarray(np.arange(rows) * study.dt)
+
+
 def numbers_of(study: Study) -> vehicles.CarNumbers:
     """The numbers of the study's vehicle."""
     if study.name == "truck":
@@ -96,7 +101,7 @@ def manoeuvre_of(study: Study, pedals, key) -> Touching:
     # One touch in each equal part of the seconds from 12 to 30.
     part = 18.0 / max(study.touches, 1)
     free = jax.random.uniform(touch_key, (study.touches,)) * (part - LENGTH_OF_A_TOUCH - 0.5)
-    starts = 12.0 + part * jnp.arange(study.touches) + free
+    starts = 12.0 + part * jnp.arange(float(study.touches)) + free
     return Touching(manoeuvre=cruise, starts=starts, torque=study.touch * per_acceleration, duration=study.duration)
 
 
@@ -118,7 +123,7 @@ def drive_once(study: Study, pedals, key) -> Drive:
 
 
 def _seen(study: Study, found: Recording, manoeuvre: Touching, key) -> Drive:
-    t = jnp.asarray(np.arange(round(study.duration / study.dt) + 1) * study.dt)
+    t = times(study, round(study.duration / study.dt) + 1)
     pulses = manoeuvre.pulses(t)
     # The motor (or the retarder) pulls both ways, and is known; the friction brake under a touch is not.
     torque = found["drive_torque"] - found["brake_torque"] + pulses

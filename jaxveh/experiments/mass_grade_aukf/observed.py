@@ -11,7 +11,7 @@ from jaxveh._core.names import record_type
 from jaxveh.diagnostics import Observability
 from jaxveh.diagnostics.observability import observability
 from jaxveh.experiments.mass_grade_aukf.contestants import WALK
-from jaxveh.experiments.mass_grade_aukf.drives import Drive, model_car
+from jaxveh.experiments.mass_grade_aukf.drives import Drive, model_car, times
 from jaxveh.experiments.mass_grade_aukf.settings import Study
 from jaxveh.roads import LEVEL
 from jaxveh.statespace import Heun, Propagate
@@ -30,14 +30,14 @@ def mass_observability(study: Study, drive: Drive) -> Observability:
     """
     car, rows = model_car(study), drive.v_x.shape[0]
     knots = int(np.ceil((rows - 1) * study.dt / KNOT)) + 1
-    time = jnp.arange(rows) * study.dt
+    time = times(study, rows)
     move = Propagate(_rates, Heun())
     kind = car.state_type
 
     def predict(z):
         mass, first, speed, steps = z[0], z[1], z[2], z[3:]
         grades = first + jnp.concatenate([jnp.zeros(1), jnp.cumsum(steps)])
-        grade = jnp.interp(time, KNOT * jnp.arange(knots), grades)
+        grade = jnp.interp(time, KNOT * jnp.arange(float(knots)), grades)
         own = eqx.tree_at(lambda c: c.mass, car, study.mass * jnp.exp(mass))
 
         def step(v, given):
@@ -50,7 +50,7 @@ def mass_observability(study: Study, drive: Drive) -> Observability:
         return v / study.v_x
 
     at = jnp.zeros(3 + knots - 1)
-    true = jnp.interp(KNOT * jnp.arange(knots), time, drive.true_grade)
+    true = jnp.interp(KNOT * jnp.arange(float(knots)), time, drive.true_grade)
     at = at.at[1].set(true[0]).at[3:].set(jnp.diff(true))
     spread = np.concatenate([[MASS_SPREAD, GRADE_SPREAD, 1.0], np.full(knots - 1, WALK * KNOT**0.5)])
     return observability(predict, at, ("mass", "grade"), spread, nuisance=knots)
