@@ -18,7 +18,7 @@ SPELLS = ("#7f7f7f", CYCLE[0], CYCLE[3], CYCLE[2], CYCLE[1])
 
 def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
     """The mass's error over time from one first guess: medians over seeds, and quartiles as bands."""
-    figure = Figure(figsize=(WIDTH, 3.6)) if figure is None else figure
+    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained") if figure is None else figure
     with style():
         axes = figure.subplots()
         for name, colour in zip(SHOWN, SPELLS, strict=True):
@@ -30,35 +30,35 @@ def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
             axes.fill_between(time, low, high, color=colour, alpha=0.15, linewidth=0)
         axes.axhspan(-3.0, 3.0, color="#f7f1df", zorder=0)
         axes.set(
-            xlabel="time, s", ylabel="error of the mass, %", ylim=(-40.0, 20.0),
+            xlabel="time [s]", ylabel="error of the mass [%]", ylim=(-40.0, 20.0),
             title=f"{raced.study.name} from {raced.study.guesses[guess]:g} kg: median and quartiles over seeds; shaded: 3 %",
         )  # fmt: skip
-        axes.legend(loc="lower right", ncols=2)
+        figure.legend(loc="outside upper left", ncols=5)
     return figure
 
 
 def grade_figure(raced: Raced, seed: int = 0, guess: int = 0, figure: Any = None) -> Any:
     """True and estimated grade of one drive, and the speed above it."""
-    figure = Figure(figsize=(WIDTH, 4.4)) if figure is None else figure
+    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained") if figure is None else figure
     every = round(1.0 / raced.study.dt)
     with style():
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
         speed = raced.drives.true_v_x[-1, seed, ::every]
         time = np.arange(len(speed))
         above.plot(time, 3.6 * speed, color=COLOURS["truth"])
-        above.set(ylabel="speed, km/h", title=f"{raced.study.name}, one drive from {raced.study.guesses[guess]:g} kg")
+        above.set(ylabel="speed [km/h]", title=f"{raced.study.name}, one drive from {raced.study.guesses[guess]:g} kg")
         below.plot(time, np.rad2deg(raced.drives.true_grade[-1, seed, ::every]), color=COLOURS["truth"], label="truth")
         for name, colour in list(zip(SHOWN, SPELLS, strict=True))[1:4]:
             grade = raced.found.at("grade", estimator=name, pedals=raced.pedals[-1])[guess, seed]
             below.plot(time, np.rad2deg(grade), color=colour, label=name)
-        below.set(xlabel="time, s", ylabel="grade, degrees")
-        below.legend(loc="lower right", ncols=4)
+        below.set(xlabel="time [s]", ylabel="grade [°]")
+        figure.legend(loc="outside upper left", ncols=4)
     return figure
 
 
 def activity_figure(raced: Raced, figure: Any = None) -> Any:
     """Final mass error against pedal activity: medians and quartiles over seeds and guesses."""
-    figure = Figure(figsize=(WIDTH, 3.4)) if figure is None else figure
+    figure = Figure(figsize=(WIDTH, 3.4), layout="constrained") if figure is None else figure
     with style():
         axes = figure.subplots()
         for i, (name, colour) in enumerate(zip(SHOWN, SPELLS, strict=True)):
@@ -72,8 +72,8 @@ def activity_figure(raced: Raced, figure: Any = None) -> Any:
         axes.set_xticks(np.arange(len(raced.pedals)), [f"{pedals:g}" for pedals in raced.pedals])
         axes.axhline(3.0, color="#444444", linewidth=0.6, linestyle=":")
         axes.set(
-            xlabel="pedal activity, m/s^2", ylabel="final error of the mass, %",
+            xlabel="pedal activity [m/s²]", ylabel="final error of the mass [%]",
             title=f"{raced.study.name}: what restless pedals are worth; median and quartiles, dotted: 3 %",
         )  # fmt: skip
-        axes.legend(loc="lower left", ncols=2)
+        figure.legend(loc="outside upper left", ncols=5)
     return figure
