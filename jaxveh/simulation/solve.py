@@ -48,6 +48,8 @@ class Grid(NamedTuple):
     @property
     def steps_a_row(self) -> int | None:
         """How many steps lie between two rows, None where that is not always the same."""
+        if len(self.rows) < 2:
+            return None
         each, left = divmod(len(self.steps) - 1, len(self.rows) - 1)
         even = not left and np.allclose(self.steps[::each], self.rows, rtol=0.0, atol=1e-9)
         return each if even else None
