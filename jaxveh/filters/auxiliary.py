@@ -99,5 +99,5 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
 
 def _scatter(model, residual, ahead):
     """By channel, the variance that the step's noise makes: how far particles came from where their ancestors were to be."""
-    apart_ = {name: residual[name] - ahead[name] for name in model.channels}
-    return {name: jnp.mean(jnp.square(wrap_angle(d) if name in model.angles else d)) for name, d in apart_.items()}
+    gone = {name: residual[name] - ahead[name] for name in model.channels}
+    return {name: jnp.mean(jnp.square(wrap_angle(d) if name in model.angles else d)) for name, d in gone.items()}

@@ -77,8 +77,8 @@ def simulate(
     motion asks for (the spins of wheels at low speed, a sensor's low-pass, the driver), or Kvaerno's implicit method where
     they would become too short; "explicit" and "implicit" insist, and a warning says where equal steps were too long for what
     happened. A diffrax solver takes equal steps, or its own with a `stepsize_controller`. Under jit, vmap or grad nothing can
-    be looked at: "auto" is then "explicit". `adjoint`: diffrax's way to differentiate; the default serves reverse mode,
-    `diffrax.ForwardMode()` forward mode.
+    be looked at: "auto" is then "explicit". `adjoint`: diffrax's way to differentiate; the default serves
+    reverse mode, and forward mode too where steps are equal and no event ends them (else `diffrax.ForwardMode()`).
     `progress` hears how far it is (single runs).
 
     It may be jitted, vmapped over keys, cars and manoeuvres, and differentiated with respect to any of their leaves.

@@ -52,11 +52,10 @@ def compare(a: np.ndarray, b: np.ndarray, *, axis: int = -1, level: float = 0.95
     a, b = (np.where(np.isfinite(v), v, np.inf) for v in (a, b))
     ratios, wins = _ratios(a, b), np.where(a < b, 1.0, np.where(a == b, 0.5, 0.0)).mean(axis=-1)
     drawn = np.random.default_rng(0).integers(0, seeds, (RESAMPLED, seeds))
-    medians = lambda v: _median(v)
     return Comparison(
-        ratio=_interval(medians(ratios), medians(ratios[..., drawn]), level),
+        ratio=_interval(_median(ratios), _median(ratios[..., drawn]), level),
         of_medians=_interval(
-            _ratios(medians(a), medians(b)), _ratios(medians(a[..., drawn]), medians(b[..., drawn])), level
+            _ratios(_median(a), _median(b)), _ratios(_median(a[..., drawn]), _median(b[..., drawn])), level
         ),
         wins=wins,
     )

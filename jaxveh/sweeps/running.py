@@ -98,8 +98,8 @@ def _all(one, given: Given, batch, memory, devices, report) -> dict[str, np.ndar
 
 def _program(one, given: Given, batch, memory, devices):
     """The compiled program of a chunk, and how many runs it takes: fewer than `batch` where they would not fit."""
-    memory = SHARE_OF_MEMORY * _machine_memory() if memory is None else memory
     check_positive("memory", memory, "bytes")
+    memory = SHARE_OF_MEMORY * _machine_memory() if memory is None else memory
     width = len(devices)
     while True:
         batch = -(-batch // width) * width
@@ -141,6 +141,9 @@ def _needed(program) -> float:
 
 
 def _machine_memory() -> float:
+    """Bytes; without end where the system does not say (Windows)."""
+    if not hasattr(os, "sysconf"):
+        return float("inf")
     return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
 
 

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from filter_systems import Flow, linear_model, linear_recording, nile_model
+from filter_systems import linear_model, linear_recording, nile_model, see_level, stay
 from test_learned_noise import model, rmse, walk
 
 from jaxveh import InputError, Recording, Result, filters
@@ -150,15 +150,20 @@ def test_a_considered_state_stays_as_predicted():
     np.testing.assert_allclose(after.covariance, left @ P @ left.T + K @ R @ K.T, rtol=1e-9, atol=1e-12)
 
 
-def test_a_pause_holds_the_state_and_widens_it_after():
-    base = ss.StateSpace(
-        transition=lambda system, t0, t1, x, u: x,
-        observation=lambda system, t, x, u: Flow(x.level),
+def braked(transition=stay):
+    """A level without process noise, and whether the brake is on."""
+    return ss.StateSpace(
+        transition=transition,
+        observation=see_level,
         process_noise=None,
         measurement_noise=ss.Gaussian({"flow": 1.0}),
         prior=nile_model(0.0, 1.0).prior,
         inputs=("braking",),
     )
+
+
+def test_a_pause_holds_the_state_and_widens_it_after():
+    base = braked()
     flow = np.array([1.0, 1.0, 50.0, 50.0, 7.0])
     recording = Recording(np.arange(5.0), {"flow": flow, "braking": np.array([0.0, 0.0, 1.0, 1.0, 0.0])})
     estimate = filters.run(filters.Paused(filters.Kalman(), "braking", {"level": 100.0}), base, recording)
@@ -170,14 +175,7 @@ def test_a_pause_holds_the_state_and_widens_it_after():
 
 def test_the_time_before_a_pause_is_predicted_and_the_pause_is_not():
     """The level rises by one a second: from the row before the pause to its first row, and not within it."""
-    base = ss.StateSpace(
-        transition=lambda system, t0, t1, x, u: type(x)(x.level + (t1 - t0)),
-        observation=lambda system, t, x, u: Flow(x.level),
-        process_noise=None,
-        measurement_noise=ss.Gaussian({"flow": 1.0}),
-        prior=nile_model(0.0, 1.0).prior,
-        inputs=("braking",),
-    )
+    base = braked(lambda system, t0, t1, x, u: type(x)(x.level + (t1 - t0)))
     nothing = np.full(6, np.nan)
     recording = Recording(np.arange(6.0), {"flow": nothing, "braking": np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0])})
     estimate = filters.run(filters.Paused(filters.Kalman(), "braking", {"level": 1.0}), base, recording)
@@ -265,14 +263,7 @@ def test_names_may_be_lists_and_one_is_no_row_of_letters():
 
 def test_what_a_wrapped_filter_remembers_stays_in_a_pause():
     """The extra noise of `ShrinkingProcess` halves with every row at least, but not while nothing is looked at."""
-    base = ss.StateSpace(
-        transition=lambda system, t0, t1, x, u: x,
-        observation=lambda system, t, x, u: Flow(x.level),
-        process_noise=None,
-        measurement_noise=ss.Gaussian({"flow": 1.0}),
-        prior=nile_model(0.0, 1.0).prior,
-        inputs=("braking",),
-    )
+    base = braked()
     braking = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
     recording = Recording(np.arange(6.0), {"flow": np.linspace(0.0, 1.0, 6), "braking": braking})
     inner = filters.ShrinkingProcess(filters.Kalman(), {"level": 2.0})

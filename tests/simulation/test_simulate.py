@@ -219,3 +219,20 @@ def test_a_manoeuvre_without_an_input_of_the_car_raises(drive):
     car = eqx.tree_at(lambda c: c.cg_height, CAR(), jnp.asarray(0.5), is_leaf=lambda leaf: leaf is None)
     with pytest.raises(InputError, match=r"Replay gives steer, v_x, but SingleTrack needs a_x"):
         simulate(car, manoeuvres.replay(drive))
+
+
+def test_equal_steps_are_diffrax_s_own_and_both_modes_differentiate():
+    """A scan of the same steps: `adjoint` sends them through `diffeqsolve`."""
+    names = ("v_y", "yaw_rate")
+
+    def last(mass, **more):
+        car = eqx.tree_at(lambda c: c.mass, CAR(), mass)
+        drive = simulate(car, lane_change(), dt=0.05, max_step=0.01, throw=False, **more)
+        return jnp.stack([drive[f"true.{name}"][-1] for name in names])
+
+    mass = jnp.asarray(1420.0)
+    through = last(mass, adjoint=diffrax.RecursiveCheckpointAdjoint())
+    np.testing.assert_allclose(last(mass), through, rtol=1e-12)
+    forward, reverse = jax.jacfwd(last)(mass), jax.jacrev(last)(mass)
+    np.testing.assert_allclose(forward, reverse, rtol=1e-9)
+    np.testing.assert_allclose(forward, (last(mass + 1.0) - last(mass - 1.0)) / 2.0, rtol=1e-5)

@@ -11,7 +11,6 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
-from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.wrappers.base import gaussian_of, rule_filter_of, with_gaussian
@@ -54,7 +53,7 @@ class Paused(AbstractFilter):
     def _init(self, model, row):
         prior = self.filter.prior(model, row)
         after, info = self.filter.update(model, prior, self._silent(model, row))
-        return _choose(self._waits(row.u), _at(prior, row), after), info
+        return _choose(self._waits(row.u), _after(prior, row), after), info
 
     def step(self, model, belief, row):
         return apart(self._step, belief.count >= 0, model, belief, row)
@@ -63,9 +62,9 @@ class Paused(AbstractFilter):
         waits, waited = self._waits(row.u), self._waits(belief.u)
         ahead = self.filter.predict_between(model, belief, row.t, row.u)
         here = _choose(waits, belief, self._widened(model, belief))
-        start = _choose(waited, with_gaussian(here, with_time(gaussian_of(here), row.t)), ahead)
+        start = _choose(waited, _at(here, t=row.t), ahead)
         after, info = self.filter.update(model, start, self._silent(model, row))
-        return _choose(waits, _at(start, row), after), info
+        return _choose(waits, _after(start, row), after), info
 
     def _waits(self, u):
         return getattr(u, self.channel) > 0.5
@@ -81,18 +80,16 @@ class Paused(AbstractFilter):
         return with_gaussian(belief, with_spread(gaussian, gaussian.vector, spread))
 
 
-def _at(belief: Any, row: Any) -> Any:
-    """The belief after a row of which nothing is taken."""
+def _at(belief: Any, **where: Any) -> Any:
+    """The same belief at another time `t`, with other inputs `u` or another `count`."""
     gaussian = gaussian_of(belief)
     spread = Spread(gaussian.factor, gaussian.matrix)
-    return with_gaussian(
-        belief, with_spread(gaussian, gaussian.vector, spread, t=row.t, u=row.u, count=gaussian.count + 1)
-    )
+    return with_gaussian(belief, with_spread(gaussian, gaussian.vector, spread, **where))
 
 
-def with_time(gaussian: GaussianBelief, t: Any) -> GaussianBelief:
-    """The same Gaussian at another time."""
-    return with_spread(gaussian, gaussian.vector, Spread(gaussian.factor, gaussian.matrix), t=t)
+def _after(belief: Any, row: Any) -> Any:
+    """The belief after a row of which nothing is taken."""
+    return _at(belief, t=row.t, u=row.u, count=gaussian_of(belief).count + 1)
 
 
 def _choose(condition: Any, a: Any, b: Any) -> Any:
