@@ -9,8 +9,8 @@ import pytest
 
 from jaxveh.experiments import mass_grade_aukf as experiment
 from jaxveh.experiments.mass_grade_aukf import drives as own_drives
-from jaxveh.experiments.mass_grade_aukf.contestants import Found, contestants, metrics
-from jaxveh.experiments.mass_grade_aukf.observed import mass_observability
+from jaxveh.experiments.mass_grade_aukf.contestants import WALK, Found, contestants, metrics
+from jaxveh.experiments.mass_grade_aukf.observed import KNOT, known_of_mass, predictions
 
 PEDALS = (0.0, 0.2)
 SMALL = experiment.truck(duration=60.0, dt=0.1, max_step=0.005, guesses=(4000.0,))
@@ -59,9 +59,22 @@ def test_estimators_rank_as_their_knowledge(drives):
 
 def test_pedals_make_the_mass_observable(drives):
     at = lambda i: own_drives.Drive(*(jnp.asarray(leaf[i, 0]) for leaf in drives))
-    still, lively = (mass_observability(SMALL, at(i)) for i in (0, 1))
-    assert lively.bounds[0] < 0.2 * still.bounds[0]
-    assert lively.names == ("mass", "grade")
+    (still, smooth), (lively, _) = ([known_of_mass(SMALL, at(i), four) for four in (False, True)] for i in (0, 1))
+    assert lively.error < 0.5 * still.error and lively.bound < still.bound
+    # A grade that walks takes the heavier car and its smaller steps; the Cramer-Rao bound does not show it.
+    assert still.verdict == "unobservable" and still.pull > 3 * still.bound
+    assert smooth.pull < still.pull
+
+
+def test_the_pull_is_that_of_least_squares_on_data_without_noise(drives):
+    """By the definition: the estimate from the true speeds, minus the truth, in the linear problem."""
+    drive = own_drives.Drive(*(jnp.asarray(leaf[1, 1]) for leaf in drives))
+    known = known_of_mass(SMALL, drive)
+    predict, at = predictions(SMALL, drive, False)
+    walk = np.concatenate([[1e9, 1.0, 0.03], np.full(at.size - 3, WALK * KNOT**0.5)])
+    rows = np.vstack([np.asarray(jax.jacrev(predict)(jnp.asarray(at))), np.diag(1 / walk)])
+    estimate = np.linalg.lstsq(rows, rows @ at - np.concatenate([np.zeros(len(rows) - at.size), at / walk]), rcond=None)[0]
+    np.testing.assert_allclose(known.pull, (estimate - at)[0], rtol=1e-4)
 
 
 def test_numbers_of_a_known_course():
