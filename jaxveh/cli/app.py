@@ -13,7 +13,7 @@ from jaxveh.cli.demo import demo
 from jaxveh.cli.estimate import estimate
 from jaxveh.cli.failure import flowing, program
 from jaxveh.cli.fit import fit
-from jaxveh.cli.reproduce import mass_grade_aukf, tyre_apf
+from jaxveh.cli.reproduce import reproduce
 from jaxveh.cli.schema import schema
 from jaxveh.cli.simulate import simulate
 from jaxveh.cli.tyre import evaluate_table, show
@@ -39,8 +39,6 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-reproduce = typer.Typer(help="Papers computed again, as printed and honestly.", no_args_is_help=True)
-
 tyre = typer.Typer(help="Tyres: property files (.tir), and fits to rig data.", no_args_is_help=True)
 
 
@@ -61,11 +59,8 @@ def options(
 
 options.__doc__ = flowing(HELP)
 
-for command in (demo, check, simulate, estimate, fit, schema):
+for command in (demo, check, simulate, estimate, fit, reproduce, schema):
     app.command()(program(command))
-reproduce.command("tyre-apf")(program(tyre_apf))
-reproduce.command("mass-grade-aukf")(program(mass_grade_aukf))
-app.add_typer(reproduce, name="reproduce")
 tyre.command("show")(program(show))
 tyre.command("evaluate")(program(evaluate_table))
 tyre.command("fit")(program(fit_table))

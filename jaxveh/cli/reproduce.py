@@ -2,124 +2,124 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Annotated
+import importlib
+import os
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Any
 
 import typer
 
+from jaxveh._core.errors import check_one_of
+from jaxveh._core.progress import Progress, part
 from jaxveh.cli import options
 from jaxveh.cli.console import number, progress, results, table
 from jaxveh.cli.output import check_report, make_folder, write_numbers
-from jaxveh.experiments import tyre_apf as experiment
+
+PAPERS = {
+    "tyre-apf": "Magic Formula parameters by auxiliary particle filter (Bao, Sabbioni et al. 2015)",
+    "mass-grade-aukf": "mass and road grade at small acceleration by adaptive unscented Kalman filter",
+}
+"""The papers by name: the module is `jaxveh.experiments.` and the name, with underscores."""
+
+ALL = "all"
+
+NAME = typer.Argument(
+    metavar="NAME",
+    help="; ".join(f"[bold]{name}[/]: {what}" for name, what in PAPERS.items()) + f"; or [bold]{ALL}[/].",
+)
 
 
-def tyre_apf(
-    seeds: Annotated[int, typer.Option("--seeds", help="How many, all in one batch.", min=1)] = 50,
+def reproduce(
+    name: Annotated[str, NAME],
+    seeds: Annotated[
+        int | None,
+        typer.Option("--seeds", help="How many, at least 2. Default: what the paper's own checks need.", min=2),
+    ] = None,
     seed: options.Seed = 0,
     as_printed: Annotated[
-        bool, typer.Option("--as-printed", help="Show only the tables made with the paper's printed settings.")
+        bool, typer.Option("--as-printed", help="Only the paper's printed settings, errata included, and what they do.")
     ] = False,
     numbers: options.Numbers = None,
     out: options.Out = None,
 ) -> None:
-    """Bao, Sabbioni et al. (2015): Magic Formula parameters by auxiliary particle filter.
+    """Compute a paper again: its tables as printed and honestly, and criteria that hold or do not.
 
-    Tables 2 and 3 and the step-steer figures, with the printed settings and honestly (a prior that does not know the
-    truth), and checks against the printed numbers. Several minutes for 50 seeds on two cores.
+    Every table has the do-nothing baseline, medians and quartiles over seeds; no estimator knows the truth. Some minutes each on
+    two cores. With --out each paper's figures are drawn, with --json every number and each check is written.
 
-    Example: [bold]jaxveh reproduce tyre-apf --seeds 50 --json tyre_apf.json[/]
+    Example: [bold]jaxveh reproduce mass-grade-aukf --json mass_grade.json --out report/[/]
     """
+    check_one_of("NAME", name, (*PAPERS, ALL))
     check_report(out, numbers)
+    chosen = list(PAPERS) if name == ALL else [name]
+    written, summary = {}, []
     with progress("reproduce") as report:
-        found = experiment.run(seeds=seeds, seed=seed, progress=report)
-    tables, checks = experiment.tables(found), experiment.check(found)
-    for one in tables:
-        if not as_printed or "as printed" in one.title:
-            table(one.title, one.columns, one.rows)
-    _print_checks(checks)
-    _print_figures(_tyre_figures(found, out), out)
-    shown = {
-        "checks": [check._asdict() for check in checks],
-        "tables": [one._asdict() for one in tables],
-        "observability": {"lane_change": _bounds(found.lane_change), "sweep": _bounds(found.sweep)},
-    }
-    configuration = {
-        "seeds": seeds,
-        "study": dataclasses.asdict(found.study),
-        "printed": dataclasses.asdict(found.printed_settings),
-    }
-    write_numbers(numbers, shown, configuration, seed)
+        for i, one in enumerate(chosen):
+            share = report if len(chosen) == 1 else part(report, i / len(chosen), (i + 1) / len(chosen), one)
+            start = time.perf_counter()
+            folder = out if out is None or len(chosen) == 1 else out / one
+            written[one] = _one(one, seeds, seed, as_printed, share, folder)
+            checks = written[one]["checks"]
+            held = f"{sum(check['holds'] for check in checks)} of {len(checks)}" if checks else "none made"
+            summary.append((one, held, f"{time.perf_counter() - start:.0f}"))
+    if len(chosen) > 1:
+        table("Papers", ("paper", "checks that hold", "took, s"), summary)
+    settings = {one: found.pop("settings") for one, found in written.items()}
+    shown = written if len(chosen) > 1 else written[name]
+    write_numbers(numbers, shown, settings if len(chosen) > 1 else settings[name], seed)
 
 
-def mass_grade_aukf(
-    seeds: Annotated[int, typer.Option("--seeds", help="How many drives of each kind, at least 2.", min=2)] = 20,
-    seed: options.Seed = 0,
-    numbers: options.Numbers = None,
-    out: options.Out = None,
-) -> None:
-    """Mass and road grade at small acceleration, by adaptive unscented Kalman filter.
-
-    The printed filter (its eq 25 freezes the mass), the repaired one, and what beats both: a grade whose rate walks, an
-    accelerometer. A truck and a car of seven degrees of freedom are the truth. Some minutes for 20 seeds on two cores.
-
-    Example: [bold]jaxveh reproduce mass-grade-aukf --seeds 20 --json mass_grade.json --out report/[/]
-    """
-    from jaxveh.experiments import mass_grade_aukf as experiment
-
-    check_report(out, numbers)
-    with progress("reproduce") as report:
-        found = experiment.run(seeds=seeds, seed=seed, progress=report)
-    tables, checks = experiment.tables(found), experiment.check(found)
+def _one(
+    name: str, seeds: int | None, seed: int, as_printed: bool, report: Progress, out: Path | None
+) -> dict[str, Any]:
+    """Run one paper and show it; what it found, for JSON."""
+    _both_cores()
+    experiment = _experiment(name)
+    many = {} if seeds is None else {"seeds": seeds}
+    if as_printed:
+        tables, checks, settings = experiment.as_printed(**many, seed=seed, progress=report), [], many
+    else:
+        found = experiment.run(**many, seed=seed, progress=report)
+        tables, checks = experiment.tables(found), experiment.check(found)
+        settings = {"seeds": found.seeds, **experiment.settings(found)}
     for one in tables:
         table(one.title, one.columns, one.rows)
-    _print_checks(checks)
-    _print_figures(_mass_figures(found, out), out)
-    shown = {
+    if checks:
+        rows = [("yes" if c.holds else "NO", c.name, number(c.value), number(c.bound)) for c in checks]
+        table(f"{name}: checks", ("holds", "criterion", "value", "bound"), rows)
+        results().print(f"{sum(c.holds for c in checks)} of {len(checks)} hold")
+    if out is not None and not as_printed:
+        _draw(experiment, found, out)
+    return {
         "checks": [check._asdict() for check in checks],
         "tables": [one._asdict() for one in tables],
-        "observability": {name: _bounds(seen) for name, seen in found.observed.items()},
+        "settings": settings,
     }
-    studies = {"truck": dataclasses.asdict(found.truck.study), "car": dataclasses.asdict(found.car.study)}
-    write_numbers(numbers, shown, {"seeds": seeds, **studies}, seed)
 
 
-def _print_figures(paths, out) -> None:
-    """Draw the figures and say where they are; nothing without a folder."""
-    if out is None:
-        return
+def _draw(experiment: ModuleType, found: Any, out: Path) -> None:
+    """Draw the figures and say where they are."""
+    from jaxveh import plots
+
     make_folder(out)
-    for path in paths:
-        results().print(f"figure: {path}")
+    figures = importlib.import_module(f"{experiment.__name__}.figures")
+    for stem, figure in figures.figures(found).items():
+        results().print(f"figure: {plots.save(figure, out / f'{stem}.png')}")
 
 
-def _print_checks(checks) -> None:
-    rows = [("yes" if c.holds else "NO", c.name, number(c.value), number(c.bound)) for c in checks]
-    table("Checks", ("holds", "criterion", "value", "bound"), rows)
-    results().print(f"{sum(c.holds for c in checks)} of {len(checks)} hold")
+def _experiment(name: str) -> ModuleType:
+    return importlib.import_module(f"jaxveh.experiments.{name.replace('-', '_')}")
 
 
-def _bounds(report) -> dict:
-    return {
-        "condition_number": report.condition_number,
-        "bounds": dict(zip(report.names, report.bounds, strict=True)),
-        "report": report.report().splitlines(),
-    }
+def _both_cores() -> None:
+    """Let sweeps split over the machine's cores, unless jax has begun or someone has decided otherwise."""
+    import jax
 
-
-def _mass_figures(found, out):
-    from jaxveh import plots
-    from jaxveh.experiments.mass_grade_aukf import figures
-
-    for raced in (found.truck, found.car):
-        name = raced.study.name
-        yield plots.save(figures.mass_figure(raced), out / f"{name}_mass.png")
-        yield plots.save(figures.grade_figure(raced), out / f"{name}_grade.png")
-    yield plots.save(figures.activity_figure(found.truck), out / "pedals.png")
-
-
-def _tyre_figures(found, out):
-    from jaxveh import plots
-    from jaxveh.experiments.tyre_apf import figures
-
-    yield plots.save(figures.curves_figure(found.outcome, found.study), out / "force_curves.png")
-    yield plots.save(figures.parameters_figure(found.outcome, found.study), out / "parameters.png")
+    if "JAX_NUM_CPU_DEVICES" in os.environ or "xla_force_host_platform" in os.environ.get("XLA_FLAGS", ""):
+        return
+    try:
+        jax.config.update("jax_num_cpu_devices", os.cpu_count() or 1)
+    except RuntimeError:  # the devices have been made: what there is stays
+        return

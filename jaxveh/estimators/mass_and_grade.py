@@ -31,6 +31,7 @@ def mass_and_grade(
     grade_rate_walk: float | None = 1e-3,
     speed_noise: float = 0.002,
     input_path: str = "linear",
+    more_inputs: tuple[str, ...] = (),
 ) -> StateSpace:
     """The state space [v_x, grade, (grade_rate), (bias), mass] of a car that goes straight, for any filter.
 
@@ -45,7 +46,8 @@ def mass_and_grade(
     `Real()` for a mass that may become negative, as papers have it, its spreads relative still; `grade_spread` (rad);
     `grade_walk` (rad/sqrt(s)); `grade_rate_walk` (rad/s per sqrt(s)), None leaves the rate out; `speed_noise` (m/s per
     sqrt(s)): what the model leaves out. `input_path`: torques run `linear` between rows or are `held`; held ones are late by
-    half a step, which a lively pedal turns into a wrong mass.
+    half a step, which a lively pedal turns into a wrong mass. `more_inputs`: names of channels that a filter's wrapper reads
+    (`Paused`, `VaryingNoise`).
 
     **Inputs** `drive_torque` and `brake_torque` (N m). **Channels** `v_x` and `a_x`. **Reported**: `v_x`, `grade` (rad), `mass`
     (kg) and what else is a state.
@@ -76,7 +78,7 @@ def mass_and_grade(
         process_noise=Continuous(Gaussian(noise)),
         measurement_noise=Gaussian({"v_x": v_x} | ({} if a_x is None else {ACCELEROMETER: a_x})),
         prior=Prior(kind(*(mean for mean, _ in states.values())), {name: std for name, (_, std) in states.items()}),
-        inputs=car.inputs,
+        inputs=(*car.inputs, *more_inputs),
         input_path=input_path,
     )
     return with_parameters(model, lambda car: (car.mass,), mass_spread, mass_walk, domain=mass_domain)

@@ -1,6 +1,7 @@
 """Each program once from end to end, at smoke size: what it prints, what it writes, that the numbers agree."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -159,38 +160,80 @@ def test_demo(tmp_path):
     assert set(content["seconds"]) == {"simulation", "MAP", "PF", "APF", "UKF", "errors and step steers"}
 
 
-def test_reproduce_prints_tables_and_writes_checks(tmp_path, monkeypatch):
+@pytest.fixture
+def papers(monkeypatch):
+    """Two papers of which only the report is real; what they were asked. The studies have tests of their own."""
     from jaxveh.cli import reproduce
-    from jaxveh.diagnostics.observability import from_sensitivities
-    from jaxveh.experiments.tyre_apf import Check, Printed, Study, Table
+    from jaxveh.experiments.report import Check, Table
 
-    class Found:
-        study, printed_settings = Study(), Printed()
-        lane_change = sweep = from_sensitivities(np.diag([1.0, 2.0]), ("front.B", "front.D"), np.array([0.1, 0.1]))
+    asked = []
 
-    asked = {}
+    def paper(name):
+        class Found:
+            seeds = 7
 
-    def study(**settings):
-        asked.update(settings)
-        return Found()
+        def run(**options):
+            options.pop("progress")(1, 1, "done")
+            asked.append((name, options))
+            return Found()
 
-    # The study itself has tests of its own; here is what the program makes of its result.
-    monkeypatch.setattr(reproduce.experiment, "run", study)
-    tables = [
-        Table("honest", ("what", "value"), [("UKF", "0.5")]),
-        Table("Table 2 as printed", ("a", "b"), [("x", "1")]),
-    ]
-    monkeypatch.setattr(reproduce.experiment, "tables", lambda found: tables)
-    checks = [Check("UKF front", 0.5, 0.8, True), Check("PF front", 1.5, 0.8, False)]
-    monkeypatch.setattr(reproduce.experiment, "check", lambda found: checks)
+        honest, printed = (
+            Table(f"honest {name}", ("what", "value"), [("UKF", "0.5")]),
+            Table("printed", ("a",), [("x",)]),
+        )
+        checks = [Check("UKF front", 0.5, 0.8, True), Check("PF front", float("nan"), 0.8, False)]
+        return SimpleNamespace(
+            run=run, tables=lambda found: [honest, printed], check=lambda found: checks,
+            as_printed=lambda **options: [printed], settings=lambda found: {"study": {"particles": 20}},
+        )  # fmt: skip
+
+    every = {name: paper(name) for name in ("first", "second")}
+    monkeypatch.setattr(reproduce, "PAPERS", dict.fromkeys(every, "a paper"))
+    monkeypatch.setattr(reproduce, "_experiment", every.__getitem__)
+    # Devices are made once in a process; other tests count on one.
+    monkeypatch.setattr(reproduce, "_both_cores", lambda: None)
+    return asked
+
+
+def test_reproduce_prints_tables_and_writes_checks(tmp_path, papers):
     numbers = tmp_path / "numbers.json"
-    result = run("reproduce", "tyre-apf", "--seeds", "7", "--seed", "3", "--json", numbers)
+    result = run("reproduce", "first", "--seeds", "7", "--seed", "3", "--json", numbers)
     assert result.exit_code == 0, result.output
-    assert (asked["seeds"], asked["seed"]) == (7, 3)
-    assert "honest" in result.stdout
+    assert papers == [("first", {"seeds": 7, "seed": 3})]
+    assert "honest first" in result.stdout
     assert "1 of 2 hold" in result.stdout
     content = read_json(numbers)
     assert content["checks"][0] == {"name": "UKF front", "value": 0.5, "bound": 0.8, "holds": True}
-    assert content["tables"][1]["rows"] == [["x", "1"]]
-    assert content["observability"]["sweep"]["condition_number"] == pytest.approx(4.0)
-    assert "honest" not in run("reproduce", "tyre-apf", "--as-printed").stdout
+    assert content["checks"][1]["value"] is None
+    assert content["tables"][1]["rows"] == [["x"]]
+    assert content["manifest"]["configuration"] == {"seeds": 7, "study": {"particles": 20}}
+
+
+def test_reproduce_as_printed_shows_that_alone(papers):
+    shown = run("reproduce", "first", "--as-printed").stdout
+    assert "printed" in shown and "honest" not in shown and not papers
+
+
+def test_reproduce_all_goes_through_every_paper(tmp_path, papers):
+    numbers = tmp_path / "numbers.json"
+    result = run("reproduce", "all", "--json", numbers)
+    assert result.exit_code == 0, result.output
+    # Every paper has its own number of seeds.
+    assert papers == [("first", {"seed": 0}), ("second", {"seed": 0})]
+    content = read_json(numbers)
+    assert content["second"]["checks"][0]["holds"] is True
+    assert content["manifest"]["configuration"]["second"]["study"] == {"particles": 20}
+    assert "Papers" in result.stdout and result.stdout.count("1 of 2") >= 4
+
+
+def test_reproduce_names_its_papers():
+    from jaxveh.cli.reproduce import PAPERS, _experiment
+
+    result = run("reproduce", "third")
+    assert result.exit_code == 2
+    for name in (*PAPERS, "all"):
+        assert name in result.stderr
+    for name in PAPERS:
+        experiment = _experiment(name)
+        for needed in ("CITATION", "as_printed", "check", "run", "settings", "tables"):
+            assert hasattr(experiment, needed), f"{name} has no {needed}"

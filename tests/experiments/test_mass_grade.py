@@ -73,7 +73,9 @@ def test_the_pull_is_that_of_least_squares_on_data_without_noise(drives):
     predict, at = predictions(SMALL, drive, False)
     walk = np.concatenate([[1e9, 1.0, 0.03], np.full(at.size - 3, WALK * KNOT**0.5)])
     rows = np.vstack([np.asarray(jax.jacrev(predict)(jnp.asarray(at))), np.diag(1 / walk)])
-    estimate = np.linalg.lstsq(rows, rows @ at - np.concatenate([np.zeros(len(rows) - at.size), at / walk]), rcond=None)[0]
+    estimate = np.linalg.lstsq(
+        rows, rows @ at - np.concatenate([np.zeros(len(rows) - at.size), at / walk]), rcond=None
+    )[0]
     np.testing.assert_allclose(known.pull, (estimate - at)[0], rtol=1e-4)
 
 

@@ -56,19 +56,28 @@ def contestants(study: Study) -> dict[str, Contestant]:
     }
 
 
-def _filtered(filter_, model: StateSpace, study: Study, drive: Drive) -> Found:
-    """A filter over the drive, waiting while the brake is touched."""
+TOLD = ("braking", "unknown_force")
+"""What wrappers are told beside the torques: whether the brake is touched (0 or 1), and the process noise of the speed."""
+
+FORCE_OF_A_TOUCH = 2.0
+"""m/s per root second: what a touched brake may do to the speed, whatever it is; four times the strongest touch over a second."""
+
+
+def _filtered(filter_, model: StateSpace, study: Study, drive: Drive, waits: bool = True) -> Found:
+    """A filter over the drive. While the brake is touched it `waits`, as the paper has it, or takes the brake's force for an
+    unknown one: then the speed is free for a while, and the grade goes on as it went."""
     time = times(study, drive.v_x.shape[0])
-    inputs, values = {"drive_torque": drive.torque, "brake_torque": jnp.zeros_like(drive.torque)}, drive._asdict()
-    if study.touches:
+    # A touch begins between two rows.
+    touched = (drive.braking > 0.5) | (jnp.pad(drive.braking[1:], (0, 1)) > 0.5)
+    force = jnp.where(touched, FORCE_OF_A_TOUCH, study.speed_noise)
+    values = drive._asdict()
+    if study.touches and waits:
         filter_ = filters.Paused(filter_, "braking", {"v_x": 20.0, "grade": 0.01})
-        model = StateSpace(
-            system=model.system, transition=model.transition_function, observation=model.observation_function,
-            process_noise=model.process_noise, measurement_noise=model.measurement_noise, prior=model.prior,
-            inputs=(*model.inputs, "braking"), report=model.report_function, chosen=model.chosen, input_path=model.input_path,
-        )  # fmt: skip
-        inputs["braking"] = drive.braking
-    u = record_type("Inputs", inputs)(*inputs.values())
+    elif study.touches:
+        filter_ = filters.VaryingNoise(filter_, process={"v_x": "unknown_force"})
+        # The accelerometer feels that force, too.
+        values["a_x"] = jnp.where(touched, jnp.nan, drive.a_x)
+    u = record_type("Inputs", model.inputs)(drive.torque, jnp.zeros_like(drive.torque), drive.braking, force)
     y = record_type("Measurements", model.channels)(*[values[name] for name in model.channels])
     estimate = filters.scan(filter_, model, Row(time, u, y))
     return Found(estimate.mean.mass, estimate.mean.grade, estimate.result)
@@ -77,7 +86,7 @@ def _filtered(filter_, model: StateSpace, study: Study, drive: Drive) -> Found:
 def _model(study: Study, guess, drive: Drive, **options) -> StateSpace:
     car = eqx.tree_at(lambda c: c.mass, model_car(study), guess)
     noises = {"grade_rate_walk": study.grade_rate_walk, "speed_noise": study.speed_noise}
-    return mass_and_grade(car, v_x=study.v_x, start_speed=drive.v_x[0], **{**noises, **options})
+    return mass_and_grade(car, v_x=study.v_x, start_speed=drive.v_x[0], more_inputs=TOLD, **{**noises, **options})
 
 
 def _guess(study: Study, guess, drive: Drive) -> Found:
@@ -96,7 +105,7 @@ def _walking(spread: float):
 def _smooth(aided: bool = False, bias: float | None = None):
     def run(study, guess, drive):
         model = _model(study, guess, drive, a_x=study.a_x if aided else None, a_x_bias=bias)
-        return _filtered(filters.Unscented(), model, study, drive)
+        return _filtered(filters.Unscented(), model, study, drive, waits=False)
 
     return run
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from jaxveh.experiments.mass_grade_aukf.report import Reproduction
 from jaxveh.experiments.mass_grade_aukf.study import Raced
 from jaxveh.plots.figure import Figure
 from jaxveh.plots.style import COLOURS, CYCLE, WIDTH, style
@@ -14,6 +15,15 @@ SHOWN = ("first guess", "UKF", "AUKF", "grade rate", "accelerometer")
 """The estimators of the figures."""
 
 SPELLS = ("#7f7f7f", CYCLE[0], CYCLE[3], CYCLE[2], CYCLE[1])
+
+
+def figures(result: Reproduction) -> dict[str, Any]:
+    """Every figure by the name of its file."""
+    drawn = {}
+    for raced in (result.truck, result.car):
+        drawn[f"{raced.study.name}_mass"] = mass_figure(raced)
+        drawn[f"{raced.study.name}_grade"] = grade_figure(raced)
+    return drawn | {"pedals": activity_figure(result.gentle, result.truck)}
 
 
 def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
@@ -56,24 +66,25 @@ def grade_figure(raced: Raced, seed: int = 0, guess: int = 0, figure: Any = None
     return figure
 
 
-def activity_figure(raced: Raced, figure: Any = None) -> Any:
-    """Final mass error against pedal activity: medians and quartiles over seeds and guesses."""
+def activity_figure(*raced: Raced, figure: Any = None) -> Any:
+    """Final mass error against pedal activity, of races of one vehicle: medians and quartiles over seeds and guesses."""
     figure = Figure(figsize=(WIDTH, 3.4), layout="constrained") if figure is None else figure
+    pedals = [p for one in raced for p in one.pedals]
     with style():
         axes = figure.subplots()
         for i, (name, colour) in enumerate(zip(SHOWN, SPELLS, strict=True)):
-            error = 100.0 * raced.found.at("mass_error", estimator=name).reshape(len(raced.pedals), -1)
-            low, mid, high = np.nanpercentile(error, [25, 50, 75], axis=1)
-            x = np.arange(len(raced.pedals)) + 0.06 * (i - 2)
+            errors = [100.0 * one.found.at("mass_error", estimator=name, pedals=p) for one in raced for p in one.pedals]
+            low, mid, high = np.transpose([np.nanpercentile(error, [25, 50, 75]) for error in errors])
+            x = np.arange(len(pedals)) + 0.06 * (i - 2)
             axes.errorbar(
                 x, mid, (mid - low, high - mid), color=colour, marker="o", markersize=4, capsize=2, label=name
             )
         axes.set_yscale("log")
-        axes.set_xticks(np.arange(len(raced.pedals)), [f"{pedals:g}" for pedals in raced.pedals])
+        axes.set_xticks(np.arange(len(pedals)), [f"{p:g}" for p in pedals])
         axes.axhline(3.0, color="#444444", linewidth=0.6, linestyle=":")
         axes.set(
             xlabel="pedal activity [m/s²]", ylabel="final error of the mass [%]",
-            title=f"{raced.study.name}: what restless pedals are worth; median and quartiles, dotted: 3 %",
+            title=f"{raced[0].study.name}: what restless pedals are worth; median and quartiles, dotted: 3 %",
         )  # fmt: skip
         figure.legend(loc="outside upper left", ncols=5)
     return figure

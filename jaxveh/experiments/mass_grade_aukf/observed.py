@@ -83,7 +83,7 @@ def known_of_mass(study: Study, drive: Drive, smooth: bool = False) -> Known:
 
 
 def predictions(study: Study, drive: Drive, smooth: bool):
-    """The whitened speeds as a function of the unknowns [log mass, first speed, first grade, (first rate), news], and the truth's."""
+    """Whitened speeds as a function of the unknowns [log mass, first speed, first grade, (first rate), news]; the truth's."""
     car, rows = model_car(study), drive.v_x.shape[0]
     knots = KNOT * np.arange(np.ceil((rows - 1) * study.dt / KNOT) + 1)
     time = times(study, rows)

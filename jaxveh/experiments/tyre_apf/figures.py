@@ -11,12 +11,21 @@ import numpy as np
 
 from jaxveh import numerics, plots, vehicles
 from jaxveh._core.parameter import pick, prior_spread, put, resolve
+from jaxveh.experiments.tyre_apf.report import Reproduction
 from jaxveh.experiments.tyre_apf.settings import Study, tyres
 from jaxveh.experiments.tyre_apf.staged import Staged
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS, Outcome, with_tyres
 
 NAMES = tuple(field.replace("_", ".") for field in FIELDS)
 """The parameters as people write them, `front.B`."""
+
+
+def figures(result: Reproduction) -> dict[str, Any]:
+    """Every figure by the name of its file."""
+    return {
+        "force_curves": curves_figure(result.outcome, result.study),
+        "parameters": parameters_figure(result.outcome, result.study),
+    }
 
 
 def truth() -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import jax
@@ -54,6 +55,21 @@ def run(
     as_printed = jax.block_until_ready(run_printed_seeds(printed, jax.random.split(printed_key, seeds)))
     progress(1.0, 1.0, "done")
     return Reproduction(study, seeds, staged.outcome, staged.steps, lane_change, sweep, as_printed, printed)
+
+
+def as_printed(*, seeds: int = 50, seed: int = 0, progress: Progress = silent) -> list[Table]:
+    """The printed settings alone, errata included."""
+    progress(0.0, 1.0, "printed settings")
+    printed = Printed()
+    _, key = jax.random.split(jax.random.key(seed))
+    found = jax.block_until_ready(run_printed_seeds(printed, jax.random.split(key, seeds)))
+    progress(1.0, 1.0, "done")
+    return [_printed_2(found), _printed_3(found, printed)]
+
+
+def settings(result: Reproduction) -> dict:
+    """The study and the printed settings, for the manifest."""
+    return {"study": dataclasses.asdict(result.study), "printed": dataclasses.asdict(result.printed_settings)}
 
 
 def _observed(study: Study, manoeuvre, where=tyres) -> Observability:
@@ -119,7 +135,13 @@ def check(result: Reproduction) -> list[Check]:
 
 def tables(result: Reproduction) -> list[Table]:
     """The tables of the report: honest first, the do-nothing prior in each, then as printed."""
-    return [_curve_table(result), _parameter_table(result), _step_table(result), _printed_2(result), _printed_3(result)]
+    return [
+        _curve_table(result),
+        _parameter_table(result),
+        _step_table(result),
+        _printed_2(result.printed),
+        _printed_3(result.printed, result.printed_settings),
+    ]
 
 
 def _spread(values, digits=3) -> str:
@@ -164,14 +186,12 @@ def _step_table(result: Reproduction) -> Table:
     )
 
 
-def _printed_2(result: Reproduction) -> Table:
-    truth = np.asarray(result.printed.truth)[0]
+def _printed_2(printed: PrintedOutcome) -> Table:
+    truth = np.asarray(printed.truth)[0]
     rows = []
     for i, field in enumerate(FIELDS):
         cells = [
-            f"{_median(where[n])[i]:.5g}"
-            for n in ("PF", "APF", "walk")
-            for where in (result.printed.last, result.printed.by_rule)
+            f"{_median(where[n])[i]:.5g}" for n in ("PF", "APF", "walk") for where in (printed.last, printed.by_rule)
         ]
         rows.append((field.replace("_", "."), f"{truth[i]:g}", f"{TABLE_2[field][1]:g}", *cells))
     heads = [f"{n}, {how}" for n in ("PF", "APF", "walk") for how in ("last", "closest 20 %")]
@@ -182,19 +202,19 @@ def _printed_2(result: Reproduction) -> Table:
     )
 
 
-def _printed_3(result: Reproduction) -> Table:
-    truth = np.asarray(result.printed.truth)[0]
+def _printed_3(printed: PrintedOutcome, settings: Printed) -> Table:
+    truth = np.asarray(printed.truth)[0]
     rows = []
     for i, field in enumerate(FIELDS):
         rms = [
-            np.sqrt(np.mean((np.asarray(result.printed.series[n])[:, i] - truth[i]) ** 2, axis=-1))
+            np.sqrt(np.mean((np.asarray(printed.series[n])[:, i] - truth[i]) ** 2, axis=-1))
             for n in ("PF", "APF", "walk")
         ]
         rows.append((field.replace("_", "."), *[f"{v:g}" for v in TABLE_3[field]], *[_spread(r) for r in rms]))
-    ess = {name: float(_median(value)) for name, value in result.printed.ess.items()}
+    ess = {name: float(_median(value)) for name, value in printed.ess.items()}
     return Table(
         f"Table 3 as printed (P0 = Q = I): RMSE over time; effective sample size {ess['PF']:.1f} (PF), {ess['APF']:.1f} (APF) "
-        f"of {result.printed_settings.particles}",
+        f"of {settings.particles}",
         ("parameter", "paper PF", "paper APF", "PF", "APF", "walk"),
         rows,
     )
