@@ -37,11 +37,12 @@ def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: 
     length = round(window / float(np.median(np.diff(time)))) if window > 0 and len(time) > 1 else 0
     if length < 2:
         raise InputError(f"window = {window} s: must span at least two steps of the recording.")
-    parts = [_cut_one(model.rows(recording), length) for recording in recordings]
+    parts = [cut_rows(model.rows(recording), length) for recording in recordings]
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=-1), *parts)
 
 
-def _cut_one(rows: Row, length: int) -> Segments:
+def cut_rows(rows: Row, length: int) -> Segments:
+    """Cut rows (T,) into segments of `length` of them: the pure part of `cut`."""
     count = rows.t.shape[0]
     if count < 3:
         raise InputError(f"recording has {count} rows: a fit needs at least 3.")

@@ -76,4 +76,5 @@ class Study:
     particles: int = 1000
     gaussian: Noise = Noise(v_y=0.02, yaw_rate=0.01, walk=0.0)
     particle: Noise = Noise(v_y=0.02, yaw_rate=0.005, walk=0.05)
+    saturated: Noise = Noise(v_y=0.0005, yaw_rate=0.0002, walk=0.0)
     window: float = 0.5

@@ -43,10 +43,10 @@ def drive_once(study: Study, key) -> Recording:
     return simulate(vehicles.passenger_car(), manoeuvre, devices, key=key, dt=1 / study.rate, throw=False)
 
 
-def guess_once(study: Study, key):
-    """A car whose tyres are a draw around the truth: what an honest prior's mean looks like."""
+def guess_once(study: Study, key, where=tyres):
+    """A car of which the parameters `where` are a draw around the truth: what an honest prior's mean looks like."""
     car = vehicles.passenger_car()
-    parameters = resolve(car, tyres)
+    parameters = resolve(car, where)
     values = pick(car, parameters)
     spreads = prior_spread(parameters, values, study.prior)
     draws = numerics.normal(key, (len(parameters),), values[0].dtype)
@@ -57,13 +57,14 @@ def guess_once(study: Study, key):
     return put(car, parameters, moved)
 
 
-def model_of(study: Study, car, noise: Noise):
-    """The state space that an estimator of the study sees, with its noise."""
+def model_of(study: Study, car, noise: Noise, where=tyres, prior=None):
+    """The state space that an estimator of the study sees, with its noise; it estimates `where`, known as well as the study's prior
+    or `prior` says."""
     return estimators.state_space(
         car,
         sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std),
-        estimate=tyres,
-        prior=study.prior,
+        estimate=where,
+        prior=study.prior if prior is None else prior,
         walk=noise.walk,
         process_noise={"v_y": noise.v_y, "yaw_rate": noise.yaw_rate},
     )

@@ -1,0 +1,180 @@
+"""Where both axles pass the peak of their curves: D and B can be identified, all eight parameters hardly.
+
+Two drives that the lane change at 25 m/s is not: a lane change at 40 m/s, and a sine sweep of 15 degrees at the road wheels.
+Beyond the peak a car remembers a small error of its tyres for long: that is why the drives tell so much, and why one pass from a
+prior of 10 % is not enough. Both estimators take a second, for which the dynamics are exact.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+
+from jaxveh import estimators, filters, manoeuvres, sensors, sweeps, vehicles
+from jaxveh._core.parameter import pick, put, resolve
+from jaxveh._core.progress import Progress, part, silent
+from jaxveh._core.recording import Recording
+from jaxveh.diagnostics.observability import Observability
+from jaxveh.estimators.observability import predict_measurements
+from jaxveh.experiments.tyre_apf.settings import Study, tyres
+from jaxveh.experiments.tyre_apf.study import guess_once, model_of
+from jaxveh.fitting.multiple_shooting import shoot
+from jaxveh.fitting.segments import cut_rows
+from jaxveh.simulation import simulate
+from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.noise import whiten
+
+SWEEP = "sweep of 15 degrees"
+
+
+AGAIN = 3.0
+"""How many of the first pass's standard deviations the second pass starts with."""
+
+
+def stiffness_and_peak(car):
+    """D and B of both axles; C and E are known."""
+    return (car.front.B, car.front.D, car.rear.B, car.rear.D)
+
+
+UNKNOWN = {"D and B": stiffness_and_peak, "all eight": tyres}
+"""What is estimated."""
+
+
+class Saturated(NamedTuple):
+    """`found`: errors by estimator, unknowns, case and seed on the parameters' real line, (..., p); `bounds`: by unknowns, then by
+    case, what the drive can tell at all; `cases`: their names."""
+
+    cases: tuple[str, ...]
+    found: dict[str, sweeps.Swept]
+    bounds: dict[str, dict[str, Observability]]
+
+
+def cases_of(study: Study) -> dict[str, manoeuvres.AbstractManoeuvre]:
+    """The drives by name."""
+    return {
+        "lane change at 40 m/s": manoeuvres.double_lane_change(speed=40.0, steer=study.steer, duration=study.duration),
+        SWEEP: manoeuvres.swept_sine(
+            speed=study.speed,
+            steer=math.radians(15.0),
+            from_frequency=0.2,
+            to_frequency=1.0,
+            duration=study.duration,
+        ),
+    }
+
+
+def run_saturated(study: Study, seeds: int, key, progress: Progress = silent) -> Saturated:
+    """UKF and MAP on both drives, with D and B unknown, and with all eight."""
+    cases = cases_of(study)
+    progress(0.0, 1.0, "drives")
+    drives = [_drives(study, manoeuvre, seeds, key) for manoeuvre in cases.values()]
+    data = jax.tree.map(lambda *leaves: np.stack(leaves), *drives)
+    found, bounds = {}, {}
+    for i, (name, where) in enumerate(UNKNOWN.items()):
+        bounds[name] = {case: _bounds(study, manoeuvre, where) for case, manoeuvre in cases.items()}
+        design = sweeps.Design(estimator=_estimators(study, where), case=range(len(cases)))
+        run = lambda point, key, drive: point.estimator(key, drive)
+        told = part(progress, 0.1 + 0.45 * i, 0.55 + 0.45 * i, name)
+        found[name] = sweeps.sweep(run, design, seeds, key, data=data, progress=told)
+    return Saturated(tuple(cases), found, bounds)
+
+
+def _recorded(study: Study, manoeuvre, key, throw: bool = False) -> Recording:
+    devices = sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std)
+    return simulate(vehicles.passenger_car(), manoeuvre, devices, key=key, dt=1 / study.rate, throw=throw)
+
+
+def _drives(study: Study, manoeuvre, seeds: int, key) -> dict[str, np.ndarray]:
+    """The channels that filters see, (seeds, T)."""
+
+    def run(point, key):
+        drive = _recorded(study, manoeuvre, jax.random.fold_in(key, 1))
+        return {"time": drive.time} | {name: drive[name] for name in ("yaw_rate", "a_y", "steer", "v_x")}
+
+    return dict(sweeps.sweep(run, sweeps.Design(), seeds, key).values)
+
+
+def _bounds(study: Study, manoeuvre, where) -> Observability:
+    car = vehicles.passenger_car()
+    return estimators.observe(
+        model_of(study, car, study.saturated, where), _recorded(study, manoeuvre, jax.random.key(0), True)
+    )
+
+
+def _estimators(study: Study, where) -> dict:
+    chosen = resolve(vehicles.passenger_car(), where)
+    truth = pick(vehicles.passenger_car(), chosen)
+    error = lambda values: jnp.stack(
+        [p.domain.inverse(v) - p.domain.inverse(t) for p, v, t in zip(chosen, values, truth, strict=True)]
+    )
+
+    def started(key, drive):
+        guess = guess_once(study, jax.random.fold_in(key, 2), where)
+        model = model_of(study, guess, study.gaussian, where)
+        return guess, model, model.rows(Recording(drive["time"], {n: v for n, v in drive.items() if n != "time"}, {}))
+
+    def prior(key, drive):
+        guess, _, _ = started(key, drive)
+        return {"error": error(pick(guess, chosen)), "result": jnp.int32(0)}
+
+    def filtered(model, rows):
+        """Values, standard deviations on the real line, result."""
+        estimate = filters.scan(filters.Unscented(), model, rows)
+        last = lambda tree: [getattr(tree, p.field)[-1] for p in chosen]
+        values = last(estimate.mean)
+        spreads = [s / p.domain.slope(v) for p, v, s in zip(chosen, values, last(estimate.std), strict=True)]
+        return values, spreads, estimate.result
+
+    def unscented(key, drive):
+        guess, model, rows = started(key, drive)
+        values, spreads, first = filtered(model, rows)
+        # The second pass begins where the first ended, with thrice its spread, so that the data hardly count twice.
+        wide = {p.name: jnp.minimum(AGAIN * s, study.prior) for p, s in zip(chosen, spreads, strict=True)}
+        again = model_of(study, put(guess, chosen, values), study.saturated, where, wide)
+        values, _, second = filtered(again, rows)
+        return {"error": error(values), "result": jnp.maximum(first, second).astype(jnp.int32)}
+
+    def fitted(key, drive):
+        _, model, rows = started(key, drive)
+        segments = cut_rows(rows, round(study.window * study.rate))
+        fit = shoot(model, segments, jnp.asarray(0.01, rows.t.dtype), True, 100, 1e-8)
+        start = jnp.stack([p.domain.inverse(getattr(fit.mean, p.field)) for p in chosen])
+        found, converged = single_shooting(model, rows, start)
+        return {
+            "error": error([p.domain.forward(v) for p, v in zip(chosen, found, strict=True)]),
+            "result": jnp.where(converged, 0, 1).astype(jnp.int32),
+        }
+
+    return {"prior": prior, "UKF": unscented, "MAP": fitted}
+
+
+def single_shooting(model: StateSpace, rows: Row, start) -> tuple[jax.Array, jax.Array]:
+    """The parameters (p,) on the real line whose undisturbed course from the prior's first state fits best, the prior counted
+    (output error, Ljung 1999, ch. 4), by Levenberg-Marquardt from `start`; and whether it converged."""
+    mean = jnp.stack(model.prior.mean)
+    n = mean.size - start.size
+    spread = jnp.sqrt(jnp.diagonal(model.prior.covariance()))[n:]
+
+    def residuals(z, args):
+        state = type(model.prior.mean)(*mean.at[n:].set(z))
+        predicted, present = predict_measurements(model, rows, state)
+        wrong = {name: jnp.where(present[name], getattr(rows.y, name), 0.0) - predicted[name] for name in model.channels}
+        white = whiten(model.measurement_noise, wrong, present)
+        return jnp.concatenate([*(white[name] for name in model.channels), (z - mean[n:]) / spread])
+
+    solver = optx.LevenbergMarquardt(rtol=1e-8, atol=1e-8)
+    solution = optx.least_squares(
+        residuals, solver, start, max_steps=60, throw=False, options={"jac": "fwd"}
+    )
+    return solution.value, solution.result == optx.RESULTS.successful
+
+
+def over_bound(result: Saturated, unknown: str, estimator: str, case: str) -> np.ndarray:
+    """(p,) root mean square over seeds of each parameter's error, over its Cramer-Rao bound."""
+    error = result.found[unknown].at("error", estimator=estimator)[result.cases.index(case)]
+    return np.sqrt(np.mean(error**2, axis=0)) / result.bounds[unknown][case].bounds
