@@ -34,6 +34,11 @@ def above(name: str, value, bound: float) -> Check:
     return Check(name, float(value), float(bound), bool(value > bound))
 
 
+def at_least(name: str, value, bound: float) -> Check:
+    """A criterion that holds at or above the bound."""
+    return Check(name, float(value), float(bound), bool(value >= bound))
+
+
 def spread(values, digits: int = 3, scale: float = 1.0, lost: str = "lost") -> str:
     """`median [lower quartile, upper quartile]` of the values; those that are not finite count as the largest, and are `lost`."""
     values = scale * np.asarray(values, float)

@@ -1,9 +1,12 @@
 """Bao, Sabbioni et al. (2015): an auxiliary particle filter for Magic Formula parameters and vehicle states."""
 
+from jaxveh.experiments.report import Check, Table
 from jaxveh.experiments.tyre_apf.printed import Printed, run_printed_seeds
-from jaxveh.experiments.tyre_apf.report import Check, Reproduction, Table, as_printed, check, run, settings, tables
+from jaxveh.experiments.tyre_apf.report import as_printed, check, run, settings
+from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.settings import CITATION, Study, tyres
 from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
+from jaxveh.experiments.tyre_apf.tables import tables
 
 __all__ = [
     "CITATION",

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh import numerics, plots, vehicles
 from jaxveh._core.parameter import pick, prior_spread, put, resolve
-from jaxveh.experiments.tyre_apf.report import Reproduction
+from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.settings import Study, tyres
 from jaxveh.experiments.tyre_apf.staged import Staged
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS, Outcome, with_tyres

@@ -57,15 +57,15 @@ def guess_once(study: Study, key, where=tyres):
     return put(car, parameters, moved)
 
 
-def model_of(study: Study, car, noise: Noise, where=tyres, prior=None):
-    """The state space that an estimator of the study sees, with its noise; it estimates `where`, known as well as the study's prior
-    or `prior` says."""
+def model_of(study: Study, car, noise: Noise, where=tyres, input_path: str = "held"):
+    """The state space that an estimator of the study sees, with its noise; it estimates `where`."""
     return estimators.state_space(
         car,
         sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std),
         estimate=where,
-        prior=study.prior if prior is None else prior,
+        prior=study.prior,
         walk=noise.walk,
+        input_path=input_path,
         process_noise={"v_y": noise.v_y, "yaw_rate": noise.yaw_rate},
     )
 

@@ -1,0 +1,112 @@
+"""Auxiliary against plain particle filter: over the sharpness of the sensors and the number of particles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import estimators, filters, manoeuvres, sensors, sweeps, vehicles
+from jaxveh._core.parameter import pick, prior_spread, resolve
+from jaxveh._core.progress import Progress, silent
+from jaxveh.experiments.tyre_apf.settings import LEVELS, Study, tyres
+from jaxveh.experiments.tyre_apf.study import guess_once
+from jaxveh.simulation import simulate
+
+PAPERS_PARTICLES = 300
+"""As printed."""
+
+COUNTS = (100, PAPERS_PARTICLES, 1000)
+
+AGAIN = 10
+"""How often each filter goes over the same drive, with other draws."""
+
+KINDS = {"PF": filters.ParticleFilter, "APF": filters.AuxiliaryParticleFilter}
+
+
+class Sharpness(NamedTuple):
+    """By number of particles, `found` over filter (and the prior), level and seed: `error`, the root mean square of the eight
+    parameters' errors in prior standard deviations, over all passes; `likelihood_spread`, the interquartile range of the
+    log-likelihood over passes of one drive; `result`."""
+
+    found: dict[int, sweeps.Swept]
+
+
+def run_sharpness(study: Study, seeds: int, key, *, again: int = AGAIN, progress: Progress = silent) -> Sharpness:
+    """Both filters with every number of particles at each level of noise, on the same drives from the same guesses."""
+    found = {}
+    for i, count in enumerate(COUNTS):
+        runs = {name: _passes(study, kind(count), again) for name, kind in KINDS.items()}
+        design = sweeps.Design(filter={"prior": _prior(study), **runs}, level=range(len(LEVELS)))
+        told = lambda done, total, stage, i=i, count=count: progress(
+            (i + done / total) / len(COUNTS), 1.0, f"{count} particles: {stage}"
+        )
+        run = lambda point, key: point.filter(point.level, key)
+        found[count] = sweeps.sweep(run, design, seeds, key, progress=told)
+    return Sharpness(found)
+
+
+def _errors(study: Study, values):
+    """The values' (..., 8) errors in prior standard deviations."""
+    car = vehicles.passenger_car()
+    chosen = resolve(car, tyres)
+    truth = pick(car, chosen)
+    spreads = prior_spread(chosen, truth, study.prior)
+    parts = [
+        (p.domain.inverse(values[..., i]) - p.domain.inverse(t)) / s
+        for i, (p, t, s) in enumerate(zip(chosen, truth, spreads, strict=True))
+    ]
+    return jnp.stack(parts, axis=-1)
+
+
+def _rms(errors):
+    return jnp.sqrt(jnp.mean(errors**2))
+
+
+def _prior(study: Study):
+    def run(level, key):
+        guess = guess_once(study, jax.random.fold_in(key, 2))
+        values = jnp.stack(pick(guess, resolve(guess, tyres)))
+        return {"error": _rms(_errors(study, values)), "likelihood_spread": jnp.nan * level, "result": jnp.int32(0)}
+
+    return run
+
+
+def _passes(study: Study, filter_, again: int):
+    def run(level, key):
+        at = lambda which: jnp.asarray([which(one) for one in LEVELS])[level.astype(int)]
+        devices = sensors.esc(yaw_rate=at(lambda one: one.yaw_rate), a_y=at(lambda one: one.a_y))
+        guess = guess_once(study, jax.random.fold_in(key, 2))
+        manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
+        drive = simulate(
+            vehicles.passenger_car(), manoeuvre, devices, key=jax.random.fold_in(key, 1), dt=1 / study.rate, throw=False
+        )
+        noise = {"v_y": at(lambda one: one.noise.v_y), "yaw_rate": at(lambda one: one.noise.yaw_rate)}
+        model = estimators.state_space(
+            guess, devices, estimate=tyres, prior=study.prior, walk=at(lambda one: one.noise.walk), process_noise=noise
+        )
+        rows = model.rows(drive)
+        fields = [p.field for p in resolve(guess, tyres)]
+
+        def once(key):
+            estimate = filters.scan(filter_, model, rows, key)
+            last = jnp.stack([getattr(estimate.mean, field)[-1] for field in fields])
+            return last, estimate.log_likelihood, estimate.result
+
+        last, likelihood, result = jax.vmap(once)(jax.random.split(jax.random.fold_in(key, 3), again))
+        low, high = jnp.quantile(likelihood, jnp.asarray([0.25, 0.75]))
+        return {
+            "error": _rms(_errors(study, last)),
+            "likelihood_spread": high - low,
+            "result": jnp.max(result).astype(jnp.int32),
+        }
+
+    return run
+
+
+def likelihood_ratio(result: Sharpness, count: int, level: int) -> float:
+    """The APF's spread of the log-likelihood over the PF's: of the medians over seeds."""
+    spread = lambda name: np.median(result.found[count].at("likelihood_spread", filter=name, level=float(level)))
+    return float(spread("APF") / spread("PF"))

@@ -1,0 +1,175 @@
+"""The tables of the tyre-apf experiment: honest first, the do-nothing prior in each, then as printed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jaxveh.experiments.report import Table, spread
+from jaxveh.experiments.tyre_apf.printed import Printed, PrintedOutcome
+from jaxveh.experiments.tyre_apf.reproduction import Reproduction
+from jaxveh.experiments.tyre_apf.saturated import over_bound
+from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER, TABLE_2, TABLE_3
+from jaxveh.experiments.tyre_apf.sharpness import KINDS, Sharpness, likelihood_ratio
+from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS
+
+
+def tables(result: Reproduction) -> list[Table]:
+    """All of them."""
+    return [
+        _curve_table(result),
+        _parameter_table(result),
+        _step_table(result),
+        _saturated_table(result),
+        _error_table(result.sharpness),
+        _likelihood_table(result.sharpness),
+        _truth_table(result),
+        *tables_as_printed(result.printed, result.printed_settings),
+    ]
+
+
+def tables_as_printed(found: PrintedOutcome, settings: Printed) -> list[Table]:
+    """Tables 2 and 3 with the printed settings."""
+    return [_printed_2(found), _printed_3(found, settings)]
+
+
+def _curve_table(result: Reproduction) -> Table:
+    rows = []
+    for name in ESTIMATORS:
+        curve, states = np.asarray(result.outcome.curve_error[name]), np.asarray(result.outcome.states[name])
+        rows.append((name, *[spread(100 * curve[:, i]) for i in (0, 1)], *[spread(states[:, i]) for i in (0, 1)]))
+    return Table(
+        f"Force curves over the visited slips and states: RMSE, median [quartiles] over {result.seeds} seeds",
+        ("estimator", "front F_y, % of D", "rear F_y, % of D", "v_y, m/s", "yaw rate, rad/s"),
+        rows,
+    )
+
+
+def _parameter_table(result: Reproduction) -> Table:
+    truth = np.asarray(result.printed.truth)[0]
+    rows = []
+    for i, field in enumerate(FIELDS):
+        unit = 1.0 if field.endswith("E") else truth[i]
+        errors = [np.abs(np.asarray(result.outcome.parameters[n])[:, i] - truth[i]) / abs(unit) for n in ESTIMATORS]
+        rows.append((field.replace("_", "."), f"{truth[i]:g}", *[spread(100 * e) for e in errors]))
+    return Table(
+        f"Absolute error of each parameter in % of the truth (E: in hundredths), median [quartiles] over {result.seeds} seeds",
+        ("parameter", "truth", *ESTIMATORS),
+        rows,
+    )
+
+
+def _step_table(result: Reproduction) -> Table:
+    rows = []
+    for degrees, printed in STEP_STEER.items():
+        for i, what in enumerate(("yaw, rad", "yaw rate, rad/s")):
+            cells = [spread(np.asarray(result.steps[degrees][n])[:, i]) for n in ESTIMATORS]
+            rows.append((f"{degrees} degrees, {what}", f"{printed[i]:g}", *cells))
+    return Table(
+        "Step steer with the estimated tyres: RMSE, median [quartiles]", ("step steer", "paper", *ESTIMATORS), rows
+    )
+
+
+def _saturated_table(result: Reproduction) -> Table:
+    rows, shown = [], [f"{axle}.{name}" for axle in ("front", "rear") for name in "BD"]
+    for unknown, found in result.saturated.found.items():
+        for i, case in enumerate(result.saturated.cases):
+            seen = result.saturated.bounds[unknown][case]
+            for name in ("prior", "UKF", "MAP"):
+                error = 100 * np.sqrt(np.mean(found.at("error", estimator=name)[i] ** 2, axis=0))
+                pairs = dict(zip(seen.names, zip(error, 100 * seen.bounds, strict=True), strict=True))
+                ratio = over_bound(result.saturated, unknown, name, case).max()
+                lost = int((found.at("result", estimator=name)[i] != 0).sum())
+                cells = [f"{pairs[one][0]:.2g} ({pairs[one][1]:.2g})" for one in shown]
+                rows.append((unknown, case, name, *cells, f"{ratio:.3g}", lost))
+    return Table(
+        f"Where both axles pass their peak: RMSE in % over {result.seeds} seeds (in brackets the Cramer-Rao bound)",
+        ("unknown", "drive", "estimator", *shown, "worst RMSE over bound", "lost"),
+        rows,
+    )
+
+
+HEADS = tuple(f"{level.yaw_rate:g} rad/s, {level.a_y:g} m/s^2" for level in LEVELS)
+
+
+def _error_table(found: Sharpness) -> Table:
+    rows = []
+    for count, runs in found.found.items():
+        rows += [(count, name, *[spread(v) for v in runs.at("error", filter=name)]) for name in ("prior", *KINDS)]
+        compared = runs.compare("error", "filter", "APF", "PF")
+        ratio = zip(*compared.ratio, compared.wins, strict=True)
+        cells = [f"{value:.3g} [{low:.3g}, {high:.3g}], {wins:.0%}" for value, low, high, wins in ratio]
+        rows.append((count, "APF over PF (95 %), wins", *cells))
+    title = "Eight parameters by the sensors' noise: RMSE in prior standard deviations, median [quartiles]"
+    return Table(title, ("particles", "filter", *HEADS), rows)
+
+
+def _likelihood_table(found: Sharpness) -> Table:
+    rows = []
+    for count, runs in found.found.items():
+        rows += [(count, name, *[spread(v) for v in runs.at("likelihood_spread", filter=name)]) for name in KINDS]
+        own = [f"{likelihood_ratio(found, count, i):.3g}" for i in range(len(LEVELS))]
+        rows.append((count, "APF over PF", *own))
+    title = (
+        "The same: interquartile range of the log-likelihood over passes of one drive, median [quartiles] over drives"
+    )
+    return Table(title, ("particles", "filter", *HEADS), rows)
+
+
+def _truth_table(result: Reproduction) -> Table:
+    """Both looks at the truth on purpose, one by one and together."""
+    truth = np.asarray(result.printed.truth)[0]
+    honest = {name: result.outcome.parameters[name] for name in ("prior", "PF", "APF")}
+    looks = [
+        ("none: an honest prior, the last estimate", honest),
+        ("at the end: an honest prior, the mean of the 20 % closest to the truth", result.peeked),
+        ("at the start: from the truth, the last estimate", result.printed.last),
+        ("both, as the paper", result.printed.by_rule),
+    ]
+    unit = np.where([field.endswith("E") for field in FIELDS], 1.0, truth)
+    rows = []
+    for look, values in looks:
+        for name in [one for one in ("prior", "PF", "APF", "walk") if one in values]:
+            error = np.abs(np.asarray(values[name]) - truth) / unit
+            rows.append((look, name, *[spread(100 * error[:, i], 2) for i in range(len(FIELDS))]))
+    return Table(
+        "Two ways to look at the truth: absolute error in % (E: in hundredths), median [quartiles]; 'walk' filters nothing; from "
+        "the truth on with the printed geometry and P0 = Q = I",
+        ("look", "estimator", *[field.replace("_", ".") for field in FIELDS]),
+        rows,
+    )
+
+
+def _printed_2(printed: PrintedOutcome) -> Table:
+    truth = np.asarray(printed.truth)[0]
+    rows = []
+    for i, field in enumerate(FIELDS):
+        cells = [
+            f"{np.median(where[n], axis=0)[i]:.5g}"
+            for n in ("PF", "APF", "walk")
+            for where in (printed.last, printed.by_rule)
+        ]
+        rows.append((field.replace("_", "."), f"{truth[i]:g}", f"{TABLE_2[field][1]:g}", *cells))
+    heads = [f"{n}, {how}" for n in ("PF", "APF", "walk") for how in ("last", "closest 20 %")]
+    return Table(
+        "Table 2 as printed: every filter starts at the truth; 'closest 20 %' looks at the truth again; 'walk' filters nothing",
+        ("parameter", "truth = start", "paper", *heads),
+        rows,
+    )
+
+
+def _printed_3(printed: PrintedOutcome, settings: Printed) -> Table:
+    truth = np.asarray(printed.truth)[0]
+    rows = []
+    for i, field in enumerate(FIELDS):
+        rms = [
+            np.sqrt(np.mean((np.asarray(printed.series[n])[:, i] - truth[i]) ** 2, axis=-1))
+            for n in ("PF", "APF", "walk")
+        ]
+        rows.append((field.replace("_", "."), *[f"{v:g}" for v in TABLE_3[field]], *[spread(r) for r in rms]))
+    ess = {name: float(np.median(value)) for name, value in printed.ess.items()}
+    return Table(
+        f"Table 3 as printed (P0 = Q = I): RMSE over time; effective sample size {ess['PF']:.1f} (PF), {ess['APF']:.1f} (APF) "
+        f"of {settings.particles}",
+        ("parameter", "paper PF", "paper APF", "PF", "APF", "walk"),
+        rows,
+    )

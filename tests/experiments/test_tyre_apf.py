@@ -1,0 +1,75 @@
+"""The further parts of the tyre-apf experiment at small size: saturated drives, sharpness, looks at the truth."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import sweeps
+from jaxveh.experiments.tyre_apf import Study, saturated, sharpness
+from jaxveh.experiments.tyre_apf.printed import closest_share
+
+
+@pytest.fixture(scope="module")
+def peaks():
+    return saturated.run_saturated(Study(), 4, jax.random.key(3), unknown=("D and B",), only=("prior", "UKF"))
+
+
+def test_beyond_the_peak_the_filter_is_near_the_bound(peaks):
+    for case in peaks.cases:
+        assert saturated.over_bound(peaks, "D and B", "UKF", case).max() < 3.0
+        assert saturated.over_bound(peaks, "D and B", "prior", case).max() > 20.0
+    assert (peaks.found["D and B"]["result"] == 0).all()
+
+
+def test_the_drives_tell_d_and_b(peaks):
+    for case in peaks.cases:
+        seen = peaks.bounds["D and B"][case]
+        assert seen.names == ("front.B", "front.D", "rear.B", "rear.D")
+        assert seen.observable() == seen.names
+
+
+def test_single_shooting_finds_what_made_the_data():
+    """On a drive without noise, from a start 2 % beside; the prior's mean is the truth."""
+    from jaxveh import manoeuvres, sensors, simulate, vehicles
+    from jaxveh.experiments.tyre_apf.study import model_of
+
+    study = Study(duration=6.0)
+    car = vehicles.passenger_car()
+    manoeuvre = manoeuvres.double_lane_change(speed=40.0, steer=0.1, duration=6.0)
+    drive = simulate(car, manoeuvre, sensors.esc(yaw_rate=1e-9, a_y=1e-9), key=jax.random.key(0), dt=0.01)
+    model = model_of(study, car, study.saturated, saturated.stiffness_and_peak, "linear")
+    truth = jnp.stack(model.prior.mean)[-4:]
+    found, converged = saturated.single_shooting(
+        model, model.rows(drive), truth + jnp.asarray([0.02, -0.02, 0.01, 0.02])
+    )
+    assert converged
+    np.testing.assert_allclose(found, truth, atol=2e-4)
+
+
+def test_errors_of_the_prior_are_one_standard_deviation(monkeypatch):
+    monkeypatch.setattr(sharpness, "COUNTS", (20,))
+    monkeypatch.setattr(sharpness, "KINDS", {"PF": sharpness.KINDS["PF"]})
+    found = sharpness.run_sharpness(Study(duration=6.0, rate=20.0), 20, jax.random.key(0), again=3).found[20]
+    prior = found.at("error", filter="prior")
+    np.testing.assert_allclose(np.sqrt(np.mean(prior**2)), 1.0, rtol=0.15)
+    # The same guess at every level; the filter's estimates differ between levels.
+    np.testing.assert_array_equal(prior[0], prior[2])
+    error = found.at("error", filter="PF")
+    assert (found.at("result", filter="PF") == 0).all() and not np.isclose(error[0], error[2]).any()
+    assert (found.at("likelihood_spread", filter="PF") > 0).all()
+
+
+def test_the_ratio_is_of_medians():
+    design = sweeps.Design(filter={"prior": 0, "PF": 1, "APF": 2}, level=[0.0, 1.0])
+    spreads = np.stack(
+        [np.full((2, 3), np.nan), [[1.0, 2.0, 9.0], [4.0, 4.0, 4.0]], [[1.0, 1.0, 0.1], [2.0, 8.0, 3.0]]]
+    )
+    given = sharpness.Sharpness({300: sweeps.Swept(design, 3, {"likelihood_spread": spreads})})
+    assert sharpness.likelihood_ratio(given, 300, 0) == pytest.approx(0.5)
+    assert sharpness.likelihood_ratio(given, 300, 1) == pytest.approx(0.75)
+
+
+def test_the_closest_fifth_looks_at_the_truth():
+    series = jnp.asarray([[5.0, 1.1, 0.7, 3.0, 9.0, 1.2, 4.0, 8.0, 0.0, 7.0]])
+    np.testing.assert_allclose(closest_share(series, jnp.asarray([1.0]), 0.2), [0.5 * (1.1 + 1.2)])
