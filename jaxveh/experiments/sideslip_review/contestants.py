@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import filters, numerics, observers
+from jaxveh._core.result import Result, code
 from jaxveh.experiments.sideslip_review.drives import Drive
 from jaxveh.experiments.sideslip_review.models import Cars, Models, rows
 from jaxveh.experiments.sideslip_review.settings import Study
-from jaxveh._core.result import Result, code
 from jaxveh.statespace import StateSpace
 
 
@@ -139,7 +139,7 @@ def steady_state(cars: Cars) -> Method:
 
 
 def pseudo_integrated(time: float, slow: Found, drive: Drive) -> Found:
-    """Piyabongkarn et al. (2009): `dv/dt = a_y - v_x r + (v_slow - v) / time`; both parts of one first-order filter add to one."""
+    """Piyabongkarn et al. (2009): `dv/dt = a_y - v_x r + (v_slow - v) / time`, a first-order filter and its complement."""
     kept = jnp.exp(-jnp.diff(drive.time) / time)
     wanted = _middle(drive.a_y - drive.v_x * drive.yaw_rate) * time + _middle(slow.v_y)
 

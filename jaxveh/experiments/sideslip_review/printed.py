@@ -11,13 +11,14 @@ import math
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import vehicles
+from jaxveh import tyres, vehicles
 from jaxveh._core.names import record
 from jaxveh.experiments.report import Table
 from jaxveh.experiments.sideslip_review.drives import numbers_of
-from jaxveh.vehicles import GRAVITY, LinearSingleTrack
+from jaxveh.vehicles import LinearSingleTrack
 
 SPEED, STEER = 20.0, 0.02
 """m/s and rad of the steady turn."""
@@ -50,9 +51,9 @@ def steady_turn(speed: float = SPEED, steer: float = STEER) -> tuple[float, floa
 
     def rates(x):
         found = car.derivatives(0.0, car.state_type(x[0], 0.0 * x[0], x[1]), u)
-        return jax.numpy.stack([found.sideslip, found.yaw_rate])
+        return jnp.stack([found.sideslip, found.yaw_rate])
 
-    zero = jax.numpy.zeros(2)
+    zero = jnp.zeros(2)
     sideslip, yaw_rate = np.linalg.solve(np.asarray(jax.jacfwd(rates)(zero)), -np.asarray(rates(zero)))
     return float(sideslip), float(yaw_rate), float(speed * yaw_rate)
 
@@ -104,46 +105,42 @@ def _place() -> list[Line]:
     return [Line("17", "l_f / l", share(1), share(-1), car.front_axle_to_cg / car.wheelbase)]
 
 
-def braking(
-    ratio: float, slip_angle: float, printed: bool, k: float = 50000.0, k_a: float = 35000.0, limit: float = 3000.0
-):
-    """Eq 4: the braking force of a wheel (N) at a slip ratio and slip angle, `limit` = mu F_z (N)."""
-    across = (ratio if printed else 1.0) * k_a * math.tan(slip_angle)
-    H = math.hypot(ratio * k, across) / ((1 - ratio) * limit)
-    full = ratio / (1 - ratio) * k
+K, K_A, LIMIT = 50000.0, 35000.0, 3000.0
+"""Slip stiffness (N), cornering stiffness (N/rad) and friction times load (N) of a wheel."""
+
+
+def braking(ratio: float, slip_angle: float, printed: bool) -> float:
+    """Eq 4: the braking force of a wheel (N) at a slip ratio (positive: braking) and a slip angle (rad)."""
+    across = (ratio if printed else 1.0) * K_A * math.tan(slip_angle)
+    H = math.hypot(ratio * K, across) / ((1 - ratio) * LIMIT)
+    full = ratio / (1 - ratio) * K
     if H <= 0.5 and not printed:
         return full
     return full * (1 / H - 1 / (4 * H**2))
 
 
 def _slipping() -> list[Line]:
-    """Eq 4 at small slip, where the force is nearly k_lambda lambda, and beside a slip angle."""
-    small = Line(
-        "4",
-        "braking force, N, slip ratio 0.01, rolling straight",
-        braking(0.01, 0.0, True),
-        braking(0.01, 0.0, False),
-        505.05,
-    )
-    angle = math.radians(5.0)
-    cornering = 35000.0 * math.tan(angle) / 0.95
-    length = math.hypot(50000.0 * 0.05 / 0.95, cornering)
-    h = length / 3000.0
-    right = 50000.0 * 0.05 / 0.95 * (1 / h - 1 / (4 * h**2))
-    beside = Line("4", "the same at 0.05 and 5 degrees", braking(0.05, angle, True), braking(0.05, angle, False), right)
-    return [small, beside]
+    """Eq 4 at small slip, where the force is nearly `K lambda`, and beside a slip angle; the library's HSRI tyre judges."""
+    tyre, lines = tyres.HSRI(K, K_A), []
+    for what, ratio, degrees in (("rolling straight", 0.01, 0.0), ("at 5 degrees", 0.05, 5.0)):
+        angle = math.radians(degrees)
+        contact = tyres.Contact(slip_angle=jnp.asarray(angle), slip_ratio=jnp.asarray(-ratio), load=jnp.asarray(LIMIT))
+        both = braking(ratio, angle, True), braking(ratio, angle, False)
+        lines.append(Line("4", f"braking force at slip {ratio:g}, {what}, N", *both, -float(tyre.forces(contact).F_x)))
+    return lines
 
 
 def _sign() -> list[Line]:
-    """Eqs 5 and 6 at one slip angle: forces of opposite sign."""
-    alpha, k, limit = 0.03, 35000.0, 0.9 * 0.5 * 1230.0 * GRAVITY / 2
-    parabola = k * alpha - k**2 * alpha**2 / (4 * limit)
-    exponential = limit * (1 - math.exp(-k / limit * alpha))
-    return [Line("5", "F_y, N, at a slip angle of 0.03 rad (eq 6 beside it)", -parabola, parabola, exponential)]
+    """Eq 5 at one slip angle; the library's parabolic tyre judges, whose slip angles are those of eqs 6 and 7."""
+    alpha = 0.03
+    force = K_A * alpha - K_A**2 * alpha**2 / (4 * LIMIT)
+    contact = tyres.Contact(slip_angle=jnp.asarray(alpha), load=jnp.asarray(LIMIT))
+    should = float(tyres.Parabolic(K_A).forces(contact).F_y)
+    return [Line("5", f"F_y at a slip angle of {alpha:g} rad, N", -force, force, should)]
 
 
 def _rear() -> list[Line]:
     """Eq 15: the rear axle's force does not depend on the steer."""
     car, a_y, steer = numbers_of(), 5.0, 0.3
     force = car.front_axle_to_cg * (car.mass or 0.0) * a_y / car.wheelbase
-    return [Line("15", "F_yr, N, at 5 m/s^2 and 0.3 rad of steer", force / math.cos(steer), force, force)]
+    return [Line("15", "F_yr at 5 m/s^2 and 0.3 rad of steer, N", force / math.cos(steer), force, force)]

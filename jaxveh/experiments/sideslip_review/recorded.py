@@ -1,4 +1,4 @@
-"""The methods on a log of a real car whose lateral velocity was measured: calibrated blind on its first half, scored on its second."""
+"""The methods on a real log with a measured v_y: calibrated blind on its first half, scored on its second."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from jaxveh.experiments.sideslip_review.study import Raced, drives_of, race
 from jaxveh.experiments.sideslip_review.verdicts import BANK, ROWS, claims, limit_of, number, verdicts
 from jaxveh.sweeps import Interval
 
-FIRST = tuple(WHAT)[0]
+FIRST = next(iter(WHAT))
 """The baseline."""
 
 

@@ -74,8 +74,8 @@ class Noise:
     """What the filters take for noise: process noise in unit per root second, measurement noise in the channel's unit.
 
     Those of the greatest likelihood on mixed drives, ordinary and at the limit, of other keys than the study's (so that the
-    truth has no part in them), none of the measurements' below the sensors' own. `linear`, `nonlinear`: the single tracks; `kinematic`: v_x and v_y driven by the
-    accelerometers; `handling`: the library's model with errors as states.
+    truth has no part in them), none of the measurements' below the sensors' own. `linear`, `nonlinear`: the single tracks;
+    `kinematic`: v_x and v_y driven by the accelerometers; `handling`: the library's model with errors as states.
     """
 
     linear: Levels = (("sideslip", 0.01), ("yaw_rate", 0.09), ("seen_yaw_rate", YAW_RATE), ("seen_a_y", A_Y))
