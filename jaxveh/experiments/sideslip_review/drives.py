@@ -68,10 +68,10 @@ def true_car(study: Study, spread, key) -> SevenDOF:
 
 def _tyre(study: Study, axle: int, stiffness, grip) -> Relaxed:
     """The tyre of one wheel of an axle (0: front): a Magic Formula that stands for all loads, roads and directions."""
-    numbers, load = numbers_of(), numbers_of().wheel_loads()[axle]
-    known = (numbers.front, numbers.rear)[axle]
+    numbers = numbers_of()
+    load, known = numbers.wheel_loads()[axle], 0.5 * numbers.values()[("front_stiffness", "rear_stiffness")[axle]]
     D = study.peak_friction * load * grip
-    curve = MagicFormula(B=known.cornering_stiffness * stiffness / (study.C * D), C=study.C, D=D, E=study.E)
+    curve = MagicFormula(B=known * stiffness / (study.C * D), C=study.C, D=D, E=study.E)
     return Relaxed(Similarity(curve, load, study.stiffest * load, study.slip_stiffness), sigma_y=study.relaxation)
 
 

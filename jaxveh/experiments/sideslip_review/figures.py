@@ -62,7 +62,7 @@ def errors_figure(raced: Raced) -> Any:
     """Sideslip RMSE of every method by scenario: medians and quartiles over seeds."""
     figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     with style():
-        panels = figure.subplots(2, 4, sharey=True).ravel()
+        panels = figure.subplots(2, 4, sharey=True, sharex=True).ravel()
         names = list(WHAT)
         for axes, scenario in zip(panels, (*raced.scenarios, "long"), strict=False):
             metric, where = ("late", "normal") if scenario == "long" else ("early", scenario)
@@ -75,6 +75,7 @@ def errors_figure(raced: Raced) -> Any:
                 axes.plot((a, c), (place, place), color=colour)
                 axes.plot(b, place, marker="o", markersize=3.5, color=colour)
             axes.set_xscale("log")
+            axes.set_xticks([0.1, 1.0, 10.0], ["0.1", "1", "10"])
             axes.set(title=f"{scenario}, the end" if metric == "late" else scenario)
             axes.set_yticks(places, names, fontsize=7)
         for axes in panels[4:]:

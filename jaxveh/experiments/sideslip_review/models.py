@@ -42,11 +42,8 @@ def sheet_cars() -> Cars:
     numbers = numbers_of()
     track = vehicles.build(numbers, SingleTrack)
     loads = track.static_loads()
-    axles = [
-        vehicles.axle_from_stiffness(2.0 * tyre.cornering_stiffness, load)
-        for tyre, load in zip((numbers.front, numbers.rear), loads, strict=True)
-        if tyre is not None
-    ]
+    stiffnesses = (numbers.values()[name] for name in ("front_stiffness", "rear_stiffness"))
+    axles = [vehicles.axle_from_stiffness(one, load) for one, load in zip(stiffnesses, loads, strict=True)]
     options = dict(front=axles[0], rear=axles[1])
     nonlinear = vehicles.build(numbers, SingleTrack, **options)
     moving = vehicles.build(numbers, SingleTrack, cg_height=numbers.cg_height, **options)
