@@ -142,7 +142,7 @@ def test_a_verdict_is_the_intervals(low, value, high, mark, verdict):
 
 def test_checks_count_failures_and_cells(raced):
     """On made-up numbers: a race of all methods would take a minute."""
-    every = dict.fromkeys(contestants.WHAT, raced.found["open loop"])
+    baseline = raced.found["open loop"]
     places = [NAMES.index(name) if name in NAMES else 0 for name in SCENARIOS]
     full = {name: {key: baseline[key][places] for key in baseline} for name in contestants.WHAT}
     whole = raced._replace(scenarios=tuple(SCENARIOS), found=full)
