@@ -10,7 +10,7 @@ from shared_data import shared
 
 from jaxveh import estimators, io, vehicles
 from jaxveh.experiments import sideslip_review as experiment
-from jaxveh.experiments.sideslip_review import contestants, models, printed, recorded, report, verdicts
+from jaxveh.experiments.sideslip_review import contestants, figures, models, printed, recorded, report, verdicts
 from jaxveh.experiments.sideslip_review.drives import Drive
 from jaxveh.experiments.sideslip_review.settings import DEGREE, MARKS, SCENARIOS
 from jaxveh.experiments.sideslip_review.study import fast_part, metrics
@@ -159,6 +159,7 @@ def test_checks_count_failures_and_cells(raced):
     assert not checks[0].holds
     titles = [table.title for table in report.tables(result)]
     assert any("none was given" in title for title in titles)
+    assert set(figures.figures(result)) == {"marks", "errors", "limit", "sensor_bias"}
 
 
 def test_on_a_log_the_baseline_is_the_open_loop():

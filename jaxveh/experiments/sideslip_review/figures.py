@@ -101,8 +101,10 @@ def drive_figure(raced: Raced, scenario: str, seed: int = 0) -> Any:
             course = np.rad2deg(raced.at("course", name, scenario)[seed])
             above.plot(time[rows], course[rows], color=colour, label=name)
             below.plot(time[rows], (course - true)[rows], color=colour)
-        above.set(ylabel="sideslip [°]", title=f"One drive: {scenario}")
-        below.set(xlabel="time [s]", ylabel="error [°]")
+        # What drifts away leaves the picture, so that the others can be told apart.
+        most = 2.0 * np.abs(true[rows]).max()
+        above.set(ylabel="sideslip [°]", ylim=(-most, most), title=f"One drive: {scenario}")
+        below.set(xlabel="time [s]", ylabel="error [°]", ylim=(-most, most))
         figure.legend(loc="outside upper left", ncols=4)
     return figure
 
@@ -125,5 +127,5 @@ def log_figure(logged: Logged) -> Any:
         for name, colour in zip(("EKF", READY[1], logged.best), (CYCLE[0], CYCLE[1], CYCLE[2]), strict=True):
             below.plot(time[rows], np.rad2deg(logged.courses[name][rows]), color=colour, label=name)
         below.set(xlabel="time in the second half [s]", ylabel="sideslip [°]")
-        below.legend(ncols=4)
+        figure.legend(*below.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
