@@ -1,0 +1,150 @@
+"""The review's circles and crosses, and what its text claims, as numbers with intervals and verdicts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh.experiments.sideslip_review.settings import MARKED, MARKS, Study
+from jaxveh.experiments.sideslip_review.study import Raced
+from jaxveh.sweeps import Interval, compare
+
+SUPPORTS, CONTRADICTS, OPEN = "supports", "contradicts", "cannot tell"
+
+
+class Statistic(NamedTuple):
+    """What stands for a row: the median over seeds of `metric` in a scenario over `reference`, (metric, scenario).
+
+    With the reference's metric `of_...` it is a share of sideslip itself, else by how much an error has grown. `what`: in words.
+    """
+
+    metric: str
+    scenario: str
+    reference: tuple[str, str]
+    what: str
+
+    @property
+    def is_share(self) -> bool:
+        """Whether sideslip itself is the reference."""
+        return self.reference[0].startswith("of_")
+
+
+ROWS = {
+    "normal driving": Statistic("early", "normal", ("of_early", "normal"), "error over sideslip, ordinary driving"),
+    "hard cornering": Statistic("early", "limit", ("of_early", "limit"), "error over sideslip, at the limit"),
+    "robust to sensor bias": Statistic("early", "sensor bias", ("early", "normal"), "error over that without the bias"),
+    "stable over a long time": Statistic(
+        "late", "normal", ("early", "normal"), "error at the end over the beginning's"
+    ),
+    "robust to a change of friction": Statistic(
+        "late", "friction", ("late", "normal"), "error over that without the change"
+    ),
+    "robust to vehicle parameters": Statistic(
+        "early", "parameters", ("early", "normal"), "error over that of a known car"
+    ),
+    "shows fast transients": Statistic("fast", "transient", ("of_fast", "transient"), "fast error over fast sideslip"),
+}
+"""The statistic of each row of the review's table."""
+
+BANK = Statistic("early", "bank", ("early", "normal"), "error over that on a level road")
+"""Of the bank, which the table does not name and the text does."""
+
+
+class Verdict(NamedTuple):
+    """One cell: its row and column, the review's mark (True: circle), the number with its interval, its limit, the verdict."""
+
+    row: str
+    method: str
+    mark: bool
+    found: Interval
+    limit: float
+    verdict: str
+
+
+class Claim(NamedTuple):
+    """A sentence of the text: errors `a` over errors `b`, (metric, method, scenario) each, should be between `low` and `high`."""
+
+    text: str
+    a: tuple[str, str, str]
+    b: tuple[str, str, str]
+    low: float
+    high: float
+
+
+DECADE = 10**0.5
+"""Within this factor either way, errors are of one order of magnitude."""
+
+
+BETTER = 0.95
+"""An error that is smaller by less than a twentieth is no smaller error."""
+
+
+def _claim(text: str, scenario: str, a: str, b: str, low: float = 0.0, high: float = BETTER) -> Claim:
+    return Claim(text, ("early", a, scenario), ("early", b, scenario), low, high)
+
+
+CLAIMS = (
+    _claim("at the limit nonlinear tyres are better than linear ones", "limit", "EKF", "linear Kalman"),
+    _claim("observers of one model and one sensor set are of one order", "limit", "Luenberger", "EKF", 1 / DECADE, DECADE),
+    _claim("observers of one model and one sensor set are of one order", "limit", "sliding mode", "EKF", 1 / DECADE, DECADE),
+    _claim("UKF is better than EKF where things are strongly nonlinear", "limit", "UKF", "EKF"),
+    _claim("PF is better than EKF", "limit", "PF", "EKF"),
+    _claim("UPF is the best of UPF, UKF and EKF", "limit", "UPF", "UKF"),
+    _claim("UPF is the best of UPF, UKF and EKF", "limit", "UPF", "EKF"),
+    _claim("pseudo-integration bears sensor bias better than integration", "sensor bias", "pseudo-integration", "integration"),
+    _claim("pseudo-integration bears banks better than integration", "bank", "pseudo-integration", "integration"),
+    _claim("pseudo-integration bears model errors better than the model", "parameters", "pseudo-integration", "EKF"),
+    Claim(
+        "pseudo-integration does not rid a_y of its bias", ("early", "pseudo-integration", "sensor bias"),
+        ("early", "pseudo-integration", "normal"), 1.0 / BETTER, float("inf"),
+    ),
+    _claim("weighted fusion bears sensor bias better than kinematics", "sensor bias", "weighted", "kinematic Kalman"),
+    _claim("weighted fusion bears model errors better than the model", "parameters", "weighted", "EKF"),
+)  # fmt: skip
+"""What the text says of methods, ours for those that it names."""
+
+
+def number(raced: Raced, statistic: Statistic, method: str) -> Interval:
+    """The statistic of a method with its 95 % bootstrap interval."""
+    metric, scenario = statistic.reference
+    return compare(raced.at(statistic.metric, method, statistic.scenario), raced.at(metric, method, scenario)).ratio
+
+
+def limit_of(study: Study, statistic: Statistic) -> float:
+    """At most this much is good."""
+    return study.share_limit if statistic.is_share else study.growth_limit
+
+
+def judged(found: Interval, low: float, high: float, expected: bool = True) -> str:
+    """Whether the number is within the bounds as expected; nobody can tell where its interval has one of them inside."""
+    if not np.isfinite([found.value, found.low]).all():
+        inside = None if np.isnan(found.value) else False
+    elif found.low >= low and found.high <= high:
+        inside = True
+    elif found.low > high or found.high < low:
+        inside = False
+    else:
+        return OPEN
+    if inside is None:
+        return ""
+    return SUPPORTS if inside == expected else CONTRADICTS
+
+
+def verdicts(raced: Raced) -> list[Verdict]:
+    """Every cell of the review's table."""
+    found = []
+    for row, marks in MARKS.items():
+        for method, mark in zip(MARKED, marks, strict=True):
+            value, limit = number(raced, ROWS[row], method), limit_of(raced.study, ROWS[row])
+            found.append(Verdict(row, method, mark, value, limit, judged(value, 0.0, limit, mark)))
+    return found
+
+
+def claims(raced: Raced) -> list[tuple[Claim, Interval, str]]:
+    """Every claim of the text, with its number and verdict."""
+    found = []
+    for claim in CLAIMS:
+        ratio = compare(raced.at(*claim.a), raced.at(*claim.b)).ratio
+        found.append((claim, ratio, judged(ratio, claim.low, claim.high)))
+    return found
