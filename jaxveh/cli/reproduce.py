@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from jaxveh._core.errors import check_one_of
+from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.progress import Progress, part
 from jaxveh.cli import options
 from jaxveh.cli.console import number, progress, results, table
@@ -19,11 +19,20 @@ from jaxveh.cli.output import check_report, make_folder, write_numbers
 
 PAPERS = {
     "tyre-apf": "Magic Formula parameters by auxiliary particle filter (Bao, Sabbioni et al. 2015)",
+    "model-adaptive-pf": "sideslip by a particle filter with noise levels from wavelets (Qin et al. 2014)",
+    "federated-ckf": "states, friction and mass of an electric car by federated cubature Kalman filters (Ji, Li, Fan)",
+    "sideslip-review": "the catalogue of sideslip estimation, its circles and crosses as numbers (Chen, Gao, Xu 2013)",
     "mass-grade-aukf": "mass and road grade at small acceleration by adaptive unscented Kalman filter",
 }
 """The papers by name: the module is `jaxveh.experiments.` and the name, with underscores."""
 
 ALL = "all"
+
+LOGGED = "sideslip-review"
+"""The paper whose methods are also judged by a real log."""
+
+LOG = typer.Option("--log", help=f"{LOGGED}: a log with steer, v_x, a_x, a_y, yaw_rate, and v_y to score against.")
+CAR = typer.Option("--vehicle", help="The log's car (see `jaxveh schema car`).")
 
 NAME = typer.Argument(
     metavar="NAME",
@@ -41,6 +50,8 @@ def reproduce(
     as_printed: Annotated[
         bool, typer.Option("--as-printed", help="Only the paper's printed settings, errata included, and what they do.")
     ] = False,
+    log: Annotated[Path | None, LOG] = None,
+    car: Annotated[Path | None, CAR] = None,
     numbers: options.Numbers = None,
     out: options.Out = None,
 ) -> None:
@@ -53,6 +64,11 @@ def reproduce(
     """
     check_one_of("NAME", name, (*PAPERS, ALL))
     check_report(out, numbers)
+    if (log is None) != (car is None):
+        raise InputError("--log and --vehicle belong together: give both, or neither.")
+    if log is not None and name not in (LOGGED, ALL):
+        raise InputError(f"--log: only {LOGGED} looks at a log; leave it out, or reproduce that paper.")
+    real = {} if log is None else {"log": log, "car": car}
     chosen = list(PAPERS) if name == ALL else [name]
     written, summary = {}, []
     with progress("reproduce") as report:
@@ -60,7 +76,9 @@ def reproduce(
             share = report if len(chosen) == 1 else part(report, i / len(chosen), (i + 1) / len(chosen), one)
             start = time.perf_counter()
             folder = out if out is None or len(chosen) == 1 else out / one
-            written[one] = _one(one, seeds, seed, as_printed, share, folder)
+            asked = {"seed": seed} | ({} if seeds is None else {"seeds": seeds})
+            asked |= real if one == LOGGED and not as_printed else {}
+            written[one] = _one(one, asked, as_printed, share, folder)
             checks = written[one]["checks"]
             held = f"{sum(check['holds'] for check in checks)} of {len(checks)}" if checks else "none made"
             summary.append((one, held, f"{time.perf_counter() - start:.0f}"))
@@ -71,17 +89,14 @@ def reproduce(
     write_numbers(numbers, shown, settings if len(chosen) > 1 else settings[name], seed)
 
 
-def _one(
-    name: str, seeds: int | None, seed: int, as_printed: bool, report: Progress, out: Path | None
-) -> dict[str, Any]:
-    """Run one paper and show it; what it found, for JSON."""
+def _one(name: str, asked: dict[str, Any], as_printed: bool, report: Progress, out: Path | None) -> dict[str, Any]:
+    """Run one paper as `asked` and show it; what it found, for JSON."""
     _both_cores()
     experiment = _experiment(name)
-    many = {} if seeds is None else {"seeds": seeds}
     if as_printed:
-        tables, checks, settings = experiment.as_printed(**many, seed=seed, progress=report), [], many
+        tables, checks, settings = experiment.as_printed(**asked, progress=report), [], asked
     else:
-        found = experiment.run(**many, seed=seed, progress=report)
+        found = experiment.run(**asked, progress=report)
         tables, checks = experiment.tables(found), experiment.check(found)
         settings = {"seeds": found.seeds, **experiment.settings(found)}
     for one in tables:

@@ -77,7 +77,8 @@ DECADE = 10**0.5
 
 
 BETTER = 0.95
-"""An error that is smaller by less than a twentieth is no smaller error."""
+"""An error that is smaller by less than a twentieth is no smaller error. Decided after a first table of 20 seeds, in which
+unscented and particle filters led by a hundredth or two: without it their claims would be supported, or be told from nothing."""
 
 
 def _claim(text: str, scenario: str, a: str, b: str, low: float = 0.0, high: float = BETTER) -> Claim:
