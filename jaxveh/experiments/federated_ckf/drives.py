@@ -118,13 +118,16 @@ def drive_once(study: Study, steer, speed_std, key, *, magic_formula: bool = Fal
 
 
 def wheel_rates(study: Study, drive: Drive) -> jax.Array:
-    """Accelerations of the wheels from what they measured until now, rad/s^2, (T, 4): differences over `rate_time`; at first zero.
+    """Accelerations of the wheels from what they measured until now, rad/s^2, (T, 4): differences over `rate_time`, or as far
+    back as there are rows.
 
     Over one row their noise would be that of 4.6 N at the tread, and the same noise is in the wheel speeds that the
     filter is given: friction then comes out one per cent too large.
     """
-    n = round(study.rate_time / study.dt)
-    return jnp.pad(drive.omega[n:] - drive.omega[:-n], ((n, 0), (0, 0))) / study.rate_time
+    n, rows = round(study.rate_time / study.dt), np.arange(drive.omega.shape[0])
+    back = np.maximum(rows - n, 0)
+    over = np.maximum(rows - back, 1) * study.dt
+    return (drive.omega - drive.omega[back]) / over[:, None]
 
 
 def felt(study: Study, drive: Drive) -> tuple[jax.Array, jax.Array]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh import filters, sweeps
 from jaxveh._core.progress import Progress, part, silent
-from jaxveh.experiments.federated_ckf.contestants import GROUPS, SHARED, contestants, metrics
+from jaxveh.experiments.federated_ckf.contestants import GROUPS, SHARED, contestants, metrics, with_shares
 from jaxveh.experiments.federated_ckf.drives import Drive
 from jaxveh.experiments.federated_ckf.model import planar, rows_of, states_model
 from jaxveh.experiments.federated_ckf.printed import as_printed as printed_filters
@@ -45,7 +45,8 @@ def _runs(study: Study) -> dict[str, tuple[Any, str]]:
     own = {name: (every[name].run, every[name].what) for name in SHOWN}
     first = {"first guess": own.pop("first guess")}
     what = "printed P, Q, R and start; shares 1/2 at first (printed: 0), 0 of R as 1e-8, R of the parameters for three channels"
-    return {**first, "as printed": (printed_filters, what), **own}
+    shares = with_shares()
+    return {**first, "as printed": (printed_filters, what), **own, "federated, disjoint sensors": shares[:2]}
 
 
 def _raced(study: Study, drives: Drive, seeds: int, progress: Progress) -> sweeps.Swept:

@@ -47,17 +47,21 @@ def run(study: Study | None = None, *, seeds: int = 20, seed: int = 0, progress:
     study = study or Study()
     # Other drives than those on which the noises were chosen.
     key = jax.random.fold_in(jax.random.key(seed), 2)
-    steers = tuple(float(np.radians(degrees)) for degrees in STEERS)
-    grid = drives_of(study, steers, SPREADS, seeds, key, progress=part(progress, 0.0, 0.08, "drives"))
+    steers = tuple(sorted({*np.radians(STEERS).tolist(), study.steer}))
+    speeds = tuple(sorted({*SPREADS, study.speed_std}))
+    grid = drives_of(study, steers, speeds, seeds, key, progress=part(progress, 0.0, 0.08, "drives"))
     names = tuple(cases(study))
-    drives = drives_by_case(study, names, seeds, key, progress=part(progress, 0.08, 0.15, "drives by case"))
+    # The paper's slalom is one of the grid's.
+    own = steers.index(study.steer), speeds.index(study.speed_std)
+    known = Drive(*(leaf[own] for leaf in grid))
+    drives = drives_by_case(study, names, seeds, key, known=known, progress=part(progress, 0.08, 0.15, "other tyres"))
     raced = race(study, drives, names, progress=part(progress, 0.15, 0.9, "estimators"))
     told = part(progress, 0.9, 0.96, "steer and speed")
-    over = race_over(study, grid, steers, SPREADS, progress=told)
+    over = race_over(study, grid, steers, speeds, progress=told)
     progress(0.96, 1.0, "observability")
     seen = observed(study, Start(*truth(study)), Drive(*(leaf[:, :, 0] for leaf in grid)))
     progress(1.0, 1.0, "done")
-    return Reproduction(seeds, raced, STEERS, SPREADS, over, seen)
+    return Reproduction(seeds, raced, tuple(np.degrees(steers).tolist()), speeds, over, seen)
 
 
 def settings(result: Reproduction) -> dict:

@@ -11,9 +11,9 @@ import numpy as np
 
 from jaxveh import sweeps
 from jaxveh._core.errors import check_whole
-from jaxveh._core.progress import Progress, part, silent
+from jaxveh._core.progress import Progress, silent
 from jaxveh.experiments.federated_ckf.contestants import contestants, metrics
-from jaxveh.experiments.federated_ckf.drives import Drive, drive_once
+from jaxveh.experiments.federated_ckf.drives import Drive, drive_once, times
 from jaxveh.experiments.federated_ckf.settings import OTHER_START, PARAMETERS, PRINTED_START, Start, Study
 from jaxveh.vehicles import sets
 
@@ -73,14 +73,18 @@ def drives_of(
     return Drive(**{name: found[name] for name in Drive._fields})
 
 
-def drives_by_case(study: Study, names: tuple[str, ...], seeds: int, key, progress: Progress = silent) -> Drive:
-    """The drives of the cases, (cases, seeds, T, ...): the same seeds for all, and the fault on top."""
-    wanted, made = cases(study), {}
-    for i, magic in enumerate(sorted({wanted[name].magic_formula for name in names})):
-        told = part(progress, 0.5 * i, 0.5 * (i + 1), "drives")
-        found = drives_of(study, (study.steer,), (study.speed_std,), seeds, key, magic_formula=magic, progress=told)
+def drives_by_case(
+    study: Study, names: tuple[str, ...], seeds: int, key, *, known: Drive | None = None, progress: Progress = silent
+) -> Drive:
+    """The drives of the cases, (cases, seeds, T, ...): the same seeds for all, and the fault on top. `known`, (seeds, T, ...):
+    those on Dugoff's tyres of the same key, where they are made already."""
+    wanted, made = cases(study), {} if known is None else {False: known}
+    for magic in {wanted[name].magic_formula for name in names} - set(made):
+        found = drives_of(
+            study, (study.steer,), (study.speed_std,), seeds, key, magic_formula=magic, progress=progress
+        )
         made[magic] = jax.tree.map(lambda leaf: leaf[0, 0], found)
-    t = np.arange(made[False].a_x.shape[-1] if False in made else made[True].a_x.shape[-1]) * study.dt
+    t = np.asarray(times(study))
     wrong = (t >= study.fault_at) & (t < study.fault_at + study.fault_time)
     own = []
     for name in names:
