@@ -74,10 +74,12 @@ def contestants(study: Study) -> dict[str, Contestant]:
             _three(shared), "the paper's structure: each of the three has two locals with the same sensors; our noises"
         ),
         "three considered": Contestant(
-            _joint(filters.Dual(cubature, BLOCKS)), "three that consider each other's spreads, but forget what they share"
+            _joint(filters.Dual(cubature, BLOCKS)),
+            "three that consider each other's spreads, but forget what they share",
         ),
         "redesigned": Contestant(
-            _joint(apart), "covariances among the three are kept; a local filter for each device has the whole prediction"
+            _joint(apart),
+            "covariances among the three are kept; a local filter for each device has the whole prediction",
         ),
         "redesigned, isolating": Contestant(_joint(isolating), "the same; a device that surprises is left out"),
     }

@@ -57,7 +57,9 @@ def parameters_figure(result: Reproduction, case: str = "printed start") -> Any:
                 axes.set(ylim=(0.05, 3.0), yscale="log")
         for axes in panels[1]:
             axes.set(xlabel="time [s]")
-        figure.suptitle(f"From the {case}: median and quartiles over {result.seeds} seeds", fontsize=9, x=0.02, ha="left")
+        figure.suptitle(
+            f"From the {case}: median and quartiles over {result.seeds} seeds", fontsize=9, x=0.02, ha="left"
+        )
         figure.legend(loc="outside lower center", ncols=3)
     return figure
 
@@ -127,6 +129,8 @@ def line_figure(result: Reproduction) -> Any:
         right.set(ylabel="m [%]", title="Mass: bound where rolling resistance is unknown")
         for axes in (left, right):
             axes.set(xlabel="steer amplitude [°]", yscale="log")
-        left.plot([], [], color="#444444", linestyle="none", marker="o", markersize=4, label="joint filter, median error")
+        left.plot(
+            [], [], color="#444444", linestyle="none", marker="o", markersize=4, label="joint filter, median error"
+        )
         figure.legend(loc="outside lower center", ncols=4)
     return figure

@@ -18,7 +18,7 @@ from jaxveh.tyres import Dugoff, Forces
 from jaxveh.vehicles import GRAVITY, sets
 from jaxveh.vehicles.load_transfer import planar_loads
 from jaxveh.vehicles.two_track import air_drag, positions_of, rolling_wheels
-from jaxveh.vehicles.wheels import Rolling, Wheels, each, of, pushed
+from jaxveh.vehicles.wheels import Wheels, each, of, pushed
 
 INPUTS = ("steer", "a_x_felt", "a_y_felt", *PULLS)
 CHANNELS = ("a_x", "a_y", "yaw_rate", *WHEELS)

@@ -39,7 +39,7 @@ def sensitivities(study: Study, true: Start, drive: Drive) -> jax.Array:
             x = MOVE(own, before.t, after.t, x, LinearInput(before.t, after.t, before.u, after.u))
             return x, jnp.stack(seen(own, after.t, x, after.u)) / levels
 
-        before, after = (jax.tree.map(lambda leaf: leaf[part], rows) for part in (slice(None, -1), slice(1, None)))
+        before, after = jax.tree.map(lambda leaf: leaf[:-1], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
         return jax.lax.scan(step, State(*z[4:7]), (before, after))[1].ravel()
 
     return jax.jacfwd(predict)(jnp.concatenate([logs, start, jnp.zeros(1)]))

@@ -48,13 +48,11 @@ LEAST_FRICTION, LEAST_MASS = 1e-3, 1.0
 
 
 def as_printed(study: Study, start: Any, drive: Drive) -> Found:
-    """The paper's estimators: fusion-reset by the traces' shares (1/2 at first: printed are zeros, which divide by zero), singular
+    """The paper's estimators: fusion-reset, shares by traces (1/2 at first: printed are zeros, which divide by zero), singular
     values, additive parameters, four frictions."""
     car = eqx.tree_at(lambda c: c.friction, planar(study, start, measured_slip=True), Wheels(*[start.friction] * 4))
     rows = _printed_rows(study, drive)
-    filter_ = filters.Federated(
-        filters.Cubature(form=filters.SingularValues()), (FIRST, SECOND), by_trace=True
-    )
+    filter_ = filters.Federated(filters.Cubature(form=filters.SingularValues()), (FIRST, SECOND), by_trace=True)
     members = (_states(filter_, study), _friction(filter_, start), _body(filter_, start))
     zero = jnp.zeros_like(rows.t[0])
     state = State(zero + study.speed, zero, zero)
@@ -149,7 +147,9 @@ SEE_FRICTION, SEE_BODY = _through(_put_friction), _through(_put_body)
 def _friction(filter_, start) -> Member:
     mean = [start.friction] * 4
     model = _model(MUS, mean, FRICTION_P, FRICTION_Q, FRICTION_R, stays, SEE_FRICTION, ALL_INPUTS)
-    return Member(filter_, model, lambda told: told, lambda mean, told: told._replace(car=_put_friction(told.car, mean)))
+    return Member(
+        filter_, model, lambda told: told, lambda mean, told: told._replace(car=_put_friction(told.car, mean))
+    )
 
 
 def _body(filter_, start) -> Member:

@@ -75,7 +75,17 @@ def _table(found: sweeps.Swept, seeds: int) -> Table:
         rows.append((name, *errors, float(final[1]), at("sideslip_rmse"), at("v_x_rmse"), whats[name][1]))
     return Table(
         f"As printed: constant 20 km/h, steer 8 degrees, mu 0.2, from mu 1, 700 kg, 1400 kg m^2, 1.0 m; {seeds} seeds",
-        ("estimator", "mu, %", "m, %", "I_z, %", "a, %", "final m, kg", "sideslip RMSE, degrees", "v_x RMSE, m/s", "what it is"),
+        (
+            "estimator",
+            "mu, %",
+            "m, %",
+            "I_z, %",
+            "a, %",
+            "final m, kg",
+            "sideslip RMSE, degrees",
+            "v_x RMSE, m/s",
+            "what it is",
+        ),
         rows,
     )
 
@@ -108,7 +118,7 @@ def _traces(found: sweeps.Swept, seeds: int) -> Table:
     names = found.design.axis("filter").labels
     rows = [(name, spread(found.at("trace", filter=name) / centralised)) for name in names]
     return Table(
-        f"Three states, parameters known: what a federated filter believes, trace of P over the centralised filter's; {seeds} seeds",
+        f"Three states, parameters known: trace of the believed P over that of the centralised filter; {seeds} seeds",
         ("filter", "ratio"),
         rows,
     )

@@ -31,8 +31,8 @@ LIMITS = {"friction": 1.0, "mass": 2.0, "yaw_inertia": 5.0, "front_axle_to_cg": 
 
 
 class Reproduction(NamedTuple):
-    """Everything the experiment found: `raced`, all estimators in all cases; over `steers` (degrees) and `spreads` (m/s) the joint
-    filter's errors `over`, and what the first seed's drive can tell, `seen`, by what is known of the rolling resistance."""
+    """Everything the experiment found: `raced`, all estimators in all cases; over `steers` (degrees) and `spreads` (m/s) the
+    joint filter's errors `over`, and what the first seed's drive can tell, `seen`, by what is known of the rolling resistance."""
 
     seeds: int
     raced: Raced
@@ -84,7 +84,9 @@ def check(result: Reproduction) -> list[Check]:
         for name, limit in LIMITS.items():
             found.append(
                 at_most(
-                    f"joint, {case}: final error of {SHORT[name]}, %", 100 * median(f"{name}_error", "joint", case), limit
+                    f"joint, {case}: final error of {SHORT[name]}, %",
+                    100 * median(f"{name}_error", "joint", case),
+                    limit,
                 )
             )
         found += _nees(f"joint, {case}", median("nees", "joint", case))
@@ -95,7 +97,9 @@ def check(result: Reproduction) -> list[Check]:
     faulty = median("sideslip_rmse", "redesigned, isolating", "fault") / median("sideslip_rmse", "redesigned", "fault")
     found.append(at_most("fault: sideslip RMSE with isolation over that without", faulty, 0.6))
     gated = [median("sideslip_rmse", "joint, gated", case) for case in ("fault", "nearer start")]
-    found.append(at_most("fault: sideslip RMSE of the gated joint filter over its fault-free one", gated[0] / gated[1], 1.2))
+    found.append(
+        at_most("fault: sideslip RMSE of the gated joint filter over its fault-free one", gated[0] / gated[1], 1.2)
+    )
     # Of mu, over the prior's spread: without end where nothing slides.
     smallest = min(float(one.bounds[0] / one.spread[0]) for one in result.seen["known"][0])
     found.append(above(f"steer {result.steers[0]:g} degrees: bound of mu over its prior's spread", smallest, 1.0))
@@ -121,7 +125,6 @@ TITLES = {
     "printed start": "From the printed start mu 1, 700 kg, 1400 kg m^2, 1.0 m",
     "nearer start": "From mu 0.3, 1050 kg, 1500 kg m^2, 1.1 m",
     "other tyres": "The same on tyres with a peak (Magic Formula), which no filter knows",
-    "constant speed": "At constant speed, as printed, from the printed start",
 }
 
 
@@ -131,10 +134,10 @@ def race_table(raced: Raced, case: str) -> Table:
     rows = []
     whats = contestants(raced.study)
     for name in raced.found.design.axis("estimator").labels:
-        at = lambda value, scale=1.0, name=name: spread(raced.at(value, name, case), scale=scale)
-        errors = [at(f"{parameter}_error", 100.0) for parameter in PARAMETERS]
-        what = whats[name].what if name in whats else ""
-        rows.append((name, *errors, at("nees"), at("nees_all"), at("sideslip_rmse"), what))
+        at = lambda value, name=name, **options: spread(raced.at(value, name, case), **options)
+        errors = [at(f"{parameter}_error", scale=100.0) for parameter in PARAMETERS]
+        sure = [at(value, lost="infinite") for value in ("nees", "nees_all")]
+        rows.append((name, *errors, *sure, at("sideslip_rmse"), whats[name].what))
     heads = [f"{SHORT[name]}, %" for name in PARAMETERS]
     return Table(
         f"{TITLES[case]}: median [quartiles] over {seeds} seeds",
@@ -192,6 +195,14 @@ def _line_table(result: Reproduction) -> Table:
             )  # fmt: skip
     return Table(
         "What steer and speed can tell: Cramer-Rao bounds in % (no process noise), and the joint filter's final errors in %",
-        ("steer, degrees", "speed varied by, m/s", "bound of mu", "found", "bound of m", "rolling resistance unknown", "found"),
+        (
+            "steer, degrees",
+            "speed varied by, m/s",
+            "bound of mu",
+            "found",
+            "bound of m",
+            "rolling resistance unknown",
+            "found",
+        ),
         rows,
     )

@@ -6,7 +6,7 @@ import dataclasses
 import math
 
 CITATION = """@article{ji_li_fan_federated_ckf,
-  title   = {Joint estimation of the states and parameters of a distributed-drive electric car by a federated cubature Kalman filter},
+  title   = {Joint estimation of states and parameters of a distributed-drive electric car by a federated cubature Kalman filter},
   author  = {Ji, Xiao and Li, Gang and Fan, Dongsheng},
   note    = {Liaoning University of Technology and Jilin University; published in Chinese}
 }"""
@@ -47,8 +47,8 @@ class Study:
     faded in. `friction`: the road's; `fading` (s/m): the paper's speed influence eps.
 
     Sensors: white noise of `a_x`, `a_y` (m/s^2), `yaw_rate` (rad/s), the size of production units (`sensors.production_car`),
-    `wheel_speed` (rad/s; 6 mm/s at the tread). Steer and motor torques are known. Wheels' accelerations (for eq 10) are differences
-    over `rate_time` s; loads follow the measured accelerations with the lag of roll and pitch, `load_time` s.
+    `wheel_speed` (rad/s; 6 mm/s at the tread). Steer and motor torques are known. Wheels' accelerations (for eq 10) are
+    differences over `rate_time` s; loads follow the measured accelerations with the lag of roll and pitch, `load_time` s.
 
     Fault: the yaw rate is off by `bias` (rad/s) from `fault_at` (s) for `fault_time` (s). Errors count from `settled` (s) on.
 

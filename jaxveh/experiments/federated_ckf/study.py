@@ -80,9 +80,7 @@ def drives_by_case(
     those on Dugoff's tyres of the same key, where they are made already."""
     wanted, made = cases(study), {} if known is None else {False: known}
     for magic in {wanted[name].magic_formula for name in names} - set(made):
-        found = drives_of(
-            study, (study.steer,), (study.speed_std,), seeds, key, magic_formula=magic, progress=progress
-        )
+        found = drives_of(study, (study.steer,), (study.speed_std,), seeds, key, magic_formula=magic, progress=progress)
         made[magic] = jax.tree.map(lambda leaf: leaf[0, 0], found)
     t = np.asarray(times(study))
     wrong = (t >= study.fault_at) & (t < study.fault_at + study.fault_time)
@@ -122,9 +120,7 @@ def race(
         estimator={name: runs(contestant) for name, contestant in chosen.items()}, case=range(len(names))
     )
     run = lambda point, key, drive: point.estimator(point, drive)
-    found = sweeps.sweep(
-        run, design, np.shape(drives.a_x)[1], jax.random.key(0), data=drives, progress=progress
-    )
+    found = sweeps.sweep(run, design, np.shape(drives.a_x)[1], jax.random.key(0), data=drives, progress=progress)
     return Raced(study, tuple(names), drives, found)
 
 

@@ -200,9 +200,7 @@ class Federated(AbstractFilter):
         self, beliefs: GaussianBelief, like: GaussianBelief, common: GaussianBelief | None = None
     ) -> GaussianBelief:
         """The Gaussian of all beliefs' information, with the time and inputs of `like`; what is `common` to all counts once."""
-        # Singular vectors make no triangular factor.
-        triangular = numerics.lower_factor if isinstance(self.filter.form, SingularValues) else lambda factor: factor
-        informations, pulls = jax.vmap(lambda local: self._information(local))(beliefs)
+        informations, pulls = jax.vmap(self._information)(beliefs)
         information, pull = jnp.sum(informations, axis=0), jnp.sum(pulls, axis=0)
         if common is not None:
             once, pulled = self._information(common)
