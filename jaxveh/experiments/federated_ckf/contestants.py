@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh import filters, numerics
 from jaxveh._core.names import record_type
-from jaxveh.experiments.federated_ckf.drives import WHEELS, Drive
+from jaxveh.experiments.federated_ckf.drives import WHEELS, Drive, times
 from jaxveh.experiments.federated_ckf.interleaved import Member, SeenThrough, Told, stays, take_turns
 from jaxveh.experiments.federated_ckf.model import (
     CHANNELS,
@@ -169,11 +169,11 @@ def metrics(study: Study, found: Found, drive: Drive, truth: Any) -> dict[str, A
     `sideslip_rmse_fault` (during the fault), `nees` of the parameters at the end and `nees_all` of states and parameters
     (mean from `settled` on), over their dimensions; the estimates, ten a second.
     """
-    t = jnp.arange(found.v_x.shape[0]) * study.dt
+    t = times(study)
     later, wrong = t >= study.settled, (t >= study.fault_at) & (t < study.fault_at + study.fault_time)
     sideslip = numerics.arctan2(found.v_y, found.v_x)
     off = jnp.rad2deg(sideslip - drive.true_sideslip)
-    rms = lambda rows: jnp.sqrt(jnp.sum(jnp.where(rows, off**2, 0.0)) / jnp.sum(rows))
+    rms = lambda rows: jnp.sqrt(jnp.sum(jnp.where(rows, off**2, 0.0)) / _count(rows))
     true = jnp.stack([drive.true_v_x, drive.true_v_y, drive.true_yaw_rate], axis=1)
     error = found.vector - jnp.concatenate([true, jnp.broadcast_to(jnp.log(truth), (t.shape[0], 4))], axis=1)
     nees = _squared(error[-1, 3:], found.covariance[-1, 3:, 3:]) / 4.0
@@ -184,14 +184,18 @@ def metrics(study: Study, found: Found, drive: Drive, truth: Any) -> dict[str, A
         **{f"{name}_error": share[i] for i, name in enumerate(PARAMETERS)},
         "sideslip_rmse": rms(later),
         "sideslip_rmse_fault": rms(wrong),
-        "v_x_rmse": jnp.sqrt(jnp.sum(jnp.where(later, (found.v_x - drive.true_v_x) ** 2, 0.0)) / jnp.sum(later)),
+        "v_x_rmse": jnp.sqrt(jnp.sum(jnp.where(later, (found.v_x - drive.true_v_x) ** 2, 0.0)) / _count(later)),
         "nees": nees,
         "spread": jnp.sqrt(jnp.diagonal(found.covariance[-1, 3:, 3:])),
         "nees_each": error[-1, 3:] ** 2 / jnp.diagonal(found.covariance[-1, 3:, 3:]),
-        "nees_all": jnp.sum(jnp.where(later, every, 0.0)) / jnp.sum(later),
+        "nees_all": jnp.sum(jnp.where(later, every, 0.0)) / _count(later),
         "sideslip": sideslip[seen],
         "parameters": found.parameters[seen],
     }
+
+
+def _count(rows: Any) -> Any:
+    return jnp.sum(jnp.where(rows, 1.0, 0.0))
 
 
 def _squared(error: Any, covariance: Any) -> Any:

@@ -16,7 +16,7 @@ from jaxveh.manoeuvres import AbstractManoeuvre
 from jaxveh.manoeuvres.base import DriverInputs, as_time
 from jaxveh.manoeuvres.speeds import AbstractSpeed
 from jaxveh.simulation import simulate
-from jaxveh.statespace import Gaussian
+from jaxveh.statespace import Gaussian, RolledRK4
 from jaxveh.tyres import Dugoff, MagicFormula, Similarity
 from jaxveh.vehicles import SevenDOF, sets
 from jaxveh.vehicles.parameter_sets import GENERIC
@@ -98,7 +98,7 @@ def drive_once(study: Study, steer, speed_std, key, *, magic_formula: bool = Fal
     slalom = Slalom(speed=speed, duration=study.duration, frequency=study.steer_frequency, steer=steer)
     found = simulate(
         truth_of(study, magic_formula), slalom, road=roads.Level(study.friction), dt=study.dt,
-        max_step=study.max_step, start={"v_x": speed.at(0.0)[0]}, solver="explicit", throw=False,
+        max_step=study.max_step, start={"v_x": speed.at(0.0)[0]}, solver=RolledRK4(), throw=False,
     )  # fmt: skip
     levels = {"a_x": study.a_x, "a_y": study.a_y, "yaw_rate": study.yaw_rate} | dict.fromkeys(WHEELS, study.wheel_speed)
     noise = Gaussian(levels).sample(sensor_key, times(study).shape)

@@ -65,26 +65,29 @@ def parameters_figure(result: Reproduction, case: str = "printed start") -> Any:
 
 
 def drive_figure(result: Reproduction, seed: int = 0) -> Any:
-    """One drive: steer, speed, lateral acceleration, and the sideslip from the printed start."""
-    figure, raced = Figure(figsize=(WIDTH, 5.6), layout="constrained"), result.raced
+    """One drive: steer, speed, lateral acceleration, sideslip, and the errors of the sideslip from the printed start."""
+    figure, raced = Figure(figsize=(WIDTH, 6.6), layout="constrained"), result.raced
     place = raced.cases.index("printed start")
     drive = type(raced.drives)(*(leaf[place, seed] for leaf in raced.drives))
     time = raced.study.dt * np.arange(len(drive.steer))
+    step = round(EVERY / raced.study.dt)
+    true = np.rad2deg(drive.true_sideslip)
     with style():
-        panels = figure.subplots(4, 1, sharex=True, height_ratios=(1, 1, 1, 2))
-        panels[0].plot(time, np.rad2deg(drive.steer), color=COLOURS["truth"])
-        panels[1].plot(time, 3.6 * drive.true_v_x, color=COLOURS["truth"])
-        panels[2].plot(time, drive.a_y, color=COLOURS["prior"], linewidth=0.5)
-        labels = ("steer [°]", "speed [km/h]", "measured $a_y$\n[m/s²]", "sideslip [°]")
+        panels = figure.subplots(5, 1, sharex=True, height_ratios=(1, 1, 1, 1, 2))
+        panels[2].plot(time, drive.a_y, color=COLOURS["prior"], linewidth=0.5, label="measured")
+        truths = (np.rad2deg(drive.steer), 3.6 * drive.true_v_x, None, true)
+        for axes, values in zip(panels, truths, strict=False):
+            if values is not None:
+                axes.plot(time, values, color=COLOURS["truth"])
+        labels = ("steer [°]", "speed [km/h]", "measured $a_y$\n[m/s²]", "sideslip [°]", "error of the\nsideslip [°]")
         for axes, label in zip(panels, labels, strict=True):
             axes.set(ylabel=label)
-        step = round(EVERY / raced.study.dt)
         for who, colour in SHOWN.items():
-            values = np.rad2deg(raced.at("sideslip", who, "printed start")[seed])
-            panels[3].plot(time[::step][: len(values)], values, color=colour, label=who)
-        panels[3].plot(time, np.rad2deg(drive.true_sideslip), color=COLOURS["truth"], linewidth=0.8, label="truth")
-        panels[3].set(xlabel="time [s]")
-        figure.legend(loc="outside lower center", ncols=3)
+            error = np.rad2deg(raced.at("sideslip", who, "printed start")[seed]) - true[::step]
+            dashes = (0, (4, 3)) if who == "redesigned" else "-"
+            panels[4].plot(time[::step], error, color=colour, linestyle=dashes, label=who)
+        panels[4].set(xlabel="time [s]")
+        figure.legend(*panels[4].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 
@@ -115,22 +118,26 @@ def fault_figure(result: Reproduction) -> Any:
 
 def line_figure(result: Reproduction) -> Any:
     """Bounds of friction and mass over the steer amplitude, by how much the speed varies, and what the joint filter finds."""
-    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 3.8), layout="constrained")
+    bounds = {name: np.array([[one.bounds for one in row] for row in rows]) for name, rows in result.seen.items()}
     with style():
         left, right = figure.subplots(1, 2)
         for j, speed in enumerate(result.spreads):
-            known, unknown = (np.array([row[j].bounds for row in result.seen[name]]) for name in ("known", "unknown"))
             colour, label = CYCLE[j], f"speed varied by {speed:g} m/s"
-            for axes, i, bounds, name in ((left, 0, known, "friction"), (right, 1, unknown, "mass")):
+            left.plot(result.steers, 100.0 * bounds["known"][:, j, 0], color=colour, label=label)
+            right.plot(result.steers, 100.0 * bounds["known"][:, j, 1], color=colour, linestyle=":")
+            right.plot(result.steers, 100.0 * bounds["unknown"][:, j, 1], color=colour)
+            for axes, name in ((left, "friction"), (right, "mass")):
                 found = 100.0 * np.median(result.over[f"{name}_error"][:, j], axis=-1)
-                axes.plot(result.steers, 100.0 * bounds[:, i], color=colour, label=label if axes is left else None)
                 axes.plot(result.steers, found, color=colour, linestyle="none", marker="o", markersize=4)
-        left.set(ylabel="mu [%]", title="Friction: below 4° nothing slides")
-        right.set(ylabel="m [%]", title="Mass: bound where rolling resistance is unknown")
+        left.set(ylabel="mu [%]", title="Friction: no bound where nothing slides")
+        right.set(ylabel="m [%]", title="Mass: what is known of rolling resistance")
         for axes in (left, right):
             axes.set(xlabel="steer amplitude [°]", yscale="log")
-        left.plot(
-            [], [], color="#444444", linestyle="none", marker="o", markersize=4, label="joint filter, median error"
-        )
-        figure.legend(loc="outside lower center", ncols=4)
+            axes.margins(x=0.04)
+        grey = dict(color="#444444")
+        left.plot([], [], **grey, label="bound (right: resistance unknown)")
+        left.plot([], [], **grey, linestyle=":", label="resistance known, as filters take it")
+        left.plot([], [], **grey, linestyle="none", marker="o", markersize=4, label="joint filter, median error")
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure

@@ -210,6 +210,7 @@ def joint_model(study: Study, start: Any, drive: Drive) -> StateSpace:
 def rows_of(study: Study, drive: Drive) -> Row:
     """The drive's rows: pulls from torques and measured wheel speeds (eq 10), measurements by channel."""
     car = sets.ev()
+    assert car.wheel_inertia is not None and car.wheel_radius is not None
     pulls = (drive.torque - car.wheel_inertia * wheel_rates(study, drive)) / car.wheel_radius
     u = record_type("Inputs", INPUTS)(drive.steer, *felt(study, drive), *pulls.T)
     y = record_type("Measurements", CHANNELS)(drive.a_x, drive.a_y, drive.yaw_rate, *drive.omega.T)
