@@ -36,8 +36,8 @@ SHARED = (CHANNELS, ("a_y", "yaw_rate"))
 class Found(NamedTuple):
     """Estimates over time, (T,): speeds (m/s), yaw rate (rad/s), and (T, 4) `parameters` in physical units.
 
-    `error_of(truth) ...`: `vector` (T, n) and `covariance` (T, n, n) as the estimator has them: three states and the
-    logarithms of four parameters; the parameters' covariance is zero where none is believed.
+    `vector` (T, 7) and `covariance` (T, 7, 7) are what the estimator believes of three states and the logarithms of four
+    parameters; the parameters' covariance is zero where they are taken for certain.
     """
 
     v_x: Any

@@ -46,7 +46,11 @@ def sensitivities(study: Study, true: Start, drive: Drive) -> jax.Array:
 
 
 def observed(study: Study, true: Start, drives: Drive) -> dict[str, list[list[Observability]]]:
-    """The observability in each of the drives, (n, m, T), with the rolling resistance `known` and `unknown`: lists (n, m)."""
+    """The observability in each of the drives, (n, m, T), with the rolling resistance `known` and `unknown`: lists (n, m).
+
+    Sensitivities are those at the truth. Where wheels barely slide, a filter that believes in more friction sees none slide,
+    and has no sensitivity at all: it stays where it is, whatever the bound says.
+    """
     shape = drives.a_x.shape[:2]
     flat = jax.tree.map(lambda leaf: jnp.asarray(leaf.reshape(-1, *leaf.shape[2:])), drives)
     every = np.asarray(jax.jit(jax.vmap(lambda drive: sensitivities(study, true, drive)))(flat))

@@ -194,7 +194,7 @@ def _line_table(result: Reproduction) -> Table:
                  100.0 * unknown.bounds[1], spread(m, scale=100.0))
             )  # fmt: skip
     return Table(
-        "What steer and speed can tell: Cramer-Rao bounds in % (no process noise), and the joint filter's final errors in %",
+        "What steer and speed can tell: Cramer-Rao bounds in % (at the truth), and the joint filter's final errors in %",
         (
             "steer, degrees",
             "speed varied by, m/s",
