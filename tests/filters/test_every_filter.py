@@ -77,6 +77,7 @@ FILTERS = {
     "variational Bayes": Line(lambda: filters.VariationalBayes(filters.Cubature()), exact=False),
     "strong tracking": Line(lambda: filters.StrongTracking(filters.Cubature()), exact=False),
     "federated": Line(lambda: filters.Federated(filters.Cubature(), GROUPS)),
+    "federated, common": Line(lambda: filters.Federated(filters.Cubature(), GROUPS, common=True)),
     "federated by trace": Line(
         lambda: filters.Federated(filters.Cubature(form=SquareRoot()), GROUPS, by_trace=True), seldom=True
     ),

@@ -130,6 +130,19 @@ def test_a_faulty_local_is_isolated_and_a_sound_one_is_not():
     assert error(safe, sound) < 2.0 * error(central, sound)
 
 
+def test_locals_with_a_common_prediction_leave_a_faulty_sensor_out():
+    base, truth, _, lying = faulty()
+    groups = (("y0",), ("y1",))
+    error = lambda filter_, recording: np.sqrt(
+        np.mean((np.stack(filters.run(filter_, base, recording).mean)[:, -truth.shape[1] :] - truth) ** 2)
+    )
+    isolating = filters.Federated(filters.Kalman(), groups, common=True, isolate=4.0)
+    assert error(isolating, lying) < 0.5 * error(filters.Kalman(), lying)
+    for options in (dict(reset=False), dict(by_trace=True), dict(shares=(0.5, 0.5))):
+        with pytest.raises(InputError, match="common: locals that share a prediction have no shares"):
+            filters.Federated(filters.Kalman(), groups, common=True, **options)
+
+
 def test_a_considered_state_stays_as_predicted():
     base, _, recording, _ = faulty(60)
     filter_ = filters.Consider(filters.Kalman(), ("x1",))

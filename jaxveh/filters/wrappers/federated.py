@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -14,7 +15,7 @@ from jaxveh._core.names import as_groups, check_names, record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
-from jaxveh.filters.gaussian.forms import Spread
+from jaxveh.filters.gaussian.forms import SingularValues, Spread
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, always, apart
@@ -73,7 +74,17 @@ class Federated(AbstractFilter):
         P^-1 = sum P_i^-1,    x = P sum P_i^-1 x_i;    reset:  x_i = x, P_i = P / share_i
 
     With `reset` (fusion-reset) on linear models this is the centralised filter; without, the locals go on by themselves, more
-    robust and less sharp. `shares`: fixed, by default equal; `by_trace`: in proportion to 1 / trace(P_i), over the prior's
+    robust and less sharp.
+
+    With `common` no local is given a share: each has the whole prediction, and what all have in common counts once in the fusion
+    (H. Hashemipour, S. Roy & A. Laub, IEEE Trans. Automatic Control 33, 1988):
+
+        P^-1 = P_-^-1 + sum (P_i^-1 - P_-^-1),    x = P (P_-^-1 x_- + sum (P_i^-1 x_i - P_-^-1 x_-))
+
+    On linear models that is the same again. On others it is nearer to the centralised filter, since points over a share lie
+    sqrt(1 / share) times as far out as they should.
+
+    `shares`: fixed, by default equal; `by_trace`: in proportion to 1 / trace(P_i), over the prior's
     variances. `isolate`: what locals measure whose fading mean NIS exceeds this multiple of its expected value is left out of
     the fusion until it falls again (None: never); it is still watched.
 
@@ -87,6 +98,7 @@ class Federated(AbstractFilter):
     shares: tuple[float, ...] | None = eqx.field(static=True, default=None)
     by_trace: bool = eqx.field(static=True, default=False)
     reset: bool = eqx.field(static=True, default=True)
+    common: bool = eqx.field(static=True, default=False)
     isolate: float | None = eqx.field(static=True, default=None)
     forgetting: float = eqx.field(static=True, default=0.9)
     overlapping: bool = eqx.field(static=True, default=False)
@@ -107,6 +119,8 @@ class Federated(AbstractFilter):
                 raise InputError(f"Federated.shares: {len(self.shares)} for {len(self.groups)} groups.")
             fine = abs(sum(self.shares) - 1) < 1e-9 and min(self.shares) > 0
             check("Federated.shares", self.shares, lambda _: fine, "positive, with the sum 1")
+        if self.common and (not self.reset or self.shares is not None or self.by_trace):
+            raise InputError("Federated.common: locals that share a prediction have no shares, and are reset.")
         check("Federated.isolate", self.isolate, lambda v: v > 1, "above 1")
         check("Federated.forgetting", self.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
 
@@ -128,43 +142,51 @@ class Federated(AbstractFilter):
         shares = self.shares or (1 / k,) * k
         shares = jnp.asarray(shares, prior.vector.dtype)
         start = FederatedBelief(prior, (prior,) * k, shares, jnp.ones_like(shares))
-        return self._measured(model, start, self._handed_out(prior, shares), row)
+        return self._measured(model, start, prior, self._handed_out(prior, shares), row)
 
     def step(self, model, belief, row):
         return apart(self._step, belief.count >= 0, model, belief, row)
 
     def _step(self, model, belief, row):
-        before = self._handed_out(belief.master, belief.shares) if self.reset else belief.locals
-        ahead = tuple(
-            self.filter.predict_between(_with_process_noise_over(model, share), local, row.t, row.u)
-            for local, share in zip(before, belief.shares, strict=True)
-        )
-        return self._measured(model, belief, ahead, row)
+        if self.common:
+            predicted = self.filter.predict_between(model, belief.master, row.t, row.u)
+            return self._measured(model, belief, predicted, self._handed_out(predicted, belief.shares), row)
+        # All locals by one program: they differ in numbers alone.
+        before = self._handed_out(belief.master, belief.shares) if self.reset else _together(belief.locals)
 
-    def _handed_out(self, master: GaussianBelief, shares) -> tuple[GaussianBelief, ...]:
-        return tuple(master.inflated(1.0 / share) for share in shares)
+        def ahead(local, share):
+            return self.filter.predict_between(_with_process_noise_over(model, share), local, row.t, row.u)
 
-    def _measured(self, model, belief: FederatedBelief, ahead, row):
-        predicted = self._fused(ahead, belief.master)
-        _, info = self.filter.update(model, predicted, row)
-        rows = [_only(model, row, group) for group in self.groups]
-        found = [self.filter.update(model, local, own)[0] for local, own in zip(ahead, rows, strict=True)]
+        alone = jax.vmap(ahead)(before, belief.shares)
+        return self._measured(model, belief, self._fused(alone, belief.master), alone, row)
+
+    def _handed_out(self, master: GaussianBelief, shares) -> GaussianBelief:
+        """The locals, one behind the other along the first axis of each array."""
+        return jax.vmap(lambda share: master.inflated(1.0 if self.common else 1.0 / share))(shares)
+
+    def _measured(self, model, belief: FederatedBelief, predicted: GaussianBelief, ahead: GaussianBelief, row):
+        rows = _together([_only(model, row, group).y for group in self.groups])
+        own = lambda local, y: self.filter.update(model, local, row._replace(y=y))
+        found, _ = jax.vmap(own)(ahead, rows)
         # A local's own prediction is wide, and seldom surprised: sensors are judged by the fused one.
-        surprise = jnp.stack([self.filter.update(model, predicted, own)[1].nis for own in rows])
+        every = jax.tree.map(lambda one, some: jnp.concatenate([one[None], some]), row.y, rows)
+        infos = jax.vmap(lambda y: own(predicted, y)[1])(every)
+        info, surprise = jax.tree.map(lambda leaf: leaf[0], infos), infos.nis[1:]
         counts = jnp.stack([_count(row, group) for group in self.groups])
         ratio = surprise / jnp.maximum(counts, 1.0)
         alarm = jnp.where(counts > 0, self.forgetting * belief.alarm + (1.0 - self.forgetting) * ratio, belief.alarm)
-        trusted = jnp.ones(len(rows), bool) if self.isolate is None else alarm < self.isolate
+        trusted = jnp.ones(len(self.groups), bool) if self.isolate is None else alarm < self.isolate
         # Where every local is suspect there is nothing to judge by.
         trusted = trusted | ~jnp.any(trusted)
-        believed = [_either(ok, after, before) for ok, after, before in zip(trusted, found, ahead, strict=True)]
-        master = self._fused(believed, belief.master)
+        believed = jax.vmap(_either)(trusted, found, ahead)
+        master = self._fused(believed, belief.master, predicted if self.common else None)
         master = with_spread(
             master, master.vector, Spread(master.factor, master.matrix), row.t, row.u, belief.count + 1
         )
         lost = ~(jnp.all(jnp.isfinite(master.factor)) & jnp.all(jnp.isfinite(master.vector)))
         result = jnp.where((info.result == 0) & lost, code(Result.not_positive_definite), info.result)
-        found = FederatedBelief(master, tuple(believed), self._new_shares(model, belief, believed), alarm)
+        locals_ = tuple(jax.tree.map(lambda leaf, i=i: leaf[i], believed) for i in range(len(self.groups)))
+        found = FederatedBelief(master, locals_, self._new_shares(model, belief, locals_), alarm)
         return found, info._replace(result=result)
 
     def _new_shares(self, model, belief, locals_):
@@ -174,13 +196,31 @@ class Federated(AbstractFilter):
         traces = jnp.stack([jnp.sum(local.variances / scale) for local in locals_])
         return (1.0 / traces) / jnp.sum(1.0 / traces)
 
-    def _fused(self, beliefs, like: GaussianBelief) -> GaussianBelief:
-        """The Gaussian of all beliefs' information, with the time and inputs of `like`."""
-        informations = [numerics.inverse_psd(numerics.lower_factor(b.factor)) for b in beliefs]
-        pulls = [times(information, b.vector) for information, b in zip(informations, beliefs, strict=True)]
-        factor = numerics.cholesky(sum(informations[1:], informations[0]))
-        mean = numerics.solve_psd(factor, sum(pulls[1:], pulls[0]))
-        return with_spread(like, mean, self.filter.form.start(numerics.inverse_psd(factor)), t=beliefs[0].t)
+    def _fused(
+        self, beliefs: GaussianBelief, like: GaussianBelief, common: GaussianBelief | None = None
+    ) -> GaussianBelief:
+        """The Gaussian of all beliefs' information, with the time and inputs of `like`; what is `common` to all counts once."""
+        informations, pulls = jax.vmap(self._information)(beliefs)
+        information, pull = jnp.sum(informations, axis=0), jnp.sum(pulls, axis=0)
+        if common is not None:
+            once, pulled = self._information(common)
+            again = len(self.groups) - 1
+            information, pull = information - again * once, pull - again * pulled
+        factor = numerics.cholesky(information)
+        mean = numerics.solve_psd(factor, pull)
+        return with_spread(like, mean, self.filter.form.start(numerics.inverse_psd(factor)), t=beliefs.t[0])
+
+    def _information(self, belief: GaussianBelief) -> tuple[Any, Any]:
+        """P^-1 (n, n) and P^-1 x (n,)."""
+        # Singular vectors make no triangular factor.
+        singular = isinstance(self.filter.form, SingularValues)
+        information = numerics.inverse_psd(numerics.lower_factor(belief.factor) if singular else belief.factor)
+        return information, times(information, belief.vector)
+
+
+def _together(trees: Sequence[Any]) -> Any:
+    """Trees of one structure as one, each array behind the other along a new first axis."""
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
 
 
 def _only(model: StateSpace, row: Row, group: tuple[str, ...]) -> Row:

@@ -1,0 +1,206 @@
+"""The estimators by name: what each knows of the others, and how it goes about the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import filters, numerics
+from jaxveh._core.names import record_type
+from jaxveh.experiments.federated_ckf.drives import WHEELS, Drive, times
+from jaxveh.experiments.federated_ckf.interleaved import Member, SeenThrough, Told, stays, take_turns
+from jaxveh.experiments.federated_ckf.model import (
+    CHANNELS,
+    State,
+    joint_model,
+    noise_levels,
+    planar,
+    rows_of,
+    states_model,
+)
+from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
+from jaxveh.statespace import Continuous, Gaussian, Prior, StateSpace
+from jaxveh.statespace.driver import scan_and_keep
+
+GROUPS = (("a_x", "a_y"), ("yaw_rate",), WHEELS)
+"""Disjoint sensors, a group for each device: accelerometers, gyroscope, wheel speeds."""
+
+SHARED = (CHANNELS, ("a_y", "yaw_rate"))
+"""As the paper's Z_1 and Z_2, with the wheel speeds in the first: what the second has the first has, too."""
+
+
+class Found(NamedTuple):
+    """Estimates over time, (T,): speeds (m/s), yaw rate (rad/s), and (T, 4) `parameters` in physical units.
+
+    `vector` (T, 7) and `covariance` (T, 7, 7) are what the estimator believes of three states and the logarithms of four
+    parameters; the parameters' covariance is zero where they are taken for certain.
+    """
+
+    v_x: Any
+    v_y: Any
+    yaw_rate: Any
+    parameters: Any
+    vector: Any
+    covariance: Any
+
+
+class Contestant(NamedTuple):
+    """`run(study, start, drive) -> Found`, and what it is, in words."""
+
+    run: Callable[[Study, Any, Drive], Found]
+    what: str
+
+
+def contestants(study: Study) -> dict[str, Contestant]:
+    """All of them by name, the do-nothing one first."""
+    cubature = filters.Cubature()
+    shared = filters.Federated(cubature, SHARED, by_trace=True, overlapping=True)
+    apart = filters.Federated(cubature, GROUPS, common=True)
+    isolating = filters.Federated(cubature, GROUPS, common=True, isolate=study.isolate)
+    return {
+        "first guess": Contestant(_guess, "the parameters are the first guess; states by a cubature filter"),
+        "joint": Contestant(_joint(cubature), "one cubature filter of states and parameters, all sensors"),
+        "joint, gated": Contestant(
+            _joint(filters.Gated(cubature, study.gate)), f"the same; innovations beyond {study.gate:g} sigma left out"
+        ),
+        "three interleaved": Contestant(
+            _three(cubature), "three cubature filters that believe each other's means; our noises"
+        ),
+        "three federated, shared sensors": Contestant(
+            _three(shared), "the paper's structure: each of the three has two locals with the same sensors; our noises"
+        ),
+        "three considered": Contestant(
+            _joint(filters.Dual(cubature, BLOCKS)),
+            "three that consider each other's spreads, but forget what they share",
+        ),
+        "redesigned": Contestant(
+            _joint(apart),
+            "covariances among the three are kept; a local filter for each device has the whole prediction",
+        ),
+        "redesigned, isolating": Contestant(_joint(isolating), "the same; a device that surprises is left out"),
+    }
+
+
+def with_shares() -> Contestant:
+    """The redesign with N. Carlson's shares instead of a common prediction."""
+    what = "as the redesigned, but each local has a third of the information, and its points lie sqrt(3) as far out"
+    return Contestant(_joint(filters.Federated(filters.Cubature(), GROUPS)), what)
+
+
+BLOCKS = (State._fields, ("mass", "yaw_inertia", "front_axle_to_cg"), ("friction",))
+"""What the three estimators estimate."""
+
+
+def _guess(study: Study, start: Any, drive: Drive) -> Found:
+    model = states_model(study, planar(study, start), drive)
+    keep = lambda belief: (jnp.stack(belief.mean), belief.covariance)
+    _, (mean, covariance) = scan_and_keep(filters.Cubature(), model, rows_of(study, drive), None, keep)
+    guess = jnp.log(jnp.stack([jnp.asarray(getattr(start, name)) for name in PARAMETERS]))
+    vector = jnp.concatenate([mean, jnp.broadcast_to(guess, (mean.shape[0], 4))], axis=1)
+    return _found(vector, jnp.pad(covariance, ((0, 0), (0, 4), (0, 4))))
+
+
+def _joint(filter_: Any):
+    def run(study, start, drive):
+        model = joint_model(study, start, drive)
+        keep = lambda belief: (jnp.stack(belief.mean), belief.covariance)
+        _, (mean, covariance) = scan_and_keep(filter_, model, rows_of(study, drive), None, keep)
+        return _found(mean, covariance)
+
+    return run
+
+
+def _found(vector: Any, covariance: Any) -> Found:
+    v_x, v_y, yaw_rate = vector[:, 0], vector[:, 1], vector[:, 2]
+    return Found(v_x, v_y, yaw_rate, jnp.exp(vector[:, 3:]), vector, covariance)
+
+
+def _put(names: tuple[str, ...]):
+    """Parameters by their logarithms into the car."""
+
+    def put(car, x):
+        where = lambda car: [getattr(car, name) for name in names]
+        return eqx.tree_at(where, car, [jnp.exp(value) for value in x])
+
+    return put
+
+
+PUT_BODY, PUT_FRICTION = _put(BLOCKS[1]), _put(BLOCKS[2])
+
+
+def _three(filter_: Any):
+    """The paper's three estimators, each with `filter_`, in logarithms and with the joint filter's noises."""
+
+    def run(study, start, drive):
+        car = planar(study, start)
+        states = states_model(study, car, drive)
+        spreads = dict(
+            mass=study.mass_spread, yaw_inertia=study.inertia_spread,
+            front_axle_to_cg=study.cg_spread, friction=study.friction_spread,
+        )  # fmt: skip
+        rows = rows_of(study, drive)
+        told = Told(rows.t[0], jax.tree.map(lambda leaf: leaf[0], rows.u), car, states.prior.mean)
+        members = [Member(filter_, states, lambda told: told.car, lambda mean, told: told._replace(state=mean))]
+        for names, put in ((BLOCKS[1], PUT_BODY), (BLOCKS[2], PUT_FRICTION)):
+            kind = record_type("State", names)
+            model = StateSpace(
+                transition=stays, observation=SeenThrough(put),
+                process_noise=Continuous(Gaussian(dict.fromkeys(names, study.walk))),
+                measurement_noise=Gaussian(noise_levels(study)),
+                prior=Prior(kind(*[jnp.log(getattr(car, name)) for name in names]), {n: spreads[n] for n in names}),
+                inputs=states.inputs, input_path="linear",
+            )  # fmt: skip
+            tell = lambda mean, told, put=put: told._replace(car=put(told.car, mean))
+            members.append(Member(filter_, model, lambda told: told, tell))
+        (state, body, friction), (P, P_body, P_friction), _ = take_turns(tuple(members), told, rows)
+        covariance = jnp.zeros((state.shape[0], 7, 7)).at[:, :3, :3].set(P)
+        covariance = covariance.at[:, 3:4, 3:4].set(P_friction).at[:, 4:, 4:].set(P_body)
+        return _found(jnp.concatenate([state, friction, body], axis=1), covariance)
+
+    return run
+
+
+def metrics(study: Study, found: Found, drive: Drive, truth: Any) -> dict[str, Any]:
+    """Errors of a run: `<parameter>_error` (shares, at the end), `sideslip_rmse` (degrees, from `settled` on) and
+    `sideslip_rmse_fault` (during the fault), `nees` of the parameters at the end and `nees_all` of states and parameters
+    (mean from `settled` on), over their dimensions; the estimates, ten a second.
+    """
+    t = times(study)
+    later, wrong = t >= study.settled, (t >= study.fault_at) & (t < study.fault_at + study.fault_time)
+    sideslip = numerics.arctan2(found.v_y, found.v_x)
+    off = jnp.rad2deg(sideslip - drive.true_sideslip)
+    rms = lambda rows: jnp.sqrt(jnp.sum(jnp.where(rows, off**2, 0.0)) / _count(rows))
+    true = jnp.stack([drive.true_v_x, drive.true_v_y, drive.true_yaw_rate], axis=1)
+    error = found.vector - jnp.concatenate([true, jnp.broadcast_to(jnp.log(truth), (t.shape[0], 4))], axis=1)
+    nees = _squared(error[-1, 3:], found.covariance[-1, 3:, 3:]) / 4.0
+    every = jax.vmap(_squared)(error, found.covariance) / 7.0
+    share = jnp.abs(found.parameters[-1] / truth - 1.0)
+    seen = slice(None, None, round(0.1 / study.dt))
+    return {
+        **{f"{name}_error": share[i] for i, name in enumerate(PARAMETERS)},
+        "sideslip_rmse": rms(later),
+        "sideslip_rmse_fault": rms(wrong),
+        "v_x_rmse": jnp.sqrt(jnp.sum(jnp.where(later, (found.v_x - drive.true_v_x) ** 2, 0.0)) / _count(later)),
+        "nees": nees,
+        "spread": jnp.sqrt(jnp.diagonal(found.covariance[-1, 3:, 3:])),
+        "nees_each": error[-1, 3:] ** 2 / jnp.diagonal(found.covariance[-1, 3:, 3:]),
+        "nees_all": jnp.sum(jnp.where(later, every, 0.0)) / _count(later),
+        "sideslip": sideslip[seen],
+        "parameters": found.parameters[seen],
+    }
+
+
+def _count(rows: Any) -> Any:
+    return jnp.sum(jnp.where(rows, 1.0, 0.0))
+
+
+def _squared(error: Any, covariance: Any) -> Any:
+    """e^T P^-1 e; infinite where nothing is believed uncertain."""
+    std = jnp.sqrt(jnp.diagonal(covariance))
+    scaled = covariance / (std[:, None] * std[None, :])
+    value = jnp.sum((error / std) * jnp.linalg.solve(scaled, error / std))
+    return jnp.where(jnp.isfinite(value), value, jnp.inf)

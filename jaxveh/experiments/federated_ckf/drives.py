@@ -1,0 +1,142 @@
+"""The drives: a car with a motor in each wheel through a slalom on a slippery road."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import manoeuvres, numerics, roads, vehicles
+from jaxveh._core.parameter import parameter
+from jaxveh.experiments.federated_ckf.settings import Study
+from jaxveh.manoeuvres import AbstractManoeuvre
+from jaxveh.manoeuvres.base import DriverInputs, as_time
+from jaxveh.manoeuvres.speeds import AbstractSpeed
+from jaxveh.simulation import simulate
+from jaxveh.statespace import Gaussian, RolledRK4
+from jaxveh.tyres import Dugoff, MagicFormula, Similarity
+from jaxveh.vehicles import SevenDOF, sets
+from jaxveh.vehicles.parameter_sets import GENERIC
+from jaxveh.vehicles.wheels import named
+
+WHEELS = named("omega")
+PULLS = named("pull")
+
+
+class Drive(NamedTuple):
+    """What filters may see, (T,) each, and the truth.
+
+    Measured: `a_x`, `a_y` (m/s^2), `yaw_rate` (rad/s), `omega` of the wheels (rad/s; (T, 4): front left, front right, rear left,
+    rear right). Known: `steer` (rad), `torque` of the motors (N m, (T, 4)). Truth: `true_v_x`, `true_v_y` (m/s),
+    `true_yaw_rate` (rad/s), `true_sideslip` (rad).
+    """
+
+    a_x: Any
+    a_y: Any
+    yaw_rate: Any
+    omega: Any
+    steer: Any
+    torque: Any
+    true_v_x: Any
+    true_v_y: Any
+    true_yaw_rate: Any
+    true_sideslip: Any
+
+
+class Slalom(AbstractManoeuvre):
+    """A sine of `steer` (rad) and `frequency` (Hz) at a speed that varies; the first second is faded in."""
+
+    speed: AbstractSpeed
+    duration: float = eqx.field(static=True)
+    frequency: float = eqx.field(static=True)
+    steer: jax.Array = parameter("rad", scale=0.1)
+
+    def inputs(self, t: Any) -> DriverInputs:
+        t = as_time(t, self.steer)
+        v_x, v_x_rate = self.speed.at(t)
+        wave = numerics.sin(2.0 * np.pi * self.frequency * t) * numerics.smooth_step(t)
+        return DriverInputs(steer=self.steer * wave, v_x=v_x, v_x_rate=v_x_rate)
+
+
+def times(study: Study) -> jax.Array:
+    """The times of the rows, s."""
+    return jnp.asarray(np.arange(round(study.duration / study.dt) + 1) * study.dt)
+
+
+def dugoff(study: Study) -> Dugoff:
+    """The paper's tyre, whose friction is the road's."""
+    numbers = sets.ev().front
+    assert numbers is not None and numbers.slip_stiffness is not None
+    return Dugoff(numbers.slip_stiffness, numbers.cornering_stiffness, friction=1.0, fading=study.fading)
+
+
+def peaked() -> Similarity:
+    """A Magic Formula of ordinary shape, as stiff as the paper's tyre at a wheel's mean load; less friction shrinks its curve."""
+    numbers = sets.ev()
+    assert numbers.front is not None and numbers.front.slip_stiffness is not None
+    load, stiffness = 0.5 * sum(numbers.wheel_loads()), numbers.front.cornering_stiffness
+    C, E = GENERIC["C"], GENERIC["E"]
+    curve = MagicFormula(B=stiffness / (C * load), C=C, D=load, E=E)
+    return Similarity(curve, load, slip_stiffness_ratio=numbers.front.slip_stiffness / stiffness)
+
+
+def truth_of(study: Study, magic_formula: bool = False) -> SevenDOF:
+    """The true car: on Dugoff's tyres, or on others of the same stiffness and peak friction, but with a peak."""
+    tyre = peaked() if magic_formula else dugoff(study)
+    return vehicles.build(sets.ev(), SevenDOF, front=tyre, rear=tyre)
+
+
+def drive_once(study: Study, steer, speed_std, key, *, magic_formula: bool = False) -> Drive:
+    """One drive with a steer amplitude (rad) and a spread of the speed (m/s); a pure function, for `vmap`."""
+    speed_key, sensor_key = jax.random.split(key)
+    speed = manoeuvres.wavering_speed(
+        study.speed, speed_std, speed_key, time=study.speed_time, fastest=study.speed_fastest, count=20
+    )
+    slalom = Slalom(speed=speed, duration=study.duration, frequency=study.steer_frequency, steer=steer)
+    found = simulate(
+        truth_of(study, magic_formula), slalom, road=roads.Level(study.friction), dt=study.dt,
+        max_step=study.max_step, start={"v_x": speed.at(0.0)[0]}, solver=RolledRK4(), throw=False,
+    )  # fmt: skip
+    levels = {"a_x": study.a_x, "a_y": study.a_y, "yaw_rate": study.yaw_rate} | dict.fromkeys(WHEELS, study.wheel_speed)
+    noise = Gaussian(levels).sample(sensor_key, times(study).shape)
+    said = {name: found[f"true.{name}"] + noise[name] for name in levels}
+    return Drive(
+        a_x=said["a_x"],
+        a_y=said["a_y"],
+        yaw_rate=said["yaw_rate"],
+        omega=jnp.stack([said[name] for name in WHEELS], axis=-1),
+        steer=found["steer"],
+        torque=jnp.stack([found[name] for name in named("torque")], axis=-1),
+        true_v_x=found["true.v_x"],
+        true_v_y=found["true.v_y"],
+        true_yaw_rate=found["true.yaw_rate"],
+        true_sideslip=found["true.sideslip"],
+    )
+
+
+def wheel_rates(study: Study, drive: Drive) -> jax.Array:
+    """Accelerations of the wheels from what they measured until now, rad/s^2, (T, 4): differences over `rate_time`, or as far
+    back as there are rows.
+
+    Over one row their noise would be that of 4.6 N at the tread, and the same noise is in the wheel speeds that the
+    filter is given: friction then comes out one per cent too large.
+    """
+    n, rows = round(study.rate_time / study.dt), np.arange(drive.omega.shape[0])
+    back = np.maximum(rows - n, 0)
+    over = np.maximum(rows - back, 1) * study.dt
+    return (drive.omega - drive.omega[back]) / over[:, None]
+
+
+def felt(study: Study, drive: Drive) -> tuple[jax.Array, jax.Array]:
+    """What the loads follow (m/s^2, (T,) each): the measured accelerations behind the lag of roll and pitch."""
+    kept = np.exp(-study.dt / study.load_time)
+
+    def step(before, measured):
+        now = kept * before + (1.0 - kept) * measured
+        return now, now
+
+    both = jnp.stack([drive.a_x, drive.a_y], axis=-1)
+    return tuple(jax.lax.scan(step, jnp.zeros_like(both[0]), both)[1].T)

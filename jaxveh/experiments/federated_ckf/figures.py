@@ -1,0 +1,143 @@
+"""The study's pictures: the parameters over time, one drive with its fault, what steer and speed can tell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jaxveh.experiments.federated_ckf.report import SHORT, Reproduction
+from jaxveh.experiments.federated_ckf.settings import PARAMETERS
+from jaxveh.experiments.federated_ckf.study import truth
+from jaxveh.plots.figure import Figure
+from jaxveh.plots.style import COLOURS, CYCLE, SHADE, WIDTH, style
+
+EVERY = 0.1
+"""s between the rows that are kept."""
+
+UNITS = {"friction": "-", "mass": "kg", "yaw_inertia": "kg m²", "front_axle_to_cg": "m"}
+
+SHOWN = {
+    "first guess": COLOURS["prior"],
+    "three federated, shared sensors": CYCLE[3],
+    "three interleaved": CYCLE[4],
+    "joint": CYCLE[0],
+    "redesigned": CYCLE[1],
+}
+"""The estimators of the figures and their colours."""
+
+
+def figures(result: Reproduction) -> dict[str, Any]:
+    """All pictures by file stem."""
+    return {
+        "parameters": parameters_figure(result),
+        "drive": drive_figure(result),
+        "fault": fault_figure(result),
+        "line": line_figure(result),
+    }
+
+
+def parameters_figure(result: Reproduction, case: str = "printed start") -> Any:
+    """The four parameters over time: medians over seeds and quartiles as bands."""
+    figure, raced = Figure(figsize=(WIDTH, 5.0), layout="constrained"), result.raced
+    with style():
+        panels = figure.subplots(2, 2, sharex=True)
+        for i, (axes, name) in enumerate(zip(panels.flat, PARAMETERS, strict=True)):
+            for who, colour in SHOWN.items():
+                values = raced.at("parameters", who, case)[..., i]
+                low, mid, high = np.nanpercentile(values, [25, 50, 75], axis=0)
+                time = EVERY * np.arange(len(mid))
+                dashes = (0, (4, 3)) if who == "redesigned" else "-"
+                axes.plot(time, mid, color=colour, linestyle=dashes, label=who if i == 0 else None)
+                axes.fill_between(time, low, high, color=colour, alpha=0.15, linewidth=0)
+            true = truth(raced.study)[i]
+            axes.axhline(true, color=COLOURS["truth"], linewidth=0.8, label="truth" if i == 0 else None)
+            axes.set(ylabel=f"{SHORT[name]} [{UNITS[name]}]", ylim=(0.4 * true, 1.7 * true))
+            if name == "friction":
+                axes.set(ylim=(0.05, 3.0), yscale="log")
+        for axes in panels[1]:
+            axes.set(xlabel="time [s]")
+        figure.suptitle(
+            f"From the {case}: median and quartiles over {result.seeds} seeds", fontsize=9, x=0.02, ha="left"
+        )
+        figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def drive_figure(result: Reproduction, seed: int = 0) -> Any:
+    """One drive: steer, speed, lateral acceleration, sideslip, and the errors of the sideslip from the printed start."""
+    figure, raced = Figure(figsize=(WIDTH, 6.6), layout="constrained"), result.raced
+    place = raced.cases.index("printed start")
+    drive = type(raced.drives)(*(leaf[place, seed] for leaf in raced.drives))
+    time = raced.study.dt * np.arange(len(drive.steer))
+    step = round(EVERY / raced.study.dt)
+    true = np.rad2deg(drive.true_sideslip)
+    with style():
+        panels = figure.subplots(5, 1, sharex=True, height_ratios=(1, 1, 1, 1, 2))
+        panels[2].plot(time, drive.a_y, color=COLOURS["prior"], linewidth=0.5, label="measured")
+        truths = (np.rad2deg(drive.steer), 3.6 * drive.true_v_x, None, true)
+        for axes, values in zip(panels, truths, strict=False):
+            if values is not None:
+                axes.plot(time, values, color=COLOURS["truth"])
+        labels = ("steer [°]", "speed [km/h]", "measured $a_y$\n[m/s²]", "sideslip [°]", "error of the\nsideslip [°]")
+        for axes, label in zip(panels, labels, strict=True):
+            axes.set(ylabel=label)
+        for who, colour in SHOWN.items():
+            error = np.rad2deg(raced.at("sideslip", who, "printed start")[seed]) - true[::step]
+            dashes = (0, (4, 3)) if who == "redesigned" else "-"
+            panels[4].plot(time[::step], error, color=colour, linestyle=dashes, label=who)
+        panels[4].set(xlabel="time [s]")
+        figure.legend(*panels[4].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+FAULTY = {"joint": CYCLE[0], "joint, gated": CYCLE[2], "redesigned": CYCLE[1], "redesigned, isolating": CYCLE[5]}
+
+
+def fault_figure(result: Reproduction) -> Any:
+    """The sideslip's error over time with the fault: the median of its size over seeds."""
+    figure, raced = Figure(figsize=(WIDTH, 3.4), layout="constrained"), result.raced
+    study, step = raced.study, round(EVERY / raced.study.dt)
+    true = np.rad2deg(raced.drives.true_sideslip[raced.cases.index("fault")][:, ::step])
+    with style():
+        axes = figure.subplots()
+        axes.axvspan(study.fault_at, study.fault_at + study.fault_time, color=SHADE, zorder=0, label="fault")
+        for who, colour in FAULTY.items():
+            error = np.abs(np.rad2deg(raced.at("sideslip", who, "fault")) - true)
+            dashes = (0, (4, 3)) if who.startswith("redesigned") else "-"
+            median = np.maximum(np.nanmedian(error, axis=0), 1e-4)
+            axes.plot(EVERY * np.arange(error.shape[1]), median, color=colour, linestyle=dashes, label=who)
+        axes.set(
+            xlabel="time [s]", ylabel="error of the sideslip [°]", yscale="log",
+            xlim=(study.settled, study.duration), ylim=(1e-3, 1.0),
+            title=f"Yaw rate off by {study.bias:g} rad/s: median over {result.seeds} seeds",
+        )  # fmt: skip
+        figure.legend(loc="outside lower center", ncols=5)
+    return figure
+
+
+def line_figure(result: Reproduction) -> Any:
+    """Bounds of friction and mass over the steer amplitude, by how much the speed varies, and what the joint filter finds."""
+    figure = Figure(figsize=(WIDTH, 3.8), layout="constrained")
+    bounds = {name: np.array([[one.bounds for one in row] for row in rows]) for name, rows in result.seen.items()}
+    with style():
+        left, right = figure.subplots(1, 2)
+        for j, speed in enumerate(result.spreads):
+            colour, label = CYCLE[j], f"speed varied by {speed:g} m/s"
+            left.plot(result.steers, 100.0 * bounds["known"][:, j, 0], color=colour, label=label)
+            right.plot(result.steers, 100.0 * bounds["known"][:, j, 1], color=colour, linestyle=":")
+            right.plot(result.steers, 100.0 * bounds["unknown"][:, j, 1], color=colour)
+            for axes, name in ((left, "friction"), (right, "mass")):
+                found = 100.0 * np.median(result.over[f"{name}_error"][:, j], axis=-1)
+                axes.plot(result.steers, found, color=colour, linestyle="none", marker="o", markersize=4)
+        left.set(ylabel="mu [%]", title="Friction: no bound where nothing slides")
+        right.set(ylabel="m [%]", title="Mass: what is known of rolling resistance")
+        for axes in (left, right):
+            axes.set(xlabel="steer amplitude [°]", yscale="log")
+            axes.margins(x=0.04)
+        grey = dict(color="#444444")
+        left.plot([], [], **grey, label="bound (right: resistance unknown)")
+        left.plot([], [], **grey, linestyle=":", label="resistance known, as filters take it")
+        left.plot([], [], **grey, linestyle="none", marker="o", markersize=4, label="joint filter, median error")
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return figure

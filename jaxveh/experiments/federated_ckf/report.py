@@ -1,0 +1,208 @@
+"""The report: tables, checks against honest criteria, and what the printed settings do."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from jaxveh._core.progress import Progress, part, silent
+from jaxveh.diagnostics import Observability
+from jaxveh.experiments.federated_ckf.contestants import contestants
+from jaxveh.experiments.federated_ckf.drives import Drive
+from jaxveh.experiments.federated_ckf.observed import observed
+from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
+from jaxveh.experiments.federated_ckf.study import Raced, cases, drives_by_case, drives_of, race, race_over, truth
+from jaxveh.experiments.report import Check, Table, above, at_most, spread
+from jaxveh.sweeps import Swept, compare
+
+STEERS, SPREADS = (3.0, 4.0, 5.0, 8.0), (0.0, 0.1, 0.3)
+"""Steer amplitudes (degrees) and spreads of the speed (m/s) whose drives are looked at for what they can tell."""
+
+NEES = (0.25, 4.0)
+"""Within which a believed covariance agrees with the errors."""
+
+SHORT = {"friction": "mu", "mass": "m", "yaw_inertia": "I_z", "front_axle_to_cg": "a"}
+
+LIMITS = {"friction": 1.0, "mass": 2.0, "yaw_inertia": 5.0, "front_axle_to_cg": 2.0}
+"""Final errors, %."""
+
+
+class Reproduction(NamedTuple):
+    """Everything the experiment found: `raced`, all estimators in all cases; over `steers` (degrees) and `spreads` (m/s) the
+    joint filter's errors `over`, and what the first seed's drive can tell, `seen`, by what is known of the rolling resistance."""
+
+    seeds: int
+    raced: Raced
+    steers: tuple[float, ...]
+    spreads: tuple[float, ...]
+    over: Swept
+    seen: dict[str, list[list[Observability]]]
+
+
+def run(study: Study | None = None, *, seeds: int = 20, seed: int = 0, progress: Progress = silent) -> Reproduction:
+    """All drives and estimators over `seeds` seeds (at least two)."""
+    study = study or Study()
+    # Other drives than those on which the noises were chosen.
+    key = jax.random.fold_in(jax.random.key(seed), 2)
+    steers = tuple(sorted({*np.radians(STEERS).tolist(), study.steer}))
+    speeds = tuple(sorted({*SPREADS, study.speed_std}))
+    grid = drives_of(study, steers, speeds, seeds, key, progress=part(progress, 0.0, 0.08, "drives"))
+    names = tuple(cases(study))
+    # The paper's slalom is one of the grid's.
+    own = steers.index(study.steer), speeds.index(study.speed_std)
+    known = Drive(*(leaf[own] for leaf in grid))
+    drives = drives_by_case(study, names, seeds, key, known=known, progress=part(progress, 0.08, 0.15, "other tyres"))
+    raced = race(study, drives, names, progress=part(progress, 0.15, 0.9, "estimators"))
+    told = part(progress, 0.9, 0.96, "steer and speed")
+    over = race_over(study, grid, steers, speeds, progress=told)
+    progress(0.96, 1.0, "observability")
+    seen = observed(study, Start(*truth(study)), Drive(*(leaf[:, :, 0] for leaf in grid)))
+    progress(1.0, 1.0, "done")
+    return Reproduction(seeds, raced, tuple(np.degrees(steers).tolist()), speeds, over, seen)
+
+
+def settings(result: Reproduction) -> dict:
+    """The study, for a manifest."""
+    study = result.raced.study
+    own = {name: case._replace(start=dataclasses.asdict(case.start))._asdict() for name, case in cases(study).items()}
+    return {"study": dataclasses.asdict(study), "cases": own}
+
+
+def _median(values) -> float:
+    return float(np.quantile(np.where(np.isnan(values), np.inf, values), 0.5, method="nearest"))
+
+
+def check(result: Reproduction) -> list[Check]:
+    """The criteria: medians over seeds; nobody knew the truth."""
+    raced, found = result.raced, []
+    median = lambda name, estimator, case: _median(raced.at(name, estimator, case))
+    starts = ("printed start", "nearer start")
+    for case in starts:
+        for name, limit in LIMITS.items():
+            found.append(
+                at_most(
+                    f"joint, {case}: final error of {SHORT[name]}, %",
+                    100 * median(f"{name}_error", "joint", case),
+                    limit,
+                )
+            )
+        found += _nees(f"joint, {case}", median("nees", "joint", case))
+    for case in starts:
+        ratio = median("sideslip_rmse", "redesigned", case) / median("sideslip_rmse", "joint", case)
+        found.append(at_most(f"redesigned, {case}: sideslip RMSE over the joint filter's", ratio, 1.1))
+        found += _nees(f"redesigned, {case}", median("nees", "redesigned", case))
+    faulty = median("sideslip_rmse", "redesigned, isolating", "fault") / median("sideslip_rmse", "redesigned", "fault")
+    found.append(at_most("fault: sideslip RMSE with isolation over that without", faulty, 0.6))
+    gated = [median("sideslip_rmse", "joint, gated", case) for case in ("fault", "nearer start")]
+    found.append(
+        at_most("fault: sideslip RMSE of the gated joint filter over its fault-free one", gated[0] / gated[1], 1.2)
+    )
+    # Of mu, over the prior's spread: without end where nothing slides.
+    smallest = min(float(one.bounds[0] / one.spread[0]) for one in result.seen["known"][0])
+    found.append(above(f"steer {result.steers[0]:g} degrees: bound of mu over its prior's spread", smallest, 1.0))
+    return found
+
+
+def _nees(who: str, value: float) -> list[Check]:
+    low, high = NEES
+    return [
+        above(f"{who}: NEES of the parameters over their number, above", value, low),
+        at_most(f"{who}: NEES of the parameters over their number", value, high),
+    ]
+
+
+def tables(result: Reproduction) -> list[Table]:
+    """The tables, the do-nothing first guess in each of the estimators'."""
+    raced = result.raced
+    found = [race_table(raced, case) for case in ("printed start", "nearer start", "other tyres")]
+    return [*found, _paired_table(raced), _fault_table(raced), _line_table(result)]
+
+
+TITLES = {
+    "printed start": "From the printed start mu 1, 700 kg, 1400 kg m^2, 1.0 m",
+    "nearer start": "From mu 0.3, 1050 kg, 1500 kg m^2, 1.1 m",
+    "other tyres": "The same on tyres with a peak (Magic Formula), which no filter knows",
+}
+
+
+def race_table(raced: Raced, case: str) -> Table:
+    """Final errors, consistency and sideslip of every estimator in one case."""
+    seeds = raced.found.seeds
+    rows = []
+    whats = contestants(raced.study)
+    for name in raced.found.design.axis("estimator").labels:
+        at = lambda value, name=name, **options: spread(raced.at(value, name, case), **options)
+        errors = [at(f"{parameter}_error", scale=100.0) for parameter in PARAMETERS]
+        sure = [at(value, lost="infinite") for value in ("nees", "nees_all")]
+        rows.append((name, *errors, *sure, at("sideslip_rmse"), whats[name].what))
+    heads = [f"{SHORT[name]}, %" for name in PARAMETERS]
+    return Table(
+        f"{TITLES[case]}: median [quartiles] over {seeds} seeds",
+        ("estimator", *heads, "NEES/4", "NEES/7", "sideslip RMSE, degrees", "what it is"),
+        rows,
+    )
+
+
+def _paired_table(raced: Raced) -> Table:
+    rows = []
+    for name in raced.found.design.axis("estimator").labels:
+        cells = []
+        for case in ("printed start", "nearer start"):
+            own, joint = (raced.at("sideslip_rmse", who, case) for who in (name, "joint"))
+            pair = compare(own, joint)
+            cells += [
+                f"{float(pair.ratio.value):.3g} [{float(pair.ratio.low):.3g}, {float(pair.ratio.high):.3g}]",
+                float(pair.wins),
+            ]
+        rows.append((name, *cells))
+    return Table(
+        "Sideslip RMSE over the joint filter's, seed by seed: median ratio [95 %], share of seeds in which it is smaller",
+        ("estimator", "printed start", "wins", "nearer start", "wins"),
+        rows,
+    )
+
+
+def _fault_table(raced: Raced) -> Table:
+    rows = []
+    for name in raced.found.design.axis("estimator").labels:
+        without, with_fault = (raced.at("sideslip_rmse", name, case) for case in ("nearer start", "fault"))
+        during = raced.at("sideslip_rmse_fault", name, "fault")
+        errors = [spread(raced.at(f"{p}_error", name, "fault"), scale=100.0) for p in ("friction", "yaw_inertia")]
+        rows.append(
+            (name, spread(without), spread(with_fault), spread(during), _median(with_fault) / _median(without), *errors)
+        )
+    study = raced.study
+    return Table(
+        f"Yaw rate off by {study.bias:g} rad/s for {study.fault_time:g} s: sideslip RMSE in degrees",
+        ("estimator", "no fault", "with the fault", "during the fault", "ratio of medians", "mu, %", "I_z, %"),
+        rows,
+    )
+
+
+def _line_table(result: Reproduction) -> Table:
+    rows = []
+    for i, steer in enumerate(result.steers):
+        for j, speed in enumerate(result.spreads):
+            known, unknown = (result.seen[name][i][j] for name in ("known", "unknown"))
+            mu, m = (result.over[f"{name}_error"][i, j] for name in ("friction", "mass"))
+            mu_bound = "unobservable" if "friction" in known.unobservable() else 100.0 * known.bounds[0]
+            rows.append(
+                (f"{steer:g}", speed, mu_bound, spread(mu, scale=100.0), 100.0 * known.bounds[1],
+                 100.0 * unknown.bounds[1], spread(m, scale=100.0))
+            )  # fmt: skip
+    return Table(
+        "What steer and speed can tell: Cramer-Rao bounds in % (at the truth), and the joint filter's final errors in %",
+        (
+            "steer, degrees",
+            "speed varied by, m/s",
+            "bound of mu",
+            "found",
+            "bound of m",
+            "rolling resistance unknown",
+            "found",
+        ),
+        rows,
+    )

@@ -1,0 +1,138 @@
+"""The runs: drives once, then every estimator on the same drives."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import sweeps
+from jaxveh._core.errors import check_whole
+from jaxveh._core.progress import Progress, silent
+from jaxveh.experiments.federated_ckf.contestants import contestants, metrics
+from jaxveh.experiments.federated_ckf.drives import Drive, drive_once, times
+from jaxveh.experiments.federated_ckf.settings import OTHER_START, PARAMETERS, PRINTED_START, Start, Study
+from jaxveh.vehicles import sets
+
+
+class Case(NamedTuple):
+    """A drive and a first guess: with a `bias` (rad/s) of the yaw rate for a while, on a Magic Formula's tyres; and what filters
+    take for the process noise (`speed_noise`, `yaw_noise`, `walk`; None: the study's)."""
+
+    start: Start
+    bias: float = 0.0
+    magic_formula: bool = False
+    noise: tuple[float, float, float] | None = None
+
+
+def cases(study: Study) -> dict[str, Case]:
+    """What every estimator goes through."""
+    return {
+        "printed start": Case(PRINTED_START),
+        "nearer start": Case(OTHER_START),
+        "fault": Case(OTHER_START, bias=study.bias),
+        "other tyres": Case(OTHER_START, magic_formula=True, noise=OTHER_NOISE),
+    }
+
+
+OTHER_NOISE = (0.01, 0.01, 1e-3)
+"""The noises of the greatest likelihood on drives of other keys with other tyres, within a factor of three."""
+
+
+class Raced(NamedTuple):
+    """One study: `drives` by case, (cases, seeds, T, ...), and what the estimators made of them, `found` with the axes
+    estimator, case (by number) and seed."""
+
+    study: Study
+    cases: tuple[str, ...]
+    drives: Drive
+    found: sweeps.Swept
+
+    def at(self, name: str, estimator: str, case: str) -> np.ndarray:
+        """Values of one estimator in one case, (seeds, ...)."""
+        return self.found.at(name, estimator=estimator, case=float(self.cases.index(case)))
+
+
+def truth(study: Study) -> np.ndarray:
+    """The true parameters, (4,)."""
+    numbers = sets.ev()
+    return np.array([study.friction, *[getattr(numbers, name) for name in PARAMETERS[1:]]])
+
+
+def drives_of(
+    study: Study, steer, speed_std, seeds: int, key, *, magic_formula: bool = False, progress: Progress = silent
+) -> Drive:
+    """Drives with each steer amplitude (rad) and spread of the speed (m/s), one a seed: (steers, spreads, seeds, T, ...)."""
+    check_whole("seeds", seeds, 2)
+    run = lambda point, key: drive_once(study, point.steer, point.speed_std, key, magic_formula=magic_formula)
+    design = sweeps.Design(steer=steer, speed_std=speed_std)
+    found = sweeps.sweep(run, design, seeds, key, progress=progress)
+    return Drive(**{name: found[name] for name in Drive._fields})
+
+
+def drives_by_case(
+    study: Study, names: tuple[str, ...], seeds: int, key, *, known: Drive | None = None, progress: Progress = silent
+) -> Drive:
+    """The drives of the cases, (cases, seeds, T, ...): the same seeds for all, and the fault on top. `known`, (seeds, T, ...):
+    those on Dugoff's tyres of the same key, where they are made already."""
+    wanted, made = cases(study), {} if known is None else {False: known}
+    for magic in {wanted[name].magic_formula for name in names} - set(made):
+        found = drives_of(study, (study.steer,), (study.speed_std,), seeds, key, magic_formula=magic, progress=progress)
+        made[magic] = jax.tree.map(lambda leaf: leaf[0, 0], found)
+    t = np.asarray(times(study))
+    wrong = (t >= study.fault_at) & (t < study.fault_at + study.fault_time)
+    own = []
+    for name in names:
+        drive = made[wanted[name].magic_formula]
+        own.append(drive._replace(yaw_rate=drive.yaw_rate + np.where(wrong, wanted[name].bias, 0.0)))
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *own)
+
+
+def race(
+    study: Study,
+    drives: Drive,
+    names: tuple[str, ...],
+    *,
+    only: tuple[str, ...] | None = None,
+    progress: Progress = silent,
+) -> Raced:
+    """Every estimator (or `only` these) on the drives of the cases."""
+    every = contestants(study)
+    chosen = {name: every[name] for name in (every if only is None else only)}
+    here = [cases(study)[name] for name in names]
+    starts = np.array([dataclasses.astuple(case.start) for case in here])
+    noises = np.array([case.noise or (study.speed_noise, study.yaw_noise, study.walk) for case in here])
+    right = truth(study)
+
+    def runs(contestant):
+        def run(point: Any, drive: Drive):
+            case = point.case.astype(int)
+            start, noise = Start(*jnp.asarray(starts)[case]), jnp.asarray(noises)[case]
+            own = dataclasses.replace(study, speed_noise=noise[0], yaw_noise=noise[1], walk=noise[2])
+            return metrics(study, contestant.run(own, start, drive), drive, jnp.asarray(right))
+
+        return run
+
+    design = sweeps.Design(
+        estimator={name: runs(contestant) for name, contestant in chosen.items()}, case=range(len(names))
+    )
+    run = lambda point, key, drive: point.estimator(point, drive)
+    found = sweeps.sweep(run, design, np.shape(drives.a_x)[1], jax.random.key(0), data=drives, progress=progress)
+    return Raced(study, tuple(names), drives, found)
+
+
+def race_over(study: Study, drives: Drive, steers, spreads, estimator: str = "joint", progress: Progress = silent):
+    """One estimator from the nearer start on drives (steers, spreads, seeds, T, ...): a sweep with the axes steer, speed_std."""
+    contestant, right = contestants(study)[estimator], truth(study)
+
+    def run(point, key, drive):
+        del point, key
+        start = Start(*map(jnp.asarray, dataclasses.astuple(OTHER_START)))
+        found = metrics(study, contestant.run(study, start, drive), drive, jnp.asarray(right))
+        return {name: found[name] for name in (*[f"{name}_error" for name in PARAMETERS], "spread", "sideslip_rmse")}
+
+    design = sweeps.Design(steer=steers, speed_std=spreads)
+    return sweeps.sweep(run, design, np.shape(drives.a_x)[2], jax.random.key(0), data=drives, progress=progress)
