@@ -1,0 +1,113 @@
+"""The estimators by name: what each believes of the motion, and of the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import filters
+from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
+from jaxveh.experiments.model_adaptive_pf.drives import Drive, fiala, model_car
+from jaxveh.experiments.model_adaptive_pf.models import autoregression, dynamics, gaussian, mixture, rows_of
+from jaxveh.experiments.model_adaptive_pf.settings import Study
+from jaxveh.statespace import Estimate, Row
+from jaxveh.tyres import AbstractTyre
+from jaxveh.vehicles import TwoTrack3DOF
+
+Run = Callable[[Study, TwoTrack3DOF, Drive, Any], Estimate]
+
+
+class Contestant(NamedTuple):
+    """`run(study, car, drive, key) -> Estimate`, with the car that the filter believes in; and what it is, in words."""
+
+    run: Run
+    what: str
+
+
+def contestants(study: Study) -> dict[str, Contestant]:
+    """All of them by name, the do-nothing one first."""
+    particles = filters.ParticleFilter(study.particles)
+    wavelet = {"window": study.window, "forgetting": study.forgetting}
+    haar, both = filters.HaarParticles(particles, **wavelet), filters.HaarParticles(particles, **wavelet, follows="both")
+    cubature = filters.Cubature()
+    robust = filters.RobustStudentT(cubature, study.dof)
+    printed = AutoRegressive(haar, study.update, as_printed=True)
+    return {
+        "open loop": Contestant(_open_loop, "the dynamics alone, from the first row on"),
+        PLAIN: Contestant(moved(particles), "the dynamics, the data sheet's Gaussian noise"),
+        "AAR as printed": Contestant(regressed(printed), "autoregression, wavelet variance, mixture"),
+        "AAR": Contestant(regressed(AutoRegressive(haar, study.update)), "the same with true least squares"),
+        "PF, wavelet": Contestant(moved(haar), "the dynamics, variances from the Haar wavelet"),
+        "PF, mixture": Contestant(moved(particles, mixture), "the dynamics, Cauchy-Gaussian likelihood"),
+        ADAPTIVE: Contestant(moved(haar, mixture), "both, the variance that of the Gaussian part"),
+        "PF, both follow": Contestant(moved(both, mixture), "the same, the Cauchy part's scale follows, too"),
+        "strong tracking": Contestant(moved(filters.StrongTracking(cubature)), "a cubature filter with a fading factor"),
+        CUBATURE: Contestant(moved(cubature), "the data sheet's Gaussian noise"),
+        "robust CKF": Contestant(moved(robust), "Student's t law with the data sheet's scales"),
+        ROBUST: Contestant(moved(filters.HaarNoise(robust, **wavelet)), "the same, scales from the Haar wavelet"),
+    }
+
+
+PLAIN = "PF"
+ADAPTIVE = "PF, wavelet and mixture"
+CUBATURE = "CKF"
+ROBUST = "robust CKF, wavelet"
+
+
+def moved(filter_, law=gaussian) -> Run:
+    """A filter of the dynamics."""
+
+    def run(study, car, drive, key):
+        model = dynamics(study, car, drive.v_x[0], law(study))
+        return filters.scan(filter_, model, rows_of(study, drive), key)
+
+    return run
+
+
+def regressed(filter_, law=mixture) -> Run:
+    """A filter of the autoregression."""
+
+    def run(study, car, drive, key):
+        model = autoregression(study, car, drive.v_x[0], law(study))
+        return filters.scan(filter_, model, rows_of(study, drive), key)
+
+    return run
+
+
+def _open_loop(study, car, drive, key):
+    rows = rows_of(study, drive)
+    first = jnp.arange(rows.t.shape[0]) == 0
+    y = jax.tree.map(lambda values: jnp.where(first, values, jnp.nan), rows.y)
+    return filters.scan(filters.Cubature(), dynamics(study, car, drive.v_x[0]), Row(rows.t, rows.u, y), key)
+
+
+def metrics(found: Estimate, drive: Drive) -> dict[str, Any]:
+    """Root mean squares over the drive of the errors of `sideslip` (degrees), `v_y` (m/s), `yaw_rate` (degrees/s) and `v_x`
+    (m/s); the sideslip over time (rad), and the result's code."""
+    rms = lambda name: jnp.sqrt(jnp.mean((getattr(found.mean, name) - getattr(drive, f"true_{name}")) ** 2))
+    return {
+        "sideslip": jnp.rad2deg(rms("sideslip")),
+        "v_y": rms("v_y"),
+        "yaw_rate": jnp.rad2deg(rms("yaw_rate")),
+        "v_x": rms("v_x"),
+        "course": found.mean.sideslip,
+        "log_likelihood": found.log_likelihood,
+        "result": found.result,
+    }
+
+
+def of_a_point(
+    study: Study, contestant: Contestant, tyre: Callable[..., AbstractTyre] = fiala
+) -> Callable[[Any, Any, Any], dict[str, Any]]:
+    """The contestant's run of a design's point: `run(point, key, (share, drive))`, as `sweeps.sweep` calls it; `share` is the
+    filter's tyre over the true one."""
+
+    def run(point, key, data):
+        del point
+        share, drive = data["tyre"], Drive(**{name: data[name] for name in Drive._fields})
+        return metrics(contestant.run(study, model_car(study, tyre(study, share)), drive, key), drive)
+
+    return run
