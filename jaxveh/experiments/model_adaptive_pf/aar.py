@@ -28,8 +28,8 @@ class AutoRegressive(AbstractFilter):
     With X the mean of the row before, e = X_t - a X and U = `update`, state by state:
 
     - as least squares with forgetting: `k = P X / (1 - U + X P X)`, `a += k e`, `P = (1 - k X) P / (1 - U)`;
-    - `as_printed`: `A = (1 - U) A + U X^2`, `k = U A X / (U X A X + 1)`, `a += k e`. Erratum: A stands where least squares has its
-      inverse, so that large numbers (v_x) learn in one row and small ones (v_y, yaw rate) never.
+    - `as_printed`: `A = (1 - U) A + U X^2`, `k = U A X / (U X A X + 1)`, `a += k e`. Erratum: A stands where least
+      squares has its inverse, so that large numbers (v_x) learn in one row and small ones (v_y, yaw rate) never.
 
     Either starts at a = 1; P at `1 / first^2`, as if the state had been about `first` once (m/s, m/s, rad/s).
     """
@@ -47,7 +47,9 @@ class AutoRegressive(AbstractFilter):
 
     def _init(self, model, row, key):
         inside, info = self.filter.init(model, row, key)
-        squares = BodyState(*(jnp.full_like(value, size**2) for value, size in zip(inside.mean, self.first, strict=True)))
+        squares = BodyState(
+            *(jnp.full_like(value, size**2) for value, size in zip(inside.mean, self.first, strict=True))
+        )
         spread = squares if self.as_printed else jax.tree.map(lambda square: 1.0 / square, squares)
         return Remembering(inside, Learned(model.system.keeps, spread)), info
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -31,7 +32,7 @@ def contestants(study: Study) -> dict[str, Contestant]:
     """All of them by name, the do-nothing one first."""
     particles = filters.ParticleFilter(study.particles)
     wavelet = {"window": study.window, "forgetting": study.forgetting}
-    haar, both = filters.HaarParticles(particles, **wavelet), filters.HaarParticles(particles, **wavelet, follows="both")
+    haar = filters.HaarParticles(particles, **wavelet)
     cubature = filters.Cubature()
     robust = filters.RobustStudentT(cubature, study.dof)
     printed = AutoRegressive(haar, study.update, as_printed=True)
@@ -43,8 +44,9 @@ def contestants(study: Study) -> dict[str, Contestant]:
         "PF, wavelet": Contestant(moved(haar), "the dynamics, variances from the Haar wavelet"),
         "PF, mixture": Contestant(moved(particles, mixture), "the dynamics, Cauchy-Gaussian likelihood"),
         ADAPTIVE: Contestant(moved(haar, mixture), "both, the variance that of the Gaussian part"),
-        "PF, both follow": Contestant(moved(both, mixture), "the same, the Cauchy part's scale follows, too"),
-        "strong tracking": Contestant(moved(filters.StrongTracking(cubature)), "a cubature filter with a fading factor"),
+        "strong tracking": Contestant(
+            moved(filters.StrongTracking(cubature)), "a cubature filter with a fading factor"
+        ),
         CUBATURE: Contestant(moved(cubature), "the data sheet's Gaussian noise"),
         "robust CKF": Contestant(moved(robust), "Student's t law with the data sheet's scales"),
         ROBUST: Contestant(moved(filters.HaarNoise(robust, **wavelet)), "the same, scales from the Haar wavelet"),
@@ -102,12 +104,14 @@ def metrics(found: Estimate, drive: Drive) -> dict[str, Any]:
 def of_a_point(
     study: Study, contestant: Contestant, tyre: Callable[..., AbstractTyre] = fiala
 ) -> Callable[[Any, Any, Any], dict[str, Any]]:
-    """The contestant's run of a design's point: `run(point, key, (share, drive))`, as `sweeps.sweep` calls it; `share` is the
-    filter's tyre over the true one."""
+    """The contestant's run of a design's point: `run(point, key, (case, drive))`, as `sweeps.sweep` calls it; `tyre(study,
+    share)` makes the filter's, `share` times as stiff and as strong."""
 
     def run(point, key, data):
         del point
-        share, drive = data["tyre"], Drive(**{name: data[name] for name in Drive._fields})
-        return metrics(contestant.run(study, model_car(study, tyre(study, share)), drive, key), drive)
+        case, drive = data
+        noises = {name: case.process * getattr(study, name) for name in ("v_x_noise", "v_y_noise", "yaw_noise")}
+        own = dataclasses.replace(study, **noises)
+        return metrics(contestant.run(own, model_car(own, tyre(own, case.tyre)), drive, key), drive)
 
     return run

@@ -101,8 +101,8 @@ def drive_once(study: Study, case: Case, key) -> Drive:
         frequency=study.frequency, periods=study.periods, start=START, duration=study.duration,
     )  # fmt: skip
     found = simulate(
-        true_car(study), manoeuvre, None, road=road_of(study, case, road_key), dt=study.dt, max_step=study.max_step, start={"v_x": manoeuvre.speed},
-        throw=False, solver=RolledRK4(),
+        true_car(study), manoeuvre, None, road=road_of(study, case, road_key), dt=study.dt, max_step=study.max_step,
+        start={"v_x": manoeuvre.speed}, throw=False, solver=RolledRK4(),
     )  # fmt: skip
     truth = {name: found[f"true.{name}"] for name in ("v_x", "v_y", "yaw_rate", "a_y", "sideslip")}
     noise, level = noise_of(study, case, sensor_key)

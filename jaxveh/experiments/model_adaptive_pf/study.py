@@ -59,13 +59,12 @@ def race(
     every = contestants(study) if entrants is None else entrants
     chosen = {name: every[name] for name in (every if only is None else only)}
     seeds = np.shape(drives.v_x)[1]
-    shares = np.broadcast_to(np.array([[case.tyre] for case in cases.values()]), (len(cases), seeds))
+    own = Case(*(np.repeat(np.array(values, float)[:, None], seeds, 1) for values in zip(*cases.values(), strict=True)))
     runs = {name: of_a_point(study, contestant, tyre) for name, contestant in chosen.items()}
     design = sweeps.Design(estimator=runs, **{axis.name: axis.values for axis in _design(cases).axes})
     run = lambda point, key, data: point.estimator(point, key, data)
-    data = {"tyre": shares, **drives._asdict()}
     key = jax.random.key(0) if key is None else key
-    found = sweeps.sweep(run, design, seeds, key, data=data, progress=progress)
+    found = sweeps.sweep(run, design, seeds, key, data=(own, drives), progress=progress)
     return Raced(study, dict(cases), drives, found)
 
 

@@ -92,7 +92,9 @@ class HaarParticles(AbstractFilter):
     def __check_init__(self):
         if not isinstance(self.filter, AbstractParticleFilter):
             kind = type(self.filter).__name__
-            raise InputError(f"HaarParticles: {kind} inside: must be a particle filter; HaarNoise is for Gaussian ones.")
+            raise InputError(
+                f"HaarParticles: {kind} inside: must be a particle filter; HaarNoise is for Gaussian ones."
+            )
         check_settings(self)
         check_one_of("HaarParticles.follows", self.follows, ("gaussian", "both"))
 

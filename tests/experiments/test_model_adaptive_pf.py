@@ -1,0 +1,180 @@
+"""The model-adaptive-pf experiment at small size: noise has the levels it says, filters rank as they should, errata show."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import statespace as ss
+from jaxveh.experiments import model_adaptive_pf as experiment
+from jaxveh.experiments.model_adaptive_pf import drives as own_drives
+from jaxveh.experiments.model_adaptive_pf import models, printed
+from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
+from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, CUBATURE, PLAIN, contestants, metrics
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter
+
+SMALL = experiment.Study(duration=2.5, periods=0.6, particles=60, max_step=0.005)
+NOISY = experiment.Case(level=6.0, outliers=0.05)
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return experiment.drives_of(SMALL, {"both": NOISY, "quiet": experiment.Case()}, 3, jax.random.key(5))
+
+
+def test_the_drive_is_a_slalom_of_the_printed_car(drives):
+    car = own_drives.true_car(SMALL)
+    assert (float(car.mass), float(car.front_axle_to_cg), float(car.track_rear)) == (1528.0, 1.48, 1.594)
+    assert drives.v_x.shape == (2, 3, 251)
+    assert np.abs(drives.true_v_x - SMALL.speed).max() < 0.1 * SMALL.speed
+    assert 2.5 < np.rad2deg(drives.steer).max() < 3.5
+    assert 0.7 < np.rad2deg(np.abs(drives.true_sideslip)).max() < 4.0
+    # Cases of one seed drive the same way.
+    np.testing.assert_array_equal(drives.true_v_y[0], drives.true_v_y[1])
+    # Tyres build up their force over some centimetres: at the front the force lags the steer.
+    assert np.argmax(drives.true_a_y[1, 0]) > np.argmax(drives.steer[1, 0])
+
+
+def test_noise_has_the_levels_that_the_case_says():
+    study = experiment.Study(duration=100.0)
+    noise, level = own_drives.noise_of(study, experiment.Case(), jax.random.key(0))
+    assert level.min() == level.max() == 1.0
+    for name, std in study.stds.items():
+        np.testing.assert_allclose(noise[name].std(), std, rtol=0.03)
+    noise, level = own_drives.noise_of(study, experiment.Case(level=5.0), jax.random.key(0))
+    np.testing.assert_allclose([level.min(), level.max()], [1.0, 5.0], atol=1e-3)
+    np.testing.assert_allclose((noise["a_y"] / level).std(), study.a_y, rtol=0.03)
+    noise, _ = own_drives.noise_of(study, experiment.Case(outliers=0.03), jax.random.key(0))
+    # A normal number is beyond 5 of the small standard deviations with 0.96 of the outliers.
+    np.testing.assert_allclose((np.abs(noise["a_y"]) > 5 * study.a_y).mean(), 0.03 * 0.96, rtol=0.1)
+    wild = noise["a_y"][np.abs(noise["a_y"]) > 5 * study.a_y]
+    np.testing.assert_allclose(np.median(np.abs(wild)), 0.6745 * study.outlier_size * study.a_y, rtol=0.15)
+
+
+def test_filters_rank_as_their_likelihoods(drives):
+    cases = {"both": NOISY, "quiet": experiment.Case()}
+    names = ("open loop", PLAIN, ADAPTIVE, CUBATURE)
+    raced = experiment.race(SMALL, cases, drives, only=names)
+    error = lambda name, case: np.median(raced.of("sideslip", name, case))
+    assert error(ADAPTIVE, "both") < error(PLAIN, "both") < 0.5 * error(CUBATURE, "both")
+    assert error(PLAIN, "quiet") < 1.1 * error(CUBATURE, "quiet") < error("open loop", "quiet")
+    assert (raced.found["result"] == 0).all()
+    result = experiment.Reproduction(3, raced)
+    assert raced.of("course", PLAIN, "both").shape == (3, 251)
+    assert experiment.settings(result)["cases"]["both"]["level"] == 6.0
+
+
+class Told(AbstractBelief):
+    """The mean that a test says."""
+
+    told: models.BodyState
+
+    @property
+    def mean(self):
+        return self.told
+
+    def moments(self, model):
+        return self.told, self.told
+
+
+class Scripted(AbstractFilter):
+    """Says each row's measurements, and keeps the coefficients that it was given."""
+
+    def check(self, model):
+        del model
+
+    def init(self, model, row, key=None):
+        return Told(models.BodyState(*row.y)), model.system.keeps
+
+    def step(self, model, belief, row):
+        return Told(models.BodyState(*row.y)), model.system.keeps
+
+
+def learned(as_printed, first):
+    """Coefficients after 200 rows of decays to 0.9, 0.98 and 1.001 of the value before, from `first`."""
+    shares, rows = np.array([0.9, 0.98, 1.001]), 200
+    values = np.array(first) * shares ** np.arange(rows)[:, None]
+    system = models.Regressed(None, models.BodyState(*jnp.ones(3)))
+    model = ss.StateSpace(
+        system=system, transition=lambda s, t0, t1, x, u: x, observation=lambda s, t, x, u: x, process_noise=None,
+        measurement_noise=dict.fromkeys(("v_x", "v_y", "yaw_rate"), 1.0),
+        prior=ss.Prior(models.BodyState(0.0, 0.0, 0.0), dict.fromkeys(("v_x", "v_y", "yaw_rate"), 1.0)),
+    )  # fmt: skip
+    filter_ = AutoRegressive(Scripted(), as_printed=as_printed)
+    y = lambda k: models.BodyState(*map(jnp.asarray, values[k]))
+    belief, _ = filter_.init(model, ss.Row(jnp.asarray(0.0), None, y(0)))
+    step = jax.jit(filter_.step)
+    for k in range(1, rows):
+        belief, _ = step(model, belief, ss.Row(jnp.asarray(0.01 * k), None, y(k)))
+    return shares, np.array(belief.memory.keeps)
+
+
+def test_least_squares_learns_whatever_the_size_and_the_printed_law_does_not():
+    shares, found = learned(False, (10.0, 0.1, 0.1))
+    np.testing.assert_allclose(found, shares, atol=2e-3)
+    _, found = learned(True, (10.0, 0.1, 0.1))
+    assert abs(found[0] - 0.9) < 0.02
+    assert abs(found[1] - 1.0) < 1e-3
+
+
+def test_the_mixture_is_that_of_the_paper_with_its_errata_corrected():
+    study = experiment.Study()
+    assert study.weight == pytest.approx((4 - 1.7**2) / (3 * 1.7**2))
+    law = models.mixture(study)
+    x = 0.03
+    scale, std = study.yaw_rate / np.sqrt(2), study.yaw_rate
+    cauchy = scale / (np.pi * (x**2 + scale**2))
+    normal = np.exp(-(x**2) / (2 * std**2)) / np.sqrt(2 * np.pi * std**2)
+    residual = {"v_x": jnp.asarray(0.0), "a_y": jnp.asarray(0.0), "yaw_rate": jnp.asarray(x)}
+    only = {"v_x": jnp.asarray(False), "a_y": jnp.asarray(False), "yaw_rate": jnp.asarray(True)}
+    expected = np.log(study.weight * cauchy + (1 - study.weight) * normal)
+    np.testing.assert_allclose(law.log_prob(residual, only), expected, rtol=1e-6)
+
+
+def test_the_printed_variance_grows_to_a_standard_deviation():
+    study = dataclasses.replace(experiment.Study(), duration=4.0)
+    noise, _ = own_drives.noise_of(study, experiment.Case(), jax.random.key(1))
+    haar = contestants(study)["PF, wavelet"]
+    assert haar.what
+    filter_ = printed.PrintedNoise(printed.filters.HaarParticles(printed.filters.ParticleFilter(2)))
+    own = jnp.square(jnp.asarray(list(study.stds.values())))
+    model = ss.StateSpace(
+        transition=lambda s, t0, t1, x, u: x, observation=lambda s, t, x, u: x, process_noise=None,
+        measurement_noise=models.mixture(study),
+        prior=ss.Prior(models.BodyState(0.0, 0.0, 0.0), dict.fromkeys(("v_x", "v_y", "yaw_rate"), 1.0)),
+    )  # fmt: skip
+    window = printed.first_window(filter_.filter, own)
+    seen = jax.jit(filter_._seen)
+    Measured = models.record_type("Measurements", study.stds)
+    for k in range(400):
+        window = seen(model, window, ss.Row(jnp.asarray(0.0), None, Measured(*(v[k] for v in noise.values()))))
+        if k == 40:
+            np.testing.assert_allclose(window.variances, own, rtol=1e-9)
+    expected = np.array(list(study.stds.values())) * 0.6745 / 0.627
+    np.testing.assert_allclose(window.variances, expected, rtol=0.25)
+
+
+def test_the_printed_tyre_jumps():
+    as_printed, corrected = printed.tyre_table(experiment.Study()).rows
+    _, force, moment, trail, push = as_printed
+    assert force == pytest.approx(-0.2, abs=0.15) or force == pytest.approx(0.2, abs=0.15)
+    assert moment == pytest.approx(64.0, abs=1.0)
+    assert trail == pytest.approx(0.2749 * 70.0, rel=1e-2)
+    assert push < 5.0
+    assert abs(corrected[2]) < 0.2 and corrected[3] == pytest.approx(31.7, rel=1e-2) and corrected[4] > 90.0
+
+
+def test_numbers_of_a_known_course(drives):
+    drive = own_drives.Drive(*(jnp.asarray(leaf[0, 0]) for leaf in drives))
+    kind = models.record_type("Report", ("v_x", "v_y", "yaw_rate", "sideslip"))
+    mean = kind(drive.true_v_x, drive.true_v_y + 0.1, drive.true_yaw_rate, drive.true_sideslip + jnp.deg2rad(0.5))
+    found = dataclasses.make_dataclass("Found", ("mean", "log_likelihood", "result"))(mean, 0.0, 0)
+    numbers = metrics(found, drive)
+    np.testing.assert_allclose([numbers["sideslip"], numbers["v_y"], numbers["yaw_rate"]], [0.5, 0.1, 0.0], atol=1e-12)
+
+
+def test_every_contestant_says_what_it_is():
+    for name, one in {**contestants(SMALL), **printed.entrants(SMALL)}.items():
+        assert name and one.what
