@@ -7,26 +7,36 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxveh import filters, vehicles
 from jaxveh import statespace as ss
 from jaxveh.experiments import model_adaptive_pf as experiment
 from jaxveh.experiments.model_adaptive_pf import drives as own_drives
 from jaxveh.experiments.model_adaptive_pf import models, printed
 from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
-from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, CUBATURE, PLAIN, contestants, metrics
+from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, PLAIN, Contestant, contestants, metrics, moved
 from jaxveh.statespace.contract import AbstractBelief, AbstractFilter
+from jaxveh.tyres import Contact, IsotropicMagicFormula, Relaxed
 
 SMALL = experiment.Study(duration=2.5, periods=0.6, particles=60, max_step=0.005)
 NOISY = experiment.Case(level=6.0, outliers=0.05)
 
 
+def quick_car(study):
+    """The truth on tyres whose program is short."""
+    numbers = own_drives.numbers_of(study)
+    tyre = lambda load: Relaxed(IsotropicMagicFormula(study.cornering_stiffness / (1.3 * load), 1.3), sigma_y=0.34)
+    front, rear = map(tyre, numbers.wheel_loads())
+    return vehicles.build(numbers, vehicles.SevenDOF, front=front, rear=rear)
+
+
 @pytest.fixture(scope="module")
 def drives():
-    return experiment.drives_of(SMALL, {"both": NOISY, "quiet": experiment.Case()}, 3, jax.random.key(5))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(own_drives, "true_car", quick_car)
+        return experiment.drives_of(SMALL, {"both": NOISY, "quiet": experiment.Case()}, 3, jax.random.key(5))
 
 
 def test_the_drive_is_a_slalom_of_the_printed_car(drives):
-    car = own_drives.true_car(SMALL)
-    assert (float(car.mass), float(car.front_axle_to_cg), float(car.track_rear)) == (1528.0, 1.48, 1.594)
     assert drives.v_x.shape == (2, 3, 251)
     assert np.abs(drives.true_v_x - SMALL.speed).max() < 0.1 * SMALL.speed
     assert 2.5 < np.rad2deg(drives.steer).max() < 3.5
@@ -35,6 +45,34 @@ def test_the_drive_is_a_slalom_of_the_printed_car(drives):
     np.testing.assert_array_equal(drives.true_v_y[0], drives.true_v_y[1])
     # Tyres build up their force over some centimetres: at the front the force lags the steer.
     assert np.argmax(drives.true_a_y[1, 0]) > np.argmax(drives.steer[1, 0])
+
+
+def test_the_truth_is_the_printed_car_on_tyres_of_the_printed_stiffness():
+    car = own_drives.true_car(SMALL)
+    assert (float(car.mass), float(car.front_axle_to_cg), float(car.track_rear)) == (1528.0, 1.48, 1.594)
+    for axle, load in zip((car.front, car.rear), own_drives.numbers_of(SMALL).wheel_loads(), strict=True):
+        assert isinstance(axle, Relaxed) and axle.sigma_y is None
+        small = jnp.asarray(1e-3)
+        contact = Contact(slip_angle=small, slip_ratio=0.0 * small, load=jnp.asarray(load), speed=jnp.asarray(14.0))
+        assert float(axle.tyre.forces(contact).F_y) == pytest.approx(SMALL.cornering_stiffness * 1e-3, rel=0.02)
+        # What the filters are told of its relaxation length.
+        assert float(axle.tyre.outputs(contact).sigma_y) == pytest.approx(SMALL.relaxation, abs=0.01)
+
+
+def test_a_lagging_tyre_is_the_static_one_after_some_way():
+    static = own_drives.model_car(SMALL, own_drives.fiala(SMALL))
+    car = models.lagging(SMALL, static)
+    model = models.dynamics(SMALL, car, jnp.asarray(14.0))
+    assert model.states == ("v_x", "v_y", "yaw_rate", *(f"{w}_deflection_y" for w in ("fl", "fr", "rl", "rr")))
+    u = models.record_type("Inputs", models.INPUTS)(*map(jnp.asarray, (0.02, 0.0, 0.0)))
+    x = model.prior.mean
+    rates = models._rates(car, 0.0, x, u)
+    # dv/dt = V alpha - V v / sigma: nothing deflects yet, and the front wheels slip by the steer.
+    np.testing.assert_allclose(rates.fl_deflection_y, 14.0 * np.tan(0.02), rtol=1e-3)
+    settled = SMALL.relaxation * np.tan(0.02)
+    x = x._replace(fl_deflection_y=jnp.asarray(settled), fr_deflection_y=jnp.asarray(settled))
+    body = models.BodyState(*x[:3])
+    np.testing.assert_allclose(models._seen(car, 0.0, x, u).a_y, models._seen(static, 0.0, body, u).a_y, rtol=1e-3)
 
 
 def test_noise_has_the_levels_that_the_case_says():
@@ -53,23 +91,27 @@ def test_noise_has_the_levels_that_the_case_says():
     np.testing.assert_allclose(np.median(np.abs(wild)), 0.6745 * study.outlier_size * study.a_y, rtol=0.15)
 
 
-def test_filters_rank_as_their_likelihoods(drives):
+def test_what_knows_outliers_beats_what_does_not(drives):
     cases = {"both": NOISY, "quiet": experiment.Case()}
-    names = ("open loop", PLAIN, ADAPTIVE, CUBATURE)
-    raced = experiment.race(SMALL, cases, drives, only=names)
-    error = lambda name, case: np.median(raced.of("sideslip", name, case))
-    assert error(ADAPTIVE, "both") < error(PLAIN, "both") < 0.5 * error(CUBATURE, "both")
-    assert error(PLAIN, "quiet") < 1.1 * error(CUBATURE, "quiet") < error("open loop", "quiet")
+    particles = filters.ParticleFilter(60)
+    entrants = {
+        PLAIN: Contestant(moved(particles, lags=False), ""),
+        ADAPTIVE: Contestant(moved(filters.HaarParticles(particles), models.mixture, lags=False), ""),
+    }
+    raced = experiment.race(SMALL, cases, drives, entrants=entrants)
+    error = lambda name, case, what="yaw_rate": np.median(raced.of(what, name, case))
+    assert error(ADAPTIVE, "both") < 0.8 * error(PLAIN, "both")
+    assert error(ADAPTIVE, "quiet") < 1.1 * error(PLAIN, "quiet") < error(PLAIN, "both")
     assert (raced.found["result"] == 0).all()
-    result = experiment.Reproduction(3, raced)
     assert raced.of("course", PLAIN, "both").shape == (3, 251)
-    assert experiment.settings(result)["cases"]["both"]["level"] == 6.0
+    assert experiment.settings(experiment.Reproduction(3, raced))["cases"]["both"]["level"] == 6.0
 
 
 class Told(AbstractBelief):
     """The mean that a test says."""
 
     told: models.BodyState
+    count: jax.Array
 
     @property
     def mean(self):
@@ -86,10 +128,10 @@ class Scripted(AbstractFilter):
         del model
 
     def init(self, model, row, key=None):
-        return Told(models.BodyState(*row.y)), model.system.keeps
+        return Told(models.BodyState(*row.y), jnp.int32(0)), model.system.keeps
 
     def step(self, model, belief, row):
-        return Told(models.BodyState(*row.y)), model.system.keeps
+        return Told(models.BodyState(*row.y), belief.count + 1), model.system.keeps
 
 
 def learned(as_printed, first):
@@ -136,9 +178,7 @@ def test_the_mixture_is_that_of_the_paper_with_its_errata_corrected():
 def test_the_printed_variance_grows_to_a_standard_deviation():
     study = dataclasses.replace(experiment.Study(), duration=4.0)
     noise, _ = own_drives.noise_of(study, experiment.Case(), jax.random.key(1))
-    haar = contestants(study)["PF, wavelet"]
-    assert haar.what
-    filter_ = printed.PrintedNoise(printed.filters.HaarParticles(printed.filters.ParticleFilter(2)))
+    filter_ = printed.PrintedNoise(filters.HaarParticles(filters.ParticleFilter(2)))
     own = jnp.square(jnp.asarray(list(study.stds.values())))
     model = ss.StateSpace(
         transition=lambda s, t0, t1, x, u: x, observation=lambda s, t, x, u: x, process_noise=None,
@@ -153,7 +193,8 @@ def test_the_printed_variance_grows_to_a_standard_deviation():
         if k == 40:
             np.testing.assert_allclose(window.variances, own, rtol=1e-9)
     expected = np.array(list(study.stds.values())) * 0.6745 / 0.627
-    np.testing.assert_allclose(window.variances, expected, rtol=0.25)
+    # Of a median of 32, some per cent; the variances themselves are 10 to 200 times smaller.
+    np.testing.assert_allclose(window.variances, expected, rtol=0.6)
 
 
 def test_the_printed_tyre_jumps():

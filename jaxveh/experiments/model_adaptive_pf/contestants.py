@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxveh import filters
 from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
 from jaxveh.experiments.model_adaptive_pf.drives import Drive, fiala, model_car
-from jaxveh.experiments.model_adaptive_pf.models import autoregression, dynamics, gaussian, mixture, rows_of
+from jaxveh.experiments.model_adaptive_pf.models import autoregression, dynamics, gaussian, lagging, mixture, rows_of
 from jaxveh.experiments.model_adaptive_pf.settings import Study
 from jaxveh.statespace import Estimate, Row
 from jaxveh.tyres import AbstractTyre
@@ -39,6 +39,7 @@ def contestants(study: Study) -> dict[str, Contestant]:
     return {
         "open loop": Contestant(_open_loop, "the dynamics alone, from the first row on"),
         PLAIN: Contestant(moved(particles), "the dynamics, the data sheet's Gaussian noise"),
+        "PF, no relaxation": Contestant(moved(particles, lags=False), "the same on tyres whose force is there at once"),
         "AAR as printed": Contestant(regressed(printed), "autoregression, wavelet variance, mixture"),
         "AAR": Contestant(regressed(AutoRegressive(haar, study.update)), "the same with true least squares"),
         "PF, wavelet": Contestant(moved(haar), "the dynamics, variances from the Haar wavelet"),
@@ -59,10 +60,11 @@ CUBATURE = "CKF"
 ROBUST = "robust CKF, wavelet"
 
 
-def moved(filter_, law=gaussian) -> Run:
-    """A filter of the dynamics."""
+def moved(filter_, law=gaussian, lags: bool = True) -> Run:
+    """A filter of the dynamics; `lags`: that knows the tyres' relaxation length."""
 
     def run(study, car, drive, key):
+        car = lagging(study, car) if lags else car
         model = dynamics(study, car, drive.v_x[0], law(study))
         return filters.scan(filter_, model, rows_of(study, drive), key)
 
@@ -83,7 +85,8 @@ def _open_loop(study, car, drive, key):
     rows = rows_of(study, drive)
     first = jnp.arange(rows.t.shape[0]) == 0
     y = jax.tree.map(lambda values: jnp.where(first, values, jnp.nan), rows.y)
-    return filters.scan(filters.Cubature(), dynamics(study, car, drive.v_x[0]), Row(rows.t, rows.u, y), key)
+    model = dynamics(study, lagging(study, car), drive.v_x[0])
+    return filters.scan(filters.Cubature(), model, Row(rows.t, rows.u, y), key)
 
 
 def metrics(found: Estimate, drive: Drive) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from jaxveh.plots.figure import Figure
 from jaxveh.plots.style import COLOURS, CYCLE, WIDTH, style
 from jaxveh.tyres import Contact
 
-SHOWN = {"open loop": "#7f7f7f", PLAIN: CYCLE[0], "AAR": CYCLE[3], ADAPTIVE: CYCLE[2], ROBUST: CYCLE[1]}
+SHOWN = {"open loop": "#7f7f7f", PLAIN: CYCLE[0], "AAR": CYCLE[3], ADAPTIVE: CYCLE[2], CUBATURE: CYCLE[1]}
 """The estimators of the drive's figure, and their colours."""
 
 
@@ -100,7 +100,7 @@ def ablation_figure(raced: Raced, figure: Any = None) -> Any:
 
 def gain_figure(raced: Raced, figure: Any = None) -> Any:
     """Paired ratios to the plain particle filter in every case, with bootstrap intervals."""
-    shown = (ADAPTIVE, "PF, wavelet", "PF, mixture", ROBUST, "robust CKF", "open loop")
+    shown = (ADAPTIVE, "PF, wavelet", "PF, mixture", ROBUST, "PF, no relaxation", "open loop")
     cases = {**CASES, **PRESSED, **LIMIT}
     figure = Figure(figsize=(WIDTH, 4.0), layout="constrained") if figure is None else figure
     with style():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh import numerics
@@ -22,12 +23,17 @@ from jaxveh.statespace import (
     Row,
     StateSpace,
 )
+from jaxveh.tyres import Relaxed
 from jaxveh.vehicles import TwoTrack3DOF
 
 INPUTS = ("steer", "drive_torque", "brake_torque")
 
 SPREAD = {"v_y": 0.2, "yaw_rate": 0.02}
 """The prior's, m/s and rad/s, about straight running."""
+
+
+DEFLECTION = 0.002
+"""The prior's spread of a tyre's deflection, m: a third of a degree of slip."""
 
 
 class BodyState(NamedTuple):
@@ -46,13 +52,23 @@ class Regressed(NamedTuple):
 
 
 def dynamics(study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNoise | None = None) -> StateSpace:
-    """The car's equations of motion with wheel torques and steer as inputs; `start_speed` m/s, the first that was measured."""
+    """The car's equations of motion with wheel torques and steer as inputs; `start_speed` m/s, the first that was measured.
+
+    Deflections of the tyres, where they have such, are states, too, without noise of their own.
+    """
     noise = {"v_x": study.v_x_noise, "v_y": study.v_y_noise, "yaw_rate": study.yaw_noise}
     return StateSpace(
         system=car, transition=Propagate(_rates, Heun()), observation=_seen, report=_shown,
         process_noise=Continuous(Gaussian(noise)), measurement_noise=gaussian(study) if law is None else law,
-        prior=prior(study, start_speed), inputs=INPUTS, input_path="linear",
+        prior=prior(study, start_speed, tuple(name for name in car.state_type._fields if name.endswith("deflection_y"))),
+        inputs=INPUTS, input_path="linear",
     )  # fmt: skip
+
+
+def lagging(study: Study, car: TwoTrack3DOF) -> TwoTrack3DOF:
+    """The car on the same tyres with the study's relaxation length."""
+    tyres = lambda c: (c.front, c.rear)
+    return eqx.tree_at(tyres, car, [Relaxed(tyre, sigma_y=study.relaxation) for tyre in tyres(car)])
 
 
 def autoregression(study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNoise) -> StateSpace:
@@ -69,10 +85,12 @@ def autoregression(study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNo
     )  # fmt: skip
 
 
-def prior(study: Study, start_speed) -> Prior:
-    """Straight running at the first speed that was measured; an outlier must not hold it for long."""
+def prior(study: Study, start_speed, lags: tuple[str, ...] = ()) -> Prior:
+    """Straight running at the first speed that was measured."""
     zero = 0.0 * start_speed
-    return Prior(BodyState(start_speed, zero, zero), {"v_x": 2.0 * study.v_x, **SPREAD})
+    spread = {"v_x": 2.0 * study.v_x, **SPREAD, **dict.fromkeys(lags, DEFLECTION)}
+    kind = record_type("MovedState", spread) if lags else BodyState
+    return Prior(kind(start_speed, *[zero] * (len(spread) - 1)), spread)
 
 
 def gaussian(study: Study) -> Gaussian:
@@ -93,13 +111,14 @@ def rows_of(study: Study, drive: Drive) -> Row:
     return Row(times(study), u, y)
 
 
-def _whole(car: TwoTrack3DOF, x: BodyState):
-    return car.state_type(v_x=x.v_x, v_y=x.v_y, yaw=0.0 * x.yaw_rate, yaw_rate=x.yaw_rate)
+def _whole(car: TwoTrack3DOF, x: Any):
+    """The car's state; of its yaw nothing depends."""
+    return car.state_type(**{"yaw": 0.0 * x.yaw_rate, **x._asdict()})
 
 
 def _rates(car: TwoTrack3DOF, t, x, u):
     rates = car.derivatives(t, _whole(car, x), u)
-    return BodyState(rates.v_x, rates.v_y, rates.yaw_rate)
+    return type(x)(*(getattr(rates, name) for name in x._fields))
 
 
 def _seen(car: TwoTrack3DOF, t, x, u):
@@ -116,4 +135,4 @@ def _seen_of_regressed(system: Regressed, t, x, u):
 
 
 def _shown(system, t, x, u):
-    return record_type("Report", (*BodyState._fields, "sideslip"))(*x, numerics.arctan2(x.v_y, x.v_x))
+    return record_type("Report", (*BodyState._fields, "sideslip"))(*x[:3], numerics.arctan2(x.v_y, x.v_x))
