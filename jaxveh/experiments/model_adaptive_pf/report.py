@@ -27,7 +27,7 @@ class Reproduction(NamedTuple):
 def run(study: Study | None = None, *, seeds: int = 20, seed: int = 0, progress: Progress = silent) -> Reproduction:
     """All drives and estimators over `seeds` seeds (at least two)."""
     study = study or Study()
-    # Other drives than those on which the noises were chosen, whose key is that of `seed` itself.
+    # Other drives than those on which the noises were chosen, whose key was another.
     drive_key, filter_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 1))
     cases = {**CASES, **PRESSED, **LIMIT}
     drives = drives_of(study, cases, seeds, drive_key, progress=part(progress, 0.0, 0.15, "drives"))

@@ -53,15 +53,15 @@ class Study:
     Sensors: standard deviations `v_x` m/s, `a_y` m/s^2, `yaw_rate` rad/s of the data sheet, those of `sensors.esc()`; where the
     noise varies it rises to a multiple and falls again within `level_period` s, to 0.8 m/s^2 and 2.3 degrees/s as on an unpaved
     road. An outlier is a normal number of `outlier_size` times the data sheet's standard deviation, added: of the size of the
-    sensors' range, 10 m/s^2 and 29 degrees/s, which makes the fixed-R cubature filter some four times worse than the plain
-    particle filter, as in the first measurements of this scenario.
+    sensors' range, 10 m/s^2 and 29 degrees/s, which makes the fixed-R cubature filter four to five times worse than the
+    plain particle filter, as in first measurements of this scenario.
 
     Filters: `particles`, `alpha` of the noise law, `window` and `forgetting` of the wavelet's variance, `update` U_c of the
     autoregression, `dof` of Student's t law. Process noise per root second: `v_x_noise`, `v_y_noise` (m/s), `yaw_noise`
     (rad/s), and of a step of the autoregression `walk_v_x`, `walk_v_y` (m/s), `walk_yaw` (rad/s): those of the greatest
-    likelihood (on grids of factor two) of the plain particle filter, and of the autoregression with it, on constant noise, 3 and
-    5 degrees of steer, drives of other keys, for the dynamics with tyres that are right, 15 % too weak and 15 % too strong; those
-    of the cubature filter, and with and without relaxation, are the same. The truth has no part in them.
+    likelihood on grids of factor two, on constant noise, drives of other keys with 3 and 5 degrees of steer, and for the dynamics
+    tyres that are right, 15 % too weak and 15 % too strong: of the cubature filter, of the plain particle filter (without
+    relaxation, where both agree) and of the autoregression with a Gaussian likelihood. The truth has no part in them.
     """
 
     mass: float = 1528.0
