@@ -125,9 +125,7 @@ def gain_figure(raced: Raced, figure: Any = None) -> Any:
         axes.set_yscale("log")
         axes.set_yticks([0.5, 0.7, 1.0, 1.5, 2.0, 3.0], ["0.5", "0.7", "1", "1.5", "2", "3"])
         axes.minorticks_off()
-        axes.set(
-            ylabel=f"sideslip RMSE over {PLAIN}'s [-]", title=f"Shaded: near the limit. {CUBATURE} and AAR lie above"
-        )
+        axes.set(ylabel=f"sideslip RMSE over {PLAIN}'s [-]", title="Median and 95 % interval; shaded: near the limit")
         figure.legend(loc="outside upper left", ncols=3)
     return figure
 
