@@ -42,7 +42,12 @@ def against(raced: Raced, case: str, estimator: str, other: str = PLAIN, error: 
 
 
 def check(result: Reproduction) -> list[Check]:
-    """The criteria: medians over seeds of sideslip RMSE over the plain particle filter's; nobody knew the truth."""
+    """The criteria: medians over seeds of sideslip RMSE over the plain particle filter's; nobody knew the truth.
+
+    With 20 seeds the first and the fourth do not hold, at 0.795 and 0.850: with a process noise by likelihood the plain filter is
+    better than those bounds foresee. With 2.5 times that noise, what the autoregression needs, both ratios are about 0.6 (median
+    paired ratios, in the tables).
+    """
     both = lambda a, b=PLAIN: against(result.raced, "both", a, b)
     ratio = lambda found: found.of_medians.value
     constant = against(result.raced, "constant", ADAPTIVE)
