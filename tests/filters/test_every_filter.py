@@ -86,6 +86,9 @@ FILTERS = {
     ),
     "interacting": Line(lambda: filters.InteractingModels(filters.Cubature(), (same, noisier), CHANGES), exact=False),
     "wavelet noise": Line(lambda: filters.HaarNoise(filters.Cubature(), window=8), exact=False),
+    "wavelet noise, particles": Line(
+        lambda: filters.HaarParticles(PARTICLES, window=8), exact=False, differentiable=False, drawn=True
+    ),
     "shrinking process": Line(
         lambda: filters.ShrinkingProcess(filters.Cubature(), {"x0": 0.1}), exact=False, seldom=True
     ),

@@ -9,6 +9,7 @@ from filter_systems import nile_model
 
 from jaxveh import InputError, Recording, filters
 from jaxveh import statespace as ss
+from jaxveh.filters.wrappers import wavelet
 
 
 def walk(rows, seed, noise, drift=0.1):
@@ -65,6 +66,39 @@ class TestHaarNoise:
     def test_bad_settings_are_refused(self, window, memory):
         with pytest.raises(InputError, match="HaarNoise"):
             filters.HaarNoise(filters.Kalman(), window, memory)
+
+
+class TestHaarParticles:
+    def test_what_it_learns_is_what_haar_noise_learns(self):
+        _, recording = walk(200, 2, np.full(200, 3.0))
+        particles = filters.run(
+            filters.HaarParticles(filters.ParticleFilter(10)), model(1.0), recording, key=jax.random.key(0)
+        )
+        gaussian = filters.run(filters.HaarNoise(filters.Kalman()), model(1.0), recording)
+        np.testing.assert_array_equal(particles.belief.memory.values, gaussian.belief.memory.values)
+        np.testing.assert_allclose(particles.belief.memory.variances, gaussian.belief.memory.variances, rtol=1e-12)
+        # Particles are weighed with it: nine times the variance is three times the spread.
+        np.testing.assert_allclose(particles.info.innovation_std.flow[-1], 3.0, rtol=0.4)
+
+    @pytest.mark.parametrize(("follows", "scale"), [("gaussian", 0.7), ("both", 0.7 * 3.0)])
+    def test_of_a_mixture_the_gaussian_part_follows_and_the_other_where_asked(self, follows, scale):
+        law = ss.CauchyGaussianMixture(0.1, {"flow": 0.7}, {"flow": 2.0})
+        mixed = eqx.tree_at(lambda m: m.measurement_noise, model(), law)
+        filter_ = filters.HaarParticles(filters.ParticleFilter(10), follows=follows)
+        filter_.check(mixed)
+        own = jnp.array([4.0])
+        memory = wavelet.first_window(filter_, own)._replace(variances=9.0 * own)
+        told = filter_._told(mixed, memory).measurement_noise
+        np.testing.assert_allclose((told.std.flow, told.scale.flow), (6.0, scale))
+
+    def test_what_it_cannot_is_refused(self):
+        with pytest.raises(InputError, match="HaarNoise is for"):
+            filters.HaarParticles(filters.Kalman())
+        with pytest.raises(InputError, match="follows"):
+            filters.HaarParticles(filters.ParticleFilter(10), follows="neither")
+        heavy = eqx.tree_at(lambda m: m.measurement_noise, model(), ss.StudentT(4.0, {"flow": 1.0}))
+        with pytest.raises(InputError, match="StudentT"):
+            filters.HaarParticles(filters.ParticleFilter(10)).check(heavy)
 
 
 class TestShrinkingProcess:

@@ -11,7 +11,7 @@ from jaxveh.filters.wrappers.process_noise import MatchedProcess, ShrinkingProce
 from jaxveh.filters.wrappers.robust import Huber, RobustStudentT
 from jaxveh.filters.wrappers.strong_tracking import StrongTracking
 from jaxveh.filters.wrappers.varying_noise import VaryingNoise
-from jaxveh.filters.wrappers.wavelet import HaarNoise
+from jaxveh.filters.wrappers.wavelet import HaarNoise, HaarParticles
 
 __all__ = [
     "Consider",
@@ -20,6 +20,7 @@ __all__ = [
     "Gated",
     "HInfinity",
     "HaarNoise",
+    "HaarParticles",
     "Huber",
     "InteractingModels",
     "MatchedProcess",

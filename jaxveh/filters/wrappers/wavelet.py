@@ -7,8 +7,9 @@ from typing import Any, ClassVar, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check
+from jaxveh._core.errors import InputError, check, check_one_of
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
+from jaxveh.filters.particle import AbstractParticleFilter
 from jaxveh.filters.wrappers.base import (
     AbstractRemembering,
     Remembering,
@@ -16,6 +17,8 @@ from jaxveh.filters.wrappers.base import (
     variances_of,
     with_variances,
 )
+from jaxveh.statespace import CauchyGaussianMixture, Gaussian
+from jaxveh.statespace.contract import AbstractFilter, always, apart
 
 # The median of the absolute value of a standard normal number.
 MEDIAN = 0.6744897501960817
@@ -52,38 +55,115 @@ class HaarNoise(AbstractRemembering):
     ceiling: float = eqx.field(static=True, default=1e4)
 
     def __check_init__(self):
-        if not isinstance(self.window, int) or self.window < 4 or self.window % 2:
-            raise InputError(f"HaarNoise.window = {self.window}: must be an even whole number of at least 4.")
-        check("HaarNoise.forgetting", self.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
-        check("HaarNoise.floor", self.floor, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
-        check("HaarNoise.ceiling", self.ceiling, lambda v: v >= 1, "at least 1")
+        check_settings(self)
 
     def check(self, model):
         check_independent("HaarNoise", model)
         self.filter.check(model)
 
     def start(self, model):
-        variances = variances_of(model)
-        m = variances.shape[0]
-        return Window(jnp.zeros((self.window, m), variances.dtype), jnp.zeros(m, jnp.int32), variances)
+        return first_window(self, variances_of(model))
 
     def believed(self, model, memory):
         return with_variances(model, memory.variances)
 
     def update(self, model, belief, row):
-        memory = self._seen(model, belief.memory, row)
+        memory = seen(self, variances_of(model), belief.memory, measured(model, row))
         return self.update_inside(model, Remembering(belief.inside, memory), row)
 
-    def _seen(self, model, memory: Window, row) -> Window:
-        given = jnp.stack([getattr(row.y, name) for name in model.channels])
-        here = jnp.isfinite(given)
-        longer = jnp.concatenate([memory.values[1:], jnp.where(here, given, 0.0)[None]])
-        values = jnp.where(here, longer, memory.values)
-        count = memory.count + here.astype(jnp.int32)
-        # Pairs as the window lies now, not as they fell: each row is in one.
-        details = (values[1::2] - values[::2]) * 0.5**0.5
-        found = jnp.square(jnp.median(jnp.abs(details), axis=0) / MEDIAN)
+
+class HaarParticles(AbstractFilter):
+    """What `HaarNoise` does, around a particle `filter`, whose likelihood need not be Gaussian.
+
+    The settings are those of `HaarNoise`. Of a `CauchyGaussianMixture` the variances are those of its Gaussian part (Qin et al.
+    2014); `follows="both"` scales the Cauchy part by the same factor, `"gaussian"` (the default, as the paper has it) leaves
+    it. The belief is that of the filter with the `Window` as its memory.
+
+    **Raises** `InputError` for settings out of range, a filter without particles, or a law of another kind.
+    """
+
+    filter: AbstractParticleFilter
+    window: int = eqx.field(static=True, default=64)
+    forgetting: float = eqx.field(static=True, default=0.9)
+    floor: float = eqx.field(static=True, default=0.01)
+    ceiling: float = eqx.field(static=True, default=1e4)
+    follows: str = eqx.field(static=True, default="gaussian")
+
+    def __check_init__(self):
+        if not isinstance(self.filter, AbstractParticleFilter):
+            kind = type(self.filter).__name__
+            raise InputError(
+                f"HaarParticles: {kind} inside: must be a particle filter; HaarNoise is for Gaussian ones."
+            )
+        check_settings(self)
+        check_one_of("HaarParticles.follows", self.follows, ("gaussian", "both"))
+
+    def check(self, model):
+        law = model.measurement_noise
+        if not isinstance(law, Gaussian | CauchyGaussianMixture):
+            raise InputError(
+                f"HaarParticles: the measurement noise is {type(law).__name__}: must be Gaussian, a standard deviation a "
+                "channel, or CauchyGaussianMixture."
+            )
+        self.filter.check(model)
+
+    def init(self, model, row, key=None):
+        return apart(self._init, always(row.t), model, row, key)
+
+    def _init(self, model, row, key):
         own = variances_of(model)
-        found = jnp.clip(found, self.floor * own, self.ceiling * own)
-        mixed = self.forgetting * memory.variances + (1.0 - self.forgetting) * found
-        return Window(values, count, jnp.where(here & (count >= self.window), mixed, memory.variances))
+        memory = seen(self, own, first_window(self, own), measured(model, row))
+        inside, info = self.filter.init(self._told(model, memory), row, key)
+        return Remembering(inside, memory), info
+
+    def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
+        memory = seen(self, variances_of(model), belief.memory, measured(model, row))
+        inside, info = self.filter.step(self._told(model, memory), belief.inside, row)
+        return Remembering(inside, memory), info
+
+    def _told(self, model, memory: Window):
+        told = with_variances(model, memory.variances)
+        if self.follows == "both" and isinstance(model.measurement_noise, CauchyGaussianMixture):
+            factors = jnp.sqrt(memory.variances / variances_of(model))
+            scale = model.measurement_noise.scale
+            wider = type(scale)(*(value * factors[i] for i, value in enumerate(scale)))
+            told = eqx.tree_at(lambda m: m.measurement_noise.scale, told, wider)
+        return told
+
+
+def check_settings(settings: Any) -> None:
+    """Raise `InputError` unless window, forgetting, floor and ceiling make sense."""
+    who = type(settings).__name__
+    if not isinstance(settings.window, int) or settings.window < 4 or settings.window % 2:
+        raise InputError(f"{who}.window = {settings.window}: must be an even whole number of at least 4.")
+    check(f"{who}.forgetting", settings.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
+    check(f"{who}.floor", settings.floor, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
+    check(f"{who}.ceiling", settings.ceiling, lambda v: v >= 1, "at least 1")
+
+
+def first_window(settings: Any, own: Any) -> Window:
+    """An empty window, with the model's `own` variances (m,)."""
+    m = own.shape[0]
+    return Window(jnp.zeros((settings.window, m), own.dtype), jnp.zeros(m, jnp.int32), own)
+
+
+def measured(model: Any, row: Any) -> Any:
+    """The row's measurements, (m,), in the order of the channels."""
+    return jnp.stack([getattr(row.y, name) for name in model.channels])
+
+
+def seen(settings: Any, own: Any, memory: Window, given: Any) -> Window:
+    """The window after the measurements `given` (m,), NaN where missing, of a model with its `own` variances (m,)."""
+    here = jnp.isfinite(given)
+    longer = jnp.concatenate([memory.values[1:], jnp.where(here, given, 0.0)[None]])
+    values = jnp.where(here, longer, memory.values)
+    count = memory.count + here.astype(jnp.int32)
+    # Pairs as the window lies now, not as they fell: each row is in one.
+    details = (values[1::2] - values[::2]) * 0.5**0.5
+    found = jnp.square(jnp.median(jnp.abs(details), axis=0) / MEDIAN)
+    found = jnp.clip(found, settings.floor * own, settings.ceiling * own)
+    mixed = settings.forgetting * memory.variances + (1.0 - settings.forgetting) * found
+    return Window(values, count, jnp.where(here & (count >= settings.window), mixed, memory.variances))

@@ -1,0 +1,77 @@
+"""The paper's adaptive autoregression: a particle filter whose transition is learned from its own estimates."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh.experiments.model_adaptive_pf.models import BodyState
+from jaxveh.filters.wrappers.base import Remembering
+from jaxveh.statespace import StateSpace
+from jaxveh.statespace.contract import AbstractFilter, always, apart
+
+
+class Learned(NamedTuple):
+    """What has been learned of each state, by name: `keeps` (-), its coefficient a; `spread`, the A of eqs 22 to 24 (its unit
+    squared), or the P of least squares (one over that)."""
+
+    keeps: BodyState
+    spread: BodyState
+
+
+class AutoRegressive(AbstractFilter):
+    """`filter` of an `autoregression` model whose coefficients follow the filter's own means (eqs 20 to 25, order p = 1).
+
+    With X the mean of the row before, e = X_t - a X and U = `update`, state by state:
+
+    - as least squares with forgetting: `k = P X / (1 - U + X P X)`, `a += k e`, `P = (1 - k X) P / (1 - U)`;
+    - `as_printed`: `A = (1 - U) A + U X^2`, `k = U A X / (U X A X + 1)`, `a += k e`. Erratum: A stands where least
+      squares has its inverse, so that large numbers (v_x) learn in one row and small ones (v_y, yaw rate) never.
+
+    Either starts at a = 1; P at `1 / first^2`, as if the state had been about `first` once (m/s, m/s, rad/s).
+    """
+
+    filter: AbstractFilter
+    update: float = eqx.field(static=True, default=0.02)
+    as_printed: bool = eqx.field(static=True, default=False)
+    first: tuple[float, float, float] = eqx.field(static=True, default=(10.0, 0.1, 0.1))
+
+    def check(self, model):
+        self.filter.check(model)
+
+    def init(self, model, row, key=None):
+        return apart(self._init, always(row.t), model, row, key)
+
+    def _init(self, model, row, key):
+        inside, info = self.filter.init(model, row, key)
+        squares = BodyState(
+            *(jnp.full_like(value, size**2) for value, size in zip(inside.mean, self.first, strict=True))
+        )
+        spread = squares if self.as_printed else jax.tree.map(lambda square: 1.0 / square, squares)
+        return Remembering(inside, Learned(model.system.keeps, spread)), info
+
+    def step(self, model, belief, row):
+        return apart(self._step, belief.count >= 0, model, belief, row)
+
+    def _step(self, model, belief, row):
+        before = belief.inside.mean
+        inside, info = self.filter.step(_told(model, belief.memory), belief.inside, row)
+        pairs = [self._learned(*values) for values in zip(*belief.memory, before, inside.mean, strict=True)]
+        memory = Learned(*(BodyState(*values) for values in zip(*pairs, strict=True)))
+        return Remembering(inside, memory), info
+
+    def _learned(self, a, spread, X, now):
+        """The coefficient and its spread after a row."""
+        U, e = self.update, now - a * X
+        if self.as_printed:
+            A = (1.0 - U) * spread + U * X**2
+            return a + U * A * X / (U * X * A * X + 1.0) * e, A
+        k = spread * X / (1.0 - U + X * spread * X)
+        return a + k * e, (1.0 - k * X) * spread / (1.0 - U)
+
+
+def _told(model: StateSpace, memory: Learned) -> Any:
+    return eqx.tree_at(lambda m: m.system.keeps, model, memory.keeps)

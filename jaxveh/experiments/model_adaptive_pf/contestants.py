@@ -1,0 +1,120 @@
+"""The estimators by name: what each believes of the motion, and of the sensors."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import filters
+from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
+from jaxveh.experiments.model_adaptive_pf.drives import Drive, fiala, model_car
+from jaxveh.experiments.model_adaptive_pf.models import autoregression, dynamics, gaussian, lagging, mixture, rows_of
+from jaxveh.experiments.model_adaptive_pf.settings import Study
+from jaxveh.statespace import Estimate, Row
+from jaxveh.tyres import AbstractTyre
+from jaxveh.vehicles import TwoTrack3DOF
+
+Run = Callable[[Study, TwoTrack3DOF, Drive, Any], Estimate]
+
+
+class Contestant(NamedTuple):
+    """`run(study, car, drive, key) -> Estimate`, with the car that the filter believes in; and what it is, in words."""
+
+    run: Run
+    what: str
+
+
+def contestants(study: Study) -> dict[str, Contestant]:
+    """All of them by name, the do-nothing one first."""
+    particles = filters.ParticleFilter(study.particles)
+    wavelet = {"window": study.window, "forgetting": study.forgetting}
+    haar = filters.HaarParticles(particles, **wavelet)
+    cubature = filters.Cubature()
+    robust = filters.RobustStudentT(cubature, study.dof)
+    printed = AutoRegressive(haar, study.update, as_printed=True)
+    return {
+        "open loop": Contestant(_open_loop, "the dynamics alone, from the first row on"),
+        PLAIN: Contestant(moved(particles), "the dynamics, the data sheet's Gaussian noise"),
+        "PF, no relaxation": Contestant(moved(particles, lags=False), "the same on tyres whose force is there at once"),
+        "AAR as printed": Contestant(regressed(printed), "autoregression, wavelet variance, mixture"),
+        "AAR": Contestant(regressed(AutoRegressive(haar, study.update)), "the same with true least squares"),
+        "PF, wavelet": Contestant(moved(haar), "the dynamics, variances from the Haar wavelet"),
+        "PF, mixture": Contestant(moved(particles, mixture), "the dynamics, Cauchy-Gaussian likelihood"),
+        ADAPTIVE: Contestant(moved(haar, mixture), "both, the variance that of the Gaussian part"),
+        "strong tracking": Contestant(
+            moved(filters.StrongTracking(cubature)), "a cubature filter with a fading factor"
+        ),
+        CUBATURE: Contestant(moved(cubature), "the data sheet's Gaussian noise"),
+        "robust CKF": Contestant(moved(robust), "Student's t law with the data sheet's scales"),
+        ROBUST: Contestant(moved(filters.HaarNoise(robust, **wavelet)), "the same, scales from the Haar wavelet"),
+    }
+
+
+PLAIN = "PF"
+ADAPTIVE = "PF, wavelet and mixture"
+CUBATURE = "CKF"
+ROBUST = "robust CKF, wavelet"
+
+
+def moved(filter_, law=gaussian, lags: bool = True) -> Run:
+    """A filter of the dynamics; `lags`: that knows the tyres' relaxation length."""
+
+    def run(study, car, drive, key):
+        car = lagging(study, car) if lags else car
+        model = dynamics(study, car, drive.v_x[0], law(study))
+        return filters.scan(filter_, model, rows_of(study, drive), key)
+
+    return run
+
+
+def regressed(filter_, law=mixture) -> Run:
+    """A filter of the autoregression."""
+
+    def run(study, car, drive, key):
+        model = autoregression(study, car, drive.v_x[0], law(study))
+        return filters.scan(filter_, model, rows_of(study, drive), key)
+
+    return run
+
+
+def _open_loop(study, car, drive, key):
+    rows = rows_of(study, drive)
+    first = jnp.arange(rows.t.shape[0]) == 0
+    y = jax.tree.map(lambda values: jnp.where(first, values, jnp.nan), rows.y)
+    model = dynamics(study, lagging(study, car), drive.v_x[0])
+    return filters.scan(filters.Cubature(), model, Row(rows.t, rows.u, y), key)
+
+
+def metrics(found: Estimate, drive: Drive) -> dict[str, Any]:
+    """Root mean squares over the drive of the errors of `sideslip` (degrees), `v_y` (m/s), `yaw_rate` (degrees/s) and `v_x`
+    (m/s); the sideslip over time (rad), and the result's code."""
+    rms = lambda name: jnp.sqrt(jnp.mean((getattr(found.mean, name) - getattr(drive, f"true_{name}")) ** 2))
+    return {
+        "sideslip": jnp.rad2deg(rms("sideslip")),
+        "v_y": rms("v_y"),
+        "yaw_rate": jnp.rad2deg(rms("yaw_rate")),
+        "v_x": rms("v_x"),
+        "course": found.mean.sideslip,
+        "log_likelihood": found.log_likelihood,
+        "result": found.result,
+    }
+
+
+def of_a_point(
+    study: Study, contestant: Contestant, tyre: Callable[..., AbstractTyre] = fiala
+) -> Callable[[Any, Any, Any], dict[str, Any]]:
+    """The contestant's run of a design's point: `run(point, key, (case, drive))`, as `sweeps.sweep` calls it; `tyre(study,
+    share)` makes the filter's, `share` times as stiff and as strong."""
+
+    def run(point, key, data):
+        del point
+        case, drive = data
+        noises = {name: case.process * getattr(study, name) for name in ("v_x_noise", "v_y_noise", "yaw_noise")}
+        own = dataclasses.replace(study, **noises)
+        return metrics(contestant.run(own, model_car(own, tyre(own, case.tyre)), drive, key), drive)
+
+    return run

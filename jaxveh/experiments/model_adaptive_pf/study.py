@@ -1,0 +1,72 @@
+"""The runs: drives once, then every estimator on the same drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import sweeps
+from jaxveh._core.errors import check_whole
+from jaxveh._core.progress import Progress, silent
+from jaxveh.experiments.model_adaptive_pf.contestants import Contestant, contestants, of_a_point
+from jaxveh.experiments.model_adaptive_pf.drives import Drive, drive_once, fiala
+from jaxveh.experiments.model_adaptive_pf.settings import Case, Study
+
+
+class Raced(NamedTuple):
+    """The `drives`, (cases, seeds, T) each, of cases by name, and what the estimators made of them, `found` with the axes
+    estimator, case and seed."""
+
+    study: Study
+    cases: dict[str, Case]
+    drives: Drive
+    found: sweeps.Swept
+
+    def of(self, name: str, estimator: str, case: str) -> np.ndarray:
+        """Values by seed."""
+        return self.found.at(name, estimator=estimator, case=float(list(self.cases).index(case)))
+
+
+def drives_of(study: Study, cases: Mapping[str, Case], seeds: int, key, *, progress: Progress = silent) -> Drive:
+    """Drives of each case, one a seed: (cases, seeds, T)."""
+    check_whole("seeds", seeds, 2)
+    columns = Case(*(jnp.asarray(np.array(values, float)) for values in zip(*cases.values(), strict=True)))
+
+    def run(point, key):
+        case = jax.tree.map(lambda column: column[point.case.astype(int)], columns)
+        return drive_once(study, case, key)
+
+    found = sweeps.sweep(run, _design(cases), seeds, key, progress=progress)
+    return Drive(**{name: found[name] for name in Drive._fields})
+
+
+def race(
+    study: Study,
+    cases: Mapping[str, Case],
+    drives: Drive,
+    *,
+    only: tuple[str, ...] | None = None,
+    entrants: Mapping[str, Contestant] | None = None,
+    tyre: Callable[..., Any] = fiala,
+    key: Any = None,
+    progress: Progress = silent,
+) -> Raced:
+    """Every estimator (or `only` these, or others: `entrants`) on the same drives, (cases, seeds, T); filters draw from `key`."""
+    every = contestants(study) if entrants is None else entrants
+    chosen = {name: every[name] for name in (every if only is None else only)}
+    seeds = np.shape(drives.v_x)[1]
+    own = Case(*(np.repeat(np.array(values, float)[:, None], seeds, 1) for values in zip(*cases.values(), strict=True)))
+    runs = {name: of_a_point(study, contestant, tyre) for name, contestant in chosen.items()}
+    design = sweeps.Design(estimator=runs, **{axis.name: axis.values for axis in _design(cases).axes})
+    run = lambda point, key, data: point.estimator(point, key, data)
+    key = jax.random.key(0) if key is None else key
+    found = sweeps.sweep(run, design, seeds, key, data=(own, drives), progress=progress)
+    return Raced(study, dict(cases), drives, found)
+
+
+def _design(cases: Mapping[str, Case]) -> sweeps.Design:
+    return sweeps.Design(case=range(len(cases)))

@@ -1,0 +1,224 @@
+"""The model-adaptive-pf experiment at small size: noise has the levels it says, filters rank as they should, errata show."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import filters
+from jaxveh import statespace as ss
+from jaxveh.experiments import model_adaptive_pf as experiment
+from jaxveh.experiments.model_adaptive_pf import drives as own_drives
+from jaxveh.experiments.model_adaptive_pf import models, printed
+from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
+from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, PLAIN, Contestant, contestants, metrics, moved
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter
+from jaxveh.tyres import Contact, Linear, Relaxed
+
+SMALL = experiment.Study(duration=2.5, periods=0.6, particles=60, max_step=0.005)
+NOISY = experiment.Case(level=6.0, outliers=0.05)
+
+
+def quick_tyre(study, share=1.0):
+    """One whose program is short."""
+    return Linear(share * study.cornering_stiffness)
+
+
+def quick_car(study):
+    """A truth of three degrees of freedom on lagging linear tyres."""
+    return models.lagging(study, own_drives.model_car(study, quick_tyre(study)))
+
+
+@pytest.fixture(scope="module")
+def drives():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(own_drives, "true_car", quick_car)
+        return experiment.drives_of(SMALL, {"both": NOISY, "quiet": experiment.Case()}, 3, jax.random.key(5))
+
+
+def test_the_drive_is_a_slalom_of_the_printed_car(drives):
+    assert drives.v_x.shape == (2, 3, 251)
+    assert np.abs(drives.true_v_x - SMALL.speed).max() < 0.1 * SMALL.speed
+    assert 2.5 < np.rad2deg(drives.steer).max() < 3.5
+    assert 0.7 < np.rad2deg(np.abs(drives.true_sideslip)).max() < 4.0
+    # Cases of one seed drive the same way.
+    np.testing.assert_array_equal(drives.true_v_y[0], drives.true_v_y[1])
+    # Tyres build up their force over some centimetres: at the front the force lags the steer.
+    assert np.argmax(drives.true_a_y[1, 0]) > np.argmax(drives.steer[1, 0])
+
+
+def test_the_truth_is_the_printed_car_on_tyres_of_the_printed_stiffness():
+    car = own_drives.true_car(SMALL)
+    assert (float(car.mass), float(car.front_axle_to_cg), float(car.track_rear)) == (1528.0, 1.48, 1.594)
+    for axle, load in zip((car.front, car.rear), own_drives.numbers_of(SMALL).wheel_loads(), strict=True):
+        assert isinstance(axle, Relaxed) and axle.sigma_y is None
+        small = jnp.asarray(1e-3)
+        contact = Contact(slip_angle=small, slip_ratio=0.0 * small, load=jnp.asarray(load), speed=jnp.asarray(14.0))
+        assert float(axle.tyre.forces(contact).F_y) == pytest.approx(SMALL.cornering_stiffness * 1e-3, rel=0.02)
+        # What the filters are told of its relaxation length.
+        assert float(axle.tyre.outputs(contact).sigma_y) == pytest.approx(SMALL.relaxation, abs=0.01)
+
+
+def test_a_lagging_tyre_is_the_static_one_after_some_way():
+    static = own_drives.model_car(SMALL, own_drives.fiala(SMALL))
+    car = models.lagging(SMALL, static)
+    model = models.dynamics(SMALL, car, jnp.asarray(14.0))
+    assert model.states == ("v_x", "v_y", "yaw_rate", *(f"{w}_deflection_y" for w in ("fl", "fr", "rl", "rr")))
+    u = models.record_type("Inputs", models.INPUTS)(*map(jnp.asarray, (0.02, 0.0, 0.0)))
+    x = model.prior.mean
+    rates = models._rates(car, 0.0, x, u)
+    # dv/dt = V alpha - V v / sigma: nothing deflects yet, and the front wheels slip by the steer.
+    np.testing.assert_allclose(rates.fl_deflection_y, 14.0 * np.tan(0.02), rtol=1e-3)
+    settled = SMALL.relaxation * np.tan(0.02)
+    # The right wheel's tyre is a mirror image.
+    x = x._replace(fl_deflection_y=jnp.asarray(settled), fr_deflection_y=jnp.asarray(-settled))
+    body = models.BodyState(*x[:3])
+    np.testing.assert_allclose(models._seen(car, 0.0, x, u).a_y, models._seen(static, 0.0, body, u).a_y, rtol=1e-3)
+
+
+def test_noise_has_the_levels_that_the_case_says():
+    study = experiment.Study(duration=100.0)
+    noise, level = own_drives.noise_of(study, experiment.Case(), jax.random.key(0))
+    assert level.min() == level.max() == 1.0
+    for name, std in study.stds.items():
+        np.testing.assert_allclose(noise[name].std(), std, rtol=0.03)
+    noise, level = own_drives.noise_of(study, experiment.Case(level=5.0), jax.random.key(0))
+    np.testing.assert_allclose([level.min(), level.max()], [1.0, 5.0], atol=1e-3)
+    np.testing.assert_allclose((noise["a_y"] / level).std(), study.a_y, rtol=0.03)
+    noise, _ = own_drives.noise_of(study, experiment.Case(outliers=0.03), jax.random.key(0))
+    # A normal number is beyond 5 of the small standard deviations with 0.96 of the outliers.
+    np.testing.assert_allclose((np.abs(noise["a_y"]) > 5 * study.a_y).mean(), 0.03 * 0.96, rtol=0.1)
+    wild = noise["a_y"][np.abs(noise["a_y"]) > 5 * study.a_y]
+    np.testing.assert_allclose(np.median(np.abs(wild)), 0.6745 * study.outlier_size * study.a_y, rtol=0.15)
+
+
+def test_what_knows_outliers_beats_what_does_not(drives):
+    cases = {"both": NOISY, "quiet": experiment.Case()}
+    particles = filters.ParticleFilter(60)
+    entrants = {
+        PLAIN: Contestant(moved(particles, lags=False), ""),
+        ADAPTIVE: Contestant(moved(filters.HaarParticles(particles), models.mixture, lags=False), ""),
+    }
+    raced = experiment.race(SMALL, cases, drives, entrants=entrants, tyre=quick_tyre)
+    error = lambda name, case, what="yaw_rate": np.median(raced.of(what, name, case))
+    assert error(ADAPTIVE, "both") < 0.8 * error(PLAIN, "both")
+    assert error(ADAPTIVE, "quiet") < 1.1 * error(PLAIN, "quiet") < error(PLAIN, "both")
+    assert (raced.found["result"] == 0).all()
+    assert raced.of("course", PLAIN, "both").shape == (3, 251)
+    assert experiment.settings(experiment.Reproduction(3, raced))["cases"]["both"]["level"] == 6.0
+
+
+class Told(AbstractBelief):
+    """The mean that a test says."""
+
+    told: models.BodyState
+    count: jax.Array
+
+    @property
+    def mean(self):
+        return self.told
+
+    def moments(self, model):
+        return self.told, self.told
+
+
+class Scripted(AbstractFilter):
+    """Says each row's measurements, and keeps the coefficients that it was given."""
+
+    def check(self, model):
+        del model
+
+    def init(self, model, row, key=None):
+        return Told(models.BodyState(*row.y), jnp.int32(0)), model.system.keeps
+
+    def step(self, model, belief, row):
+        return Told(models.BodyState(*row.y), belief.count + 1), model.system.keeps
+
+
+def learned(as_printed, first):
+    """Coefficients after 200 rows that grow by 1, 0.5 and 0.1 %, from `first`."""
+    shares, rows = np.array([1.01, 1.005, 1.001]), 200
+    values = np.array(first) * shares ** np.arange(rows)[:, None]
+    system = models.Regressed(None, models.BodyState(*jnp.ones(3)))
+    model = ss.StateSpace(
+        system=system, transition=lambda s, t0, t1, x, u: x, observation=lambda s, t, x, u: x, process_noise=None,
+        measurement_noise=dict.fromkeys(("v_x", "v_y", "yaw_rate"), 1.0),
+        prior=ss.Prior(models.BodyState(0.0, 0.0, 0.0), dict.fromkeys(("v_x", "v_y", "yaw_rate"), 1.0)),
+    )  # fmt: skip
+    filter_ = AutoRegressive(Scripted(), as_printed=as_printed)
+    y = lambda k: models.BodyState(*map(jnp.asarray, values[k]))
+    belief, _ = filter_.init(model, ss.Row(jnp.asarray(0.0), None, y(0)))
+    step = jax.jit(filter_.step)
+    for k in range(1, rows):
+        belief, _ = step(model, belief, ss.Row(jnp.asarray(0.01 * k), None, y(k)))
+    return shares, np.array(belief.memory.keeps)
+
+
+def test_least_squares_learns_whatever_the_size_and_the_printed_law_does_not():
+    shares, found = learned(False, (10.0, 0.1, 0.1))
+    np.testing.assert_allclose(found, shares, atol=2e-4)
+    _, found = learned(True, (10.0, 0.1, 0.1))
+    assert abs(found[0] - 1.01) < 2e-4
+    assert abs(found[1] - 1.0) < 1e-3 and abs(found[2] - 1.0) < 1e-4
+
+
+def test_the_mixture_is_that_of_the_paper_with_its_errata_corrected():
+    study = experiment.Study()
+    assert study.weight == pytest.approx((4 - 1.7**2) / (3 * 1.7**2))
+    law = models.mixture(study)
+    x = 0.03
+    scale, std = study.yaw_rate / np.sqrt(2), study.yaw_rate
+    cauchy = scale / (np.pi * (x**2 + scale**2))
+    normal = np.exp(-(x**2) / (2 * std**2)) / np.sqrt(2 * np.pi * std**2)
+    residual = {"v_x": jnp.asarray(0.0), "a_y": jnp.asarray(0.0), "yaw_rate": jnp.asarray(x)}
+    only = {"v_x": jnp.asarray(False), "a_y": jnp.asarray(False), "yaw_rate": jnp.asarray(True)}
+    expected = np.log(study.weight * cauchy + (1 - study.weight) * normal)
+    np.testing.assert_allclose(law.log_prob(residual, only), expected, rtol=1e-6)
+
+
+def test_the_printed_variance_grows_to_a_standard_deviation():
+    study = dataclasses.replace(experiment.Study(), duration=4.0)
+    noise, _ = own_drives.noise_of(study, experiment.Case(), jax.random.key(1))
+    filter_ = printed.PrintedNoise(filters.HaarParticles(filters.ParticleFilter(2)))
+    own = jnp.square(jnp.asarray(list(study.stds.values())))
+    model = ss.StateSpace(
+        transition=lambda s, t0, t1, x, u: x, observation=lambda s, t, x, u: x, process_noise=None,
+        measurement_noise=models.mixture(study),
+        prior=ss.Prior(models.BodyState(0.0, 0.0, 0.0), dict.fromkeys(("v_x", "v_y", "yaw_rate"), 1.0)),
+    )  # fmt: skip
+    window = printed.first_window(filter_.filter, own)
+    seen = jax.jit(filter_._seen)
+    Measured = models.record_type("Measurements", study.stds)
+    for k in range(400):
+        window = seen(model, window, ss.Row(jnp.asarray(0.0), None, Measured(*(v[k] for v in noise.values()))))
+        if k == 40:
+            np.testing.assert_allclose(window.variances, own, rtol=1e-9)
+    expected = np.array(list(study.stds.values())) * 0.6745 / 0.627
+    # Of a median of 32, some per cent; the variances themselves are 10 to 200 times smaller.
+    np.testing.assert_allclose(window.variances, expected, rtol=0.6)
+
+
+def test_the_printed_tyre_jumps():
+    as_printed, corrected = printed.tyre_table(experiment.Study()).rows
+    _, force, moment, trail, push = as_printed
+    assert force == pytest.approx(-0.2, abs=0.15) or force == pytest.approx(0.2, abs=0.15)
+    assert moment == pytest.approx(64.0, abs=1.0)
+    assert trail == pytest.approx(0.2749 * 70.0, rel=1e-2)
+    assert push < 5.0
+    assert abs(corrected[2]) < 0.2 and corrected[3] == pytest.approx(31.7, rel=1e-2) and corrected[4] > 90.0
+
+
+def test_numbers_of_a_known_course(drives):
+    drive = own_drives.Drive(*(jnp.asarray(leaf[0, 0]) for leaf in drives))
+    kind = models.record_type("Report", ("v_x", "v_y", "yaw_rate", "sideslip"))
+    mean = kind(drive.true_v_x, drive.true_v_y + 0.1, drive.true_yaw_rate, drive.true_sideslip + jnp.deg2rad(0.5))
+    found = dataclasses.make_dataclass("Found", ("mean", "log_likelihood", "result"))(mean, 0.0, 0)
+    numbers = metrics(found, drive)
+    np.testing.assert_allclose([numbers["sideslip"], numbers["v_y"], numbers["yaw_rate"]], [0.5, 0.1, 0.0], atol=1e-12)
+
+
+def test_every_contestant_says_what_it_is():
+    for name, one in {**contestants(SMALL), **printed.entrants(SMALL)}.items():
+        assert name and one.what
