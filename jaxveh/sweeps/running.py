@@ -41,7 +41,8 @@ def sweep(
     of arrays that begin with the axes of numbers and the seeds: then it is `run(point, key, data)` with each run's own part
     (drives that several filters see); `batch`, runs at a time (default: all points of a choice, or as many as `memory`, bytes,
     holds: half of the machine's); `devices`, over which a batch is split by `shard_map` (default: all of `jax.devices()`: on a
-    CPU one, unless `jax_num_cpu_devices` is set before jax starts); `progress(done, total, stage)` is called between chunks.
+    CPU one, unless `jax_num_cpu_devices` is set before jax starts; a run that fits with optimistix takes one,
+    `jax.devices()[:1]`: linear solves of lineax refuse `shard_map`); `progress(done, total, stage)` is called between chunks.
 
     Every choice is compiled once, whatever the number of chunks.
 

@@ -87,7 +87,8 @@ def run_saturated(
         design = sweeps.Design(estimator={one: every[one] for one in only or every}, case=range(len(cases)))
         run = lambda point, key, drive: point.estimator(key, drive)
         told = part(progress, i / len(unknown), (i + 1) / len(unknown), name)
-        found[name] = sweeps.sweep(run, design, seeds, key, data=data, progress=told)
+        # Optimistix' linear solves cannot be split over devices.
+        found[name] = sweeps.sweep(run, design, seeds, key, data=data, devices=jax.devices()[:1], progress=told)
     return Saturated(tuple(cases), found, bounds)
 
 
