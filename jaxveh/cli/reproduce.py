@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import time
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
@@ -12,8 +11,9 @@ from typing import Annotated, Any
 import typer
 
 from jaxveh._core.errors import InputError, check_one_of
-from jaxveh._core.progress import Progress, part
+from jaxveh._core.progress import Progress
 from jaxveh.cli import options
+from jaxveh.cli.all_papers import all_papers
 from jaxveh.cli.console import number, progress, results, table
 from jaxveh.cli.output import check_report, make_folder, write_numbers
 
@@ -68,25 +68,20 @@ def reproduce(
         raise InputError("--log and --vehicle belong together: give both, or neither.")
     if log is not None and name not in (LOGGED, ALL):
         raise InputError(f"--log: only {LOGGED} looks at a log; leave it out, or reproduce that paper.")
-    real = {} if log is None else {"log": log, "car": car}
-    chosen = list(PAPERS) if name == ALL else [name]
-    written, summary = {}, []
+    if log is not None and as_printed:
+        raise InputError("--log: nothing is printed of it; leave it out, or --as-printed.")
+    if name == ALL:
+        asked = {"--seeds": seeds, "--seed": seed, "--as-printed": as_printed or None, "--out": out}
+        all_papers(
+            {name: asked | ({"--log": log, "--vehicle": car} if name == LOGGED else {}) for name in PAPERS}, numbers
+        )
+        return
+    asked = (
+        {"seed": seed} | ({} if seeds is None else {"seeds": seeds}) | ({} if log is None else {"log": log, "car": car})
+    )
     with progress("reproduce") as report:
-        for i, one in enumerate(chosen):
-            share = report if len(chosen) == 1 else part(report, i / len(chosen), (i + 1) / len(chosen), one)
-            start = time.perf_counter()
-            folder = out if out is None or len(chosen) == 1 else out / one
-            asked = {"seed": seed} | ({} if seeds is None else {"seeds": seeds})
-            asked |= real if one == LOGGED and not as_printed else {}
-            written[one] = _one(one, asked, as_printed, share, folder)
-            checks = written[one]["checks"]
-            held = f"{sum(check['holds'] for check in checks)} of {len(checks)}" if checks else "none made"
-            summary.append((one, held, f"{time.perf_counter() - start:.0f}"))
-    if len(chosen) > 1:
-        table("Papers", ("paper", "checks that hold", "took, s"), summary)
-    settings = {one: found.pop("settings") for one, found in written.items()}
-    shown = written if len(chosen) > 1 else written[name]
-    write_numbers(numbers, shown, settings if len(chosen) > 1 else settings[name], seed)
+        found = _one(name, asked, as_printed, report, out)
+    write_numbers(numbers, found, found.pop("settings"), seed)
 
 
 def _one(name: str, asked: dict[str, Any], as_printed: bool, report: Progress, out: Path | None) -> dict[str, Any]:

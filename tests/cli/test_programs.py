@@ -214,16 +214,45 @@ def test_reproduce_as_printed_shows_that_alone(papers):
     assert "printed" in shown and "honest" not in shown and not papers
 
 
-def test_reproduce_all_goes_through_every_paper(tmp_path, papers):
+def test_reproduce_all_goes_through_every_paper(tmp_path, papers, monkeypatch):
+    """Each by a program of its own, which stands here for what it writes."""
+    from jaxveh.cli import all_papers
+
+    asked = {}
+
+    def program(name, options, folder, tell):
+        asked[name] = {option: value for option, value in options.items() if value is not None}
+        tell("done")
+        checks = [{"name": "UKF", "value": 0.5, "bound": 0.8, "holds": True}, {"name": "PF", "holds": name == "first"}]
+        return all_papers.Done(int(name == "failing"), f"tables of {name}\n", {"checks": checks}, 61.4)
+
+    monkeypatch.setattr(all_papers, "run_program", program)
     numbers = tmp_path / "numbers.json"
-    result = run("reproduce", "all", "--json", numbers)
+    result = run("reproduce", "all", "--seed", "3", "--json", numbers)
     assert result.exit_code == 0, result.output
-    # Every paper has its own number of seeds.
-    assert papers == [("first", {"seed": 0}), ("second", {"seed": 0})]
-    content = read_json(numbers)
-    assert content["second"]["checks"][0]["holds"] is True
-    assert content["manifest"]["configuration"]["second"]["study"] == {"particles": 20}
-    assert "Papers" in result.stdout and result.stdout.count("1 of 2") >= 4
+    assert asked == {"first": {"--seed": 3}, "second": {"--seed": 3}}
+    assert result.stdout.index("tables of first") < result.stdout.index("tables of second")
+    assert "2 of 2" in result.stdout and "1 of 2" in result.stdout and "61" in result.stdout
+    assert json.loads(numbers.read_text())["second"]["checks"][0]["holds"] is True
+    monkeypatch.setattr("jaxveh.cli.reproduce.PAPERS", {"failing": "a paper"})
+    result = run("reproduce", "all")
+    assert result.exit_code == 1 and "failing failed" in result.stderr
+
+
+def test_a_paper_by_a_program_of_its_own(tmp_path):
+    """A program that refuses its input: the line it says is told, its code kept."""
+    from jaxveh.cli.all_papers import run_program
+
+    told = []
+    done = run_program("no-paper", {"--seed": 1, "--as-printed": True, "--out": None}, tmp_path, told.append)
+    assert done.code == 2 and done.numbers == {} and done.took > 0
+    assert any("must be one of" in line for line in told)
+
+
+def test_a_log_is_for_the_review_alone(tmp_path, papers):
+    assert "belong together" in error_line(run("reproduce", "first", "--log", tmp_path / "log.csv"))
+    both = ("--log", tmp_path / "log.csv", "--vehicle", tmp_path / "car.toml")
+    assert "only sideslip-review looks at a log" in error_line(run("reproduce", "first", *both))
 
 
 def test_reproduce_names_its_papers():
