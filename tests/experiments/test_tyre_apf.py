@@ -40,11 +40,14 @@ def test_single_shooting_finds_what_made_the_data():
     drive = simulate(car, manoeuvre, sensors.esc(yaw_rate=1e-9, a_y=1e-9), key=jax.random.key(0), dt=0.01)
     model = model_of(study, car, study.saturated, saturated.stiffness_and_peak, "linear")
     truth = jnp.stack(model.prior.mean)[-4:]
-    found, converged = saturated.single_shooting(
-        model, model.rows(drive), truth + jnp.asarray([0.02, -0.02, 0.01, 0.02])
-    )
+    rows, beside = model.rows(drive), truth + jnp.asarray([0.02, -0.02, 0.01, 0.02])
+    fit = jax.jit(lambda rows: saturated.single_shooting(model, rows, beside))
+    found, converged = fit(rows)
     assert converged
     np.testing.assert_allclose(found, truth, atol=2e-4)
+    # Where nothing was measured the prior alone is left.
+    nothing = rows._replace(y=jax.tree.map(lambda leaf: jnp.full_like(leaf, jnp.nan), rows.y))
+    np.testing.assert_allclose(fit(nothing)[0], truth, atol=1e-9)
 
 
 def test_errors_of_the_prior_are_one_standard_deviation(monkeypatch):
