@@ -18,9 +18,9 @@ from jaxveh.simulation import simulate
 PAPERS_PARTICLES = 300
 """As printed."""
 
-COUNTS = (100, PAPERS_PARTICLES, 1000)
+COUNTS = (100, PAPERS_PARTICLES)
 
-AGAIN = 10
+AGAIN = 8
 """How often each filter goes over the same drive, with other draws."""
 
 KINDS = {"PF": filters.ParticleFilter, "APF": filters.AuxiliaryParticleFilter}

@@ -74,7 +74,7 @@ def _saturated_table(result: Reproduction) -> Table:
     for unknown, found in result.saturated.found.items():
         for i, case in enumerate(result.saturated.cases):
             seen = result.saturated.bounds[unknown][case]
-            for name in ("prior", "UKF", "MAP"):
+            for name in found.design.axis("estimator").labels:
                 error = 100 * np.sqrt(np.mean(found.at("error", estimator=name)[i] ** 2, axis=0))
                 pairs = dict(zip(seen.names, zip(error, 100 * seen.bounds, strict=True), strict=True))
                 ratio = over_bound(result.saturated, unknown, name, case).max()
