@@ -74,8 +74,8 @@ def run_saturated(
     unknown: tuple[str, ...] = tuple(UNKNOWN),
     only: tuple[str, ...] | None = None,
 ) -> Saturated:
-    """UKF and MAP (or `only` these) on both drives, with D and B `unknown`; with all eight the UKF alone, since a fit takes long to
-    say that they cannot be told apart."""
+    """UKF and MAP (or `only` these) on both drives, with D and B `unknown`; with all eight the UKF alone, since a
+    fit takes long to say that they cannot be told apart."""
     cases = cases_of(study)
     progress(0.0, 1.0, "drives")
     drives = [_drives(study, manoeuvre, seeds, key) for manoeuvre in cases.values()]
