@@ -86,7 +86,7 @@ def reproduce(
 
 def _one(name: str, asked: dict[str, Any], as_printed: bool, report: Progress, out: Path | None) -> dict[str, Any]:
     """Run one paper as `asked` and show it; what it found, for JSON."""
-    _both_cores()
+    _every_core()
     experiment = _experiment(name)
     if as_printed:
         tables, checks, settings = experiment.as_printed(**asked, progress=report), [], asked
@@ -123,7 +123,7 @@ def _experiment(name: str) -> ModuleType:
     return importlib.import_module(f"jaxveh.experiments.{name.replace('-', '_')}")
 
 
-def _both_cores() -> None:
+def _every_core() -> None:
     """Let sweeps split over the machine's cores, unless jax has begun or someone has decided otherwise."""
     import jax
 

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxveh.sweeps import Interval
+
 
 class Check(NamedTuple):
     """One criterion: what was found, the bound, and whether it holds (at or below the bound unless the name says)."""
@@ -37,6 +39,12 @@ def above(name: str, value, bound: float) -> Check:
 def at_least(name: str, value, bound: float) -> Check:
     """A criterion that holds at or above the bound."""
     return Check(name, float(value), float(bound), bool(value >= bound))
+
+
+def interval(found: Interval, digits: int = 3) -> str:
+    """`value [low, high]` of a number with its bootstrap interval."""
+    value, low, high = (float(number) for number in found)
+    return f"{value:.{digits}g} [{low:.{digits}g}, {high:.{digits}g}]"
 
 
 def spread(values, digits: int = 3, scale: float = 1.0, lost: str = "lost") -> str:

@@ -191,7 +191,7 @@ def papers(monkeypatch):
     monkeypatch.setattr(reproduce, "PAPERS", dict.fromkeys(every, "a paper"))
     monkeypatch.setattr(reproduce, "_experiment", every.__getitem__)
     # Devices are made once in a process; other tests count on one.
-    monkeypatch.setattr(reproduce, "_both_cores", lambda: None)
+    monkeypatch.setattr(reproduce, "_every_core", lambda: None)
     return asked
 
 

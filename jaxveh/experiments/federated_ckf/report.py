@@ -15,7 +15,7 @@ from jaxveh.experiments.federated_ckf.drives import Drive
 from jaxveh.experiments.federated_ckf.observed import observed
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
 from jaxveh.experiments.federated_ckf.study import Raced, cases, drives_by_case, drives_of, race, race_over, truth
-from jaxveh.experiments.report import Check, Table, above, at_most, spread
+from jaxveh.experiments.report import Check, Table, above, at_most, interval, spread
 from jaxveh.sweeps import Swept, compare
 
 STEERS, SPREADS = (3.0, 4.0, 5.0, 8.0), (0.0, 0.1, 0.3)
@@ -153,10 +153,7 @@ def _paired_table(raced: Raced) -> Table:
         for case in ("printed start", "nearer start"):
             own, joint = (raced.at("sideslip_rmse", who, case) for who in (name, "joint"))
             pair = compare(own, joint)
-            cells += [
-                f"{float(pair.ratio.value):.3g} [{float(pair.ratio.low):.3g}, {float(pair.ratio.high):.3g}]",
-                float(pair.wins),
-            ]
+            cells += [interval(pair.ratio), float(pair.wins)]
         rows.append((name, *cells))
     return Table(
         "Sideslip RMSE over the joint filter's, seed by seed: median ratio [95 %], share of seeds in which it is smaller",

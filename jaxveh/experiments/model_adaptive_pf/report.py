@@ -11,7 +11,7 @@ from jaxveh._core.progress import Progress, part, silent
 from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, CUBATURE, PLAIN, ROBUST, contestants
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, PRESSED, Study
 from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
-from jaxveh.experiments.report import Check, Table, at_most, spread
+from jaxveh.experiments.report import Check, Table, at_most, interval, spread
 from jaxveh.sweeps import Comparison, compare
 
 ERRORS = {"sideslip": "sideslip, degrees", "v_y": "v_y, m/s", "yaw_rate": "yaw rate, degrees/s"}
@@ -74,11 +74,6 @@ def tables(result: Reproduction) -> list[Table]:
 
 def _seeds(raced: Raced) -> int:
     return raced.found.seeds
-
-
-def interval(found: Any, digits: int = 3) -> str:
-    """`value [low, high]` of a comparison's ratio."""
-    return f"{found.value:.{digits}g} [{found.low:.{digits}g}, {found.high:.{digits}g}]"
 
 
 def _names(raced: Raced) -> tuple[str, ...]:

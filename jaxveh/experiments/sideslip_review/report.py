@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 import jax
 
 from jaxveh._core.progress import Progress, part, silent
-from jaxveh.experiments.report import Check, Table, at_most, spread
+from jaxveh.experiments.report import Check, Table, at_most, interval, spread
 from jaxveh.experiments.sideslip_review.contestants import WHAT
 from jaxveh.experiments.sideslip_review.printed import equations
 from jaxveh.experiments.sideslip_review.recorded import BEST, READY, SMOOTHED, Logged, on_log
 from jaxveh.experiments.sideslip_review.settings import SCENARIOS, Study
 from jaxveh.experiments.sideslip_review.study import Raced, drives_of, race
 from jaxveh.experiments.sideslip_review.verdicts import BANK, ROWS, claims, limit_of, number, verdicts
-from jaxveh.sweeps import Interval, compare
+from jaxveh.sweeps import compare
 
 FIRST = next(iter(WHAT))
 """The baseline."""
@@ -101,18 +101,13 @@ def settings(result: Reproduction) -> dict[str, Any]:
     return found
 
 
-def shown(interval: Interval) -> str:
-    """A number with its interval."""
-    return f"{float(interval.value):.2g} [{float(interval.low):.2g}, {float(interval.high):.2g}]"
-
-
 def _verdict_table(result: Reproduction) -> Table:
     rows = [
         (
             one.row,
             one.method,
             "o" if one.mark else "x",
-            shown(one.found),
+            interval(one.found, 2),
             f"<= {one.limit:g}",
             one.verdict,
             ROWS[one.row].what,
@@ -130,7 +125,7 @@ def _mark_table(result: Reproduction) -> Table:
     """What the same rules make of every method."""
     rows = []
     for name in WHAT:
-        cells = [shown(number(result.raced, one, name)) for one in (*ROWS.values(), BANK)]
+        cells = [interval(number(result.raced, one, name), 2) for one in (*ROWS.values(), BANK)]
         rows.append((name, *cells))
     limits = [f"<= {limit_of(result.raced.study, one):g}" for one in (*ROWS.values(), BANK)]
     return Table("The same numbers of every method", ("method", *ROWS, "robust to bank"), [("good is", *limits), *rows])
@@ -138,7 +133,7 @@ def _mark_table(result: Reproduction) -> Table:
 
 def _claim_table(result: Reproduction) -> Table:
     words = lambda side: f"{side[1]}, {side[2]}"
-    rows = [(c.text, words(c.a), words(c.b), shown(ratio), verdict) for c, ratio, verdict in claims(result.raced)]
+    rows = [(c.text, words(c.a), words(c.b), interval(ratio, 2), verdict) for c, ratio, verdict in claims(result.raced)]
     return Table(
         "What the text says: errors of one over the other's, on the same seeds",
         ("claim", "of", "over", "ratio", "verdict"),
@@ -163,7 +158,7 @@ def _against_open_loop(result: Reproduction) -> Table:
         cells = []
         for scenario in raced.scenarios:
             found = compare(raced.at("early", name, scenario), raced.at("early", FIRST, scenario))
-            cells.append(f"{shown(found.ratio)}, {100 * float(found.wins):.0f} %")
+            cells.append(f"{interval(found.ratio, 2)}, {100 * float(found.wins):.0f} %")
         rows.append((name, *cells))
     return Table("Error over the open loop's, and how often it is smaller", ("method", *raced.scenarios), rows)
 

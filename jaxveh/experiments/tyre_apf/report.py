@@ -50,8 +50,8 @@ def run(
     found = jax.block_until_ready(run_printed_seeds(printed, jax.random.split(printed_key, seeds)))
     progress(1.0, 1.0, "done")
     return Reproduction(
-        study, seeds, staged.outcome, staged.steps, lane_change, saturated.bounds["D and B"][SWEEP], found, printed,
-        saturated, sharpness, looked_at_the_truth(staged, printed),
+        study, seeds, staged.outcome, staged.steps, lane_change, saturated, sharpness, found, printed,
+        looked_at_the_truth(staged, printed),
     )  # fmt: skip
 
 
@@ -114,8 +114,8 @@ def check(result: Reproduction) -> list[Check]:
                 )
     condition = result.lane_change.condition_number
     checks.append(above("lane change: condition number of eight parameters, above", condition, UNOBSERVABLE))
-    observable = result.sweep.observable()
-    add("sweep of 15 degrees: D and B not observable, number", sum(n not in observable for n in result.sweep.names), 0)
+    seen = result.saturated.bounds["D and B"][SWEEP]
+    add(f"{SWEEP}: D and B not observable, number", len(seen.names) - len(seen.observable()), 0)
     for name in ("UKF", "MAP"):
         worst = over_bound(result.saturated, "D and B", name, SWEEP).max()
         add(f"{SWEEP}, D and B: {name}'s largest RMSE over its Cramer-Rao bound", worst, 2.0)

@@ -13,16 +13,20 @@ from jaxveh.experiments.tyre_apf.study import Outcome
 
 
 class Reproduction(NamedTuple):
-    """Everything the experiment found; leaves over seeds. `peeked`: the honest filters' parameters by the paper's final rule."""
+    """Everything the experiment found; leaves over seeds.
+
+    `outcome` of the honest lane change, `steps`: errors of step steers by degrees; `lane_change`: what it can tell of eight
+    parameters; `saturated`, `sharpness`: the further drives and sweeps. `printed`: what the printed settings do. `peeked`: the
+    honest filters' parameters, (seeds, 8), by the paper's final rule, which looks at the truth.
+    """
 
     study: Study
     seeds: int
     outcome: Outcome
     steps: dict
     lane_change: Observability
-    sweep: Observability
-    printed: PrintedOutcome
-    printed_settings: Printed
     saturated: Saturated
     sharpness: Sharpness
+    printed: PrintedOutcome
+    printed_settings: Printed
     peeked: dict

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxveh import estimators, filters, manoeuvres, sensors, sweeps, vehicles
 from jaxveh._core.parameter import pick, prior_spread, resolve
-from jaxveh._core.progress import Progress, silent
+from jaxveh._core.progress import Progress, part, silent
 from jaxveh.experiments.tyre_apf.settings import LEVELS, Study, tyres
 from jaxveh.experiments.tyre_apf.study import guess_once
 from jaxveh.simulation import simulate
@@ -40,9 +40,7 @@ def run_sharpness(study: Study, seeds: int, key, *, again: int = AGAIN, progress
     for i, count in enumerate(COUNTS):
         runs = {name: _passes(study, kind(count), again) for name, kind in KINDS.items()}
         design = sweeps.Design(filter={"prior": _prior(study), **runs}, level=range(len(LEVELS)))
-        told = lambda done, total, stage, i=i, count=count: progress(
-            (i + done / total) / len(COUNTS), 1.0, f"{count} particles: {stage}"
-        )
+        told = part(progress, i / len(COUNTS), (i + 1) / len(COUNTS), f"{count} particles")
         run = lambda point, key: point.filter(point.level, key)
         found[count] = sweeps.sweep(run, design, seeds, key, progress=told)
     return Sharpness(found)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.experiments.report import Table, spread
+from jaxveh.experiments.report import Table, interval, spread
 from jaxveh.experiments.tyre_apf.printed import Printed, PrintedOutcome
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.saturated import over_bound
 from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER, TABLE_2, TABLE_3
 from jaxveh.experiments.tyre_apf.sharpness import KINDS, Sharpness, likelihood_ratio
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS
+from jaxveh.sweeps import Interval
 
 
 def tables(result: Reproduction) -> list[Table]:
@@ -96,8 +97,8 @@ def _error_table(found: Sharpness) -> Table:
     for count, runs in found.found.items():
         rows += [(count, name, *[spread(v) for v in runs.at("error", filter=name)]) for name in ("prior", *KINDS)]
         compared = runs.compare("error", "filter", "APF", "PF")
-        ratio = zip(*compared.ratio, compared.wins, strict=True)
-        cells = [f"{value:.3g} [{low:.3g}, {high:.3g}], {wins:.0%}" for value, low, high, wins in ratio]
+        ratios = [Interval(*numbers) for numbers in zip(*compared.ratio, strict=True)]
+        cells = [f"{interval(ratio)}, {wins:.0%}" for ratio, wins in zip(ratios, compared.wins, strict=True)]
         rows.append((count, "APF over PF (95 %), wins", *cells))
     title = "Eight parameters by the sensors' noise: RMSE in prior standard deviations, median [quartiles]"
     return Table(title, ("particles", "filter", *HEADS), rows)
