@@ -101,3 +101,30 @@ def test_disturbances_are_what_they_say():
 def test_every_contestant_says_what_it_is():
     for name, one in contestants(dataclasses.replace(SMALL, touches=3)).items():
         assert name and one.what
+
+
+def test_a_touched_brake_is_an_unknown_force():
+    """Told when the brake is touched, the filter finds the mass; told nothing of a touch, it takes it for weight."""
+    study = dataclasses.replace(SMALL, touches=1, duration=40.0)
+    car, rows = own_drives.model_car(study), 401
+    t = np.arange(rows) * study.dt
+    touched = ((t >= 20.0) & (t < 22.0)).astype(float)
+    torque = study.mass * car.wheel_radius * (0.3 + 0.3 * np.sin(2 * np.pi * t / 4.0))
+    turning = 4 * car.wheel_inertia / car.wheel_radius**2
+
+    def step(v, given):
+        pull, brake = given
+        force = (
+            pull / car.wheel_radius - car.drag * v**2 - study.mass * (9.80665 * car.rolling_resistance + 0.5 * brake)
+        )
+        return v + study.dt * force / (study.mass + turning), v
+
+    between = lambda x: jnp.asarray(0.5 * (x + np.append(x[1:], x[-1])))
+    _, v = jax.lax.scan(step, jnp.asarray(15.0), (between(torque), jnp.asarray(touched)))
+    noise = np.random.default_rng(0).normal(0.0, study.v_x, rows)
+    zero = jnp.zeros(rows)
+    drive = own_drives.Drive(v + noise, zero, jnp.asarray(torque), jnp.asarray(touched), v, zero, zero)
+    run = jax.jit(lambda drive: contestants(study)["grade rate"].run(study, jnp.asarray(4000.0), drive))
+    error = lambda drive: abs(float(run(drive).mass[-1]) / study.mass - 1.0)
+    told, untold = error(drive), error(drive._replace(braking=zero))
+    assert told < 0.02 and untold > 3.0 * told

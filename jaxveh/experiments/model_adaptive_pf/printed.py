@@ -16,7 +16,7 @@ from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
 from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, PLAIN, Contestant, contestants, moved, regressed
 from jaxveh.experiments.model_adaptive_pf.drives import fiala, numbers_of
 from jaxveh.experiments.model_adaptive_pf.models import mixture
-from jaxveh.experiments.model_adaptive_pf.report import against, interval
+from jaxveh.experiments.model_adaptive_pf.report import against
 from jaxveh.experiments.model_adaptive_pf.settings import (
     CASES,
     LIMIT,
@@ -26,7 +26,7 @@ from jaxveh.experiments.model_adaptive_pf.settings import (
     Study,
 )
 from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
-from jaxveh.experiments.report import Table, spread
+from jaxveh.experiments.report import Table, interval, spread
 from jaxveh.filters.wrappers.base import Remembering
 from jaxveh.filters.wrappers.wavelet import MEDIAN, Window, first_window, measured, seen
 from jaxveh.statespace.contract import AbstractFilter, always, apart
