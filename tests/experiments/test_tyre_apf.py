@@ -8,6 +8,7 @@ import pytest
 from jaxveh import sweeps
 from jaxveh.experiments.tyre_apf import Study, saturated, sharpness
 from jaxveh.experiments.tyre_apf.printed import closest_share
+from jaxveh.experiments.tyre_apf.sweep_figures import saturated_figure, sharpness_figure
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +28,18 @@ def test_the_drives_tell_d_and_b(peaks):
         seen = peaks.bounds["D and B"][case]
         assert seen.names == ("front.B", "front.D", "rear.B", "rear.D")
         assert seen.observable() == seen.names
+
+
+def test_the_figure_shows_errors_beside_the_bound(peaks):
+    figure = saturated_figure(peaks)
+    (axes, _), seen = figure.axes, peaks.bounds["D and B"][peaks.cases[0]]
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["f.B", "f.D", "r.B", "r.D"]
+    (bounds,) = axes.collections
+    np.testing.assert_allclose([line[0, 1] for line in bounds.get_segments()], 100 * seen.bounds)
+    drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
+    ratio = saturated.over_bound(peaks, "D and B", "UKF", peaks.cases[0])
+    np.testing.assert_allclose(drawn["UKF"], 100 * ratio * seen.bounds)
+    assert set(drawn) == {"prior", "UKF"} and "%" in axes.get_ylabel()
 
 
 def test_single_shooting_finds_what_made_the_data():
@@ -76,3 +89,22 @@ def test_the_ratio_is_of_medians():
 def test_the_closest_fifth_looks_at_the_truth():
     series = jnp.asarray([[5.0, 1.1, 0.7, 3.0, 9.0, 1.2, 4.0, 8.0, 0.0, 7.0]])
     np.testing.assert_allclose(closest_share(series, jnp.asarray([1.0]), 0.2), [0.5 * (1.1 + 1.2)])
+
+
+def test_the_figure_shows_medians_with_quartiles():
+    levels, seeds = 3, 5
+    design = sweeps.Design(filter={"prior": 0, "PF": 1, "APF": 2}, level=range(levels))
+    values = np.arange(3.0 * levels * seeds).reshape(3, levels, seeds) + 1.0
+    runs = sweeps.Swept(design, seeds, {"error": values, "likelihood_spread": 10.0 * values})
+    left, right = sharpness_figure(sharpness.Sharpness({100: runs, 300: runs})).axes
+    (prior,) = [line for line in left.lines if line.get_label() == "prior"]
+    np.testing.assert_allclose(prior.get_ydata(), np.median(values[0], axis=-1))
+    for axes, factor in ((left, 1.0), (right, 10.0)):
+        assert [bars.get_label() for bars in axes.containers] == [
+            f"{n}, {c} particles" for c in (100, 300) for n in ("PF", "APF")
+        ]
+        for bars, mine in zip(axes.containers, (values[1], values[2]) * 2, strict=True):
+            line, _, (stems,) = bars.lines
+            np.testing.assert_allclose(line.get_ydata(), factor * np.median(mine, axis=-1))
+            ends = np.array([stem[:, 1] for stem in stems.get_segments()])
+            np.testing.assert_allclose(ends, factor * np.quantile(mine, [0.25, 0.75], axis=-1).T)

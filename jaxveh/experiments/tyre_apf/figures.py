@@ -15,6 +15,7 @@ from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.settings import Study, tyres
 from jaxveh.experiments.tyre_apf.staged import Staged
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS, Outcome, with_tyres
+from jaxveh.experiments.tyre_apf.sweep_figures import saturated_figure, sharpness_figure
 
 NAMES = tuple(field.replace("_", ".") for field in FIELDS)
 """The parameters as people write them, `front.B`."""
@@ -25,6 +26,8 @@ def figures(result: Reproduction) -> dict[str, Any]:
     return {
         "force_curves": curves_figure(result.outcome, result.study),
         "parameters": parameters_figure(result.outcome, result.study),
+        "beyond_the_peak": saturated_figure(result.saturated),
+        "sharpness": sharpness_figure(result.sharpness),
     }
 
 

@@ -1,0 +1,67 @@
+"""Pictures of the further parts: what drives beyond the peak tell, and both particle filters over the sensors' noise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jaxveh.experiments.tyre_apf.saturated import Saturated
+from jaxveh.experiments.tyre_apf.settings import LEVELS
+from jaxveh.experiments.tyre_apf.sharpness import KINDS, Sharpness
+from jaxveh.plots.figure import Figure
+from jaxveh.plots.style import COLOURS, WIDTH, style
+
+MARKS = {"prior": "s", "UKF": "o", "MAP": "D"}
+
+ASIDE = 0.09
+"""Between marks that belong to one place on the axis."""
+
+
+def saturated_figure(found: Saturated) -> Any:
+    """Root mean square errors of the parameters beside the Cramer-Rao bound: a column a drive, a row for what is unknown."""
+    figure = Figure(figsize=(WIDTH, 1.2 + 2.1 * len(found.found)), layout="constrained")
+    with style():
+        panels = figure.subplots(len(found.found), len(found.cases), squeeze=False, sharey="row")
+        for row, (unknown, runs) in zip(panels, found.found.items(), strict=True):
+            for i, (axes, case) in enumerate(zip(row, found.cases, strict=True)):
+                seen = found.bounds[unknown][case]
+                place = np.arange(len(seen.names))
+                axes.hlines(100 * seen.bounds, place - 0.35, place + 0.35, color="#000000", label="Cramér-Rao bound")
+                names = runs.design.axis("estimator").labels
+                for j, name in enumerate(names):
+                    rms = 100 * np.sqrt(np.mean(runs.at("error", estimator=name)[i] ** 2, axis=0))
+                    x = place + 2 * ASIDE * (j - 0.5 * (len(names) - 1))
+                    axes.plot(x, rms, MARKS[name], color=COLOURS[name], markersize=4, label=name)
+                labels = [name.replace("front.", "f.").replace("rear.", "r.") for name in seen.names]
+                axes.set(yscale="log", title=f"{case}: {unknown}", xticks=place, xticklabels=labels)
+            row[0].set(ylabel="RMSE [% (E: hundredths)]")
+        every = {name: mark for ax in panels.flat for mark, name in zip(*ax.get_legend_handles_labels(), strict=True)}
+        figure.legend(every.values(), every.keys(), loc="outside lower center", ncols=4)
+    return figure
+
+
+def sharpness_figure(found: Sharpness) -> Any:
+    """Errors of the eight parameters, and how far the log-likelihood spreads, over the sensors' noise: medians and quartiles."""
+    figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
+    places = np.arange(len(LEVELS))
+    with style():
+        left, right = figure.subplots(1, 2)
+        prior = next(iter(found.found.values())).at("error", filter="prior")
+        left.plot(places, np.median(prior, axis=-1), color=COLOURS["prior"], linestyle="--", label="prior")
+        for i, (count, runs) in enumerate(found.found.items()):
+            for j, name in enumerate(KINDS):
+                faded = (i + 1) / len(found.found)
+                x = places + ASIDE * (2 * i + j - len(found.found) + 0.5)
+                for axes, what in ((left, "error"), (right, "likelihood_spread")):
+                    low, mid, high = np.quantile(runs.at(what, filter=name), [0.25, 0.5, 0.75], axis=-1)
+                    bars = dict(color=COLOURS[name], alpha=faded, marker="o", markersize=4, linestyle="none", capsize=2)
+                    axes.errorbar(x, mid, (mid - low, high - mid), **bars, label=f"{name}, {count} particles")
+        labels = [f"{level.yaw_rate:g} rad/s\n{level.a_y:g} m/s²" for level in LEVELS]
+        for axes in (left, right):
+            axes.set(xticks=places, xticklabels=labels, xlabel="noise of yaw rate and lateral acceleration")
+            axes.margins(x=0.08)
+        left.set(ylabel="RMSE [prior standard deviations]", title="Eight parameters", ylim=(0, None))
+        right.set(ylabel="interquartile range [-]", yscale="log", title="Log-likelihood over passes of one drive")
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
