@@ -7,13 +7,24 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import filters
+from jaxveh import filters, sweeps
 from jaxveh import statespace as ss
 from jaxveh.experiments import model_adaptive_pf as experiment
+from jaxveh.experiments.model_adaptive_pf import choice, figures, models, printed, report
 from jaxveh.experiments.model_adaptive_pf import drives as own_drives
-from jaxveh.experiments.model_adaptive_pf import models, printed
 from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
-from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, PLAIN, Contestant, contestants, metrics, moved
+from jaxveh.experiments.model_adaptive_pf.contestants import (
+    ADAPTIVE,
+    PLAIN,
+    REDESIGNED,
+    TOLD,
+    Contestant,
+    contestants,
+    metrics,
+    moved,
+    redesigned,
+    told,
+)
 from jaxveh.statespace.contract import AbstractBelief, AbstractFilter
 from jaxveh.tyres import Contact, Linear, Relaxed
 
@@ -101,13 +112,70 @@ def test_what_knows_outliers_beats_what_does_not(drives):
         PLAIN: Contestant(moved(particles, lags=False), ""),
         ADAPTIVE: Contestant(moved(filters.HaarParticles(particles), models.mixture, lags=False), ""),
     }
+    entrants |= {REDESIGNED: Contestant(redesigned(SMALL), ""), TOLD: Contestant(told(filters.Cubature()), "")}
     raced = experiment.race(SMALL, cases, drives, entrants=entrants, tyre=quick_tyre)
     error = lambda name, case, what="yaw_rate": np.median(raced.of(what, name, case))
     assert error(ADAPTIVE, "both") < 0.8 * error(PLAIN, "both")
     assert error(ADAPTIVE, "quiet") < 1.1 * error(PLAIN, "quiet") < error(PLAIN, "both")
+    assert error(TOLD, "both") < error(REDESIGNED, "both") < 0.8 * error(PLAIN, "both")
     assert (raced.found["result"] == 0).all()
     assert raced.of("course", PLAIN, "both").shape == (3, 251)
-    assert experiment.settings(experiment.Reproduction(3, raced))["cases"]["both"]["level"] == 6.0
+    assert experiment.settings(experiment.Reproduction(3, raced, raced))["cases"]["both"]["level"] == 6.0
+
+
+def test_who_is_told_weighs_by_the_true_noise_and_leaves_out_what_is_wild(drives):
+    """On quiet rows the plain filter's numbers; a row with a wild value and one without it are the same to it."""
+    one = own_drives.Drive(*(jnp.asarray(leaf[1, 0]) for leaf in drives))
+    car = own_drives.model_car(SMALL, quick_tyre(SMALL))
+    plain, knows = moved(filters.Cubature()), told(filters.Cubature())
+    course = lambda run, drive: np.asarray(run(SMALL, car, drive, jax.random.key(0)).mean.sideslip)
+    np.testing.assert_allclose(course(knows, one), course(plain, one), atol=1e-12)
+    missing = one._replace(a_y=one.a_y.at[100].set(jnp.nan))
+    wild = one._replace(a_y=one.a_y.at[100].add(50.0 * SMALL.a_y))
+    np.testing.assert_allclose(course(knows, wild), course(plain, missing), atol=1e-12)
+    loud = dataclasses.replace(SMALL, v_x=3.0 * SMALL.v_x, a_y=3.0 * SMALL.a_y, yaw_rate=3.0 * SMALL.yaw_rate)
+    # But for the prior's spread of the speed, which is the data sheet's.
+    expected = np.asarray(plain(loud, car, one, None).mean.sideslip)
+    np.testing.assert_allclose(course(knows, one._replace(level=3.0 * one.level)), expected, atol=1e-4)
+    assert np.abs(course(knows, one) - expected).max() > 1e-3
+
+
+def test_the_redesigned_filter_follows_with_both_parts(drives):
+    one = own_drives.Drive(*(jnp.asarray(leaf[0, 0]) for leaf in drives))
+    car = own_drives.model_car(SMALL, quick_tyre(SMALL))
+    own = dataclasses.replace(SMALL, short_window=8, heavy_alpha=1.2)
+    found = redesigned(own)(own, car, one, jax.random.key(0))
+    filter_ = filters.HaarParticles(filters.ParticleFilter(60), 8, SMALL.forgetting, follows="both")
+    law = models.mixture(dataclasses.replace(SMALL, alpha=1.2))
+    expected = moved(filter_, lambda study: law)(SMALL, car, one, jax.random.key(0))
+    np.testing.assert_array_equal(found.mean.sideslip, expected.mean.sideslip)
+
+
+def test_the_choice_is_of_the_likelihood(monkeypatch):
+    monkeypatch.setattr(own_drives, "true_car", quick_car)
+    monkeypatch.setattr(choice, "fiala", quick_tyre)
+    found = choice.likelihoods(SMALL, windows=(16,), alphas=(1.5, 1.99), drives=2)
+    assert found.shape == (1, 2, 2) and np.isfinite(found).all()
+    # There are outliers: a law without tails does not like them.
+    assert (found[0, 0] > found[0, 1] + 10.0).all()
+
+
+def test_the_table_by_process_noise_shows_each_ones_own_choice():
+    cases = {"x 1": experiment.Case(), "x 2": experiment.Case(process=2.0)}
+    design = sweeps.Design(estimator={PLAIN: None, TOLD: None}, case=range(2))
+    values = np.array([[[1.0, 2.0, 3.0], [2.0, 4.0, 6.0]], [[0.5, 0.5, 0.5], [0.25, 0.25, 0.25]]])
+    likelihood = np.array([[[-9.0, -9.0, 7.0], [-1.0, -1.0, -8.0]], [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]])
+    found = sweeps.Swept(design, 3, {"sideslip": values, "log_likelihood": likelihood})
+    raced = experiment.Raced(SMALL, cases, None, found)
+    table = report._pressed(raced)
+    assert table.columns == ("estimator", "x 1", "x 2", "its own choice")
+    assert [row[0] for row in table.rows] == [PLAIN, TOLD]
+    assert table.rows[0][1].startswith("2") and table.rows[0][2].startswith("4")
+    # Of sums, not of the best drive; and none of who leaves rows out.
+    assert [row[-1] for row in table.rows] == ["x 2", "-"]
+    (axes,) = figures.pressed_figure(raced).axes
+    np.testing.assert_allclose([line.get_ydata() for line in axes.lines[:2]], [[2.0, 4.0], [0.5, 0.25]])
+    np.testing.assert_allclose(axes.lines[0].get_xdata(), [1.0, 2.0])
 
 
 class Told(AbstractBelief):

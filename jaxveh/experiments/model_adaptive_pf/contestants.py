@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import filters
+from jaxveh._core.names import record_type
 from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
 from jaxveh.experiments.model_adaptive_pf.drives import Drive, fiala, model_car
 from jaxveh.experiments.model_adaptive_pf.models import autoregression, dynamics, gaussian, lagging, mixture, rows_of
@@ -32,6 +33,7 @@ def contestants(study: Study) -> dict[str, Contestant]:
     """All of them by name, the do-nothing one first."""
     particles = filters.ParticleFilter(study.particles)
     wavelet = {"window": study.window, "forgetting": study.forgetting}
+    short = wavelet | {"window": study.short_window}
     haar = filters.HaarParticles(particles, **wavelet)
     cubature = filters.Cubature()
     robust = filters.RobustStudentT(cubature, study.dof)
@@ -45,19 +47,29 @@ def contestants(study: Study) -> dict[str, Contestant]:
         "PF, wavelet": Contestant(moved(haar), "the dynamics, variances from the Haar wavelet"),
         "PF, mixture": Contestant(moved(particles, mixture), "the dynamics, Cauchy-Gaussian likelihood"),
         ADAPTIVE: Contestant(moved(haar, mixture), "both, the variance that of the Gaussian part"),
+        REDESIGNED: Contestant(redesigned(study), "both parts follow the variance, of a quarter of the window"),
         "strong tracking": Contestant(
             moved(filters.StrongTracking(cubature)), "a cubature filter with a fading factor"
         ),
         CUBATURE: Contestant(moved(cubature), "the data sheet's Gaussian noise"),
         "robust CKF": Contestant(moved(robust), "Student's t law with the data sheet's scales"),
-        ROBUST: Contestant(moved(filters.HaarNoise(robust, **wavelet)), "the same, scales from the Haar wavelet"),
+        ROBUST: Contestant(
+            moved(filters.HaarNoise(robust, **short)), "the same, scales from the wavelet, short window"
+        ),
+        TOLD: Contestant(told(cubature), "knows the truth: told each row's noise level, and which rows are wild"),
     }
 
 
 PLAIN = "PF"
 ADAPTIVE = "PF, wavelet and mixture"
+REDESIGNED = "PF, redesigned"
 CUBATURE = "CKF"
 ROBUST = "robust CKF, wavelet"
+TOLD = "CKF, told the noise"
+"""A limit and no competitor: nobody who adapts to noise can do better than to know it."""
+
+WILD = 4.0
+"""Errors beyond so many standard deviations of their row are wild."""
 
 
 def moved(filter_, law=gaussian, lags: bool = True) -> Run:
@@ -67,6 +79,32 @@ def moved(filter_, law=gaussian, lags: bool = True) -> Run:
         car = lagging(study, car) if lags else car
         model = dynamics(study, car, drive.v_x[0], law(study))
         return filters.scan(filter_, model, rows_of(study, drive), key)
+
+    return run
+
+
+def redesigned(study: Study) -> Run:
+    """The particle filter whose law follows the wavelet as a whole, from a window of its own, with tails of its own."""
+    law = lambda study: mixture(dataclasses.replace(study, alpha=study.heavy_alpha))
+    haar = filters.HaarParticles(
+        filters.ParticleFilter(study.particles), study.short_window, study.forgetting, follows="both"
+    )
+    return moved(haar, law)
+
+
+def told(filter_) -> Run:
+    """A filter of the dynamics that is told the noise's true level row by row, and to leave out what is wild."""
+
+    def run(study, car, drive, key):
+        names = {name: f"{name}_std" for name in study.stds}
+        model = dynamics(study, lagging(study, car), drive.v_x[0], more=tuple(names.values()))
+        rows = rows_of(study, drive)
+        stds = {name: std * drive.level for name, std in study.stds.items()}
+        error = {name: jnp.abs(getattr(drive, name) - getattr(drive, f"true_{name}")) for name in stds}
+        u = record_type("ToldInputs", model.inputs)(*rows.u, *stds.values())
+        y = {name: jnp.where(error[name] > WILD * stds[name], jnp.nan, getattr(rows.y, name)) for name in stds}
+        rows = rows._replace(u=u, y=type(rows.y)(**y))
+        return filters.scan(filters.VaryingNoise(filter_, names), model, rows, key)
 
     return run
 

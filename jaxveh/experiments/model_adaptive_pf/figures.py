@@ -7,17 +7,17 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, CUBATURE, PLAIN, ROBUST
+from jaxveh.experiments.model_adaptive_pf.contestants import CUBATURE, PLAIN, REDESIGNED, ROBUST, TOLD
 from jaxveh.experiments.model_adaptive_pf.drives import Drive, fiala, numbers_of, times, true_car
 from jaxveh.experiments.model_adaptive_pf.printed import printed_tyre
 from jaxveh.experiments.model_adaptive_pf.report import Reproduction, against
-from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, PRESSED, Study
+from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, Study
 from jaxveh.experiments.model_adaptive_pf.study import Raced
 from jaxveh.plots.figure import Figure
 from jaxveh.plots.style import COLOURS, CYCLE, WIDTH, style
 from jaxveh.tyres import Contact
 
-SHOWN = {CUBATURE: "#e0c8b8", "open loop": "#7f7f7f", "AAR": CYCLE[3], PLAIN: CYCLE[0], ADAPTIVE: CYCLE[2]}
+SHOWN = {CUBATURE: "#e0c8b8", "open loop": "#7f7f7f", "AAR": CYCLE[3], PLAIN: CYCLE[0], REDESIGNED: CYCLE[2]}
 """The estimators of the drive's figure, and their colours."""
 
 
@@ -29,6 +29,7 @@ def figures(result: Reproduction) -> dict[str, Any]:
         "sideslip": sideslip_figure(raced),
         "ablation": ablation_figure(raced),
         "gain": gain_figure(raced),
+        "process_noise": pressed_figure(result.pressed),
         "tyre": tyre_figure(raced.study),
     }
 
@@ -107,8 +108,8 @@ def ablation_figure(raced: Raced, figure: Any = None) -> Any:
 
 def gain_figure(raced: Raced, figure: Any = None) -> Any:
     """Paired ratios to the plain particle filter in every case, with bootstrap intervals."""
-    shown = (ADAPTIVE, "PF, wavelet", "PF, mixture", ROBUST, "PF, no relaxation", "open loop")
-    cases = {**CASES, **PRESSED, **LIMIT}
+    shown = (REDESIGNED, "PF, wavelet", "PF, mixture", ROBUST, TOLD, "PF, no relaxation", "open loop")
+    cases = {**CASES, **LIMIT}
     figure = Figure(figsize=(WIDTH, 4.0), layout="constrained") if figure is None else figure
     with style():
         axes = figure.subplots()
@@ -116,16 +117,38 @@ def gain_figure(raced: Raced, figure: Any = None) -> Any:
             found = [against(raced, case, name).ratio for case in cases]
             mid = np.array([float(one.value) for one in found])
             bars = mid - np.array([float(one.low) for one in found]), np.array([float(one.high) for one in found]) - mid
-            x = np.arange(len(cases)) + 0.12 * (i - 2.5)
-            axes.errorbar(x, mid, bars, fmt="o", markersize=3, capsize=2, color=CYCLE[i % len(CYCLE)], label=name)
+            x = np.arange(len(cases)) + 0.11 * (i - 3.0)
+            axes.errorbar(x, mid, bars, fmt="o", markersize=3, capsize=2, color=(*CYCLE, "#7f7f7f")[i], label=name)
         axes.axhline(1.0, color="#444444", linewidth=0.6)
-        axes.axvspan(len(CASES) + len(PRESSED) - 0.5, len(cases) - 0.5, color="#f7f1df", zorder=0)
-        labels = [name.replace(", ", ",\n").replace(" % ", " %\n").replace("process ", "process\n") for name in cases]
+        axes.axvspan(len(CASES) - 0.5, len(cases) - 0.5, color="#f7f1df", zorder=0)
+        labels = [name.replace(" % ", " %\n") for name in cases]
         axes.set_xticks(np.arange(len(cases)), labels, fontsize=7)
         axes.set_yscale("log")
         axes.set_yticks([0.5, 0.7, 1.0, 1.5, 2.0, 3.0], ["0.5", "0.7", "1", "1.5", "2", "3"])
         axes.minorticks_off()
         axes.set(ylabel=f"sideslip RMSE over {PLAIN}'s [-]", title="Median and 95 % interval; shaded: near the limit")
+        figure.legend(loc="outside upper left", ncols=3)
+    return figure
+
+
+def pressed_figure(raced: Raced, figure: Any = None) -> Any:
+    """Sideslip RMSE over the process noise that filters assume: medians and quartiles."""
+    figure = Figure(figsize=(WIDTH, 3.4), layout="constrained") if figure is None else figure
+    shares = [case.process for case in raced.cases.values()]
+    with style():
+        axes = figure.subplots()
+        for i, name in enumerate(raced.found.design.axis("estimator").labels):
+            values = np.stack([raced.of("sideslip", name, case) for case in raced.cases])
+            low, mid, high = np.percentile(values, [25, 50, 75], axis=1)
+            colour = ("#7f7f7f", *CYCLE)[i]
+            axes.plot(shares, mid, marker="o", markersize=3, color=colour, label=name)
+            axes.fill_between(shares, low, high, color=colour, alpha=0.12, linewidth=0)
+        axes.set(
+            xscale="log", yscale="log", xlabel="process noise over the one that clean sensors chose [-]",
+            ylabel="sideslip RMSE [°]", title="'both': median and quartiles over seeds",
+        )  # fmt: skip
+        axes.set_xticks(shares, [f"{share:g}" for share in shares])
+        axes.minorticks_off()
         figure.legend(loc="outside upper left", ncols=3)
     return figure
 

@@ -51,8 +51,11 @@ class Regressed(NamedTuple):
     keeps: BodyState
 
 
-def dynamics(study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNoise | None = None) -> StateSpace:
-    """The car's equations of motion with wheel torques and steer as inputs; `start_speed` m/s, the first that was measured.
+def dynamics(
+    study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNoise | None = None, more: tuple[str, ...] = ()
+) -> StateSpace:
+    """The car's equations of motion with wheel torques and steer as inputs; `start_speed` m/s, the first that was measured;
+    `more` inputs of which the car knows nothing.
 
     Deflections of the tyres, where they have such, are states, too, without noise of their own.
     """
@@ -61,7 +64,7 @@ def dynamics(study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNoise | 
         system=car, transition=Propagate(_rates, Heun()), observation=_seen, report=_shown,
         process_noise=Continuous(Gaussian(noise)), measurement_noise=gaussian(study) if law is None else law,
         prior=prior(study, start_speed, tuple(name for name in car.state_type._fields if name.endswith("deflection_y"))),
-        inputs=INPUTS, input_path="linear",
+        inputs=(*INPUTS, *more), input_path="linear",
     )  # fmt: skip
 
 
