@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import sweeps
+from jaxveh import numerics, sweeps
 from jaxveh.experiments.tyre_apf import Study, saturated, sharpness
 from jaxveh.experiments.tyre_apf.printed import closest_share
 from jaxveh.experiments.tyre_apf.sweep_figures import saturated_figure, sharpness_figure
@@ -67,6 +67,7 @@ def test_errors_of_the_prior_are_one_standard_deviation(monkeypatch):
     monkeypatch.setattr(sharpness, "COUNTS", (20,))
     monkeypatch.setattr(sharpness, "KINDS", {"PF": sharpness.KINDS["PF"]})
     found = sharpness.run_sharpness(Study(duration=6.0, rate=20.0), 20, jax.random.key(0), again=3).found[20]
+    assert sharpness.pairs(found) == []
     prior = found.at("error", filter="prior")
     np.testing.assert_allclose(np.sqrt(np.mean(prior**2)), 1.0, rtol=0.15)
     # The same guess at every level; the filter's estimates differ between levels.
@@ -74,6 +75,18 @@ def test_errors_of_the_prior_are_one_standard_deviation(monkeypatch):
     error = found.at("error", filter="PF")
     assert (found.at("result", filter="PF") == 0).all() and not np.isclose(error[0], error[2]).any()
     assert (found.at("likelihood_spread", filter="PF") > 0).all()
+
+
+def test_the_paper_resamples_multinomially_and_systematically_stands_beside_it():
+    few, paper = sharpness.contestants(100), sharpness.contestants(300)
+    assert list(few) == ["PF", "APF"] and list(paper) == ["PF", "APF", "PF, systematic", "APF, systematic"]
+    for name, filter_ in {**few, **paper}.items():
+        systematic = name.endswith("systematic")
+        assert filter_.resampling is (numerics.systematic if systematic else numerics.multinomial)
+        assert filter_.threshold == 1.0 and isinstance(filter_, sharpness.KINDS[name.split(",")[0]])
+    design = sweeps.Design(filter={"prior": 0, **dict.fromkeys(paper, 1)}, level=[0.0])
+    pairs = sharpness.pairs(sweeps.Swept(design, 2, {}))
+    assert pairs == [("APF", "PF"), ("APF, systematic", "PF, systematic")]
 
 
 def test_the_ratio_is_of_medians():

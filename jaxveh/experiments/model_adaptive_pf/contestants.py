@@ -66,7 +66,7 @@ REDESIGNED = "PF, redesigned"
 CUBATURE = "CKF"
 ROBUST = "robust CKF, wavelet"
 TOLD = "CKF, told the noise"
-"""A limit and no competitor: nobody who adapts to noise can do better than to know it."""
+"""A yardstick and no competitor: what it is worth to know what the others learn."""
 
 WILD = 4.0
 """Errors beyond so many standard deviations of their row are wild."""

@@ -148,6 +148,7 @@ def pressed_figure(raced: Raced, figure: Any = None) -> Any:
             ylabel="sideslip RMSE [°]", title="'both': median and quartiles over seeds",
         )  # fmt: skip
         axes.set_xticks(shares, [f"{share:g}" for share in shares])
+        axes.set_yticks([0.07, 0.1, 0.15, 0.2, 0.3], ["0.07", "0.1", "0.15", "0.2", "0.3"])
         axes.minorticks_off()
         figure.legend(loc="outside upper left", ncols=3)
     return figure

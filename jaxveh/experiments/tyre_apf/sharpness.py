@@ -1,4 +1,8 @@
-"""Auxiliary against plain particle filter: over the sharpness of the sensors and the number of particles."""
+"""Auxiliary against plain particle filter: over the sharpness of the sensors, the number of particles, and how they resample.
+
+Both draw at every row, by multinomial resampling as the paper has it; systematic resampling, which draws with less noise, is
+beside it, since it gives the plain filter most of what looking ahead does.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import estimators, filters, manoeuvres, sensors, sweeps, vehicles
+from jaxveh import estimators, filters, manoeuvres, numerics, sensors, sweeps, vehicles
 from jaxveh._core.parameter import pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.experiments.tyre_apf.settings import LEVELS, Study, tyres
@@ -25,9 +29,12 @@ AGAIN = 8
 
 KINDS = {"PF": filters.ParticleFilter, "APF": filters.AuxiliaryParticleFilter}
 
+SYSTEMATIC = "systematic"
+"""What follows the name of a filter that resamples so."""
+
 
 class Sharpness(NamedTuple):
-    """By number of particles, `found` over filter (and the prior), level and seed: `error`, the root mean square of the eight
+    """By number of particles, `found` over filter (the prior first), level and seed: `error`, the root mean square of the eight
     parameters' errors in prior standard deviations, over all passes; `likelihood_spread`, the interquartile range of the
     log-likelihood over passes of one drive; `result`."""
 
@@ -38,12 +45,20 @@ def run_sharpness(study: Study, seeds: int, key, *, again: int = AGAIN, progress
     """Both filters with every number of particles at each level of noise, on the same drives from the same guesses."""
     found = {}
     for i, count in enumerate(COUNTS):
-        runs = {name: _passes(study, kind(count), again) for name, kind in KINDS.items()}
+        runs = {name: _passes(study, filter_, again) for name, filter_ in contestants(count).items()}
         design = sweeps.Design(filter={"prior": _prior(study), **runs}, level=range(len(LEVELS)))
         told = part(progress, i / len(COUNTS), (i + 1) / len(COUNTS), f"{count} particles")
         run = lambda point, key: point.filter(point.level, key)
         found[count] = sweeps.sweep(run, design, seeds, key, progress=told)
     return Sharpness(found)
+
+
+def contestants(count: int) -> dict[str, filters.AbstractParticleFilter]:
+    """Both filters with `count` particles; with the paper's number, both ways to resample."""
+    chosen = {name: kind(count, numerics.multinomial) for name, kind in KINDS.items()}
+    if count == PAPERS_PARTICLES:
+        chosen |= {f"{name}, {SYSTEMATIC}": kind(count, numerics.systematic) for name, kind in KINDS.items()}
+    return chosen
 
 
 def _errors(study: Study, values):
@@ -104,7 +119,15 @@ def _passes(study: Study, filter_, again: int):
     return run
 
 
-def likelihood_ratio(result: Sharpness, count: int, level: int) -> float:
+def pairs(runs: sweeps.Swept) -> list[tuple[str, str]]:
+    """Of these filters the auxiliary ones, each with its plain one."""
+    names = runs.design.axis("filter").labels
+    return [
+        (name, name.removeprefix("A")) for name in names if name.startswith("APF") and name.removeprefix("A") in names
+    ]
+
+
+def likelihood_ratio(result: Sharpness, count: int, level: int, auxiliary: str = "APF", plain: str = "PF") -> float:
     """The APF's spread of the log-likelihood over the PF's: of the medians over seeds."""
     spread = lambda name: np.median(result.found[count].at("likelihood_spread", filter=name, level=float(level)))
-    return float(spread("APF") / spread("PF"))
+    return float(spread(auxiliary) / spread(plain))

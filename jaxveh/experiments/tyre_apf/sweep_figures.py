@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh.experiments.tyre_apf.saturated import Saturated
 from jaxveh.experiments.tyre_apf.settings import LEVELS
-from jaxveh.experiments.tyre_apf.sharpness import KINDS, Sharpness
+from jaxveh.experiments.tyre_apf.sharpness import PAPERS_PARTICLES, SYSTEMATIC, Sharpness
 from jaxveh.plots.figure import Figure
 from jaxveh.plots.style import COLOURS, WIDTH, style
 
@@ -49,14 +49,16 @@ def sharpness_figure(found: Sharpness) -> Any:
         left, right = figure.subplots(1, 2)
         prior = next(iter(found.found.values())).at("error", filter="prior")
         left.plot(places, np.median(prior, axis=-1), color=COLOURS["prior"], linestyle="--", label="prior")
-        for i, (count, runs) in enumerate(found.found.items()):
-            for j, name in enumerate(KINDS):
-                faded = (i + 1) / len(found.found)
-                x = places + ASIDE * (2 * i + j - len(found.found) + 0.5)
-                for axes, what in ((left, "error"), (right, "likelihood_spread")):
-                    low, mid, high = np.quantile(runs.at(what, filter=name), [0.25, 0.5, 0.75], axis=-1)
-                    bars = dict(color=COLOURS[name], alpha=faded, marker="o", markersize=4, linestyle="none", capsize=2)
-                    axes.errorbar(x, mid, (mid - low, high - mid), **bars, label=f"{name}, {count} particles")
+        groups = [(n, c, runs) for c, runs in found.found.items() for n in runs.design.axis("filter").labels[1:]]
+        for i, (name, count, runs) in enumerate(groups):
+            colour, paper = COLOURS[name.split(",")[0]], count == PAPERS_PARTICLES
+            fill = "white" if name.endswith(SYSTEMATIC) else colour
+            line = dict(color=colour, alpha=1.0 if paper else 0.5, marker="o", markersize=4, markerfacecolor=fill)
+            x = places + ASIDE * (i - 0.5 * (len(groups) - 1))
+            for axes, what in ((left, "error"), (right, "likelihood_spread")):
+                low, mid, high = np.quantile(runs.at(what, filter=name), [0.25, 0.5, 0.75], axis=-1)
+                label = f"{name}, {count} particles"
+                axes.errorbar(x, mid, (mid - low, high - mid), **line, linestyle="none", capsize=2, label=label)
         labels = [f"{level.yaw_rate:g} rad/s\n{level.a_y:g} m/s²" for level in LEVELS]
         for axes in (left, right):
             axes.set(xticks=places, xticklabels=labels, xlabel="noise of yaw rate and lateral acceleration")

@@ -9,9 +9,9 @@ from jaxveh.experiments.tyre_apf.printed import Printed, PrintedOutcome
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.saturated import over_bound
 from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER, TABLE_2, TABLE_3
-from jaxveh.experiments.tyre_apf.sharpness import KINDS, Sharpness, likelihood_ratio
+from jaxveh.experiments.tyre_apf.sharpness import Sharpness, likelihood_ratio, pairs
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS
-from jaxveh.sweeps import Interval
+from jaxveh.sweeps import Interval, Swept
 
 
 def tables(result: Reproduction) -> list[Table]:
@@ -95,11 +95,12 @@ HEADS = tuple(f"{level.yaw_rate:g} rad/s, {level.a_y:g} m/s^2" for level in LEVE
 def _error_table(found: Sharpness) -> Table:
     rows = []
     for count, runs in found.found.items():
-        rows += [(count, name, *[spread(v) for v in runs.at("error", filter=name)]) for name in ("prior", *KINDS)]
-        compared = runs.compare("error", "filter", "APF", "PF")
-        ratios = [Interval(*numbers) for numbers in zip(*compared.ratio, strict=True)]
-        cells = [f"{interval(ratio)}, {wins:.0%}" for ratio, wins in zip(ratios, compared.wins, strict=True)]
-        rows.append((count, "APF over PF (95 %), wins", *cells))
+        rows += [(count, name, *[spread(v) for v in runs.at("error", filter=name)]) for name in _names(runs)]
+        for auxiliary, plain in pairs(runs):
+            compared = runs.compare("error", "filter", auxiliary, plain)
+            ratios = [Interval(*numbers) for numbers in zip(*compared.ratio, strict=True)]
+            cells = [f"{interval(ratio)}, {wins:.0%}" for ratio, wins in zip(ratios, compared.wins, strict=True)]
+            rows.append((count, f"{auxiliary} over plain (95 %), wins", *cells))
     title = "Eight parameters by the sensors' noise: RMSE in prior standard deviations, median [quartiles]"
     return Table(title, ("particles", "filter", *HEADS), rows)
 
@@ -107,13 +108,19 @@ def _error_table(found: Sharpness) -> Table:
 def _likelihood_table(found: Sharpness) -> Table:
     rows = []
     for count, runs in found.found.items():
-        rows += [(count, name, *[spread(v) for v in runs.at("likelihood_spread", filter=name)]) for name in KINDS]
-        own = [f"{likelihood_ratio(found, count, i):.3g}" for i in range(len(LEVELS))]
-        rows.append((count, "APF over PF", *own))
+        own = [name for name in _names(runs) if name != "prior"]
+        rows += [(count, name, *[spread(v) for v in runs.at("likelihood_spread", filter=name)]) for name in own]
+        for auxiliary, plain in pairs(runs):
+            ratios = [likelihood_ratio(found, count, i, auxiliary, plain) for i in range(len(LEVELS))]
+            rows.append((count, f"{auxiliary} over plain", *[f"{ratio:.3g}" for ratio in ratios]))
     title = (
         "The same: interquartile range of the log-likelihood over passes of one drive, median [quartiles] over drives"
     )
     return Table(title, ("particles", "filter", *HEADS), rows)
+
+
+def _names(runs: Swept) -> tuple[str, ...]:
+    return runs.design.axis("filter").labels
 
 
 def _truth_table(result: Reproduction) -> Table:
