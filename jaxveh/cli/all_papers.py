@@ -22,7 +22,7 @@ from jaxveh.cli.console import messages, progress, results, table
 from jaxveh.cli.output import plain
 from jaxveh.io import write_text
 
-SLOWEST = ("mass-grade-aukf", "model-adaptive-pf", "tyre-apf", "federated-ckf", "sideslip-review")
+SLOWEST = ("tyre-apf", "model-adaptive-pf", "mass-grade-aukf", "federated-ckf", "sideslip-review")
 """In this order they fill the cores best."""
 
 

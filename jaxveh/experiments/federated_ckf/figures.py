@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh.experiments.federated_ckf.report import SHORT, Reproduction
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS
-from jaxveh.experiments.federated_ckf.study import truth
+from jaxveh.experiments.federated_ckf.study import Raced, truth
 from jaxveh.plots.figure import Figure
 from jaxveh.plots.style import COLOURS, CYCLE, SHADE, WIDTH, style
 
@@ -30,20 +30,25 @@ SHOWN = {
 def figures(result: Reproduction) -> dict[str, Any]:
     """All pictures by file stem."""
     return {
-        "parameters": parameters_figure(result),
-        "drive": drive_figure(result),
-        "fault": fault_figure(result),
+        "parameters": parameters_figure(result.raced),
+        "drive": drive_figure(result.raced),
+        "fault": fault_figure(result.raced),
         "line": line_figure(result),
     }
 
 
-def parameters_figure(result: Reproduction, case: str = "printed start") -> Any:
+def _those(raced: Raced, colours: dict[str, str]) -> dict[str, str]:
+    """Who of these has raced."""
+    return {name: colour for name, colour in colours.items() if name in raced.found.design.axis("estimator").labels}
+
+
+def parameters_figure(raced: Raced, case: str = "printed start") -> Any:
     """The four parameters over time: medians over seeds and quartiles as bands."""
-    figure, raced = Figure(figsize=(WIDTH, 5.0), layout="constrained"), result.raced
+    figure = Figure(figsize=(WIDTH, 5.0), layout="constrained")
     with style():
         panels = figure.subplots(2, 2, sharex=True)
         for i, (axes, name) in enumerate(zip(panels.flat, PARAMETERS, strict=True)):
-            for who, colour in SHOWN.items():
+            for who, colour in _those(raced, SHOWN).items():
                 values = raced.at("parameters", who, case)[..., i]
                 low, mid, high = np.nanpercentile(values, [25, 50, 75], axis=0)
                 time = EVERY * np.arange(len(mid))
@@ -58,15 +63,15 @@ def parameters_figure(result: Reproduction, case: str = "printed start") -> Any:
         for axes in panels[1]:
             axes.set(xlabel="time [s]")
         figure.suptitle(
-            f"From the {case}: median and quartiles over {result.seeds} seeds", fontsize=9, x=0.02, ha="left"
+            f"From the {case}: median and quartiles over {raced.found.seeds} seeds", fontsize=9, x=0.02, ha="left"
         )
         figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 
-def drive_figure(result: Reproduction, seed: int = 0) -> Any:
+def drive_figure(raced: Raced, seed: int = 0) -> Any:
     """One drive: steer, speed, lateral acceleration, sideslip, and the errors of the sideslip from the printed start."""
-    figure, raced = Figure(figsize=(WIDTH, 6.6), layout="constrained"), result.raced
+    figure = Figure(figsize=(WIDTH, 6.6), layout="constrained")
     place = raced.cases.index("printed start")
     drive = type(raced.drives)(*(leaf[place, seed] for leaf in raced.drives))
     time = raced.study.dt * np.arange(len(drive.steer))
@@ -82,7 +87,7 @@ def drive_figure(result: Reproduction, seed: int = 0) -> Any:
         labels = ("steer [°]", "speed [km/h]", "measured $a_y$\n[m/s²]", "sideslip [°]", "error of the\nsideslip [°]")
         for axes, label in zip(panels, labels, strict=True):
             axes.set(ylabel=label)
-        for who, colour in SHOWN.items():
+        for who, colour in _those(raced, SHOWN).items():
             error = np.rad2deg(raced.at("sideslip", who, "printed start")[seed]) - true[::step]
             dashes = (0, (4, 3)) if who == "redesigned" else "-"
             panels[4].plot(time[::step], error, color=colour, linestyle=dashes, label=who)
@@ -94,15 +99,15 @@ def drive_figure(result: Reproduction, seed: int = 0) -> Any:
 FAULTY = {"joint": CYCLE[0], "joint, gated": CYCLE[2], "redesigned": CYCLE[1], "redesigned, isolating": CYCLE[5]}
 
 
-def fault_figure(result: Reproduction) -> Any:
+def fault_figure(raced: Raced) -> Any:
     """The sideslip's error over time with the fault: the median of its size over seeds."""
-    figure, raced = Figure(figsize=(WIDTH, 3.4), layout="constrained"), result.raced
+    figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     study, step = raced.study, round(EVERY / raced.study.dt)
     true = np.rad2deg(raced.drives.true_sideslip[raced.cases.index("fault")][:, ::step])
     with style():
         axes = figure.subplots()
         axes.axvspan(study.fault_at, study.fault_at + study.fault_time, color=SHADE, zorder=0, label="fault")
-        for who, colour in FAULTY.items():
+        for who, colour in _those(raced, FAULTY).items():
             error = np.abs(np.rad2deg(raced.at("sideslip", who, "fault")) - true)
             dashes = (0, (4, 3)) if who.startswith("redesigned") else "-"
             median = np.maximum(np.nanmedian(error, axis=0), 1e-4)
@@ -110,7 +115,7 @@ def fault_figure(result: Reproduction) -> Any:
         axes.set(
             xlabel="time [s]", ylabel="error of the sideslip [°]", yscale="log",
             xlim=(study.settled, study.duration), ylim=(1e-3, 1.0),
-            title=f"Yaw rate off by {study.bias:g} rad/s: median over {result.seeds} seeds",
+            title=f"Yaw rate off by {study.bias:g} rad/s: median over {raced.found.seeds} seeds",
         )  # fmt: skip
         figure.legend(loc="outside lower center", ncols=5)
     return figure

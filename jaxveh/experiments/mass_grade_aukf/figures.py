@@ -45,8 +45,9 @@ def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
             axes.plot(time, mid, color=colour, label=name)
             axes.fill_between(time, low, high, color=colour, alpha=0.15, linewidth=0)
         axes.axhspan(-3.0, 3.0, color="#f7f1df", zorder=0)
+        first = 100.0 * (raced.study.guesses[guess] / raced.study.mass - 1.0)
         axes.set(
-            xlabel="time [s]", ylabel="error of the mass [%]", ylim=(-40.0, 20.0),
+            xlabel="time [s]", ylabel="error of the mass [%]", ylim=(min(-40.0, first - 5.0), 20.0),
             title=f"{raced.study.name} from {raced.study.guesses[guess]:g} kg: median and quartiles over seeds; shaded: 3 %",
         )  # fmt: skip
         figure.legend(loc="outside upper left", ncols=5)
