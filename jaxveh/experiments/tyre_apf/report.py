@@ -134,7 +134,11 @@ def check(result: Reproduction) -> list[Check]:
 
 
 def _sharpness_checks(found: Sharpness) -> list[Check]:
-    """At the paper's number of particles: the APF over the PF, paired."""
+    """At the paper's number of particles and with its resampling: the APF over the PF, paired.
+
+    The last does not hold, and is itself uncertain: with eight passes a drive 1.04 over 20 drives (with systematic resampling
+    0.80), with 48 passes 0.83 over 40 others (0.91).
+    """
     compared, checks = found.found[PAPERS_PARTICLES].compare("error", "filter", "APF", "PF"), []
     where = [f"yaw rate {level.yaw_rate:g} rad/s, a_y {level.a_y:g} m/s^2" for level in LEVELS]
     for i, bound in enumerate((0.95, 1.1, 1.1)):

@@ -1,7 +1,7 @@
 """Auxiliary against plain particle filter: over the sharpness of the sensors, the number of particles, and how they resample.
 
 Both draw at every row, by multinomial resampling as the paper has it; systematic resampling, which draws with less noise, is
-beside it, since it gives the plain filter most of what looking ahead does.
+beside it: but for sharp sensors it gives the plain filter more than looking ahead does.
 """
 
 from __future__ import annotations
