@@ -173,6 +173,10 @@ def test_the_table_by_process_noise_shows_each_ones_own_choice():
     assert table.rows[0][1].startswith("2") and table.rows[0][2].startswith("4")
     # Of sums, not of the best drive; and none of who leaves rows out.
     assert [row[-1] for row in table.rows] == ["x 2", "-"]
+    lost = raced._replace(
+        found=sweeps.Swept(design, 3, {"log_likelihood": np.where(likelihood == -8.0, np.nan, likelihood)})
+    )
+    assert report.likeliest(lost, PLAIN) == "x 1"
     (axes,) = figures.pressed_figure(raced).axes
     np.testing.assert_allclose([line.get_ydata() for line in axes.lines[:2]], [[2.0, 4.0], [0.5, 0.25]])
     np.testing.assert_allclose(axes.lines[0].get_xdata(), [1.0, 2.0])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from jaxveh.experiments.tyre_apf import Study, noise
+from jaxveh.experiments.tyre_apf.settings import Level
 
 SMALL = dataclasses.replace(Study(), rate=25.0, particles=40)
 
@@ -36,6 +37,30 @@ def test_a_candidate_that_fails_on_one_drive_is_out(monkeypatch):
 
     monkeypatch.setattr(noise, "_drives", likelihood)
     assert noise.choose(SMALL, "PF", drives=2).noise.walk == 0.05
+
+
+def test_both_particle_filters_share_the_noise_of_a_level(monkeypatch):
+    monkeypatch.setattr(noise, "V_Y", (0.02, 5.0))
+    monkeypatch.setattr(noise, "YAW_RATE", (0.005,))
+    monkeypatch.setattr(noise, "WALK", (0.05, 0.1))
+    level = Level(0.02, 0.4, None)
+    found = noise.choose_level(
+        dataclasses.replace(SMALL, duration=6.0, rate=20.0), level, particles=40, drives=2, again=2
+    )
+    assert found.candidates.shape == (4, 3) and found.log_likelihood.shape == (4, 2)
+    assert np.isfinite(found.log_likelihood).all()
+    assert dataclasses.astuple(found.noise) == tuple(found.candidates[found.log_likelihood.sum(axis=1).argmax()])
+    assert found.noise.v_y == 0.02
+    # Both filters count, with every pass.
+    kinds = dict(noise.KINDS)
+    each = []
+    for name, kind in kinds.items():
+        monkeypatch.setattr(noise, "KINDS", {name: kind})
+        alone = noise.choose_level(
+            dataclasses.replace(SMALL, duration=6.0, rate=20.0), level, particles=40, drives=2, again=2
+        )
+        each.append(alone.log_likelihood)
+    np.testing.assert_allclose(sum(each), found.log_likelihood, rtol=1e-9)
 
 
 def test_its_drives_are_not_those_of_the_report(choice):

@@ -64,9 +64,9 @@ def test_single_shooting_finds_what_made_the_data():
 
 
 def test_errors_of_the_prior_are_one_standard_deviation(monkeypatch):
-    monkeypatch.setattr(sharpness, "COUNTS", (20,))
     monkeypatch.setattr(sharpness, "KINDS", {"PF": sharpness.KINDS["PF"]})
-    found = sharpness.run_sharpness(Study(duration=6.0, rate=20.0), 20, jax.random.key(0), again=3).found[20]
+    study = Study(duration=6.0, rate=20.0)
+    found = sharpness.run_sharpness(study, 20, jax.random.key(0), counts=(20,), again=3).found[20]
     assert sharpness.pairs(found) == []
     prior = found.at("error", filter="prior")
     np.testing.assert_allclose(np.sqrt(np.mean(prior**2)), 1.0, rtol=0.15)

@@ -10,7 +10,6 @@ import numpy as np
 
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.experiments.model_adaptive_pf.contestants import (
-    ADAPTIVE,
     CUBATURE,
     PLAIN,
     REDESIGNED,
@@ -27,10 +26,10 @@ from jaxveh.sweeps import Comparison, compare
 ERRORS = {"sideslip": "sideslip, degrees", "v_y": "v_y, m/s", "yaw_rate": "yaw rate, degrees/s"}
 
 
-PRESSED = ("open loop", PLAIN, ADAPTIVE, REDESIGNED, ROBUST, TOLD)
+PRESSED = ("open loop", PLAIN, REDESIGNED, ROBUST, TOLD)
 """Who is tried with every process noise."""
 
-DENSITIES = (PLAIN, ADAPTIVE, REDESIGNED)
+DENSITIES = (PLAIN, REDESIGNED)
 """Of these, whose likelihood is one of the same data: the robust one's is none, and who is told leaves rows out."""
 
 
@@ -155,8 +154,13 @@ def _pressed(raced: Raced) -> Table:
 
 
 def likeliest(raced: Raced, estimator: str) -> str:
-    """The case under which the estimator's likelihood, all drives together, is greatest."""
-    return max(raced.cases, key=lambda case: np.sum(raced.of("log_likelihood", estimator, case)))
+    """The case under which the estimator's likelihood, all drives together, is greatest; a drive that is lost has none."""
+
+    def total(case: str) -> float:
+        values = raced.of("log_likelihood", estimator, case)
+        return float(np.sum(np.where(np.isfinite(values), values, -np.inf)))
+
+    return max(raced.cases, key=total)
 
 
 def settings(result: Reproduction) -> dict[str, Any]:

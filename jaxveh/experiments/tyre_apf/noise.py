@@ -2,8 +2,8 @@
 
     python -m jaxveh.experiments.tyre_apf.noise
 
-prints what `settings.Study` holds: for each filter the candidate whose log-likelihood, summed over the drives, is largest.
-The truth has no part in it.
+prints what `settings.Study` holds: for each filter the candidate whose log-likelihood, summed over the drives, is largest; and
+what `settings.LEVELS` holds, where both particle filters share one. The truth has no part in it.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import filters
+from jaxveh import filters, numerics, sweeps
 from jaxveh._core.progress import Progress, silent
-from jaxveh.experiments.tyre_apf.settings import Noise, Study
+from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study
+from jaxveh.experiments.tyre_apf.sharpness import KINDS, PAPERS_PARTICLES, several_passes
 from jaxveh.experiments.tyre_apf.study import drive_once, filter_of, guess_once, model_of
 
 V_Y = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
@@ -58,6 +59,34 @@ def choose(study: Study, name: str, *, drives: int = 8, seed: int = 1000, progre
     return Choice(Noise(*map(float, candidates[mean.argmax()])), candidates, log_likelihood)
 
 
+def choose_level(
+    study: Study,
+    level: Level,
+    *,
+    particles: int = PAPERS_PARTICLES,
+    drives: int = 8,
+    again: int = 2,
+    seed: int = 2000,
+    progress: Progress = silent,
+) -> Choice:
+    """Choose what both particle filters assume at a level of the sensors' noise, resampling as the paper does: the candidate with
+    the largest sum of their log-likelihoods, over `again` passes of each drive. One with which a filter fails is out."""
+    both = [kind(particles, numerics.multinomial) for kind in KINDS.values()]
+
+    def run(point, key):
+        own = level._replace(noise=Noise(point.v_y, point.yaw_rate, point.walk))
+        found = [several_passes(study, filter_, own, again, key) for filter_ in both]
+        total = sum(jnp.sum(jnp.where(result == 0, likelihood, -jnp.inf)) for _, likelihood, result in found)
+        return {"log_likelihood": total}
+
+    design = sweeps.Design(v_y=V_Y, yaw_rate=YAW_RATE, walk=WALK)
+    found = sweeps.sweep(run, design, drives, jax.random.key(seed), progress=progress)["log_likelihood"]
+    candidates = np.array(list(itertools.product(V_Y, YAW_RATE, WALK)))
+    log_likelihood = found.reshape(len(candidates), drives)
+    total = np.where(np.isfinite(log_likelihood), log_likelihood, -np.inf).sum(axis=1)
+    return Choice(Noise(*map(float, candidates[total.argmax()])), candidates, log_likelihood)
+
+
 def _drives(study: Study, name: str, keys):
     """The likelihood of every drive as a function of the noise's levels, compiled once."""
 
@@ -83,18 +112,23 @@ def _drives(study: Study, name: str, keys):
 
 
 def main() -> None:
-    """Print the choice for each filter, and the runners-up."""
+    """Print the choice for each filter and for each level, and the runners-up."""
     jax.config.update("jax_enable_x64", True)
     study = Study()
     for name in ("UKF", "PF", "APF"):
-        choice = choose(study, name)
-        mean = choice.log_likelihood.mean(axis=1)
-        print(f"{name}: {choice.noise}")
-        for i in np.argsort(-mean)[:8]:
-            spread = (choice.log_likelihood[i] - choice.log_likelihood[mean.argmax()]).std() / np.sqrt(len(mean))
-            print(
-                "   v_y {:g}, yaw rate {:g}, walk {:g}".format(*choice.candidates[i]), f"{mean[i]:.2f}, +- {spread:.2f}"
-            )
+        _show(name, choose(study, name))
+    for level in LEVELS:
+        _show(f"PF and APF at {level.yaw_rate:g} rad/s, {level.a_y:g} m/s^2", choose_level(study, level))
+
+
+def _show(name: str, choice: Choice) -> None:
+    mean = choice.log_likelihood.mean(axis=1)
+    print(f"{name}: {choice.noise}")
+    for i in np.argsort(-mean)[:8]:
+        spread = (choice.log_likelihood[i] - choice.log_likelihood[mean.argmax()]).std() / np.sqrt(
+            choice.log_likelihood.shape[1]
+        )
+        print("   v_y {:g}, yaw rate {:g}, walk {:g}".format(*choice.candidates[i]), f"{mean[i]:.2f}, +- {spread:.2f}")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ beside it: but for sharp sensors it gives the plain filter more than looking ahe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -15,7 +16,7 @@ import numpy as np
 from jaxveh import estimators, filters, manoeuvres, numerics, sensors, sweeps, vehicles
 from jaxveh._core.parameter import pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, part, silent
-from jaxveh.experiments.tyre_apf.settings import LEVELS, Study, tyres
+from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study, tyres
 from jaxveh.experiments.tyre_apf.study import guess_once
 from jaxveh.simulation import simulate
 
@@ -41,13 +42,21 @@ class Sharpness(NamedTuple):
     found: dict[int, sweeps.Swept]
 
 
-def run_sharpness(study: Study, seeds: int, key, *, again: int = AGAIN, progress: Progress = silent) -> Sharpness:
+def run_sharpness(
+    study: Study,
+    seeds: int,
+    key,
+    *,
+    counts: Sequence[int] = COUNTS,
+    again: int = AGAIN,
+    progress: Progress = silent,
+) -> Sharpness:
     """Both filters with every number of particles at each level of noise, on the same drives from the same guesses."""
     found = {}
-    for i, count in enumerate(COUNTS):
+    for i, count in enumerate(counts):
         runs = {name: _passes(study, filter_, again) for name, filter_ in contestants(count).items()}
         design = sweeps.Design(filter={"prior": _prior(study), **runs}, level=range(len(LEVELS)))
-        told = part(progress, i / len(COUNTS), (i + 1) / len(COUNTS), f"{count} particles")
+        told = part(progress, i / len(counts), (i + 1) / len(counts), f"{count} particles")
         run = lambda point, key: point.filter(point.level, key)
         found[count] = sweeps.sweep(run, design, seeds, key, progress=told)
     return Sharpness(found)
@@ -90,25 +99,9 @@ def _prior(study: Study):
 def _passes(study: Study, filter_, again: int):
     def run(level, key):
         at = lambda which: jnp.asarray([which(one) for one in LEVELS])[level.astype(int)]
-        devices = sensors.esc(yaw_rate=at(lambda one: one.yaw_rate), a_y=at(lambda one: one.a_y))
-        guess = guess_once(study, jax.random.fold_in(key, 2))
-        manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
-        drive = simulate(
-            vehicles.passenger_car(), manoeuvre, devices, key=jax.random.fold_in(key, 1), dt=1 / study.rate, throw=False
-        )
-        noise = {"v_y": at(lambda one: one.noise.v_y), "yaw_rate": at(lambda one: one.noise.yaw_rate)}
-        model = estimators.state_space(
-            guess, devices, estimate=tyres, prior=study.prior, walk=at(lambda one: one.noise.walk), process_noise=noise
-        )
-        rows = model.rows(drive)
-        fields = [p.field for p in resolve(guess, tyres)]
-
-        def once(key):
-            estimate = filters.scan(filter_, model, rows, key)
-            last = jnp.stack([getattr(estimate.mean, field)[-1] for field in fields])
-            return last, estimate.log_likelihood, estimate.result
-
-        last, likelihood, result = jax.vmap(once)(jax.random.split(jax.random.fold_in(key, 3), again))
+        noise = Noise(*(at(lambda one, name=name: getattr(one.noise, name)) for name in ("v_y", "yaw_rate", "walk")))
+        chosen = Level(at(lambda one: one.yaw_rate), at(lambda one: one.a_y), noise)
+        last, likelihood, result = several_passes(study, filter_, chosen, again, key)
         low, high = jnp.quantile(likelihood, jnp.asarray([0.25, 0.75]))
         return {
             "error": _rms(_errors(study, last)),
@@ -117,6 +110,29 @@ def _passes(study: Study, filter_, again: int):
         }
 
     return run
+
+
+def several_passes(study: Study, filter_, level: Level, again: int, key) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """`again` passes over one lane change at a level: the last parameters (again, 8), log-likelihoods and results (again,)."""
+    devices = sensors.esc(yaw_rate=level.yaw_rate, a_y=level.a_y)
+    guess = guess_once(study, jax.random.fold_in(key, 2))
+    manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
+    drive = simulate(
+        vehicles.passenger_car(), manoeuvre, devices, key=jax.random.fold_in(key, 1), dt=1 / study.rate, throw=False
+    )
+    noise = {"v_y": level.noise.v_y, "yaw_rate": level.noise.yaw_rate}
+    model = estimators.state_space(
+        guess, devices, estimate=tyres, prior=study.prior, walk=level.noise.walk, process_noise=noise
+    )
+    rows = model.rows(drive)
+    fields = [p.field for p in resolve(guess, tyres)]
+
+    def once(key):
+        estimate = filters.scan(filter_, model, rows, key)
+        last = jnp.stack([getattr(estimate.mean, field)[-1] for field in fields])
+        return last, estimate.log_likelihood, estimate.result
+
+    return jax.vmap(once)(jax.random.split(jax.random.fold_in(key, 3), again))
 
 
 def pairs(runs: sweeps.Swept) -> list[tuple[str, str]]:
