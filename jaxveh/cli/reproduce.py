@@ -57,8 +57,9 @@ def reproduce(
 ) -> None:
     """Compute a paper again: its tables as printed and honestly, and criteria that hold or do not.
 
-    Every table has the do-nothing baseline, medians and quartiles over seeds; no estimator knows the truth. Some minutes each on
-    two cores. With --out each paper's figures are drawn, with --json every number and each check is written.
+    Every table has the do-nothing baseline, medians and quartiles over seeds; no estimator knows the truth (one is told the
+    sensors' noise, and is called so). Some minutes each on two cores. With --out each paper's figures are drawn, with --json
+    every number and each check is written.
 
     Example: [bold]jaxveh reproduce mass-grade-aukf --json mass_grade.json --out report/[/]
     """

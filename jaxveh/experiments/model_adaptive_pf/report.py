@@ -63,7 +63,7 @@ def against(raced: Raced, case: str, estimator: str, other: str = PLAIN, error: 
 
 
 def check(result: Reproduction) -> list[Check]:
-    """The criteria: medians over seeds of sideslip RMSE over the plain particle filter's; nobody knew the truth.
+    """The criteria: medians over seeds of sideslip RMSE over the plain particle filter's; nobody in them knew the truth.
 
     The fourth does not hold: with 20 seeds 0.835, where a cubature filter that is told the noise's level and the wild rows, and
     so knows what the others learn, ends at 0.68 (it stands in the tables).

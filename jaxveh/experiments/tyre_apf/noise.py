@@ -3,7 +3,8 @@
     python -m jaxveh.experiments.tyre_apf.noise
 
 prints what `settings.Study` holds: for each filter the candidate whose log-likelihood, summed over the drives, is largest; and
-what `settings.LEVELS` holds, where both particle filters share one. The truth has no part in it.
+what both particle filters would share at each of `settings.LEVELS` as they are compared there, resampling multinomially (what
+`LEVELS` holds was chosen with systematic resampling). The truth has no part in it.
 """
 
 from __future__ import annotations
@@ -125,9 +126,8 @@ def _show(name: str, choice: Choice) -> None:
     mean = choice.log_likelihood.mean(axis=1)
     print(f"{name}: {choice.noise}")
     for i in np.argsort(-mean)[:8]:
-        spread = (choice.log_likelihood[i] - choice.log_likelihood[mean.argmax()]).std() / np.sqrt(
-            choice.log_likelihood.shape[1]
-        )
+        behind = choice.log_likelihood[i] - choice.log_likelihood[mean.argmax()]
+        spread = behind.std() / np.sqrt(behind.size)
         print("   v_y {:g}, yaw rate {:g}, walk {:g}".format(*choice.candidates[i]), f"{mean[i]:.2f}, +- {spread:.2f}")
 
 
