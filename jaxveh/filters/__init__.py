@@ -42,6 +42,7 @@ from jaxveh.filters.smoothing import BackwardSampling, FixedLag, Genealogy, Smoo
 from jaxveh.filters.smoothing.parallel import smooth_parallel
 from jaxveh.filters.wrappers import (
     Consider,
+    Contaminated,
     Dual,
     Federated,
     Gated,
@@ -74,6 +75,7 @@ __all__ = [
     "BackwardSampling",
     "Calibration",
     "Consider",
+    "Contaminated",
     "Covariance",
     "Cubature",
     "Delayed",

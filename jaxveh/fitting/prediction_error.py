@@ -76,9 +76,8 @@ def prediction_error(
     if len({len(recording) for recording in recordings}) != 1:
         raise InputError("recordings: must be one or several of the same number of rows; cut them to one length.")
     check_positive("tolerance", tolerance)
-    if not filter.whitens:
-        name = type(filter).__name__
-        raise InputError(f"prediction_error: {name} has no whitened innovations; use maximum_likelihood with it.")
+    if (mixture := _without_whitened(filter)) is not None:
+        raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
     filter.check(model)
     parameters = resolve(model, where)
     rows = _stack([model.rows(recording) for recording in recordings])
@@ -98,6 +97,15 @@ def prediction_error(
     if throw:
         raise_unfinished(fit)
     return fit
+
+
+def _without_whitened(filter: Any) -> str | None:
+    """The name of the filter, or of one that it goes around, whose innovations are not whitened."""
+    while filter is not None:
+        if not filter.whitens:
+            return type(filter).__name__
+        filter = getattr(filter, "filter", None)
+    return None
 
 
 def _stack(parts):

@@ -17,6 +17,7 @@ from jaxveh.experiments.model_adaptive_pf.contestants import (
     ADAPTIVE,
     PLAIN,
     REDESIGNED,
+    ROBUST,
     TOLD,
     Contestant,
     contestants,
@@ -117,7 +118,8 @@ def test_what_knows_outliers_beats_what_does_not(drives):
     error = lambda name, case, what="yaw_rate": np.median(raced.of(what, name, case))
     assert error(ADAPTIVE, "both") < 0.8 * error(PLAIN, "both")
     assert error(ADAPTIVE, "quiet") < 1.1 * error(PLAIN, "quiet") < error(PLAIN, "both")
-    assert error(TOLD, "both") < error(REDESIGNED, "both") < 0.8 * error(PLAIN, "both")
+    assert error(REDESIGNED, "both") < 0.8 * error(PLAIN, "both")
+    assert error(TOLD, "both", "sideslip") < error(REDESIGNED, "both", "sideslip")
     assert (raced.found["result"] == 0).all()
     assert raced.of("course", PLAIN, "both").shape == (3, 251)
     assert experiment.settings(experiment.Reproduction(3, raced, raced))["cases"]["both"]["level"] == 6.0
@@ -143,11 +145,25 @@ def test_who_is_told_weighs_by_the_true_noise_and_leaves_out_what_is_wild(drives
 def test_the_redesigned_filter_follows_with_both_parts(drives):
     one = own_drives.Drive(*(jnp.asarray(leaf[0, 0]) for leaf in drives))
     car = own_drives.model_car(SMALL, quick_tyre(SMALL))
-    own = dataclasses.replace(SMALL, short_window=8, heavy_alpha=1.2)
+    own = dataclasses.replace(SMALL, short_window=8, heavy_alpha=1.2, fewest=6, initial=9.0)
     found = redesigned(own)(own, car, one, jax.random.key(0))
-    filter_ = filters.HaarParticles(filters.ParticleFilter(60), 8, SMALL.forgetting, follows="both")
+    filter_ = filters.HaarParticles(
+        filters.ParticleFilter(60), 8, SMALL.forgetting, fewest=6, initial=9.0, follows="both"
+    )
     law = models.mixture(dataclasses.replace(SMALL, alpha=1.2))
     expected = moved(filter_, lambda study: law)(SMALL, car, one, jax.random.key(0))
+    np.testing.assert_array_equal(found.mean.sideslip, expected.mean.sideslip)
+
+
+def test_the_robust_filter_shares_the_redesigned_one_s_wavelet(drives):
+    one = own_drives.Drive(*(jnp.asarray(leaf[0, 0]) for leaf in drives))
+    car = own_drives.model_car(SMALL, quick_tyre(SMALL))
+    own = dataclasses.replace(SMALL, short_window=8, fewest=6, initial=9.0, wild_share=0.1, wild_factor=20.0)
+    found = contestants(own)[ROBUST].run(own, car, one, None)
+    filter_ = filters.HaarNoise(
+        filters.Contaminated(filters.Cubature(), 0.1, 20.0), 8, SMALL.forgetting, fewest=6, initial=9.0
+    )
+    expected = moved(filter_)(SMALL, car, one, None)
     np.testing.assert_array_equal(found.mean.sideslip, expected.mean.sideslip)
 
 
@@ -158,6 +174,14 @@ def test_the_choice_is_of_the_likelihood(monkeypatch):
     assert found.shape == (1, 2, 2) and np.isfinite(found).all()
     # There are outliers: a law without tails does not like them.
     assert (found[0, 0] > found[0, 1] + 10.0).all()
+    starts = ((None, 1.0), (4, 16.0))
+    found = choice.robust_likelihoods(
+        SMALL, windows=(16,), starts=starts, shares=(0.03,), factors=(1.5, 30.0), drives=3
+    )
+    assert found.shape == (1, 2, 1, 2, 3) and np.isfinite(found).all()
+    # Nor one that has them hardly wider, nor, on most drives, one that believes the data sheet for sixteen rows.
+    assert (found[..., 1, :] > found[..., 0, :] + 10.0).all()
+    assert found[0, 1, 0, 1].sum() > found[0, 0, 0, 1].sum()
 
 
 def test_the_table_by_process_noise_shows_each_ones_own_choice():

@@ -39,28 +39,38 @@ def test_a_candidate_that_fails_on_one_drive_is_out(monkeypatch):
     assert noise.choose(SMALL, "PF", drives=2).noise.walk == 0.05
 
 
+CANDIDATES = np.array([(0.02, 0.005, 0.05), (0.02, 0.005, 0.1), (5.0, 0.005, 0.05), (5.0, 0.005, 0.1)])
+
+
+def choose_level(rounds, seed=2000):
+    return noise.choose_level(
+        dataclasses.replace(SMALL, duration=6.0, rate=20.0), Level(0.02, 0.4, None), candidates=CANDIDATES, particles=40,
+        rounds=rounds, seed=seed,
+    )  # fmt: skip
+
+
 def test_both_particle_filters_share_the_noise_of_a_level(monkeypatch):
-    monkeypatch.setattr(noise, "V_Y", (0.02, 5.0))
-    monkeypatch.setattr(noise, "YAW_RATE", (0.005,))
-    monkeypatch.setattr(noise, "WALK", (0.05, 0.1))
-    level = Level(0.02, 0.4, None)
-    found = noise.choose_level(
-        dataclasses.replace(SMALL, duration=6.0, rate=20.0), level, particles=40, drives=2, again=2
-    )
-    assert found.candidates.shape == (4, 3) and found.log_likelihood.shape == (4, 2)
-    assert np.isfinite(found.log_likelihood).all()
+    found = choose_level([noise.Round(4, 2, 2)])
+    np.testing.assert_array_equal(found.candidates, CANDIDATES)
+    assert found.log_likelihood.shape == (4, 2) and np.isfinite(found.log_likelihood).all()
     assert dataclasses.astuple(found.noise) == tuple(found.candidates[found.log_likelihood.sum(axis=1).argmax()])
     assert found.noise.v_y == 0.02
     # Both filters count, with every pass.
-    kinds = dict(noise.KINDS)
-    each = []
+    kinds, each = dict(noise.KINDS), []
     for name, kind in kinds.items():
         monkeypatch.setattr(noise, "KINDS", {name: kind})
-        alone = noise.choose_level(
-            dataclasses.replace(SMALL, duration=6.0, rate=20.0), level, particles=40, drives=2, again=2
-        )
-        each.append(alone.log_likelihood)
+        each.append(choose_level([noise.Round(4, 2, 2)]).log_likelihood)
     np.testing.assert_allclose(sum(each), found.log_likelihood, rtol=1e-9)
+
+
+def test_the_best_of_a_round_go_to_other_drives():
+    found = choose_level([noise.Round(4, 2, 1), noise.Round(2, 3, 1)])
+    first = choose_level([noise.Round(4, 2, 1)])
+    best = np.sort(np.argsort(-first.log_likelihood.sum(axis=1))[:2])
+    np.testing.assert_array_equal(found.candidates, CANDIDATES[best])
+    # Drives of the next seed.
+    again = choose_level([noise.Round(4, 3, 1)], seed=2001)
+    np.testing.assert_allclose(found.log_likelihood, again.log_likelihood[best], rtol=1e-9)
 
 
 def test_its_drives_are_not_those_of_the_report(choice):

@@ -72,6 +72,7 @@ FILTERS = {
     "Ensemble, perturbed": Line(lambda: filters.Ensemble(N, perturbed=True), exact=False, drawn=True, seldom=True),
     "Gated": Line(lambda: filters.Gated(filters.Cubature(), 50.0)),
     "Huber": Line(lambda: filters.Huber(filters.Cubature(), 50.0), seldom=True),
+    "contaminated": Line(lambda: filters.Contaminated(filters.Cubature(), 0.1, 3.0), exact=False),
     "Student-t": Line(lambda: filters.RobustStudentT(filters.Cubature(), 4.0), exact=False),
     "Sage-Husa": Line(lambda: filters.SageHusa(filters.Cubature()), exact=False),
     "variational Bayes": Line(lambda: filters.VariationalBayes(filters.Cubature()), exact=False),
@@ -86,6 +87,10 @@ FILTERS = {
     ),
     "interacting": Line(lambda: filters.InteractingModels(filters.Cubature(), (same, noisier), CHANGES), exact=False),
     "wavelet noise": Line(lambda: filters.HaarNoise(filters.Cubature(), window=8), exact=False),
+    "wavelet noise, contaminated": Line(
+        lambda: filters.HaarNoise(filters.Contaminated(filters.Cubature()), window=8, fewest=2, initial=4.0),
+        exact=False,
+    ),
     "wavelet noise, particles": Line(
         lambda: filters.HaarParticles(PARTICLES, window=8), exact=False, differentiable=False, drawn=True
     ),

@@ -62,6 +62,47 @@ class TestHaarNoise:
         expected = (np.median(np.abs(details)) / 0.6744897501960817) ** 2
         np.testing.assert_allclose(belief.memory.variances[0], expected, rtol=1e-12)
 
+    def test_from_its_fewest_rows_on_what_is_there_of_a_window_counts(self):
+        flow = np.array([1.0, 3.0, np.nan, 8.0, 4.0, 9.0, 1.0, 2.0, 2.5, 7.0])
+        filter_ = filters.HaarNoise(filters.Kalman(), 6, 0.75, 1e-6, 1e9, fewest=4, initial=25.0)
+        base, given = model(2.0), []
+        expected = 25.0 * 4.0
+        step, belief = eqx.filter_jit(filter_.step), None
+        rows = base.rows(Recording(np.arange(10.0), {"flow": flow}))
+        for k, value in enumerate(flow):
+            row = jax.tree.map(lambda leaf, k=k: leaf[k], rows)
+            belief = filter_.init(base, row)[0] if k == 0 else step(base, belief, row)[0]
+            if np.isfinite(value):
+                given.append(value)
+                last = np.array(given[-6:])
+                last = last[len(last) % 2 :]
+                if len(given) >= 4:
+                    median = np.median(np.abs(last[1::2] - last[::2]) / np.sqrt(2))
+                    expected = 0.75 * expected + 0.25 * (median / 0.6744897501960817) ** 2
+            np.testing.assert_allclose(belief.memory.variances[0], expected, rtol=1e-12)
+
+    def test_a_wary_start_saves_what_the_first_rows_of_a_poor_sensor_spoil(self):
+        errors = {"told": [], "wary": [], "as the data sheet says": []}
+        poor = {
+            "told": (filters.Kalman(), 8.0),
+            "wary": (filters.HaarNoise(filters.Kalman(), 16, fewest=4, initial=16.0), 1.0),
+            "as the data sheet says": (filters.HaarNoise(filters.Kalman(), 16), 1.0),
+        }
+        for seed in range(10):
+            level, recording = walk(60, seed, np.full(60, 8.0))
+            for name, (filter_, noise) in poor.items():
+                errors[name].append(rmse(filters.run(filter_, model(noise), recording), level, start=0))
+        told, wary, sheet = (np.mean(values) for values in errors.values())
+        assert wary - told < 0.4 * (sheet - told)
+
+    @pytest.mark.parametrize(
+        ("more", "message"),
+        [({"fewest": 1}, "fewest = 1"), ({"fewest": 9}, "to the window, 8"), ({"initial": 0.001}, "initial = 0.001")],
+    )
+    def test_a_start_that_makes_no_sense_is_refused(self, more, message):
+        with pytest.raises(InputError, match=message):
+            filters.HaarNoise(filters.Kalman(), 8, **more)
+
     @pytest.mark.parametrize(("window", "memory"), [(5, 0.9), (2, 0.9), (8, 1.0)])
     def test_bad_settings_are_refused(self, window, memory):
         with pytest.raises(InputError, match="HaarNoise"):

@@ -51,6 +51,7 @@ def test_sage_husa_is_its_equation():
 
 ROBUST = {
     "gated": filters.Gated(filters.Kalman(), 4.0),
+    "contaminated": filters.Contaminated(filters.Kalman()),
     "Huber": filters.Huber(filters.Kalman()),
     "Student-t": filters.RobustStudentT(filters.Kalman(), 3.0),
 }
@@ -68,7 +69,7 @@ def test_outliers_cost_the_robust_little(name):
         robust.append(rmse(filters.run(ROBUST[name], model(), hit), level))
         plain.append(rmse(filters.run(filters.Kalman(), model(), hit), level))
     assert np.mean(plain) > 2.0 * np.mean(clean)
-    share = {"gated": 0.05, "Huber": 0.25, "Student-t": 0.1}[name]
+    share = {"gated": 0.05, "contaminated": 0.05, "Huber": 0.25, "Student-t": 0.1}[name]
     assert np.mean(robust) - np.mean(clean) < share * (np.mean(plain) - np.mean(clean))
 
 

@@ -1,23 +1,26 @@
-"""The redesigned filter's window and tails, chosen by its own likelihood on drives that no table shows.
+"""The redesigned filters' settings, chosen by their own likelihood on drives that no table shows.
 
     python -m jaxveh.experiments.model_adaptive_pf.choice
 
-prints the log-likelihood, summed over the drives, of each window and alpha; `settings.Study` holds the best. The truth has no
-part in it.
+prints log-likelihoods, summed over the drives, below the best: the robust cubature filter's by window, start, share and width of
+what is wild, and the redesigned particle filter's, whose wavelet it shares, by window and alpha. `settings.Study` holds the best.
+The truth has no part in it.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import sweeps
+from jaxveh import filters, sweeps
 from jaxveh._core.progress import Progress, silent
-from jaxveh.experiments.model_adaptive_pf.contestants import redesigned
+from jaxveh.experiments.model_adaptive_pf.contestants import contaminated, moved, redesigned, wary
 from jaxveh.experiments.model_adaptive_pf.drives import fiala, model_car
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, Study
 from jaxveh.experiments.model_adaptive_pf.study import drives_of
@@ -25,8 +28,50 @@ from jaxveh.experiments.model_adaptive_pf.study import drives_of
 WINDOWS = (8, 16, 32, 64)
 """Rows,"""
 
+STARTS = ((None, 1.0), (4, 1.0), (4, 4.0), (2, 16.0), (4, 16.0), (4, 64.0))
+"""how many of them first, None for all, and what holds until then, times the data sheet's variances;"""
+
+SHARES = (0.01, 0.03, 0.1)
+"""of wild values,"""
+
+FACTORS = (10.0, 30.0, 100.0)
+"""how many times as wide;"""
+
 ALPHAS = (1.1, 1.3, 1.5, 1.7, 1.9)
 """and exponents of the stable law: 1 is Cauchy's, 2 the normal one's."""
+
+
+def robust_likelihoods(
+    study: Study,
+    *,
+    windows: Sequence[int] = WINDOWS,
+    starts: Sequence[tuple[int | None, float]] = STARTS,
+    shares: Sequence[float] = SHARES,
+    factors: Sequence[float] = FACTORS,
+    drives: int = 20,
+    seed: int = 1000,
+    progress: Progress = silent,
+) -> np.ndarray:
+    """Log-likelihoods (windows, starts, shares, factors, drives) of the robust cubature filter under the noise of 'both'."""
+
+    def of(window, start):
+        def run(study, car, drive, key, point):
+            fewest, initial = start
+            own = dataclasses.replace(
+                study,
+                short_window=window,
+                fewest=fewest,
+                initial=initial,
+                wild_share=point.share,
+                wild_factor=point.factor,
+            )
+            return moved(filters.HaarNoise(contaminated(own), **wary(own)))(own, car, drive, key)
+
+        return run
+
+    choices = {f"{w} rows, {start}": of(w, start) for w, start in itertools.product(windows, starts)}
+    found = _likelihoods(study, choices, {"share": shares, "factor": factors}, drives, seed, progress)
+    return found.reshape(len(windows), len(starts), len(shares), len(factors), drives)
 
 
 def likelihoods(
@@ -38,29 +83,52 @@ def likelihoods(
     seed: int = 1000,
     progress: Progress = silent,
 ) -> np.ndarray:
-    """Log-likelihoods (windows, alphas, drives) under the noise of 'both'. `seed` differs from the report's."""
-    seen = drives_of(study, {"both": CASES["both"]}, drives, jax.random.key(seed))
-    car = model_car(study, fiala(study))
+    """Log-likelihoods (windows, alphas, drives) of the redesigned particle filter under the noise of 'both'."""
 
     def of(window):
-        def run(alpha, key, drive):
-            own = dataclasses.replace(study, short_window=window, heavy_alpha=alpha)
-            found = redesigned(own)(own, car, drive, key)
-            return {"log_likelihood": jnp.where(found.result == 0, found.log_likelihood, -jnp.inf)}
+        def run(study, car, drive, key, point):
+            own = dataclasses.replace(study, short_window=window, heavy_alpha=point.alpha)
+            return redesigned(own)(own, car, drive, key)
 
         return run
 
-    design = sweeps.Design(window={f"{window} rows": of(window) for window in windows}, alpha=list(alphas))
-    run = lambda point, key, drive: point.window(point.alpha, key, drive)
-    data = jax.tree.map(lambda leaf: np.repeat(leaf, len(alphas), axis=0), seen)
-    key = jax.random.key(seed + 1)
-    return sweeps.sweep(run, design, drives, key, data=data, progress=progress)["log_likelihood"]
+    choices = {f"{window} rows": of(window) for window in windows}
+    return _likelihoods(study, choices, {"alpha": alphas}, drives, seed, progress)
+
+
+def _likelihoods(
+    study: Study, choices: dict[str, Callable], numbers: dict[str, Any], drives: int, seed: int, progress: Progress
+) -> np.ndarray:
+    """(choices, *numbers, drives): of drives whose seed differs from the report's."""
+    seen = drives_of(study, {"both": CASES["both"]}, drives, jax.random.key(seed))
+    car = model_car(study, fiala(study))
+
+    def run(point, key, drive):
+        found = point.choice(study, car, drive, key, point)
+        return {"log_likelihood": jnp.where(found.result == 0, found.log_likelihood, -jnp.inf)}
+
+    design = sweeps.Design(choice=choices, **{name: list(values) for name, values in numbers.items()})
+    shape = [len(values) for values in numbers.values()]
+    data = jax.tree.map(
+        lambda leaf: np.broadcast_to(leaf.reshape(*[1] * len(shape), *leaf.shape[1:]), (*shape, *leaf.shape[1:])), seen
+    )
+    return sweeps.sweep(run, design, drives, jax.random.key(seed + 1), data=data, progress=progress)["log_likelihood"]
 
 
 def main() -> None:
-    """Print the table, as differences from its best."""
+    """Print both tables, as differences from their best."""
     jax.config.update("jax_enable_x64", True)
+    found = robust_likelihoods(Study())
+    total = found.sum(axis=-1)
+    print("robust cubature filter: the best of each window and start, with its share and factor")
+    for i, window in enumerate(WINDOWS):
+        for j, (fewest, initial) in enumerate(STARTS):
+            share, factor = np.unravel_index(total[i, j].argmax(), total[i, j].shape)
+            start = f"{window:3d} rows, from {fewest or window:3d} on, {initial:3g} until then"
+            wild = f"{SHARES[share]:5.2f} wild, {FACTORS[factor]:4g} times as wide"
+            print(f"{start}; {wild}: {total[i, j].max() - total.max():.0f}")
     total = likelihoods(Study()).sum(axis=-1)
+    print("redesigned particle filter")
     print("window  " + "".join(f"alpha {alpha:<6g}" for alpha in ALPHAS))
     for window, row in zip(WINDOWS, total - total.max(), strict=True):
         print(f"{window:6d}  " + "".join(f"{value:<12.0f}" for value in row))

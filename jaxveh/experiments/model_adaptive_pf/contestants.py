@@ -33,10 +33,9 @@ def contestants(study: Study) -> dict[str, Contestant]:
     """All of them by name, the do-nothing one first."""
     particles = filters.ParticleFilter(study.particles)
     wavelet = {"window": study.window, "forgetting": study.forgetting}
-    short = wavelet | {"window": study.short_window}
     haar = filters.HaarParticles(particles, **wavelet)
     cubature = filters.Cubature()
-    robust = filters.RobustStudentT(cubature, study.dof)
+    student = filters.RobustStudentT(cubature, study.dof)
     printed = AutoRegressive(haar, study.update, as_printed=True)
     return {
         "open loop": Contestant(_open_loop, "the dynamics alone, from the first row on"),
@@ -47,14 +46,24 @@ def contestants(study: Study) -> dict[str, Contestant]:
         "PF, wavelet": Contestant(moved(haar), "the dynamics, variances from the Haar wavelet"),
         "PF, mixture": Contestant(moved(particles, mixture), "the dynamics, Cauchy-Gaussian likelihood"),
         ADAPTIVE: Contestant(moved(haar, mixture), "both, the variance that of the Gaussian part"),
-        REDESIGNED: Contestant(redesigned(study), "both parts follow the variance, of a quarter of the window"),
+        REDESIGNED: Contestant(
+            redesigned(study), "both parts follow the variance, of a short window with a wary start"
+        ),
         "strong tracking": Contestant(
             moved(filters.StrongTracking(cubature)), "a cubature filter with a fading factor"
         ),
         CUBATURE: Contestant(moved(cubature), "the data sheet's Gaussian noise"),
-        "robust CKF": Contestant(moved(robust), "Student's t law with the data sheet's scales"),
+        "Student-t CKF": Contestant(moved(student), "Student's t law with the data sheet's scales"),
+        "Student-t CKF, wavelet": Contestant(
+            moved(filters.HaarNoise(student, **wary(study))),
+            "the same, scales from the wavelet, as the redesigned PF's",
+        ),
+        "robust CKF": Contestant(
+            moved(contaminated(study)), "noise of which a share is wild, with the data sheet's scales"
+        ),
         ROBUST: Contestant(
-            moved(filters.HaarNoise(robust, **short)), "the same, scales from the wavelet, short window"
+            moved(filters.HaarNoise(contaminated(study), **wary(study))),
+            "the same, scales from the wavelet, as the redesigned PF's",
         ),
         TOLD: Contestant(told(cubature), "knows the truth: told each row's noise level, and which rows are wild"),
     }
@@ -83,12 +92,26 @@ def moved(filter_, law=gaussian, lags: bool = True) -> Run:
     return run
 
 
+def wary(study: Study) -> dict[str, Any]:
+    """The wavelet of the redesigned filters: a short window, used from its first rows on, and until then noise far above the data
+    sheet's."""
+    return {
+        "window": study.short_window,
+        "forgetting": study.forgetting,
+        "fewest": study.fewest,
+        "initial": study.initial,
+    }
+
+
+def contaminated(study: Study) -> filters.Contaminated:
+    """The cubature filter that knows that a share of what is measured is wild."""
+    return filters.Contaminated(filters.Cubature(), study.wild_share, study.wild_factor)
+
+
 def redesigned(study: Study) -> Run:
     """The particle filter whose law follows the wavelet as a whole, from a window of its own, with tails of its own."""
     law = lambda study: mixture(dataclasses.replace(study, alpha=study.heavy_alpha))
-    haar = filters.HaarParticles(
-        filters.ParticleFilter(study.particles), study.short_window, study.forgetting, follows="both"
-    )
+    haar = filters.HaarParticles(filters.ParticleFilter(study.particles), **wary(study), follows="both")
     return moved(haar, law)
 
 

@@ -29,8 +29,8 @@ ERRORS = {"sideslip": "sideslip, degrees", "v_y": "v_y, m/s", "yaw_rate": "yaw r
 PRESSED = ("open loop", PLAIN, REDESIGNED, ROBUST, TOLD)
 """Who is tried with every process noise."""
 
-DENSITIES = (PLAIN, REDESIGNED)
-"""Of these, whose likelihood is one of the same data: the robust one's is none, and who is told leaves rows out."""
+DENSITIES = (PLAIN, REDESIGNED, ROBUST)
+"""Of these, whose likelihood is one of the same data: who is told leaves rows out."""
 
 
 class Reproduction(NamedTuple):

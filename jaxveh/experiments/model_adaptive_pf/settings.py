@@ -58,8 +58,10 @@ class Study:
     plain particle filter, as in first measurements of this scenario.
 
     Filters: `particles`, `alpha` of the noise law, `window` (printed) and `forgetting` of the wavelet's variance, `update` U_c of
-    the autoregression, `dof` of Student's t law; `short_window` and `heavy_alpha` of the redesigned filters, those of the
-    greatest likelihood on drives of another key with the noise of 'both' (`choice`). Process noise per root second:
+    the autoregression, `dof` of Student's t law. Of the redesigned filters: the wavelet's `short_window`, used from its `fewest`
+    rows on, and how many times the data sheet's variances hold until then, `initial`; the robust cubature filter's share of
+    wild values, `wild_share`, `wild_factor` times as wide; the particle filter's tails, `heavy_alpha`: those of the greatest
+    likelihood on drives of another key with the noise of 'both' (`choice`). Process noise per root second:
     `v_x_noise`, `v_y_noise` (m/s), `yaw_noise` (rad/s), and of a step of the autoregression `walk_v_x`, `walk_v_y` (m/s),
     `walk_yaw` (rad/s): those of the greatest likelihood on grids of factor two, on constant noise, drives of other keys with 3
     and 5 degrees of steer, and for the dynamics tyres that are right, 15 % too weak and 15 % too strong: of the cubature filter,
@@ -105,6 +107,10 @@ class Study:
     alpha: float = 1.7
     window: int = 64
     short_window: int = 16
+    fewest: int = 4
+    initial: float = 16.0
+    wild_share: float = 0.03
+    wild_factor: float = 30.0
     heavy_alpha: float = 1.5
     forgetting: float = 0.9
     update: float = 0.02

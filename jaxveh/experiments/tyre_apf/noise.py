@@ -10,6 +10,7 @@ what both particle filters would share at each of `settings.LEVELS` as they are 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -18,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import filters, numerics, sweeps
-from jaxveh._core.progress import Progress, silent
+from jaxveh._core.progress import Progress, part, silent
 from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study
 from jaxveh.experiments.tyre_apf.sharpness import KINDS, PAPERS_PARTICLES, several_passes
 from jaxveh.experiments.tyre_apf.study import drive_once, filter_of, guess_once, model_of
@@ -31,6 +32,23 @@ YAW_RATE = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
 
 WALK = (0.01, 0.02, 0.05, 0.1, 0.2)
 """and relative, all per root second."""
+
+
+class Round(NamedTuple):
+    """Of a choice: how many candidates to `keep` for it, over how many `drives`, and how often `again` over each."""
+
+    keep: int
+    drives: int
+    again: int
+
+
+LEVEL_CANDIDATES = np.array(
+    list(itertools.product((0.005, 0.01, 0.02, 0.05, 0.1), (0.001, 0.002, 0.005, 0.01), (0.05, 0.1, 0.2)))
+)
+"""(m, 3): as above, fewer, for the levels: where a particle filter may lose a drive, fewer drives do not tell."""
+
+ROUNDS = (Round(keep=len(LEVEL_CANDIDATES), drives=24, again=2), Round(keep=12, drives=48, again=4))
+"""All of them first, then the best on more drives."""
 
 
 class Choice(NamedTuple):
@@ -64,28 +82,42 @@ def choose_level(
     study: Study,
     level: Level,
     *,
+    candidates: np.ndarray = LEVEL_CANDIDATES,
     particles: int = PAPERS_PARTICLES,
-    drives: int = 8,
-    again: int = 2,
+    rounds: Sequence[Round] = ROUNDS,
     seed: int = 2000,
     progress: Progress = silent,
 ) -> Choice:
     """Choose what both particle filters assume at a level of the sensors' noise, resampling as the paper does: the candidate with
-    the largest sum of their log-likelihoods, over `again` passes of each drive. One with which a filter fails is out."""
+    the largest sum of their log-likelihoods, over every pass of each drive. One with which a filter fails is out.
+
+    Each of the `rounds` takes the best of the one before to drives of its own: one pass in which a filter loses the drive weighs
+    more than all other differences, so that few drives do not tell which of the best is best. The last round is returned.
+    """
     both = [kind(particles, numerics.multinomial) for kind in KINDS.values()]
+    total = np.zeros(len(candidates))
+    for i, (keep, drives, again) in enumerate(rounds):
+        # Stable, so that equals stay in the order of the grid.
+        candidates = candidates[np.sort(np.argsort(-total, kind="stable")[:keep])]
+        told = part(progress, i / len(rounds), (i + 1) / len(rounds), f"round {i + 1}")
+        log_likelihood = _of_level(study, level, both, candidates, again, (drives, seed + i), told)
+        total = np.where(np.isfinite(log_likelihood), log_likelihood, -np.inf).sum(axis=1)
+    return Choice(Noise(*map(float, candidates[total.argmax()])), candidates, log_likelihood)
+
+
+def _of_level(study: Study, level: Level, both, candidates, again: int, drives: tuple[int, int], progress: Progress):
+    """Log-likelihoods (candidates, drives): of all passes by both filters together. `drives`: how many, from which seed."""
+    values = jnp.asarray(candidates)
 
     def run(point, key):
-        own = level._replace(noise=Noise(point.v_y, point.yaw_rate, point.walk))
+        own = level._replace(noise=Noise(*values[point.candidate.astype(int)]))
         found = [several_passes(study, filter_, own, again, key) for filter_ in both]
         total = sum(jnp.sum(jnp.where(result == 0, likelihood, -jnp.inf)) for _, likelihood, result in found)
         return {"log_likelihood": total}
 
-    design = sweeps.Design(v_y=V_Y, yaw_rate=YAW_RATE, walk=WALK)
-    found = sweeps.sweep(run, design, drives, jax.random.key(seed), progress=progress)["log_likelihood"]
-    candidates = np.array(list(itertools.product(V_Y, YAW_RATE, WALK)))
-    log_likelihood = found.reshape(len(candidates), drives)
-    total = np.where(np.isfinite(log_likelihood), log_likelihood, -np.inf).sum(axis=1)
-    return Choice(Noise(*map(float, candidates[total.argmax()])), candidates, log_likelihood)
+    design = sweeps.Design(candidate=range(len(candidates)))
+    count, seed = drives
+    return sweeps.sweep(run, design, count, jax.random.key(seed), progress=progress)["log_likelihood"]
 
 
 def _drives(study: Study, name: str, keys):

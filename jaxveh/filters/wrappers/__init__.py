@@ -1,6 +1,7 @@
 """Filters around filters: noises learned, outliers borne, sensors gated and shared out, models that change."""
 
 from jaxveh.filters.wrappers.considered import Consider, Dual
+from jaxveh.filters.wrappers.contaminated import Contaminated
 from jaxveh.filters.wrappers.federated import Federated
 from jaxveh.filters.wrappers.gated import Gated
 from jaxveh.filters.wrappers.h_infinity import HInfinity
@@ -15,6 +16,7 @@ from jaxveh.filters.wrappers.wavelet import HaarNoise, HaarParticles
 
 __all__ = [
     "Consider",
+    "Contaminated",
     "Dual",
     "Federated",
     "Gated",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -54,7 +54,7 @@ class MixtureBelief(AbstractBelief):
     @property
     def covariance(self):
         """(n, n) of the mixture, in the order of the state's fields."""
-        return _mixed_covariance(self.probabilities, self.modes)[1]
+        return _of_modes(self.probabilities, self.modes)[1]
 
     def sample(self, key, draws):
         which, inside = jax.random.split(key)
@@ -136,7 +136,7 @@ class InteractingModels(AbstractFilter):
 
     def _mix(self, belief: MixtureBelief, weights, j: int) -> GaussianBelief:
         """The Gaussian with the mixture's moments, for mode j."""
-        mean, covariance = _mixed_covariance(weights, belief.modes)
+        mean, covariance = _of_modes(weights, belief.modes)
         return with_spread(belief.modes[j], mean, self.filter.form.start(covariance))
 
     def _weighed(self, model, row, before, found):
@@ -150,14 +150,18 @@ class InteractingModels(AbstractFilter):
         return MixtureBelief(tuple(beliefs), weights / total), info
 
 
-def _mixed_covariance(weights, modes):
-    """Mean (n,) and covariance (n, n) of a mixture of Gaussians."""
-    vectors = jnp.stack([mode.vector for mode in modes])
+def mixed_covariance(weights: Any, vectors: Any, covariances: Any) -> tuple[Any, Any]:
+    """Mean (n,) and covariance (n, n) of the mixture of Gaussians with these `weights` (r,), means and covariances."""
     mean = jnp.sum(weights[:, None] * vectors, axis=0)
     deviations = vectors - mean
     outer = deviations[:, :, None] * deviations[:, None, :]
-    whole = jnp.stack([mode.covariance for mode in modes]) + outer
-    return mean, jnp.sum(weights[:, None, None] * whole, axis=0)
+    return mean, jnp.sum(weights[:, None, None] * (covariances + outer), axis=0)
+
+
+def _of_modes(weights, modes):
+    """Mean (n,) and covariance (n, n) of these Gaussians' mixture."""
+    stacked = lambda values: jnp.stack(list(values))
+    return mixed_covariance(weights, stacked(mode.vector for mode in modes), stacked(mode.covariance for mode in modes))
 
 
 def _mixed(weights, moments):

@@ -42,9 +42,13 @@ class HaarNoise(AbstractRemembering):
     with b = `forgetting` (D. Donoho & I. Johnstone 1994). Channel by channel, of the rows where it is present. It asks nothing of
     the model, so that the model's errors are no noise to it; but the signal must move less than the noise from row to row: of a
     fast manoeuvre or of coarse samples it makes noise, noise that is coloured it does not see, and of noise that jumps up it
-    learns half a window late, trusting wild values meanwhile (gate them). Before a window is full the model's own variances
-    hold; always they stay between `floor` and `ceiling` times the model's own (a channel that is quantised, or stuck, has a
-    median of zero). The noise must be Gaussian, a standard deviation a channel.
+    learns half a window late, trusting wild values meanwhile (gate them). Always variances stay between `floor` and `ceiling`
+    times the model's own (a channel that is quantised, or stuck, has a median of zero). The noise must be Gaussian, a standard
+    deviation a channel.
+
+    Until a channel has had `fewest` rows (at least 2; None: a full window, as printed), `initial` times the model's own
+    variances hold; from then on as much of the window counts as is there. Where the noise may be far above the data sheet's
+    from the first row on, `initial` is what that row is worth: what is believed then for no reason, a slow state keeps.
     """
 
     learns_variances: ClassVar[bool] = True
@@ -53,6 +57,8 @@ class HaarNoise(AbstractRemembering):
     forgetting: float = eqx.field(static=True, default=0.9)
     floor: float = eqx.field(static=True, default=0.01)
     ceiling: float = eqx.field(static=True, default=1e4)
+    fewest: int | None = eqx.field(static=True, default=None)
+    initial: float = eqx.field(static=True, default=1.0)
 
     def __check_init__(self):
         check_settings(self)
@@ -87,6 +93,8 @@ class HaarParticles(AbstractFilter):
     forgetting: float = eqx.field(static=True, default=0.9)
     floor: float = eqx.field(static=True, default=0.01)
     ceiling: float = eqx.field(static=True, default=1e4)
+    fewest: int | None = eqx.field(static=True, default=None)
+    initial: float = eqx.field(static=True, default=1.0)
     follows: str = eqx.field(static=True, default="gaussian")
 
     def __check_init__(self):
@@ -142,12 +150,18 @@ def check_settings(settings: Any) -> None:
     check(f"{who}.forgetting", settings.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
     check(f"{who}.floor", settings.floor, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
     check(f"{who}.ceiling", settings.ceiling, lambda v: v >= 1, "at least 1")
+    if settings.fewest is not None and not 2 <= settings.fewest <= settings.window:
+        raise InputError(
+            f"{who}.fewest = {settings.fewest}: must be from 2 to the window, {settings.window}; None: the whole window."
+        )
+    within = lambda v: (v >= settings.floor) & (v <= settings.ceiling)
+    check(f"{who}.initial", settings.initial, within, f"from floor, {settings.floor}, to ceiling, {settings.ceiling}")
 
 
 def first_window(settings: Any, own: Any) -> Window:
-    """An empty window, with the model's `own` variances (m,)."""
+    """An empty window, with `initial` times the model's `own` variances (m,)."""
     m = own.shape[0]
-    return Window(jnp.zeros((settings.window, m), own.dtype), jnp.zeros(m, jnp.int32), own)
+    return Window(jnp.zeros((settings.window, m), own.dtype), jnp.zeros(m, jnp.int32), settings.initial * own)
 
 
 def measured(model: Any, row: Any) -> Any:
@@ -163,7 +177,18 @@ def seen(settings: Any, own: Any, memory: Window, given: Any) -> Window:
     count = memory.count + here.astype(jnp.int32)
     # Pairs as the window lies now, not as they fell: each row is in one.
     details = (values[1::2] - values[::2]) * 0.5**0.5
-    found = jnp.square(jnp.median(jnp.abs(details), axis=0) / MEDIAN)
+    found = jnp.square(_median_of_last(jnp.abs(details), count // 2) / MEDIAN)
     found = jnp.clip(found, settings.floor * own, settings.ceiling * own)
     mixed = settings.forgetting * memory.variances + (1.0 - settings.forgetting) * found
-    return Window(values, count, jnp.where(here & (count >= settings.window), mixed, memory.variances))
+    fewest = settings.window if settings.fewest is None else settings.fewest
+    return Window(values, count, jnp.where(here & (count >= fewest), mixed, memory.variances))
+
+
+def _median_of_last(values: Any, count: Any) -> Any:
+    """By column, the median of the last `count` (m,) of the values (n, m), at least one and at most all."""
+    n = values.shape[0]
+    count = jnp.clip(count, 1, n)
+    known = jnp.arange(n, dtype=count.dtype)[:, None] >= n - count
+    ordered = jnp.sort(jnp.where(known, values, jnp.inf), axis=0)
+    at = lambda i: jnp.take_along_axis(ordered, i[None], axis=0)[0]
+    return 0.5 * (at((count - 1) // 2) + at(count // 2))

@@ -1,0 +1,89 @@
+"""Measurements of which a share is wild: each case of who is wild and who is not, weighed by how well it explains the row."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError, check, float_array
+from jaxveh._core.result import first_failure
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
+from jaxveh.filters.wrappers.base import AbstractStateless, check_independent, variances_of, with_variances
+from jaxveh.filters.wrappers.interacting import mixed_covariance
+from jaxveh.statespace.contract import Info
+
+MOST_CHANNELS = 6
+"""Of which 64 cases are made."""
+
+
+class Contaminated(AbstractStateless):
+    """`filter` for noise of which a `share` is `factor` times as wide, channel by channel (J. Tukey's law, 1960):
+
+        e ~ (1 - share) N(0, sigma^2) + share N(0, factor^2 sigma^2)
+
+    Which of a row's m channels are wild is one of 2^m cases, in each of which the row is an ordinary update; the belief after is
+    the Gaussian with the moments of their mixture (G. Ackerson & K. Fu 1970). Where `Gated` decides, this one weighs, and a
+    row's log-likelihood is a density of what was measured: share and factor can be chosen by it, or fitted, as arrays that
+    gradients reach. NIS is NaN, a mixture has none. At most six channels. The noise must be Gaussian, a standard deviation a
+    channel. Not around a filter that learns variances: inside it.
+
+    **Raises** `InputError` for a share that is not between 0 and 1, a factor that is not above 1, too many channels, and around
+    another wrapper.
+    """
+
+    whitens: ClassVar[bool] = False
+    filter: AbstractRuleFilter
+    share: jax.Array = eqx.field(converter=float_array, default=0.05)
+    factor: jax.Array = eqx.field(converter=float_array, default=10.0)
+
+    def __check_init__(self):
+        check_kind("Contaminated", self.filter, AbstractRuleFilter)
+        check("Contaminated.share", self.share, lambda p: (p > 0) & (p < 1), "between 0 and 1")
+        check("Contaminated.factor", self.factor, lambda f: f > 1, "above 1")
+
+    def check(self, model):
+        check_independent("Contaminated", model)
+        count = len(model.channels)
+        if count > MOST_CHANNELS:
+            raise InputError(
+                f"Contaminated: {count} channels ({', '.join(model.channels)}) make {2**count} cases: must be at most "
+                f"{MOST_CHANNELS}. Use RobustStudentT or Gated."
+            )
+        self.filter.check(model)
+
+    def update(self, model, belief, row):
+        wild = jnp.asarray(list(itertools.product((False, True), repeat=len(model.channels))))
+        own = variances_of(model)
+        share, factor = self.share.astype(own.dtype), self.factor.astype(own.dtype)
+        variances = jnp.where(wild, jnp.square(factor), 1) * own
+        before = jnp.sum(jnp.where(wild, jnp.log(share), jnp.log1p(-share)), axis=-1)
+        case = lambda values: _by_case(*self.filter.update(with_variances(model, values), belief, row))
+        vectors, covariances, infos = jax.vmap(case)(variances)
+        logs = before + infos.log_likelihood
+        weights = jax.nn.softmax(logs)
+        mean, covariance = mixed_covariance(weights, vectors, covariances)
+        after = with_spread(belief, mean, self.filter.form.start(covariance), t=row.t, u=row.u, count=belief.count + 1)
+        return after, _info(infos, jnp.exp(before), jax.nn.logsumexp(logs))
+
+
+def _by_case(after: GaussianBelief, info: Info) -> tuple[Any, Any, Info]:
+    return after.vector, after.covariance, info
+
+
+def _info(infos: Info, probabilities: Any, log_likelihood: Any) -> Info:
+    """One info of those of every case, whose innovation is the same; `probabilities` (r,) of cases before the row is seen."""
+    spread = lambda std: jnp.sqrt(jnp.sum(probabilities * jnp.square(std)))
+    nothing = jnp.full_like(log_likelihood, jnp.nan)
+    return Info(
+        log_likelihood=log_likelihood,
+        innovation=jax.tree.map(lambda each: each[0], infos.innovation),
+        innovation_std=jax.tree.map(spread, infos.innovation_std),
+        nis=nothing,
+        ess=nothing,
+        result=first_failure(infos.result)[0],
+    )
