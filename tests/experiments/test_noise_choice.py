@@ -61,6 +61,9 @@ def test_both_particle_filters_share_the_noise_of_a_level(monkeypatch):
         monkeypatch.setattr(noise, "KINDS", {name: kind})
         each.append(choose_level([noise.Round(4, 2, 2)]).log_likelihood)
     np.testing.assert_allclose(sum(each), found.log_likelihood, rtol=1e-9)
+    monkeypatch.setattr(noise, "KINDS", kinds)
+    once = choose_level([noise.Round(4, 2, 1)]).log_likelihood
+    np.testing.assert_allclose(found.log_likelihood[:2].sum() / once[:2].sum(), 2.0, rtol=0.3)
 
 
 def test_the_best_of_a_round_go_to_other_drives():
@@ -71,6 +74,7 @@ def test_the_best_of_a_round_go_to_other_drives():
     # Drives of the next seed.
     again = choose_level([noise.Round(4, 3, 1)], seed=2001)
     np.testing.assert_allclose(found.log_likelihood, again.log_likelihood[best], rtol=1e-9)
+    assert not np.isclose(found.log_likelihood[:, :2], first.log_likelihood[best]).any()
 
 
 def test_its_drives_are_not_those_of_the_report(choice):
