@@ -170,7 +170,7 @@ def test_the_robust_filter_shares_the_redesigned_one_s_wavelet(drives):
 def test_the_choice_is_of_the_likelihood(monkeypatch):
     monkeypatch.setattr(own_drives, "true_car", quick_car)
     monkeypatch.setattr(choice, "fiala", quick_tyre)
-    found = choice.likelihoods(SMALL, windows=(16,), alphas=(1.5, 1.99), drives=2)
+    found = choice.redesigned_likelihoods(SMALL, windows=(16,), alphas=(1.5, 1.99), drives=2)
     assert found.shape == (1, 2, 2) and np.isfinite(found).all()
     # There are outliers: a law without tails does not like them.
     assert (found[0, 0] > found[0, 1] + 10.0).all()

@@ -77,6 +77,11 @@ def test_the_best_of_a_round_go_to_other_drives():
     assert not np.isclose(found.log_likelihood[:, :2], first.log_likelihood[best]).any()
 
 
+def test_a_choice_takes_a_round_at_least():
+    with pytest.raises(ValueError, match="number of rounds = 0: must be at least 1"):
+        choose_level([])
+
+
 def test_its_drives_are_not_those_of_the_report(choice):
     keys = jax.random.key_data(jax.random.split(jax.random.key(1000), 8))
     honest, _ = jax.random.split(jax.random.key(0))

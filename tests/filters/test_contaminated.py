@@ -19,9 +19,7 @@ SHARE, FACTOR = 0.1, 8.0
 
 def two_channels():
     """A linear model of three states, two channels of independent noise."""
-    return eqx.tree_at(
-        lambda m: m.measurement_noise, linear_model(), ss.Gaussian({"y0": 0.3, "y1": 0.5}), is_leaf=lambda x: x is None
-    )
+    return eqx.tree_at(lambda m: m.measurement_noise, linear_model(), ss.Gaussian({"y0": 0.3, "y1": 0.5}))
 
 
 def by_hand(base, recording, share, factor):

@@ -74,7 +74,7 @@ def robust_likelihoods(
     return found.reshape(len(windows), len(starts), len(shares), len(factors), drives)
 
 
-def likelihoods(
+def redesigned_likelihoods(
     study: Study,
     *,
     windows: Sequence[int] = WINDOWS,
@@ -127,7 +127,7 @@ def main() -> None:
             start = f"{window:3d} rows, from {fewest or window:3d} on, {initial:3g} until then"
             wild = f"{SHARES[share]:5.2f} wild, {FACTORS[factor]:4g} times as wide"
             print(f"{start}; {wild}: {total[i, j].max() - total.max():.0f}")
-    total = likelihoods(Study()).sum(axis=-1)
+    total = redesigned_likelihoods(Study()).sum(axis=-1)
     print("redesigned particle filter")
     print("window  " + "".join(f"alpha {alpha:<6g}" for alpha in ALPHAS))
     for window, row in zip(WINDOWS, total - total.max(), strict=True):

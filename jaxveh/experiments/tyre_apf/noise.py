@@ -19,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import filters, numerics, sweeps
+from jaxveh._core.errors import check_at_least
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study
 from jaxveh.experiments.tyre_apf.sharpness import KINDS, PAPERS_PARTICLES, several_passes
@@ -94,6 +95,7 @@ def choose_level(
     Each of the `rounds` takes the best of the one before to drives of its own: one pass in which a filter loses the drive weighs
     more than all other differences, so that few drives do not tell which of the best is best. The last round is returned.
     """
+    check_at_least("number of rounds", len(rounds), 1)
     both = [kind(particles, numerics.multinomial) for kind in KINDS.values()]
     total = np.zeros(len(candidates))
     for i, (keep, drives, again) in enumerate(rounds):
