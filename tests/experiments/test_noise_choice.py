@@ -3,9 +3,12 @@
 import dataclasses
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
+import scipy.stats
 
+from jaxveh import Recording
 from jaxveh.experiments.tyre_apf import Study, noise
 from jaxveh.experiments.tyre_apf.settings import Level
 
@@ -42,37 +45,53 @@ def test_a_candidate_that_fails_on_one_drive_is_out(monkeypatch):
 CANDIDATES = np.array([(0.02, 0.005, 0.05), (0.02, 0.005, 0.1), (5.0, 0.005, 0.05), (5.0, 0.005, 0.1)])
 
 
-def choose_level(rounds, seed=2000):
+def choose_level(rounds, seed=2000, keep=2):
     return noise.choose_level(
         dataclasses.replace(SMALL, duration=6.0, rate=20.0), Level(0.02, 0.4, None), candidates=CANDIDATES, particles=40,
-        rounds=rounds, seed=seed,
+        rounds=rounds, keep=keep, seed=seed,
     )  # fmt: skip
 
 
 def test_both_particle_filters_share_the_noise_of_a_level(monkeypatch):
-    found = choose_level([noise.Round(4, 2, 2)])
+    found = choose_level([noise.Round(2, 3)])
     np.testing.assert_array_equal(found.candidates, CANDIDATES)
     assert found.log_likelihood.shape == (4, 2) and np.isfinite(found.log_likelihood).all()
-    assert dataclasses.astuple(found.noise) == tuple(found.candidates[found.log_likelihood.sum(axis=1).argmax()])
+    assert dataclasses.astuple(found.noise) == tuple(found.candidates[found.log_likelihood.mean(axis=1).argmax()])
     assert found.noise.v_y == 0.02
-    # Both filters count, with every pass.
+    # Both filters count, each with the mean of its passes.
     kinds, each = dict(noise.KINDS), []
     for name, kind in kinds.items():
         monkeypatch.setattr(noise, "KINDS", {name: kind})
-        each.append(choose_level([noise.Round(4, 2, 2)]).log_likelihood)
+        each.append(choose_level([noise.Round(2, 3)]).log_likelihood)
     np.testing.assert_allclose(sum(each), found.log_likelihood, rtol=1e-9)
-    monkeypatch.setattr(noise, "KINDS", kinds)
-    once = choose_level([noise.Round(4, 2, 1)]).log_likelihood
-    np.testing.assert_allclose(found.log_likelihood[:2].sum() / once[:2].sum(), 2.0, rtol=0.3)
+
+
+def test_a_lost_pass_counts_as_what_mean_and_spread_explain(monkeypatch):
+    passes = jnp.array([5.0, 3.0, -1e9])
+    monkeypatch.setattr(noise, "unexplained", lambda drive: -2.0)
+    monkeypatch.setattr(noise, "several_passes", lambda *a: (None, passes, jnp.zeros(3)))
+    np.testing.assert_allclose(choose_level([noise.Round(2, 3)]).log_likelihood, 4.0)
+    # A pass that fails rules the candidate out.
+    monkeypatch.setattr(noise, "several_passes", lambda *a: (None, passes, jnp.array([0, 0, 1])))
+    with pytest.raises(ValueError, match="all 4 candidates fail on a drive"):
+        choose_level([noise.Round(2, 3)])
+
+
+def test_what_a_mean_and_a_spread_explain():
+    rng = np.random.default_rng(0)
+    values = {"yaw_rate": rng.normal(0.3, 2.0, 50), "a_y": rng.normal(-1.0, 0.1, 50), "speed": np.ones(50)}
+    normal = lambda x: scipy.stats.norm.logpdf(x, x.mean(), x.std()).sum()
+    found = noise.unexplained(Recording(np.arange(50.0), values))
+    np.testing.assert_allclose(found, normal(values["yaw_rate"]) + normal(values["a_y"]), rtol=1e-12)
 
 
 def test_the_best_of_a_round_go_to_other_drives():
-    found = choose_level([noise.Round(4, 2, 1), noise.Round(2, 3, 1)])
-    first = choose_level([noise.Round(4, 2, 1)])
-    best = np.sort(np.argsort(-first.log_likelihood.sum(axis=1))[:2])
+    found = choose_level([noise.Round(2, 1), noise.Round(3, 1)])
+    first = choose_level([noise.Round(2, 1)])
+    best = np.sort(np.argsort(-first.log_likelihood.mean(axis=1))[:2])
     np.testing.assert_array_equal(found.candidates, CANDIDATES[best])
     # Drives of the next seed.
-    again = choose_level([noise.Round(4, 3, 1)], seed=2001)
+    again = choose_level([noise.Round(3, 1)], seed=2001)
     np.testing.assert_allclose(found.log_likelihood, again.log_likelihood[best], rtol=1e-9)
     assert not np.isclose(found.log_likelihood[:, :2], first.log_likelihood[best]).any()
 

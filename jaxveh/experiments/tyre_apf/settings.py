@@ -59,7 +59,7 @@ class Noise:
 
 class Level(NamedTuple):
     """The sensors' noise, `yaw_rate` (rad/s) and `a_y` (m/s^2), and the process noise that both particle filters assume there:
-    the one with the largest sum of their log-likelihoods on drives of other seeds (300 particles, systematic resampling)."""
+    the one with the largest mean of their log-likelihoods on drives of other seeds (`noise.choose_level`)."""
 
     yaw_rate: float
     a_y: float

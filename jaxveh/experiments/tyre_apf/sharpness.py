@@ -6,6 +6,7 @@ beside it: but for sharp sensors it gives the plain filter more than looking ahe
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,12 +14,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import estimators, filters, manoeuvres, numerics, sensors, sweeps, vehicles
+from jaxveh import filters, numerics, sweeps, vehicles
 from jaxveh._core.parameter import pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, part, silent
+from jaxveh._core.recording import Recording
 from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study, tyres
-from jaxveh.experiments.tyre_apf.study import guess_once
-from jaxveh.simulation import simulate
+from jaxveh.experiments.tyre_apf.study import drive_once, guess_once, model_of
 
 PAPERS_PARTICLES = 300
 """As printed."""
@@ -114,17 +115,9 @@ def _passes(study: Study, filter_, again: int):
 
 def several_passes(study: Study, filter_, level: Level, again: int, key) -> tuple[jax.Array, jax.Array, jax.Array]:
     """`again` passes over one lane change at a level: the last parameters (again, 8), log-likelihoods and results (again,)."""
-    devices = sensors.esc(yaw_rate=level.yaw_rate, a_y=level.a_y)
     guess = guess_once(study, jax.random.fold_in(key, 2))
-    manoeuvre = manoeuvres.double_lane_change(speed=study.speed, steer=study.steer, duration=study.duration)
-    drive = simulate(
-        vehicles.passenger_car(), manoeuvre, devices, key=jax.random.fold_in(key, 1), dt=1 / study.rate, throw=False
-    )
-    noise = {"v_y": level.noise.v_y, "yaw_rate": level.noise.yaw_rate}
-    model = estimators.state_space(
-        guess, devices, estimate=tyres, prior=study.prior, walk=level.noise.walk, process_noise=noise
-    )
-    rows = model.rows(drive)
+    model = model_of(_at(study, level), guess, level.noise)
+    rows = model.rows(drive_at(study, level, key))
     fields = [p.field for p in resolve(guess, tyres)]
 
     def once(key):
@@ -133,6 +126,15 @@ def several_passes(study: Study, filter_, level: Level, again: int, key) -> tupl
         return last, estimate.log_likelihood, estimate.result
 
     return jax.vmap(once)(jax.random.split(jax.random.fold_in(key, 3), again))
+
+
+def drive_at(study: Study, level: Level, key) -> Recording:
+    """The lane change of `several_passes`, as the level's sensors see it."""
+    return drive_once(_at(study, level), jax.random.fold_in(key, 1))
+
+
+def _at(study: Study, level: Level) -> Study:
+    return dataclasses.replace(study, yaw_rate_std=level.yaw_rate, a_y_std=level.a_y)
 
 
 def pairs(runs: sweeps.Swept) -> list[tuple[str, str]]:
