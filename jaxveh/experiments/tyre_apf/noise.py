@@ -46,7 +46,7 @@ class Round(NamedTuple):
 LEVEL_CANDIDATES = np.array(
     list(itertools.product((0.005, 0.01, 0.02, 0.05, 0.1), (0.001, 0.002, 0.005, 0.01), (0.01, 0.02, 0.05, 0.1)))
 )
-"""(m, 3): as above, for the levels."""
+"""(m, 3): as above, for the levels. A walk of 0.2 with the best of the rest is worse at each of them, by 60 to 1300."""
 
 ROUNDS = (Round(drives=8, again=3), Round(drives=40, again=4))
 """All of them first, then the best on more drives,"""

@@ -67,9 +67,9 @@ class Level(NamedTuple):
 
 
 LEVELS = (
-    Level(0.001, 0.02, Noise(v_y=0.05, yaw_rate=0.002, walk=0.1)),
-    Level(0.005, 0.1, Noise(v_y=0.02, yaw_rate=0.002, walk=0.05)),
-    Level(0.02, 0.4, Noise(v_y=0.02, yaw_rate=0.005, walk=0.05)),
+    Level(0.001, 0.02, Noise(v_y=0.05, yaw_rate=0.001, walk=0.1)),
+    Level(0.005, 0.1, Noise(v_y=0.01, yaw_rate=0.005, walk=0.1)),
+    Level(0.02, 0.4, Noise(v_y=0.01, yaw_rate=0.002, walk=0.1)),
 )
 """From sharp sensors to coarse ones; the middle is the study's."""
 
