@@ -115,7 +115,7 @@ def choose_level(
 def unexplained(drive: Recording) -> jax.Array:
     """The greatest log-likelihood of the drive's measurements to which time, inputs and each other say nothing: normal ones."""
     each = [len(drive[name]) * (jnp.log(2 * jnp.pi * jnp.var(drive[name])) + 1) / 2 for name in ("yaw_rate", "a_y")]
-    return -sum(each)
+    return -jnp.sum(jnp.stack(each))
 
 
 def _best(candidates: np.ndarray, log_likelihood: np.ndarray) -> Choice:
