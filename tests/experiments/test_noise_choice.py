@@ -34,9 +34,10 @@ def test_the_candidate_of_the_largest_likelihood_is_chosen(choice):
     assert choice.noise.walk == 0.0
 
 
-def test_a_candidate_that_fails_on_one_drive_is_out(monkeypatch):
+@pytest.mark.parametrize("failed", [-np.inf, np.nan])
+def test_a_candidate_that_fails_on_one_drive_is_out(monkeypatch, failed):
     def likelihood(study, name, keys):
-        return lambda levels: np.array([9.0, -np.inf if levels[2] > 0.05 else float(levels[2])])
+        return lambda levels: np.array([9.0, failed if levels[2] > 0.05 else float(levels[2])])
 
     monkeypatch.setattr(noise, "_drives", likelihood)
     assert noise.choose(SMALL, "PF", drives=2).noise.walk == 0.05

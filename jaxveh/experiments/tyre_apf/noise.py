@@ -120,6 +120,7 @@ def unexplained(drive: Recording) -> jax.Array:
 
 def _best(candidates: np.ndarray, log_likelihood: np.ndarray) -> Choice:
     mean = log_likelihood.mean(axis=1)
+    mean = np.where(np.isfinite(mean), mean, -np.inf)
     if not np.isfinite(mean).any():
         raise InputError(f"all {len(candidates)} candidates fail on a drive: give others, or filters more particles.")
     return Choice(Noise(*map(float, candidates[mean.argmax()])), candidates, log_likelihood)
