@@ -40,7 +40,7 @@ _OWN = (
     "was lost with 1.0, with which all of these held, too"
 )
 _OTHER = (
-    "the same where the truth's tyre is a Magic Formula of the same stiffness and peak friction, and the filter's law is Dugoff's; "
+    "the same where the truth's tyre is a Magic Formula of equal stiffness and peak friction, and the filter's law is Dugoff's; "
     "process noise by likelihood on other drives of such a truth"
 )
 

@@ -7,7 +7,7 @@ from jaxveh.experiments.tyre_apf.saturated import SWEEP
 from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER
 
 _LANE = (
-    "median over the drives; the truth is the filter's own single track, whose mass and inertia are told, as is the sensors' noise; "
+    "median over the drives; the truth is the filter's own single track, its mass and inertia told, and the sensors' noise; "
     "priors of 10 % about other tyres; process noise by the filters' likelihood on other drives"
 )
 _BOUND = "the truth is the filter's own car; what one drive can tell, whoever estimates"
