@@ -71,10 +71,11 @@ def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None) -> 
 
 
 def _held(done: Done) -> str:
-    checks = done.numbers.get("checks", [])
+    from jaxveh.experiments.report import Tally
+
     if done.code != 0:
         return "failed"
-    return f"{sum(check['holds'] for check in checks)} of {len(checks)}" if checks else "none made"
+    return str(Tally(**done.numbers["tally"])) if done.numbers.get("checks") else "none made"
 
 
 def run_program(name: str, asked: Mapping[str, Any], folder: Path, tell: Callable[[str], None]) -> Done:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +17,9 @@ from jaxveh.cli import options
 from jaxveh.cli.all_papers import all_papers
 from jaxveh.cli.console import number, progress, results, table
 from jaxveh.cli.output import check_report, make_folder, write_numbers
+
+if TYPE_CHECKING:
+    from jaxveh.experiments.report import Check
 
 PAPERS = {
     "tyre-apf": "Magic Formula parameters by auxiliary particle filter (Bao, Sabbioni et al. 2015)",
@@ -55,11 +59,11 @@ def reproduce(
     numbers: options.Numbers = None,
     out: options.Out = None,
 ) -> None:
-    """Compute a paper again: its tables as printed and honestly, and criteria that hold or do not.
+    """Compute a paper again: its tables as printed and honestly, and criteria that hold, fail or stay open.
 
-    Every table has the do-nothing baseline, medians and quartiles over seeds; no estimator knows the truth (one is told the
-    sensors' noise, and is called so). Some minutes each on two cores. With --out each paper's figures are drawn, with --json
-    every number and each check is written.
+    Every table has the do-nothing baseline, medians and quartiles over seeds; each criterion says who was told what of the
+    truth. Counted are criteria as they were asked; what took the place of one stands beside it. Some minutes each on two cores.
+    With --out each paper's figures are drawn, with --json every number and each check is written.
 
     Example: [bold]jaxveh reproduce mass-grade-aukf --json mass_grade.json --out report/[/]
     """
@@ -87,6 +91,8 @@ def reproduce(
 
 def _one(name: str, asked: dict[str, Any], as_printed: bool, report: Progress, out: Path | None) -> dict[str, Any]:
     """Run one paper as `asked` and show it; what it found, for JSON."""
+    from jaxveh.experiments.report import tally
+
     _every_core()
     experiment = _experiment(name)
     if as_printed:
@@ -98,16 +104,28 @@ def _one(name: str, asked: dict[str, Any], as_printed: bool, report: Progress, o
     for one in tables:
         table(one.title, one.columns, one.rows)
     if checks:
-        rows = [("yes" if c.holds else "NO", c.name, number(c.value), number(c.bound)) for c in checks]
-        table(f"{name}: checks", ("holds", "criterion", "value", "bound"), rows)
-        results().print(f"{sum(c.holds for c in checks)} of {len(checks)} hold")
+        _show_checks(name, checks)
     if out is not None and not as_printed:
         _draw(experiment, found, out)
     return {
         "checks": [check._asdict() for check in checks],
+        "tally": tally(checks)._asdict(),
         "tables": [one._asdict() for one in tables],
         "settings": settings,
     }
+
+
+def _show_checks(name: str, checks: Sequence[Check]) -> None:
+    """Criteria with value, bound and condition; below each as it was asked those that stand beside it, which are not counted."""
+    from jaxveh.experiments.report import tally
+
+    rows = [
+        (c.status.upper() if not c.holds else c.status, "  beside it: " + c.name if c.original else c.name,
+         number(c.value), number(c.bound), c.condition)
+        for c in checks
+    ]  # fmt: skip
+    table(f"{name}: criteria", ("status", "criterion", "value", "bound", "where"), rows, left=2)
+    results().print(f"{tally(checks)} hold, as they were asked")
 
 
 def _draw(experiment: ModuleType, found: Any, out: Path) -> None:

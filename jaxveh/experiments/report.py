@@ -1,21 +1,65 @@
-"""What every experiment reports: tables for people, and criteria that hold or do not."""
+"""What every experiment reports: tables for people, and criteria that hold, fail or stay open."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from jaxveh._core.errors import InputError
 from jaxveh.sweeps import Interval
+
+HELD, FAILED, OPEN = "held", "failed", "open"
+"""What becomes of a criterion: it is met, it is not, or what was found cannot decide."""
+
+
+class Terms(NamedTuple):
+    """What a criterion rests on, written down before anything runs.
+
+    `condition`: what is assumed, and who was told what. `original`: empty for a criterion as it was asked; else the name of the
+    one as asked that this one stands beside, since it took its place or asks the same under another condition.
+    """
+
+    condition: str
+    original: str = ""
+
+
+Criteria = Mapping[str, Terms]
+"""An experiment's criteria by name; those with an `original` follow it."""
 
 
 class Check(NamedTuple):
-    """One criterion: what was found, the bound, and whether it holds (at or below the bound unless the name says)."""
+    """One criterion: what was found, the bound, `status` (held, failed or open), and its `Terms`."""
 
     name: str
     value: float
     bound: float
-    holds: bool
+    status: str
+    condition: str = ""
+    original: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether it is held; what is open is not."""
+        return self.status == HELD
+
+
+class Tally(NamedTuple):
+    """How many criteria, as they were asked, there are, `of`, and how many are `held`, `failed` and `open`."""
+
+    held: int
+    failed: int
+    open: int
+
+    @property
+    def of(self) -> int:
+        """All of them."""
+        return self.held + self.failed + self.open
+
+    def __str__(self) -> str:
+        rest = [f"{count} {what}" for what, count in ((FAILED, self.failed), (OPEN, self.open)) if count]
+        return f"{self.held} of {self.of}" + (f" ({', '.join(rest)})" if rest else "")
 
 
 class Table(NamedTuple):
@@ -28,17 +72,51 @@ class Table(NamedTuple):
 
 def at_most(name: str, value, bound: float) -> Check:
     """A criterion that holds at or below the bound; what is not a number does not hold."""
-    return Check(name, float(value), float(bound), bool(value <= bound))
+    return _checked(name, value, bound, value <= bound)
 
 
 def above(name: str, value, bound: float) -> Check:
     """A criterion that holds above the bound."""
-    return Check(name, float(value), float(bound), bool(value > bound))
+    return _checked(name, value, bound, value > bound)
 
 
 def at_least(name: str, value, bound: float) -> Check:
     """A criterion that holds at or above the bound."""
-    return Check(name, float(value), float(bound), bool(value >= bound))
+    return _checked(name, value, bound, value >= bound)
+
+
+def undecided(check: Check) -> Check:
+    """The criterion left open, whatever its number says: `check` for what cannot decide."""
+    return check._replace(status=OPEN)
+
+
+def _checked(name: str, value, bound: float, holds) -> Check:
+    return Check(name, float(value), float(bound), HELD if holds else FAILED)
+
+
+def stated(checks: Iterable[Check], criteria: Criteria) -> list[Check]:
+    """The checks with their terms, in the criteria's order, so that what took the place of another stands behind it.
+
+    **Raises** `InputError` where checks and criteria are not the same: none is left out, and none comes without its terms.
+    """
+    found = {check.name: check for check in checks}
+    if set(found) != set(criteria):
+        raise InputError(
+            f"checks without terms: {sorted(set(found) - set(criteria))}; criteria that were not looked at: "
+            f"{sorted(set(criteria) - set(found))}."
+        )
+    return [found[name]._replace(**terms._asdict()) for name, terms in criteria.items()]
+
+
+def tally(checks: Iterable[Check]) -> Tally:
+    """The count of the criteria as they were asked: those that stand beside them are shown, and not counted."""
+    asked = [check.status for check in checks if not check.original]
+    return Tally(*(asked.count(status) for status in (HELD, FAILED, OPEN)))
+
+
+def number_asked(criteria: Criteria) -> int:
+    """How many criteria there are as they were asked."""
+    return sum(not terms.original for terms in criteria.values())
 
 
 def interval(found: Interval, digits: int = 3) -> str:

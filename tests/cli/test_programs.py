@@ -181,7 +181,10 @@ def papers(monkeypatch):
             Table(f"honest {name}", ("what", "value"), [("UKF", "0.5")]),
             Table("printed", ("a",), [("x",)]),
         )
-        checks = [Check("UKF front", 0.5, 0.8, True), Check("PF front", float("nan"), 0.8, False)]
+        checks = [
+            Check("UKF front", 0.5, 0.8, "held", "told the noise"), Check("PF front", float("nan"), 0.8, "failed"),
+            Check("PF front, redesigned", 0.7, 0.8, "held", "made later", "PF front"),
+        ]  # fmt: skip
         return SimpleNamespace(
             run=run, tables=lambda found: [honest, printed], check=lambda found: checks,
             as_printed=lambda **options: [printed], settings=lambda found: {"study": {"particles": 20}},
@@ -201,10 +204,15 @@ def test_reproduce_prints_tables_and_writes_checks(tmp_path, papers):
     assert result.exit_code == 0, result.output
     assert papers == [("first", {"seeds": 7, "seed": 3})]
     assert "honest first" in result.stdout
-    assert "1 of 2 hold" in result.stdout
+    # What stands beside a criterion is shown, and not counted.
+    assert "1 of 2 (1 failed) hold" in result.stdout and "beside it: PF front, redesigned" in result.stdout
+    assert "told the noise" in result.stdout and "made later" in result.stdout
     content = read_json(numbers)
-    assert content["checks"][0] == {"name": "UKF front", "value": 0.5, "bound": 0.8, "holds": True}
+    assert content["checks"][0] == {
+        "name": "UKF front", "value": 0.5, "bound": 0.8, "status": "held", "condition": "told the noise", "original": "",
+    }  # fmt: skip
     assert content["checks"][1]["value"] is None
+    assert content["tally"] == {"held": 1, "failed": 1, "open": 0}
     assert content["tables"][1]["rows"] == [["x"]]
     assert content["manifest"]["configuration"] == {"seeds": 7, "study": {"particles": 20}}
 
@@ -223,8 +231,9 @@ def test_reproduce_all_goes_through_every_paper(tmp_path, papers, monkeypatch):
     def program(name, options, folder, tell):
         asked[name] = {option: value for option, value in options.items() if value is not None}
         tell("done")
-        checks = [{"name": "UKF", "value": 0.5, "bound": 0.8, "holds": True}, {"name": "PF", "holds": name == "first"}]
-        return all_papers.Done(int(name == "failing"), f"tables of {name}\n", {"checks": checks}, 61.4)
+        checks = [{"name": "UKF", "value": 0.5, "bound": 0.8, "status": "held"}, {"name": "PF", "status": "open"}]
+        found = {"held": 2, "failed": 0, "open": 0} if name == "first" else {"held": 1, "failed": 0, "open": 1}
+        return all_papers.Done(int(name == "failing"), f"tables of {name}\n", {"checks": checks, "tally": found}, 61.4)
 
     monkeypatch.setattr(all_papers, "run_program", program)
     numbers = tmp_path / "numbers.json"
@@ -232,8 +241,8 @@ def test_reproduce_all_goes_through_every_paper(tmp_path, papers, monkeypatch):
     assert result.exit_code == 0, result.output
     assert asked == {"first": {"--seed": 3}, "second": {"--seed": 3}}
     assert result.stdout.index("tables of first") < result.stdout.index("tables of second")
-    assert "2 of 2" in result.stdout and "1 of 2" in result.stdout and "61" in result.stdout
-    assert json.loads(numbers.read_text())["second"]["checks"][0]["holds"] is True
+    assert "2 of 2" in result.stdout and "1 of 2 (1 open)" in result.stdout and "61" in result.stdout
+    assert json.loads(numbers.read_text())["second"]["checks"][0]["status"] == "held"
     monkeypatch.setattr("jaxveh.cli.reproduce.PAPERS", {"failing": "a paper"})
     result = run("reproduce", "all")
     assert result.exit_code == 1 and "failing failed" in result.stderr
@@ -264,5 +273,5 @@ def test_reproduce_names_its_papers():
         assert name in result.stderr
     for name in PAPERS:
         experiment = _experiment(name)
-        for needed in ("CITATION", "as_printed", "check", "run", "settings", "tables"):
+        for needed in ("CITATION", "CRITERIA", "as_printed", "check", "run", "settings", "tables"):
             assert hasattr(experiment, needed), f"{name} has no {needed}"

@@ -98,12 +98,32 @@ def real_log():
     )
 
 
-def test_real_log_taken_at_its_word_beats_the_open_loop():
+@pytest.mark.parametrize(("log", "begin", "measured", "open_loop"), [
+    ("ferrari_250lm", 13750, 0.1816, 0.3047), ("ferrari_250lm", 16750, 0.2364, 0.6899),
+    ("genesis", 16129, 0.4819, 0.4752),
+])  # fmt: skip
+def test_real_logs_as_near_as_they_were_measured(log, begin, measured, open_loop):
+    """Half a minute of each, the car taken at its file's word: sideslip RMSE, degrees, as measured, and 3 % for another rounding.
+
+    On the Ferrari's log the estimate is better than the open loop; on the Genesis', whose accelerometer is 0.65 m/s^2 off and
+    whose v_y is of another point than the file's, it is not. A bound far above what was measured would hide either.
+    """
+    recording, car = io.read_recording(shared(f"{log}_100hz.csv")), io.read_car(shared(f"{log}.toml"))
+    span = recording.rows(slice(begin, begin + 3000))
+    found = estimators.estimate(span.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]), car)
+    numbers = estimators.score(found, span, car)
+    assert numbers["open_loop_sideslip_rmse_deg"] == pytest.approx(open_loop, rel=0.03)
+    assert numbers["sideslip_rmse_deg"] <= 1.03 * measured
+
+
+@pytest.mark.full
+def test_real_log_taken_at_its_word():
     _, rest, car = real_log()
-    found = estimators.estimate(rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]), car)
-    numbers = estimators.score(found, rest, car)
+    numbers = estimators.score(
+        estimators.estimate(rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]), car), rest, car
+    )
     assert numbers["open_loop_sideslip_rmse_deg"] == pytest.approx(0.605, abs=0.005)
-    assert numbers["sideslip_rmse_deg"] < 0.35
+    assert numbers["sideslip_rmse_deg"] <= 0.305  # 0.296 measured
 
 
 @pytest.mark.full
@@ -112,7 +132,7 @@ def test_real_log_calibrated_blind():
     blind = ["steer", "v_x", "a_x", "a_y", "yaw_rate"]
     calibration = estimators.calibrate(first.select(blind), car)
     numbers = estimators.score(estimators.estimate(rest.select(blind), calibration), rest, car)
-    assert numbers["sideslip_rmse_deg"] <= 0.40
+    assert numbers["sideslip_rmse_deg"] <= 0.24  # 0.2312 measured
     assert set(calibration.summary()) >= {"car.front.B", "car.rear.D", "process noise.v_y", "measurement noise.a_y"}
     fitted = calibration.specification(car)
     assert fitted.front.nominal_load == pytest.approx(982 * 9.80665 * 1.07 / 2.40, rel=1e-6)

@@ -7,12 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import filters
+from jaxveh import filters, sweeps
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record_type
 from jaxveh.diagnostics.observability import observability
 from jaxveh.experiments import federated_ckf as experiment
-from jaxveh.experiments.federated_ckf import contestants, drives, model, observed, printed, study
+from jaxveh.experiments.federated_ckf import contestants, criteria, drives, model, observed, printed, report, study
 from jaxveh.experiments.federated_ckf.interleaved import Member, Told, stays, take_turns
 from jaxveh.experiments.federated_ckf.settings import OTHER_START, PARAMETERS, PRINTED_START, Start
 from jaxveh.statespace import Gaussian, Prior, Row, StateSpace
@@ -160,6 +160,24 @@ def test_the_printed_shares_and_sensors_are_refused():
         filters.Federated(cubature, contestants.GROUPS, shares=(0.0, 0.0, 0.0))
     with pytest.raises(InputError, match="a_y, yaw_rate in more than one group"):
         filters.Federated(cubature, contestants.SHARED)
+
+
+def test_what_another_tyre_does_stands_beside_the_truths_own():
+    names, cases = tuple(contestants.contestants(SMALL)), tuple(study.cases(SMALL))
+    shape = (len(names), len(cases), 2)
+    values = {f"{name}_error": np.full(shape, 0.001) for name in PARAMETERS}
+    values |= {"sideslip_rmse": np.ones(shape), "nees": np.ones(shape)}
+    values["friction_error"][:, cases.index(criteria.OTHER)] = 0.22
+    design = sweeps.Design(estimator=dict.fromkeys(names), case=range(len(cases)))
+    raced = study.Raced(SMALL, cases, None, sweeps.Swept(design, 2, values))
+    known = dataclasses.make_dataclass("Known", ("bounds", "spread"))([np.inf], [0.8])
+    checks = report.check(report.Reproduction(2, raced, (3.0,), (0.0,), None, {"known": [[known]]}))
+    found = {check.name: check for check in checks}
+    own, other = (found[criteria.final(case, "friction")] for case in ("nearer start", criteria.OTHER))
+    assert (own.value, own.status, own.original) == (pytest.approx(0.1), "held", "")
+    assert (other.value, other.status, other.original) == (pytest.approx(22.0), "failed", own.name)
+    assert checks[checks.index(own) + 1] is other
+    assert found[criteria.SMALL_STEER].status == "held"
 
 
 def test_every_contestant_says_what_it_is():

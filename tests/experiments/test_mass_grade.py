@@ -7,10 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxveh import sweeps
 from jaxveh.experiments import mass_grade_aukf as experiment
+from jaxveh.experiments.mass_grade_aukf import criteria
 from jaxveh.experiments.mass_grade_aukf import drives as own_drives
-from jaxveh.experiments.mass_grade_aukf.contestants import WALK, Found, contestants, metrics
-from jaxveh.experiments.mass_grade_aukf.observed import KNOT, known_of_mass, predictions
+from jaxveh.experiments.mass_grade_aukf.contestants import WALK, Found, contestants, metrics, pausing
+from jaxveh.experiments.mass_grade_aukf.observed import KNOT, Known, bound_of_mass, known_of_mass, predictions
 
 PEDALS = (0.0, 0.2)
 SMALL = experiment.truck(duration=60.0, dt=0.1, max_step=0.005, guesses=(4000.0,))
@@ -77,6 +79,58 @@ def test_the_pull_is_that_of_least_squares_on_data_without_noise(drives):
         rows, rows @ at - np.concatenate([np.zeros(len(rows) - at.size), at / walk]), rcond=None
     )[0]
     np.testing.assert_allclose(known.pull, (estimate - at)[0], rtol=1e-4)
+
+
+def test_the_bound_calls_observable_what_three_states_cannot_find(drives):
+    """Why the criterion as it was asked fails: by the bound the report never says so."""
+    still = own_drives.Drive(*(jnp.asarray(leaf[0, 0]) for leaf in drives))
+    bounds, known = bound_of_mass(SMALL, still), known_of_mass(SMALL, still)
+    assert bounds.names == ("mass", "grade") and "mass" not in bounds.unobservable()
+    assert known.verdict == "unobservable"
+    # The same bound, but for the first grade, of which nothing is known here, and for wider knots.
+    fine = bound_of_mass(SMALL, still, KNOT).bounds[0]
+    np.testing.assert_allclose(fine, known.bound, rtol=0.05)
+    assert bounds.bounds[0] < fine
+
+
+def made_up(study, **errors):
+    """A race of two seeds in which every estimator has the `mass_error` 0.001, or that of `errors`."""
+    names = tuple(contestants(study))
+    shape = (len(names), 1, len(study.guesses), 2)
+    values = {name: np.full(shape, value) for name, value in (("grade_rmse", 0.05), ("settled", 5.0))}
+    values["mass_error"] = np.stack([np.full(shape[1:], errors.get(name, 0.001)) for name in names])
+    design = sweeps.Design(estimator=dict.fromkeys(names), pedals=(0.1,), guess=study.guesses)
+    return experiment.Raced(study, (0.1,), None, sweeps.Swept(design, 2, values))
+
+
+def test_criteria_are_judged_as_they_were_asked_and_what_took_their_place_stands_beside():
+    touched = dataclasses.replace(experiment.car(), guesses=(1300.0,))
+    car = made_up(touched, **{pausing(criteria.RATE): 0.012, criteria.RATE: 0.0076})
+    pulled = (Known(0.06, 0.7, 0.1), Known(0.06, 0.1, 0.1))
+    bounds = dataclasses.make_dataclass("Bounds", ("bounds", "spread"))([0.06, 1.0], [0.4, 0.03])
+    result = experiment.Reproduction(
+        2, made_up(SMALL), car, made_up(SMALL), {}, dict.fromkeys(criteria.STILL, pulled),
+        dict.fromkeys(criteria.STILL, bounds),
+    )  # fmt: skip
+    found = {check.name: check for check in experiment.check(result)}
+    asked, later = (found[criteria.final_mass("car", name)] for name in (pausing(criteria.RATE), criteria.RATE))
+    assert (asked.value, asked.status, asked.original) == (pytest.approx(1.2), "failed", "")
+    assert (later.value, later.status, later.original) == (pytest.approx(0.76), "held", asked.name)
+    for drive in criteria.STILL:
+        asked, later = found[criteria.bounded(drive)], found[criteria.erring(drive)]
+        assert (asked.value, asked.status) == (pytest.approx(0.15), "failed")
+        assert (later.value, later.status) == (pytest.approx(np.hypot(0.7, 0.1) / 0.4), "held")
+
+
+def test_who_pauses_learns_nothing_of_the_mass_while_the_brake_is_touched(drives):
+    """As was asked; only where the brake is touched there are such."""
+    assert pausing(criteria.RATE) not in contestants(SMALL)
+    study = dataclasses.replace(SMALL, touches=1)
+    drive = own_drives.Drive(*(jnp.asarray(leaf[1, 0, :101]) for leaf in drives))
+    touched = slice(40, 60)
+    drive = drive._replace(braking=jnp.zeros(101).at[touched].set(1.0))
+    masses = lambda name: np.asarray(contestants(study)[name].run(study, jnp.asarray(4000.0), drive).mass[touched])
+    assert np.ptp(masses(pausing(criteria.RATE))) < 1e-9 < np.ptp(masses(criteria.RATE))
 
 
 def test_numbers_of_a_known_course():

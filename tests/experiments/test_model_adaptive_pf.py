@@ -10,19 +10,23 @@ import pytest
 from jaxveh import filters, sweeps
 from jaxveh import statespace as ss
 from jaxveh.experiments import model_adaptive_pf as experiment
-from jaxveh.experiments.model_adaptive_pf import choice, figures, models, printed, report
+from jaxveh.experiments.model_adaptive_pf import choice, criteria, figures, models, printed, report
 from jaxveh.experiments.model_adaptive_pf import drives as own_drives
 from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
 from jaxveh.experiments.model_adaptive_pf.contestants import (
     ADAPTIVE,
+    CUBATURE,
+    JUDGED,
     PLAIN,
     REDESIGNED,
     ROBUST,
+    STUDENT,
     TOLD,
     Contestant,
     contestants,
     metrics,
     moved,
+    of_a_point,
     redesigned,
     told,
 )
@@ -122,7 +126,7 @@ def test_what_knows_outliers_beats_what_does_not(drives):
     assert error(TOLD, "both", "sideslip") < error(REDESIGNED, "both", "sideslip")
     assert (raced.found["result"] == 0).all()
     assert raced.of("course", PLAIN, "both").shape == (3, 251)
-    assert experiment.settings(experiment.Reproduction(3, raced, raced))["cases"]["both"]["level"] == 6.0
+    assert experiment.settings(experiment.Reproduction(3, raced, raced, raced, raced))["cases"]["both"]["level"] == 6.0
 
 
 def test_who_is_told_weighs_by_the_true_noise_and_leaves_out_what_is_wild(drives):
@@ -204,6 +208,85 @@ def test_the_table_by_process_noise_shows_each_ones_own_choice():
     (axes,) = figures.pressed_figure(raced).axes
     np.testing.assert_allclose([line.get_ydata() for line in axes.lines[:2]], [[2.0, 4.0], [0.5, 0.25]])
     np.testing.assert_allclose(axes.lines[0].get_xdata(), [1.0, 2.0])
+
+
+class Built(Exception):
+    """Ends a run once its model is there."""
+
+
+def test_nobody_knows_of_relaxation_where_it_is_said_so(drives, monkeypatch):
+    """With `lags=False` no contestant's car has tyres that lag, else all but the one named so and the regressions."""
+
+    def scan(filter_, model, rows, key=None):
+        raise Built(getattr(model.system, "car", model.system).front)
+
+    monkeypatch.setattr(filters, "scan", scan)
+    one = own_drives.Drive(*(jnp.asarray(leaf[0, 0]) for leaf in drives))
+    car = own_drives.model_car(SMALL, quick_tyre(SMALL))
+
+    def who_knows(lags):
+        found = set()
+        for name, contestant in contestants(SMALL, lags).items():
+            with pytest.raises(Built) as built:
+                contestant.run(SMALL, car, one, jax.random.key(0))
+            found |= {name} if isinstance(built.value.args[0], Relaxed) else set()
+        return found
+
+    assert who_knows(False) == set()
+    assert who_knows(True) == set(contestants(SMALL)) - {"PF, no relaxation", "AAR", "AAR as printed"}
+
+
+def test_filters_are_told_the_relaxation_length_that_the_case_says():
+    told_lengths = []
+
+    def run(study, car, drive, key):
+        told_lengths.append(float(study.relaxation))
+        kind = models.record_type("Report", ("v_x", "v_y", "yaw_rate", "sideslip"))
+        return dataclasses.make_dataclass("Found", ("mean", "log_likelihood", "result"))(
+            kind(*[jnp.zeros(3)] * 4), 0.0, 0
+        )
+
+    drive = own_drives.Drive(*[jnp.zeros(3)] * len(own_drives.Drive._fields))
+    point = of_a_point(SMALL, Contestant(run, ""), quick_tyre)
+    for case in (experiment.Case(), experiment.Case(relaxation=0.5)):
+        point(None, None, (case, drive))
+    assert told_lengths == pytest.approx([SMALL.relaxation, 0.5 * SMALL.relaxation])
+
+
+def made_up(cases, **sideslip):
+    """Races in which every contestant's sideslip is 1 in both seeds, or that of `sideslip` by case."""
+    values = [[sideslip.get(case, {}).get(name, 1.0) for case in cases] for name in JUDGED]
+    values = np.repeat(np.array(values)[..., None], 2, axis=-1)
+    design = sweeps.Design(estimator=dict.fromkeys(JUDGED), case=range(len(cases)))
+    return experiment.Raced(SMALL, cases, None, sweeps.Swept(design, 2, {"sideslip": values}))
+
+
+def test_criteria_are_asked_of_the_first_contestant_that_knows_nothing():
+    """What was made later, and what is told the length, stands beside; of two wrong lengths the worse counts."""
+    cases = {name: experiment.Case() for name in ("constant", "both")}
+    wrong = {f"{name}, {what}": experiment.Case() for name in cases for what in ("half", "double")}
+    result = report.Reproduction(
+        2,
+        raced=made_up(cases, both={ADAPTIVE: 0.79, REDESIGNED: 0.70, STUDENT: 0.85, ROBUST: 0.69, CUBATURE: 5.0}),
+        pressed=None,
+        unaware=made_up(cases, both={ADAPTIVE: 0.90, REDESIGNED: 0.77, STUDENT: 0.95, ROBUST: 0.80}),
+        misled=made_up(wrong, **{"both, half": {ADAPTIVE: 0.6}, "both, double": {ADAPTIVE: 0.81, PLAIN: 0.9}}),
+    )
+    checks = report.check(result)
+    found = {(check.name.split(";")[0].split(": ")[1], check.name.split("; ")[1]): check for check in checks[:6]}
+    of = lambda name, knows: found[f"{name} over {PLAIN}", knows]
+    first = of(ADAPTIVE, criteria.NOTHING)
+    assert (first.value, first.status, first.original) == (pytest.approx(0.90), "failed", "")
+    assert (of(ADAPTIVE, criteria.TOLD_LENGTH).value, of(ADAPTIVE, criteria.TOLD_LENGTH).status) == (0.79, "failed")
+    assert of(ADAPTIVE, criteria.WRONG_LENGTH).value == pytest.approx(0.9)
+    assert of(REDESIGNED, criteria.TOLD_LENGTH).status == "held"
+    assert all(check.original == first.name for check in checks[1:6])
+    (lost,) = [check for check in checks if check.name.startswith(f"both: {ADAPTIVE} loses") and not check.original]
+    assert (lost.value, lost.status) == (0.0, "held")
+    (robust,) = [check for check in checks if check.bound == 0.72 and not check.original]
+    assert (robust.value, robust.status) == (pytest.approx(0.95), "failed")
+    rows = {row[0]: row for row in report._knowledge(result, "both").rows}
+    np.testing.assert_allclose(rows[ADAPTIVE][5:], [0.90, 0.6, 0.79, 0.9])
 
 
 class Told(AbstractBelief):

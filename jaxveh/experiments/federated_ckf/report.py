@@ -11,11 +11,23 @@ import numpy as np
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.diagnostics import Observability
 from jaxveh.experiments.federated_ckf.contestants import contestants
+from jaxveh.experiments.federated_ckf.criteria import (
+    CRITERIA,
+    GATE,
+    ISOLATION,
+    OTHER,
+    SHORT,
+    SMALL_STEER,
+    STARTS,
+    consistent,
+    final,
+    sideslip,
+)
 from jaxveh.experiments.federated_ckf.drives import Drive
 from jaxveh.experiments.federated_ckf.observed import observed
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
 from jaxveh.experiments.federated_ckf.study import Raced, cases, drives_by_case, drives_of, race, race_over, truth
-from jaxveh.experiments.report import Check, Table, above, at_most, interval, spread
+from jaxveh.experiments.report import Check, Table, above, at_most, interval, spread, stated
 from jaxveh.sweeps import Swept, compare
 
 STEERS, SPREADS = (3.0, 4.0, 5.0, 8.0), (0.0, 0.1, 0.3)
@@ -23,8 +35,6 @@ STEERS, SPREADS = (3.0, 4.0, 5.0, 8.0), (0.0, 0.1, 0.3)
 
 NEES = (0.25, 4.0)
 """Within which a believed covariance agrees with the errors."""
-
-SHORT = {"friction": "mu", "mass": "m", "yaw_inertia": "I_z", "front_axle_to_cg": "a"}
 
 LIMITS = {"friction": 1.0, "mass": 2.0, "yaw_inertia": 5.0, "front_axle_to_cg": 2.0}
 """Final errors, %."""
@@ -76,48 +86,36 @@ def _median(values) -> float:
 
 
 def check(result: Reproduction) -> list[Check]:
-    """The criteria: medians over seeds; nobody knew the truth."""
+    """The criteria, each with its condition (`criteria`): medians over seeds."""
     raced, found = result.raced, []
     median = lambda name, estimator, case: _median(raced.at(name, estimator, case))
-    starts = ("printed start", "nearer start")
-    for case in starts:
+    for case in (*STARTS, OTHER):
         for name, limit in LIMITS.items():
-            found.append(
-                at_most(
-                    f"joint, {case}: final error of {SHORT[name]}, %",
-                    100 * median(f"{name}_error", "joint", case),
-                    limit,
-                )
-            )
-        found += _nees(f"joint, {case}", median("nees", "joint", case))
-    for case in starts:
+            found.append(at_most(final(case, name), 100 * median(f"{name}_error", "joint", case), limit))
+        found += _nees("joint", case, median("nees", "joint", case))
+    for case in STARTS:
         ratio = median("sideslip_rmse", "redesigned", case) / median("sideslip_rmse", "joint", case)
-        found.append(at_most(f"redesigned, {case}: sideslip RMSE over the joint filter's", ratio, 1.1))
-        found += _nees(f"redesigned, {case}", median("nees", "redesigned", case))
+        found.append(at_most(sideslip(case), ratio, 1.1))
+        found += _nees("redesigned", case, median("nees", "redesigned", case))
     faulty = median("sideslip_rmse", "redesigned, isolating", "fault") / median("sideslip_rmse", "redesigned", "fault")
-    found.append(at_most("fault: sideslip RMSE with isolation over that without", faulty, 0.6))
+    found.append(at_most(ISOLATION, faulty, 0.6))
     gated = [median("sideslip_rmse", "joint, gated", case) for case in ("fault", "nearer start")]
-    found.append(
-        at_most("fault: sideslip RMSE of the gated joint filter over its fault-free one", gated[0] / gated[1], 1.2)
-    )
+    found.append(at_most(GATE, gated[0] / gated[1], 1.2))
     # Of mu, over the prior's spread: without end where nothing slides.
     smallest = min(float(one.bounds[0] / one.spread[0]) for one in result.seen["known"][0])
-    found.append(above(f"steer {result.steers[0]:g} degrees: bound of mu over its prior's spread", smallest, 1.0))
-    return found
+    found.append(above(SMALL_STEER, smallest, 1.0))
+    return stated(found, CRITERIA)
 
 
-def _nees(who: str, value: float) -> list[Check]:
-    low, high = NEES
-    return [
-        above(f"{who}: NEES of the parameters over their number, above", value, low),
-        at_most(f"{who}: NEES of the parameters over their number", value, high),
-    ]
+def _nees(who: str, case: str, value: float) -> list[Check]:
+    (below, over), (low, high) = consistent(who, case), NEES
+    return [above(below, value, low), at_most(over, value, high)]
 
 
 def tables(result: Reproduction) -> list[Table]:
     """The tables, the do-nothing first guess in each of the estimators'."""
     raced = result.raced
-    found = [race_table(raced, case) for case in ("printed start", "nearer start", "other tyres")]
+    found = [race_table(raced, case) for case in (*STARTS, OTHER)]
     return [*found, _paired_table(raced), _fault_table(raced), _line_table(result)]
 
 

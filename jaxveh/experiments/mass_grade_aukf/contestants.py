@@ -41,9 +41,8 @@ WALK = 2e-3
 
 
 def contestants(study: Study) -> dict[str, Contestant]:
-    """All of them by name, the do-nothing ones first."""
-    del study
-    return {
+    """All of them by name, the do-nothing ones first; where the brake is touched, those that pause meanwhile, too."""
+    found = {
         "first guess": Contestant(_guess, "the mass is the first guess, the grade that of a filter which believes it"),
         "UKF": Contestant(_walking(spread=0.4), "three states, the grade walks, an honest spread of the mass"),
         "UKF, timid": Contestant(_walking(spread=0.05), "the same, sure of its first guess by 5 %"),
@@ -54,6 +53,19 @@ def contestants(study: Study) -> dict[str, Contestant]:
         "accelerometer": Contestant(_smooth(aided=True), "grade rate and accelerometer"),
         "accelerometer with bias": Contestant(_smooth(aided=True, bias=0.02), "the same, its offset a state"),
     }
+    if not study.touches:
+        return found
+    return found | {
+        pausing("grade rate"): Contestant(
+            _smooth(waits=True), "pauses while the brake is touched, as the paper has it"
+        ),
+        pausing("accelerometer"): Contestant(_smooth(aided=True, waits=True), "the same with the accelerometer"),
+    }
+
+
+def pausing(name: str) -> str:
+    """The name of the contestant that pauses while the brake is touched, where `name` takes its force for an unknown one."""
+    return f"{name}, pausing"
 
 
 TOLD = ("braking", "unknown_force")
@@ -102,10 +114,10 @@ def _walking(spread: float):
     return run
 
 
-def _smooth(aided: bool = False, bias: float | None = None):
+def _smooth(aided: bool = False, bias: float | None = None, waits: bool = False):
     def run(study, guess, drive):
         model = _model(study, guess, drive, a_x=study.a_x if aided else None, a_x_bias=bias)
-        return _filtered(filters.Unscented(), model, study, drive, waits=False)
+        return _filtered(filters.Unscented(), model, study, drive, waits)
 
     return run
 

@@ -16,14 +16,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.names import record_type
+from jaxveh.diagnostics import Observability
+from jaxveh.diagnostics.observability import observability
 from jaxveh.experiments.mass_grade_aukf.contestants import WALK
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, model_car, times
 from jaxveh.experiments.mass_grade_aukf.settings import Study
 from jaxveh.roads import LEVEL
 from jaxveh.statespace import Heun, Propagate
 
-KNOT = 1.0
-"""s between the knots of the unknown grade."""
+KNOT, WIDE_KNOT = 1.0, 5.0
+"""s between the knots of the unknown grade; and in the bound by which the mass was first judged."""
 
 MASS_SPREAD, GRADE_SPREAD = 0.4, 0.03
 """What the prior knows: of the mass's logarithm, and of the grade (rad)."""
@@ -82,17 +84,31 @@ def known_of_mass(study: Study, drive: Drive, smooth: bool = False) -> Known:
     return Known(float(np.sqrt(inverse[0, 0])), float(pull), float(np.sqrt(noise)))
 
 
-def predictions(study: Study, drive: Drive, smooth: bool):
+def bound_of_mass(study: Study, drive: Drive, knot: float = WIDE_KNOT) -> Observability:
+    """Cramer-Rao bounds of mass and first grade from the speed of one drive, with a grade that walks, as three states have it.
+
+    By these the report was first to say whether the mass can be observed. They average over grades that owe nothing to the
+    torque.
+    """
+    predict, at = predictions(study, drive, False, knot)
+    # The named ones first: mass and grade, then the first speed.
+    order = np.array([0, 2, 1, *range(3, at.size)])
+    spread = np.concatenate([[MASS_SPREAD, GRADE_SPREAD, 1.0], np.full(at.size - 3, WALK * knot**0.5)])
+    ordered = lambda z: predict(z[order])
+    return observability(ordered, jnp.asarray(at[order]), ("mass", "grade"), spread, nuisance=at.size - 2)
+
+
+def predictions(study: Study, drive: Drive, smooth: bool, knot: float = KNOT):
     """Whitened speeds as a function of the unknowns [log mass, first speed, first grade, (first rate), news]; the truth's."""
     car, rows = model_car(study), drive.v_x.shape[0]
-    knots = KNOT * np.arange(np.ceil((rows - 1) * study.dt / KNOT) + 1)
+    knots = knot * np.arange(np.ceil((rows - 1) * study.dt / knot) + 1)
     time = times(study, rows)
     move = Propagate(_rates, Heun())
     kind = car.state_type
     torque = 0.5 * (drive.torque[1:] + drive.torque[:-1])
 
     def grades(z):
-        steps = jnp.cumsum(z[3:]) * KNOT if smooth else z[3:]
+        steps = jnp.cumsum(z[3:]) * knot if smooth else z[3:]
         return z[2] + jnp.pad(jnp.cumsum(steps), (1, 0))
 
     def predict(z):
@@ -110,7 +126,7 @@ def predictions(study: Study, drive: Drive, smooth: bool):
     true = np.interp(knots, np.asarray(time), np.asarray(drive.true_grade))
     news = np.diff(true)
     if smooth:
-        rates = news / KNOT
+        rates = news / knot
         news = np.concatenate([rates[:1], np.diff(rates)])
     return predict, np.concatenate([[0.0, 0.0, true[0]], news])
 

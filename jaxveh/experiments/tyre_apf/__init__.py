@@ -1,6 +1,7 @@
 """Bao, Sabbioni et al. (2015): an auxiliary particle filter for Magic Formula parameters and vehicle states."""
 
 from jaxveh.experiments.report import Check, Table
+from jaxveh.experiments.tyre_apf.criteria import CRITERIA
 from jaxveh.experiments.tyre_apf.printed import Printed, run_printed_seeds
 from jaxveh.experiments.tyre_apf.report import as_printed, check, run, settings
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
@@ -10,6 +11,7 @@ from jaxveh.experiments.tyre_apf.tables import tables
 
 __all__ = [
     "CITATION",
+    "CRITERIA",
     "Check",
     "Printed",
     "Reproduction",

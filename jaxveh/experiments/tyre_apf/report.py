@@ -14,7 +14,8 @@ from jaxveh._core.errors import check_at_least
 from jaxveh._core.parameter import pick, resolve
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.diagnostics.observability import UNOBSERVABLE, Observability
-from jaxveh.experiments.report import Check, Table, above, at_least, at_most
+from jaxveh.experiments.report import Check, Table, above, at_least, at_most, stated
+from jaxveh.experiments.tyre_apf.criteria import CRITERIA
 from jaxveh.experiments.tyre_apf.printed import Printed, closest_share, run_printed_seeds
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.saturated import SWEEP, over_bound, run_saturated
@@ -94,7 +95,7 @@ def _median(values) -> Any:
 
 
 def check(result: Reproduction) -> list[Check]:
-    """The criteria, medians over seeds; no estimator of the honest study knew the truth."""
+    """The criteria, each with its condition (`criteria`): medians over seeds."""
     checks = []
     add = lambda name, value, bound: checks.append(at_most(name, value, bound))
     prior = _median(result.outcome.curve_error["prior"])
@@ -130,7 +131,7 @@ def check(result: Reproduction) -> list[Check]:
             walk[rows].max(),
             bound,
         )
-    return checks
+    return stated(checks, CRITERIA)
 
 
 def _sharpness_checks(found: Sharpness) -> list[Check]:

@@ -1,0 +1,75 @@
+"""The criteria: as they were asked, and what stands beside them."""
+
+from __future__ import annotations
+
+from jaxveh.experiments.mass_grade_aukf.contestants import pausing
+from jaxveh.experiments.mass_grade_aukf.observed import WIDE_KNOT
+from jaxveh.experiments.report import Terms
+
+RATE, AIDED, BIASED = "grade rate", "accelerometer", "accelerometer with bias"
+"""The contestants of the criteria."""
+
+STILL = ("held speed, no pedals", "pedals 0 m/s^2")
+"""Drives without pedal activity: nothing but what a held speed asks for, and with the speed's own wavering."""
+
+
+def final_mass(study: str, estimator: str) -> str:
+    """The criterion of the final mass."""
+    return f"{study}, {estimator}: final mass error, %"
+
+
+def settled(study: str, estimator: str) -> str:
+    """That of the time to settle."""
+    return f"{study}, {estimator}: within 3 % from then on, s"
+
+
+UPPER = f"truck, {RATE}: upper quartile of the final mass error, %"
+GRADE = f"truck, {RATE}: grade RMSE, degrees"
+
+
+def bounded(drive: str) -> str:
+    """That of the bound of three states."""
+    return f"three states, {drive}: bound of the mass over its prior's spread"
+
+
+def erring(drive: str) -> str:
+    """That of their error."""
+    return f"three states, {drive}: error of the mass over what the prior knew"
+
+
+_SEEDS = "median over the drives, worst first guess; "
+_TOLD = "told the torque at the wheels to the last digit, air and rolling resistance, and the noise of the sensors"
+_TRUCK = Terms(_SEEDS + _TOLD)
+_PAUSE = Terms(_SEEDS + _TOLD + "; pauses while the brake is touched, as was asked")
+_UNKNOWN = (
+    _SEEDS
+    + _TOLD
+    + "; a touched brake is an unknown force: made after the pause had missed the first bound on these drives"
+)
+_BOUND = Terms(
+    f"Cramer-Rao bound of one drive, the grade linear over {WIDE_KNOT:g} s: by this quantity the report was first to say so"
+)
+_ERROR = "pull of the grade's prior and noise at one drive's own grade, linear problem: chosen after the bound had not said so"
+
+CRITERIA = {
+    final_mass("truck", RATE): _TRUCK,
+    UPPER: _TRUCK,
+    GRADE: _TRUCK,
+    settled("truck", RATE): _TRUCK,
+    final_mass("truck", AIDED): _TRUCK,
+    settled("truck", AIDED): _TRUCK,
+    **{
+        name: terms
+        for one in (RATE, AIDED)
+        for name, terms in (
+            (final_mass("car", pausing(one)), _PAUSE),
+            (final_mass("car", one), Terms(_UNKNOWN, final_mass("car", pausing(one)))),
+        )
+    },
+    **{
+        name: terms
+        for drive in STILL
+        for name, terms in ((bounded(drive), _BOUND), (erring(drive), Terms(_ERROR, bounded(drive))))
+    },
+}
+"""The criteria by name; those that stand beside one as it was asked follow it."""

@@ -1,0 +1,80 @@
+"""The criteria: as they were asked, and what stands beside them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, CUBATURE, PLAIN, REDESIGNED, ROBUST, STUDENT
+from jaxveh.experiments.report import Terms
+
+
+class Question(NamedTuple):
+    """A criterion of sideslip in a `case`: the contestant that was `asked` about and the one that was made `later`, over that of
+    `other`, by the ratio of medians or, with `loses`, by the share of seeds that are lost to it; at most `bound`."""
+
+    case: str
+    asked: str
+    later: str
+    other: str
+    bound: float
+    loses: bool = False
+
+
+QUESTIONS = (
+    Question("both", ADAPTIVE, REDESIGNED, PLAIN, 0.78),
+    Question("both", ADAPTIVE, REDESIGNED, CUBATURE, 0.4),
+    Question("both", ADAPTIVE, REDESIGNED, PLAIN, 0.1, loses=True),
+    Question("both", STUDENT, ROBUST, PLAIN, 0.72),
+    Question("constant", ADAPTIVE, REDESIGNED, PLAIN, 1.03),
+)
+
+NOTHING, TOLD_LENGTH, WRONG_LENGTH = (
+    "no relaxation known",
+    "told the relaxation length",
+    "told half or twice the length",
+)
+"""What all filters of a ratio know of the true tyres' relaxation."""
+
+
+class Asked(NamedTuple):
+    """A question of one `contestant`, with what all filters in it know of the relaxation length, `knows`."""
+
+    question: Question
+    contestant: str
+    knows: str
+
+    @property
+    def name(self) -> str:
+        """The criterion's name."""
+        case, *_, loses = self.question
+        how = f"loses to {self.question.other}, share of seeds" if loses else f"over {self.question.other}"
+        return f"{case}: {self.contestant} {how}; {self.knows}"
+
+
+_DRIVES = (
+    "medians of sideslip RMSE on the report's drives; filters are told steer, torques, each tyre's true stiffness and friction "
+    "(their law is another) and the data sheet's noise"
+)
+_LATER = "; made after the asked one had missed 0.78 and 0.72, window, start and tails by likelihood on drives of a third key"
+_KNOWS = {
+    NOTHING: "; no filter knows of relaxation, as in the first run",
+    TOLD_LENGTH: "; all filters are told the true length, after the first run without had missed",
+    WRONG_LENGTH: "; all filters are told half of the true length, or twice: the worse of both",
+}
+
+
+def _asked(question: Question) -> list[Asked]:
+    """As it was asked, and what stands beside it."""
+    knows = (NOTHING, WRONG_LENGTH, TOLD_LENGTH)
+    return [Asked(question, who, what) for who in (question.asked, question.later) for what in knows]
+
+
+def _terms(one: Asked, first: Asked) -> Terms:
+    later = _LATER if one.contestant == one.question.later else ""
+    return Terms(_DRIVES + _KNOWS[one.knows] + later, "" if one == first else first.name)
+
+
+ASKED = tuple(one for question in QUESTIONS for one in _asked(question))
+
+CRITERIA = {one.name: _terms(one, _asked(one.question)[0]) for one in ASKED}
+"""The criteria by name; those that stand beside one as it was asked follow it."""

@@ -1,0 +1,103 @@
+"""Criteria of every paper: each says what it rests on, what took the place of one stands beside it, README counts them."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jaxveh._core.errors import InputError
+from jaxveh.cli.reproduce import PAPERS, _experiment
+from jaxveh.experiments.report import (
+    FAILED,
+    HELD,
+    OPEN,
+    Check,
+    Tally,
+    Terms,
+    above,
+    at_least,
+    at_most,
+    number_asked,
+    stated,
+    tally,
+    undecided,
+)
+
+README = Path(__file__).parents[2] / "README.md"
+LARGE, NONE = np.float64(3.0), np.float64("nan")
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_every_criterion_says_what_it_rests_on(name):
+    criteria = _experiment(name).CRITERIA
+    assert number_asked(criteria) > 0
+    for criterion, terms in criteria.items():
+        assert criterion.strip() and len(terms.condition) > 20, criterion
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_what_took_the_place_of_another_stands_behind_it(name):
+    criteria = _experiment(name).CRITERIA
+    last = ""
+    for criterion, terms in criteria.items():
+        last = last if terms.original else criterion
+        assert terms.original in ("", last), f"{criterion} does not stand behind {terms.original}"
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_a_check_of_every_criterion_has_its_terms(name):
+    """`stated` refuses what is left out, and what has no terms."""
+    criteria = _experiment(name).CRITERIA
+    checks = stated([at_most(one, 0.0, 1.0) for one in reversed(criteria)], criteria)
+    assert [check.name for check in checks] == list(criteria)
+    assert all(Terms(check.condition, check.original) == criteria[check.name] for check in checks)
+    assert tally(checks).of == number_asked(criteria)
+    with pytest.raises(InputError, match="not looked at"):
+        stated([at_most(one, 0.0, 1.0) for one in list(criteria)[1:]], criteria)
+    with pytest.raises(InputError, match="without terms: .'more'"):
+        stated([*checks, at_most("more", 0.0, 1.0)], criteria)
+
+
+def row_of(name: str) -> list[str]:
+    """The cells of a paper's row in README's table."""
+    (line,) = (line for line in README.read_text().splitlines() if line.startswith(f"| `{name}`"))
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_readme_counts_the_criteria_that_the_code_defines(name):
+    _, count, finding, changes = row_of(name)
+    criteria = _experiment(name).CRITERIA
+    held, of, *rest = re.fullmatch(r"(\d+) of (\d+)(?: \((?:(\d+) failed)?(?:, )?(?:(\d+) open)?\))?", count).groups()
+    assert int(of) == number_asked(criteria)
+    assert int(held) + sum(int(one or 0) for one in rest) == int(of), "held, failed and open are all there are"
+    assert str(Tally(int(held), *(int(one or 0) for one in rest))) == count
+    assert finding and changes, "a row says what would change its verdict"
+
+
+def test_readme_has_a_row_for_every_paper_and_says_what_its_columns_are():
+    assert "what would change the verdict" in README.read_text()
+    assert [name for name in PAPERS if row_of(name)] == list(PAPERS)
+
+
+@pytest.mark.parametrize(("make", "value", "bound", "status"), [
+    (at_most, 1.0, 1.0, HELD), (at_most, 1.1, 1.0, FAILED), (at_most, NONE, 1.0, FAILED),
+    (above, 1.0, 1.0, FAILED), (above, LARGE, 1.0, HELD), (above, NONE, 1.0, FAILED),
+    (at_least, 1.0, 1.0, HELD), (at_least, 0.9, 1.0, FAILED), (at_least, NONE, 1.0, FAILED),
+])  # fmt: skip
+def test_a_criterion_holds_by_its_number(make, value, bound, status):
+    check = make("a", value, bound)
+    assert (check.status, check.holds) == (status, status == HELD)
+    assert not undecided(check).holds and undecided(check).status == OPEN
+
+
+def test_what_is_open_and_what_stands_beside_is_not_counted_as_held():
+    checks = [
+        Check("a", 0.5, 1.0, HELD), Check("b", 0.5, 1.0, FAILED), undecided(Check("c", 0.5, 1.0, HELD)),
+        Check("b, later", 0.5, 1.0, HELD, "later", "b"), Check("d", 0.5, 1.0, HELD),
+    ]  # fmt: skip
+    assert tally(checks) == Tally(held=2, failed=1, open=1)
+    assert tally(checks).of == 4
+    assert str(tally(checks)) == "2 of 4 (1 failed, 1 open)"
+    assert str(tally(checks[:1])) == "1 of 1"
