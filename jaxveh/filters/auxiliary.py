@@ -86,7 +86,9 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         found = ParticleBelief(moved, weights, ancestors, belief.key, row.t, row.u, belief.count + 1)
         became = fate(alive_first & alive_second, lost)
         within = _scatter(model, after, gather(residual, ancestors))
-        info = make_info(model, row, log_likelihood, residual, (belief.weights, weights), became, within)
+        info = make_info(
+            model, row, log_likelihood, residual, (belief.weights, weights), became, within, characteristic
+        )
         return found, info
 
     def _look(self, model, belief, row, u):

@@ -14,6 +14,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
+from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes, product
 from jaxveh.filters.particle import (
     SHORTEST,
@@ -61,7 +62,8 @@ class Guided(AbstractParticleFilter):
         w_{k-1} p(y | x) p(e) / q(e)
 
     `auxiliary`: ancestors are chosen by what each predicts of the measurement, too; with a linear observation this is the fully
-    adapted filter (M. Pitt & N. Shephard 1999), whose weights are all equal. It pays where the measurement is sharper than the
+    adapted filter (M. Pitt & N. Shephard 1999), whose weights are all equal (measurement noise that depends on the state is
+    taken for the proposal where the particle is without its noise). It pays where the measurement is sharper than the
     process noise; each particle costs a small Kalman update. The process noise must be Gaussian, and measurement noise have a
     covariance.
     """
@@ -128,7 +130,7 @@ class Guided(AbstractParticleFilter):
         became = fate(alive & alive_first, lost)
         within = mean_variances(model, belief.weights, proposals.variances)
         total = log_first + n + log_second
-        info = make_info(model, row, total, residual, (belief.weights, weights), became, within)
+        info = make_info(model, row, total, residual, (belief.weights, weights), became, within, moved)
         return found, info
 
 
@@ -151,7 +153,8 @@ def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: S
     image = rule.image(see, jnp.zeros(len(names), prior.matrix.dtype), prior.factor)
     given = jnp.stack([measured[name] for name in model.channels])
     innovation = wrapped_innovation(model, given - image.mean, here)
-    found = Covariance().condition(image, model.measurement_noise, model.channels, here, innovation, prior)
+    law = law_at(model, row, lambda: moved)
+    found = Covariance().condition(image, law, model.channels, here, innovation, prior)
     count = jnp.sum(here.astype(innovation.dtype))
     distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
     variances = jnp.diagonal(product(image.deviations, image.deviations, image.signs))

@@ -4,6 +4,7 @@ import abc
 from typing import Any, ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
@@ -12,8 +13,9 @@ from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
 from jaxveh.filters.gaussian.forms import AbstractForm, Spread
+from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Image
-from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace import Row, StateDependent, StateSpace
 from jaxveh.statespace.contract import (
     AbstractBelief,
     AbstractFilter,
@@ -78,6 +80,8 @@ class AbstractGaussianFilter(AbstractFilter):
 class AbstractRuleFilter(AbstractGaussianFilter):
     """A Gaussian filter by a `rule(n)` that approximates functions, and the `form` in which it keeps its covariance.
 
+    Measurement noise that depends on the state (`StateDependent`) counts with its covariance at the prediction's mean.
+
     Points are drawn anew after the prediction, so that the update sees the process noise (on linear models this is the exact
     Kalman filter).
     """
@@ -133,7 +137,8 @@ def corrected(
     given = jnp.stack([measured[name] for name in model.channels])
     innovation = wrapped_innovation(model, given - image.mean, here)
     before = Spread(belief.factor, belief.matrix)
-    found = form.condition(image, model.measurement_noise, model.channels, here, innovation, before)
+    law = law_at(model, row, lambda: belief.mean)
+    found = form.condition(image, law, model.channels, here, innovation, before)
     after = with_spread(belief, belief.vector + found.shift, found.spread, t=row.t, u=row.u, count=belief.count + 1)
     result = _result(model, row, (belief, after), image, found.innovation_factor)
     return after, innovation_info(model, row, innovation, found.white, found.innovation_factor, result)
@@ -141,7 +146,7 @@ def corrected(
 
 def check_covariances(name: str, model: StateSpace) -> None:
     """Raise `InputError` where a law of the model has no covariance."""
-    laws = {"measurement noise": model.measurement_noise, "prior": model.prior.law}
+    laws = {"measurement noise": kind_of_law(model), "prior": model.prior.law}
     if model.process_noise is not None:
         laws["process noise"] = model.process_noise.law
     for what, law in laws.items():
@@ -150,6 +155,17 @@ def check_covariances(name: str, model: StateSpace) -> None:
                 f"{name}: the {what} {type(law).__name__} has no covariance, which a Kalman filter needs. "
                 "Use a particle filter, or a Gaussian or Student-t law."
             )
+
+
+def kind_of_law(model: StateSpace) -> AbstractNoise:
+    """The law of the measurement noise; where it depends on the state, that of the prior's mean, its numbers unknown."""
+    if not isinstance(model.measurement_noise, StateDependent):
+        return model.measurement_noise
+    number = jax.ShapeDtypeStruct((), model.prior.mean[0].dtype)
+    u = record("Inputs", dict.fromkeys(model.inputs, number))
+    laws = []
+    eqx.filter_eval_shape(lambda t, u: laws.append(model.measurement_law(t, model.prior.mean, u)), number, u)
+    return laws[0]
 
 
 def check_kind(who: str, filter: Any, kind: type) -> None:

@@ -1,0 +1,136 @@
+"""Every vehicle with every set of sensors: a state space that runs, or a refusal that says what to do.
+
+Models are traced only: what a filter does with them is that of `transition`, `observation`, `report` and `prior`, in each of
+which an error would come up.
+"""
+
+import importlib.util
+import inspect
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import InputError, Recording, estimators, filters, sensors, vehicles
+from jaxveh._core.names import record
+from jaxveh.statespace import Gaussian, Heun, StateDependent
+
+
+def _vehicles_of_the_package():
+    path = Path(__file__).parents[1] / "vehicles" / "test_every_vehicle.py"
+    spec = importlib.util.spec_from_file_location("every_vehicle", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.CARS
+
+
+CARS = _vehicles_of_the_package()
+
+SENSORS = {
+    "esc": sensors.esc(),
+    "all": sensors.esc(0.005, 0.1, 0.1, 0.1, 0.1, position=(1.0, 0.2, 0.3)),
+    "low pass": sensors.esc(low_pass=sensors.LowPass(20.0)),
+    "speed": sensors.esc(None, None, 0.1, 0.1),
+    "spins": sensors.SensorSet(Gaussian({"omega_fl": 0.1})),
+    "suite": sensors.production_car(),
+}
+
+
+def start_of(car):
+    return None if "v_x" in car.inputs else {"v_x": 15.0}
+
+
+def traced(model):
+    """Shapes of a moved state, of measurements and of a report, as a filter would ask for them."""
+    dtype = model.prior.mean[0].dtype
+    number = jax.ShapeDtypeStruct((), dtype)
+    u = record("Inputs", dict.fromkeys(model.inputs, number))
+
+    def look(t, u):
+        x = model.transition(t, t + 0.01, model.prior.mean, u)
+        return x, model.observation(t, x, u), model.report(t, x, u)
+
+    return eqx.filter_eval_shape(look, number, u)
+
+
+@pytest.mark.parametrize("suite", SENSORS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.full if car.heavy else []) for n, car in CARS.items()]
+)
+def test_a_state_space_runs_or_says_what_to_do(name, suite):
+    car, chosen = CARS[name].make(), SENSORS[suite]
+    try:
+        model = estimators.state_space(car, chosen, start=start_of(car), solver=Heun())
+    except InputError as refusal:
+        text = str(refusal)
+        lacking = "sensors measure a channel the vehicle does not have" in text and "there are:" in text
+        assert lacking or (suite == "suite" and "must be a SensorSet" in text), text
+        return
+    moved, seen, shown = traced(model)
+    assert moved._fields == model.states
+    assert set(model.channels) <= set(seen._fields)
+    assert set(model.states) <= set(shown._fields)
+    assert {leaf.dtype for leaf in jax.tree.leaves((moved, seen, shown))} == {np.dtype("float64")}
+
+
+def test_the_table_has_every_vehicle_of_the_package():
+    concrete = {
+        name
+        for name in vehicles.__all__
+        if inspect.isclass(getattr(vehicles, name))
+        and issubclass(getattr(vehicles, name), vehicles.AbstractVehicle)
+        and not inspect.isabstract(getattr(vehicles, name))
+    }
+    assert concrete <= {type(car.make()).__name__ for car in CARS.values()}
+
+
+@pytest.mark.parametrize("name", [name for name, car in CARS.items() if not car.told_speed and not car.heavy])
+def test_a_car_whose_speed_is_a_state_asks_for_it(name):
+    with pytest.raises(InputError, match=r'v_x, which needs a mean: give the speed.*start=\{"v_x": 20.0\}'):
+        estimators.state_space(CARS[name].make(), sensors.esc(v_x=0.1) if CARS[name].lateral else SENSORS["speed"])
+
+
+def test_a_car_of_seven_degrees_of_freedom_is_followed():
+    """Speed and spins among the states, torques as inputs: no longer an AttributeError in `run`."""
+    car = CARS["SevenDOF"].make()
+    devices = sensors.esc(v_x=0.1)
+    model = estimators.state_space(car, devices, start={"v_x": 20.0}, steps=2)
+    assert float(model.prior.mean.omega_rr) == pytest.approx(20.0 / 0.32)
+    rows = 12
+    time = 0.01 * np.arange(rows)
+    inputs = {name: np.zeros(rows) for name in model.inputs} | {"steer": 0.02 * np.ones(rows)}
+    schedule = Recording(time, {**inputs, **{name: np.zeros(rows) for name in model.channels}})
+    rows_ = model.rows(schedule)
+
+    def drive(x, k):
+        row = jax.tree.map(lambda leaf: leaf[k], rows_)
+        seen = model.observation(row.t, x, row.u)
+        return model.transition(row.t, row.t + 0.01, x, row.u), (x, {n: getattr(seen, n) for n in model.channels})
+
+    _, (truth, seen) = jax.lax.scan(drive, model.prior.mean, jnp.arange(rows))
+    found = filters.run(filters.Extended(), model, schedule.replace(**{n: np.array(v) for n, v in seen.items()}))
+    np.testing.assert_allclose(found.mean.yaw_rate, truth.yaw_rate, atol=2e-3)
+    np.testing.assert_allclose(found.mean.v_x, truth.v_x, atol=0.02)
+    np.testing.assert_allclose(found.mean.sideslip, np.arctan2(truth.v_y, truth.v_x), atol=2e-3)
+
+
+def test_a_sensor_that_is_worse_in_slip():
+    """Noise that depends on an output of the car, with parameters of the car as states."""
+
+    def worse(system, t, x, u):
+        slip = system.outputs(t, x, u).slip_angle_front
+        return {"yaw_rate": 0.005 + 0.1 * jnp.abs(slip), "a_y": jnp.asarray(0.1, slip.dtype)}
+
+    car = vehicles.passenger_car()
+    noise = StateDependent(worse, ("yaw_rate", "a_y"))
+    model = estimators.state_space(
+        car, sensors.esc(), estimate=lambda car: (car.front.D,), measurement_noise=noise, minimum_speed=0.0
+    )
+    u = record("Inputs", {"steer": jnp.asarray(0.05), "v_x": jnp.asarray(20.0)})
+    law = model.measurement_law(jnp.asarray(0.0), model.prior.mean, u)
+    np.testing.assert_allclose(law.std.yaw_rate, 0.005 + 0.1 * 0.05, rtol=1e-2)
+    with pytest.raises(InputError, match="measurement_noise is of yaw_rate: must be of the sensors' channels"):
+        estimators.state_space(car, sensors.esc(), measurement_noise=Gaussian({"yaw_rate": 0.1}))
