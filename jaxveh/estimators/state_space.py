@@ -186,8 +186,8 @@ def _rolling(system: Instrumented, mean: Mapping):
     """The state of straight running at the speed given, nothing driving or braking."""
     if TOLD_SPEED not in mean:
         raise InputError(
-            f"start: the speed of {type(system.vehicle).__name__} is a state, v_x, which needs a mean: give the speed in the first "
-            'row, start={"v_x": 20.0} (m/s).'
+            f"start: the speed of {type(system.vehicle).__name__} is a state, v_x, which needs a mean: give the speed in the "
+            'first row, start={"v_x": 20.0} (m/s).'
         )
     zero = jnp.zeros((), _dtype(system))
     values = {name: jnp.asarray(value, zero.dtype) for name, value in mean.items()}

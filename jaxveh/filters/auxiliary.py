@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -27,7 +28,7 @@ from jaxveh.filters.particle import (
     need_key,
     without,
 )
-from jaxveh.statespace.contract import apart, presence, wrap_angle
+from jaxveh.statespace.contract import Smoothing, apart, presence, wrap_angle
 
 
 class AuxiliaryParticleFilter(AbstractParticleFilter):
@@ -40,6 +41,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
     first-stage weights stays above `threshold`, no ancestors are drawn and the step is a bootstrap step.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
     resampling: Callable = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -36,7 +36,7 @@ from jaxveh.filters.particle import (
 )
 from jaxveh.numerics import sigma_points
 from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import always, apart, presence
+from jaxveh.statespace.contract import Smoothing, always, apart, presence
 from jaxveh.statespace.noise import LOG_2PI
 
 RULES = ("extended", "unscented")
@@ -68,6 +68,7 @@ class Guided(AbstractParticleFilter):
     covariance.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
     rule: str = eqx.field(static=True, default="extended")
     auxiliary: bool = eqx.field(static=True, default=False)

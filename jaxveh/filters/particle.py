@@ -1,7 +1,7 @@
 """The bootstrap particle filter, and what every particle filter shares."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -18,6 +18,7 @@ from jaxveh.statespace.contract import (
     AbstractBelief,
     AbstractFilter,
     Info,
+    Smoothing,
     always,
     apart,
     by_channel,
@@ -270,6 +271,7 @@ class Drawn(NamedTuple):
 class ParticleFilter(AbstractParticleFilter):
     """The bootstrap particle filter (Gordon, Salmond & Smith 1993; Sarkka 2013, algorithm 7.4, the transition as proposal)."""
 
+    smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
     resampling: Callable = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)

@@ -1,6 +1,7 @@
 """What every Gaussian filter does: predict, update, and both as one step."""
 
 import abc
+import warnings
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -8,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
@@ -118,13 +119,28 @@ class AbstractRuleFilter(AbstractGaussianFilter):
         return model
 
 
+MOST_LOST = 1e-3
+"""Of what is averaged over points, the share that rounding may take before a warning."""
+
+
 def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
-    """Raise `InputError` where the form needs positive weights and the rule has others."""
+    """Raise `InputError` where the form needs positive weights and the rule has others; warn where rounding ruins them."""
     form = type(filter.form)
     if form.needs_positive and not filter.rule(len(model.states)).positive:
         raise InputError(
             f"{type(filter).__name__}: a weight is negative for {len(model.states)} states, which {form.__name__} cannot take. "
             "Use weights without (alpha = 1, kappa >= 0), or Covariance()."
+        )
+    rule, dtype = filter.rule(len(model.states)), model.prior.mean[0].dtype
+    lost = rule.amplification * float(jnp.finfo(dtype).eps)
+    if lost > MOST_LOST:
+        # Words that do not change with the numbers are shown once.
+        warnings.warn(
+            f"{type(filter).__name__}: its weights cancel each other, so that in {dtype} means are rounded to {lost:.1g} of "
+            "their size: estimates and likelihoods are wrong by more than that. Take points further out (alpha = 1, the default), or "
+            "float64.",
+            JaxvehWarning,
+            stacklevel=3,
         )
 
 

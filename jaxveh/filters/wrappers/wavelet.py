@@ -18,7 +18,7 @@ from jaxveh.filters.wrappers.base import (
     with_variances,
 )
 from jaxveh.statespace import CauchyGaussianMixture, Gaussian
-from jaxveh.statespace.contract import AbstractFilter, always, apart
+from jaxveh.statespace.contract import AbstractFilter, Smoothing, always, apart
 
 # The median of the absolute value of a standard normal number.
 MEDIAN = 0.6744897501960817
@@ -51,6 +51,7 @@ class HaarNoise(AbstractRemembering):
     from the first row on, `initial` is what that row is worth: what is believed then for no reason, a slow state keeps.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     learns_variances: ClassVar[bool] = True
     filter: AbstractGaussianFilter
     window: int = eqx.field(static=True, default=64)
