@@ -69,7 +69,7 @@ def evaluated(car, ground):
 )
 def test_loads_are_those_of_what_the_car_feels(kind, transfer, grade, bank):
     car = made(kind, transfer)
-    x, u, rates, outputs = evaluated(car, Ground(grade=np.asarray(grade), bank=np.asarray(bank)))
+    _, u, rates, outputs = evaluated(car, Ground(grade=np.asarray(grade), bank=np.asarray(bank)))
     g_x, g_y, g_z = fall(grade, bank)
     torque = sum(u._asdict().get(name, 0.0) * sign for name, sign in (("drive_torque", 1.0), ("brake_torque", -1.0)))
     if kind is vehicles.TwoTrack2DOF:

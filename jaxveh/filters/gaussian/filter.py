@@ -137,8 +137,8 @@ def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
         # Words that do not change with the numbers are shown once.
         warnings.warn(
             f"{type(filter).__name__}: its weights cancel each other, so that in {dtype} means are rounded to {lost:.1g} of "
-            "their size: estimates and likelihoods are wrong by more than that. Take points further out (alpha = 1, the default), or "
-            "float64.",
+            "their size: estimates and likelihoods are wrong by more. Take points further out (alpha = 1, the default), "
+            "or float64.",
             JaxvehWarning,
             stacklevel=3,
         )
