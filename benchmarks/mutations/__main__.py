@@ -2,13 +2,14 @@
 
 Changes one expression of filters, vehicles, tyres or sensors at random, in a copy, and runs the test files that execute its
 line until one fails. Prints what survived and the share that was killed. Results are kept, so that the same call goes on
-where it was ended; the files' coverage is measured first, once. Run it on a clean checkout whose tests pass.
+where it was ended; the files' coverage is measured first, once. Both hold for these sources alone, whose tests must pass.
 """
 
 from __future__ import annotations
 
 import argparse
 import concurrent.futures
+import hashlib
 import json
 import os
 import random
@@ -46,6 +47,9 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     options.kept.mkdir(parents=True, exist_ok=True)
     (options.kept / ".gitignore").write_text("*\n")
+    # What was found of other sources says nothing of these.
+    options.kept = options.kept / digest()
+    options.kept.mkdir(exist_ok=True)
     end = time.monotonic() + 60.0 * options.minutes
     chosen = draw(options.count, options.seed, options.only)
     with concurrent.futures.ThreadPoolExecutor(options.workers) as pool:
@@ -56,6 +60,12 @@ def main(arguments: list[str] | None = None) -> int:
     return report(chosen, results, options.kept / f"results-{options.seed}-{options.count}.json")
 
 
+def digest() -> str:
+    """A name of the package and its tests as they are."""
+    paths = [path for folder in ("jaxveh", "tests") for path in sorted((ROOT / folder).rglob("*.py"))]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()[:12]
+
+
 def environment(root: Path, kept: Path) -> dict[str, str]:
     """Tests of the package in `root`, with programs kept: most are those of the package as it is."""
     shared = os.environ.get("JAXVEH_SHARED", str(ROOT.parent / "shared"))
@@ -63,7 +73,7 @@ def environment(root: Path, kept: Path) -> dict[str, str]:
         "PYTHONPATH": str(root),
         "PYTHONDONTWRITEBYTECODE": "1",
         "JAXVEH_SHARED": shared,
-        "JAX_COMPILATION_CACHE_DIR": str(kept / "programs"),
+        "JAX_COMPILATION_CACHE_DIR": str(kept.parent / "programs"),
         "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.3",
     }
     return os.environ | more
