@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import difflib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 OPERATORS = {
@@ -104,7 +104,7 @@ def _computing(node: ast.AST) -> Iterator[ast.expr]:
                 yield from _computing(child)
 
 
-def _only_checks(name: str, more: set[str] = frozenset()) -> bool:
+def _only_checks(name: str, more: Collection[str] = ()) -> bool:
     return name.lstrip("_").startswith("check") or name in {"units", "__repr__", *more}
 
 
@@ -120,7 +120,7 @@ def _of(file: str, source: str, node: ast.expr) -> Iterator[Mutation]:
     def change(start: int, end: int, after: str, kind: str) -> Mutation:
         return Mutation(file, node.lineno, start, end, line[start:end].decode(), after, kind)
 
-    whole = lambda after, kind: change(node.col_offset, node.end_col_offset, after, kind)
+    whole = lambda after, kind: change(node.col_offset, _end(node), after, kind)
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS and not _words(node):
         sign, other = OPERATORS[type(node.op)]
         yield _between(change, line, node.left, node.right, sign, other, "operator")
@@ -142,11 +142,17 @@ def _of(file: str, source: str, node: ast.expr) -> Iterator[Mutation]:
             numbers = all(isinstance(a, ast.Name | ast.Attribute | ast.BinOp | ast.Subscript) for a in (first, second))
             named = text(first) in ("self", "model") or _called(node) in NOT_SWAPPED
             if numbers and not named and text(first) != text(second):
-                between = line[first.end_col_offset : second.col_offset].decode()
-                yield change(first.col_offset, second.end_col_offset, text(second) + between + text(first), SWAPS)
+                between = line[_end(first) : second.col_offset].decode()
+                yield change(first.col_offset, _end(second), text(second) + between + text(first), SWAPS)
         if isinstance(node.func, ast.Attribute) and node.func.attr in NAMES:
-            end = node.func.end_col_offset
+            end = _end(node.func)
             yield change(end - len(node.func.attr), end, NAMES[node.func.attr], "function")
+
+
+def _end(node: ast.expr) -> int:
+    """Behind the expression, which stands in one line."""
+    assert node.end_col_offset is not None
+    return node.end_col_offset
 
 
 def _between(change, line: bytes, left: ast.expr, right: ast.expr, sign: str, other: str, kind: str) -> Mutation:

@@ -36,9 +36,6 @@ CARS = {fidelity: (lambda fidelity=fidelity: named(fidelity)) for fidelity in ve
         lambda c: c.front, vehicles.passenger_car(), tyres.Relaxed(tyres.Linear(8e4), None, 0.4)
     ),
 }
-HEAVY = ("fourteen-dof", "roll-4dof")
-"""Which take long to trace: with one set of sensors in the default run."""
-
 SENSORS = {
     "esc": sensors.esc(),
     "all": sensors.esc(0.005, 0.1, 0.1, 0.1, 0.1, position=(1.0, 0.2, 0.3)),
@@ -66,13 +63,9 @@ def traced(model):
     return eqx.filter_eval_shape(look, number, u)
 
 
-def cases():
-    for name in CARS:
-        for suite in SENSORS:
-            yield pytest.param(name, suite, marks=pytest.mark.full if name in HEAVY and suite != "all" else [])
-
-
-@pytest.mark.parametrize(("name", "suite"), list(cases()))
+@pytest.mark.product
+@pytest.mark.parametrize("suite", SENSORS)
+@pytest.mark.parametrize("name", CARS)
 def test_a_state_space_runs_or_says_what_to_do(name, suite):
     car, chosen = CARS[name](), SENSORS[suite]
     try:
