@@ -111,3 +111,31 @@ def test_every_kind_of_load_transfer_is_here():
         if inspect.isclass(k) and issubclass(k, vehicles.AbstractLoadTransfer) and not inspect.isabstract(k)
     ]  # fmt: skip
     assert {k.__name__ for k in concrete} == set(TRANSFERS)
+
+
+@pytest.mark.parametrize(("grade", "bank"), SLOPES)
+@pytest.mark.parametrize("transfer", ["QuasiStatic", "MeasuredLoads", "LaggedLoads"])
+@pytest.mark.parametrize("kind", [vehicles.Roll3DOF, vehicles.Roll4DOF], ids=lambda k: k.__name__)
+def test_a_body_that_rolls_passes_on_what_its_roll_centres_hold(kind, transfer, grade, bank):
+    """On each axle  (K phi + C p + share a_y (m_s h_rc + m_u h_u)) / track  moves to the right wheel (W. & D. Milliken)."""
+    body = dict(
+        sprung_mass=1350.0, roll_inertia=500.0, roll_stiffness_front=40e3, roll_stiffness_rear=30e3, roll_damping_front=2e3,
+        roll_damping_rear=1.5e3, roll_centre_front=0.06, roll_centre_rear=0.14, unsprung_height=0.3,
+    )  # fmt: skip
+    tyre = tyres.Brush(80000.0, 60000.0, 1.0)
+    car = kind(**NUMBERS, **body, front=tyre, rear=tyre, load_transfer=TRANSFERS[transfer])
+    x, u, _, _ = evaluated(car, Ground())
+    x = x._replace(roll=np.asarray(0.02), roll_rate=np.asarray(-0.1))
+    ground = Ground(grade=np.asarray(grade), bank=np.asarray(bank))
+    _, outputs = car.evaluate(0.0, x, u, ground)
+    _, g_y, g_z = fall(grade, bank)
+    a_y = {"QuasiStatic": SPEED * YAW_RATE - g_y, "MeasuredLoads": MEASURED[1], "LaggedLoads": LAGGED[1]}[transfer]
+    a, b = NUMBERS["front_axle_to_cg"], NUMBERS["rear_axle_to_cg"]
+    for axle, share, wheels in (("front", b / (a + b), ("fl", "fr")), ("rear", a / (a + b), ("rl", "rr"))):
+        left, right = (float(getattr(outputs, f"load_{wheel}")) for wheel in wheels)
+        spring = body[f"roll_stiffness_{axle}"] * 0.02 - body[f"roll_damping_{axle}"] * 0.1
+        direct = share * a_y * (1350.0 * body[f"roll_centre_{axle}"] + 150.0 * 0.3)
+        expected = (spring + direct) / NUMBERS[f"track_{axle}"]
+        np.testing.assert_allclose(0.5 * (right - left), expected, rtol=5e-3, atol=0.5)
+    total = sum(float(getattr(outputs, f"load_{wheel}")) for wheel in ("fl", "fr", "rl", "rr"))
+    np.testing.assert_allclose(total, -1500.0 * g_z, rtol=1e-9)
