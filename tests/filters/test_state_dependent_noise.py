@@ -232,6 +232,7 @@ DEFAULT = ("Ensemble", "strong tracking", "federated", "guided, fully adapted")
 """Of which numbers are compared in the default run; the others are only traced there, or have tests above."""
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", [name for name in FILTERS if name not in ONE_LAW])
 def test_every_other_filter_takes_it(name):
     model, rows = batch("linear")
