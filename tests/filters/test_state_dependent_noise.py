@@ -261,7 +261,7 @@ def test_every_filter_takes_a_law_that_never_changes_for_the_law_itself(name):
 def test_a_filter_that_needs_one_law_says_so(name):
     model = linear()
     other = with_noise(model, ss.StateDependent(never_changes, ("y0", "y1")))
-    with pytest.raises(InputError, match="StateDependent"):
+    with pytest.raises(InputError, match=r"\(StateDependent\): must be one law. Take"):
         FILTERS[name].make().check(other)
 
 
@@ -284,7 +284,7 @@ def chosen_beta():
         ),
         (
             lambda m: filters.VaryingNoise(filters.Extended(), {"y0": "force"}).check(m),
-            "is StateDependent: must be Gaussian",
+            "VaryingNoise.measurement: the measurement noise of y0, y1 depends on the state",
         ),
         (
             lambda m: ss.posterior_cramer_rao(m, linear_recording(linear_model(3, 2)), jax.random.key(0), runs=2),

@@ -13,6 +13,7 @@ from jaxveh._core.names import check_names
 from jaxveh.filters.wrappers.base import check_variances_count
 from jaxveh.statespace import Continuous, Gaussian, StateSpace
 from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.process import Discrete
 
 
@@ -60,6 +61,8 @@ class VaryingNoise(AbstractFilter):
             if not isinstance(model.process_noise, Continuous | Discrete):
                 raise InputError(f"VaryingNoise: the process noise is {kind}: must be Continuous or Discrete.")
             laws.append(("process noise", model.process_noise.law))
+        if self.measurement:
+            check_fixed("VaryingNoise.measurement", model.measurement_noise, "Its function may take the input itself.")
         for what, law in laws:
             if not isinstance(law, Gaussian):
                 kind = type(law).__name__

@@ -19,6 +19,7 @@ from jaxveh.filters.wrappers.base import (
 )
 from jaxveh.statespace import CauchyGaussianMixture, Gaussian
 from jaxveh.statespace.contract import AbstractFilter, Smoothing, always, apart
+from jaxveh.statespace.dependent_noise import check_fixed
 
 # The median of the absolute value of a standard normal number.
 MEDIAN = 0.6744897501960817
@@ -109,6 +110,7 @@ class HaarParticles(AbstractFilter):
 
     def check(self, model):
         law = model.measurement_noise
+        check_fixed("HaarParticles", law, "Take the particle filter by itself.")
         if not isinstance(law, Gaussian | CauchyGaussianMixture):
             raise InputError(
                 f"HaarParticles: the measurement noise is {type(law).__name__}: must be Gaussian, a standard deviation a "
