@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.bijectors import AbstractBijector
 from jaxveh._core.errors import InputError, check_at_least
-from jaxveh._core.names import check_names, record_type
+from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import Where
 from jaxveh.sensors import Instrumented, SensorSet
 from jaxveh.statespace import (
@@ -21,6 +21,7 @@ from jaxveh.statespace import (
     Continuous,
     Gaussian,
     LinearInput,
+    MeasurementNoise,
     Prior,
     Propagate,
     StateSpace,
@@ -28,10 +29,13 @@ from jaxveh.statespace import (
 )
 from jaxveh.vehicles import AbstractVehicle
 
-PROCESS_NOISE = {"v_y": 0.1, "yaw_rate": 0.05}
-"""Default spreads of what the single track leaves out: m/s and rad/s, per root second."""
+TOLD_SPEED = "v_x"
+"""The input of a car that is told its speed, and the state of one that is not."""
 
-START_SPREAD = {"v_y": 0.2, "yaw": 0.02, "yaw_rate": 0.02}
+PROCESS_NOISE = {"v_x": 0.1, "v_y": 0.1, "yaw_rate": 0.05}
+"""Default spreads of what a car's equations leave out: m/s and rad/s, per root second."""
+
+START_SPREAD = {"v_x": 0.5, "v_y": 0.2, "yaw": 0.02, "yaw_rate": 0.02}
 """Default spreads of the start state: m/s, rad, rad/s."""
 
 
@@ -46,8 +50,9 @@ def state_space(
     process_noise: Mapping[str, float] | AbstractProcessNoise | None = None,
     start: Mapping[str, float] | None = None,
     start_spread: Mapping[str, float] | None = None,
+    measurement_noise: MeasurementNoise | None = None,
     minimum_speed: float = 2.0,
-    report: tuple[str, ...] = ("sideslip",),
+    report: tuple[str, ...] | None = None,
     solver: diffrax.AbstractSolver | None = None,
     steps: int = 1,
     input_path: str = "held",
@@ -58,26 +63,33 @@ def state_space(
       spread and `walk` their random walk's, one number or by name; see `statespace.with_parameters`.
     - `process_noise`: standard deviations by state in unit per root second (default `PROCESS_NOISE`, for the states the
       car has), or a `Continuous` or `Discrete` law. `start`, `start_spread`: mean and spread of the start state.
-    - `minimum_speed` (m/s): below it the lateral states are held (Estimate.held says where); a single track has no
-      steady slip angle at standstill.
-    - `report`: outputs of the car to show beside its states, such as `sideslip`, `F_yf`, `slip_angle_front`.
+    - A car whose speed is a state (`SevenDOF`, `TwoTrack3DOF`, ... under torques) needs `start={"v_x": ...}` (m/s), the speed
+      in the first row, and starts straight on with wheels that roll. Its wheels' spins are stiff: rows of 0.01 s take one step at
+      20 m/s, slower ones or longer rows more `steps` (the spins' poles are in the car's docstring).
+    - `measurement_noise`: another law than the sensors' own (`StateDependent`: worse in large slip, say), of their channels.
+    - `minimum_speed` (m/s): below it all states are held (`held_rows` says where) of a car whose speed is the input `v_x`: a
+      single track has no steady slip angle at standstill. One whose speed is a state is held nowhere.
+    - `report`: outputs of the car to show beside its states, such as `sideslip`, `F_yf`, `slip_angle_front`; by default the
+      sideslip of a car that has one.
     - `solver`, `steps`: fixed steps between two rows; `input_path`: inputs `held` over a step or `linear`.
 
     The estimate's fields are the states, then `report`, then the parameters (`front_B`), in physical units.
-    **Raises** `InputError` for unknown names and spreads that are not positive.
+    **Raises** `InputError` for unknown names, spreads that are not positive, sensors that are no `SensorSet` or measure what the
+    car does not have.
     """
     check_at_least("steps", steps, 1)
     check_at_least("minimum_speed", minimum_speed, 0)
+    _check_kinds(car, sensors)
     system = Instrumented(car, _without_noise(sensors))
     states = system.state_type._fields
-    _check_report(system, report)
+    transition = Propagate(_derivatives, solver or RK4(), steps)
     model = StateSpace(
         system=system,
-        transition=HeldBelow(Propagate(_derivatives, solver or RK4(), steps), minimum_speed),
+        transition=HeldBelow(transition, minimum_speed) if TOLD_SPEED in system.inputs else transition,
         observation=_observation,
-        report=ReportOutputs(tuple(report), states),
+        report=ReportOutputs(_reported(system, report), states),
         process_noise=_process_noise(process_noise, states),
-        measurement_noise=sensors.noise,
+        measurement_noise=_noise(sensors, measurement_noise),
         prior=_start(system, start or {}, start_spread or {}),
         inputs=system.inputs,
         input_path=input_path,
@@ -93,6 +105,26 @@ def _derivatives(system: Instrumented, t, x, u):
 
 def _observation(system: Instrumented, t, x, u):
     return system.observation(t, x, u)
+
+
+def _check_kinds(car, sensors) -> None:
+    if not isinstance(car, AbstractVehicle):
+        raise InputError(f"state_space: car = {type(car).__name__}: must be a vehicle of jaxveh.vehicles.")
+    if not isinstance(sensors, SensorSet):
+        raise InputError(
+            f"state_space: sensors = {type(sensors).__name__}: must be a SensorSet, which says the noise of each channel as a "
+            "filter takes it: sensors.esc(yaw_rate=0.005, a_y=0.1), or SensorSet(Gaussian({...})) with the devices' channels."
+        )
+
+
+def _noise(sensors: SensorSet, given: MeasurementNoise | None) -> MeasurementNoise:
+    if given is None:
+        return sensors.noise
+    if sorted(given.names) != sorted(sensors.channels):
+        raise InputError(
+            f"measurement_noise is of {', '.join(given.names)}: must be of the sensors' channels, {', '.join(sensors.channels)}."
+        )
+    return given
 
 
 class HeldBelow(eqx.Module):
@@ -141,10 +173,25 @@ def _start(system: Instrumented, mean: Mapping, spread: Mapping) -> Prior:
     states = system.state_type._fields
     check_names("start", mean, states)
     check_names("start_spread", spread, states)
-    means = [mean.get(name, 0.0) for name in states]
+    usual = dict.fromkeys(states, 0.0)
+    if TOLD_SPEED not in system.inputs and TOLD_SPEED in states:
+        usual = _rolling(system, mean)._asdict()
+    means = [mean.get(name, usual[name]) for name in states]
     # What is neither told nor known by name is a sensor's filter state: one unit is wide, and forgotten at once.
     spreads = {name: spread.get(name, START_SPREAD.get(name, 1.0)) for name in states}
     return Prior(system.state_type(*means), Gaussian(spreads))
+
+
+def _rolling(system: Instrumented, mean: Mapping):
+    """The state of straight running at the speed given, nothing driving or braking."""
+    if TOLD_SPEED not in mean:
+        raise InputError(
+            f"start: the speed of {type(system.vehicle).__name__} is a state, v_x, which needs a mean: give the speed in the "
+            'first row, start={"v_x": 20.0} (m/s).'
+        )
+    zero = jnp.zeros((), _dtype(system))
+    values = {name: jnp.asarray(value, zero.dtype) for name, value in mean.items()}
+    return system.start(zero, record("Inputs", dict.fromkeys(system.inputs, zero)), **values)
 
 
 def _without_noise(sensors: SensorSet) -> SensorSet:
@@ -153,13 +200,19 @@ def _without_noise(sensors: SensorSet) -> SensorSet:
     return eqx.tree_at(lambda s: s.noise.std, sensors, type(levels)(*[None] * len(levels)))
 
 
-def _check_report(system: Instrumented, report) -> None:
-    dtype = jnp.result_type(system.vehicle.mass)
-    number = jax.ShapeDtypeStruct((), dtype)
+def _dtype(system: Instrumented):
+    return jnp.result_type(*jax.tree.leaves(eqx.filter(system, eqx.is_inexact_array)))
+
+
+def _reported(system: Instrumented, report: tuple[str, ...] | None) -> tuple[str, ...]:
+    number = jax.ShapeDtypeStruct((), _dtype(system))
     state = system.state_type(*[number] * len(system.state_type._fields))
     inputs = record_type("Inputs", system.inputs)(*[number] * len(system.inputs))
     outputs = eqx.filter_eval_shape(system.outputs, number, state, inputs)
+    if report is None:
+        return tuple(name for name in ("sideslip",) if name in outputs._fields)
     check_names("report", report, outputs._fields)
+    return tuple(report)
 
 
 def held_rows(model: StateSpace, recording) -> jax.Array:

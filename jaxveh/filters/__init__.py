@@ -60,7 +60,7 @@ from jaxveh.filters.wrappers import (
     VariationalBayes,
     VaryingNoise,
 )
-from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info, Smoothing
 from jaxveh.statespace.driver import Estimate, run, scan
 
 __all__ = [
@@ -117,6 +117,7 @@ __all__ = [
     "Simplex",
     "SingularValues",
     "SmoothedEstimate",
+    "Smoothing",
     "Soft",
     "SquareRoot",
     "StrongTracking",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -27,7 +28,7 @@ from jaxveh.filters.particle import (
     need_key,
     without,
 )
-from jaxveh.statespace.contract import apart, presence, wrap_angle
+from jaxveh.statespace.contract import Smoothing, apart, presence, wrap_angle
 
 
 class AuxiliaryParticleFilter(AbstractParticleFilter):
@@ -40,6 +41,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
     first-stage weights stays above `threshold`, no ancestors are drawn and the step is a bootstrap step.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
     resampling: Callable = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
@@ -86,7 +88,9 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         found = ParticleBelief(moved, weights, ancestors, belief.key, row.t, row.u, belief.count + 1)
         became = fate(alive_first & alive_second, lost)
         within = _scatter(model, after, gather(residual, ancestors))
-        info = make_info(model, row, log_likelihood, residual, (belief.weights, weights), became, within)
+        info = make_info(
+            model, row, log_likelihood, residual, (belief.weights, weights), became, within, characteristic
+        )
         return found, info
 
     def _look(self, model, belief, row, u):

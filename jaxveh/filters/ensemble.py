@@ -13,6 +13,7 @@ from jaxveh._core.errors import check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.filter import check_covariances, innovation_info, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import masked_factor
+from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.filters.particle import add_noise, need_key
 from jaxveh.statespace import Row, StateSpace
@@ -62,7 +63,8 @@ class Ensemble(AbstractFilter):
     of J. Whitaker & T. Hamill (2002), the mean by the gain and the deviations by a smaller one, without that sampling error.
     With M channels the gain has errors of about sqrt(M / members), so that it is exact only in the limit.
 
-    Noises must have covariances. Its gradients are right: nothing is drawn from weights.
+    Noises must have covariances; of one that depends on the state that at the members' mean counts. Its gradients are right:
+    nothing is drawn from weights.
     """
 
     whitens: ClassVar[bool] = True
@@ -105,7 +107,8 @@ class Ensemble(AbstractFilter):
         predicted = jnp.where(here[:, None], jnp.stack(rows), 0)
         states = jnp.stack(belief.members)
         X, E = _deviations(states), _deviations(predicted)
-        noise = masked_factor(model.measurement_noise, model.channels, here, states.dtype)
+        law = law_at(model, row, lambda: belief.mean)
+        noise = masked_factor(law, model.channels, here, states.dtype)
         factor = numerics.cholesky(times(E, E.T) + times(noise, noise.T))
         # P H^T S^-1, as the transpose of S^-1 (E X^T).
         gain = numerics.solve_psd(factor, times(E, X.T)).T

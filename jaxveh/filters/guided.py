@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -14,6 +14,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
+from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes, product
 from jaxveh.filters.particle import (
     SHORTEST,
@@ -35,7 +36,7 @@ from jaxveh.filters.particle import (
 )
 from jaxveh.numerics import sigma_points
 from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import always, apart, presence
+from jaxveh.statespace.contract import Smoothing, always, apart, presence
 from jaxveh.statespace.noise import LOG_2PI
 
 RULES = ("extended", "unscented")
@@ -61,11 +62,13 @@ class Guided(AbstractParticleFilter):
         w_{k-1} p(y | x) p(e) / q(e)
 
     `auxiliary`: ancestors are chosen by what each predicts of the measurement, too; with a linear observation this is the fully
-    adapted filter (M. Pitt & N. Shephard 1999), whose weights are all equal. It pays where the measurement is sharper than the
+    adapted filter (M. Pitt & N. Shephard 1999), whose weights are all equal (measurement noise that depends on the state is
+    taken for the proposal where the particle is without its noise). It pays where the measurement is sharper than the
     process noise; each particle costs a small Kalman update. The process noise must be Gaussian, and measurement noise have a
     covariance.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
     rule: str = eqx.field(static=True, default="extended")
     auxiliary: bool = eqx.field(static=True, default=False)
@@ -128,7 +131,7 @@ class Guided(AbstractParticleFilter):
         became = fate(alive & alive_first, lost)
         within = mean_variances(model, belief.weights, proposals.variances)
         total = log_first + n + log_second
-        info = make_info(model, row, total, residual, (belief.weights, weights), became, within)
+        info = make_info(model, row, total, residual, (belief.weights, weights), became, within, moved)
         return found, info
 
 
@@ -151,7 +154,8 @@ def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: S
     image = rule.image(see, jnp.zeros(len(names), prior.matrix.dtype), prior.factor)
     given = jnp.stack([measured[name] for name in model.channels])
     innovation = wrapped_innovation(model, given - image.mean, here)
-    found = Covariance().condition(image, model.measurement_noise, model.channels, here, innovation, prior)
+    law = law_at(model, row, lambda: moved)
+    found = Covariance().condition(image, law, model.channels, here, innovation, prior)
     count = jnp.sum(here.astype(innovation.dtype))
     distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
     variances = jnp.diagonal(product(image.deviations, image.deviations, image.signs))

@@ -34,6 +34,7 @@ from jaxveh.filters.particle import (
 )
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import AbstractBelief, always, apart, presence
+from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.noise import LOG_2PI
 
 
@@ -132,6 +133,7 @@ class Marginalised(AbstractParticleFilter):
     def check(self, model):
         check_names("Marginalised.linear", self.linear, model.states)
         check_covariances("Marginalised", model)
+        check_fixed("Marginalised", model.measurement_noise, "Take Guided or ParticleFilter.")
         check_gaussian("Marginalised", "measurement noise", model.measurement_noise)
         check_gaussian("Marginalised", "prior", model.prior.law)
         if model.process_noise is None:

@@ -1,7 +1,7 @@
 """The bootstrap particle filter, and what every particle filter shares."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -12,12 +12,13 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import Soft, Transport, log_of, score
-from jaxveh.statespace import StateSpace
+from jaxveh.statespace import StateDependent, StateSpace
 from jaxveh.statespace.contract import (
     KEPT,
     AbstractBelief,
     AbstractFilter,
     Info,
+    Smoothing,
     always,
     apart,
     by_channel,
@@ -137,8 +138,12 @@ def log_prob(model: StateSpace, row, particles, measured, present):
     residual = {name: measured[name] - predicted[name] for name in model.channels}
     for name in model.angles:
         residual[name] = wrap_angle(residual[name])
-    logs = jnp.broadcast_to(model.measurement_noise.log_prob(residual, present), (n,))
-    return numerics.barrier(logs), residual
+    if isinstance(model.measurement_noise, StateDependent):
+        of = lambda x, r: model.measurement_law(row.t, x, row.u).log_prob(r, present)
+        logs = jax.vmap(of)(particles, residual)
+    else:
+        logs = model.measurement_noise.log_prob(residual, present)
+    return numerics.barrier(jnp.broadcast_to(logs, (n,))), residual
 
 
 def add_noise(model: StateSpace, key, particles, dt):
@@ -203,9 +208,28 @@ def start_particles(filter_, model, row, key):
     return particles, key
 
 
-def make_info(model, row, log_likelihood, residual, weights, became, within=None):
+def noise_variances(model, row, particles, weights):
+    """Variances (m,) of the measurement noise in the order of the channels, NaN of a law that has none; where it depends on the
+    state, their weighted mean over the particles."""
+    if not isinstance(model.measurement_noise, StateDependent):
+        return _variances(model.measurement_noise, weights.dtype)
+
+    def at(x):
+        law = model.measurement_law(row.t, x, row.u)
+        found = dict(zip(law.names, _variances(law, weights.dtype), strict=True))
+        return jnp.stack([found[name] for name in model.channels])
+
+    return weights @ jax.vmap(at)(particles)
+
+
+def _variances(law, dtype):
+    return jnp.diagonal(law.covariance()) if law.has_covariance else jnp.full((len(law.names),), jnp.nan, dtype)
+
+
+def make_info(model, row, log_likelihood, residual, weights, became, within=None, particles=None):
     """The info of one step; `weights`: those of the prediction, whose residuals are given, and those after the row; `became`:
-    its result code where the input is right; `within`: the variance by channel that the residuals lack, but for R."""
+    its result code where the input is right; `within`: the variance by channel that the residuals lack, but for R; `particles`
+    of the prediction, which noise that depends on the state is of."""
     before, after = weights
     # A particle that shows nothing finite has no say.
     known = jnp.isfinite(sum(residual[name] for name in model.channels))
@@ -216,11 +240,8 @@ def make_info(model, row, log_likelihood, residual, weights, became, within=None
     spread = {name: numerics.total(before * (residual[name] - mean[name]) ** 2) * whole for name in model.channels}
     if within is not None:
         spread = {name: spread[name] + within[name] for name in model.channels}
-    law = model.measurement_noise
-    noise = (
-        jnp.diagonal(law.covariance()) if law.has_covariance else jnp.full((len(model.channels),), jnp.nan, after.dtype)
-    )
-    std = [numerics.sqrt(spread[name] + noise[i]) for i, name in enumerate(law.names)]
+    noise = noise_variances(model, row, particles, before * whole)
+    std = [numerics.sqrt(spread[name] + noise[i]) for i, name in enumerate(model.channels)]
     result = input_result(model, row)
     dtype = after.dtype
     _, present = presence(model, row)
@@ -250,6 +271,7 @@ class Drawn(NamedTuple):
 class ParticleFilter(AbstractParticleFilter):
     """The bootstrap particle filter (Gordon, Salmond & Smith 1993; Sarkka 2013, algorithm 7.4, the transition as proposal)."""
 
+    smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
     resampling: Callable = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
@@ -307,7 +329,8 @@ class ParticleFilter(AbstractParticleFilter):
         # normalise gives the log of the mean over N of what sums to the likelihood.
         log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
         became = fate(alive, lost)
-        return belief, make_info(model, row, log_likelihood, residual, (drawn.weights, weights), became)
+        about = (drawn.weights, weights)
+        return belief, make_info(model, row, log_likelihood, residual, about, became, particles=particles)
 
 
 def need_key(filter_, key):

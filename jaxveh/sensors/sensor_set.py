@@ -6,6 +6,7 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_finite
 from jaxveh._core.names import check_names, record_type
@@ -72,8 +73,9 @@ class SensorSet(eqx.Module):
     def feel(self, outputs: Any) -> Any:
         """What reaches the sensors: a NamedTuple by channel, before low-pass and noise.
 
-        `outputs` has the channels' names as attributes, and yaw_rate and yaw_acceleration where accelerations are
-        measured; of a car that leans a_x, a_y, yaw_rate and yaw_acceleration wherever one of `rigid_body.INERTIAL` is.
+        `outputs` has the channels' names as attributes; yaw_rate and yaw_acceleration count where accelerations are measured,
+        as zero where a car (`Longitudinal`, `Kinematic`) does not say them. Of a car that leans a_x, a_y, yaw_rate and
+        yaw_acceleration are needed wherever one of `rigid_body.INERTIAL` is measured.
         """
         check_names("sensors measure a channel the vehicle does not have", self.channels, outputs._fields)
         leans = {"roll", "pitch"} & set(outputs._fields) and set(INERTIAL) & set(self.channels)
@@ -104,11 +106,14 @@ class SensorSet(eqx.Module):
 
     def _at_position(self, channel: str, outputs: Any):
         value = getattr(outputs, channel)
+        if channel not in ("a_x", "a_y"):
+            return value
+        # A car without these goes straight, or turns as steadily as its inputs are held.
+        zero = jnp.zeros_like(value)
+        turns, gains = getattr(outputs, "yaw_rate", zero) ** 2, getattr(outputs, "yaw_acceleration", zero)
         if channel == "a_x":
-            return value - outputs.yaw_acceleration * self.position.y - outputs.yaw_rate**2 * self.position.x
-        if channel == "a_y":
-            return value + outputs.yaw_acceleration * self.position.x - outputs.yaw_rate**2 * self.position.y
-        return value
+            return value - gains * self.position.y - turns * self.position.x
+        return value + gains * self.position.x - turns * self.position.y
 
 
 def esc(

@@ -1,6 +1,7 @@
 """The one contract that a filter sees: models by name, noise laws, discretisation, chosen parameters as states."""
 
 from jaxveh.statespace.cramer_rao import PosteriorBound, posterior_cramer_rao
+from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.disturbances import with_disturbances
 from jaxveh.statespace.draw import Drawn, draw
 from jaxveh.statespace.driver import Estimate, run, scan
@@ -31,6 +32,7 @@ __all__ = [
     "Heun",
     "Independent",
     "LinearInput",
+    "MeasurementNoise",
     "MultivariateGaussian",
     "PerPoint",
     "PosteriorBound",
@@ -38,6 +40,7 @@ __all__ = [
     "Propagate",
     "RolledRK4",
     "Row",
+    "StateDependent",
     "StateSpace",
     "StudentT",
     "cast",

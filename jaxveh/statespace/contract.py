@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import enum
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
@@ -67,6 +68,16 @@ class AbstractBelief(eqx.Module):
         return InputError(f"{type(self).__name__} has no {what} of the state: take a filter whose belief has one.")
 
 
+class Smoothing(enum.Enum):
+    """How a filter can be smoothed: `none`; `gaussian`, by the steps back of Rauch, Tung & Striebel, since it predicts by the
+    transition and the process noise of its `adapted` model, through the rule inside all wrappers, and nothing else; `particles`,
+    by ancestors or backward sampling, since its weighted particles are all that it knows of a row."""
+
+    none = "none"
+    gaussian = "gaussian"
+    particles = "particles"
+
+
 class AbstractFilter(eqx.Module):
     """The contract of every filter.
 
@@ -74,10 +85,12 @@ class AbstractFilter(eqx.Module):
     measurement, without propagation. `step(model, belief, row) -> (belief, info)` propagates with the inputs of the
     previous row over the time between, then applies the row's measurement with its own inputs. Both return the
     info of their row, so that the log-likelihoods add up to that of all measurements. `whitens`: whether its infos carry
-    whitened innovations.
+    whitened innovations. `smooths`: how it can be smoothed, which each class declares for itself: what predicts otherwise
+    than the class it comes from would be smoothed wrongly without a word, so that this is not inherited (`smoothing_of`).
     """
 
     whitens: ClassVar[bool] = False
+    smooths: ClassVar[Smoothing] = Smoothing.none
 
     @abc.abstractmethod
     def check(self, model: StateSpace) -> None:
@@ -90,6 +103,28 @@ class AbstractFilter(eqx.Module):
     @abc.abstractmethod
     def step(self, model: StateSpace, belief: AbstractBelief, row: Row) -> tuple[AbstractBelief, Info]:
         """The belief after the next row."""
+
+
+def smoothing_of(filter: Any) -> Smoothing:
+    """How a filter can be smoothed: as its own class declares, and the filter inside, if it is a wrapper, allows."""
+    own = vars(type(filter)).get("smooths", Smoothing.none)
+    inside = getattr(filter, "filter", None)
+    return own if inside is None or smoothing_of(inside) is own else Smoothing.none
+
+
+def check_smooths(who: str, filter: Any) -> Smoothing:
+    """How the filter can be smoothed, or an `InputError` that says which one cannot."""
+    kind = smoothing_of(filter)
+    if kind is not Smoothing.none:
+        return kind
+    while vars(type(filter)).get("smooths", Smoothing.none) is not Smoothing.none:
+        filter = filter.filter
+    name = type(filter).__name__
+    raise InputError(
+        f"{who}: {name} has no smoother: its class does not declare one (`smooths`, which is not inherited). Take a Gaussian "
+        "filter or a particle filter that does; a filter of your own declares smooths = Smoothing.gaussian where it predicts as "
+        "the filter inside."
+    )
 
 
 @eqx.filter_jit

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import check_names, record_type
+from jaxveh.statespace.dependent_noise import around
 from jaxveh.statespace.model import Prior, StateSpace
 from jaxveh.statespace.noise import Gaussian, combine
 from jaxveh.statespace.process import Continuous, join
@@ -63,6 +64,17 @@ class DisturbedObservation(eqx.Module):
         for name, channel in self.disturbances.felt:
             found = found._replace(**{channel: getattr(found, channel) + rates[name]})
         return found
+
+
+class DisturbedNoise(eqx.Module):
+    """The law of the model's own state: a disturbance is no noise of a sensor."""
+
+    function: Callable = eqx.field(static=True)
+    disturbances: Disturbances = eqx.field(static=True)
+    state_type: Any = eqx.field(static=True)
+
+    def __call__(self, system, t, x, u):
+        return self.function(system, t, self.disturbances.split(x, self.state_type)[0], u)
 
 
 class DisturbedReport(eqx.Module):
@@ -119,7 +131,7 @@ def with_disturbances(
         observation=wrap(DisturbedObservation, model.observation_function),
         report=None if report is None else wrap(DisturbedReport, report),
         process_noise=join(model.process_noise, walking),
-        measurement_noise=model.measurement_noise,
+        measurement_noise=around(model.measurement_noise, lambda law: wrap(DisturbedNoise, law)),
         prior=Prior(joint(*model.prior.mean, *[scalar(0.0)] * len(prior)), law),
         inputs=model.inputs,
         angles=model.angles,

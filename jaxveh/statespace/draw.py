@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxveh._core.names import record
 from jaxveh._core.recording import TRUTH, Recording
+from jaxveh.statespace.dependent_noise import StateDependent
 from jaxveh.statespace.model import Row, StateSpace
 
 
@@ -66,12 +67,21 @@ def draw_rows(model: StateSpace, rows: Row, key) -> tuple[Any, Row]:
     _, rest = jax.lax.scan(move, first, ((before, after), counts))
     states = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), first, rest)
     seen = jax.vmap(model.observation)(rows.t, states, rows.u)
-    error = model.measurement_noise.sample(measurement_key, rows.t.shape)
+    error = _errors(model, rows, states, measurement_key)
     made = {}
     for name in model.channels:
         given = getattr(rows.y, name)
         made[name] = jnp.where(jnp.isfinite(given), getattr(seen, name) + error[name], jnp.nan)
     return states, rows._replace(y=record("Measurements", made))
+
+
+def _errors(model: StateSpace, rows: Row, states: Any, key) -> dict:
+    """Draws of the measurement noise in every row, (T,) by channel."""
+    noise = model.measurement_noise
+    if not isinstance(noise, StateDependent):
+        return noise.sample(key, rows.t.shape)
+    draw = lambda key, t, x, u: model.measurement_law(t, x, u).sample(key)
+    return jax.vmap(draw)(jax.random.split(key, rows.t.shape[0]), rows.t, states, rows.u)
 
 
 def moved(model: StateSpace, t0, t1, x, u):

@@ -13,6 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, float_array, is_concrete
 from jaxveh._core.names import check_names, record
 from jaxveh._core.recording import Recording
+from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
 from jaxveh.statespace.process import AbstractProcessNoise
 
@@ -75,7 +76,7 @@ class StateSpace(eqx.Module):
     - `transition(system, t0, t1, x, u) -> x`: the state at `t1` without noise. `observation(system, t, x, u) -> y`: what the
       sensors would say without noise, a NamedTuple whose fields include every channel of `measurement_noise`.
     - `process_noise`: `Continuous(law)`, `Discrete(law)` or None; `measurement_noise`: a law whose names are the measured
-      channels; `prior`: the belief before the first measurement.
+      channels, or `StateDependent(function, channels)`; `prior`: the belief before the first measurement.
     - `inputs`: the recording's channels that `u` carries. `input_path`: `"held"` (u of the step's first row throughout)
       or `"linear"` (the transition gets a `LinearInput`, which `Propagate` evaluates along the step).
     - `report(system, t, x, u) -> NamedTuple`: the quantities an Estimate shows (means and spreads); default the state.
@@ -88,7 +89,7 @@ class StateSpace(eqx.Module):
 
     system: Any
     process_noise: AbstractProcessNoise | None
-    measurement_noise: AbstractNoise
+    measurement_noise: MeasurementNoise
     prior: Prior
     transition_function: Callable = eqx.field(static=True)
     observation_function: Callable = eqx.field(static=True)
@@ -104,7 +105,7 @@ class StateSpace(eqx.Module):
         transition: Callable,
         observation: Callable,
         process_noise: AbstractProcessNoise | None,
-        measurement_noise: AbstractNoise | Mapping,
+        measurement_noise: MeasurementNoise | Mapping,
         prior: Prior,
         system: Any = None,
         inputs: tuple[str, ...] = (),
@@ -117,7 +118,7 @@ class StateSpace(eqx.Module):
         self.transition_function, self.observation_function, self.report_function = transition, observation, report
         self.process_noise = process_noise
         law = measurement_noise
-        self.measurement_noise = law if isinstance(law, AbstractNoise) else Gaussian(law)
+        self.measurement_noise = law if isinstance(law, AbstractNoise | StateDependent) else Gaussian(law)
         self.prior = prior
         self.inputs, self.angles, self.input_path = tuple(inputs), tuple(angles), input_path
         self.chosen = chosen
@@ -191,6 +192,11 @@ class StateSpace(eqx.Module):
                 f"measurement noise ({', '.join(self.channels)})."
             )
         return seen
+
+    def measurement_law(self, t, x, u) -> AbstractNoise:
+        """The law of the measurement noise at one state (a NamedTuple of scalars)."""
+        noise = self.measurement_noise
+        return noise.at(self.system, t, x, u) if isinstance(noise, StateDependent) else noise
 
     def report(self, t, x, u):
         """What an Estimate shows of a state (or of a batch of states), in physical units."""

@@ -309,7 +309,15 @@ class Independent(AbstractNoise):
 
 
 def whiten(law: AbstractNoise, residual: Mapping, present: Mapping) -> dict[str, jax.Array]:
-    """Residuals as independent numbers of unit variance, by the law's covariance; zero where absent (batches broadcast)."""
+    """Residuals as independent numbers of unit variance, by the law's covariance; zero where absent (batches broadcast).
+
+    **Raises** `InputError` for what is no law by itself, as `StateDependent` noise.
+    """
+    if not isinstance(law, AbstractNoise):
+        raise InputError(
+            f"residuals are weighed by one law, and {type(law).__name__} has another for each state. "
+            "Take a filter's likelihood (fitting.maximum_likelihood), or one law."
+        )
     if isinstance(law, Independent):
         return {name: value for part in law.laws for name, value in whiten(part, residual, present).items()}
     flat, shape = _flatten_batch(law.names, residual, present)

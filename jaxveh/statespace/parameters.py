@@ -12,6 +12,7 @@ from jaxveh._core.bijectors import AbstractBijector
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_spread, put, resolve, share_of, view
+from jaxveh.statespace.dependent_noise import around
 from jaxveh.statespace.model import Prior, StateSpace
 from jaxveh.statespace.noise import Gaussian, Independent
 from jaxveh.statespace.process import Continuous, join
@@ -65,7 +66,7 @@ class JointTransition(eqx.Module):
 
 
 class JointObservation(eqx.Module):
-    """Observes the model's own state with the parameters of the joint state."""
+    """Observes the model's own state, or says its noise, with the parameters of the joint state."""
 
     function: Callable = eqx.field(static=True)
     chosen: Chosen = eqx.field(static=True)
@@ -134,7 +135,7 @@ def with_parameters(
         observation=JointObservation(model.observation_function, chosen),
         report=JointReport(model.report_function, chosen),
         process_noise=join(model.process_noise, _walk(parameters, values, walk)),
-        measurement_noise=model.measurement_noise,
+        measurement_noise=around(model.measurement_noise, lambda law: JointObservation(law, chosen)),
         prior=Prior(chosen.joint_type(*model.prior.mean, *starts), law),
         inputs=model.inputs,
         angles=model.angles,

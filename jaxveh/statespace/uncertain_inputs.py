@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import check_names, record_type
+from jaxveh.statespace.dependent_noise import around
 from jaxveh.statespace.model import LinearInput, Prior, StateSpace
 from jaxveh.statespace.noise import Gaussian, combine
 from jaxveh.statespace.process import AbstractProcessNoise, join
@@ -49,7 +50,7 @@ def uncertain_inputs(
         transition=Moved(model.transition_function, errors),
         observation=Observed(model.observation_function, errors),
         process_noise=join(model.process_noise, Wandering(spreads, errors.times)),
-        measurement_noise=model.measurement_noise,
+        measurement_noise=around(model.measurement_noise, lambda law: Observed(law, errors)),
         prior=Prior(mean, combine(model.prior.law, spreads)),
         inputs=model.inputs,
         report=None if model.report_function is None else Observed(model.report_function, errors),
@@ -96,7 +97,7 @@ class Moved(eqx.Module):
 
 
 class Observed(eqx.Module):
-    """What the sensors say, or a report shows, of the model's own state with inputs that are off by the errors."""
+    """What the sensors say, their noise law, or a report, of the model's own state with inputs that are off by the errors."""
 
     function: Callable = eqx.field(static=True)
     errors: Errors = eqx.field(static=True)

@@ -182,3 +182,33 @@ def test_a_touched_brake_is_an_unknown_force():
     error = lambda drive: abs(float(run(drive).mass[-1]) / study.mass - 1.0)
     told, untold = error(drive), error(drive._replace(braking=zero))
     assert told < 0.02 and untold > 3.0 * told
+
+
+EVERY = list(contestants(SMALL))
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[] if n in ("UKF", "accelerometer", "RLS") else pytest.mark.full) for n in EVERY]
+)
+def test_no_contestant_looks_ahead(name):
+    """What comes after a row, a touch of the brake in the very next one too, changes nothing up to it."""
+    study = dataclasses.replace(SMALL, touches=1)
+    rows, last = 61, 40
+    rng = np.random.default_rng(1)
+    t = study.dt * np.arange(rows)
+    torque = 3000.0 + 1500.0 * np.sin(2 * np.pi * t / 4.0)
+    v = 10.0 + 0.3 * t + rng.normal(0.0, study.v_x, rows)
+    numbers = [v, 0.3 + 0.01 * rng.normal(size=rows), torque, np.zeros(rows), v, np.zeros(rows), np.zeros(rows)]
+    drive = own_drives.Drive(*[jnp.asarray(values) for values in numbers])
+    later = np.arange(rows) > last
+    other = drive._replace(
+        v_x=jnp.where(later, 5.0, drive.v_x),
+        a_x=jnp.where(later, -3.0, drive.a_x),
+        braking=jnp.asarray(later.astype(float)),
+        torque=jnp.where(later, 0.0, drive.torque),
+    )
+    run = jax.jit(lambda drive: contestants(study)[name].run(study, jnp.asarray(4000.0), drive))
+    found, changed = run(drive), run(other)
+    assert not np.allclose(found.mass[last + 1 :], changed.mass[last + 1 :], rtol=1e-6) or name == "first guess"
+    np.testing.assert_allclose(changed.mass[: last + 1], found.mass[: last + 1], rtol=1e-9)
+    np.testing.assert_allclose(changed.grade[: last + 1], found.grade[: last + 1], atol=1e-9)

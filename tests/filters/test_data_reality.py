@@ -155,6 +155,15 @@ class TestVaryingNoise:
         plain = filters.run(filters.Kalman(), model, recording)
         np.testing.assert_allclose(found.mean.x1[:13], plain.mean.x1[:13], rtol=1e-12)
         assert float(found.std.x1[13]) > 1.2 * float(plain.std.x1[13])
+        # Told of the time behind it, the row itself is the first to know.
+        behind = filters.run(
+            filters.VaryingNoise(filter_.filter, process={"x1": "told"}, process_of="after"), model, recording
+        )
+        np.testing.assert_allclose(behind.mean.x1[:12], plain.mean.x1[:12], rtol=1e-12)
+        moved = filters.run(filter_, model, recording.replace(told=np.append(stds[1:], 0.3)))
+        np.testing.assert_allclose(behind.std.x1, moved.std.x1, rtol=1e-12)
+        with pytest.raises(InputError, match="process_of = 'later': must be one of 'before', 'after'"):
+            filters.VaryingNoise(filters.Kalman(), process={"x1": "told"}, process_of="later")
 
     def test_a_number_that_is_no_spread_is_a_code(self):
         stds = np.full(30, 0.4)

@@ -158,13 +158,13 @@ def _scaled(scale):
         ),
         (
             lambda: filters.smooth(filters.Ensemble(10), MODEL, RECORDING, key=jax.random.key(0)),
-            "Ensemble has no smoother",
+            "smooth: Ensemble has no smoother",
         ),
         (lambda: filters.smooth(filters.ParticleFilter(10), MODEL, RECORDING), "give it a key"),
         (lambda: filters.smooth_parallel(filters.Cubature(), MODEL, RECORDING), r"must be Kalman\(\) or Iterated"),
         (lambda: filters.BackwardSampling(1), "trajectories = 1"),
         (lambda: filters.FixedLag(filters.Kalman(), 0), "lag = 0"),
-        (lambda: filters.FixedLag(filters.Ensemble(10), 2), "Ensemble has no fixed-lag smoother"),
+        (lambda: filters.FixedLag(filters.Ensemble(10), 2), "FixedLag: Ensemble has no smoother"),
         (
             lambda: filters.smooth(
                 filters.ParticleFilter(10, filters.Transport()), MODEL, RECORDING, key=KEY, method=filters.Genealogy()

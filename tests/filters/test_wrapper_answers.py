@@ -227,7 +227,7 @@ def test_smoothers_of_what_they_would_get_wrong_are_refused():
     base, _, recording, _ = faulty(20)
     key = jax.random.key(0)
     for what, filter_ in (
-        ("Marginalised keeps Gaussians", filters.Marginalised(20, ("x2",))),
+        ("Marginalised has no smoother", filters.Marginalised(20, ("x2",))),
         ("StrongTracking has no", filters.StrongTracking(filters.Kalman())),
         ("HInfinity has no", filters.HInfinity(filters.Kalman(), 0.1, {"x0": 1.0})),
         ("Consider has no", filters.Consider(filters.Kalman(), ("x1",))),

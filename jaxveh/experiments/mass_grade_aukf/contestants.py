@@ -79,16 +79,17 @@ def _filtered(filter_, model: StateSpace, study: Study, drive: Drive, waits: boo
     """A filter over the drive. While the brake is touched it `waits`, as the paper has it, or takes the brake's force for an
     unknown one: then the speed is free for a while, and the grade goes on as it went."""
     time = times(study, drive.v_x.shape[0])
-    # A touch begins between two rows.
-    touched = (drive.braking > 0.5) | (jnp.pad(drive.braking[1:], (0, 1)) > 0.5)
+    now = drive.braking > 0.5
+    # A touch begins and ends between two rows: where either end of a step is braked, its force is unknown.
+    touched = now | jnp.pad(now[:-1], (1, 0))
     force = jnp.where(touched, FORCE_OF_A_TOUCH, study.speed_noise)
     values = drive._asdict()
     if study.touches and waits:
         filter_ = filters.Paused(filter_, "braking", {"v_x": 20.0, "grade": 0.01})
     elif study.touches:
-        filter_ = filters.VaryingNoise(filter_, process={"v_x": "unknown_force"})
+        filter_ = filters.VaryingNoise(filter_, process={"v_x": "unknown_force"}, process_of="after")
         # The accelerometer feels that force, too.
-        values["a_x"] = jnp.where(touched, jnp.nan, drive.a_x)
+        values["a_x"] = jnp.where(now, jnp.nan, drive.a_x)
     u = record_type("Inputs", model.inputs)(drive.torque, jnp.zeros_like(drive.torque), drive.braking, force)
     y = record_type("Measurements", model.channels)(*[values[name] for name in model.channels])
     estimate = filters.scan(filter_, model, Row(time, u, y))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import ClassVar
 
 import equinox as eqx
 
@@ -11,6 +12,7 @@ from jaxveh.filters.gaussian.forms import AbstractForm, Covariance
 from jaxveh.filters.gaussian.linear import check_linear
 from jaxveh.filters.gaussian.rules import Points, Slopes
 from jaxveh.numerics import sigma_points
+from jaxveh.statespace.contract import Smoothing
 
 
 class Kalman(AbstractRuleFilter):
@@ -19,6 +21,7 @@ class Kalman(AbstractRuleFilter):
     A model that is not linear raises `InputError`: take `Extended`, which linearises.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     form: AbstractForm = Covariance()
 
     def rule(self, n):
@@ -32,6 +35,7 @@ class Kalman(AbstractRuleFilter):
 class Extended(AbstractRuleFilter):
     """The extended Kalman filter of first order, by slopes at the mean (Sarkka 2013, sec. 5.2)."""
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     form: AbstractForm = Covariance()
 
     def rule(self, n):
@@ -44,6 +48,7 @@ class Unscented(AbstractRuleFilter):
     `alpha`, `beta`, `kappa` as in `numerics.sigma_points.unscented`; Julier & Uhlmann's first weights are alpha = 1, beta = 0.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     alpha: float = eqx.field(static=True, default=1.0)
     beta: float = eqx.field(static=True, default=2.0)
     kappa: float = eqx.field(static=True, default=0.0)
@@ -56,6 +61,7 @@ class Unscented(AbstractRuleFilter):
 class Simplex(AbstractRuleFilter):
     """The unscented filter with the fewest points: n+2 on a spherical simplex, one of them central (S. Julier 2003)."""
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     central: float = eqx.field(static=True, default=0.0)
     form: AbstractForm = Covariance()
 
@@ -66,6 +72,7 @@ class Simplex(AbstractRuleFilter):
 class Cubature(AbstractRuleFilter):
     """The cubature Kalman filter of `degree` 3 (2n points) or 5 (2n^2+1) (Arasaratnam & Haykin 2009; Jia, Xin & Cheng 2013)."""
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     degree: int = eqx.field(static=True, default=3)
     form: AbstractForm = Covariance()
 
@@ -76,6 +83,7 @@ class Cubature(AbstractRuleFilter):
 class GaussHermite(AbstractRuleFilter):
     """The Gauss-Hermite Kalman filter with `order` points an axis, order^n in all (Ito & Xiong 2000; Sarkka 2013, sec. 6.3)."""
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     order: int = eqx.field(static=True, default=3)
     form: AbstractForm = Covariance()
 
@@ -86,6 +94,7 @@ class GaussHermite(AbstractRuleFilter):
 class SigmaPointFilter(AbstractRuleFilter):
     """A filter by points of one's own: `points(n)` makes the `numerics.SigmaPoints` for n states."""
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     points: Callable[[int], sigma_points.SigmaPoints] = eqx.field(static=True)
     form: AbstractForm = Covariance()
 

@@ -1,19 +1,22 @@
 """What every Gaussian filter does: predict, update, and both as one step."""
 
 import abc
+import warnings
 from typing import Any, ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh._core.names import record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
 from jaxveh.filters.gaussian.forms import AbstractForm, Spread
+from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Image
-from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace import Row, StateDependent, StateSpace
 from jaxveh.statespace.contract import (
     AbstractBelief,
     AbstractFilter,
@@ -78,6 +81,8 @@ class AbstractGaussianFilter(AbstractFilter):
 class AbstractRuleFilter(AbstractGaussianFilter):
     """A Gaussian filter by a `rule(n)` that approximates functions, and the `form` in which it keeps its covariance.
 
+    Measurement noise that depends on the state (`StateDependent`) counts with its covariance at the prediction's mean.
+
     Points are drawn anew after the prediction, so that the update sees the process noise (on linear models this is the exact
     Kalman filter).
     """
@@ -114,13 +119,28 @@ class AbstractRuleFilter(AbstractGaussianFilter):
         return model
 
 
+MOST_LOST = 1e-3
+"""Of what is averaged over points, the share that rounding may take before a warning."""
+
+
 def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
-    """Raise `InputError` where the form needs positive weights and the rule has others."""
+    """Raise `InputError` where the form needs positive weights and the rule has others; warn where rounding ruins them."""
     form = type(filter.form)
     if form.needs_positive and not filter.rule(len(model.states)).positive:
         raise InputError(
             f"{type(filter).__name__}: a weight is negative for {len(model.states)} states, which {form.__name__} cannot take. "
             "Use weights without (alpha = 1, kappa >= 0), or Covariance()."
+        )
+    rule, dtype = filter.rule(len(model.states)), model.prior.mean[0].dtype
+    lost = rule.amplification * float(jnp.finfo(dtype).eps)
+    if lost > MOST_LOST:
+        # Words that do not change with the numbers are shown once.
+        warnings.warn(
+            f"{type(filter).__name__}: its weights cancel each other, so that in {dtype} means are rounded to {lost:.1g} of "
+            "their size: estimates and likelihoods are wrong by more. Take points further out (alpha = 1, the default), "
+            "or float64.",
+            JaxvehWarning,
+            stacklevel=3,
         )
 
 
@@ -133,7 +153,8 @@ def corrected(
     given = jnp.stack([measured[name] for name in model.channels])
     innovation = wrapped_innovation(model, given - image.mean, here)
     before = Spread(belief.factor, belief.matrix)
-    found = form.condition(image, model.measurement_noise, model.channels, here, innovation, before)
+    law = law_at(model, row, lambda: belief.mean)
+    found = form.condition(image, law, model.channels, here, innovation, before)
     after = with_spread(belief, belief.vector + found.shift, found.spread, t=row.t, u=row.u, count=belief.count + 1)
     result = _result(model, row, (belief, after), image, found.innovation_factor)
     return after, innovation_info(model, row, innovation, found.white, found.innovation_factor, result)
@@ -141,7 +162,7 @@ def corrected(
 
 def check_covariances(name: str, model: StateSpace) -> None:
     """Raise `InputError` where a law of the model has no covariance."""
-    laws = {"measurement noise": model.measurement_noise, "prior": model.prior.law}
+    laws = {"measurement noise": kind_of_law(model), "prior": model.prior.law}
     if model.process_noise is not None:
         laws["process noise"] = model.process_noise.law
     for what, law in laws.items():
@@ -150,6 +171,17 @@ def check_covariances(name: str, model: StateSpace) -> None:
                 f"{name}: the {what} {type(law).__name__} has no covariance, which a Kalman filter needs. "
                 "Use a particle filter, or a Gaussian or Student-t law."
             )
+
+
+def kind_of_law(model: StateSpace) -> AbstractNoise:
+    """The law of the measurement noise; where it depends on the state, that of the prior's mean, its numbers unknown."""
+    if not isinstance(model.measurement_noise, StateDependent):
+        return model.measurement_noise
+    number = jax.ShapeDtypeStruct((), model.prior.mean[0].dtype)
+    u = record("Inputs", dict.fromkeys(model.inputs, number))
+    laws = []
+    eqx.filter_eval_shape(lambda t, u: laws.append(model.measurement_law(t, model.prior.mean, u)), number, u)
+    return laws[0]
 
 
 def check_kind(who: str, filter: Any, kind: type) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -20,6 +20,7 @@ from jaxveh.filters.gaussian.filter import (
 )
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import Image, product, times
+from jaxveh.statespace.contract import Smoothing
 
 
 class Iterated(AbstractGaussianFilter):
@@ -31,6 +32,7 @@ class Iterated(AbstractGaussianFilter):
     log-likelihood stay those of the prediction. A linear observation is left alone by every iteration.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     filter: AbstractRuleFilter
     iterations: int = eqx.field(static=True, default=4)
 

@@ -10,24 +10,30 @@ import numpy as np
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import record
 from jaxveh.filters.gaussian.belief import rows_of
-from jaxveh.statespace import StateSpace
+from jaxveh.statespace import StateDependent, StateSpace
 
 
 def check_linear(who: str, model: StateSpace) -> None:
     """Raise `InputError` naming the first value that is no linear function of the state.
 
     Each function is compared with its tangent at ten times the prior's spread, for inputs of 0 and of 1; where it is not
-    finite there is nothing to compare. Tracers pass.
+    finite there is nothing to compare. Noise that depends on the state is none of a linear model; of the inputs it may.
+    Tracers pass.
     """
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
     with jax.ensure_compile_time_eval():  # inside jit, too, a model may be made of plain numbers
         found = jax.tree.map(np.asarray, _curved(model))
+        varies = isinstance(model.measurement_noise, StateDependent) and bool(_noise_varies(model))
     for curved in found:
         for (what, names), values in zip((("state", model.states), ("channel", model.channels)), curved, strict=True):
             if np.any(values):
                 name = names[int(np.argmax(values))]
                 raise InputError(f"{who}: {what} {name} is no linear function of the state. Use Extended or Unscented.")
+    if varies:
+        raise InputError(
+            f"{who}: the measurement noise depends on the state. Use Extended, Unscented or a particle filter."
+        )
 
 
 # Compiled: operation by operation it would take longer than filtering a short recording.
@@ -35,6 +41,19 @@ def check_linear(who: str, model: StateSpace) -> None:
 def _curved(model: StateSpace):
     """Which states and which channels are curved, (n,) and (m,), for inputs of 0 and for inputs of 1."""
     return [[_is_curved(f, model) for f in _functions(model, value)] for value in (0.0, 1.0)]
+
+
+@eqx.filter_jit
+def _noise_varies(model: StateSpace):
+    """Whether the covariance of the measurement noise is another at another state, for inputs of 0 or of 1."""
+    start, step = _start_and_step(model)
+    kind, t = type(model.prior.mean), jnp.zeros((), start.dtype)
+    changed = []
+    for value in (0.0, 1.0):
+        u = record("Inputs", {name: jnp.asarray(value, start.dtype) for name in model.inputs})
+        at = lambda rows, u=u: model.measurement_law(t, kind(*rows), u).covariance()
+        changed.append(jnp.any(at(start) != at(start + step)))
+    return jnp.any(jnp.stack(changed))
 
 
 def _functions(model: StateSpace, value: float):
@@ -52,11 +71,16 @@ def _functions(model: StateSpace, value: float):
 
 
 def _is_curved(f, model: StateSpace):
-    start = jnp.stack(model.prior.mean)
-    reach = 10.0 * jnp.sqrt(jnp.diagonal(model.prior.covariance()))
-    # One direction of mixed signs, which no sum of squares or products survives by chance.
-    step = reach * jnp.asarray(np.cos(1.0 + 2.0 * np.arange(len(start))), start.dtype)
+    start, step = _start_and_step(model)
     here, slope = jax.jvp(f, (start,), (step,))
     there = f(start + step)
     size = jnp.abs(here) + jnp.abs(slope) + jnp.abs(there)
     return (jnp.abs(there - here - slope) > 1e3 * jnp.finfo(start.dtype).eps * size) & jnp.isfinite(size)
+
+
+def _start_and_step(model: StateSpace):
+    """The prior's mean, and a step of ten of its spreads."""
+    start = jnp.stack(model.prior.mean)
+    reach = 10.0 * jnp.sqrt(jnp.diagonal(model.prior.covariance()))
+    # One direction of mixed signs, which no sum of squares or products survives by chance.
+    return start, reach * jnp.asarray(np.cos(1.0 + 2.0 * np.arange(len(start))), start.dtype)

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh.filters.gaussian.rules import times
-from jaxveh.statespace import AbstractNoise, Gaussian
+from jaxveh.statespace import AbstractNoise, Gaussian, Row, StateDependent, StateSpace
+
+
+def law_at(model: StateSpace, row: Row, mean: Callable[[], Any]) -> AbstractNoise:
+    """The law of the measurement noise in a row; where it depends on the state, at the state `mean()`."""
+    if isinstance(model.measurement_noise, StateDependent):
+        return model.measurement_law(row.t, mean(), row.u)
+    return model.measurement_noise
 
 
 def covariance_in(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:

@@ -13,7 +13,7 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import innovation_info, observation_image, transition_image, wrapped_innovation
 from jaxveh.filters.gaussian.forms import masked_factor
 from jaxveh.filters.gaussian.iterated import line_through
-from jaxveh.filters.gaussian.noises import covariance_in
+from jaxveh.filters.gaussian.noises import covariance_in, law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, product
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import input_result, presence
@@ -46,11 +46,13 @@ class Smoothing(NamedTuple):
 
 
 class Passed(NamedTuple):
-    """Means (T, n) and covariances (T, n, n) of all rows: predicted, filtered, smoothed; and the observation's lines."""
+    """Means (T, n) and covariances (T, n, n) of all rows: predicted, filtered, smoothed; the means `about` which (T, n) they
+    were linearised; and the observation's lines."""
 
     predicted: tuple[Any, Any]
     filtered: tuple[Any, Any]
     smoothed: tuple[Any, Any]
+    about: Any
     lines: Lines
 
 
@@ -60,11 +62,12 @@ def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, cova
     S. Sarkka & A. Garcia-Fernandez, Temporal parallelization of Bayesian smoothers, IEEE Trans. Automatic Control 66 (2021).
     """
     moves, sees = _lines(rule, model, rows, means, covariances)
-    y, R = _measured(model, rows)
+    about = means
+    y, R = _measured(model, rows, about)
     if model.angles:
         # A measured angle is the one of all its turns that is nearest to where its line was laid.
-        about = jnp.einsum("tmn,tn->tm", sees.slope, means) + sees.offset
-        y = about + wrapped_innovation(model, (y - about).T, jnp.ones((*y.shape[1:], 1), bool)).T
+        seen = jnp.einsum("tmn,tn->tm", sees.slope, means) + sees.offset
+        y = seen + wrapped_innovation(model, (y - seen).T, jnp.ones((*y.shape[1:], 1), bool)).T
     R = R + sees.error
     prior = jnp.stack(model.prior.mean), model.prior.covariance()
     elements = _filtering_elements(moves, sees, y, R, prior)
@@ -77,7 +80,7 @@ def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, cova
     back = jax.tree.map(lambda a, b: jnp.concatenate([a, b[None]]), back, last)
     joined = jax.lax.associative_scan(jax.vmap(_join_smoothing), back, reverse=True)
     predicted = jax.tree.map(lambda first, rest: jnp.concatenate([first[None], rest]), prior, predicted)
-    return Passed(predicted, filtered, (joined.g, numerics.symmetric(joined.L)), sees)
+    return Passed(predicted, filtered, (joined.g, numerics.symmetric(joined.L)), about, sees)
 
 
 def _lines(rule, model, rows: Row, means, covariances) -> tuple[Lines, Lines]:
@@ -109,16 +112,19 @@ def _line(image, belief) -> Lines:
     return Lines(slope, image.mean - slope @ belief.vector, product(rest, rest, image.signs))
 
 
-def _measured(model, rows: Row):
-    """Measurements (T, m), zero where missing, and noise covariances (T, m, m), of unit variance there."""
+def _measured(model, rows: Row, means):
+    """Measurements (T, m), zero where missing, and noise covariances (T, m, m), of unit variance there; those of noise that
+    depends on the state at the `means` (T, n)."""
+    kind = type(model.prior.mean)
 
-    def of(row):
+    def of(row, mean):
         values, present = presence(model, row)
         here = jnp.stack([present[name] for name in model.channels])
-        noise = masked_factor(model.measurement_noise, model.channels, here, row.t.dtype)
+        law = law_at(model, row, lambda: kind(*mean))
+        noise = masked_factor(law, model.channels, here, row.t.dtype)
         return jnp.stack([values[name] for name in model.channels]), noise @ noise.T
 
-    return jax.vmap(of)(rows)
+    return jax.vmap(of)(rows, means)
 
 
 def _filtering_elements(moves: Lines, sees: Lines, y, R, prior) -> Filtering:
@@ -174,7 +180,7 @@ def _join_smoothing(j: Smoothing, i: Smoothing) -> Smoothing:
 
 def infos_of(model: StateSpace, rows: Row, passed: Passed) -> Any:
     """The infos (T,) of all rows: what the predictions said of the measurements."""
-    y, R = _measured(model, rows)
+    y, R = _measured(model, rows, passed.about)
 
     def of(row, y, R, mean, covariance, line):
         _, present = presence(model, row)

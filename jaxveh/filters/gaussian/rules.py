@@ -41,6 +41,11 @@ class AbstractRule(eqx.Module):
     def positive(self) -> bool:
         """Whether all weights of covariances are positive, as square-root forms need."""
 
+    @property
+    def amplification(self) -> float:
+        """How many times its own size a mean loses to rounding, as weights of both signs cancel."""
+        return 1.0
+
     @abc.abstractmethod
     def image(self, f: Callable, mean: Any, factor: Any) -> Image:
         """The function's mean and deviations."""
@@ -69,6 +74,10 @@ class Points(AbstractRule):
     @property
     def positive(self):
         return self._signs is None
+
+    @property
+    def amplification(self):
+        return float(np.sum(np.abs(self.points.mean_weights)))
 
     @property
     def _signs(self):

@@ -13,10 +13,10 @@ from jaxveh.filters.particle import AbstractParticleFilter, need_key
 from jaxveh.filters.smoothing.backward_sampling import check_density, sample_backwards
 from jaxveh.filters.smoothing.fixed_lag import check_lag, smooth_with_lag
 from jaxveh.filters.smoothing.genealogy import trace_genealogy
-from jaxveh.filters.smoothing.rauch_tung_striebel import has_smoother, rauch_tung_striebel
-from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, check_particles_alone
+from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate
 from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.statespace.contract import AbstractFilter, Smoothing, check_smooths
 from jaxveh.statespace.driver import raise_failure
 
 
@@ -51,25 +51,25 @@ def smooth(
 
     Gradients with respect to array leaves of `model` work for Gaussian filters.
 
-    **Raises** as `run`, and `InputError` for a method that does not go with filter or model.
+    **Raises** as `run`, and `InputError` for a method that does not go with filter or model, and for a filter whose class does
+    not declare that it can be smoothed (`AbstractFilter.smooths`).
     """
     filter.check(model)
+    kind = check_smooths("smooth", filter)
     rows = model.rows(recording)
     if lag is not None:
         check_lag(filter, lag)
         if method is not None:
             raise InputError("smooth: a lag has a method of its own; give one of both.")
         found = smooth_with_lag(filter, model, rows, key, lag)
-    elif isinstance(filter, AbstractParticleFilter):
+    elif kind is Smoothing.particles:
         found = _particles(filter, model, rows, need_key(filter, key), method)
     elif method is not None:
         raise InputError(
             f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has its own."
         )
-    elif has_smoother(filter):
-        found = rauch_tung_striebel(filter, model, rows)
     else:
-        raise InputError(f"{type(filter).__name__} has no smoother: take a Gaussian filter, or a particle filter.")
+        found = rauch_tung_striebel(filter, model, rows)
     found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
     if throw:
         raise_failure(found.filtered, filter, model, recording)
@@ -77,7 +77,6 @@ def smooth(
 
 
 def _particles(filter: AbstractParticleFilter, model: StateSpace, rows: Any, key, method) -> SmoothedEstimate:
-    check_particles_alone("smooth", filter)
     if method is None:
         noisy = () if model.process_noise is None else model.process_noise.law.names
         method = BackwardSampling() if set(noisy) == set(model.states) else Genealogy()

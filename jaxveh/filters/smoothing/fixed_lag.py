@@ -10,12 +10,12 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh.filters.choosing import Transport
-from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
-from jaxveh.filters.smoothing.rauch_tung_striebel import given_later, has_smoother
-from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, check_particles_alone, smoothed_estimate
+from jaxveh.filters.particle import ParticleBelief
+from jaxveh.filters.smoothing.rauch_tung_striebel import given_later
+from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.filters.wrappers.base import gaussian_of
 from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import AbstractBelief, AbstractFilter
+from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Smoothing, check_smooths, smoothing_of
 from jaxveh.statespace.driver import scan_and_keep
 
 
@@ -82,14 +82,9 @@ class FixedLag(AbstractFilter):
 def check_lag(filter: Any, lag: int) -> None:
     """Raise `InputError` for a lag that is no whole number of at least 1, or a filter without a smoother."""
     check_whole("lag", lag)
-    if isinstance(filter, AbstractParticleFilter):
-        check_particles_alone("FixedLag", filter)
-        if isinstance(filter.resampling, Transport):
-            raise InputError("FixedLag: particles of Transport have no ancestors.")
-    elif not has_smoother(filter):
-        raise InputError(
-            f"{type(filter).__name__} has no fixed-lag smoother: take a Gaussian filter, or a particle filter."
-        )
+    kind = check_smooths("FixedLag", filter)
+    if kind is Smoothing.particles and isinstance(filter.resampling, Transport):
+        raise InputError("FixedLag: particles of Transport have no ancestors.")
 
 
 def first_of(filter: Any, model: StateSpace, past: Any, real: Any) -> tuple[Any, Any]:
@@ -97,7 +92,7 @@ def first_of(filter: Any, model: StateSpace, past: Any, real: Any) -> tuple[Any,
 
     A belief that is not `real` (L,) is passed over: it is a copy of the one after it.
     """
-    if isinstance(filter, AbstractParticleFilter):
+    if smoothing_of(filter) is Smoothing.particles:
         return _traced(model, past, real)
     last = jax.tree.map(lambda leaf: leaf[-1], past)
     before = jax.tree.map(lambda leaf: leaf[:-1], past)

@@ -17,6 +17,7 @@ from jaxveh.filters.gaussian.forms import Covariance
 from jaxveh.filters.gaussian.parallel import infos_of, pass_over
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.statespace import Row, StateSpace, parameter_view
+from jaxveh.statespace.contract import Smoothing, smoothing_of
 from jaxveh.statespace.driver import Estimate, raise_failure
 
 
@@ -38,9 +39,10 @@ def smooth_parallel(
     **Raises** as `run`, and `InputError` for other filters and forms.
     """
     inner = filter.filter if isinstance(filter, Iterated) else filter
-    if not isinstance(filter, (Kalman, Iterated)) or not isinstance(inner.form, Covariance):
+    declared = smoothing_of(filter) is Smoothing.gaussian
+    if not declared or not isinstance(filter, (Kalman, Iterated)) or not isinstance(inner.form, Covariance):
         raise InputError(
-            f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...), of the form Covariance()."
+            f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...) itself, of the form Covariance()."
         )
     filter.check(model)
     if model.angles and isinstance(filter, Kalman):

@@ -9,13 +9,10 @@ import jax
 
 from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.filter import AbstractRuleFilter, transition_image, with_spread
+from jaxveh.filters.gaussian.filter import transition_image, with_spread
 from jaxveh.filters.gaussian.forms import Later, Spread
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
 from jaxveh.filters.wrappers.base import gaussian_of, rule_filter_of
-from jaxveh.filters.wrappers.considered import Consider
-from jaxveh.filters.wrappers.h_infinity import HInfinity
-from jaxveh.filters.wrappers.strong_tracking import StrongTracking
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.driver import scan_and_keep
 
@@ -52,15 +49,3 @@ def given_later(
     before = Spread(gaussian.factor, gaussian.matrix)
     found = rule_filter_of(filter).form.smooth(image, law, model.states, before, known)
     return with_spread(gaussian, gaussian.vector + found.shift, found.spread)
-
-
-def has_smoother(filter: Any) -> bool:
-    """Whether the filter, inside its wrappers, keeps one Gaussian by a rule, predicted as the smoother predicts.
-
-    `StrongTracking` and `HInfinity` update another covariance than the predicted one, `Consider` not all states.
-    """
-    while isinstance(filter, AbstractGaussianFilter) and not isinstance(filter, AbstractRuleFilter):
-        if isinstance(filter, StrongTracking | HInfinity | Consider):
-            return False
-        filter = getattr(filter, "filter", None)
-    return isinstance(filter, AbstractRuleFilter)

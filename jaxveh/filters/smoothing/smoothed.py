@@ -8,8 +8,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
-from jaxveh.filters.marginalised import Marginalised
 from jaxveh.statespace import StateSpace, parameter_view
 from jaxveh.statespace.driver import Estimate
 
@@ -34,15 +32,6 @@ class SmoothedEstimate(eqx.Module):
     def __getitem__(self, name: str):
         """The mean of a reported quantity by name, (T,)."""
         return getattr(self.mean, name)
-
-
-def check_particles_alone(who: str, filter: Any) -> None:
-    """Raise `InputError` for particles with Gaussians beside them, which the smoothers of particles would lose."""
-    if isinstance(filter, Marginalised):
-        raise InputError(
-            f"{who}: Marginalised keeps Gaussians beside its particles, which this smoother would lose. "
-            "Take ParticleFilter or Guided."
-        )
 
 
 def smoothed_estimate(

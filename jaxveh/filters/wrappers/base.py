@@ -11,6 +11,7 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, AbstractRuleFilter, check_kind
 from jaxveh.statespace import Gaussian, Row, StateSpace
 from jaxveh.statespace.contract import AbstractBelief, Info
+from jaxveh.statespace.dependent_noise import check_fixed
 
 
 class AbstractStateless(AbstractGaussianFilter):
@@ -143,6 +144,7 @@ def rule_filter_of(filter: Any) -> AbstractRuleFilter:
 
 def check_independent(who: str, model: StateSpace) -> None:
     """Raise `InputError` unless the measurement noise is one standard deviation a channel."""
+    check_fixed(who, model.measurement_noise, "Take the filter inside by itself, or a particle filter.")
     if not isinstance(model.measurement_noise, Gaussian):
         kind = type(model.measurement_noise).__name__
         raise InputError(f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation a channel.")

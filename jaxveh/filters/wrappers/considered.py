@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,6 +14,7 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.wrappers.base import AbstractStateless
 from jaxveh.statespace import StateSpace
+from jaxveh.statespace.contract import Smoothing
 
 
 class Consider(AbstractStateless):
@@ -54,6 +55,7 @@ class Dual(AbstractStateless):
     out too small: the joint filter, without this wrapper, is better wherever it is stable.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     filter: AbstractRuleFilter
     groups: tuple[tuple[str, ...], ...] | None = eqx.field(static=True, default=None, converter=as_groups)
 

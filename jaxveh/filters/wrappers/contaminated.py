@@ -15,7 +15,7 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.wrappers.base import AbstractStateless, check_independent, variances_of, with_variances
 from jaxveh.filters.wrappers.interacting import mixed_covariance
-from jaxveh.statespace.contract import Info
+from jaxveh.statespace.contract import Info, Smoothing
 
 MOST_CHANNELS = 6
 """Of which 64 cases are made."""
@@ -36,6 +36,7 @@ class Contaminated(AbstractStateless):
     another wrapper.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     whitens: ClassVar[bool] = False
     filter: AbstractRuleFilter
     share: jax.Array = eqx.field(converter=float_array, default=0.05)

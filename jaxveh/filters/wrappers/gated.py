@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -10,6 +12,7 @@ from jaxveh._core.names import record
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.wrappers.base import AbstractStateless
 from jaxveh.filters.wrappers.innovation import innovation
+from jaxveh.statespace.contract import Smoothing
 
 
 class Gated(AbstractStateless):
@@ -20,6 +23,7 @@ class Gated(AbstractStateless):
     look at how often each channel is left out; `info.innovation` is NaN there.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     filter: AbstractGaussianFilter
     limit: float = eqx.field(static=True, default=4.0)
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
-from jaxveh.filters.gaussian.noises import covariance_in
+from jaxveh.filters.gaussian.noises import covariance_in, law_at
 from jaxveh.filters.gaussian.rules import Image
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import presence
@@ -30,7 +30,8 @@ def innovation(filter: AbstractGaussianFilter, model: StateSpace, belief: Any, r
     here = jnp.stack([present[name] for name in model.channels])
     error = jnp.stack([measured[name] for name in model.channels]) - image.mean
     own = filter.adapted(model, belief)
-    noise = jnp.diagonal(covariance_in(own.measurement_noise, model.channels, error.dtype))
+    law = law_at(own, row, lambda: belief.mean)
+    noise = jnp.diagonal(covariance_in(law, model.channels, error.dtype))
     return Innovation(wrapped_innovation(model, error, here), spread_of(image), noise, here)
 
 

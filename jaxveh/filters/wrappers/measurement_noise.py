@@ -19,6 +19,7 @@ from jaxveh.filters.wrappers.base import (
 )
 from jaxveh.filters.wrappers.innovation import innovation
 from jaxveh.filters.wrappers.robust import expected_squares
+from jaxveh.statespace.contract import Smoothing
 
 
 class SageHusa(AbstractRemembering):
@@ -31,6 +32,7 @@ class SageHusa(AbstractRemembering):
     predictions. Errors of the model count as noise of the sensor. The noise must be Gaussian, a standard deviation a channel.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     learns_variances: ClassVar[bool] = True
     filter: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)
@@ -86,6 +88,7 @@ class VariationalBayes(AbstractRemembering):
     channel.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     learns_variances: ClassVar[bool] = True
     filter: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)

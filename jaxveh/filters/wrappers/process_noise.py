@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,6 +15,7 @@ from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.wrappers.base import AbstractRemembering, Remembering
 from jaxveh.statespace import AbstractNoise, Gaussian, MultivariateGaussian, StateSpace
+from jaxveh.statespace.contract import Smoothing
 from jaxveh.statespace.process import AbstractProcessNoise
 
 
@@ -33,6 +34,7 @@ class ShrinkingProcess(AbstractRemembering):
     the data take `MatchedProcess`.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     filter: AbstractGaussianFilter
     extra: tuple[tuple[str, float], ...] = eqx.field(static=True)
 
@@ -71,6 +73,7 @@ class MatchedProcess(AbstractRemembering):
     deviations a step by state). It grows in a manoeuvre that the model does not explain and falls again.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     filter: AbstractGaussianFilter
     most: tuple[tuple[str, float], ...] = eqx.field(static=True)
     forgetting: float = eqx.field(static=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -18,7 +18,7 @@ from jaxveh.filters.wrappers.base import (
     with_variances,
 )
 from jaxveh.filters.wrappers.innovation import innovation, spread_of
-from jaxveh.statespace.contract import presence
+from jaxveh.statespace.contract import Smoothing, presence
 
 
 class Huber(AbstractStateless):
@@ -30,6 +30,7 @@ class Huber(AbstractStateless):
     a standard deviation a channel. Not around a filter that learns variances: inside it.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     filter: AbstractGaussianFilter
     threshold: float = eqx.field(static=True, default=1.345)
 
@@ -61,6 +62,7 @@ class RobustStudentT(AbstractStateless):
     t law. The noise must be Gaussian, a standard deviation a channel.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     filter: AbstractGaussianFilter
     dof: float = eqx.field(static=True, default=4.0)
     iterations: int = eqx.field(static=True, default=3)

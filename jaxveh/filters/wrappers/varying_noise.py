@@ -8,11 +8,12 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.names import check_names
 from jaxveh.filters.wrappers.base import check_variances_count
 from jaxveh.statespace import Continuous, Gaussian, StateSpace
 from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.process import Discrete
 
 
@@ -21,27 +22,31 @@ class VaryingNoise(AbstractFilter):
 
     `measurement`: the input that is a channel's standard deviation (its unit), by channel (`{"gnss_speed":
     "gnss_speed_accuracy"}`), that of the same row. `process`: the input that is a state's process noise (unit per root second,
-    or a step, as the model has it), by state, that of the step's first row. The model's noises must be Gaussian, a standard
-    deviation a field; the fields not named keep theirs. Numbers that are not positive end in a result code.
+    or a step, as the model has it), by state: that of the step's first row, or with `process_of="after"` that of its last, the
+    row being filtered, which tells of the time behind it (a brake touched since). The model's noises must be Gaussian, a
+    standard deviation a field; the fields not named keep theirs. Numbers that are not positive end in a result code.
     """
 
     filter: AbstractFilter
     measurement: tuple[tuple[str, str], ...] = eqx.field(static=True)
     process: tuple[tuple[str, str], ...] = eqx.field(static=True)
+    process_of: str = eqx.field(static=True)
 
     def __init__(
         self,
         filter: AbstractFilter,
         measurement: Mapping[str, str] | None = None,
         process: Mapping[str, str] | None = None,
+        process_of: str = "before",
     ):
-        self.filter = filter
+        self.filter, self.process_of = filter, process_of
         self.measurement, self.process = (
             tuple(sorted((measurement or {}).items())),
             tuple(sorted((process or {}).items())),
         )
 
     def __check_init__(self):
+        check_one_of("VaryingNoise.process_of", self.process_of, ("before", "after"))
         if not self.measurement and not self.process:
             raise InputError("VaryingNoise: name a channel in `measurement` or a state in `process`.")
 
@@ -56,6 +61,8 @@ class VaryingNoise(AbstractFilter):
             if not isinstance(model.process_noise, Continuous | Discrete):
                 raise InputError(f"VaryingNoise: the process noise is {kind}: must be Continuous or Discrete.")
             laws.append(("process noise", model.process_noise.law))
+        if self.measurement:
+            check_fixed("VaryingNoise.measurement", model.measurement_noise, "Its function may take the input itself.")
         for what, law in laws:
             if not isinstance(law, Gaussian):
                 kind = type(law).__name__
@@ -68,17 +75,18 @@ class VaryingNoise(AbstractFilter):
         return self.filter.init(self._told(model, row.u, row.u), row, key)
 
     def step(self, model, belief, row):
-        return self.filter.step(self._told(model, row.u, belief.u), belief, row)
+        moved = row.u if self.process_of == "after" else belief.u
+        return self.filter.step(self._told(model, row.u, moved), belief, row)
 
-    def _told(self, model: StateSpace, now: Any, before: Any) -> StateSpace:
-        """The model with what the inputs `now` say of the measurement, and those `before` of the process."""
+    def _told(self, model: StateSpace, now: Any, moved: Any) -> StateSpace:
+        """The model with what the inputs `now` say of the measurement, and those `moved` of the process."""
         if self.measurement:
             law = _with(model.measurement_noise, self.measurement, now)
             model = eqx.tree_at(lambda m: m.measurement_noise, model, law)
         if self.process:
             noise = model.process_noise
             assert noise is not None  # `check` has seen to it
-            model = eqx.tree_at(lambda m: m.process_noise.law, model, _with(noise.law, self.process, before))
+            model = eqx.tree_at(lambda m: m.process_noise.law, model, _with(noise.law, self.process, moved))
         return model
 
 

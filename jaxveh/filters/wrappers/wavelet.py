@@ -18,7 +18,8 @@ from jaxveh.filters.wrappers.base import (
     with_variances,
 )
 from jaxveh.statespace import CauchyGaussianMixture, Gaussian
-from jaxveh.statespace.contract import AbstractFilter, always, apart
+from jaxveh.statespace.contract import AbstractFilter, Smoothing, always, apart
+from jaxveh.statespace.dependent_noise import check_fixed
 
 # The median of the absolute value of a standard normal number.
 MEDIAN = 0.6744897501960817
@@ -51,6 +52,7 @@ class HaarNoise(AbstractRemembering):
     from the first row on, `initial` is what that row is worth: what is believed then for no reason, a slow state keeps.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     learns_variances: ClassVar[bool] = True
     filter: AbstractGaussianFilter
     window: int = eqx.field(static=True, default=64)
@@ -108,6 +110,7 @@ class HaarParticles(AbstractFilter):
 
     def check(self, model):
         law = model.measurement_noise
+        check_fixed("HaarParticles", law, "Take the particle filter by itself.")
         if not isinstance(law, Gaussian | CauchyGaussianMixture):
             raise InputError(
                 f"HaarParticles: the measurement noise is {type(law).__name__}: must be Gaussian, a standard deviation a "

@@ -1,0 +1,93 @@
+"""Which test files execute which lines: each file's own coverage, measured once and kept."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+FOLDERS = (
+    "tyres",
+    "vehicles",
+    "sensors",
+    "statespace",
+    "filters",
+    "simulation",
+    "estimators",
+    "io",
+    "fitting",
+    "observers",
+)
+"""Rooms of tests that are measured."""
+
+
+def test_files(root: Path) -> list[str]:
+    """The test files of the rooms, from the root."""
+    return sorted(
+        str(path.relative_to(root)) for folder in FOLDERS for path in (root / "tests" / folder).glob("test_*.py")
+    )
+
+
+def measured(root: Path, kept: Path, file: str, environment: dict[str, str], limit: float) -> dict:
+    """What a test file executes: `seconds`, and `lines` by file of the package; from `kept` where it has been measured.
+
+    In a process of its own: what another file has traced already would not be executed again. A file whose tests fail as it is
+    can say nothing of a mutation: it ends the program.
+    """
+    found = kept / (file.replace("/", "__") + ".json")
+    if found.exists():
+        return json.loads(found.read_text())
+    data = kept / (file.replace("/", "__") + ".coverage")
+    start = time.monotonic()
+    coverage = [sys.executable, "-m", "coverage"]
+    tests = ["-m", "pytest", "-n", "0", "-q", "-p", "no:cacheprovider", file]
+    ended = subprocess.run(
+        [*coverage, "run", "--source=jaxveh", f"--data-file={data}", *tests],
+        cwd=root, env=environment, capture_output=True, text=True, timeout=limit, check=False,
+    )  # fmt: skip
+    if ended.returncode not in (0, 5):
+        raise SystemExit(f"{file} fails without a mutation:\n{ended.stdout[-2000:]}")
+    seconds = time.monotonic() - start
+    shown = kept / (data.name + ".shown")
+    subprocess.run(
+        [*coverage, "json", f"--data-file={data}", "-o", str(shown)],
+        cwd=root,
+        env=environment,
+        capture_output=True,
+        check=True,
+    )
+    files = json.loads(shown.read_text())["files"]
+    result = {"seconds": seconds, "lines": {name: about["executed_lines"] for name, about in files.items()}}
+    found.write_text(json.dumps(result))
+    for path in (data, shown):
+        os.remove(path)
+    return result
+
+
+def choose(measurements: dict[str, dict], file: str, lines: set[int]) -> list[str]:
+    """The test files that execute one of the lines: those of its own room first, then the quick ones."""
+    room = Path(file).parts[1]
+    hit = [name for name, about in measurements.items() if lines & set(about["lines"].get(file, ()))]
+    return sorted(hit, key=lambda name: (Path(name).parts[1] != room, measurements[name]["seconds"]))
+
+
+def lines_beside(source: str, line: int) -> set[int]:
+    """The lines whose execution tells that of `line`: its statement's; for one that runs on import, those of all functions of
+    the module, since every test file runs it and few look at it."""
+    tree = ast.parse(source)
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    bodies = {i for node in functions for i in range(node.body[0].lineno, (node.end_lineno or 0) + 1)}
+    if line not in bodies:
+        return bodies or {line}
+    around = [
+        node for node in ast.walk(tree)
+        if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or node.lineno)
+    ]  # fmt: skip
+    statement = max(around, key=lambda node: node.lineno)
+    inner = getattr(statement, "body", None)
+    last = inner[0].lineno - 1 if isinstance(inner, list) else statement.end_lineno or line
+    return set(range(statement.lineno, max(last, line) + 1))

@@ -1,0 +1,159 @@
+"""Every vehicle with every set of sensors: a state space that runs, or a refusal that says what to do.
+
+Models are traced only: what a filter does with them is that of `transition`, `observation`, `report` and `prior`, in each of
+which an error would come up.
+"""
+
+import inspect
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import InputError, Recording, estimators, filters, sensors, tyres, vehicles
+from jaxveh._core.names import record
+from jaxveh.statespace import Gaussian, Heun, StateDependent
+
+
+def named(fidelity):
+    """The first car whose numbers reach for this fidelity."""
+    for name in ("sedan", "semi_trailer", "passenger_car"):
+        try:
+            return vehicles.named_car(name, fidelity)
+        except InputError:
+            continue
+    raise AssertionError(fidelity)
+
+
+CARS = {fidelity: (lambda fidelity=fidelity: named(fidelity)) for fidelity in vehicles.sets.FIDELITIES} | {
+    "commanded": lambda: vehicles.Commanded(vehicles.passenger_car()),
+    "crawling": lambda: vehicles.KinematicCrawl(named("linear")),
+    "steered": lambda: vehicles.Steered(named("two-track-3dof"), 16.0, 2e-5, trail=0.02),
+    "travelling": lambda: vehicles.Travelling(named("seven-dof")),
+    "relaxed": lambda: eqx.tree_at(
+        lambda c: c.front, vehicles.passenger_car(), tyres.Relaxed(tyres.Linear(8e4), None, 0.4)
+    ),
+}
+SENSORS = {
+    "esc": sensors.esc(),
+    "all": sensors.esc(0.005, 0.1, 0.1, 0.1, 0.1, position=(1.0, 0.2, 0.3)),
+    "low pass": sensors.esc(low_pass=sensors.LowPass(20.0)),
+    "speed": sensors.esc(None, None, 0.1, 0.1),
+    "spins": sensors.SensorSet(Gaussian({"omega_fl": 0.1})),
+    "suite": sensors.production_car(),
+}
+
+
+def start_of(car):
+    return None if "v_x" in car.inputs else {"v_x": 15.0}
+
+
+def traced(model):
+    """Shapes of a moved state, of measurements and of a report, as a filter would ask for them."""
+    dtype = model.prior.mean[0].dtype
+    number = jax.ShapeDtypeStruct((), dtype)
+    u = record("Inputs", dict.fromkeys(model.inputs, number))
+
+    def look(t, u):
+        x = model.transition(t, t + 0.01, model.prior.mean, u)
+        return x, model.observation(t, x, u), model.report(t, x, u)
+
+    return eqx.filter_eval_shape(look, number, u)
+
+
+@pytest.mark.product
+@pytest.mark.parametrize("suite", SENSORS)
+@pytest.mark.parametrize("name", CARS)
+def test_a_state_space_runs_or_says_what_to_do(name, suite):
+    car, chosen = CARS[name](), SENSORS[suite]
+    try:
+        model = estimators.state_space(car, chosen, start=start_of(car), solver=Heun())
+    except InputError as refusal:
+        text = str(refusal)
+        lacking = "sensors measure a channel the vehicle does not have" in text and "there are:" in text
+        assert lacking or (suite == "suite" and "must be a SensorSet" in text), text
+        return
+    moved, seen, shown = traced(model)
+    assert moved._fields == model.states
+    assert set(model.channels) <= set(seen._fields)
+    assert set(model.states) <= set(shown._fields)
+    assert {leaf.dtype for leaf in jax.tree.leaves((moved, seen, shown))} == {np.dtype("float64")}
+
+
+def test_the_table_has_every_vehicle_of_the_package():
+    concrete = {
+        name
+        for name in vehicles.__all__
+        if inspect.isclass(getattr(vehicles, name))
+        and issubclass(getattr(vehicles, name), vehicles.AbstractVehicle)
+        and not inspect.isabstract(getattr(vehicles, name))
+    }
+    assert concrete <= {type(make()).__name__ for make in CARS.values()}
+
+
+def test_an_accelerometer_of_a_car_that_does_not_say_its_yaw_acceleration():
+    """One that goes straight feels the same everywhere; one without slip, its inputs held, what turning makes of its place."""
+    mounted = sensors.esc(None, 0.1, 0.1, position=(1.0, 0.2, 0.0))
+    car = vehicles.Kinematic(2.6, 1.4)
+    u = record("Inputs", {"steer": jnp.asarray(0.1), "v_x": jnp.asarray(8.0)})
+    outputs = car.outputs(0.0, car.start(0.0, u), u)
+    seen = mounted.measure(outputs)
+    turning = 8.0 * np.tan(0.1) / 2.6
+    np.testing.assert_allclose(seen.a_y, 8.0 * turning - turning**2 * 0.2, rtol=1e-12)
+    np.testing.assert_allclose(seen.a_x, -1.4 * turning**2 - turning**2 * 1.0, rtol=1e-12)
+    straight = vehicles.Longitudinal(1500.0)
+    u = record("Inputs", {"drive_torque": jnp.asarray(300.0), "brake_torque": jnp.asarray(0.0)})
+    outputs = straight.outputs(0.0, straight.start(0.0, u, v_x=10.0), u)
+    found = sensors.esc(None, None, 0.1, position=(1.0, 0.2, 0.0)).measure(outputs)
+    np.testing.assert_allclose(found.a_x, outputs.a_x, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["longitudinal", "seven-dof", "two-track-3dof", "commanded", "travelling"])
+def test_a_car_whose_speed_is_a_state_asks_for_it(name):
+    with pytest.raises(InputError, match=r'v_x, which needs a mean: give the speed in the.*start=\{"v_x": 20.0\}'):
+        estimators.state_space(CARS[name](), SENSORS["speed"])
+
+
+def test_a_car_of_seven_degrees_of_freedom_is_followed():
+    """Speed and spins among the states, torques as inputs: no longer an AttributeError in `run`."""
+    car = CARS["seven-dof"]()
+    devices = sensors.esc(v_x=0.1)
+    model = estimators.state_space(car, devices, start={"v_x": 20.0}, solver=Heun(), steps=2)
+    assert float(model.prior.mean.omega_rr) == pytest.approx(20.0 / float(car.wheel_radius))
+    rows = 12
+    time = 0.01 * np.arange(rows)
+    inputs = {name: np.zeros(rows) for name in model.inputs} | {"steer": 0.02 * np.ones(rows)}
+    schedule = Recording(time, {**inputs, **{name: np.zeros(rows) for name in model.channels}})
+    rows_ = model.rows(schedule)
+
+    def drive(x, k):
+        row = jax.tree.map(lambda leaf: leaf[k], rows_)
+        seen = model.observation(row.t, x, row.u)
+        return model.transition(row.t, row.t + 0.01, x, row.u), (x, {n: getattr(seen, n) for n in model.channels})
+
+    _, (truth, seen) = jax.lax.scan(drive, model.prior.mean, jnp.arange(rows))
+    found = filters.run(filters.Cubature(), model, schedule.replace(**{n: np.array(v) for n, v in seen.items()}))
+    np.testing.assert_allclose(found.mean.yaw_rate, truth.yaw_rate, atol=2e-3)
+    np.testing.assert_allclose(found.mean.v_x, truth.v_x, atol=0.02)
+    np.testing.assert_allclose(found.mean.sideslip, np.arctan2(truth.v_y, truth.v_x), atol=2e-3)
+
+
+def test_a_sensor_that_is_worse_in_slip():
+    """Noise that depends on an output of the car, with parameters of the car as states."""
+
+    def worse(system, t, x, u):
+        slip = system.outputs(t, x, u).slip_angle_front
+        return {"yaw_rate": 0.005 + 0.1 * jnp.abs(slip), "a_y": jnp.asarray(0.1, slip.dtype)}
+
+    car = vehicles.passenger_car()
+    noise = StateDependent(worse, ("yaw_rate", "a_y"))
+    model = estimators.state_space(
+        car, sensors.esc(), estimate=lambda car: (car.front.D,), measurement_noise=noise, minimum_speed=0.0
+    )
+    u = record("Inputs", {"steer": jnp.asarray(0.05), "v_x": jnp.asarray(20.0)})
+    law = model.measurement_law(jnp.asarray(0.0), model.prior.mean, u)
+    np.testing.assert_allclose(law.std.yaw_rate, 0.005 + 0.1 * 0.05, rtol=1e-2)
+    with pytest.raises(InputError, match="measurement_noise is of yaw_rate: must be of the sensors' channels"):
+        estimators.state_space(car, sensors.esc(), measurement_noise=Gaussian({"yaw_rate": 0.1}))
