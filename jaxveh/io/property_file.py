@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from jaxveh._core.errors import InputError
@@ -79,11 +80,18 @@ class PropertyFile:
 
         **Raises** `InputError` where several disagree about it.
         """
-        return _one(self.source, key, [entry for entry in self.entries if entry.key == key])
+        return _one(self.source, key, self._by_key.get(key, []))
 
     def holds(self, key: str) -> bool:
         """Whether there is a line of that name, with or without a value."""
-        return any(entry.key == key for entry in self.entries)
+        return key in self._by_key
+
+    @cached_property
+    def _by_key(self) -> dict[str, list[Entry]]:
+        found: dict[str, list[Entry]] = {}
+        for entry in self.entries:
+            found.setdefault(entry.key, []).append(entry)
+        return found
 
     def number(self, key: str, default: float | None = None) -> float:
         """The number of that name; `default` where the file is silent.
@@ -111,7 +119,7 @@ class PropertyFile:
 
     def unit(self, quantity: str) -> float:
         """The size in SI of the file's unit of `LENGTH`, `FORCE`, `ANGLE`, `MASS` or `TIME`; 1 where it is silent."""
-        entry = _one(self.source, quantity, [e for e in self.entries if e.section == "UNITS" and e.key == quantity])
+        entry = _one(self.source, quantity, [e for e in self._by_key.get(quantity, []) if e.section == "UNITS"])
         if entry is None:
             return 1.0
         known, said = UNITS[quantity], str(entry.value).strip().lower()

@@ -21,7 +21,7 @@ import numpy as np
 from jaxveh.io.property_file import UNITS, PropertyFile, read_property_file
 from jaxveh.tyres.base import Contact
 from jaxveh.tyres.mf_tyre import MFTyre
-from jaxveh.tyres.property_file import SIDES, from_property_file
+from jaxveh.tyres.property_file import SIDES, from_property_file, tells
 from jaxveh.tyres.property_lines import Finding, first_of, odd_lines
 
 USUAL = {
@@ -41,6 +41,7 @@ PER_LOAD, PER_RADIUS = ("K_xk", "K_ya", "F_y"), ("rho", "trail")
 
 GRID = 11
 """Points over a range of the file."""
+
 
 def check_property_file(source: str | Path | PropertyFile) -> list[Finding]:
     """What is worth a look in a .tir file; an empty list where nothing is.
@@ -101,7 +102,7 @@ def _missing(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
     if tyre.version != 52:
         wanted += ["NOMPRES", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS"]
     for key in wanted:
-        if file.find(key) is None:
+        if not tells(file, key):
             yield Finding(key, f"is missing: {float(getattr(tyre.structure, key)):g} is taken")
     speed = float(tyre.structure.LONGVL)
     if not 5 <= speed <= 50:
@@ -135,7 +136,7 @@ def _ranges(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
 def _pressure(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
     r = tyre.ranges
     for key in ("NOMPRES", "INFLPRES"):
-        if file.find(key) is None:
+        if not tells(file, key):
             continue
         value = float(getattr(tyre.structure, key))
         if not 2e4 <= value <= 2e6:

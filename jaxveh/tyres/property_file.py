@@ -9,7 +9,6 @@ from typing import Literal, overload
 import jax
 import numpy as np
 
-from jaxveh._core.bijectors import Positive
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh.io.property_file import PropertyFile, read_property_file
 from jaxveh.tyres.mf_tyre import (
@@ -38,6 +37,11 @@ OLD_FORMATS = ("PAC2002", "MF_05", "MF-TYRE", "MF_TYRE")
 
 NEEDED = ("FNOMIN", "UNLOADED_RADIUS", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 """What no tyre can do without; for all else see `TYPICAL`."""
+
+NOT_MEASURED = (
+    "WIDTH", "VERTICAL_STIFFNESS", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS", "NOMPRES", "INFLPRES", "LONGVL", "Q_RE0",
+)  # fmt: skip
+"""What must be positive, and what tools write as zero where it was not measured."""
 
 DIMENSIONS = {
     "UNLOADED_RADIUS": (1, 0, 0), "WIDTH": (1, 0, 0), "RIM_RADIUS": (1, 0, 0), "BOTTOM_OFFST": (1, 0, 0),
@@ -83,8 +87,7 @@ def from_property_file(
     `side`, `left` or `right`: the side of the car on which the tyre is mounted; it comes mirrored where TYRESIDE, for which
     the file's coefficients hold, is the other one. None takes it as it is. The version comes from FITTYP or
     PROPERTY_FILE_FORMAT; `limits`, `angles` and `spins` as in `MFTyre`. Where the file is silent coefficients are `TYPICAL`,
-    or zero; an entry without a value is silent, and so is a zero for what must be positive and is not `NEEDED`, which is how
-    tools write that a width or a carcass stiffness was not measured. `check_property_file` tells of both.
+    or zero; an entry without a value is silent, and so is a zero for what is `NOT_MEASURED`. `check_property_file` tells of both.
 
     **Raises** `InputError` for a version that is not in, a coefficient of the tyre that is no finite number (entries that it
     does not read may say what they like), a needed one that is missing, and a `side` where the file does not tell its own.
@@ -112,6 +115,7 @@ def _as_it_is(file: PropertyFile, limits: bool, angles: bool, spins: bool) -> MF
     for key in NEEDED:
         file.number(key)
     size = {key: size_of(file, powers) for key, powers in DIMENSIONS.items()}
+
     def section(kind):
         values = _numbers(file, kind, size)
         try:
@@ -160,21 +164,17 @@ def size_of(file: PropertyFile, powers: tuple[int, int, int]) -> float:
     return file.unit("LENGTH") ** length * file.unit("FORCE") ** force * file.unit("TIME") ** time
 
 
-def tells(file: PropertyFile, field: dataclasses.Field) -> bool:
+def tells(file: PropertyFile, key: str) -> bool:
     """Whether the file says this coefficient."""
-    entry = file.find(field.name)
-    if entry is None:
-        return False
-    return field.name in NEEDED or entry.value != 0 or not isinstance(field.metadata["domain"], Positive)
+    entry = file.find(key)
+    return entry is not None and not (key in NOT_MEASURED and entry.value == 0)
 
 
 def _numbers(file: PropertyFile, kind: type, size: dict[str, float]) -> dict[str, float]:
     """The coefficients of one section: the file's, typical ones where it is silent."""
-    fields = dataclasses.fields(kind)
-    found = {field.name: TYPICAL[field.name] for field in fields if field.name in TYPICAL}
-    found |= {
-        field.name: _number(file, field.name, size.get(field.name, 1.0)) for field in fields if tells(file, field)
-    }
+    names = [field.name for field in dataclasses.fields(kind)]
+    found = {name: TYPICAL[name] for name in names if name in TYPICAL}
+    found |= {name: _number(file, name, size.get(name, 1.0)) for name in names if tells(file, name)}
     if kind is Structure and "INFLPRES" not in found and "NOMPRES" in found:
         found["INFLPRES"] = found["NOMPRES"]
     return found
@@ -185,5 +185,7 @@ def _number(file: PropertyFile, name: str, size: float) -> float:
     value = file.number(name) * size
     largest = float(np.finfo(jax.dtypes.canonicalize_dtype(float)).max)
     if abs(value) > largest:
-        raise InputError(f"{file.source}: {name} = {file.number(name):g}: must be at most {largest / size:.3g} in size.")
+        raise InputError(
+            f"{file.source}: {name} = {file.number(name):g}: must be at most {largest / size:.3g} in size."
+        )
     return value

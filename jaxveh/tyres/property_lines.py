@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import equinox as eqx
 
-from jaxveh._core.bijectors import Positive
 from jaxveh.io.property_file import Entry, PropertyFile
 from jaxveh.tyres.mf_tyre import MFTyre
-from jaxveh.tyres.property_file import NEEDED
+from jaxveh.tyres.property_file import NOT_MEASURED
 
 NEUTRAL = {"LMUV": 0.0}
 """Scaling factors that do nothing at another value than 1."""
@@ -43,37 +41,27 @@ def first_of(file: PropertyFile, key: str) -> Entry | None:
 
 def odd_lines(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
     """Findings about single lines of a file, and about the coefficients in them that this tyre, made of it, does not use."""
-    fields = {
-        field.name: field
-        for part in vars(tyre).values()
-        if isinstance(part, eqx.Module)
-        for field in dataclasses.fields(part)
-    }
-    yield from _without_value(file, fields)
-    yield from _zeros(file, fields)
+    known = {name for part in vars(tyre).values() if isinstance(part, eqx.Module) for name in vars(part)}
+    yield from _without_value(file, known)
+    yield from _zeros(file)
     yield from _texts(file)
     yield from _twice(file)
-    yield from _unread(file, fields)
+    yield from _unread(file, known)
 
 
-def _without_value(file: PropertyFile, fields: dict) -> Iterator[Finding]:
+def _without_value(file: PropertyFile, known: set[str]) -> Iterator[Finding]:
     """Empty entries: those that the tyre reads, of which it takes a default, and in one line those that it does not."""
     told = {entry.key for entry in file.entries if entry.value != ""}
     empty = [entry for entry in file.entries if entry.value == "" and entry.key not in told]
-    read = [entry for entry in empty if entry.key in fields or entry.key in WORDS or entry.section == "UNITS"]
+    read = [entry for entry in empty if entry.key in known or entry.key in WORDS or entry.section == "UNITS"]
     if read:
         yield Finding(_listed(read), "without a value: as if the lines were not there")
     if others := [entry for entry in empty if entry not in read and not entry.quoted]:
         yield Finding(_listed(others), "without a value, and not read")
 
 
-def _zeros(file: PropertyFile, fields: dict) -> Iterator[Finding]:
-    zeros = [
-        entry for entry in file.entries
-        if entry.value == 0 and entry.key in fields and entry.key not in NEEDED
-        and isinstance(fields[entry.key].metadata["domain"], Positive)
-    ]  # fmt: skip
-    if zeros:
+def _zeros(file: PropertyFile) -> Iterator[Finding]:
+    if zeros := [entry for entry in file.entries if entry.value == 0 and entry.key in NOT_MEASURED]:
         yield Finding(_listed(zeros), "0, where only a positive number means anything: as if the lines were not there")
 
 
@@ -97,13 +85,13 @@ def _twice(file: PropertyFile) -> Iterator[Finding]:
             yield Finding(entry.key, f"stands in lines {before.line} and {entry.line} with different values")
 
 
-def _unread(file: PropertyFile, fields: dict) -> Iterator[Finding]:
+def _unread(file: PropertyFile, known: set[str]) -> Iterator[Finding]:
     """Coefficients of forces and moments that do something, and that are not read; names in small letters; tables."""
     unread: dict[str, list[Entry]] = {}
     for entry in file.entries:
-        if entry.key in fields or entry.key in DYNAMIC or isinstance(entry.value, str):
+        if entry.key in known or entry.key in DYNAMIC or isinstance(entry.value, str):
             continue
-        if entry.key.upper() in fields:
+        if entry.key.upper() in known:
             yield Finding(entry.key, f"in [{entry.section}], line {entry.line}, is not read: write {entry.key.upper()}")
         elif entry.section.endswith("COEFFICIENTS") or entry.section.startswith("TURNSLIP"):
             neutral = NEUTRAL.get(entry.key, 1.0 if entry.section.startswith("SCALING") else 0.0)
@@ -117,4 +105,8 @@ def _unread(file: PropertyFile, fields: dict) -> Iterator[Finding]:
 
 def _listed(entries: Iterable[Entry]) -> str:
     keys = list(dict.fromkeys(entry.key for entry in entries))
-    return ", ".join(keys) if len(keys) <= LISTED else f"{', '.join(keys[: LISTED // 2])} and {len(keys) - LISTED // 2} more"
+    return (
+        ", ".join(keys)
+        if len(keys) <= LISTED
+        else f"{', '.join(keys[: LISTED // 2])} and {len(keys) - LISTED // 2} more"
+    )

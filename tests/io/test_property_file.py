@@ -80,7 +80,11 @@ def test_units_comments_tables_and_unknown_sections():
         ("PCY1 = 1.3\n", "", "PCY1 is missing"),
         ("PCY1 = 1.3", "PCY1 = fast", r"line 20: PCY1 = 'fast': must be one finite number"),
         ("PCY1 = 1.3", "PCY1 = 'fast'", r"line 20: PCY1 = 'fast': must be one finite number"),
-        ("PCY1 = 1.3", "PCY1 = 1.3\nPCY1 = 1.4", r"PCY1 has several values: 1.3 in \[LATERAL_COEFFICIENTS\], line 20, 1.4 "),
+        (
+            "PCY1 = 1.3",
+            "PCY1 = 1.3\nPCY1 = 1.4",
+            r"PCY1 has several values: 1.3 in \[LATERAL_COEFFICIENTS\], line 20, 1.4 ",
+        ),
         ("[NOBODY_KNOWS]", "[NOBODY_KNOWS]\nFNOMIN = 3", "FNOMIN has several values"),
         ("'mm'", "'furlong'", "LENGTH = 'furlong': must be one of meter"),
         ("FNOMIN = 4.0d3", "FNOMIN = -4", "Structure.FNOMIN = -4"),

@@ -1,0 +1,154 @@
+"""Where wheels are every day: off the ground, at standstill, rolling freely, sliding. Every law of `tyres.__all__`, every
+wrapper and every property file gives finite forces there, and finite derivatives."""
+
+import inspect
+import itertools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from property_files import SMALL
+from shared_data import shared, shared_names
+
+from jaxveh import statespace, tyres
+from jaxveh.io.property_file import parse_property_file
+from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
+
+
+def tmeasy(**more):
+    curve = tyres.TMeasyCurve
+    one = curve(90e3, 0.11, 3300.0, 0.40, 3200.0), curve(75e3, 0.16, 3100.0, 0.60, 3000.0)
+    two = curve(160e3, 0.12, 6000.0, 0.45, 5700.0), curve(120e3, 0.18, 5500.0, 0.70, 5400.0)
+    return tyres.TMeasy(*one, 3000.0, *two, trail=tyres.TMeasyTrail(0.035, 0.20, 0.45), **more)
+
+
+def truck():
+    """PAC2002 as truck tyres have it: without relaxation lengths, which is said by zeros."""
+    return tyres.from_property_file(parse_property_file(SMALL.decode() + "PTY1 = 0\nPTY2 = 0\n"))
+
+
+LAWS = {
+    "Arctangent": lambda: tyres.Arctangent(20e3, 12.0, 0.9),
+    "Brush": lambda: tyres.Brush(80e3, 60e3, 0.9),
+    "Dugoff": lambda: tyres.Dugoff(80e3, 60e3, 0.9, 0.01),
+    "Exponential": lambda: tyres.Exponential(15.0, 0.9, 20.0),
+    "Fiala": lambda: tyres.Fiala(80e3, 60e3, 0.9),
+    "FialaADAMS": lambda: tyres.FialaADAMS(80e3, 60e3, 0.9, 0.7),
+    "FialaPolynomial": lambda: tyres.FialaPolynomial(80e3, 60e3, 0.9),
+    "FrictionEllipse": lambda: tyres.FrictionEllipse(
+        tyres.MagicFormula(10.0, 1.4, 3600.0, -0.8, nominal_load=4e3), 0.9
+    ),
+    "HSRI": lambda: tyres.HSRI(80e3, 60e3, 0.9),
+    "IsotropicMagicFormula": lambda: tyres.IsotropicMagicFormula(10.0, 1.4, 0.9, 0.2),
+    "Linear": lambda: tyres.Linear(60e3, 80e3),
+    "LinearWithLoad": lambda: tyres.LinearWithLoad(60e3, 5e3, 20.0),
+    "Longitudinal": lambda: tyres.Longitudinal(tyres.Exponential(15.0, 0.9, 20.0)),
+    "LuGre": lambda: tyres.LuGre(200.0, 150.0, 1.1, 0.8, 6.0, 0.15, 0.2, 0.3, 1e-3, 0.5),
+    "MFTyre": lambda: tyres.typical_mf_tyre(4000.0, version=62),
+    "MagicFormula": lambda: tyres.MagicFormula(10.0, 1.4, 3600.0, -0.8, nominal_load=4e3),
+    "Mirrored": lambda: tyres.Mirrored(tyres.Brush(80e3, 60e3, 0.9)),
+    "OnRoad": lambda: tyres.OnRoad(tyres.Brush(80e3, 60e3, 0.9), 0.8),
+    "Parabolic": lambda: tyres.Parabolic(60e3, 0.9, 80e3),
+    "Relaxed": lambda: tyres.Relaxed(tyres.Brush(80e3, 60e3, 0.9), 0.2, 0.4),
+    "Similarity": lambda: tyres.Similarity(tyres.MagicFormula(10.0, 1.4, 3600.0, -0.8, nominal_load=4e3), 4e3),
+    "TMeasy": tmeasy,
+    "UniTire": lambda: tyres.UniTire(80e3, 60e3, 0.9, 0.4),
+}
+"""Every law of the package by its name; others of the same law below."""
+
+MORE = {
+    "Relaxed, force": lambda: tyres.Relaxed(tyres.Brush(80e3, 60e3, 0.9), 0.2, 0.4, of="force"),
+    "Relaxed MFTyre": lambda: tyres.Relaxed(tyres.typical_mf_tyre(4000.0)),
+    "Relaxed truck": lambda: tyres.Relaxed(truck()),
+}
+
+FILES = {
+    name: lambda name=name: tyres.Relaxed(tyres.from_property_file(shared("tyres") / name))
+    for name in shared_names("tyres", "*.tir")
+}
+"""With their own relaxation lengths, so that forces, moments and lengths are looked at."""
+
+LOADS, SPEEDS, SLIP_SPEEDS, FRICTIONS = (4000.0, 0.0, -100.0), (20.0, 0.0), (None, 0.0, 1.2), (1.0, 0.0)
+SLIPS = ((0.0, 0.0), (0.05, -0.02), (-1.2, 2.0), (0.3, -1.0), (1.57, 1e4))
+
+
+def test_every_law_of_the_package_is_here():
+    laws = [getattr(tyres, name) for name in tyres.__all__]
+    laws = {law.__name__ for law in laws if inspect.isclass(law) and issubclass(law, AbstractTyre)}
+    assert laws - {"AbstractTyre", "AbstractDynamicTyre"} == set(LAWS)
+
+
+def contact(row, slip_speed):
+    angle, ratio, load, speed, friction, camber, told = row
+    told = None if slip_speed is None else told
+    return Contact(
+        slip_angle=angle, slip_ratio=ratio, load=load, speed=speed, friction=friction, camber=camber, slip_speed=told
+    )
+
+
+def everything(tyre, at):
+    """Forces and moments; of a tyre with states those at the settled state, that state and its derivative there."""
+    if not isinstance(tyre, AbstractDynamicTyre):
+        return jnp.stack([jnp.asarray(value, at.load.dtype) for value in tyre.forces(at)])
+    state = tyre.start(at)
+    # Off the settled state, where nothing cancels.
+    moved = jax.tree.map(lambda value: value + 1e-3, state)
+    parts = state, tyre.derivatives(at, moved), tyre.forces(at, moved)
+    return jnp.stack([jnp.asarray(value, at.load.dtype) for part in parts for value in part])
+
+
+@jax.jit
+def with_derivatives(tyre, rows, plain):
+    """Values, and their derivatives by each of the contact's numbers and along all parameters at once."""
+
+    def at_row(row, slip_speed):
+        value = lambda tyre, row: everything(tyre, contact(row, slip_speed))
+        ones = jax.tree.map(jnp.ones_like, tyre)
+        along = jax.jvp(lambda tyre: value(tyre, row), (tyre,), (ones,))[1]
+        return value(tyre, row), jax.jacfwd(lambda row: value(tyre, row))(row), along
+
+    told = jax.vmap(lambda row: at_row(row, 1.0))(rows)
+    return told, jax.vmap(lambda row: at_row(row, None))(plain)
+
+
+def points(dtype):
+    rows = [
+        (*slips, load, speed, friction, camber, slip_speed)
+        for slips, load, speed, friction, camber, slip_speed in itertools.product(
+            SLIPS, LOADS, SPEEDS, FRICTIONS, (0.0, 0.05), SLIP_SPEEDS
+        )
+    ]
+    told = np.array([row for row in rows if row[-1] is not None], dtype)
+    return told, np.array([row[:-1] + (0.0,) for row in rows if row[-1] is None], dtype)
+
+
+def check_finite(tyre, dtype=np.float64):
+    tyre = statespace.cast(tyre, dtype)
+    for rows, found in zip(points(dtype), with_derivatives(tyre, *points(dtype)), strict=True):
+        for what, values in zip(("values", "derivatives", "along parameters"), found, strict=True):
+            values = np.asarray(values).reshape(len(rows), -1)
+            bad = ~np.isfinite(values).all(axis=1)
+            assert not bad.any(), f"{what} at {rows[bad][0]}: {values[bad][0]}"
+
+
+@pytest.mark.parametrize("name", [*LAWS, *MORE])
+def test_finite_forces_and_derivatives(name):
+    check_finite({**LAWS, **MORE}[name]())
+
+
+@pytest.mark.parametrize("name", [name for name in LAWS if name != "MFTyre"])
+def test_finite_forces_and_derivatives_in_single_precision(name):
+    check_finite(LAWS[name](), np.float32)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_finite_forces_and_derivatives_of_files(name):
+    check_finite(FILES[name]())
+
+
+def test_a_truck_tyre_that_lifts_keeps_a_length():
+    tyre = tyres.Relaxed(truck())
+    at = Contact(slip_angle=0.05, load=0.0, speed=20.0)
+    assert float(tyre.tyre.outputs(at).sigma_y) == 0.0
+    assert np.isfinite(tyre.derivatives(at, tyre.start(at))).all()
