@@ -96,10 +96,10 @@ class TMeasy(AbstractTyre):
     - Friction: forces, slips of the curve and of the trail scale with the contact's friction, slopes stay.
     - Each curve: `F = dF_0 s / (1 + q (q + dF_0 s_max / F_max - 2))` with `q = s / s_max` up to the peak, then a way down, then
       F_slide: smooth to the first derivative.
-    - `after_peak`, the way down: `cubic` (the default, as the book of 2012 has it) is `F_max - (F_max - F_slide) t^2 (3 - 2 t)`
-      with `t = (s - s_max) / (s_slide - s_max)`. `parabolas` (G. Rill & A. Arrieta Castro, Road Vehicle Dynamics: Fundamentals and
-      Modeling with MATLAB, 2nd ed., CRC Press, 2020, sec. 3.3, and the tools that follow it) is
-      `F_max - a (s - s_max)^2` up to `s_* = s_max + (F_max - F_slide) / (a (s_slide - s_max))`, then
+    - `after_peak`, the way down: `cubic` (the default, as the book of 2012 has it) is
+      `F_max - (F_max - F_slide) t^2 (3 - 2 t)` with `t = (s - s_max) / (s_slide - s_max)`. `parabolas` (G. Rill & A. Arrieta
+      Castro, Road Vehicle Dynamics: Fundamentals and Modeling with MATLAB, 2nd ed., CRC Press, 2020, ch. 3, and tools such as
+      Project Chrono) is `F_max - a (s - s_max)^2` up to `s_* = s_max + (F_max - F_slide) / (a (s_slide - s_max))`, then
       `F_slide + b (s_slide - s)^2` with `b = a (s_* - s_max) / (s_slide - s_*)`; `a = F_max^2 / (dF_0 s_max^3)` makes the second
       derivative one at the peak. Where s_* is beyond s_slide the parabolas do not fit, and it is the cubic: in combined slip
       the force can jump at the direction where they cease to.

@@ -23,6 +23,10 @@ def tmeasy(**more):
     return tyres.TMeasy(*one, 3000.0, *two, trail=tyres.TMeasyTrail(0.035, 0.20, 0.45), **more)
 
 
+def magic_formula():
+    return tyres.MagicFormula(10.0, 1.4, 3600.0, -0.8, nominal_load=4e3)
+
+
 def truck():
     """PAC2002 as truck tyres have it: without relaxation lengths, which is said by zeros."""
     return tyres.from_property_file(parse_property_file(SMALL.decode() + "PTY1 = 0\nPTY2 = 0\n"))
@@ -46,18 +50,20 @@ LAWS = {
     "Longitudinal": lambda: tyres.Longitudinal(tyres.Exponential(15.0, 0.9, 20.0)),
     "LuGre": lambda: tyres.LuGre(200.0, 150.0, 1.1, 0.8, 6.0, 0.15, 0.2, 0.3, 1e-3, 0.5),
     "MFTyre": lambda: tyres.typical_mf_tyre(4000.0, version=62),
-    "MagicFormula": lambda: tyres.MagicFormula(10.0, 1.4, 3600.0, -0.8, nominal_load=4e3),
+    "MagicFormula": lambda: magic_formula(),
     "Mirrored": lambda: tyres.Mirrored(tyres.Brush(80e3, 60e3, 0.9)),
     "OnRoad": lambda: tyres.OnRoad(tyres.Brush(80e3, 60e3, 0.9), 0.8),
     "Parabolic": lambda: tyres.Parabolic(60e3, 0.9, 80e3),
     "Relaxed": lambda: tyres.Relaxed(tyres.Brush(80e3, 60e3, 0.9), 0.2, 0.4),
-    "Similarity": lambda: tyres.Similarity(tyres.MagicFormula(10.0, 1.4, 3600.0, -0.8, nominal_load=4e3), 4e3),
+    "Similarity": lambda: tyres.Similarity(magic_formula(), 4e3),
     "TMeasy": tmeasy,
     "UniTire": lambda: tyres.UniTire(80e3, 60e3, 0.9, 0.4),
 }
 """Every law of the package by its name; others of the same law below."""
 
 MORE = {
+    "Brush, against velocity": lambda: tyres.Brush(80e3, 60e3, 0.9, slides="against velocity"),
+    "TMeasy, parabolas": lambda: tmeasy(after_peak="parabolas"),
     "Relaxed, force": lambda: tyres.Relaxed(tyres.Brush(80e3, 60e3, 0.9), 0.2, 0.4, of="force"),
     "Relaxed MFTyre": lambda: tyres.Relaxed(tyres.typical_mf_tyre(4000.0)),
     "Relaxed truck": lambda: tyres.Relaxed(truck()),
@@ -120,7 +126,7 @@ def points(dtype):
         )
     ]
     told = np.array([row for row in rows if row[-1] is not None], dtype)
-    return told, np.array([row[:-1] + (0.0,) for row in rows if row[-1] is None], dtype)
+    return told, np.array([(*row[:-1], 0.0) for row in rows if row[-1] is None], dtype)
 
 
 def check_finite(tyre, dtype=np.float64):
