@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 
 from jaxveh._core.errors import InputError
+from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable, replacing
 
 UNITS = {
@@ -28,9 +28,6 @@ _ENTRY = re.compile(
     r"(?P<value>'[^'\r\n]*'|\"[^\"\r\n]*\"|[^$!\r\n]*[^$!\s]|)(?P<rest>.*)$",
     re.DOTALL,
 )
-# Narrower than Python's float: no digits of other scripts, no underscores, no "nan"; but Fortran's 1.0d3.
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][+-]?[0-9]+)?")
-
 SHOWN = 40
 """So many characters of a value are shown in a message."""
 
@@ -214,11 +211,10 @@ def _value(text: str) -> tuple[float | str, bool]:
     """What stands there, and whether it is in quotes."""
     if len(text) > 1 and text[0] in "'\"" and text[-1] == text[0]:
         return text[1:-1], True
-    if _NUMBER.fullmatch(text):
-        number = float(re.sub("[dD]", "e", text))
-        if math.isfinite(number):
-            return number, False
-    return text, False
+    try:
+        return decimal(re.sub("[dD]", "e", text)), False  # Fortran writes 1.0d3
+    except ValueError:
+        return text, False
 
 
 def _with_value(line: str, text: str) -> str:
