@@ -221,5 +221,10 @@ def _with_value(line: str, text: str) -> str:
     """The line with another value, the comment where it was if the width allows."""
     found = _ENTRY.match(line)
     assert found is not None
-    width = len(found["value"]) + len(found["rest"]) - len(found["rest"].lstrip(" "))
-    return found["lead"] + text.ljust(max(width, len(text) + 1)) + found["rest"].lstrip(" ")
+    lead, rest = found["lead"], found["rest"]
+    if not found["value"]:
+        # Blanks up to a comment are room for the value that is not there yet.
+        lead = lead.rstrip() + " "
+        rest = " " * (len(found["lead"]) - len(lead)) + rest
+    width = len(found["value"]) + len(rest) - len(rest.lstrip(" "))
+    return lead + text.ljust(max(width, len(text) + 1)) + rest.lstrip(" ")
