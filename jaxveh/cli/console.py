@@ -62,6 +62,11 @@ def _lines(console: Console, title: str) -> Report:
     return report
 
 
+def printable(text: str) -> str:
+    """The text with a question mark for each byte that was no text when it was read, which no terminal takes."""
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "", left: int = 1) -> None:
     """Print a table: the first `left` columns to the left, numbers to the right; a cell that is no string is shown by
     `number`."""
@@ -69,7 +74,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], 
     for i, column in enumerate(columns):
         shown.add_column(Text(column), justify="left" if i < left else "right")
     for row in rows:
-        shown.add_row(*[Text(cell if isinstance(cell, str) else number(cell)) for cell in row])
+        shown.add_row(*[Text(printable(cell) if isinstance(cell, str) else number(cell)) for cell in row])
     console = results()
     console.print(Text(title, "bold"))
     console.print(shown)

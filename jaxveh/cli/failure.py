@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from jaxveh import FilterError, InputError, JaxvehWarning
-from jaxveh.cli.console import messages
+from jaxveh.cli.console import messages, printable
 
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
 
@@ -88,6 +88,6 @@ def _warnings_in_words() -> Iterator[None]:
 
 def say(kind: str, colour: str, message: object) -> None:
     """One unwrapped line on stderr: `kind: message`."""
-    line = " ".join(str(message).split())
+    line = printable(" ".join(str(message).split()))
     messages().print(f"[bold {colour}]{kind}:[/] ", end="", soft_wrap=True)
     messages().print(line, markup=False, soft_wrap=True)

@@ -6,12 +6,15 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
 import typer
 
 from jaxveh import InputError, io, tyres
 from jaxveh.cli import options
-from jaxveh.cli.console import messages, number, results, table
+from jaxveh.cli.console import messages, number, printable, results, table
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
 from jaxveh.tyres.evaluation import INPUTS, evaluate
 
@@ -38,11 +41,12 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
     source = io.read_property_file(file)
     tyre = tyres.from_property_file(source)
     s, r = tyre.structure, tyre.ranges
-    results().print(
+    head = (
         f"{file}: MF-Tyre {tyre.version / 10:g}, side {source.text('TYRESIDE', 'not told')}, "
         f"radius {float(s.UNLOADED_RADIUS):g} m, "
         f"nominal load {float(s.FNOMIN):g} N, pressure {float(s.NOMPRES) / 1e5:g} bar, measured at {float(s.LONGVL):g} m/s"
     )
+    results().print(printable(head), markup=False)
     ranges = {
         "slip ratio, -": (r.KPUMIN, r.KPUMAX, 1.0),
         "slip angle, degrees": (r.ALPMIN, r.ALPMAX, 180 / np.pi),
@@ -51,13 +55,13 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
     }
     rows = [(name, number(float(low) * unit), number(float(high) * unit)) for name, (low, high, unit) in ranges.items()]
     table("Measured from .. to", ("quantity", "from", "to"), rows)
-    found = [tyre.outputs(tyres.Contact(load=share * s.FNOMIN)) for share in LOADS]
+    found = _free_rolling(tyre, jnp.asarray(LOADS, s.FNOMIN.dtype) * s.FNOMIN)
     quantities = {
         "friction along, -": "mu_x", "friction across, -": "mu_y", "slip stiffness, N": "K_xk",
         "cornering stiffness, N/rad": "K_ya", "relaxation along, m": "sigma_x", "relaxation across, m": "sigma_y",
         "trail, m": "trail", "effective radius, m": "R_e", "deflection, m": "rho",
     }  # fmt: skip
-    rows = [(name, *[number(float(getattr(one, field))) for one in found]) for name, field in quantities.items()]
+    rows = [(name, *map(number, found[field])) for name, field in quantities.items()]
     table("Free rolling, at loads in N", ("quantity", *[f"{share * float(s.FNOMIN):g}" for share in LOADS]), rows)
     findings = tyres.check_property_file(source)
     if findings:
@@ -65,12 +69,18 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
     shown: dict[str, Any] = {
         "version": tyre.version,
         "loads": [share * float(s.FNOMIN) for share in LOADS],
-        **{field: [float(getattr(one, field)) for one in found] for field in quantities.values()},
+        **{field: found[field] for field in quantities.values()},
         "findings": [finding._asdict() for finding in findings],
     }
     if out is not None:
         _draw(tyre, out)
     write_numbers(numbers, shown, {"file": file}, 0)
+
+
+def _free_rolling(tyre: tyres.MFTyre, load: jax.Array) -> dict[str, list[float]]:
+    """All outputs at these loads, by name."""
+    found = eqx.filter_jit(lambda tyre, at: tyre.outputs(at))(tyre, tyres.Contact(load=load))
+    return {name: np.broadcast_to(value, load.shape).tolist() for name, value in found._asdict().items()}
 
 
 def _draw(tyre: tyres.MFTyre, out: Path) -> None:

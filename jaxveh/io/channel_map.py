@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxveh._core.errors import InputError, check, check_finite, check_one_of
-from jaxveh.io.toml import check_keys, number, read_toml, text
+from jaxveh.io.toml import check_keys, number, read_toml, shortened, text
 
 SCHEMA = """\
 # A channel map. Everything but `column` is optional.
@@ -31,6 +31,8 @@ separator = ";"             # without it: whichever of , ; and tab the header li
 decimal = ","               # without it: a point
 """
 """The file's schema as a commented example, for programs to print."""
+
+MOST_GROUPS = 2**31
 
 
 @dataclass(frozen=True)
@@ -108,8 +110,8 @@ def _entry(where: str, entry: Any) -> Channel:
     if "column" not in entry:
         raise InputError(f'{where}: has no `column`; add column = "NAME IN THE FILE".')
     group = entry.get("group")
-    if group is not None and (isinstance(group, bool) or not isinstance(group, int)):
-        raise InputError(f"{where}: group = {group!r}: must be a whole number.")
+    if group is not None and (isinstance(group, bool) or not isinstance(group, int) or not 0 <= group < MOST_GROUPS):
+        raise InputError(f"{where}: group = {shortened(group)}: must be a whole number from 0 to {MOST_GROUPS - 1}.")
     try:
         return Channel(
             column=text(f"{where}: column", entry["column"]),

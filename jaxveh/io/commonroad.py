@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from jaxveh._core.errors import InputError
+from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable
 from jaxveh.io.naming import check_known
 from jaxveh.io.optional import require
+from jaxveh.io.toml import shortened
 
 TYRE_COEFFICIENTS = (
     *("p_cx1", "p_dx1", "p_dx3", "p_ex1", "p_kx1", "p_hx1", "p_vx1", "r_bx1", "r_bx2", "r_cx1", "r_ex1", "r_hx1"),
@@ -143,10 +145,15 @@ def _load(path: Path) -> Mapping:
     check_readable(path)
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
-    except yaml.YAMLError as error:
-        raise InputError(f"{path}: broken YAML: {' '.join(str(error).split())}.") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: broken YAML: not UTF-8 text (byte {error.start}).") from error
+    except (
+        yaml.YAMLError,
+        ValueError,
+        TypeError,
+        RecursionError,
+    ) as error:  # dates, numbers and keys that are none, too
+        raise InputError(f"{path}: broken YAML: {' '.join(str(error).split())}.") from error
     if not isinstance(content, Mapping):
         raise InputError(f"{path}: must be a mapping of keys to numbers.")
     return content
@@ -164,9 +171,9 @@ def _flat(content: Mapping) -> dict[str, Any]:
 def _number(name: str, value: Any, low: float, high: float, allowed: str) -> float:
     try:
         # YAML takes 10.0e3 for a text: its exponents have signs.
-        number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
+        number = math.nan if isinstance(value, bool) else decimal(value) if isinstance(value, str) else float(value)
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (math.isfinite(number) and low <= number <= high):
-        raise InputError(f"{name} = {value!r}: must be {allowed}.")
+        raise InputError(f"{name} = {shortened(value)}: must be {allowed}.")
     return number

@@ -12,7 +12,9 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import Channel
+from jaxveh.io.decimals import decimal
 from jaxveh.io.naming import check_known, listing
+from jaxveh.io.toml import shortened
 from jaxveh.io.units import convert, given
 
 TIME_NAMES = ("time", "timestamps", "timestamp", "t")
@@ -134,12 +136,12 @@ def _cell(cell, row: int, what: str) -> float:
     if cell is None:
         return np.nan
     try:
-        return float(cell)
-    except (TypeError, ValueError) as error:
+        return decimal(cell) if isinstance(cell, str) else float(cell)
+    except (TypeError, ValueError, OverflowError) as error:
         comma = isinstance(cell, str) and re.fullmatch(r"\s*[-+]?\d+,\d+\s*", cell)
         advice = (
             'Decimal commas: set decimal = "," under [csv] in the channel map.'
             if comma
             else "Correct the cell, or leave the column out by naming the others in a channel map."
         )
-        raise InputError(f"{what}, data row {row + 1}: {cell!r} is not a number. {advice}") from error
+        raise InputError(f"{what}, data row {row + 1}: {shortened(cell)} is not a number. {advice}") from error

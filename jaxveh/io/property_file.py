@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from jaxveh._core.errors import InputError
+from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable, replacing
 
 UNITS = {
@@ -20,19 +22,35 @@ UNITS = {
 """What a [UNITS] section may say, and its size in SI."""
 
 _SECTION = re.compile(r"^\s*\[(?P<name>[^\]]+)\]\s*$")
+# A value is a text in quotes, or all up to a comment.
 _ENTRY = re.compile(
-    r"^(?P<lead>\s*(?P<key>[A-Za-z_][\w.]*)\s*=\s*)(?P<value>'[^']*'|\"[^\"]*\"|[^\s$!]*)(?P<rest>.*)$", re.DOTALL
+    r"^(?P<lead>\s*(?P<key>[A-Za-z_][\w.]*)\s*=[^\S\r\n]*)"
+    r"(?P<value>'[^'\r\n]*'|\"[^\"\r\n]*\"|[^$!\r\n]*[^$!\s]|)(?P<rest>.*)$",
+    re.DOTALL,
 )
+SHOWN = 40
+"""So many characters of a value are shown in a message."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One coefficient of a property file: `section`, `key`, `value` (float, or str where it is quoted), its `line` from 1."""
+    """One line `key = value` of a property file: `section`, `key`, `value`, its `line` from 1.
+
+    `value`: a float where one finite number stands there, else the text: without its quotes where it has some (`quoted`), as it
+    stands where it has none, and empty where there is nothing.
+    """
 
     section: str
     key: str
     value: float | str
     line: int
+    quoted: bool = False
+
+    @property
+    def shown(self) -> str:
+        """The value for a message, shortened."""
+        text = repr(self.value)
+        return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
 @dataclass(frozen=True)
@@ -55,27 +73,38 @@ class PropertyFile:
         return found
 
     def find(self, key: str) -> Entry | None:
-        """The entry of that name, wherever it stands; None where there is none.
+        """The entry of that name that has a value, wherever it stands; None where there is none.
 
-        **Raises** `InputError` where sections disagree about it.
+        **Raises** `InputError` where several disagree about it.
         """
-        found = [entry for entry in self.entries if entry.key == key]
-        if len({str(entry.value) for entry in found}) > 1:
-            places = ", ".join(f"{e.value!r} in [{e.section}], line {e.line}" for e in found)
-            raise InputError(f"{self.source}: {key} has several values: {places}. Leave one.")
-        return found[0] if found else None
+        return _one(self.source, key, self._by_key.get(key, []))
+
+    def holds(self, key: str) -> bool:
+        """Whether there is a line of that name, with or without a value."""
+        return key in self._by_key
+
+    @cached_property
+    def _by_key(self) -> dict[str, list[Entry]]:
+        found: dict[str, list[Entry]] = {}
+        for entry in self.entries:
+            found.setdefault(entry.key, []).append(entry)
+        return found
 
     def number(self, key: str, default: float | None = None) -> float:
-        """The number of that name; `default` where the file is silent, an `InputError` without one or for a text."""
+        """The number of that name; `default` where the file is silent.
+
+        **Raises** `InputError` for what is not one finite number, and for silence without a default.
+        """
         entry = self.find(key)
         if entry is None:
             if default is None:
                 raise InputError(
-                    f"{self.source}: {key} is missing, and this tyre cannot do without: add a line `{key} = ...`."
+                    f"{self.source}: {key} {'has no value' if self.holds(key) else 'is missing'}, and this tyre cannot do "
+                    f"without: {'complete' if self.holds(key) else 'add'} the line `{key} = ...`."
                 )
             return default
         if isinstance(entry.value, str):
-            raise InputError(f"{self.source}, line {entry.line}: {key} = {entry.value!r}: must be a number.")
+            raise InputError(f"{self.source}, line {entry.line}: {key} = {entry.shown}: must be one finite number.")
         return entry.value
 
     def text(self, key: str, default: str = "") -> str:
@@ -87,13 +116,15 @@ class PropertyFile:
 
     def unit(self, quantity: str) -> float:
         """The size in SI of the file's unit of `LENGTH`, `FORCE`, `ANGLE`, `MASS` or `TIME`; 1 where it is silent."""
-        said = self.sections.get("UNITS", {}).get(quantity)
-        if said is None:
+        entry = _one(self.source, quantity, [e for e in self._by_key.get(quantity, []) if e.section == "UNITS"])
+        if entry is None:
             return 1.0
-        known = UNITS[quantity]
-        if str(said).strip().lower() not in known:
-            raise InputError(f"{self.source}: {quantity} = {said!r}: must be one of {', '.join(known)}.")
-        return known[str(said).strip().lower()]
+        known, said = UNITS[quantity], str(entry.value).strip().lower()
+        if said not in known:
+            raise InputError(
+                f"{self.source}, line {entry.line}: {quantity} = {entry.shown}: must be one of {', '.join(known)}."
+            )
+        return known[said]
 
     def replace(self, values: Mapping[str, float]) -> PropertyFile:
         """The same file with other numbers; everything else stays as it is, comments and columns included.
@@ -102,8 +133,7 @@ class PropertyFile:
         """
         lines = list(self.lines)
         for key, value in values.items():
-            entry = self.find(key)
-            if entry is None:
+            if not self.holds(key):
                 raise InputError(f"{self.source}: {key} is not in the file; there are: {', '.join(self._numbers())}.")
             for each in self.entries:
                 if each.key == key:
@@ -114,11 +144,22 @@ class PropertyFile:
         return [entry.key for entry in self.entries if isinstance(entry.value, float)]
 
 
+def _one(source: str, key: str, entries: list[Entry]) -> Entry | None:
+    """The first of the entries that have a value. **Raises** `InputError` where they disagree."""
+    told = [entry for entry in entries if entry.value != ""]
+    if len({str(entry.value) for entry in told}) > 1:
+        places = ", ".join(f"{e.shown} in [{e.section}], line {e.line}" for e in told)
+        raise InputError(f"{source}: {key} has several values: {places}. Leave one.")
+    return told[0] if told else None
+
+
 def read_property_file(path: str | Path) -> PropertyFile:
     """Read a .tir file.
 
-    **Raises** `InputError` for a file that is missing or holds no section, a coefficient that is no number, or one that
-    stands twice in a section.
+    What is no number stays as text: it is for whoever needs that number to object (`PropertyFile.number` does).
+
+    **Raises** `InputError` for a file that is missing, holds no section with entries, or is no text in UTF-8 or one of the
+    codes of single bytes.
     """
     path = Path(path)
     check_readable(path)
@@ -129,10 +170,13 @@ def read_property_file(path: str | Path) -> PropertyFile:
 
 def parse_property_file(text: str, source: str = "property file") -> PropertyFile:
     """Parse the text of a .tir file; see `read_property_file`."""
+    if "\0" in text:
+        raise InputError(f"{source}: holds zero bytes: it is no text, or one in UTF-16; save it as UTF-8.")
     lines = tuple(re.findall(r"[^\r\n]*(?:\r\n|\n|\r)|[^\r\n]+$", text))
-    section, entries, seen = "", [], {}
+    section, entries = "", []
     for number, line in enumerate(lines, start=1):
-        bare = line.rstrip("\r\n")
+        # A byte order mark must not hide the first heading, which may be that of the units.
+        bare = line.rstrip("\r\n").removeprefix("\ufeff" if number == 1 else "")
         if heading := _SECTION.match(_uncommented(bare)):
             section = heading["name"].strip().upper()
             continue
@@ -140,12 +184,8 @@ def parse_property_file(text: str, source: str = "property file") -> PropertyFil
         # What stands before any section is a preamble; other lines are comments and rows of tables.
         if not entry or not section or bare.lstrip().startswith(("$", "!", "{")):
             continue
-        key = entry["key"]
-        if (section, key) in seen:
-            first = seen[section, key]
-            raise InputError(f"{source}: {key} stands twice in [{section}], lines {first} and {number}: leave one.")
-        seen[section, key] = number
-        entries.append(Entry(section, key, _value(entry["value"], key, source, number), number))
+        value, quoted = _value(entry["value"])
+        entries.append(Entry(section, entry["key"], value, number, quoted))
     if not entries:
         raise InputError(f"{source}: no section with entries: this is no tyre property file (.tir).")
     return PropertyFile(source, lines, tuple(entries))
@@ -167,20 +207,24 @@ def _uncommented(line: str) -> str:
     return re.split(r"[$!]", line, maxsplit=1)[0]
 
 
-def _value(text: str, key: str, source: str, line: int) -> float | str:
-    if text[:1] in ("'", '"'):
-        return text[1:-1]
+def _value(text: str) -> tuple[float | str, bool]:
+    """What stands there, and whether it is in quotes."""
+    if len(text) > 1 and text[0] in "'\"" and text[-1] == text[0]:
+        return text[1:-1], True
     try:
-        return float(re.sub(r"(?<=[\d.])[dD](?=[+-]?\d)", "e", text))  # Fortran writes 1.0d3
+        return decimal(re.sub("[dD]", "e", text)), False  # Fortran writes 1.0d3
     except ValueError:
-        raise InputError(
-            f"{source}, line {line}: {key} = {text or 'nothing'}: must be a number, or a text in quotes."
-        ) from None
+        return text, False
 
 
 def _with_value(line: str, text: str) -> str:
     """The line with another value, the comment where it was if the width allows."""
     found = _ENTRY.match(line)
     assert found is not None
-    width = len(found["value"]) + len(found["rest"]) - len(found["rest"].lstrip(" "))
-    return found["lead"] + text.ljust(max(width, len(text) + 1)) + found["rest"].lstrip(" ")
+    lead, rest = found["lead"], found["rest"]
+    if not found["value"]:
+        # Blanks up to a comment are room for the value that is not there yet.
+        lead = lead.rstrip() + " "
+        rest = " " * (len(found["lead"]) - len(lead)) + rest
+    width = len(found["value"]) + len(rest) - len(rest.lstrip(" "))
+    return lead + text.ljust(max(width, len(text) + 1)) + rest.lstrip(" ")

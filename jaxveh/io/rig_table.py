@@ -72,6 +72,8 @@ class RigTable:
         self._check_shapes()
         for name in (*INPUTS, "run"):
             self._check_rows(name, np.isfinite, "must be finite in every row: leave out the rows without it")
+        for name in MEASURED:
+            self._check_rows(name, lambda v: ~np.isinf(v), "must be finite, or NaN where nothing was measured")
         if np.median(self.load) <= 0:
             raise InputError(
                 f"{self.source}: load = {np.median(self.load):g} in the median: z points up here (ISO-W, TYDEX), so that a "

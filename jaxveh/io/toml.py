@@ -12,16 +12,19 @@ from jaxveh._core.errors import InputError
 from jaxveh.io.files import check_readable
 from jaxveh.io.naming import check_known
 
+SHOWN = 200
+"""So many characters of a value are shown in a message."""
+
 
 def read_toml(path: Path) -> dict[str, Any]:
     """The file's content; raises `InputError` with file and line where it is not TOML."""
     check_readable(path)
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: broken TOML: {error}.") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: broken TOML: not UTF-8 text (byte {error.start}).") from error
+    except (ValueError, RecursionError) as error:  # whole numbers and nests of lists that are too large for Python, too
+        raise InputError(f"{path}: broken TOML: {error}.") from error
 
 
 def check_keys(where: str, table: object, allowed: Iterable[str]) -> None:
@@ -34,9 +37,19 @@ def check_keys(where: str, table: object, allowed: Iterable[str]) -> None:
 
 def number(where: str, value: object) -> float:
     """A TOML number as a finite float; raises for anything else (true and false included)."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{where} = {value!r}: must be a finite number.")
-    return float(value)
+    try:
+        number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{where} = {shortened(value)}: must be a finite number.")
+    return number
+
+
+def shortened(value: object) -> str:
+    """A value for a message: a stranger's may be pages long."""
+    shown = repr(value)
+    return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}..."
 
 
 def text(where: str, value: object) -> str:

@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from jaxveh._core.errors import InputError
+from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable
+from jaxveh.io.toml import shortened
 
 MISSING = ("NOTAVAIL", "NAN")
 """What stands in place of a number that was not measured."""
@@ -109,7 +111,7 @@ def _sections(text: str) -> dict[str, list[tuple[int, str]]]:
 def _conversion(line: str, number: int, source: str) -> _Conversion:
     name, unit = line[_NAME].strip(), line[_UNIT].strip()
     try:
-        factors = [float(cell) for cell in _cells(line[_VALUES:], 3)]
+        factors = [decimal(cell) for cell in _cells(line[_VALUES:], 3)]
     except ValueError:
         factors = [np.nan]
     if len(factors) > 3 or not np.isfinite(factors).all():
@@ -152,15 +154,17 @@ def _number(cell: str, line: int, source: str) -> float:
     if cell.upper() in MISSING:
         return np.nan
     try:
-        return float(cell)
+        return decimal(cell)
     except ValueError:
-        raise InputError(f"{source}, line {line}: {cell!r} is not a number ({MISSING[0]} is a missing one).") from None
+        raise InputError(
+            f"{source}, line {line}: {shortened(cell)} is not a number ({MISSING[0]} is a missing one)."
+        ) from None
 
 
 def _constant(line: str, number: int) -> Channel:
     text = line[_VALUES:].strip()
     try:
-        value: float | str = float(text)
+        value: float | str = decimal(text)
     except ValueError:
         value = text
     return Channel(line[_NAME].strip(), line[_UNIT].strip(), value, number)

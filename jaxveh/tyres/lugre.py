@@ -120,9 +120,14 @@ class LuGre(AbstractDynamicTyre):
 
 
 def _travels(contact: Contact):
-    """v_x over the speed that the slips are relative to, with its sign."""
+    """v_x over the speed that the slips are relative to, with its sign; where that speed is zero nothing moves, and the
+    direction of travel alone is left."""
     forwards = jnp.sign(contact.direction)
-    return forwards if contact.slip_speed is None else forwards * need_speed(contact, "LuGre") / contact.slip_speed
+    if contact.slip_speed is None:
+        return forwards
+    moves = contact.slip_speed > 0
+    share = need_speed(contact, "LuGre") / jnp.where(moves, contact.slip_speed, 1.0)
+    return forwards * jnp.where(moves, share, 1.0)
 
 
 def _settled(slip, fading):

@@ -32,13 +32,14 @@ MODELS: dict[str, type[AbstractTyre]] = {
         Arctangent, Brush, Dugoff, Exponential, Fiala, FialaADAMS, HSRI, Linear, LinearWithLoad, MagicFormula, Parabolic, UniTire,
     )
 }  # fmt: skip
-"""The laws whose parameters are one number each."""
+"""The laws whose parameters are one number each, or a word."""
 
 
 def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", overwrite: bool = False) -> None:
     """Write a tyre's parameters as TOML, SI units and radians; `note` is a comment at its top.
 
-    The file is a table `[tyre]`: `model`, the law's name, and a number for each parameter; one that is None is left out.
+    The file is a table `[tyre]`: `model`, the law's name, and a number for each parameter (a text for a choice in words); one
+    that is None is left out.
 
     **Raises** `InputError` for a law that is not in `MODELS`, parameters that are no finite scalars, and where the file exists
     and `overwrite` is not set.
@@ -54,6 +55,9 @@ def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", ov
     entries = [(field, value) for field, value in entries if value is not None]
     width = max(len(field.name) for field, _ in entries)
     for field, value in entries:
+        if isinstance(value, str):
+            lines.append(f"{field.name:<{width}} = {quoted(value)}")
+            continue
         value = np.asarray(value)
         if value.shape != () or not np.isfinite(value):
             raise InputError(f"{name}.{field.name} = {value}: must be one finite number to be written.")
@@ -85,7 +89,12 @@ def read_parameters(path: str | Path) -> AbstractTyre:
     for field in fields.values():
         if field.default is dataclasses.MISSING and field.name not in table:
             raise InputError(f"{where}: {field.name} is missing; {name} needs it ({field.metadata['unit']}).")
-    values: dict[str, Any] = {key: number(f"{where} {key}", value) for key, value in table.items() if key != "model"}
+    values: dict[str, Any] = {
+        # What has no unit is a choice in words.
+        key: (number if "unit" in fields[key].metadata else text)(f"{where} {key}", value)
+        for key, value in table.items()
+        if key != "model"
+    }
     try:
         return MODELS[name](**values)
     except InputError as error:

@@ -21,7 +21,8 @@ import numpy as np
 from jaxveh.io.property_file import UNITS, PropertyFile, read_property_file
 from jaxveh.tyres.base import Contact
 from jaxveh.tyres.mf_tyre import MFTyre
-from jaxveh.tyres.property_file import SIDES, from_property_file
+from jaxveh.tyres.property_file import SIDES, from_property_file, tells
+from jaxveh.tyres.property_lines import Finding, first_of, odd_lines
 
 USUAL = {
     "mu_x": ("friction along", 0.2, 3.0, ""),
@@ -41,28 +42,12 @@ PER_LOAD, PER_RADIUS = ("K_xk", "K_ya", "F_y"), ("rho", "trail")
 GRID = 11
 """Points over a range of the file."""
 
-NEUTRAL = {"LMUV": 0.0}
-"""Scaling factors that do nothing at another value than 1."""
-
-DYNAMIC = ("QTZ1", "MBELT")
-"""Coefficients of the gyroscopic moment, of which a steady law has no use."""
-
-DEFLECTIONS = "[DEFLECTION_LOAD_CURVE]"
-"""A table that stands in place of VERTICAL_STIFFNESS."""
-
-
-class Finding(NamedTuple):
-    """One thing worth a look: the key or quantity that it is `about`, and what there is to say."""
-
-    about: str
-    says: str
-
 
 def check_property_file(source: str | Path | PropertyFile) -> list[Finding]:
     """What is worth a look in a .tir file; an empty list where nothing is.
 
-    It tells of what is missing, of ranges and units that are odd, of scaling factors other than 1, of coefficients that are not
-    read, and of a tyre that behaves as hardly any does. **Raises** `InputError` where `from_property_file` does.
+    It tells of what is missing, of ranges and units that are odd, of scaling factors other than 1, of entries that are not
+    read or cannot be, and of a tyre that behaves as hardly any does. **Raises** `InputError` where `from_property_file` does.
     """
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
     tyre = from_property_file(file)
@@ -81,22 +66,20 @@ def check_property_file(source: str | Path | PropertyFile) -> list[Finding]:
         *_aligning(tyre),
         *_combined(tyre),
         *_moments(tyre),
-        *_unread(file, tyre),
+        *odd_lines(file, tyre),
     ]
 
 
 def _model(file: PropertyFile, version: int) -> Iterator[Finding]:
-    side = file.text("TYRESIDE")
-    if not side:
+    side, kind, mode = (first_of(file, key) for key in ("TYRESIDE", "PROPERTY_FILE_FORMAT", "USE_MODE"))
+    if side is None:
         yield Finding("TYRESIDE", "is missing: the side for which the coefficients hold is not known")
-    elif side.strip().lower() not in SIDES:
-        yield Finding("TYRESIDE", f"is {side!r}, neither LEFT nor RIGHT: the tyre cannot be mirrored")
-    kind = file.text("PROPERTY_FILE_FORMAT").upper()
-    if file.find("FITTYP") is None and kind.startswith("MF"):
-        yield Finding("FITTYP", f"is missing: {version / 10:g} is taken because of PROPERTY_FILE_FORMAT = {kind!r}")
+    elif str(side.value).strip().lower() not in SIDES:
+        yield Finding("TYRESIDE", f"is {side.shown}, neither LEFT nor RIGHT: the tyre cannot be mirrored")
+    if file.find("FITTYP") is None and kind is not None and str(kind.value).upper().startswith("MF"):
+        yield Finding("FITTYP", f"is missing: {version / 10:g} is taken because of PROPERTY_FILE_FORMAT = {kind.shown}")
     elif file.text("FITTYP") == "60":
         yield Finding("FITTYP", "is 60: the equations of 6.1 are taken")
-    mode = file.find("USE_MODE")
     if mode is not None and not isinstance(mode.value, str):
         if mode.value < 0:
             yield Finding(
@@ -119,7 +102,7 @@ def _missing(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
     if tyre.version != 52:
         wanted += ["NOMPRES", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS"]
     for key in wanted:
-        if file.find(key) is None:
+        if not tells(file, key):
             yield Finding(key, f"is missing: {float(getattr(tyre.structure, key)):g} is taken")
     speed = float(tyre.structure.LONGVL)
     if not 5 <= speed <= 50:
@@ -153,7 +136,7 @@ def _ranges(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
 def _pressure(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
     r = tyre.ranges
     for key in ("NOMPRES", "INFLPRES"):
-        if file.find(key) is None:
+        if not tells(file, key):
             continue
         value = float(getattr(tyre.structure, key))
         if not 2e4 <= value <= 2e6:
@@ -314,26 +297,6 @@ def _moments(tyre: MFTyre) -> Iterator[Finding]:
     rolling = float(tyre.rolling.QSY1)
     if not 0 <= rolling <= 0.05:
         yield Finding("QSY1", f"is {rolling:g}: rolling resistance over load is usually 0 to 0.05")
-
-
-def _unread(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
-    """Coefficients of forces and moments that do something, and that are not read; names in small letters; tables."""
-    known = {name for part in vars(tyre).values() if isinstance(part, eqx.Module) for name in vars(part)}
-    unread: dict[str, list[str]] = {}
-    for entry in file.entries:
-        if entry.key in known or entry.key in DYNAMIC or isinstance(entry.value, str):
-            continue
-        if entry.key.upper() in known:
-            yield Finding(entry.key, f"in [{entry.section}], line {entry.line}, is not read: write {entry.key.upper()}")
-        elif entry.section.endswith("COEFFICIENTS") or entry.section.startswith("TURNSLIP"):
-            neutral = NEUTRAL.get(entry.key, 1.0 if entry.section.startswith("SCALING") else 0.0)
-            if entry.value != neutral:
-                unread.setdefault(entry.section, []).append(entry.key)
-    for section, keys in unread.items():
-        listed = ", ".join(keys) if len(keys) <= 6 else f"{', '.join(keys[:3])} and {len(keys) - 3} more"
-        yield Finding(f"[{section}]", f"{listed}: not read, and not neutral")
-    if DEFLECTIONS in (line.strip().upper() for line in file.lines):
-        yield Finding(DEFLECTIONS, "is not read: the deflection follows VERTICAL_STIFFNESS")
 
 
 @eqx.filter_jit

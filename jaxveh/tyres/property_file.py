@@ -6,6 +6,9 @@ import dataclasses
 from pathlib import Path
 from typing import Literal, overload
 
+import jax
+import numpy as np
+
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh.io.property_file import PropertyFile, read_property_file
 from jaxveh.tyres.mf_tyre import (
@@ -34,6 +37,11 @@ OLD_FORMATS = ("PAC2002", "MF_05", "MF-TYRE", "MF_TYRE")
 
 NEEDED = ("FNOMIN", "UNLOADED_RADIUS", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 """What no tyre can do without; for all else see `TYPICAL`."""
+
+NOT_MEASURED = (
+    "WIDTH", "VERTICAL_STIFFNESS", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS", "NOMPRES", "INFLPRES", "LONGVL", "Q_RE0",
+)  # fmt: skip
+"""What must be positive, and what tools write as zero where it was not measured."""
 
 DIMENSIONS = {
     "UNLOADED_RADIUS": (1, 0, 0), "WIDTH": (1, 0, 0), "RIM_RADIUS": (1, 0, 0), "BOTTOM_OFFST": (1, 0, 0),
@@ -79,10 +87,10 @@ def from_property_file(
     `side`, `left` or `right`: the side of the car on which the tyre is mounted; it comes mirrored where TYRESIDE, for which
     the file's coefficients hold, is the other one. None takes it as it is. The version comes from FITTYP or
     PROPERTY_FILE_FORMAT; `limits`, `angles` and `spins` as in `MFTyre`. Where the file is silent coefficients are `TYPICAL`,
-    or zero.
+    or zero; an entry without a value is silent, and so is a zero for what is `NOT_MEASURED`. `check_property_file` tells of both.
 
-    **Raises** `InputError` for a version that is not in, a coefficient that is needed and missing or no number, and a `side`
-    where the file does not tell its own.
+    **Raises** `InputError` for a version that is not in, a coefficient of the tyre that is no finite number (entries that it
+    does not read may say what they like), a needed one that is missing, and a `side` where the file does not tell its own.
     """
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
     tyre = _as_it_is(file, limits, angles, spins)
@@ -107,7 +115,14 @@ def _as_it_is(file: PropertyFile, limits: bool, angles: bool, spins: bool) -> MF
     for key in NEEDED:
         file.number(key)
     size = {key: size_of(file, powers) for key, powers in DIMENSIONS.items()}
-    section = lambda kind: kind(**_numbers(file, kind, size))
+
+    def section(kind):
+        values = _numbers(file, kind, size)
+        try:
+            return kind(**values)
+        except InputError as error:
+            raise InputError(f"{file.source}: {error}") from None
+
     return MFTyre(
         section(Structure),
         section(Longitudinal),
@@ -129,11 +144,11 @@ def version_of(file: PropertyFile) -> int:
     """52, 61 or 62. **Raises** `InputError` for others, and where the file does not say."""
     entry = file.find("FITTYP")
     if entry is not None:
-        number = int(file.number("FITTYP"))
+        number = file.number("FITTYP")
         if number not in VERSION_OF_FITTYP:
             known = ", ".join(map(str, VERSION_OF_FITTYP))
-            raise InputError(f"{file.source}, line {entry.line}: FITTYP = {number}: must be one of {known}.")
-        return VERSION_OF_FITTYP[number]
+            raise InputError(f"{file.source}, line {entry.line}: FITTYP = {number:g}: must be one of {known}.")
+        return VERSION_OF_FITTYP[int(number)]
     kind = file.text("PROPERTY_FILE_FORMAT").upper()
     if kind not in OLD_FORMATS:
         raise InputError(
@@ -149,11 +164,28 @@ def size_of(file: PropertyFile, powers: tuple[int, int, int]) -> float:
     return file.unit("LENGTH") ** length * file.unit("FORCE") ** force * file.unit("TIME") ** time
 
 
+def tells(file: PropertyFile, key: str) -> bool:
+    """Whether the file says this coefficient."""
+    entry = file.find(key)
+    return entry is not None and not (key in NOT_MEASURED and entry.value == 0)
+
+
 def _numbers(file: PropertyFile, kind: type, size: dict[str, float]) -> dict[str, float]:
     """The coefficients of one section: the file's, typical ones where it is silent."""
     names = [field.name for field in dataclasses.fields(kind)]
     found = {name: TYPICAL[name] for name in names if name in TYPICAL}
-    found |= {name: file.number(name) * size.get(name, 1.0) for name in names if file.find(name) is not None}
+    found |= {name: _number(file, name, size.get(name, 1.0)) for name in names if tells(file, name)}
     if kind is Structure and "INFLPRES" not in found and "NOMPRES" in found:
         found["INFLPRES"] = found["NOMPRES"]
     return found
+
+
+def _number(file: PropertyFile, name: str, size: float) -> float:
+    """A coefficient in SI units that is finite in the precision that tyres have."""
+    value = file.number(name) * size
+    largest = float(np.finfo(jax.dtypes.canonicalize_dtype(float)).max)
+    if abs(value) > largest:
+        raise InputError(
+            f"{file.source}: {name} = {file.number(name):g}: must be at most {largest / size:.3g} in size."
+        )
+    return value

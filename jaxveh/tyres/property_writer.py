@@ -162,7 +162,7 @@ def _changed(file: PropertyFile, coefficients: list[_Coefficient]) -> PropertyFi
             continue
         size = size_of(file, DIMENSIONS[one.name]) if one.name in DIMENSIONS else 1.0
         number = _in_units(_number(one.value), size)
-        if file.find(one.name) is not None:
+        if file.holds(one.name):
             replaced[one.name] = number
         else:
             added.setdefault(one.section, []).append(_line(one._replace(unit="-"), number))

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
-from jaxveh._core.errors import check, check_positive, is_concrete
+from jaxveh._core.errors import check, check_one_of, check_positive, is_concrete
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 from jaxveh.tyres.slip import theoretical
@@ -94,16 +94,23 @@ class TMeasy(AbstractTyre):
     - Load: forces and slopes by the parabola through zero and both loads, slips by the line through both; from three nominal
       loads on, forces grow with the load alone.
     - Friction: forces, slips of the curve and of the trail scale with the contact's friction, slopes stay.
-    - Each curve: `F = dF_0 s / (1 + q (q + dF_0 s_max / F_max - 2))` with `q = s / s_max` up to the peak, then the cubic
-      `F_max - (F_max - F_slide) t^2 (3 - 2 t)` with `t = (s - s_max) / (s_slide - s_max)`, then F_slide: smooth to the first
-      derivative. (Later editions put two parabolas for the cubic where they fit, and change form with the slip's direction.)
+    - Each curve: `F = dF_0 s / (1 + q (q + dF_0 s_max / F_max - 2))` with `q = s / s_max` up to the peak, then a way down, then
+      F_slide: smooth to the first derivative.
+    - `after_peak`, the way down: `cubic` (the default, as the book of 2012 has it) is
+      `F_max - (F_max - F_slide) t^2 (3 - 2 t)` with `t = (s - s_max) / (s_slide - s_max)`. `parabolas` (G. Rill & A. Arrieta
+      Castro, Road Vehicle Dynamics: Fundamentals and Modeling with MATLAB, 2nd ed., CRC Press, 2020, ch. 3, and tools such as
+      Project Chrono) is `F_max - a (s - s_max)^2` up to `s_* = s_max + (F_max - F_slide) / (a (s_slide - s_max))`, then
+      `F_slide + b (s_slide - s)^2` with `b = a (s_* - s_max) / (s_slide - s_*)`; `a = F_max^2 / (dF_0 s_max^3)` makes the second
+      derivative one at the peak. Where s_* is beyond s_slide the parabolas do not fit, and it is the cubic: in combined slip
+      the force can jump at the direction where they cease to.
     - Combined: slips are divided by `s_x_max / (s_x_max + s_y_max) + (F_x_max / dF_x0) / (F_x_max / dF_x0 + F_y_max / dF_y0)`,
       and likewise for y; the curve along their direction has numbers on the ellipses between both, its force that direction.
 
     Where both directions differ in slope over normalised slip the force has no total derivative at zero slip (it is a cone):
     the derivatives there are those along each direction.
 
-    **Raises** `InputError` for curves that cannot be followed from zero to three nominal loads, or a contact without a load.
+    **Raises** `InputError` for curves that cannot be followed from zero to three nominal loads, an unknown `after_peak`, or a
+    contact without a load.
     """
 
     longitudinal: TMeasyCurve
@@ -112,9 +119,11 @@ class TMeasy(AbstractTyre):
     twice_longitudinal: TMeasyCurve | None = None
     twice_lateral: TMeasyCurve | None = None
     trail: TMeasyTrail | None = None
+    after_peak: str = eqx.field(static=True, default="cubic")
 
     def __check_init__(self):
         check_parameters(self)
+        check_one_of("TMeasy.after_peak", self.after_peak, AFTER_PEAK)
         _check_loads("TMeasy.twice_longitudinal", self.longitudinal, self.twice_longitudinal)
         _check_loads("TMeasy.twice_lateral", self.lateral, self.twice_lateral)
 
@@ -128,13 +137,13 @@ class TMeasy(AbstractTyre):
         limit = contact.friction * (load / self.nominal_load)
         grip = jnp.maximum(contact.friction * jnp.ones_like(load), LEAST_GRIP)
         slip_x, slip_y = (slip / grip for slip in theoretical(contact))
-        F_x, F_y = (limit * force for force in _combined(x, y, slip_x, slip_y))
+        F_x, F_y = (limit * force for force in _combined(x, y, slip_x, slip_y, AFTER_PEAK[self.after_peak]))
         if self.trail is None:
             return Forces(F_x=F_x, F_y=F_y)
         return Forces(F_x=F_x, F_y=F_y, M_z=-contact.direction * self.trail(slip_y) * F_y)
 
 
-def _combined(x: _Numbers, y: _Numbers, slip_x, slip_y):
+def _combined(x: _Numbers, y: _Numbers, slip_x, slip_y, after_peak):
     """Forces along both slips, each in the unit of the curves' forces."""
     peaks, bends = x.s_max + y.s_max, x.F_max / x.initial_stiffness + y.F_max / y.initial_stiffness
     norm_x = x.s_max / peaks + x.F_max / x.initial_stiffness / bends
@@ -153,20 +162,40 @@ def _combined(x: _Numbers, y: _Numbers, slip_x, slip_y):
         s_slide=between(x.s_slide / norm_x, y.s_slide / norm_y),
         F_slide=between(x.F_slide, y.F_slide),
     )
-    secant = _secant(curve, slip)
+    secant = _secant(curve, slip, after_peak)
     F_x = jnp.where(moves, secant, x.initial_stiffness * norm_x) * n_x
     F_y = jnp.where(moves, secant, y.initial_stiffness * norm_y) * n_y
     return F_x, F_y
 
 
-def _secant(curve: _Numbers, slip):
+def _secant(curve: _Numbers, slip, after_peak):
     """Force over slip at a positive slip."""
-    stiffness, s_max, F_max, s_slide, F_slide = curve
+    stiffness, s_max, F_max, s_slide, _ = curve
     q = jnp.minimum(slip / s_max, 1.0)
     rise = stiffness / (1 + q * (q + stiffness * s_max / F_max - 2))
-    t = jnp.clip((slip - s_max) / (s_slide - s_max), 0.0, 1.0)
-    fall = (F_max - (F_max - F_slide) * t**2 * (3 - 2 * t)) / slip
+    fall = after_peak(curve, jnp.clip(slip, s_max, s_slide)) / slip
     return jnp.where(slip < s_max, rise, fall)
+
+
+def _cubic(curve: _Numbers, slip):
+    """The force between `s_max` and `s_slide`."""
+    t = (slip - curve.s_max) / (curve.s_slide - curve.s_max)
+    return curve.F_max - (curve.F_max - curve.F_slide) * t**2 * (3 - 2 * t)
+
+
+def _parabolas(curve: _Numbers, slip):
+    """The force between `s_max` and `s_slide` by two parabolas that meet in value and slope, the cubic where they cannot."""
+    stiffness, s_max, F_max, s_slide, F_slide = curve
+    bend = F_max**2 / (stiffness * s_max**3)
+    meet = s_max + (F_max - F_slide) / (bend * (s_slide - s_max))
+    fits = meet < s_slide
+    left = jnp.where(fits, s_slide - meet, 1.0)
+    first = F_max - bend * (slip - s_max) ** 2
+    second = F_slide + bend * (meet - s_max) / left * (s_slide - slip) ** 2
+    return jnp.where(fits, jnp.where(slip < meet, first, second), _cubic(curve, slip))
+
+
+AFTER_PEAK = {"cubic": _cubic, "parabolas": _parabolas}
 
 
 def _at_load(one: TMeasyCurve, two: TMeasyCurve | None, ratio) -> _Numbers:

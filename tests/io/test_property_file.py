@@ -1,5 +1,8 @@
 """Property files: every file of the world, its quirks, and back without loss."""
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import pytest
 from shared_data import shared, shared_names
 
@@ -78,9 +81,13 @@ def test_units_comments_tables_and_unknown_sections():
     ("old", "new", "message"),
     [
         ("PCY1 = 1.3\n", "", "PCY1 is missing"),
-        ("PCY1 = 1.3", "PCY1 = fast", r"line 20: PCY1 = fast: must be a number"),
-        ("PCY1 = 1.3", "PCY1 = 'fast'", r"line 20: PCY1 = 'fast': must be a number"),
-        ("PCY1 = 1.3", "PCY1 = 1.3\nPCY1 = 1.4", r"PCY1 stands twice in \[LATERAL_COEFFICIENTS\], lines 20 and 21"),
+        ("PCY1 = 1.3", "PCY1 = fast", r"line 20: PCY1 = 'fast': must be one finite number"),
+        ("PCY1 = 1.3", "PCY1 = 'fast'", r"line 20: PCY1 = 'fast': must be one finite number"),
+        (
+            "PCY1 = 1.3",
+            "PCY1 = 1.3\nPCY1 = 1.4",
+            r"PCY1 has several values: 1.3 in \[LATERAL_COEFFICIENTS\], line 20, 1.4 ",
+        ),
         ("[NOBODY_KNOWS]", "[NOBODY_KNOWS]\nFNOMIN = 3", "FNOMIN has several values"),
         ("'mm'", "'furlong'", "LENGTH = 'furlong': must be one of meter"),
         ("FNOMIN = 4.0d3", "FNOMIN = -4", "Structure.FNOMIN = -4"),
@@ -106,3 +113,90 @@ def test_what_is_no_property_file(tmp_path):
         file.replace({"PXX9": 1.0})
     with pytest.raises(InputError, match="exists already"):
         write_property_file(file, other)
+
+
+# Shapes that files of the world have, in lines of which the tyre has no need.
+ODD = {
+    "no value": "ROAD_INCREMENT =",
+    "no value, and a comment": "ROAD_DIRECTION =        $ not set",
+    "a unit": "MASS = kg",
+    "a text": "CONSTRUCTION = R20 16 x 7.5",
+    "two numbers": "FREQ_LAT = 1.2 1.2",
+    "not finite": "DAMP_LAT = NaN",
+    "too large": "BELT_MASS = 1e400",
+    "digits that are none": "BELT_IXX = 1_000",
+    "an open quote": "VENDOR = 'open",
+}
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_a_line_that_nobody_reads_is_kept_and_told_of(odd, tmp_path):
+    line, key = ODD[odd], ODD[odd].split()[0]
+    text = SMALL.replace("[SHAPE]", f"[INERTIA]\n{line}\n[SHAPE]")
+    path = tmp_path / "odd.tir"
+    path.write_bytes(text.encode())
+    file = read_property_file(path)
+    expected, found = tyres.from_property_file(parse_property_file(SMALL)), tyres.from_property_file(file)
+    assert jax.tree.leaves(found) == jax.tree.leaves(expected)
+    assert isinstance(file.sections["INERTIA"][key], str)
+    assert [finding for finding in tyres.check_property_file(file) if key in finding.about]
+    # Through the writer too, also where other numbers change.
+    write_property_file(
+        tyres.to_property_file(tyres.from_property_file(file.replace({"PDY1": 0.9})), file), path, overwrite=True
+    )
+    assert line in path.read_text().splitlines() and "PDY1 = 0.9" in path.read_text()
+
+
+@pytest.mark.parametrize(
+    "value", ["NaN", "inf", "-inf", "1e400", "1_000", "1.2 1.2", "１２", "٣", "fast", "1,5", "0x10", "1.5 kg", "1e"]
+)
+@pytest.mark.parametrize("key", ["PKY1", "PEY1", "FITTYP", "LMUX"])
+def test_what_the_tyre_reads_must_be_one_finite_number(key, value):
+    old = {"PKY1": "PKY1 = -15 !", "FITTYP": "FITTYP = 61   $"}.get(key, "[NOBODY_KNOWS]")
+    text = SMALL.replace(old, f"{key} = {value} $\n" if old[0] != "[" else f"[X]\n{key} = {value}\n{old}")
+    with pytest.raises(InputError, match=rf"{key} = .*: must be one finite number"):
+        tyres.from_property_file(parse_property_file(text))
+
+
+def test_silence_in_other_words():
+    """An empty entry, and a zero for what was not measured, are as if the line were not there."""
+    text = SMALL.replace("[VERTICAL]", "WIDTH = 0\nRIM_RADIUS =\n[VERTICAL]\nVERTICAL_STIFFNESS = 0.0\nQ_RE0 = 0")
+    odd, plain = (
+        tyres.from_property_file(parse_property_file(text)),
+        tyres.from_property_file(parse_property_file(SMALL)),
+    )
+    assert jax.tree.leaves(odd) == jax.tree.leaves(plain)
+    about = " ".join(finding.about for finding in tyres.check_property_file(parse_property_file(text)))
+    assert all(key in about for key in ("WIDTH", "RIM_RADIUS", "VERTICAL_STIFFNESS", "Q_RE0"))
+    with pytest.raises(InputError, match="FNOMIN has no value"):
+        tyres.from_property_file(parse_property_file(SMALL.replace("FNOMIN = 4.0d3", "FNOMIN =")))
+    with pytest.raises(InputError, match=r"property file: Scaling\.LFZO = 0\.0: must be positive"):
+        tyres.from_property_file(parse_property_file(SMALL + "LFZO = 0\n"))
+
+
+def test_a_value_that_was_missing_is_written_in_its_line():
+    file = parse_property_file(SMALL.replace("[VERTICAL]", "WIDTH =     $ not told\n[VERTICAL]"))
+    assert "WIDTH = 0.2 $ not told\n" in file.replace({"WIDTH": 0.2}).lines
+    tyre = eqx.tree_at(lambda t: t.structure.WIDTH, tyres.from_property_file(file), jnp.asarray(0.25))
+    lines = tyres.to_property_file(tyre, file).lines
+    assert [line for line in lines if "WIDTH" in line] == ["WIDTH = 250.0 $ not told\n"]
+
+
+def test_a_byte_order_mark_does_not_hide_the_units(tmp_path):
+    path = tmp_path / "marked.tir"
+    text = SMALL.removeprefix("$ a comment = 1\n")
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert float(tyres.from_property_file(path).structure.UNLOADED_RADIUS) == pytest.approx(0.3)
+    path.write_bytes(text.encode("utf-16"))
+    with pytest.raises(InputError, match="holds zero bytes"):
+        tyres.from_property_file(path)
+
+
+def test_entries_that_contradict_each_other():
+    with pytest.raises(InputError, match=r"LENGTH has several values: 'mm' in \[UNITS\], line 3, 'inch'"):
+        tyres.from_property_file(parse_property_file(SMALL.replace("FORCE", "LENGTH = 'inch'\nFORCE")))
+    twice = SMALL.replace("PCY1 = 1.3", "PCY1 = 1.3\nPCY1 = 1.3")
+    assert float(tyres.from_property_file(parse_property_file(twice)).lateral.PCY1) == 1.3
+    file = parse_property_file(SMALL + "X = 'other'\n[INERTIA]\nMASS = 7\nTYRESIDE = 'LEFT'\n[Y]\nTYRESIDE = 'RIGHT'\n")
+    about = [finding.about for finding in tyres.check_property_file(file)]
+    assert "X" in about and "TYRESIDE" in about

@@ -1,5 +1,7 @@
 """Parameter files of tyres: what is written is read again, and a person's slips are named."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +12,7 @@ from jaxveh.tyres.parameters_file import MODELS
 
 TYRES = [
     tyres.Brush(91234.56789012, 1e5 / 3, 0.95),
+    tyres.Brush(9e4, 6e4, slides="against velocity"),
     tyres.Dugoff(9e4, 6e4, 0.9, 0.001),
     tyres.MagicFormula(B=10.0, C=1.3, D=4000.0, E=-0.5, S_h=1e-7),
     tyres.LinearWithLoad(8e4, 6000.0),
@@ -34,8 +37,9 @@ def test_tyres_come_back(tyre, tmp_path):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_every_model_is_of_numbers_alone(name, tmp_path):
-    tyre = MODELS[name](*[jnp.asarray(0.5 + 0.1 * k) for k in range(len(MODELS[name].__dataclass_fields__))])
+def test_every_model_is_of_numbers_and_words_alone(name, tmp_path):
+    numbers = [field for field in dataclasses.fields(MODELS[name]) if "unit" in field.metadata]
+    tyre = MODELS[name](**{field.name: jnp.asarray(0.5 + 0.1 * k) for k, field in enumerate(numbers)})
     tyres.write_parameters(tyre, tmp_path / "tyre.toml")
     assert jax.tree.leaves(tyres.read_parameters(tmp_path / "tyre.toml")) == jax.tree.leaves(tyre)
 
@@ -50,6 +54,7 @@ def test_it_is_a_file_that_a_person_can_read(tmp_path):
         "cornering_stiffness = 33333.333333333336  # N/rad\n"
         "friction            = 0.95\n"
         "half_length         = 0.06  # m\n"
+        'slides              = "along deflection"\n'
     )
 
 

@@ -137,3 +137,49 @@ def test_the_trail():
 def test_bad_numbers_are_named(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+PARABOLAS = TMeasy(X1, Y1, N, X2, Y2, TRAIL, after_peak="parabolas")
+
+
+def falling(curve):
+    """Bend `a` of the first parabola, where it ends, and the bend of the second, by hand from value and slope."""
+    a = curve.F_max**2 / (curve.initial_stiffness * curve.s_max**3)
+    meet = curve.s_max + (curve.F_max - curve.F_slide) / (a * (curve.s_slide - curve.s_max))
+    return float(a), float(meet), float(a * (meet - curve.s_max) / (curve.s_slide - meet))
+
+
+@pytest.mark.parametrize(("direction", "curve"), [("F_x", X1), ("F_y", Y1)])
+def test_two_parabolas_after_the_peak(direction, curve):
+    def force(slip, tyre=PARABOLAS):
+        return getattr(tyre.forces(contact(*((slip, 0.0) if direction == "F_x" else (0.0, slip)))), direction)
+
+    bend, meet, second = falling(curve)
+    assert curve.s_max < meet < curve.s_slide
+    for slip in (0.3 * curve.s_max, 1.1 * curve.s_slide):
+        assert float(force(slip)) == float(force(slip, TYRE))
+    for slip in (curve.s_max, 0.5 * (curve.s_max + meet), meet - 1e-9):
+        np.testing.assert_allclose(force(slip), curve.F_max - bend * (slip - curve.s_max) ** 2, rtol=1e-12)
+    for slip in (meet + 1e-9, 0.5 * (meet + curve.s_slide), curve.s_slide):
+        np.testing.assert_allclose(force(slip), curve.F_slide + second * (curve.s_slide - slip) ** 2, rtol=1e-12)
+    # Value and slope meet at all three places, and the second derivative at the peak, which the cubic's does not.
+    slope, turn = jax.grad(force), jax.grad(jax.grad(force))
+    for edge in (curve.s_max, meet, curve.s_slide):
+        np.testing.assert_allclose(force(edge - 1e-9), force(edge + 1e-9), rtol=1e-6)
+        np.testing.assert_allclose(slope(edge - 1e-9), slope(edge + 1e-9), atol=1e-2)
+    np.testing.assert_allclose(turn(curve.s_max - 1e-7), turn(curve.s_max + 1e-7), rtol=1e-3)
+    cubic = jax.grad(jax.grad(lambda slip: force(slip, TYRE)))
+    assert abs(cubic(curve.s_max - 1e-7) / cubic(curve.s_max + 1e-7) - 1) > 0.2
+
+
+def test_parabolas_that_do_not_fit_are_the_cubic():
+    """A steep fall: the first parabola would not be down at s_slide."""
+    steep = TMeasyCurve(90e3, 0.11, 3300.0, 0.13, 1500.0)
+    bend, meet, _ = falling(steep)
+    assert bend > 0 and meet > steep.s_slide
+    either = [TMeasy(steep, steep, N, after_peak=form) for form in ("parabolas", "cubic")]
+    for slip in (0.05, 0.115, 0.12, 0.128, 0.2):
+        one, other = (tyre.forces(contact(slip)).F_x for tyre in either)
+        assert float(one) == float(other)
+    with pytest.raises(InputError, match=r"TMeasy\.after_peak = 'line': must be one of 'cubic', 'parabolas'"):
+        TMeasy(steep, steep, N, after_peak="line")

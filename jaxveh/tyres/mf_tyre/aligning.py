@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import EPSILON, coefficient, cosine_curve, cosine_of_arctan, curvature, not_zero, sign
 
 
@@ -61,6 +62,9 @@ class Aligning(eqx.Module):
     SSZ2: jax.Array = coefficient(scale=0.05)
     SSZ3: jax.Array = coefficient()
     SSZ4: jax.Array = coefficient()
+
+    def __check_init__(self):
+        check_parameters(self)
 
     def parts(self, at, scaling, structure, pure, K_xk, weight_y, forces) -> AligningParts:
         """M_z of combined slip.

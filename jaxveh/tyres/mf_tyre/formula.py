@@ -61,6 +61,11 @@ def not_zero(x):
     return x + EPSILON * sign(x)
 
 
+def unless_zero(x):
+    """A denominator that odd coefficients make exactly zero: `epsilon` then."""
+    return jnp.where(x == 0, EPSILON, x)
+
+
 def cosine_of_arctan(x):
     """`cos(arctan x)`, which needs neither."""
     return 1 / jnp.sqrt(1 + x * x)

@@ -9,7 +9,17 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh.tyres.mf_tyre.formula import coefficient, cosine_of_arctan, curvature, not_zero, sign, sine_curve, weight
+from jaxveh._core.parameter import check_parameters
+from jaxveh.tyres.mf_tyre.formula import (
+    coefficient,
+    cosine_of_arctan,
+    curvature,
+    not_zero,
+    sign,
+    sine_curve,
+    unless_zero,
+    weight,
+)
 
 
 class PureLateral(NamedTuple):
@@ -79,6 +89,9 @@ class Lateral(eqx.Module):
     PTY1: jax.Array = coefficient()
     PTY2: jax.Array = coefficient(1.0)
 
+    def __check_init__(self):
+        check_parameters(self)
+
     def pure(self, at, scaling, nominal_load, version: int) -> PureLateral:
         """F_y0 and what it is made of, at the point's camber; `nominal_load` is F_z0 with its scale."""
         c, s, sine = self, scaling, at.sine
@@ -111,7 +124,9 @@ class Lateral(eqx.Module):
         c = self
         reach = (c.PKY2 + c.PKY5 * sine**2) * (1 + c.PPY2 * at.dp_i)
         K_ya = c.PKY1 * nominal_load * (1 + c.PPY1 * at.dp_i) * (1 - c.PKY3 * jnp.abs(sine)) * scaling.LKY
-        return K_ya * numerics.sin(c.PKY4 * numerics.arctan(at.load / nominal_load / reach)) * at.spin.zeta_3
+        return (
+            K_ya * numerics.sin(c.PKY4 * numerics.arctan(at.load / nominal_load / unless_zero(reach))) * at.spin.zeta_3
+        )
 
     def weight(self, at, scaling):
         """G_yk: the share of F_y0 that is left at a slip ratio."""

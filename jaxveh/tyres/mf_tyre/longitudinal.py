@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient, cosine_of_arctan, curvature, not_zero, sign, sine_curve, weight
 
 
@@ -56,6 +57,9 @@ class Longitudinal(eqx.Module):
     PTX1: jax.Array = coefficient()
     PTX2: jax.Array = coefficient()
     PTX3: jax.Array = coefficient()
+
+    def __check_init__(self):
+        check_parameters(self)
 
     def pure(self, at, scaling) -> PureLongitudinal:
         """F_x0 and what it is made of."""

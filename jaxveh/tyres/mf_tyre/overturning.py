@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient
 
 
@@ -28,6 +29,9 @@ class Overturning(eqx.Module):
     QSX13: jax.Array = coefficient(scale=0.1)
     QSX14: jax.Array = coefficient()
     PPMX1: jax.Array = coefficient()
+
+    def __check_init__(self):
+        check_parameters(self)
 
     def moment(self, at, scaling, structure, least_load, F_y):
         """M_x, N m; below `least_load` (N) it fades with the load's third power."""

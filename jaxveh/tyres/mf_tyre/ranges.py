@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient
 
 UNLIMITED = 1e10
@@ -17,7 +18,7 @@ UNLIMITED = 1e10
 class Ranges(eqx.Module):
     """The ranges of a property file: slip ratio `KPUMIN`, `KPUMAX` (-), slip angle `ALPMIN`, `ALPMAX` and camber `CAMMIN`,
     `CAMMAX` (rad), load `FZMIN`, `FZMAX` (N), pressure `PRESMIN`, `PRESMAX` (Pa), and the speed `VXLOW` (m/s) below which slip
-    (unless a vehicle has regularised it) and shifts fade."""
+    (unless a vehicle has regularised it) and shifts fade; with a `VXLOW` of zero or less they do not."""
 
     KPUMIN: jax.Array = coefficient(-UNLIMITED)
     KPUMAX: jax.Array = coefficient(UNLIMITED)
@@ -31,9 +32,14 @@ class Ranges(eqx.Module):
     PRESMAX: jax.Array = coefficient(UNLIMITED, unit="Pa")
     VXLOW: jax.Array = coefficient(1.0, unit="m/s")
 
+    def __check_init__(self):
+        check_parameters(self)
+
     def fading(self, slip_angle, speed):
         """Factors of slip ratio and slip angle, and the smooth one of shifts, that fade below `VXLOW`."""
-        share = jnp.minimum(jnp.abs(speed) / self.VXLOW, 1.0)
+        fades = self.VXLOW > 0
+        lowest = jnp.where(fades, self.VXLOW, 1.0)
+        share = jnp.where(fades, jnp.minimum(jnp.abs(speed) / lowest, 1.0), 1.0)
         smooth = 0.5 * (1 - numerics.cos(math.pi * share))
-        both = jnp.minimum(jnp.abs(speed) * (1 + jnp.abs(numerics.tan(slip_angle))) / self.VXLOW, 1.0)
-        return share, both, smooth
+        both = jnp.minimum(jnp.abs(speed) * (1 + jnp.abs(numerics.tan(slip_angle))) / lowest, 1.0)
+        return share, jnp.where(fades, both, 1.0), smooth

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient
 
 
@@ -24,6 +25,9 @@ class Rolling(eqx.Module):
     QSY6: jax.Array = coefficient()
     QSY7: jax.Array = coefficient(1.0)
     QSY8: jax.Array = coefficient()
+
+    def __check_init__(self):
+        check_parameters(self)
 
     def moment(self, at, scaling, structure, ranges, version: int, F_x, load, slip_ratio):
         """M_y, N m, negative when rolling forward; `load`, `slip_ratio`: as given, not limited."""

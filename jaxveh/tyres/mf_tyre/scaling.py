@@ -5,6 +5,7 @@ from __future__ import annotations
 import equinox as eqx
 import jax
 
+from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.tyres.mf_tyre.formula import factor
 
 
@@ -17,7 +18,7 @@ class Scaling(eqx.Module):
     (`LMP`); relaxation lengths of version 5.2 (`LSGKP`, `LSGAL`).
     """
 
-    LFZO: jax.Array = factor()
+    LFZO: jax.Array = positive(default=1.0)
     LCX: jax.Array = factor()
     LMUX: jax.Array = factor()
     LEX: jax.Array = factor()
@@ -44,3 +45,6 @@ class Scaling(eqx.Module):
     LMP: jax.Array = factor()
     LSGKP: jax.Array = factor()
     LSGAL: jax.Array = factor()
+
+    def __check_init__(self):
+        check_parameters(self)

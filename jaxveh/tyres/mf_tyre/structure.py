@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.tyres.mf_tyre.formula import coefficient
+from jaxveh.tyres.mf_tyre.formula import coefficient, unless_zero
 
 RADIUS_ITERATIONS = 12
 """The rolling radius depends on the wheel's speed, and that on the radius, weakly: a dozen rounds reach the last digit."""
@@ -45,7 +45,7 @@ class Structure(eqx.Module):
     BREFF: jax.Array = coefficient()
     DREFF: jax.Array = coefficient()
     FREFF: jax.Array = coefficient()
-    Q_RE0: jax.Array = coefficient(1.0)
+    Q_RE0: jax.Array = positive("-", default=1.0)
     Q_V1: jax.Array = coefficient(scale=1e-3)
     Q_V2: jax.Array = coefficient(scale=0.05)
     Q_FZ2: jax.Array = coefficient(1e-4, scale=10.0)
@@ -88,7 +88,7 @@ class Structure(eqx.Module):
         sinks = sinks * (self.DREFF * numerics.arctan(self.BREFF * share) + self.FREFF * share)
         radius = self.UNLOADED_RADIUS * 0.965 * jnp.ones_like(sinks)
         for _ in range(RADIUS_ITERATIONS):
-            omega = (1 + slip_ratio) * speed / radius
+            omega = (1 + slip_ratio) * speed / unless_zero(radius)
             grown = self.Q_RE0 + self.Q_V1 * (omega * self.UNLOADED_RADIUS / self.LONGVL) ** 2
             free = self.UNLOADED_RADIUS * grown
             radius = free - sinks
@@ -143,7 +143,7 @@ class Structure(eqx.Module):
     def contact_patch(self, load, dp_i, version: int):
         """Half length a and half width b of the contact patch (A9, A10; 5.2: the MF-Tyre manual), m."""
         stiffness = self.vertical_stiffness(dp_i)
-        lowest = self.UNLOADED_RADIUS - self.RIM_RADIUS - self.BOTTOM_OFFST
+        lowest = jnp.maximum(self.UNLOADED_RADIUS - self.RIM_RADIUS - self.BOTTOM_OFFST, 0.0)
         load = jnp.minimum(load, lowest * stiffness)
         if version == 52:
             share = load / self.FNOMIN

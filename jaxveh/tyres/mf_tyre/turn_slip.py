@@ -10,7 +10,15 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh.tyres.mf_tyre.formula import EPSILON, coefficient, cosine_of_arctan, curvature, not_zero, sine_curve
+from jaxveh._core.parameter import check_parameters
+from jaxveh.tyres.mf_tyre.formula import (
+    coefficient,
+    cosine_of_arctan,
+    curvature,
+    not_zero,
+    sine_curve,
+    unless_zero,
+)
 
 
 class TurnSlip(eqx.Module):
@@ -39,6 +47,9 @@ class TurnSlip(eqx.Module):
     QCRP2: jax.Array = coefficient(0.1)
     QBRP1: jax.Array = coefficient(0.1)
     QDRP1: jax.Array = coefficient(1.0)
+
+    def __check_init__(self):
+        check_parameters(self)
 
     def spin(self, at, turn_slip, omega, radius, least_speed) -> Spin:
         """Spin and its factors at an operating point.
@@ -89,7 +100,7 @@ class Spin(NamedTuple):
         """S_Hyp: the slip angle by which spin shifts F_y (4.80, 4.85 to 4.89), camber's thrust included."""
         c = self.coefficients
         D = c.PHYP2 + c.PHYP3 * at.df_z
-        B = K_yg / _unless_zero(1 - self.reduction) / _unless_zero(c.PHYP1 * D * not_zero(K_ya0))
+        B = K_yg / unless_zero(1 - self.reduction) / unless_zero(c.PHYP1 * D * not_zero(K_ya0))
         return sine_curve(self.turns, B, c.PHYP1, D, curvature(c.PHYP4, at))
 
     def parking(self, at, scaling, aligning, structure, mu_y, weight) -> tuple[Any, Any]:
@@ -101,7 +112,7 @@ class Spin(NamedTuple):
         c, a = self.coefficients, aligning
         R_0, nominal = structure.UNLOADED_RADIUS, scaling.LFZO * structure.FNOMIN
         most = c.QCRP1 * jnp.abs(mu_y) * R_0 * at.moment_load * numerics.sqrt(at.moment_load / nominal) * scaling.LMP
-        D = most / _unless_zero(numerics.sin(0.5 * math.pi * c.QDRP1))
+        D = most / unless_zero(numerics.sin(0.5 * math.pi * c.QDRP1))
         slope = a.QDZ8 + a.QDZ9 * at.df_z + (a.QDZ10 + a.QDZ11 * at.df_z) * jnp.abs(at.camber)
         slope = at.moment_load * R_0 * slope * scaling.LKZC
         turned = slope / not_zero(c.QDRP1 * D * (1 - self.reduction)) * self.path
@@ -115,8 +126,3 @@ class Spin(NamedTuple):
 
 
 NO_SPIN = Spin()
-
-
-def _unless_zero(x):
-    """A denominator that coefficients of zero make zero; what it divides is multiplied by them again."""
-    return jnp.where(x == 0, EPSILON, x)

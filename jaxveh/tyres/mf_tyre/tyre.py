@@ -201,11 +201,14 @@ class MFTyre(AbstractTyre):
         return wheel.speed, wheel.effective_radius, R_l, rho, a, b, C_x, C_y, C_z, *sigma
 
     def _manual_relaxation(self, at: Operating, s) -> tuple:
-        """Relaxation lengths of version 5.2, m."""
+        """Relaxation lengths of version 5.2, m; of the book's sin(2 arctan(F_z / (PTY2 F_z0))) the form that needs no angle,
+        and that is zero without a load and for a PTY2 of zero, with which truck tyres say that they have no such length."""
         x, y, R_0 = self.longitudinal, self.lateral, self.structure.UNLOADED_RADIUS
         nominal = s.LFZO * self.structure.FNOMIN
         sigma_x = (x.PTX1 + x.PTX2 * at.df_z) * jnp.exp(-x.PTX3 * at.df_z) * s.LSGKP
         sigma_x = sigma_x * R_0 * at.load / self.structure.FNOMIN
-        angle = 2 * numerics.arctan(at.load / (y.PTY2 * nominal))
-        sigma_y = y.PTY1 * numerics.sin(angle) * (1 - y.PKY3 * jnp.abs(at.camber)) * R_0 * s.LFZO * s.LSGAL
+        greatest = y.PTY2 * nominal
+        squares = at.load**2 + greatest**2
+        sine = 2 * at.load * greatest / jnp.where(squares > 0, squares, 1.0)
+        sigma_y = y.PTY1 * sine * (1 - y.PKY3 * jnp.abs(at.camber)) * R_0 * s.LFZO * s.LSGAL
         return sigma_x, sigma_y

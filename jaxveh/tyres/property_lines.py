@@ -1,0 +1,112 @@
+"""What is odd about the lines of a tyre property file: entries that are not read, and entries that cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import equinox as eqx
+
+from jaxveh.io.property_file import Entry, PropertyFile
+from jaxveh.tyres.mf_tyre import MFTyre
+from jaxveh.tyres.property_file import NOT_MEASURED
+
+NEUTRAL = {"LMUV": 0.0}
+"""Scaling factors that do nothing at another value than 1."""
+
+DYNAMIC = ("QTZ1", "MBELT")
+"""Coefficients of the gyroscopic moment, of which a steady law has no use."""
+
+DEFLECTIONS = "[DEFLECTION_LOAD_CURVE]"
+"""A table that stands in place of VERTICAL_STIFFNESS."""
+
+WORDS = ("TYRESIDE", "PROPERTY_FILE_FORMAT")
+"""Entries that are words, read with quotes or without, as those of [UNITS] are."""
+
+LISTED = 6
+"""So many keys are listed by name; of more, the first ones."""
+
+
+class Finding(NamedTuple):
+    """One thing worth a look: the key or quantity that it is `about`, and what there is to say."""
+
+    about: str
+    says: str
+
+
+def first_of(file: PropertyFile, key: str) -> Entry | None:
+    """The first entry of that name that has a value, whatever others say (`PropertyFile.find` objects where they differ)."""
+    return next((entry for entry in file.entries if entry.key == key and entry.value != ""), None)
+
+
+def odd_lines(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
+    """Findings about single lines of a file, and about the coefficients in them that this tyre, made of it, does not use."""
+    known = {name for part in vars(tyre).values() if isinstance(part, eqx.Module) for name in vars(part)}
+    yield from _without_value(file, known)
+    yield from _zeros(file)
+    yield from _texts(file)
+    yield from _twice(file)
+    yield from _unread(file, known)
+
+
+def _without_value(file: PropertyFile, known: set[str]) -> Iterator[Finding]:
+    """Empty entries: those that the tyre reads, of which it takes a default, and in one line those that it does not."""
+    told = {entry.key for entry in file.entries if entry.value != ""}
+    empty = [entry for entry in file.entries if entry.value == "" and entry.key not in told]
+    read = [entry for entry in empty if entry.key in known or entry.key in WORDS or entry.section == "UNITS"]
+    if read:
+        yield Finding(_listed(read), "without a value: as if the lines were not there")
+    if others := [entry for entry in empty if entry not in read and not entry.quoted]:
+        yield Finding(_listed(others), "without a value, and not read")
+
+
+def _zeros(file: PropertyFile) -> Iterator[Finding]:
+    if zeros := [entry for entry in file.entries if entry.value == 0 and entry.key in NOT_MEASURED]:
+        yield Finding(_listed(zeros), "0, where only a positive number means anything: as if the lines were not there")
+
+
+def _texts(file: PropertyFile) -> Iterator[Finding]:
+    """What stands without quotes and is no number: whatever it is, the tyre has no need of it."""
+    for entry in file.entries:
+        if entry.quoted or not isinstance(entry.value, str) or entry.value == "":
+            continue
+        if entry.key not in WORDS and entry.section != "UNITS":
+            place = f"in [{entry.section}], line {entry.line}"
+            yield Finding(entry.key, f"{place}, is {entry.shown}: neither a number nor in quotes; kept, and not read")
+
+
+def _twice(file: PropertyFile) -> Iterator[Finding]:
+    """Entries that contradict each other, of which the tyre has no need (else there were no tyre)."""
+    first: dict[tuple[str, str], Entry] = {}
+    for entry in file.entries:
+        section = "" if entry.key in (*WORDS, "USE_MODE") else entry.section
+        before = first.setdefault((section, entry.key), entry)
+        if before.value != entry.value and "" not in (before.value, entry.value):
+            yield Finding(entry.key, f"stands in lines {before.line} and {entry.line} with different values")
+
+
+def _unread(file: PropertyFile, known: set[str]) -> Iterator[Finding]:
+    """Coefficients of forces and moments that do something, and that are not read; names in small letters; tables."""
+    unread: dict[str, list[Entry]] = {}
+    for entry in file.entries:
+        if entry.key in known or entry.key in DYNAMIC or isinstance(entry.value, str):
+            continue
+        if entry.key.upper() in known:
+            yield Finding(entry.key, f"in [{entry.section}], line {entry.line}, is not read: write {entry.key.upper()}")
+        elif entry.section.endswith("COEFFICIENTS") or entry.section.startswith("TURNSLIP"):
+            neutral = NEUTRAL.get(entry.key, 1.0 if entry.section.startswith("SCALING") else 0.0)
+            if entry.value != neutral:
+                unread.setdefault(entry.section, []).append(entry)
+    for section, entries in unread.items():
+        yield Finding(f"[{section}]", f"{_listed(entries)}: not read, and not neutral")
+    if DEFLECTIONS in (line.strip().upper() for line in file.lines):
+        yield Finding(DEFLECTIONS, "is not read: the deflection follows VERTICAL_STIFFNESS")
+
+
+def _listed(entries: Iterable[Entry]) -> str:
+    keys = list(dict.fromkeys(entry.key for entry in entries))
+    return (
+        ", ".join(keys)
+        if len(keys) <= LISTED
+        else f"{', '.join(keys[: LISTED // 2])} and {len(keys) - LISTED // 2} more"
+    )
