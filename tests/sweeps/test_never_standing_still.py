@@ -64,7 +64,8 @@ class Cpu:
 
 class Program:
     def as_text(self):
-        return "ENTRY %main (x: f64[8]) -> c128[5] {\n  %x = f64[8] parameter(0)\n  %a = c128[5] fft(%x)\n  %b = c128[5] fft(%x)\n}"
+        lines = ("%x = f64[8] parameter(0)", "%a = c128[5] fft(%x)", "%b = c128[5] fft(%x)")
+        return "\n".join(["ENTRY %main (x: f64[8]) -> c128[5] {", *lines, "}"])
 
 
 @pytest.mark.parametrize(("pool", "devices", "fit"), [(16, 4, 4), (9, 4, 4), (8, 4, 3), (4, 4, 1), (2, 1, 1)])
@@ -137,7 +138,11 @@ def test_a_late_chunk_is_named_and_goes_on(monkeypatch):
         return x
 
     def run(point, key):
-        return {"x": jax.pure_callback(slow, jax.ShapeDtypeStruct((), jnp.result_type(float)), point.a, vmap_method="sequential")}
+        return {
+            "x": jax.pure_callback(
+                slow, jax.ShapeDtypeStruct((), jnp.result_type(float)), point.a, vmap_method="sequential"
+            )
+        }
 
     said = []
     monkeypatch.setattr(warnings, "warn", lambda text, *rest, **more: said.append(text))
