@@ -10,9 +10,6 @@ from jaxveh.cli.family import end_with_parent
 
 VECTOR_WIDTH = "--xla_cpu_prefer_vector_width"
 
-WORKERS = 8
-"""Worker threads a core, where jax's kernels block them: nearly as many may then wait on every core (see `sweeps/workers.py`)."""
-
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line (`sys.argv` by default) and exit: 0 done, 1 a filter or a fit failed, 2 bad input."""
@@ -29,8 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def prepare() -> None:
-    """Wide vectors (unless XLA_FLAGS says otherwise), float64, workers to spare: before anything is computed, and in programs
-    only."""
+    """Wide vectors (unless XLA_FLAGS says otherwise) and float64: before anything is computed, and in programs only."""
     flags = os.environ.get("XLA_FLAGS", "")
     if VECTOR_WIDTH not in flags:
         # XLA reads its flags when the first computation starts, which importing jax is not.
@@ -38,8 +34,3 @@ def prepare() -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
-
-    from jaxveh.sweeps.workers import POOL, WHOLE_AGAIN
-
-    if jax.__version_info__[:2] < WHOLE_AGAIN and "NPROC" not in os.environ:
-        os.environ.setdefault(POOL, str(WORKERS * (os.cpu_count() or 1)))

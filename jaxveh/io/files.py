@@ -143,7 +143,7 @@ def _interrupts_heard() -> Iterator[None]:
 
     def hear(number, frame):
         heard.append(number)
-        usual(number, frame)
+        signal.default_int_handler(number, frame)
 
     signal.signal(signal.SIGINT, hear)
     try:

@@ -38,6 +38,7 @@ def in_a_scan(A):
         (lambda A: A + 1.0, 0),
         (lambda A: solve(A[:10], B[:10]), 0),  # a small batch
         (lambda A: solve(A[0], B[0]), 0),  # none
+        (lambda A: jnp.linalg.cholesky(A[:1000]), 0),  # a third of n^3 each
         (solve, 1),  # three kernels, each of which needs the one before
         (lambda A: (solve(A), solve(A + 1.0)), 2),
         (in_a_scan, 1),
