@@ -6,11 +6,14 @@ import os
 import sys
 from collections.abc import Sequence
 
+from jaxveh.cli.family import end_with_parent
+
 VECTOR_WIDTH = "--xla_cpu_prefer_vector_width"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line (`sys.argv` by default) and exit: 0 done, 1 a filter or a fit failed, 2 bad input."""
+    end_with_parent()
     prepare()
     try:
         from jaxveh.cli.app import app

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,6 +18,7 @@ from typing import Any, NamedTuple
 import typer
 
 from jaxveh.cli.console import messages, progress, results, table
+from jaxveh.cli.family import Family, ends_in_order
 from jaxveh.cli.output import plain
 from jaxveh.io import write_text
 
@@ -39,17 +39,23 @@ def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None) -> 
     """Run each paper with the options `asked` of it, show what they print in the mapping's order, and write all numbers as one
     file. Exits with 1 where one of them failed, after the others."""
     order = sorted(asked, key=lambda name: SLOWEST.index(name) if name in SLOWEST else -1)
-    with progress("reproduce") as report, tempfile.TemporaryDirectory() as folder:
+    with ends_in_order(), progress("reproduce") as report, tempfile.TemporaryDirectory() as folder:
         finished: list[str] = []
+        family = Family()
 
         def go(name: str) -> Done:
             tell = lambda line: report(len(finished), len(order), f"{name}: {line}")
-            done = run_program(name, asked[name], Path(folder), tell)
+            done = run_program(name, asked[name], Path(folder), tell, family)
             finished.append(name)
             return done
 
         with ThreadPoolExecutor(min(os.cpu_count() or 1, len(order))) as pool:
-            done = dict(zip(order, pool.map(go, order), strict=True))
+            try:
+                done = dict(zip(order, pool.map(go, order), strict=True))
+            except BaseException:
+                family.end()
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
     done = {name: done[name] for name in asked}
     for one in done.values():
         typer.echo(one.printed, nl=False)
@@ -78,7 +84,7 @@ def _held(done: Done) -> str:
     return str(Tally(**done.numbers["tally"])) if done.numbers.get("checks") else "none made"
 
 
-def run_program(name: str, asked: Mapping[str, Any], folder: Path, tell: Callable[[str], None]) -> Done:
+def run_program(name: str, asked: Mapping[str, Any], folder: Path, tell: Callable[[str], None], family: Family) -> Done:
     """Run `jaxveh reproduce NAME` to its end; each line of its progress is told. Figures go to a folder of the paper's name."""
     start, file = time.perf_counter(), folder / f"{name}.json"
     arguments = [sys.executable, "-m", "jaxveh", "reproduce", name, "--json", str(file)]
@@ -86,11 +92,9 @@ def run_program(name: str, asked: Mapping[str, Any], folder: Path, tell: Callabl
         value = value / name if option == "--out" and value is not None else value
         if value is not None:
             arguments += [option] if value is True else [option, str(value)]
-    # One device a program: the cores are shared out already.
-    environment = {"JAX_NUM_CPU_DEVICES": "1", **os.environ}
-    pipes = dict(stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
     with tempfile.TemporaryFile("w+") as printed:
-        with subprocess.Popen(arguments, **{**pipes, "stdout": printed}) as running:
+        # One device a program: the cores are shared out already.
+        with family.child(arguments, printed, JAX_NUM_CPU_DEVICES="1") as running:
             assert running.stderr is not None
             for line in running.stderr:
                 tell(line.strip().removeprefix("reproduce: "))

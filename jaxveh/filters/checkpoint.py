@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
+from jaxveh.io.files import replacing
 from jaxveh.statespace.contract import AbstractBelief
 
 STATES = "states"
@@ -24,16 +25,16 @@ def save_belief(path: str | Path, belief: AbstractBelief) -> Path:
 
     `load_belief` reads it; steps from there are those of an unbroken run, bit for bit. An existing file is replaced only once
     the new one is whole. Returns the path.
+
+    **Raises** `InputError` for another suffix, or where the file cannot be written.
     """
     path = Path(path)
     if path.suffix != ".npz":
         raise InputError(f"path = {path}: must end in .npz.")
     arrays = {name: np.asarray(_words(leaf)) for name, leaf in _named(belief).items()}
     arrays[STATES] = np.asarray(_states(belief))
-    partial = path.with_name(path.name + ".part")
-    with partial.open("wb") as file:
-        np.savez(file, **arrays)
-    partial.replace(path)
+    with replacing(path, overwrite=True) as part:
+        np.savez(part, **arrays)
     return path
 
 

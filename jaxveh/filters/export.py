@@ -13,6 +13,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
+from jaxveh.io.files import making_folder
 from jaxveh.io.optional import require
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace.contract import AbstractFilter
@@ -34,7 +35,7 @@ def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace,
     report (r,), and `numbers` (4,): log-likelihood, NIS, ESS, result code. The model's parameters, and the `key` of a particle
     filter, are constants in the programs. With x64 arrays, jax_enable_x64 must be on there, too.
 
-    **Raises** `InputError` where the folder exists already, and as `filter.check`.
+    **Raises** `InputError` where the folder exists already or cannot be written, and as `filter.check`.
     """
     folder = Path(folder)
     if folder.exists():
@@ -78,10 +79,10 @@ def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace,
         "jax": jax.__version__,
         "platforms": first.platforms,
     }
-    folder.mkdir(parents=True)
-    (folder / "init.jaxexport").write_bytes(first.serialize())
-    (folder / "step.jaxexport").write_bytes(then.serialize())
-    (folder / "names.json").write_text(json.dumps(described, indent=2) + "\n", encoding="utf-8")
+    with making_folder(folder) as part:
+        (part / "init.jaxexport").write_bytes(first.serialize())
+        (part / "step.jaxexport").write_bytes(then.serialize())
+        (part / "names.json").write_text(json.dumps(described, indent=2) + "\n", encoding="utf-8")
     return folder
 
 

@@ -1,10 +1,16 @@
-"""Files: clear errors on reading, all or nothing on writing."""
+"""Files: clear errors on reading, all or nothing on writing. Nothing else in the package opens a file to write it."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import re
+import shutil
+import signal
+import socket
 import tempfile
+import threading
+import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -34,7 +40,9 @@ def check_suffix(path: Path, allowed: Iterable[str], kind: str = "file") -> str:
 def replacing(path: str | os.PathLike, overwrite: bool = False) -> Iterator[Path]:
     """Yield a path to write to; it takes the place of `path` in one step when the block ends without an error.
 
-    A failure, an interrupt included, leaves what was there before: never half a file.
+    A failure, an interrupt included, leaves what was there before: never half a file, and nothing beside it. What a program
+    that was killed has left beside `path` goes with the next writing of it. A link stays one: its target is replaced. An
+    interrupt that a library has swallowed on its way is raised at the end.
 
     **Raises** `InputError` where `path` exists and `overwrite` is False, or the system refuses to write.
     """
@@ -43,17 +51,114 @@ def replacing(path: str | os.PathLike, overwrite: bool = False) -> Iterator[Path
         raise InputError(f"{path}: is a folder; name a file.")
     if path.exists() and not overwrite:
         raise InputError(f"{path}: exists already; pass overwrite=True, or name another file.")
-    try:
-        # A folder rather than a file: writers may add files of their own, and the result has the usual permissions.
-        with tempfile.TemporaryDirectory(prefix=".writing-", dir=path.parent) as folder:
-            part = Path(folder) / path.name
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    with _refusals_in_words(path), _beside(target) as part:
+        with _interrupts_heard():
             yield part
-            os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}). Check folder and space.") from error
+        _settle(part)
+        if target.exists():
+            shutil.copymode(target, part)
+        os.replace(part, target)
+
+
+@contextlib.contextmanager
+def making_folder(path: str | os.PathLike) -> Iterator[Path]:
+    """Yield a new folder to write into; it becomes `path`, with all that is in it, when the block ends without an error.
+
+    **Raises** `InputError` where `path` exists, or the system refuses to write.
+    """
+    path = Path(path)
+    if path.exists():
+        raise InputError(f"{path}: exists already; name a new folder.")
+    with _refusals_in_words(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with _beside(path) as part:
+            part.mkdir()
+            with _interrupts_heard():
+                yield part
+            for file in part.iterdir():
+                _settle(file)
+            os.rename(part, path)
 
 
 def write_text(text: str, path: str | os.PathLike, overwrite: bool = False) -> None:
     """Write a text file in UTF-8, all or nothing."""
     with replacing(path, overwrite) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
+
+
+@contextlib.contextmanager
+def _refusals_in_words(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}). Check folder and space.") from error
+
+
+@contextlib.contextmanager
+def _beside(path: Path) -> Iterator[Path]:
+    """A path of the same name in a hidden folder beside `path`, on the same disk; the folder goes in the end.
+
+    A folder rather than a file: writers may add files of their own, and the result has the usual permissions. Its name says
+    for what, and which process of which computer writes, so that it is known for a leftover once that process is gone.
+    """
+    mark = f".writing-{zlib.crc32(os.fsencode(path.name)):08x}-{_host()}-"
+    for leftover in path.parent.glob(f"{mark}*"):
+        if not _lives(leftover.name.removeprefix(mark)):
+            shutil.rmtree(leftover, ignore_errors=True)
+    folder = Path(tempfile.mkdtemp(prefix=f"{mark}{os.getpid()}-", dir=path.parent))
+    try:
+        yield folder / path.name
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _host() -> str:
+    """This computer's name, of letters and digits; folders may be shared by several."""
+    return re.sub(r"\W", "", socket.gethostname())[:32]
+
+
+def _lives(rest: str) -> bool:
+    """Whether the process whose number begins the rest of a hidden folder's name is there; on Windows nobody can ask safely."""
+    number = rest.partition("-")[0]
+    if os.name == "nt" or not number.isdigit():
+        return True
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+@contextlib.contextmanager
+def _interrupts_heard() -> Iterator[None]:
+    """Raise `KeyboardInterrupt` at the end of a block in which one came and was lost, as in pandas' writer of CSV, which is C."""
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+        yield  # someone else hears them
+        return
+    heard = []
+
+    def hear(number, frame):
+        heard.append(number)
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield
+        if heard:
+            raise KeyboardInterrupt
+    except Exception as error:
+        if heard:
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        signal.signal(signal.SIGINT, usual)
+
+
+def _settle(path: Path) -> None:
+    """Have the system put a file's content on the disk before its name points to it."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())

@@ -16,10 +16,15 @@ from jax.sharding import PartitionSpec as P
 from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh.sweeps.design import Design
+from jaxveh.sweeps.lateness import told_when_late
 from jaxveh.sweeps.swept import Swept, named_leaves
+from jaxveh.sweeps.workers import fit_for
 
 SHARE_OF_MEMORY = 0.5
 """How much of the machine's memory a chunk may take, unless `memory` says otherwise."""
+
+PATIENCE = 900.0
+"""How long a chunk may take until a word is said, s, unless `patience` says otherwise."""
 
 
 def sweep(
@@ -32,6 +37,7 @@ def sweep(
     batch: int | None = None,
     memory: float | None = None,
     devices: list | None = None,
+    patience: float | None = PATIENCE,
     progress: Progress = silent,
 ) -> Swept:
     """`run(point, key)` at every point of the design, each with the same `seeds` keys, so that points can be compared in pairs.
@@ -42,13 +48,18 @@ def sweep(
     (drives that several filters see); `batch`, runs at a time (default: all points of a choice, or as many as `memory`, bytes,
     holds: half of the machine's); `devices`, over which a batch is split by `shard_map` (default: all of `jax.devices()`: on a
     CPU one, unless `jax_num_cpu_devices` is set before jax starts; a run that fits with optimistix takes one,
-    `jax.devices()[:1]`: linear solves of lineax refuse `shard_map`); `progress(done, total, stage)` is called between chunks.
+    `jax.devices()[:1]`: linear solves of lineax refuse `shard_map`); `patience`, s: each time that a chunk, or compiling, has
+    taken so long, a `JaxvehWarning` names it and says what can be done (None: never); `progress(done, total, stage)` is called
+    between chunks.
 
-    Every choice is compiled once, whatever the number of chunks.
+    Every choice is compiled once, whatever the number of chunks; and again for fewer devices where as many as were asked for
+    could wait for each other for ever (large batches of LAPACK routines with jax before 0.12; see `sweeps/workers.py`).
 
     **Raises** `InputError` for bad counts, data of another shape, and for a `run` that returns nothing named.
+    **Warns** where a program may never end even on one device, and what keeps it from that.
     """
     check_whole("seeds", seeds)
+    check_positive("patience", patience, "s")
     devices = jax.devices() if devices is None else list(devices)
     given = Given(design, seeds, key, data)
     done, total = 0, given.runs * int(np.prod([len(axis.values) for axis in design.choices]))
@@ -56,7 +67,8 @@ def sweep(
     for _, said, choices in design.combinations():
         one = lambda numbers, *rest, choices=choices: run(design.point(numbers, choices), *rest)
         report = lambda n, said=said, done=done: progress(done + n, total, said or "runs")
-        found.append(_all(one, given, batch, memory, devices, report))
+        late = lambda what, said=said: told_when_late(f"{what} ({said})" if said else what, patience)
+        found.append(_all(one, given, batch, memory, devices, report, late))
         done += given.runs
     return Swept(design, seeds, _arranged(design, seeds, found))
 
@@ -83,16 +95,18 @@ class Given:
         return numbers, self.keys[jnp.asarray(place[-1])], *own
 
 
-def _all(one, given: Given, batch, memory, devices, report) -> dict[str, np.ndarray]:
+def _all(one, given: Given, batch, memory, devices, report, late) -> dict[str, np.ndarray]:
     """All runs of one choice: values by name with (R, ...)."""
     batch = given.runs if batch is None else batch
     check_whole("batch", batch)
-    program, batch = _program(one, given, min(batch, given.runs), memory, devices)
+    with late("compiling"):
+        program, batch = _program(one, given, min(batch, given.runs), memory, devices)
     parts = []
     for first in range(0, given.runs, batch):
         report(first)
-        part = program(*given.chunk(first, batch))
-        parts.append({n: np.asarray(leaf)[: given.runs - first] for n, leaf in named_leaves(part).items()})
+        with late(f"the chunk of runs {first + 1} to {min(first + batch, given.runs)} of {given.runs}"):
+            part = program(*given.chunk(first, batch))
+            parts.append({n: np.asarray(leaf)[: given.runs - first] for n, leaf in named_leaves(part).items()})
     report(given.runs)
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
@@ -101,10 +115,14 @@ def _program(one, given: Given, batch, memory, devices):
     """The compiled program of a chunk, and how many runs it takes: fewer than `batch` where they would not fit."""
     check_positive("memory", memory, "bytes")
     memory = SHARE_OF_MEMORY * _machine_memory() if memory is None else memory
-    width = len(devices)
     while True:
+        width = len(devices)
         batch = -(-batch // width) * width
         program = _split_over(one, devices).lower(*given.chunk(0, batch)).compile()
+        fit = fit_for(program, devices)
+        if len(fit) < width:
+            devices = fit
+            continue
         needed = _needed(program)
         if needed <= memory or batch == width:
             return program, batch

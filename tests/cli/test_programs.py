@@ -228,7 +228,7 @@ def test_reproduce_all_goes_through_every_paper(tmp_path, papers, monkeypatch):
 
     asked = {}
 
-    def program(name, options, folder, tell):
+    def program(name, options, folder, tell, family):
         asked[name] = {option: value for option, value in options.items() if value is not None}
         tell("done")
         checks = [{"name": "UKF", "value": 0.5, "bound": 0.8, "status": "held"}, {"name": "PF", "status": "open"}]
@@ -251,9 +251,10 @@ def test_reproduce_all_goes_through_every_paper(tmp_path, papers, monkeypatch):
 def test_a_paper_by_a_program_of_its_own(tmp_path):
     """A program that refuses its input: the line it says is told, its code kept."""
     from jaxveh.cli.all_papers import run_program
+    from jaxveh.cli.family import Family
 
-    told = []
-    done = run_program("no-paper", {"--seed": 1, "--as-printed": True, "--out": None}, tmp_path, told.append)
+    told, asked = [], {"--seed": 1, "--as-printed": True, "--out": None}
+    done = run_program("no-paper", asked, tmp_path, told.append, Family())
     assert done.code == 2 and done.numbers == {} and done.took > 0
     assert any("must be one of" in line for line in told)
 

@@ -201,6 +201,6 @@ def _count(rows: Any) -> Any:
 def _squared(error: Any, covariance: Any) -> Any:
     """e^T P^-1 e; infinite where nothing is believed uncertain."""
     std = jnp.sqrt(jnp.diagonal(covariance))
-    scaled = covariance / (std[:, None] * std[None, :])
-    value = jnp.sum((error / std) * jnp.linalg.solve(scaled, error / std))
+    factor = numerics.cholesky(covariance / (std[:, None] * std[None, :]))
+    value = numerics.mahalanobis(factor, error / std)
     return jnp.where(jnp.isfinite(value), value, jnp.inf)

@@ -1,0 +1,38 @@
+"""A word about a chunk that takes long: nothing is stopped, but nobody waits without knowing for what."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import warnings
+from collections.abc import Iterator
+
+from jaxveh._core.errors import JaxvehWarning
+
+
+@contextlib.contextmanager
+def told_when_late(what: str, patience: float | None) -> Iterator[None]:
+    """Warn each time that the block has taken another `patience` seconds (None: never), naming `what` it does."""
+    if patience is None:
+        yield
+        return
+    ended = threading.Event()
+    watcher = threading.Thread(target=_watch, args=(what, patience, ended), daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        ended.set()
+
+
+def _watch(what: str, patience: float, ended: threading.Event) -> None:
+    times = 1
+    while not ended.wait(patience):
+        warnings.warn(
+            f"sweep: {what} has not finished for {times * patience:g} s. Where the processor is busy, it may only be slow: a "
+            "smaller batch= says more often how far it is. Where the processor is idle, it stands still: stop it, and run "
+            "again on one device (devices=jax.devices()[:1], or JAX_NUM_CPU_DEVICES=1 in the environment).",
+            JaxvehWarning,
+            stacklevel=1,
+        )
+        times += 1
