@@ -151,7 +151,6 @@ def log_of_normal(x: Array) -> Array:
     return (exponent.astype(x.dtype) + 1.0) * math.log(2.0) + 2.0 * (s + s * t * q)
 
 
-
 # Types
 
 

@@ -46,11 +46,17 @@ ROOMS = {"fitting": FITS}
 
 PLACES = {
     "cli/app.py": {"callback": "of a command, not of jax"},
-    "experiments/sideslip_review/contestants.py": {"custom_batching": "particle filters one by one; nothing is differentiated"},
+    "experiments/sideslip_review/contestants.py": {
+        "custom_batching": "particle filters one by one; nothing is differentiated"
+    },
     "experiments/tyre_apf/saturated.py": {"least_squares": "a fit, whose values alone are used"},
-    "filters/adaptive_number.py": {"stop_gradient": "how many particles are drawn, and the draws that say so: whole numbers"},
+    "filters/adaptive_number.py": {
+        "stop_gradient": "how many particles are drawn, and the draws that say so: whole numbers"
+    },
     "filters/choosing.py": {"stop_gradient": SCORES},
-    "filters/particle.py": {"stop_gradient": "the draw of ancestors, whole numbers; the base of moments, which cancels"},
+    "filters/particle.py": {
+        "stop_gradient": "the draw of ancestors, whole numbers; the base of moments, which cancels"
+    },
     "numerics/blocks.py": {"filter_custom_jvp": EVERY},
     "numerics/elementary.py": {"custom_jvp": EVERY, "stop_gradient": EVERY, "bitcast_convert_type": EVERY},
     "numerics/held.py": {

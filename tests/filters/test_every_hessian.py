@@ -96,9 +96,7 @@ def test_on_a_small_model(name):
 
 def test_on_the_car_of_the_readme():
     car, device = vehicles.passenger_car(), sensors.esc(yaw_rate=0.005, a_y=0.1)
-    drive = jaxveh.simulate(
-        car, manoeuvres.double_lane_change(speed=25.0, steer=0.12), device, key=jax.random.key(0)
-    )
+    drive = jaxveh.simulate(car, manoeuvres.double_lane_change(speed=25.0, steer=0.12), device, key=jax.random.key(0))
     tyres = lambda car: (car.front.B, car.front.D, car.rear.B, car.rear.D)
     model = estimators.state_space(car, device, estimate=tyres, prior=0.1)
     rows = jax.tree.map(lambda leaf: leaf[100:106], model.rows(drive))

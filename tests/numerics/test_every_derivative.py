@@ -172,16 +172,39 @@ PLACES = {
     "solver": Place(in_solver, 60),
 }
 
-FORWARD = lambda f: lambda x: jax.jvp(f, (x,), (jnp.ones_like(x),))[1]
-MODES = {"forward": (FORWARD,) * 3, "reverse": (jax.grad,) * 3, "mixed": (jax.grad, FORWARD, jax.grad)}
+
+def forward(function):
+    """Of `x -> (highest, lower)`: the same with one derivative more, forward."""
+
+    def more(x):
+        highest, change, lower = jax.jvp(function, (x,), (jnp.ones_like(x),), has_aux=True)
+        return change, (*lower, highest)
+
+    return more
+
+
+def reverse(function):
+    def more(x):
+        (highest, lower), change = jax.value_and_grad(function, has_aux=True)(x)
+        return change, (*lower, highest)
+
+    return more
+
+
+MODES = {"forward": (forward,) * 3, "reverse": (reverse,) * 3, "mixed": (reverse, forward, reverse)}
 
 
 def derivatives(function, mode):
     """Value and three derivatives, in a batch."""
-    chain = [function]
+    found = lambda x: (function(x), ())
     for one_more in MODES[mode]:
-        chain.append(one_more(chain[-1]))
-    return jax.jit(jax.vmap(lambda x: jnp.stack([f(x) for f in chain])))
+        found = one_more(found)
+
+    def stacked(x):
+        highest, lower = found(x)
+        return jnp.stack((*lower, highest))
+
+    return jax.jit(jax.vmap(stacked))
 
 
 def polynomial_of(case, steps):
