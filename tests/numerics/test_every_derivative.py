@@ -16,6 +16,7 @@ import pytest
 from numpy.polynomial import Chebyshev
 
 from jaxveh import numerics
+from jaxveh.numerics import elementary, triangular
 
 NONE = {
     "barriers_hold": "a fact of the platform",
@@ -224,10 +225,13 @@ def reference(name, steps):
     return polynomial_of(CASES[name], steps)
 
 
+RULED = ("arctan", "arctan2", "cos", "kept", "log", "lower_factor", "secant", "sin", "stored", "sum_in_blocks", "tan")
+"""Made of a rule, a primitive or a value without derivative: they go backward by default, where jax 0.10 drops rules."""
+
+
 def turn(i, name, mode):
-    """By default each name meets one mode in turn; those that jax 0.10 would get wrong go backward."""
-    rules = ("arctan", "arctan2", "log", "secant", "lower_factor", "sin", "cos", "sum_in_blocks")
-    mine = mode == ("reverse" if name in rules else list(MODES)[i % 3])
+    """By default all that is `RULED`, and of the others one in three, each in a mode of its turn."""
+    mine = mode == "reverse" if name in RULED else i % 3 == 0 and mode == list(MODES)[i // 3 % 3]
     return pytest.param(name, mode, marks=[] if mine else pytest.mark.full)
 
 
@@ -263,13 +267,53 @@ def test_in_float32(name, mode):
 ELEMENTARY = ("arctan", "arctan2", "cos", "hypot", "log", "sin", "sqrt", "tan")
 
 
-@pytest.mark.parametrize("place", ["scan", "checkpoint", "solver"])
-def test_all_elementary_functions_at_once(place):
-    """What the full run asks of each by itself, in one program a place, both types and the mode that jax 0.10 gets wrong."""
+@pytest.mark.parametrize(
+    ("place", "dtype"),
+    [
+        ("scan", jnp.float32),
+        ("checkpoint", jnp.float64),
+        ("solver", jnp.float64),
+        pytest.param("checkpoint", jnp.float32, marks=pytest.mark.full),
+        pytest.param("solver", jnp.float32, marks=pytest.mark.full),
+    ],
+)
+def test_all_elementary_functions_at_once(place, dtype):
+    """What the full run asks of each by itself, in one program a place, in the mode that jax 0.10 gets wrong."""
     of, steps = PLACES[place]
     case = lambda x: sum(CASES[name](x) for name in ELEMENTARY) / len(ELEMENTARY)
-    expected = polynomial_of(case, steps)
-    for dtype, close in ((jnp.float64, 2e-7), (jnp.float32, 2e-2)):
-        found = derivatives(of(case), "reverse")(jnp.asarray(POINTS, dtype))
-        assert found.dtype == dtype
-        np.testing.assert_allclose(found, expected, rtol=close, atol=close)
+    found = derivatives(of(case), "reverse")(jnp.asarray(POINTS, dtype))
+    assert found.dtype == dtype
+    close = 2e-7 if dtype == jnp.float64 else 2e-2
+    np.testing.assert_allclose(found, polynomial_of(case, steps), rtol=close, atol=close)
+
+
+def test_zeros_with_infinite_slopes_are_flat_in_a_scan():
+    case = lambda x: numerics.sqrt(x) + numerics.hypot(x, 2 * x) + numerics.arctan2(x, 3 * x)
+    found = derivatives(lambda x: jax.lax.scan(lambda c, _: (c * case(x), None), x, None, length=2)[0], "reverse")
+    np.testing.assert_array_equal(found(jnp.zeros(1)), 0.0)
+
+
+RULES = {
+    f"{module.__name__}.{name}": value
+    for module in (elementary, triangular)
+    for name, value in vars(module).items()
+    if isinstance(value, jax.custom_jvp)
+}
+SQUARE = jnp.asarray(np.random.default_rng(0).normal(size=(3, 5)))
+ANGLES = jnp.asarray([-2.5, -0.4, -0.0, 0.0, 0.3, 1.1, 2.5])
+PAIRS = (
+    jnp.asarray([0.0, -0.0, 1.0, -1.0, 0.0, 0.4, -0.7, 2.0]),
+    jnp.asarray([0.0, 0.0, 0.0, -0.0, 2.0, -0.3, -2.0, 0.5]),
+)
+ARGUMENTS = {"_log": (jnp.asarray([1e-300, 0.2, 1.0, 3.0, 1e300]),), "_arctan2": PAIRS, "lower_factor": (SQUARE,)}
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_without_its_rule_a_function_has_the_same_derivative(name):
+    """What jax 0.10 does in a scan, asked of every rule by itself."""
+    rule = RULES[name]
+    arguments = ARGUMENTS.get(name.rpartition(".")[2], (ANGLES,))
+    tangents = tuple(jnp.cos(x + i) for i, x in enumerate(arguments))
+    ours, bare = (jax.jvp(f, arguments, tangents) for f in (rule, rule.__wrapped__))
+    np.testing.assert_array_equal(ours[0], bare[0])
+    np.testing.assert_allclose(ours[1], bare[1], rtol=1e-11, atol=1e-12)
