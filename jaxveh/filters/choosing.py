@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_whole
+from jaxveh.numerics.tangents import derivative_alone
 
 
 def score(log_probability):
@@ -20,9 +21,7 @@ def score(log_probability):
     expectation's derivative has the share that comes from choosing (A. Scibior & F. Wood, Differentiable particle filtering
     without modifying the forward pass, 2021; G. Poyiadjis, A. Doucet & S. Singh 2011).
     """
-    # What cannot have been drawn has no number to take from itself.
-    finite = jnp.where(jnp.isfinite(log_probability), log_probability, 0)
-    return finite - jax.lax.stop_gradient(finite)
+    return derivative_alone(log_probability)
 
 
 def log_of(weights):

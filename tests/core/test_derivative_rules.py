@@ -53,7 +53,6 @@ PLACES = {
     "filters/adaptive_number.py": {
         "stop_gradient": "how many particles are drawn, and the draws that say so: whole numbers"
     },
-    "filters/choosing.py": {"stop_gradient": SCORES},
     "filters/particle.py": {
         "stop_gradient": "the draw of ancestors, whole numbers; the base of moments, which cancels"
     },
@@ -67,6 +66,7 @@ PLACES = {
     "numerics/platform.py": {"optimization_barrier": EVERY},
     "numerics/resampling.py": {"stop_gradient": EVERY},
     "numerics/roots.py": {"stop_gradient": EVERY, "while_loop": EVERY},
+    "numerics/tangents.py": {"Primitive": SCORES},
     "numerics/triangular.py": {"custom_jvp": EVERY},
     "simulation/meter.py": {"callback": "tells how far a run is; no number comes back"},
     "simulation/solve.py": {"diffeqsolve": "tests/simulation, by the adjoint that is asked for"},

@@ -264,7 +264,8 @@ def test_in_float32(name, mode):
     np.testing.assert_allclose(found[:, 3], reference(name, 3)[:, 3], rtol=2e-2, atol=2e-2)
 
 
-ELEMENTARY = ("arctan", "arctan2", "cos", "hypot", "log", "sin", "sqrt", "tan")
+BITS = ("arctan", "log", "sqrt")
+"""Of each way to be without a derivative by itself one: signs, exponents, infinite slopes."""
 
 
 @pytest.mark.parametrize(
@@ -277,10 +278,10 @@ ELEMENTARY = ("arctan", "arctan2", "cos", "hypot", "log", "sin", "sqrt", "tan")
         pytest.param("solver", jnp.float32, marks=pytest.mark.full),
     ],
 )
-def test_all_elementary_functions_at_once(place, dtype):
+def test_functions_of_bits_elsewhere(place, dtype):
     """What the full run asks of each by itself, in one program a place, in the mode that jax 0.10 gets wrong."""
     of, steps = PLACES[place]
-    case = lambda x: sum(CASES[name](x) for name in ELEMENTARY) / len(ELEMENTARY)
+    case = lambda x: sum(CASES[name](x) for name in BITS) / len(BITS)
     found = derivatives(of(case), "reverse")(jnp.asarray(POINTS, dtype))
     assert found.dtype == dtype
     close = 2e-7 if dtype == jnp.float64 else 2e-2
