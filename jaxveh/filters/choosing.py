@@ -11,22 +11,17 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_whole
+from jaxveh.numerics.tangents import derivative_alone
 
 
-@jax.custom_jvp
 def score(log_probability):
-    """Zero, with the derivative of a draw's log-probability: what makes gradients through a choice right.
+    """Zero, with all derivatives of a draw's log-probability: what makes gradients through a choice right.
 
     A draw j of a category i of probability p_i counts with p_i over the same p_i without derivative, a factor of 1, so that the
     expectation's derivative has the share that comes from choosing (A. Scibior & F. Wood, Differentiable particle filtering
     without modifying the forward pass, 2021; G. Poyiadjis, A. Doucet & S. Singh 2011).
     """
-    return jnp.zeros_like(log_probability)
-
-
-@score.defjvp
-def _score_jvp(primals, tangents):
-    return jnp.zeros_like(primals[0]), tangents[0]
+    return derivative_alone(log_probability)
 
 
 def log_of(weights):

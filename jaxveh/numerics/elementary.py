@@ -2,9 +2,13 @@
 
 On the CPU, float32 and float64 arrays go through polynomials of our own (`polynomials`), several times faster than
 the library's; elsewhere, and for other types and weakly typed values (Python numbers), the library's functions are
-used. Every function has its own derivative rule, written in the same functions, so that both modes and all orders are
-as fast. Arrays of any shape; arguments of two-argument functions broadcast. NaN gives NaN. Errors stated are for
+used. Arrays of any shape; arguments of two-argument functions broadcast. NaN gives NaN. Errors stated are for
 float32 / float64.
+
+Every function is differentiable to any order by the way it is computed: what comes of bits (signs, exponents) is a constant
+factor of something that is not. Those made of polynomials have a derivative rule besides, which is faster and more accurate:
+jax before 0.12 drops such rules from the values that the backward pass of a scan keeps, so that second derivatives there
+are those of the polynomials.
 """
 
 import math
@@ -131,15 +135,20 @@ def log_of_normal(x: Array) -> Array:
     """Natural logarithm of positive, finite, normal float32 or float64 numbers; anything else gives a wrong number."""
     unsigned, mantissa_bits = _layout(x)
     signed = jnp.int32 if unsigned == jnp.uint32 else jnp.int64
-    origin = int(np.asarray(math.sqrt(0.5), x.dtype).view(signed))
-    word = lax.bitcast_convert_type(x, signed)
-    # x = 2^exponent * mantissa, with the mantissa between sqrt(1/2) and sqrt(2).
-    exponent = (word - jnp.asarray(origin, signed)) >> jnp.asarray(mantissa_bits, signed)
-    mantissa = lax.bitcast_convert_type(word - (exponent << jnp.asarray(mantissa_bits, signed)), x.dtype)
-    s = (mantissa - 1.0) / (mantissa + 1.0)
+    origin, one = (jnp.asarray(int(np.asarray(value, x.dtype).view(signed)), signed) for value in (math.sqrt(2.0), 1.0))
+    held = lax.stop_gradient(x)
+    word = lax.bitcast_convert_type(held, signed)
+    # x = 2^exponent * mantissa, with the mantissa between sqrt(2) and 2 sqrt(2).
+    exponent = (word - origin) >> jnp.asarray(mantissa_bits, signed)
+    lowered = exponent << jnp.asarray(mantissa_bits, signed)
+    # Bits have no derivative. The mantissa's is 2^-exponent, which is a number for all exponents but the largest, and there 0
+    # as 1 / x is.
+    slope = lax.bitcast_convert_type(one - lowered, x.dtype)
+    mantissa = lax.bitcast_convert_type(word - lowered, x.dtype) + (x - held) * slope
+    s = (mantissa - 2.0) / (mantissa + 2.0)
     t = s * s
     q = polynomials.evaluate(polynomials.of_dtype(x, polynomials.LOGARITHM_32, polynomials.LOGARITHM_64), t)
-    return exponent.astype(x.dtype) * math.log(2.0) + 2.0 * (s + s * t * q)
+    return (exponent.astype(x.dtype) + 1.0) * math.log(2.0) + 2.0 * (s + s * t * q)
 
 
 # Types
@@ -187,12 +196,12 @@ def _flip(x: Array, word: Array) -> Array:
     return lax.bitcast_convert_type(lax.bitcast_convert_type(x, unsigned) ^ sign, x.dtype)
 
 
-def _with_sign(magnitude: Array, sign: Array) -> Array:
-    """`magnitude` (not negative) with the sign bit of `sign`; as bits, because a comparison loses the sign of zero."""
-    unsigned, _ = _layout(magnitude)
-    mask = jnp.asarray(1 << (8 * magnitude.dtype.itemsize - 1), unsigned)
-    bits = lax.bitcast_convert_type(magnitude, unsigned) | (lax.bitcast_convert_type(sign, unsigned) & mask)
-    return lax.bitcast_convert_type(bits, magnitude.dtype)
+def _sign(x: Array) -> Array:
+    """1 with the sign bit of `x`; as bits, because a comparison loses the sign of zero. A constant to derivatives."""
+    unsigned, _ = _layout(x)
+    mask = jnp.asarray(1 << (8 * x.dtype.itemsize - 1), unsigned)
+    one = lax.bitcast_convert_type(jnp.ones_like(x), unsigned)
+    return lax.bitcast_convert_type(one | (lax.bitcast_convert_type(x, unsigned) & mask), x.dtype)
 
 
 # Sine and cosine
@@ -287,21 +296,32 @@ def _arctan(x: Array) -> Array:
     if not _ours(x):
         return jnp.arctan(x)
     x = _stored(x)
-    turned, top, bottom = _three_ranges(jnp.abs(x), jnp.ones_like(x))
-    return _with_sign(_arctan_polynomial(turned, top / bottom), x)
+    # |x| as a product, because the derivative of |x| is 0 at 0.
+    sign = _sign(x)
+    turned, top, bottom = _three_ranges(sign * x, jnp.ones_like(x))
+    return sign * _arctan_polynomial(turned, top / bottom)
 
 
 @jax.custom_jvp
 def _arctan2(y: Array, x: Array) -> Array:
     if not _ours(x, y):
-        return jnp.arctan2(y, jnp.where(x == 0.0, jnp.abs(x), x))
+        return _library_arctan2(y, x)
     x, y = _stored(jnp.broadcast_arrays(x, y))
     largest = float(jnp.finfo(x.dtype).max) / 4  # so that infinities and sums of the two stay finite
-    width, height = (jnp.where(jnp.abs(z) > largest, largest, jnp.abs(z)) for z in (x, y))
+    sign = _sign(y)
+    left = x < 0.0
+    width, height = (jnp.where(z > largest, largest, z) for z in (jnp.where(left, -x, x), sign * y))
     turned, top, bottom = _three_ranges(height, width)
-    # 0 / 0 counts as 0.
-    angle = _arctan_polynomial(turned, top / jnp.where(bottom == 0.0, 1.0, bottom))
-    return _with_sign(jnp.where(x < 0.0, math.pi - angle, angle), y)
+    # 0 / 0 counts as 0 / infinity: 0, and so are all its derivatives.
+    angle = _arctan_polynomial(turned, top / jnp.where(bottom == 0.0, jnp.inf, bottom))
+    return sign * jnp.where(left, math.pi - angle, angle)
+
+
+def _library_arctan2(y: Array, x: Array) -> Array:
+    origin = (x == 0.0) & (y == 0.0)
+    # A zero x becomes +0, with the derivative of x.
+    width = jnp.where(x == 0.0, x - lax.stop_gradient(x), x)
+    return jnp.arctan2(jnp.where(origin, lax.stop_gradient(y), y), jnp.where(origin, 1.0, width))
 
 
 @_arctan.defjvp
@@ -321,29 +341,16 @@ def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Arra
 # Roots and logarithm
 
 
-@jax.custom_jvp
 def _sqrt(x: Array) -> Array:
-    return jnp.sqrt(x)
+    # At 0 what goes in and what comes out are constants, so that infinite slopes meet a zero on either way. XLA sees a choice
+    # between equals, which costs the value nothing.
+    zero = x == 0.0
+    root = jnp.sqrt(jnp.where(zero, lax.stop_gradient(x), x))
+    return jnp.where(zero, lax.stop_gradient(root), root)
 
 
-@_sqrt.defjvp
-def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
-    (x,), (dx,) = primals, tangents
-    slope = jnp.where(x == 0.0, 0.0, 0.5 / _sqrt(jnp.where(x == 0.0, 1.0, x)))
-    return _sqrt(x), slope * dx
-
-
-@jax.custom_jvp
 def _hypot(x: Array, y: Array) -> Array:
-    return jnp.sqrt(x * x + y * y)
-
-
-@_hypot.defjvp
-def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Array, Array]:
-    (x, y), (dx, dy) = primals, tangents
-    length = _hypot(x, y)
-    inverse = jnp.where(length == 0.0, 0.0, 1.0 / jnp.where(length == 0.0, 1.0, length))
-    return length, (x * inverse) * dx + (y * inverse) * dy
+    return _sqrt(x * x + y * y)
 
 
 @jax.custom_jvp

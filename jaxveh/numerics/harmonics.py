@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import DTypeLike
 
-from jaxveh.numerics.elementary import cos, tan
+from jaxveh.numerics.elementary import arctan, cos, tan
 from jaxveh.numerics.random import uniform
 
 
@@ -37,7 +37,7 @@ def gauss_markov_harmonics(
     share, phases = _shares(key, count, dtype)
     # The integral of the density is (2 / pi) atan(2 pi f L): frequencies of equal energy are tangents.
     turn = 2.0 * math.pi * length
-    return tan(share * math.atan(turn * highest)) / turn, phases
+    return tan(share * arctan(turn * highest)) / turn, phases
 
 
 def sum_of_harmonics(x: Array, frequencies: Array, phases: Array) -> Array:

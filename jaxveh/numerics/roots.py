@@ -7,12 +7,16 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 
+_CORRECTIONS = 2
+"""Newton's steps from a root without derivatives: with each, twice as many and one more orders are right."""
+
 
 def secant(function: Callable, arguments, x_0, x_1, tolerance, steps: int = 17):
     """`x` with `|function(x, arguments)| <= tolerance`, elementwise, by the secant method from two first guesses.
 
     `function` maps an array and a tree of arrays to an array of the guesses' shape, each element by itself. An element stops
-    where it is within `tolerance`, all after `steps`. Derivatives are those of the root: `-(df / darguments) / (df / dx)`.
+    where it is within `tolerance`, all after `steps`. Derivatives up to the third are those of the root: the first is
+    `-(df / darguments) / (df / dx)`.
     """
 
     def step(carry):
@@ -31,8 +35,9 @@ def secant(function: Callable, arguments, x_0, x_1, tolerance, steps: int = 17):
     first = (0, x_0, fixed(x_0), x_1, fixed(x_1), x_1, jnp.ones(jnp.shape(x_1), bool))
     root = jax.lax.while_loop(lambda carry: jnp.any(carry[-1]) & (carry[0] < steps), step, first)[5]
     root = jax.lax.stop_gradient(root)
-    slope = jax.lax.stop_gradient(jax.jvp(fixed, (root,), (jnp.ones_like(root),))[1])
-    value = function(root, arguments)
-    # Zero by value: it carries the derivative alone.
-    moved = value - jax.lax.stop_gradient(value)
-    return root - moved / jnp.where(slope == 0, jnp.ones_like(slope), slope)
+    for _ in range(_CORRECTIONS):
+        value, slope = jax.jvp(lambda x: function(x, arguments), (root,), (jnp.ones_like(root),))
+        # Zero by value: it carries derivatives alone.
+        moved = value - jax.lax.stop_gradient(value)
+        root = root - moved / jnp.where(slope == 0, jnp.ones_like(slope), slope)
+    return root

@@ -11,7 +11,7 @@ from test_every_filter import batch, kalman_of, pendulum, recordings
 from jaxveh import InputError, filters
 from jaxveh import statespace as ss
 from jaxveh._core.names import record_type
-from jaxveh.filters.choosing import distances, log_of, transport_plan
+from jaxveh.filters.choosing import distances, log_of, score, transport_plan
 
 SEEDS = 60
 
@@ -26,6 +26,26 @@ def runs(filter_, model, rows, seeds=SEEDS):
 def one():
     model, rows = batch("linear")
     return model, jax.tree.map(lambda leaf: leaf[0], rows), kalman_of(recordings("linear")[0])
+
+
+def test_scores_carry_derivatives_of_every_order_through_a_scan():
+    """A mean over draws with held chances and their scores has the derivatives of the mean itself."""
+    gains = jnp.asarray([1.0, -2.0, 0.5])
+    chances = lambda x: jax.nn.softmax(jnp.stack([x, x * x, 1 - x]))
+
+    def drawn(x):
+        chance = chances(x)
+        return jnp.sum(jax.lax.stop_gradient(chance) * jnp.exp(score(jnp.log(chance))) * gains)
+
+    def three_steps(mean):
+        return lambda x: jax.lax.scan(lambda c, _: (x + 0.3 * mean(c), None), x, None, length=3)[0]
+
+    x = jnp.asarray(0.4, jnp.float64)
+    ours, exact = three_steps(drawn), three_steps(lambda x: jnp.sum(chances(x) * gains))
+    for _ in range(3):
+        ours, exact = jax.grad(ours), jax.grad(exact)
+        np.testing.assert_allclose(ours(x), exact(x), rtol=1e-12)
+    assert score(jnp.asarray(-jnp.inf)) == 0.0
 
 
 class TestTransport:

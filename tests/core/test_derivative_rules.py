@@ -1,0 +1,108 @@
+"""Every place of the package where a derivative is not what jax makes of arithmetic, and what tests it there.
+
+A derivative rule, a primitive, a value without derivative, a loop of unknown length or a callback that is not in `PLACES` fails.
+Fences (`barrier`, `kept`, `stored`, `apart`) stand here where they are made; who uses them needs no line.
+"""
+
+import ast
+from pathlib import Path
+
+import jaxveh
+
+SPECIAL = {
+    "Primitive",
+    "approx_max_k",
+    "bitcast_convert_type",
+    "callback",
+    "closure_convert",
+    "custom_batching",
+    "custom_gradient",
+    "custom_jvp",
+    "custom_linear_solve",
+    "custom_root",
+    "custom_vjp",
+    "diffeqsolve",
+    "filter_custom_jvp",
+    "filter_custom_vjp",
+    "fixed_point",
+    "implicit_jvp",
+    "io_callback",
+    "least_squares",
+    "linear_call",
+    "minimise",
+    "optimization_barrier",
+    "pure_callback",
+    "root_find",
+    "stop_gradient",
+    "while_loop",
+}
+
+EVERY = "tests/numerics/test_every_derivative.py"
+HESSIAN = "tests/filters/test_every_hessian.py"
+SCORES = "tests/filters/test_choosing.py"
+FITS = "tests/fitting/test_fitted_derivatives.py"
+ROOMS = {"fitting": FITS}
+"""Rooms of solvers, all of whose derivatives are those of an optimum."""
+
+PLACES = {
+    "cli/app.py": {"callback": "of a command, not of jax"},
+    "experiments/sideslip_review/contestants.py": {
+        "custom_batching": "particle filters one by one; nothing is differentiated"
+    },
+    "experiments/tyre_apf/saturated.py": {"least_squares": "a fit, whose values alone are used"},
+    "filters/adaptive_number.py": {
+        "stop_gradient": "how many particles are drawn, and the draws that say so: whole numbers"
+    },
+    "filters/particle.py": {
+        "stop_gradient": "the draw of ancestors, whole numbers; the base of moments, which cancels"
+    },
+    "numerics/blocks.py": {"filter_custom_jvp": EVERY},
+    "numerics/elementary.py": {"custom_jvp": EVERY, "stop_gradient": EVERY, "bitcast_convert_type": EVERY},
+    "numerics/held.py": {
+        "Primitive": EVERY,
+        "optimization_barrier": EVERY,
+        "bitcast_convert_type": "the condition of a branch that is always taken",
+    },
+    "numerics/platform.py": {"optimization_barrier": EVERY},
+    "numerics/resampling.py": {"stop_gradient": EVERY},
+    "numerics/roots.py": {"stop_gradient": EVERY, "while_loop": EVERY},
+    "numerics/tangents.py": {"Primitive": SCORES},
+    "numerics/triangular.py": {"custom_jvp": EVERY},
+    "simulation/meter.py": {"callback": "tells how far a run is; no number comes back"},
+    "simulation/solve.py": {"diffeqsolve": "tests/simulation, by the adjoint that is asked for"},
+    "statespace/contract.py": {
+        "custom_jvp": HESSIAN,
+        "bitcast_convert_type": "the condition of a branch that is always taken",
+    },
+}
+
+
+def names_in(text):
+    """Names and attributes, wherever they are used or imported."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Name):
+            yield node.id
+        elif isinstance(node, ast.Attribute):
+            yield node.attr
+        elif isinstance(node, ast.ImportFrom):
+            yield from (alias.name for alias in node.names)
+
+
+def found():
+    root = Path(jaxveh.__file__).parent
+    for path in sorted(root.rglob("*.py")):
+        special = SPECIAL & set(names_in(path.read_text(encoding="utf-8")))
+        place = path.relative_to(root)
+        if special and place.parts[0] not in ROOMS:
+            yield place.as_posix(), special
+
+
+def test_every_place_is_listed_with_its_test():
+    assert {path: sorted(special) for path, special in found()} == {p: sorted(lines) for p, lines in PLACES.items()}
+
+
+def test_the_tests_that_are_named_exist():
+    root = Path(__file__).parents[2]
+    reasons = [where for lines in PLACES.values() for where in lines.values()] + list(ROOMS.values())
+    named = {where.split(",")[0] for where in reasons if where.startswith("tests/")}
+    assert named and all((root / where).exists() for where in named)
