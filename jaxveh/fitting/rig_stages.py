@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +53,10 @@ class Stage(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Coefficients that show in one force or moment: always, and where load, camber or pressure vary (names split at blanks)."""
+    """Coefficients that show in one force or moment: always, and where load, camber or pressure vary (names split at blanks).
+
+    Those of `asked` are fitted where somebody asks for them alone.
+    """
 
     section: str
     channel: str
@@ -61,10 +65,11 @@ class Group(NamedTuple):
     camber: str = ""
     pressure: str = ""
     speed: str = ""
+    asked: str = ""
 
-    def shown(self, varies: set[str]) -> tuple[str, ...]:
-        """Those that data show in which these inputs vary."""
-        found = self.always.split()
+    def shown(self, varies: set[str], asked: Collection[str] = ()) -> tuple[str, ...]:
+        """Those that data show in which these inputs vary, and those among `asked`, by their full names."""
+        found = self.always.split() + [name for name in self.asked.split() if f"{self.section}.{name}" in asked]
         for name in ("load", "camber", "pressure", "speed"):
             found += getattr(self, name).split() if name in varies else []
         return tuple(f"{self.section}.{name}" for name in found)
@@ -77,9 +82,11 @@ ALONG = Group(
 ALONG_52 = ALONG._replace(pressure="")
 ALONG_COMBINED = Group("longitudinal", "F_x", "RBX1 RBX2 RCX1 REX1 RHX1", "REX2", "RBX3")
 ACROSS = Group(
-    "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PKY4 PHY2 PVY2",
-    "PDY3 PEY4 PEY5 PKY3 PKY5 PKY6 PKY7 PVY3 PVY4", "PPY1 PPY2 PPY3 PPY4 PPY5",
+    "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PHY2 PVY2",
+    "PDY3 PEY4 PEY5 PKY3 PKY5 PKY6 PKY7 PVY3 PVY4", "PPY1 PPY2 PPY3 PPY4 PPY5", asked="PKY4",
 )  # fmt: skip
+"""PKY4, the form of the stiffness over load, is 2 in the book's simple form; beside PKY1 and PKY2 three or four loads hardly show
+it, and all three run along one valley."""
 ACROSS_52 = Group(
     "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PHY2 PVY2", "PDY3 PEY4 PKY3 PHY3 PVY3 PVY4"
 )  # fmt: skip
@@ -113,9 +120,14 @@ def varying(rig: RigTable) -> set[str]:
 
 
 def stages_of(
-    law: AbstractTyre, rig: RigTable, measured: tuple[str, ...], chosen: tuple[str, ...] | None
+    law: AbstractTyre,
+    rig: RigTable,
+    measured: tuple[str, ...],
+    chosen: tuple[str, ...] | None,
+    free: Collection[str] = (),
 ) -> list[Stage]:
-    """The stages for a law and data; the coefficients `chosen` by the user, where given, instead of those that data show.
+    """The stages for a law and data; the coefficients `chosen` by the user, where given, instead of those that data show, or
+    those besides them that the user lets `free`.
 
     A law other than MF-Tyre is fitted at once, all its parameters to all its forces.
     """
@@ -144,7 +156,7 @@ def stages_of(
         # Rows of pure slip show its coefficients alone; without one that was measured, all rows have to do.
         seen = np.isfinite(getattr(rig, group.channel))
         rows = rows & seen if np.any(rows & seen) else seen
-        names = group.shown(varies)
+        names = group.shown(varies, free if chosen is None else chosen)
         names = names if chosen is None else tuple(name for name in names if name in chosen)
         if names:
             starts = tuple((one, STARTS[one]) for one in names if one in STARTS)

@@ -77,7 +77,7 @@ def test_what_the_data_do_not_show_is_said(brush):
     assert unseen == ["slip_stiffness", "half_length"] and numbers["identified_directions"] == 2
     assert numbers["coefficients"]["half_length"]["std"] is None
     assert "warning: the data tell 2 of 4 directions" in result.stderr
-    assert "not one by one: slip_stiffness, half_length" in result.stderr
+    assert "held at their start: slip_stiffness, half_length" in result.stderr
     assert result.stdout.count("not identified") == 2
 
 
@@ -138,7 +138,7 @@ def fit_of(*converged, rmse=10.0, validated=11.0, std=0.1, identified=1):
         (fit_of(False, True), "stages that stopped before they converged: stage 0"),
         (
             fit_of(True, std=np.nan, identified=0),
-            "0 of 1 directions of the coefficients apart; not one by one: friction",
+            "0 of 1 directions of the coefficients apart; held at their start: friction",
         ),
         (fit_of(True, rmse=60.0, validated=60.0), "residuals larger than at the start: F_y"),
         (fit_of(True, validated=21.0), "missed by more than twice the fit's RMSE: F_y"),
