@@ -60,9 +60,9 @@ START = typer.Option(
 AXES = typer.Option(
     "--axes",
     show_default=False,
-    help="Signs of the data. sae: z down, FZ negative, a positive slip angle gives a negative force; adapted-sae: z down, load and "
-    "that force positive (the book's); iso-w: z up, that force negative; ours: z up, that force positive. By default iso-w, and "
-    "sae for the FSAE TTC's files.",
+    help="Signs of the data. sae: z down, FZ negative, a positive slip angle gives a negative force; adapted-sae: z down, load "
+    "and that force positive (the book's); iso-w: z up, that force negative; ours: z up, that force positive. By default iso-w, "
+    "and sae for the FSAE TTC's files.",
 )
 CHANNELS = typer.Option(
     "--measured",
@@ -80,7 +80,7 @@ FREE = typer.Option(
 )
 ROBUST = typer.Option(
     "--robust",
-    help="For data with outliers: residuals are taken for Student's t with 4 degrees of freedom, on the scale of their median size.",
+    help="For data with outliers: residuals are taken for Student's t with 4 degrees of freedom, on their median size's scale.",
 )
 FOLDS = typer.Option(
     "--folds", metavar="N", min=0, help="Cross-validate: fit N times without a part, and score it on that part."

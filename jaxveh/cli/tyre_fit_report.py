@@ -13,23 +13,22 @@ from jaxveh.cli.failure import say
 from jaxveh.fitting import RigFit, heavy_tails
 from jaxveh.fitting.rig_data import LEAST_NOISE
 from jaxveh.fitting.rig_robust import FAR
+from jaxveh.fitting.rig_stages import HELD
 
 UNCERTAIN = 0.2
 """Standard error over a coefficient's own size above which it is marked."""
 
 UNITS = {"F_x": "N", "F_y": "N", "M_x": "N m", "M_y": "N m", "M_z": "N m"}
 
-UNSEEN, WEAK = "not identified", "uncertain"
+UNSEEN, WEAK, SET = "not identified", "uncertain", "held"
 
 
-def show(
-    fit: RigFit, start: tyres.AbstractTyre, findings: list[tyres.Finding], robust: bool = False
-) -> dict[str, Any]:
+def show(fit: RigFit, start: tyres.AbstractTyre, findings: list[tyres.Finding], robust: bool = False) -> dict[str, Any]:
     """Print tables and warnings; returns every number for the JSON file. `start`: the tyre before the fit; `robust`: as in
     `fit_rig`."""
     parameters, size = _parameters(fit), _sizes(fit)
     share = fit.std / size
-    marks = [UNSEEN if np.isnan(one) else WEAK if one > UNCERTAIN else "" for one in share]
+    marks = [_mark(name, one) for name, one in zip(fit.names, share, strict=True)]
     _stages(fit)
     _channels(fit)
     _coefficients(fit, start, parameters, share, marks)
@@ -93,7 +92,7 @@ def _coefficients(fit: RigFit, start, parameters, share: np.ndarray, marks: list
     heads = ("coefficient", "unit", "start", "fitted", "standard error", "% of its size", "")
     note = (
         f"The size of a coefficient that may be zero is its usual one; above {UNCERTAIN:.0%} of it: {WEAK}. "
-        f"What is {UNSEEN} stands at its start."
+        f"What is {UNSEEN} stands at its start, and so does what is {SET} unless asked (--free)."
     )
     table("Coefficients", heads, rows, note, left=2)
 
@@ -108,8 +107,9 @@ def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
         )
     elif stopped:
         found.append(f"stages that stopped before they converged: {', '.join(stopped)}")
-    unseen = [name for name, std in zip(fit.names, fit.std, strict=True) if np.isnan(std)]
-    if fit.identified < len(fit.names):
+    still = [name for name, std in zip(fit.names, fit.std, strict=True) if np.isnan(std)]
+    unseen = [name for name in still if name not in HELD]
+    if fit.identified < len(fit.names) - (len(still) - len(unseen)):
         found.append(
             f"the data tell {fit.identified} of {len(fit.names)} directions of the coefficients apart"
             + (f"; held at their start: {', '.join(unseen)}" if unseen else "")
@@ -131,6 +131,13 @@ def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
     return found
 
 
+def _mark(name: str, share: float) -> str:
+    """What to say of a coefficient whose standard error is this share of its size."""
+    if np.isnan(share):
+        return SET if name in HELD else UNSEEN
+    return WEAK if share > UNCERTAIN else ""
+
+
 def _tails_in_words(name: str, residual: np.ndarray, robust: bool) -> str:
     """What heavy tails of a channel's residuals mean; nothing where there are none."""
     tails = heavy_tails(residual)
@@ -143,8 +150,8 @@ def _tails_in_words(name: str, residual: np.ndarray, robust: bool) -> str:
         )
     return (
         f"{name}: residuals have heavy tails: {100 * tails.share:.2g} % of the rows lie beyond {FAR:g} standard deviations "
-        f"({number(tails.deviation)} {UNITS[name]} by their median size; of noise 0.006 %), and their RMS is {tails.ratio:.2g} of "
-        "them: outliers, which pull the fit, or rows that the law cannot meet; compare with --robust"
+        f"({number(tails.deviation)} {UNITS[name]} by their median size; of noise 0.006 %), and their RMS is {tails.ratio:.2g} "
+        "of them: outliers, which pull the fit, or rows that the law cannot meet; compare with --robust"
     )
 
 

@@ -19,7 +19,7 @@ from jaxveh.fitting.rig_identify import settle, without
 from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered
 from jaxveh.fitting.rig_robust import inflation
 from jaxveh.fitting.rig_solve import covariance, information
-from jaxveh.fitting.rig_stages import Stage, stages_of
+from jaxveh.fitting.rig_stages import HELD, Stage, stages_of
 from jaxveh.io.rig_table import MEASURED, RigTable
 from jaxveh.tyres import AbstractTyre, MFTyre
 
@@ -34,8 +34,9 @@ class RigFit(eqx.Module):
 
     `tyre`: the law with its coefficients. `names` (p,), `values`, `std` (p,): the coefficients that were fitted, in the law's
     units and in the canonical one of the tyre's twins (`rig_canonical`); standard errors by the Gauss-Newton matrix of the joint
-    stage with the noise estimated from residuals, nan for what data do not identify, which stands at its start and counts with
-    a spread of its own size in the others' errors; `identified`: how many directions they do.
+    stage with the noise estimated from residuals. nan for what stands at its start, because data do not identify it or because it
+    is held unless asked (`rig_stages.HELD`): in the others' errors it counts with a spread of its own size, or of what it is
+    among ordinary tyres. `identified`: how many directions the data do.
     `unconstrained`, `covariance` (p, p): on the line of each one's bijector. By channel (`F_x`, ...): `rmse` of residuals,
     `peak` (the 99.5th percentile of what was measured), `start_rmse` before the fit, `noise` (standard deviation), and
     `cross_validation`, the RMSE at rows that a fold's fit did not see (nan without). `residuals` (n,): fitted less measured, nan
@@ -102,20 +103,21 @@ def fit_rig(
     chosen = None if where is None else tuple(p.name for p in resolve(law, where))
     plan = stages_of(law, rig, channels, chosen, free)
     _check_free(free, plan)
-    names = _names(law, plan, chosen)
+    fitted, aside = _names(law, plan, chosen), tuple(name for stage in plan for name in stage.aside)
+    names = (*fitted, *aside)
     settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance)
     data = RigData(rig, contact, channels, names, settings)
     data.check(law)
     parts = fold_of(rig, folds) if folds else np.zeros(rig.load.shape)
     joint = Stage(JOINT, channels, names, np.ones(rig.load.shape, bool))
-    plan = [*(plan if staged else ()), joint]
+    plan = [*(plan if staged else ()), joint._replace(coefficients=fitted)]
     total = len(plan) + folds
     tyre, reports = law, []
     for k, stage in enumerate(plan):
         progress(k, total, stage.name)
         tyre, report = data.fit(tyre, stage)
         reports.append(report)
-    settled = settle(data, law, tyre, joint, reports[-1])
+    settled = settle(data, law, tyre, joint, aside, reports[-1])
     tyre, reports[-1] = settled.tyre, settled.report
     plan = [without(stage, settled.held, names) for stage in plan]
     missed = np.full(data.measured.shape, np.nan)
@@ -216,11 +218,14 @@ def _result(data: RigData, law, joint: Stage, held: np.ndarray, reports, start_r
 def _spread(data: RigData, law: AbstractTyre, joint: Stage, problem: RigProblem, held) -> tuple[Any, Any]:
     """The covariance (p, p) in the problem's coordinates, and how many directions the data identify.
 
-    What is held at its start for lack of data may be off by its own size, and what is confounded with it by as much.
+    What is held at its start for lack of data may be off by its own size, what is held unless asked by what `HELD` says, and what
+    is confounded with it by as much.
     """
     zero = jnp.zeros(problem.origin.shape)
     found = information(problem, zero)
-    prior = jnp.where(jnp.asarray(held), 1.0, PULL**2)
+    spreads = jnp.asarray([HELD.get(name, np.nan) for name in joint.coefficients])
+    size = jnp.where(jnp.isnan(spreads), 1.0, spreads / problem.scale)
+    prior = jnp.where(jnp.asarray(held), 1 / size**2, PULL**2)
     spread, known = covariance(found, prior)
     if not data.chosen.weights:
         return spread, known

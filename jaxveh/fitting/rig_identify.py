@@ -7,6 +7,7 @@ fitted anew.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -41,15 +42,21 @@ class Settled(NamedTuple):
     report: StageReport
 
 
-def settle(data: RigData, start: AbstractTyre, tyre: AbstractTyre, joint: Stage, report: StageReport) -> Settled:
-    """The tyre of a joint fit in its canonical form, with what the data do not identify at its start, the rest fitted anew."""
-    fixed = _fixed(data, joint)
+def settle(
+    data: RigData, start: AbstractTyre, tyre: AbstractTyre, joint: Stage, aside: Collection[str], report: StageReport
+) -> Settled:
+    """The tyre of a joint fit in its canonical form, with what the data do not identify at its start, the rest fitted anew.
+
+    `joint`: the stage with all coefficients, those `aside` included, which are held whatever the data say.
+    """
+    names = joint.coefficients
+    held = np.array([name in aside for name in names])
+    fixed = _fixed(data, without(joint, held, names))
     if isinstance(tyre, MFTyre) and isinstance(start, MFTyre):
-        tyre, steps = _below_one(data, tyre, joint)
+        tyre, steps = _below_one(data, tyre, without(joint, held, names))
         start, tyre = canonical(start, fixed), canonical(tyre, fixed)
         report = report._replace(steps=report.steps + steps)
-    held = np.zeros(len(joint.coefficients), bool)
-    kept = held.copy()
+    kept = np.zeros(held.shape, bool)
     while True:
         found = _unseen(data, start, tyre, joint, held, kept)
         if not found:

@@ -24,8 +24,8 @@ SURE = 3.0
 """Standard errors that a slope must have the wrong sign by."""
 
 LEAST_SLOPE = {"F_y, slip_angle": 1.0, "F_x, slip_ratio": 1.0, "M_z, slip_angle": 0.02, "F_y, camber": 0.1}
-"""Slopes over load (1/rad, per slip ratio; m/rad for M_z) below which a wrong sign is none: an ordinary tyre's are 15, 15, -0.5 and
--1."""
+"""Slopes over load (1/rad, per slip ratio; m/rad for M_z) below which a wrong sign is none: an ordinary tyre's are 15,
+15, -0.5 and -1."""
 
 EXPECTED = {"F_y, slip_angle": 1.0, "F_x, slip_ratio": 1.0, "M_z, slip_angle": -1.0, "F_y, camber": -1.0}
 """What each slope's sign must be."""
@@ -67,10 +67,11 @@ def _in_words(rig: RigTable, pair: str, slope: float, error: float) -> str:
 
 
 def slope_of(rig: RigTable, channel: str, name: str) -> tuple[float, float]:
-    """The slope over load of a force or moment over slip angle, slip ratio or camber, where slips are small, and its standard error.
+    """The slope over load of a force or moment over slip angle, slip ratio or camber, where slips are small, and its
+    standard error.
 
-    Least squares with an offset and, for what acts sideways, slip angle and camber together; where few rows have a small slip, the
-    smallest of those that are swept. nan where the data do not tell.
+    Least squares with an offset and, for what acts sideways, slip angle and camber together; where few rows have a small slip,
+    the smallest of those that are swept. nan where the data do not tell.
     """
     values = getattr(rig, channel)
     inputs = ["slip_ratio"] if name == "slip_ratio" else ["slip_angle", "camber"]

@@ -39,10 +39,17 @@ there; in combined slip the shape C has a good end on either side of 1; a typica
 what they multiply."""
 
 
+HELD = {"lateral.PKY4": 0.5}
+"""Coefficients that are held where the law has them unless somebody asks, and how far from there an ordinary tyre's may be
+(standard deviation). PKY4, the form of the cornering stiffness over load, is 2 in the book's simple form (4.E25); beside PKY1 and
+PKY2 the three or four loads of a rig hardly show it, and all three run along one valley."""
+
+
 class Stage(NamedTuple):
     """One fit: its `name`, the `channels` that it compares, the names of its coefficients, and which rows count (n,).
 
-    `starts`: coefficients and other values from which the stage starts, in every combination; the best end counts.
+    `starts`: coefficients and other values from which the stage starts, in every combination; the best end counts. `aside`: those
+    of `HELD` that belong here and nobody asked for.
     """
 
     name: str
@@ -50,12 +57,13 @@ class Stage(NamedTuple):
     coefficients: tuple[str, ...]
     rows: np.ndarray
     starts: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    aside: tuple[str, ...] = ()
 
 
 class Group(NamedTuple):
     """Coefficients that show in one force or moment: always, and where load, camber or pressure vary (names split at blanks).
 
-    Those of `asked` are fitted where somebody asks for them alone.
+    Those of `asked` show where the load varies, and are fitted where somebody asks for them alone (`HELD`).
     """
 
     section: str
@@ -74,6 +82,11 @@ class Group(NamedTuple):
             found += getattr(self, name).split() if name in varies else []
         return tuple(f"{self.section}.{name}" for name in found)
 
+    def aside(self, varies: set[str], free: Collection[str]) -> tuple[str, ...]:
+        """Those that data would show in which these inputs vary, and that nobody let `free`."""
+        names = (f"{self.section}.{name}" for name in self.asked.split())
+        return tuple(name for name in names if "load" in varies and name not in free)
+
 
 ALONG = Group(
     "longitudinal", "F_x", "PCX1 PDX1 PEX1 PEX4 PKX1 PHX1 PVX1", "PDX2 PEX2 PEX3 PKX2 PKX3 PHX2 PVX2", "PDX3",
@@ -85,8 +98,7 @@ ACROSS = Group(
     "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PHY2 PVY2",
     "PDY3 PEY4 PEY5 PKY3 PKY5 PKY6 PKY7 PVY3 PVY4", "PPY1 PPY2 PPY3 PPY4 PPY5", asked="PKY4",
 )  # fmt: skip
-"""PKY4, the form of the stiffness over load, is 2 in the book's simple form; beside PKY1 and PKY2 three or four loads hardly show
-it, and all three run along one valley."""
+
 ACROSS_52 = Group(
     "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PHY2 PVY2", "PDY3 PEY4 PKY3 PHY3 PVY3 PVY4"
 )  # fmt: skip
@@ -160,5 +172,6 @@ def stages_of(
         names = names if chosen is None else tuple(name for name in names if name in chosen)
         if names:
             starts = tuple((one, STARTS[one]) for one in names if one in STARTS)
-            found.append(Stage(name, (group.channel,), names, rows, starts))
+            aside = () if chosen is not None else group.aside(varies, free)
+            found.append(Stage(name, (group.channel,), names, rows, starts, aside))
     return found

@@ -75,8 +75,8 @@ FREE = 0.03
 
 
 class TtcTable(NamedTuple):
-    """A file of the consortium: `columns` (n,) by field of a `RigTable`, in SI units and in the signs that the file has; `title`, its
-    first line or the tyre's name; `source`, its path."""
+    """A file of the consortium: `columns` (n,) by field of a `RigTable`, in SI units and in the signs that the file has; `title`,
+    its first line or the tyre's name; `source`, its path."""
 
     columns: dict[str, np.ndarray]
     title: str
@@ -114,8 +114,9 @@ def read_ttc(path: str | Path) -> TtcTable:
     Units are those that the file names; metric ones, as the consortium has them, where it names none. A slip that is not there is
     zero: `SR` refers to the loaded radius, and its zero is no free rolling.
 
-    **Raises** `InputError`, naming the file and the column, for a file without `FZ`, or with neither `SA` nor `SL`; for units that are
-    not known, cells that are no numbers, columns of several lengths, and an `SR` that is swept where `SL` is missing.
+    **Raises** `InputError`, naming the file and the column, for a file without `FZ`, or with neither `SA` nor `SL`; for
+    units that are not known, cells that are no numbers, columns of several lengths, and an `SR` that is swept without
+    an `SL`.
     """
     path = Path(path)
     check_readable(path)
@@ -165,7 +166,8 @@ def _text(path: Path) -> _Cells:
     found = names_line(path)
     if found is None:
         raise InputError(
-            f"{path}: no line with the names FZ and SA or SL among the first {HEADER_LINES}: these are no columns of the FSAE TTC."
+            f"{path}: no line with the names FZ and SA or SL among the first {HEADER_LINES}: these are no columns of "
+            "the FSAE TTC."
         )
     number, headings, separator = found
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:

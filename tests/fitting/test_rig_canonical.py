@@ -28,7 +28,9 @@ def ordinary(version, seed=0):
         for field in dataclasses.fields(part):
             typical = float(getattr(part, field.name))
             size = field.metadata.get("scale") or 1.0
-            values[field.name] = jnp.asarray(typical * random.uniform(0.8, 1.2) or 0.3 * size * random.uniform(0.5, 1.5))
+            values[field.name] = jnp.asarray(
+                typical * random.uniform(0.8, 1.2) or 0.3 * size * random.uniform(0.5, 1.5)
+            )
         tyre = dataclasses.replace(tyre, **{section: dataclasses.replace(part, **values)})
     return tyre
 
@@ -66,7 +68,9 @@ def test_twins_are_one_tyre(version):
     tyre, at = ordinary(version), contact()
     own = forces(tyre, at)
     for twin in TWINS:
-        np.testing.assert_allclose(forces(flipped(tyre, twin.members), at) / peaks(own), own / peaks(own), atol=1e-6, err_msg=twin.lead)
+        np.testing.assert_allclose(
+            forces(flipped(tyre, twin.members), at) / peaks(own), own / peaks(own), atol=1e-6, err_msg=twin.lead
+        )
 
 
 def products(names):
@@ -125,7 +129,9 @@ def test_every_twin_comes_to_the_same_form(version):
         for twin in TWINS:
             other = flipped(other, twin.members) if random.random() < 0.5 else other
         again = canonical(other)
-        assert [float(leaf_of(again, name)) for name in names_of(tyre)] == [float(leaf_of(form, name)) for name in names_of(tyre)]
+        assert [float(leaf_of(again, name)) for name in names_of(tyre)] == [
+            float(leaf_of(form, name)) for name in names_of(tyre)
+        ]
     assert all(float(leaf_of(form, twin.lead)) > 0 for twin in TWINS)
     np.testing.assert_allclose(forces(form, at), forces(tyre, at), rtol=1e-5, atol=1e-5)
 

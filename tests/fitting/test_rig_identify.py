@@ -81,7 +81,9 @@ def lateral():
 
 def test_the_form_of_the_stiffness_over_load_is_held_unless_asked():
     tyre = tyres.typical_mf_tyre(4e3)
-    names = lambda **chosen: stages_of(tyre, lateral(), ("F_y",), chosen.get("where"), chosen.get("free", ()))[0].coefficients
+    names = lambda **chosen: (
+        stages_of(tyre, lateral(), ("F_y",), chosen.get("where"), chosen.get("free", ()))[0].coefficients
+    )
     assert "lateral.PKY4" not in names() and {"lateral.PKY1", "lateral.PKY2"} <= set(names())
     assert set(names(free=("lateral.PKY4",))) == {*names(), "lateral.PKY4"}
     assert names(where=("lateral.PKY4", "lateral.PKY1")) == ("lateral.PKY1", "lateral.PKY4")

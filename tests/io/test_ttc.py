@@ -8,11 +8,13 @@ from jaxveh import io
 from jaxveh._core.errors import InputError
 from jaxveh.io.ttc import COLUMNS, UNITS, read_ttc
 
-NAMES = (
-    "ET V N SA IA RL RE P FX FY FZ MX MZ NFX NFY RST TSTI TSTC TSTO AMBTMP SR SL".split()
-)  # what the consortium's files hold, in their order
-METRIC = "sec kph rpm deg deg cm cm kPa N N N N-m N-m none none C C C C C none none".split()
-CUSTOMARY = "sec mph rpm deg deg in in psi lb lb lb ft-lb ft-lb none none F F F F F none none".split()
+FORM = """
+ET sec sec|V kph mph|N rpm rpm|SA deg deg|IA deg deg|RL cm in|RE cm in|P kPa psi|FX N lb|FY N lb|FZ N lb|MX N-m ft-lb|MZ N-m ft-lb
+NFX none none|NFY none none|RST C F|TSTI C F|TSTC C F|TSTO C F|AMBTMP C F|SR none none|SL none none
+"""
+NAMES, METRIC, CUSTOMARY = zip(*(one.split() for one in FORM.strip().replace("\n", "|").split("|")), strict=True)
+"""What the consortium's files hold, in their order, with both systems of units."""
+
 FACTORS = {
     "kph": 1.609344, "cm": 2.54, "kPa": 6.894757293168361, "N": 4.4482216152605, "N-m": 1.3558179483314004,
 }  # fmt: skip
@@ -67,7 +69,8 @@ def file(request, tmp_path):
 def test_columns_come_in_si_units_and_the_package_s_signs(file, units):
     table, plain = io.read_rig_table(file(rows(units), units)), rows()
     expected = {
-        "slip_angle": np.radians(plain["SA"]), "slip_ratio": 0 * plain["SL"], "load": -plain["FZ"], "camber": np.radians(plain["IA"]),
+        "slip_angle": np.radians(plain["SA"]), "slip_ratio": 0 * plain["SL"], "load": -plain["FZ"],
+        "camber": np.radians(plain["IA"]),
         "speed": plain["V"] / 3.6, "pressure": 1e3 * plain["P"], "F_x": plain["FX"], "F_y": -plain["FY"],
         "M_x": plain["MX"], "M_z": -plain["MZ"],
     }  # fmt: skip
@@ -81,8 +84,10 @@ def test_every_unit_of_the_table_has_its_size(tmp_path):
     """Against pint, which has them from elsewhere."""
     pint = pytest.importorskip("pint").UnitRegistry()
     ours = {
-        "n-m": "N*m", "nm": "N*m", "n m": "N*m", "n*m": "N*m", "ft-lb": "ft*lbf", "lb-ft": "ft*lbf", "in-lb": "inch*lbf", "lb": "lbf", "lbs": "lbf",
-        "n": "N", "kn": "kN", "kpa": "kPa", "pa": "Pa", "kmh": "km/h", "none": "", "-": "", "unitless": "", "1": "", "%": "percent",
+        "n-m": "N*m", "nm": "N*m", "n m": "N*m", "n*m": "N*m", "ft-lb": "ft*lbf", "lb-ft": "ft*lbf", "in-lb": "inch*lbf",
+        "lb": "lbf", "lbs": "lbf",
+        "n": "N", "kn": "kN", "kpa": "kPa", "pa": "Pa", "kmh": "km/h", "none": "", "-": "", "unitless": "", "1": "",
+        "%": "percent",
     }  # fmt: skip
     si = {"angle": "rad", "ratio": "", "force": "N", "moment": "N*m", "pressure": "Pa", "speed": "m/s"}
     for quantity, known in UNITS.items():
