@@ -53,8 +53,9 @@ def settle(
     held = np.array([name in aside for name in names])
     fixed = _fixed(data, without(joint, held, names))
     if isinstance(tyre, MFTyre) and isinstance(start, MFTyre):
-        tyre, steps = _below_one(data, tyre, without(joint, held, names))
-        start, tyre = canonical(start, fixed), canonical(tyre, fixed)
+        found, steps = _below_one(data, tyre, without(joint, held, names))
+        assert isinstance(found, MFTyre)
+        start, tyre = canonical(start, fixed), canonical(found, fixed)
         report = report._replace(steps=report.steps + steps)
     kept = np.zeros(held.shape, bool)
     while True:
@@ -87,7 +88,7 @@ def _sections():
         yield name, kind.__dataclass_fields__
 
 
-def _below_one(data: RigData, tyre: MFTyre, joint: Stage) -> tuple[MFTyre, int]:
+def _below_one(data: RigData, tyre: AbstractTyre, joint: Stage) -> tuple[AbstractTyre, int]:
     """The end with the shapes of combined slip below 1, where a weight keeps its sign, if the data do not tell it apart."""
     steps = 0
     for shape, curvature in OTHER_SIDE.items():

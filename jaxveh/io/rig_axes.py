@@ -16,7 +16,8 @@ Tire and Vehicle Dynamics (2012), appendix 1, which draws SAE, ISO and adapted S
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Mapping
+from typing import Any
 
 AXES = ("sae", "adapted-sae", "iso-w", "ours")
 
@@ -32,7 +33,7 @@ FLIPS = {
 """By convention, the columns of a rig table whose sign is the other one here."""
 
 
-def to_ours(columns: dict[str, np.ndarray | None], axes: str) -> dict[str, np.ndarray | None]:
+def to_ours(columns: Mapping[str, Any], axes: str) -> dict[str, Any]:
     """Columns of a rig table by field, (n,) each or None, from the signs of `axes` to those of this package."""
     turned = {name: 0.0 - values for name in FLIPS[axes] if (values := columns.get(name)) is not None}
     return {**columns, **turned}
