@@ -1,12 +1,16 @@
 """What data do not identify stays at its start and counts in the others' errors; what they reject does not."""
 
+from types import SimpleNamespace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxveh import InputError, fitting, tyres
 from jaxveh._core.parameter import parameter
-from jaxveh.fitting.rig_stages import stages_of
+from jaxveh.fitting.rig_data import with_leaf
+from jaxveh.fitting.rig_identify import _below_one
+from jaxveh.fitting.rig_stages import Stage, stages_of
 from jaxveh.io import RigTable
 
 NOISE = 30.0
@@ -93,3 +97,34 @@ def test_the_form_of_the_stiffness_over_load_is_held_unless_asked():
 def test_what_cannot_be_freed_is_named():
     with pytest.raises(InputError, match="free: unknown name.* lateral.PKY9; there are: "):
         fitting.fit_rig(tyres.typical_mf_tyre(4e3), lateral(), free=("lateral.PKY9",))
+
+
+class Ends:
+    """Data whose fit ends at a shape of 0.93 where it starts below 1, with losses of the two ends."""
+
+    def __init__(self, below, beyond, bounds=()):
+        self.below, self.beyond, self.chosen = below, beyond, SimpleNamespace(bounds=bounds)
+
+    def descend(self, law, stage):
+        return with_leaf(law, "lateral.RCY1", 0.93), 7, True
+
+    def noise(self, law):
+        return {}
+
+    def loss(self, law, stage, noise):
+        return self.below if float(law.lateral.RCY1) < 1 else self.beyond
+
+
+@pytest.mark.parametrize(
+    ("data", "shape", "steps"),
+    [
+        (Ends(102.0, 100.0), 0.93, 7),
+        (Ends(105.0, 100.0), 1.12, 7),
+        (Ends(90.0, 100.0), 0.93, 7),
+        (Ends(102.0, 100.0, {"lateral.RCY1": (0.5, 2.0)}), 1.12, 0),
+    ],
+)
+def test_of_two_ends_that_are_not_told_apart_the_weight_that_keeps_its_sign(data, shape, steps):
+    tyre = with_leaf(tyres.typical_mf_tyre(4e3), "lateral.RCY1", 1.12)
+    found, taken = _below_one(data, tyre, Stage("joint", ("F_y",), ("lateral.RCY1", "lateral.REY1"), np.ones(1, bool)))
+    assert float(found.lateral.RCY1) == pytest.approx(shape) and taken == steps
