@@ -16,13 +16,21 @@ from jaxveh.cli import options, tyre_fit_report
 from jaxveh.cli.console import progress, results
 from jaxveh.cli.failure import say
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
-from jaxveh.cli.tyre import Axes
 from jaxveh.fitting.rig_ranges import measured_ranges, widened_ranges
 from jaxveh.fitting.rig_start import STARTS
 from jaxveh.io.rig_table import MEASURED
 
 DEFAULT = "mf61"
 SHAPE_OF_BOUNDS, SHAPE_OF_WEIGHT = "NAME=LOW:HIGH, such as PCY1=1:2", "CHANNEL=NUMBER, such as F_x=2"
+
+
+class Axes(StrEnum):
+    """In which signs rig data are."""
+
+    sae = "sae"
+    adapted_sae = "adapted-sae"
+    iso_w = "iso-w"
+    ours = "ours"
 
 
 class Side(StrEnum):
@@ -33,7 +41,9 @@ class Side(StrEnum):
 
 
 DATA = typer.Argument(
-    metavar="DATA", show_default=False, help="Rig data: .csv, or TYDEX (.tdx, .tyd, .tydex); each file is a run."
+    metavar="DATA",
+    show_default=False,
+    help="Rig data: .csv, the FSAE TTC's files (.dat, .txt, .csv, .mat) or TYDEX (.tdx, .tyd, .tydex); each file is a run.",
 )
 PRODUCT = typer.Option("-o", metavar="FILE", show_default=False, help="The tyre: .tir for MF-Tyre, .toml for others.")
 MODEL = typer.Option(
@@ -48,7 +58,11 @@ START = typer.Option(
     "not fitted, or a parameter file (.toml) that this program wrote.",
 )
 AXES = typer.Option(
-    "--axes", help="Of slip angles in CSV: a positive one gives a negative force (iso-w), or a positive one."
+    "--axes",
+    show_default=False,
+    help="Signs of the data. sae: z down, FZ negative, a positive slip angle gives a negative force; adapted-sae: z down, load "
+    "and that force positive (the book's); iso-w: z up, that force negative; ours: z up, that force positive. By default iso-w, "
+    "and sae for the FSAE TTC's files.",
 )
 CHANNELS = typer.Option(
     "--measured",
@@ -59,7 +73,15 @@ BOUNDS = typer.Option("--bounds", metavar="NAME=LOW:HIGH", help="Keep a coeffici
 WEIGHT = typer.Option(
     "--weight", metavar="CHANNEL=NUMBER", help="Count a channel so many times what its noise says; repeatable."
 )
-ROBUST = typer.Option("--robust", help="Outliers, beyond two standard deviations, count by their size, not its square.")
+FREE = typer.Option(
+    "--free",
+    metavar="NAME",
+    help="Fit a coefficient too that is held unless asked: PKY4, the form of the cornering stiffness over load; repeatable.",
+)
+ROBUST = typer.Option(
+    "--robust",
+    help="For data with outliers: residuals are taken for Student's t with 4 degrees of freedom, on their median size's scale.",
+)
 FOLDS = typer.Option(
     "--folds", metavar="N", min=0, help="Cross-validate: fit N times without a part, and score it on that part."
 )
@@ -85,8 +107,9 @@ def fit_table(
     product: Annotated[Path, PRODUCT],
     model: Annotated[str | None, MODEL] = None,
     start: Annotated[Path | None, START] = None,
-    axes: Annotated[Axes, AXES] = Axes.iso_w,
+    axes: Annotated[Axes | None, AXES] = None,
     measured: Annotated[str | None, CHANNELS] = None,
+    free: Annotated[list[str] | None, FREE] = None,
     bounds: Annotated[list[str] | None, BOUNDS] = None,
     weight: Annotated[list[str] | None, WEIGHT] = None,
     robust: Annotated[bool, ROBUST] = False,
@@ -100,11 +123,17 @@ def fit_table(
 
     CSV: columns Fz, alpha, kappa, gamma, Vx, P and what was measured, Fx, Fy, Mx, My, Mz, in SI units and radians, or with the
     unit in the name, such as alpha \\[deg]; Fz, a slip and a measurement are needed. A column run numbers sweeps for --folds.
+    Files of the Formula SAE Tire Test Consortium are read as they are: SA, SL, IA, FZ, ..., metric or US units by their line of
+    units, in SAE's axes. Slopes that no tyre has (F_y over slip angle and camber, F_x over slip ratio, M_z over slip angle)
+    tell that the axes are others: they are refused, or with --start, which says what tyre it is, reported.
 
     MF-Tyre is fitted in stages over the coefficients that the data show, then in all; standard errors tell how far each can be
-    believed. --out draws residuals over slip and load.
+    believed. What the data do not identify stays at its start. Of tyres that are the same by other signs (of RBY2, say) one
+    form is written. --out draws residuals over slip and load. Where residuals have heavier tails than noise, try --robust.
 
     Example: [bold]jaxveh tyre fit lateral.csv braking.csv --model mf61 --side left --folds 5 --out figures -o tyre.tir[/]
+
+    Example: [bold]jaxveh tyre fit run23.mat run24.dat --robust -o tyre.tir[/]
     """
     origin = _origin(model, start)
     check_product(product, (".tir",) if origin.is_mf_tyre else (".toml",), force, (*data, start))
@@ -112,22 +141,22 @@ def fit_table(
     _check_side(side, origin)
     chosen = _channels(measured)
     limits, weights = _bounds(bounds), _weights(weight)
-    rig = io.read_rig_table(data, axes.value, measured=chosen or MEASURED)
+    rig = io.read_rig_table(data, None if axes is None else axes.value, measured=chosen or MEASURED)
     law = _law(origin, rig)
     with progress("fit") as report:
         fit = fitting.fit_rig(
-            law, rig, measured=chosen, weights=weights,
+            law, rig, free=[_full_name(law, name) for name in free or ()], measured=chosen, weights=weights,
             bounds={_full_name(law, name): ends for name, ends in limits.items()},
             robust=robust, folds=folds, progress=report, throw=False,
         )  # fmt: skip
     note = f"Fitted to {', '.join(path.name for path in data)} by jaxveh tyre fit: {', '.join(fit.rmse)}."
     findings = _write(fit, rig, origin, side, note, product, force)
-    shown = tyre_fit_report.show(fit, law, findings)
+    shown = tyre_fit_report.show(fit, law, findings, robust)
     if out is not None:
         _draw(fit, rig, out)
     results().print(f"{product}: {type(fit.tyre).__name__} fitted to {fit.stages[-1].rows} rows of {rig.source}")
     configuration = {
-        "data": data, "model": origin.model, "start": start, "axes": axes.value, "measured": chosen, "bounds": limits,
+        "data": data, "model": origin.model, "start": start, "axes": axes, "measured": chosen, "free": free, "bounds": limits,
         "weights": weights, "robust": robust, "folds": folds, "side": side,
     }  # fmt: skip
     write_numbers(numbers, {**shown, "file": product}, configuration, None)
@@ -156,9 +185,11 @@ def _check_side(side: Side | None, origin: Origin) -> None:
 
 
 def _law(origin: Origin, rig: io.RigTable) -> tyres.AbstractTyre:
-    """The tyre to start from; of a property file with ranges that hold the data, and a word about it."""
+    """The tyre to start from; of a property file with ranges that hold the data, and a word about it and about odd signs."""
     if origin.model is not None:
         return fitting.starting_tyre(origin.model, rig)
+    for wrong in fitting.wrong_signs(rig):
+        say("warning", "yellow", wrong.words)
     law = origin.tyre
     assert law is not None
     if isinstance(law, tyres.MFTyre):

@@ -10,28 +10,31 @@ from jaxveh import tyres
 from jaxveh._core.parameter import Parameter, resolve
 from jaxveh.cli.console import number, table
 from jaxveh.cli.failure import say
-from jaxveh.fitting import RigFit
+from jaxveh.fitting import RigFit, heavy_tails
 from jaxveh.fitting.rig_data import LEAST_NOISE
+from jaxveh.fitting.rig_robust import FAR
+from jaxveh.fitting.rig_stages import HELD
 
 UNCERTAIN = 0.2
 """Standard error over a coefficient's own size above which it is marked."""
 
 UNITS = {"F_x": "N", "F_y": "N", "M_x": "N m", "M_y": "N m", "M_z": "N m"}
 
-UNSEEN, WEAK = "not identified", "uncertain"
+UNSEEN, WEAK, SET = "not identified", "uncertain", "held"
 
 
-def show(fit: RigFit, start: tyres.AbstractTyre, findings: list[tyres.Finding]) -> dict[str, Any]:
-    """Print tables and warnings; returns every number for the JSON file. `start`: the tyre before the fit."""
+def show(fit: RigFit, start: tyres.AbstractTyre, findings: list[tyres.Finding], robust: bool = False) -> dict[str, Any]:
+    """Print tables and warnings; returns every number for the JSON file. `start`: the tyre before the fit; `robust`: as in
+    `fit_rig`."""
     parameters, size = _parameters(fit), _sizes(fit)
     share = fit.std / size
-    marks = [UNSEEN if np.isnan(one) else WEAK if one > UNCERTAIN else "" for one in share]
+    marks = [_mark(name, one) for name, one in zip(fit.names, share, strict=True)]
     _stages(fit)
     _channels(fit)
     _coefficients(fit, start, parameters, share, marks)
     if findings:
         table("Worth a look in the fitted file", ("about", "what"), findings, left=2)
-    warnings = warnings_of(fit)
+    warnings = warnings_of(fit, robust)
     for warning in warnings:
         say("warning", "yellow", warning)
     return {
@@ -48,6 +51,11 @@ def show(fit: RigFit, start: tyres.AbstractTyre, findings: list[tyres.Finding]) 
             for p, value, std, one, mark in zip(parameters, fit.values, fit.std, share, marks, strict=True)
         },
         "identified_directions": fit.identified,
+        "heavy_tails": {
+            name: tails._asdict()
+            for name, residual in fit.residuals.items()
+            if (tails := heavy_tails(residual)) is not None
+        },
         "findings": [finding._asdict() for finding in findings],
         "warnings": warnings,
     }  # fmt: skip
@@ -82,12 +90,15 @@ def _coefficients(fit: RigFit, start, parameters, share: np.ndarray, marks: list
         for p, was, value, std, one, mark in zip(parameters, before, fit.values, fit.std, share, marks, strict=True)
     ]
     heads = ("coefficient", "unit", "start", "fitted", "standard error", "% of its size", "")
-    note = f"The size of a coefficient that may be zero is its usual one; above {UNCERTAIN:.0%} of it: {WEAK}."
+    note = (
+        f"The size of a coefficient that may be zero is its usual one; above {UNCERTAIN:.0%} of it: {WEAK}. "
+        f"What is {UNSEEN} stands at its start, and so does what is {SET} unless asked (--free)."
+    )
     table("Coefficients", heads, rows, note, left=2)
 
 
-def warnings_of(fit: RigFit) -> list[str]:
-    """What whoever uses the tyre should know."""
+def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
+    """What whoever uses the tyre should know; `robust`: outliers counted little already."""
     found = []
     stopped = [stage.name for stage in fit.stages[:-1] if not stage.converged]
     if not fit.stages[-1].converged:
@@ -96,11 +107,12 @@ def warnings_of(fit: RigFit) -> list[str]:
         )
     elif stopped:
         found.append(f"stages that stopped before they converged: {', '.join(stopped)}")
-    unseen = [name for name, std in zip(fit.names, fit.std, strict=True) if np.isnan(std)]
-    if fit.identified < len(fit.names):
+    still = [name for name, std in zip(fit.names, fit.std, strict=True) if np.isnan(std)]
+    unseen = [name for name in still if name not in HELD]
+    if fit.identified < len(fit.names) - (len(still) - len(unseen)):
         found.append(
             f"the data tell {fit.identified} of {len(fit.names)} directions of the coefficients apart"
-            + (f"; not one by one: {', '.join(unseen)}" if unseen else "")
+            + (f"; held at their start: {', '.join(unseen)}" if unseen else "")
         )
     worse = [name for name in fit.rmse if fit.rmse[name] > fit.start_rmse[name]]
     if worse:
@@ -111,10 +123,36 @@ def warnings_of(fit: RigFit) -> list[str]:
             f"met to the last digits: {', '.join(exact)}: computed data, or as few distinct values as coefficients; "
             "no measure of how well the law predicts"
         )
+    found += [_tails_in_words(name, fit.residuals[name], robust) for name in fit.residuals if name not in exact]
+    found = [one for one in found if one]
     missed = [name for name in fit.rmse if fit.cross_validation[name] > 2 * fit.rmse[name]]
     if missed:
         found.append(f"rows that a fold did not see are missed by more than twice the fit's RMSE: {', '.join(missed)}")
     return found
+
+
+def _mark(name: str, share: float) -> str:
+    """What to say of a coefficient whose standard error is this share of its size."""
+    if np.isnan(share):
+        return SET if name in HELD else UNSEEN
+    return WEAK if share > UNCERTAIN else ""
+
+
+def _tails_in_words(name: str, residual: np.ndarray, robust: bool) -> str:
+    """What heavy tails of a channel's residuals mean; nothing where there are none."""
+    tails = heavy_tails(residual)
+    if tails is None:
+        return ""
+    if robust:
+        return (
+            f"{name}: {100 * tails.share:.2g} % of the rows lie beyond {FAR:g} standard deviations of the others "
+            f"({number(tails.deviation)} {UNITS[name]}) and counted little: outliers, or what the law cannot meet"
+        )
+    return (
+        f"{name}: residuals have heavy tails: {100 * tails.share:.2g} % of the rows lie beyond {FAR:g} standard deviations "
+        f"({number(tails.deviation)} {UNITS[name]} by their median size; of noise 0.006 %), and their RMS is {tails.ratio:.2g} "
+        "of them: outliers, which pull the fit, or rows that the law cannot meet; compare with --robust"
+    )
 
 
 def _parameters(fit: RigFit) -> tuple[Parameter, ...]:

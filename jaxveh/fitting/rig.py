@@ -15,9 +15,11 @@ from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Where, pick, resolve
 from jaxveh._core.progress import Progress, silent
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
+from jaxveh.fitting.rig_identify import settle, without
 from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered
+from jaxveh.fitting.rig_robust import inflation
 from jaxveh.fitting.rig_solve import covariance, information
-from jaxveh.fitting.rig_stages import Stage, stages_of
+from jaxveh.fitting.rig_stages import HELD, Stage, stages_of
 from jaxveh.io.rig_table import MEASURED, RigTable
 from jaxveh.tyres import AbstractTyre, MFTyre
 
@@ -31,8 +33,10 @@ class RigFit(eqx.Module):
     """A tyre fitted to rig data.
 
     `tyre`: the law with its coefficients. `names` (p,), `values`, `std` (p,): the coefficients that were fitted, in the law's
-    units; standard errors by the Gauss-Newton matrix of the joint stage with the noise estimated from residuals, nan where
-    one is larger than the coefficient's own size: data do not identify it; `identified`: how many directions they do.
+    units and in the canonical one of the tyre's twins (`rig_canonical`); standard errors by the Gauss-Newton matrix of the joint
+    stage with the noise estimated from residuals. nan for what stands at its start, because data do not identify it or because it
+    is held unless asked (`rig_stages.HELD`): in the others' errors it counts with a spread of its own size, or of what it is
+    among ordinary tyres. `identified`: how many directions the data do.
     `unconstrained`, `covariance` (p, p): on the line of each one's bijector. By channel (`F_x`, ...): `rmse` of residuals,
     `peak` (the 99.5th percentile of what was measured), `start_rmse` before the fit, `noise` (standard deviation), and
     `cross_validation`, the RMSE at rows that a fold's fit did not see (nan without). `residuals` (n,): fitted less measured, nan
@@ -60,6 +64,7 @@ def fit_rig(
     rig: RigTable,
     *,
     where: Where | None = None,
+    free: Sequence[str] = (),
     measured: Sequence[str] | None = None,
     weights: Mapping[str, float] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -74,10 +79,13 @@ def fit_rig(
     """Fit a tyre to rig data, from the coefficients that it has.
 
     MF-Tyre goes in stages (pure slip, combined slip, moments) over the coefficients that the data show (those of load where
-    the load varies, and so on), then all of them together; other laws at once. `where` picks coefficients instead.
+    the load varies, and so on), then all of them together; other laws at once. `where` picks coefficients instead. `free`:
+    names of those that are held unless asked (`lateral.PKY4`, the form of the cornering stiffness over load, which stays at what
+    the law has, 2 in a typical one). What the data do not identify stays at its start.
     `measured`: the forces and moments to be compared; by default those that both data and law have. `weights`: by channel, on
     top of one over the noise squared, which is estimated. `bounds`: by name, an interval that a coefficient stays in. `robust`:
-    residuals beyond two standard deviations count by their size. `folds`: parts for cross-validation, whole runs
+    residuals are taken for Student's t with 4 degrees of freedom, on the scale of their median size, so that outliers count
+    little. `folds`: parts for cross-validation, whole runs
     where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law
     that is near the data already.
 
@@ -93,31 +101,41 @@ def fit_rig(
         check_positive(f"weights[{name!r}]", weight)
     check_at_least("max_steps", max_steps, 1)
     chosen = None if where is None else tuple(p.name for p in resolve(law, where))
-    plan = stages_of(law, rig, channels, chosen)
-    names = _names(law, plan, chosen)
+    plan = stages_of(law, rig, channels, chosen, free)
+    _check_free(free, plan)
+    fitted, aside = _names(law, plan, chosen), tuple(name for stage in plan for name in stage.aside)
+    names = (*fitted, *aside)
     settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance)
     data = RigData(rig, contact, channels, names, settings)
     data.check(law)
     parts = fold_of(rig, folds) if folds else np.zeros(rig.load.shape)
     joint = Stage(JOINT, channels, names, np.ones(rig.load.shape, bool))
-    plan = [*(plan if staged else ()), joint]
+    plan = [*(plan if staged else ()), joint._replace(coefficients=fitted)]
     total = len(plan) + folds
     tyre, reports = law, []
     for k, stage in enumerate(plan):
         progress(k, total, stage.name)
         tyre, report = data.fit(tyre, stage)
         reports.append(report)
+    settled = settle(data, law, tyre, joint, aside, reports[-1])
+    tyre, reports[-1] = settled.tyre, settled.report
+    plan = [without(stage, settled.held, names) for stage in plan]
     missed = np.full(data.measured.shape, np.nan)
     for k in range(folds):
         progress(len(plan) + k, total, "cross-validation")
         missed[:, parts == k] = _unseen(data, law, plan, parts == k)[:, parts == k]
     progress(total, total, JOINT)
     validation = rms(channels, missed) if folds else dict.fromkeys(channels, float("nan"))
-    fit = _result(data, tyre, joint, tuple(reports), data.rmse(law), validation)
+    fit = _result(data, tyre, joint, settled.held, tuple(reports), data.rmse(law), validation)
     if throw and not reports[-1].converged:
         steps = reports[-1].steps
         raise FilterError(f"fit to {rig.source} stopped after {steps} steps; throw=False returns it as it is.")
     return fit
+
+
+def _check_free(free: Sequence[str], plan: list[Stage]) -> None:
+    there = tuple(dict.fromkeys(name for stage in plan for name in stage.coefficients))
+    check_names("free", dict.fromkeys(free), there)
 
 
 def _unseen(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarray) -> np.ndarray:
@@ -165,23 +183,25 @@ def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None)
     return found
 
 
-def _result(data: RigData, law, joint: Stage, reports, start_rmse, validation) -> RigFit:
+def _result(data: RigData, law, joint: Stage, held: np.ndarray, reports, start_rmse, validation) -> RigFit:
     parameters = data.parameters(law)
     values = np.array([float(value) for value in pick(law, parameters)])
     problem = data.problem(law, joint, data.noise(law))
     # The noise is that of the fit, with the degrees of freedom that coefficients take.
     count = int(data.present.sum())
-    free = count / (count - len(parameters))
-    spread, known = _spread(data, law, joint, problem)
+    free = count / (count - int((~held).sum()))
+    noise = data.noise(law)
+    if data.chosen.robust:
+        free *= inflation(data.residuals(law) / np.array([[noise[name]] for name in data.channels]))
+    spread, known = _spread(data, law, joint, problem, held)
     line = np.asarray(spread * problem.scale * problem.scale[:, None]) * free
-    unseen = np.asarray(jnp.diagonal(spread)) > 1.0
     slopes = np.array([float(p.domain.slope(value)) for p, value in zip(parameters, values, strict=True)])
     residual = data.residuals(law)
     return RigFit(
         tyre=law,
         names=joint.coefficients,
         values=values,
-        std=np.where(unseen, np.nan, np.sqrt(np.diag(line)) * np.abs(slopes)),
+        std=np.where(held, np.nan, np.sqrt(np.diag(line)) * np.abs(slopes)),
         unconstrained=np.asarray(problem.origin),
         covariance=line,
         identified=int(known),
@@ -195,15 +215,22 @@ def _result(data: RigData, law, joint: Stage, reports, start_rmse, validation) -
     )
 
 
-def _spread(data: RigData, law: AbstractTyre, joint: Stage, problem: RigProblem) -> tuple[Any, Any]:
-    """The covariance (p, p) in the problem's coordinates, and how many directions the data identify."""
+def _spread(data: RigData, law: AbstractTyre, joint: Stage, problem: RigProblem, held) -> tuple[Any, Any]:
+    """The covariance (p, p) in the problem's coordinates, and how many directions the data identify.
+
+    What is held at its start for lack of data may be off by its own size, what is held unless asked by what `HELD` says, and what
+    is confounded with it by as much.
+    """
     zero = jnp.zeros(problem.origin.shape)
     found = information(problem, zero)
-    spread, known = covariance(found)
+    spreads = jnp.asarray([HELD.get(name, np.nan) for name in joint.coefficients])
+    size = jnp.where(jnp.isnan(spreads), 1.0, spreads / problem.scale)
+    prior = jnp.where(jnp.asarray(held), 1 / size**2, PULL**2)
+    spread, known = covariance(found, prior)
     if not data.chosen.weights:
         return spread, known
     # Weights of the user's change what is minimised, not what is known: the sandwich, and what the data know without them. The
     # pull counts in its middle as in its ends: what data do not show stays unknown.
     middle, plain = (information(data.problem(law, joint, data.noise(law), power), zero) for power in (1.0, 0.0))
-    middle = middle + PULL**2 * jnp.eye(middle.shape[0], dtype=middle.dtype)
+    middle = middle + jnp.diag(prior.astype(middle.dtype))
     return spread @ middle @ spread, covariance(plain)[1]

@@ -16,6 +16,7 @@ from jaxveh._core.errors import InputError, check_at_least, check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, resolve
 from jaxveh.fitting.rig_problem import RigProblem, start_of
+from jaxveh.fitting.rig_robust import TO_DEVIATION
 from jaxveh.fitting.rig_solve import solve
 from jaxveh.fitting.rig_stages import Stage
 from jaxveh.io.rig_table import RigTable
@@ -146,7 +147,7 @@ class RigData:
         """The spread of residuals: their RMS, or where the fit is robust 1.48 times their median size."""
         size = self.residuals(law)
         robust = self.chosen.robust
-        spread = 1.4826 * np.nanmedian(np.abs(size), axis=1) if robust else np.sqrt(np.nanmean(size**2, axis=1))
+        spread = TO_DEVIATION * np.nanmedian(np.abs(size), axis=1) if robust else np.sqrt(np.nanmean(size**2, axis=1))
         return {
             name: max(float(one), LEAST_NOISE * self.peak[name])
             for name, one in zip(self.channels, spread, strict=True)
@@ -170,21 +171,25 @@ class RigData:
     def fit(self, law: AbstractTyre, stage: Stage) -> tuple[AbstractTyre, StageReport]:
         """One stage: from where the law is, then from its other starts; the best end counts."""
         before = self.share(law, stage)
-        law, steps, converged = self._descend(law, stage, self.chosen.max_steps)
+        law, steps, converged = self.descend(law, stage)
         # The others start from there: near the data in all else, they part from what they would run back to.
-        ends = [self._descend(one, stage, ROUND)[0] for one in starts_of(law, stage, self.chosen.bounds)]
+        ends = [self.descend(one, stage, ROUND)[0] for one in starts_of(law, stage, self.chosen.bounds)]
         noise = self.noise(law)
         best = min([law, *ends], key=lambda end: self.loss(end, stage, noise))
         if best is not law:
-            law, steps, converged = self._descend(best, stage, self.chosen.max_steps)
+            law, steps, converged = self.descend(best, stage)
         rows = int(np.sum(self._counts(stage).any(axis=0)))
         report = StageReport(
             stage.name, rows, len(stage.coefficients), before, self.share(law, stage), steps, converged
         )
         return law, report
 
-    def _descend(self, law: AbstractTyre, stage: Stage, most: int) -> tuple[AbstractTyre, int, bool]:
-        """From one start, in rounds: the noise, which weighs channels and says what is an outlier, has to be found first."""
+    def descend(self, law: AbstractTyre, stage: Stage, most: int | None = None) -> tuple[AbstractTyre, int, bool]:
+        """From one start, in rounds: the noise, which weighs channels and says what is an outlier, has to be found first.
+
+        Returns the law, the steps taken (at `most` so many, the user's limit by default), and whether it converged.
+        """
+        most = self.chosen.max_steps if most is None else most
         steps, alone = 0, not self.chosen.robust and len(stage.channels) == 1
         while steps < most:
             problem, limit = self.problem(law, stage, self.noise(law)), min(ROUND, most - steps)
@@ -211,9 +216,7 @@ def starts_of(law: AbstractTyre, stage: Stage, bounds: Mapping[str, tuple[float,
 
 def _started(law: AbstractTyre, start: Sequence[tuple[str, float | None]]) -> AbstractTyre:
     for name, value in start:
-        if value is not None:
-            like = jnp.asarray(leaf_of(law, name))
-            law = eqx.tree_at(lambda law, name=name: leaf_of(law, name), law, jnp.asarray(value, like.dtype))
+        law = law if value is None else with_leaf(law, name, value)
     return law
 
 
@@ -240,3 +243,9 @@ def leaf_of(law: AbstractTyre, name: str) -> Any:
     for part in name.split("."):
         law = getattr(law, part)
     return law
+
+
+def with_leaf(law: AbstractTyre, name: str, value: Any) -> AbstractTyre:
+    """The law with another value of the coefficient of a dotted name."""
+    like = jnp.asarray(leaf_of(law, name))
+    return eqx.tree_at(lambda law: leaf_of(law, name), law, jnp.asarray(value, like.dtype))

@@ -22,7 +22,8 @@ PULL = 0.1
 identify, but what they do not show stays where it was, where it would creep for hundreds of steps."""
 
 KINK = 2.0
-"""Residuals above this many standard deviations count by their size, not by their square, where a fit is robust."""
+"""Standard deviations of a residual where a fit that is robust begins to count it little: Student's t with 2^2 = 4 degrees of
+freedom."""
 
 BLOCK = 2000
 """Rows at a time on a CPU; an accelerator takes all at once."""
@@ -65,10 +66,11 @@ class RigProblem(eqx.Module):
         """Residuals in standard deviations, bent beyond `KINK` where the fit is robust, and the slope of the bend."""
         if not self.robust:
             return residual, jnp.ones_like(residual)
-        # The square of the result is the pseudo-Huber loss 2 k^2 (sqrt(1 + (r / k)^2) - 1): smooth, linear far out.
-        root = jnp.sqrt(1 + (residual / KINK) ** 2)
-        shrink = jnp.sqrt(2 / (root + 1))
-        return residual * shrink, shrink * (1 - 0.5 * (root - 1) / root)
+        # The square of the result is k^2 log(1 + (r / k)^2), what Student's t with k^2 degrees of freedom has in its exponent.
+        x = (residual / KINK) ** 2
+        some = jnp.where(x > 1e-8, x, 1.0)
+        shrink = jnp.sqrt(jnp.where(x > 1e-8, jnp.log1p(some) / some, 1 - x / 2))
+        return residual * shrink, 1 / ((1 + x) * shrink)
 
 
 class Normal(NamedTuple):

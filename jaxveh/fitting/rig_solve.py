@@ -84,11 +84,15 @@ def information(problem: RigProblem, z):
     return matrix - PULL**2 * jnp.eye(z.size, dtype=z.dtype)
 
 
-def covariance(information) -> tuple[jax.Array, jax.Array]:
-    """The covariance (p, p) in z of an information matrix and the pull, and how many directions the data identify.
+def covariance(information, prior=PULL**2) -> tuple[jax.Array, jax.Array]:
+    """The covariance (p, p) in z of an information matrix and a prior's, and how many directions the data identify.
 
-    A direction is identified where its standard error is below one step, a coefficient's own size: beyond, it is the pull's.
+    `prior`: one over the variance, by coefficient (p,) or for all; by default the pull's. A direction is identified where its
+    standard error is below one step, a coefficient's own size: beyond, it is the prior's.
     """
-    values, vectors = jnp.linalg.eigh(information)
-    values = jnp.maximum(values, 0.0)
-    return (vectors / (values + PULL**2)) @ vectors.T, jnp.sum(values > 1.0)
+    known = jnp.sum(jnp.linalg.eigvalsh(information) > 1.0)
+    # On scales on which the prior is one: no eigenvalue is lost in the largest one's rounding.
+    scale = 1 / jnp.sqrt(jnp.broadcast_to(jnp.asarray(prior, information.dtype), information.shape[:1]))
+    values, vectors = jnp.linalg.eigh(information * scale * scale[:, None])
+    spread = (vectors / (jnp.maximum(values, 0.0) + 1.0)) @ vectors.T
+    return spread * scale * scale[:, None], known

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -38,10 +39,17 @@ there; in combined slip the shape C has a good end on either side of 1; a typica
 what they multiply."""
 
 
+HELD = {"lateral.PKY4": 0.5}
+"""Coefficients that are held where the law has them unless somebody asks, and how far from there an ordinary tyre's may be
+(standard deviation). PKY4, the form of the cornering stiffness over load, is 2 in the book's simple form (4.E25); beside PKY1 and
+PKY2 the three or four loads of a rig hardly show it, and all three run along one valley."""
+
+
 class Stage(NamedTuple):
     """One fit: its `name`, the `channels` that it compares, the names of its coefficients, and which rows count (n,).
 
-    `starts`: coefficients and other values from which the stage starts, in every combination; the best end counts.
+    `starts`: coefficients and other values from which the stage starts, in every combination; the best end counts. `aside`: those
+    of `HELD` that belong here and nobody asked for.
     """
 
     name: str
@@ -49,10 +57,14 @@ class Stage(NamedTuple):
     coefficients: tuple[str, ...]
     rows: np.ndarray
     starts: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    aside: tuple[str, ...] = ()
 
 
 class Group(NamedTuple):
-    """Coefficients that show in one force or moment: always, and where load, camber or pressure vary (names split at blanks)."""
+    """Coefficients that show in one force or moment: always, and where load, camber or pressure vary (names split at blanks).
+
+    Those of `asked` show where the load varies, and are fitted where somebody asks for them alone (`HELD`).
+    """
 
     section: str
     channel: str
@@ -61,13 +73,19 @@ class Group(NamedTuple):
     camber: str = ""
     pressure: str = ""
     speed: str = ""
+    asked: str = ""
 
-    def shown(self, varies: set[str]) -> tuple[str, ...]:
-        """Those that data show in which these inputs vary."""
-        found = self.always.split()
+    def shown(self, varies: set[str], asked: Collection[str] = ()) -> tuple[str, ...]:
+        """Those that data show in which these inputs vary, and those among `asked`, by their full names."""
+        found = self.always.split() + [name for name in self.asked.split() if f"{self.section}.{name}" in asked]
         for name in ("load", "camber", "pressure", "speed"):
             found += getattr(self, name).split() if name in varies else []
         return tuple(f"{self.section}.{name}" for name in found)
+
+    def aside(self, varies: set[str], free: Collection[str]) -> tuple[str, ...]:
+        """Those that data would show in which these inputs vary, and that nobody let `free`."""
+        names = (f"{self.section}.{name}" for name in self.asked.split())
+        return tuple(name for name in names if "load" in varies and name not in free)
 
 
 ALONG = Group(
@@ -77,9 +95,10 @@ ALONG = Group(
 ALONG_52 = ALONG._replace(pressure="")
 ALONG_COMBINED = Group("longitudinal", "F_x", "RBX1 RBX2 RCX1 REX1 RHX1", "REX2", "RBX3")
 ACROSS = Group(
-    "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PKY4 PHY2 PVY2",
-    "PDY3 PEY4 PEY5 PKY3 PKY5 PKY6 PKY7 PVY3 PVY4", "PPY1 PPY2 PPY3 PPY4 PPY5",
+    "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PHY2 PVY2",
+    "PDY3 PEY4 PEY5 PKY3 PKY5 PKY6 PKY7 PVY3 PVY4", "PPY1 PPY2 PPY3 PPY4 PPY5", asked="PKY4",
 )  # fmt: skip
+
 ACROSS_52 = Group(
     "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PHY2 PVY2", "PDY3 PEY4 PKY3 PHY3 PVY3 PVY4"
 )  # fmt: skip
@@ -113,9 +132,14 @@ def varying(rig: RigTable) -> set[str]:
 
 
 def stages_of(
-    law: AbstractTyre, rig: RigTable, measured: tuple[str, ...], chosen: tuple[str, ...] | None
+    law: AbstractTyre,
+    rig: RigTable,
+    measured: tuple[str, ...],
+    chosen: tuple[str, ...] | None,
+    free: Collection[str] = (),
 ) -> list[Stage]:
-    """The stages for a law and data; the coefficients `chosen` by the user, where given, instead of those that data show.
+    """The stages for a law and data; the coefficients `chosen` by the user, where given, instead of those that data show, or
+    those besides them that the user lets `free`.
 
     A law other than MF-Tyre is fitted at once, all its parameters to all its forces.
     """
@@ -144,9 +168,10 @@ def stages_of(
         # Rows of pure slip show its coefficients alone; without one that was measured, all rows have to do.
         seen = np.isfinite(getattr(rig, group.channel))
         rows = rows & seen if np.any(rows & seen) else seen
-        names = group.shown(varies)
+        names = group.shown(varies, free if chosen is None else chosen)
         names = names if chosen is None else tuple(name for name in names if name in chosen)
         if names:
             starts = tuple((one, STARTS[one]) for one in names if one in STARTS)
-            found.append(Stage(name, (group.channel,), names, rows, starts))
+            aside = () if chosen is not None else group.aside(varies, free)
+            found.append(Stage(name, (group.channel,), names, rows, starts, aside))
     return found

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of
+from jaxveh.fitting.rig_signs import SMALL, wrong_signs
 from jaxveh.fitting.rig_stages import LEAST_SPREAD
 from jaxveh.io.rig_table import RigTable
 from jaxveh.tyres import (
@@ -21,9 +22,6 @@ from jaxveh.tyres import (
     UniTire,
     typical_mf_tyre,
 )
-
-SMALL = {"slip_angle": np.radians(2.0), "slip_ratio": 0.02}
-"""Slips below which a force follows its slip, to the precision of a start."""
 
 LEAST_ROWS = 5
 """Rows that a slope needs; where fewer have a small slip, that many of the smallest count."""
@@ -84,20 +82,11 @@ def _slope(rig: RigTable, channel: str, load: float) -> float | None:
     if rows.sum() < LEAST_ROWS:
         return None
     rows &= np.abs(slip) <= max(SMALL[name], np.sort(np.abs(slip[rows]))[LEAST_ROWS - 1])
+    if np.ptp(slip[rows]) == 0:
+        return None
     # A line with an offset (conicity, ply steer); the share of the load brings other loads near the median one.
     columns = np.stack([slip[rows], np.ones(rows.sum())], axis=1)
-    target = force[rows] / share[rows]
-    slope, offset = np.linalg.lstsq(columns, target, rcond=None)[0]
-    left = target - slope * slip[rows] - offset
-    spread = np.sum((slip[rows] - np.mean(slip[rows])) ** 2)
-    if spread == 0:
-        return None
-    error = np.sqrt(np.mean(left**2) / spread)
-    if slope < -3 * error:
-        raise InputError(
-            f"{rig.source}: {channel} falls with {name} ({slope:.3g} N per unit): a positive slip must give a positive force; "
-            "are the axes of the data those that were told (iso-w or ours)?"
-        )
+    slope = np.linalg.lstsq(columns, force[rows] / share[rows], rcond=None)[0][0]
     return float(slope) if slope > 0 else None
 
 
@@ -154,7 +143,10 @@ def starting_tyre(model: str, rig: RigTable) -> AbstractTyre:
     ones. Others take their stiffnesses from the slope of forces at small slip, and their friction from the largest force
     over load.
 
-    **Raises** `InputError` for an unknown name, and for forces that fall with their slip, as in other axes.
+    **Raises** `InputError` for an unknown name, and for a slope that no tyre has, as in data of other axes
+    (`rig_signs.wrong_signs`): who knows such a tyre starts from one of his own.
     """
     check_one_of("model", model, tuple(STARTS))
+    for wrong in wrong_signs(rig):
+        raise InputError(f"{wrong.words} If they are, start from a tyre of your own (--start).")
     return STARTS[model](rig_facts(rig))

@@ -1,7 +1,7 @@
 """Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, the files that describe a car and a road, tyre
-property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX).
+property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX, FSAE TTC).
 
-pandas, pyarrow, asammdf, pint and pyyaml are the extra `io`, imported where they are used.
+pandas, pyarrow, asammdf, pint, pyyaml and scipy are the extra `io`, imported where they are used.
 """
 
 from jaxveh.io.canonical import CANONICAL, CanonicalChannel, canonical_unit

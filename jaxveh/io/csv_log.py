@@ -36,8 +36,15 @@ def read_columns(path: Path) -> dict[str, Any]:
     return _columns(path, headings, separator, ".")
 
 
-def _columns(path: Path, headings: list[str], separator: str, decimal: str) -> dict[str, Any]:
-    frame = _read(path, headings, separator, decimal)
+def read_below(path: Path, headings: list[str], separator: str, lines: int) -> dict[str, Any]:
+    """The cells of each column by heading, below so many `lines` of a header; what is no UTF-8 stays unreadable text."""
+    return _columns(path, headings, separator, ".", lines, "replace")
+
+
+def _columns(
+    path: Path, headings: list[str], separator: str, decimal: str, lines: int = 1, errors: str = "strict"
+) -> dict[str, Any]:
+    frame = _read(path, headings, separator, decimal, lines, errors)
     # A separator at the end of every line makes a last column without name and without cells.
     if headings[-1] == "" and frame.iloc[:, -1].isna().all():
         headings = headings[:-1]
@@ -98,7 +105,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _read(path: Path, headings: list[str], separator: str, decimal: str):
+def _read(path: Path, headings: list[str], separator: str, decimal: str, lines: int, errors: str):
     pandas = require("pandas", "reading CSV")
     try:
         with warnings.catch_warnings():
@@ -109,13 +116,14 @@ def _read(path: Path, headings: list[str], separator: str, decimal: str):
                 sep=separator,
                 decimal=decimal,
                 header=None,
-                skiprows=1,
+                skiprows=lines,
                 names=range(len(headings)),
                 index_col=False,
                 skipinitialspace=True,
                 **_exact(pandas.__version__),
                 low_memory=False,
                 encoding=_ENCODING,
+                encoding_errors=errors,
             )
     except pandas.errors.EmptyDataError as error:
         raise InputError(f"{path}: the log is empty: it has columns but no row.") from error

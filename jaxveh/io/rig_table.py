@@ -13,11 +13,13 @@ from jaxveh._core.errors import InputError, check_one_of
 from jaxveh.io.csv_log import read_columns
 from jaxveh.io.files import check_readable, check_suffix
 from jaxveh.io.log import numeric, split_unit
+from jaxveh.io.rig_axes import AXES, to_ours
+from jaxveh.io.ttc import SUFFIXES as TTC_SUFFIXES
+from jaxveh.io.ttc import names_line, read_ttc
 from jaxveh.io.tydex import read_tydex
 from jaxveh.io.tydex_axes import contact_patch
 from jaxveh.io.units import convert, given
 
-AXES = ("iso-w", "ours")
 INPUTS = ("slip_angle", "slip_ratio", "load", "camber", "speed", "pressure")
 MEASURED = ("F_x", "F_y", "M_x", "M_y", "M_z")
 TYDEX_SUFFIXES = (".tdx", ".tyd", ".tydex")
@@ -37,6 +39,11 @@ COLUMNS = {
     "run": (("run",), "dimensionless"),
 }
 """Names of a CSV file's columns, the first that is there counts, and the unit that is meant where a name carries none."""
+
+LARGEST = {"slip_angle": 1.0, "camber": 1.2}
+"""Angles (rad) beyond which numbers without a unit are taken for degrees: 57 degrees of slip, 69 of camber."""
+
+RIGHT_ANGLE = np.pi / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +83,12 @@ class RigTable:
             self._check_rows(name, lambda v: ~np.isinf(v), "must be finite, or NaN where nothing was measured")
         if np.median(self.load) <= 0:
             raise InputError(
-                f"{self.source}: load = {np.median(self.load):g} in the median: z points up here (ISO-W, TYDEX), so that a "
-                "wheel's load is positive. Data in SAE axes must be turned first: y and z change sign."
+                f"{self.source}: load = {np.median(self.load):g} in the median: a wheel's load is positive here, as in ISO-W and "
+                "TYDEX, where z points up; SAE's FZ is negative: axes = 'sae' (--axes sae)."
+            )
+        for name in LARGEST:
+            self._check_rows(
+                name, lambda v: np.abs(v) <= RIGHT_ANGLE, "must be radians within a right angle: degrees? (np.radians)"
             )
         self._check_rows("speed", lambda v: v >= 0, "must be at least 0: turn the wheel's axes instead")
         self._check_rows("pressure", lambda v: v > 0, "must be positive (Pa)")
@@ -105,17 +116,25 @@ class RigTable:
 
 
 def read_rig_table(
-    path: str | Path | Sequence[str | Path], axes: str = "iso-w", *, measured: Sequence[str] = MEASURED
+    path: str | Path | Sequence[str | Path], axes: str | None = None, *, measured: Sequence[str] = MEASURED
 ) -> RigTable:
-    """Read rig data from CSV or TYDEX files (.tdx, .tyd, .tydex); several files are joined, each one its run.
+    """Read rig data; several files are joined, each one its run. What a file is, its suffix and its columns tell:
 
-    CSV: one header line, columns by the names of `COLUMNS` in SI units, or with a unit in the name (`alpha [deg]`); slips that
-    a file does not have are zero; an empty cell is a missing measurement. `axes` of its slip angle: `iso-w`, where a positive
-    one gives a negative force, or `ours`. TYDEX files know their axes. `measured`: which forces and moments to read.
+    - CSV with one header line, columns by the names of `COLUMNS` in SI units, or with a unit in the name (`alpha [deg]`); slips
+      that a file does not have are zero; an empty cell is a missing measurement.
+    - The Formula SAE Tire Test Consortium's (`.dat`, `.txt`, `.mat`, and a `.csv` with its names): see `ttc.read_ttc`.
+    - TYDEX (`.tdx`, `.tyd`, `.tydex`): see `tydex.read_tydex`.
 
-    **Raises** `InputError` as `RigTable` and `read_tydex`, for unknown axes, and for files that do not tell the same inputs.
+    `axes`: the signs of the file, one of `rig_axes.AXES`, for whatever file. By default those that its kind has: ISO-W for
+    CSV and TYDEX (a positive slip angle gives a negative force), SAE for the consortium's, where FZ is negative. `measured`:
+    which forces and moments to read.
+
+    **Raises** `InputError` as `RigTable`, `read_ttc` and `read_tydex`, for unknown axes, for angles without a unit that must be
+    degrees, for the consortium's files whose FZ is not SAE's and whose axes nobody told, and for files that do not tell the
+    same inputs.
     """
-    check_one_of("axes", axes, AXES)
+    if axes is not None:
+        check_one_of("axes", axes, AXES)
     for name in measured:
         check_one_of("measured", name, MEASURED)
     paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
@@ -147,40 +166,65 @@ def join(tables: Sequence[RigTable]) -> RigTable:
     return RigTable(**joined, run=np.concatenate(runs), source=", ".join(table.source for table in tables))
 
 
-def _read(path: Path, axes: str, measured: tuple[str, ...]) -> RigTable:
-    check_suffix(path, (".csv", *TYDEX_SUFFIXES), "rig table")
-    if path.suffix.lower() == ".csv":
-        return _read_csv(path, axes, measured)
-    if axes != AXES[0]:
-        raise InputError(f"axes = {axes!r}: {path} is a TYDEX file, which knows its axes; leave `axes` out.")
-    return RigTable(**contact_patch(read_tydex(path), measured), source=str(path))
-
-
-def _read_csv(path: Path, axes: str, measured: tuple[str, ...]) -> RigTable:
+def _read(path: Path, axes: str | None, measured: tuple[str, ...]) -> RigTable:
+    suffix = check_suffix(path, (".csv", *TTC_SUFFIXES, *TYDEX_SUFFIXES), "rig table")
     check_readable(path)
+    if suffix in TYDEX_SUFFIXES:
+        columns, usual = contact_patch(read_tydex(path), measured, axes or "iso-w"), "iso-w"
+    elif suffix in TTC_SUFFIXES or names_line(path) is not None:
+        found = read_ttc(path).columns
+        columns = {name: values for name, values in found.items() if name not in MEASURED or name in measured}
+        usual = _ttc_axes(path, columns["load"]) if axes is None else axes
+    else:
+        columns, usual = _read_csv(path, measured), "iso-w"
+    return RigTable(**to_ours(columns, axes or usual), source=str(path))
+
+
+def _ttc_axes(path: Path, load: np.ndarray) -> str:
+    """SAE, which the consortium's files are in unless somebody turned them."""
+    if load.size and np.nanmedian(load) > 0:
+        raise InputError(
+            f"{path}: FZ = {np.nanmedian(load):g} N in the median: it is negative in SAE's axes, in which the FSAE TTC's files "
+            "are; tell in which these were written: axes = 'adapted-sae' or 'iso-w' (--axes)."
+        )
+    return "sae"
+
+
+def _read_csv(path: Path, measured: tuple[str, ...]) -> dict[str, np.ndarray | None]:
     cells = {split_unit(heading): column for heading, column in read_columns(path).items()}
     units = dict(cells.keys())
     columns = {name: column for (name, _), column in cells.items()}
     _refuse_turn_slip(path, columns)
-    found: dict[str, np.ndarray] = {}
+    found: dict[str, np.ndarray | None] = {}
     for field, (names, unit) in COLUMNS.items():
         name = next((name for name in names if name in columns), None)
         if name is None or (field in MEASURED and field not in measured):
             continue
         values = numeric(columns[name], f"{path}: column {name!r}")
+        if not given(units[name]):
+            _refuse_degrees(path, field, name, values)
         found[field] = convert(values, units[name], unit, f"{path}: {name}") if given(units[name]) else values
     if "load" not in found:
         raise InputError(f"{path}: no load among the columns {', '.join(columns)}: {COLUMNS['load'][0][0]} is needed.")
     if "slip_angle" not in found and "slip_ratio" not in found:
         raise InputError(f"{path}: no slip among the columns {', '.join(columns)}: in_alpha or in_kappa is needed.")
-    zero = np.zeros(len(found["load"]))
+    zero = np.zeros(len(np.asarray(found["load"])))
     found = {"slip_angle": zero, "slip_ratio": zero, **found}
-    if axes == "iso-w":
-        found["slip_angle"] = 0.0 - found["slip_angle"]
     # For the reference evaluator a pressure of zero is the nominal one.
-    if "pressure" in found and not found["pressure"].any():
+    if found.get("pressure") is not None and not np.any(found["pressure"]):
         del found["pressure"]
-    return RigTable(**found, source=str(path))
+    return found
+
+
+def _refuse_degrees(path: Path, field: str, name: str, values: np.ndarray) -> None:
+    """Raise where angles that name no unit are too large for radians."""
+    if field not in LARGEST or not np.any(np.abs(values) > LARGEST[field]):
+        return
+    size = np.nanmax(np.abs(values))
+    raise InputError(
+        f"{path}: {name} goes to {size:.4g} and names no unit, which means radians, {np.degrees(size):.0f} degrees: if these are "
+        f"degrees, name the column '{name} [deg]', if they are not, '{name} [rad]'."
+    )
 
 
 def _refuse_turn_slip(path: Path, columns: dict) -> None:

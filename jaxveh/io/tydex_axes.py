@@ -1,4 +1,4 @@
-"""From the channels of a TYDEX file to slips, forces and moments at the contact patch, in SI units and this package's axes.
+"""From the channels of a TYDEX file to slips, forces and moments at the contact patch, in SI units and ISO-W's signs.
 
 TYDEX knows three axes, all with z up (Unrau & Zamow 1997, section 2.6): W at the contact point, H at the wheel's centre with
 the same directions, C at the centre and inclined with the wheel. With the loaded radius R and the inclination angle gamma the
@@ -24,16 +24,17 @@ UNITS = {
 """Units by quantity, capitals or not, and their size in SI."""
 
 
-def contact_patch(file: TydexFile, measured: tuple[str, ...]) -> dict[str, np.ndarray | None]:
-    """The inputs of a `RigTable` and those of its `measured` quantities that the file holds.
+def contact_patch(file: TydexFile, measured: tuple[str, ...], axes: str = "iso-w") -> dict[str, np.ndarray | None]:
+    """The inputs of a `RigTable` and those of its `measured` quantities that the file holds, with the signs that it has.
 
     Names without a letter of axes count as W. Forces of the wheel's centre are those of the contact point, in C turned by
     INCLANGL; moments there need the forces, INCLANGL, and LOADRAD (loaded radius) or DSTGRWHC (height of the centre) as well.
+    In other `axes` than ISO-W, which the format demands and some files do not have, only quantities of the contact point count.
 
     **Raises** `InputError` for a unit that is not known, a file without a load or any slip, and axes that cannot be converted
     with what is in the file; it says what is needed.
     """
-    rig = _Rig(file)
+    rig = _Rig(file, centre=axes in ("iso-w", "ours"))
     if rig.quantity("SLIPANGL", "angle") is None and rig.quantity("LONGSLIP", "ratio") is None:
         raise InputError(f"{file.source}: neither SLIPANGL nor LONGSLIP is among the channels: no slip was measured.")
     load = rig.force("Z")
@@ -41,8 +42,7 @@ def contact_patch(file: TydexFile, measured: tuple[str, ...]) -> dict[str, np.nd
         raise InputError(f"{file.source}: no load among the channels: one of FZW, FZ, FZH or FZC is needed.")
     slip_angle, slip_ratio = rig.quantity("SLIPANGL", "angle"), rig.quantity("LONGSLIP", "ratio")
     found: dict[str, np.ndarray | None] = {
-        # In TYDEX a positive slip angle gives a negative force.
-        "slip_angle": np.zeros(rig.rows) if slip_angle is None else 0.0 - slip_angle,
+        "slip_angle": np.zeros(rig.rows) if slip_angle is None else slip_angle,
         "slip_ratio": np.zeros(rig.rows) if slip_ratio is None else slip_ratio,
         "load": load,
         "camber": rig.quantity("INCLANGL", "angle"),
@@ -56,10 +56,11 @@ def contact_patch(file: TydexFile, measured: tuple[str, ...]) -> dict[str, np.nd
 
 
 class _Rig:
-    """The quantities of one file, by TYDEX name, in SI units and W axes."""
+    """The quantities of one file, by TYDEX name, in SI units and W axes; those of the wheel's `centre` can be converted where
+    z points up."""
 
-    def __init__(self, file: TydexFile):
-        self.file = file
+    def __init__(self, file: TydexFile, centre: bool = True):
+        self.file, self.centre = file, centre
         self.rows = len(np.asarray(next(iter(file.channels.values())).values))
 
     def quantity(self, name: str, kind: str) -> np.ndarray | None:
@@ -96,19 +97,33 @@ class _Rig:
         return np.abs(trajectory * np.cos(slip_angle))
 
     def force(self, axis: str) -> np.ndarray | None:
-        for name in (f"F{axis}W", f"F{axis}", f"F{axis}H"):
+        for name in (f"F{axis}W", f"F{axis}"):
             if (found := self.quantity(name, "force")) is not None:
                 return found
-        return self._turned("F", axis, "force")
+        if not self.centre:
+            return self._refused(f"F{axis}")
+        found = self.quantity(f"F{axis}H", "force")
+        return self._turned("F", axis, "force") if found is None else found
 
     def moment(self, axis: str) -> np.ndarray | None:
         for name in (f"M{axis}W", f"M{axis}"):
             if (found := self.quantity(name, "moment")) is not None:
                 return found
+        if not self.centre:
+            return self._refused(f"M{axis}")
         name, found = f"M{axis}H", self.quantity(f"M{axis}H", "moment")
         if found is None:
             name, found = f"M{axis}C", self._turned("M", axis, "moment")
         return None if found is None else found + self._arm(axis, name)
+
+    def _refused(self, name: str) -> None:
+        """None where the file has no such quantity of the wheel's centre either; raises where it has."""
+        for centre in (f"{name}H", f"{name}C"):
+            if self.file.find(centre) is not None:
+                raise InputError(
+                    f"{self.file.source}: {centre} is in axes of the wheel's centre, which are converted where z points up: "
+                    "leave `axes` out (TYDEX is ISO-W), or leave it out of `measured`."
+                )
 
     def _turned(self, kind: str, axis: str, unit: str) -> np.ndarray | None:
         """A component in C axes, turned by the inclination angle about x."""

@@ -1,8 +1,8 @@
-"""MF-Tyre 6.1 from rig data: the reference tyre's forces are found again from a generic start."""
+"""MF-Tyre 6.1 from rig data: the reference tyre's forces are found again from a generic start, and intervals hold its
+coefficients."""
 
 import dataclasses
 
-import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,12 +11,10 @@ from shared_data import shared
 
 from jaxveh import fitting, io, tyres
 from jaxveh.fitting.rig_data import leaf_of as leaf
+from jaxveh.fitting.rig_problem import contact_of
 
 CHANNELS = ("F_x", "F_y")
 NOISE = 0.02
-
-SIGNLESS = ("longitudinal.RBX2", "lateral.RBY2", "lateral.RVY4")
-"""Coefficients of which either sign is the same tyre; that of RVY5 and RVY6 turns together."""
 
 
 def start(rig):
@@ -35,8 +33,9 @@ def test_a_generic_start_comes_to_the_truth_through_noise():
         error = np.sqrt(np.mean((found[name] - clean[name]) ** 2)) / peak(clean[name])
         assert error < 0.005 < NOISE < 0.05 < fit.start_rmse[name] / fit.peak[name]
         np.testing.assert_allclose(fit.noise[name] / peak(clean[name]), NOISE, rtol=0.05)
-    # Camber and pressure never vary together here.
-    assert np.isnan(fit.std[fit.names.index("lateral.PPY5")])
+    # Camber and pressure never vary together here, and PKY4 was not asked for.
+    for name, value in (("lateral.PPY5", 0.0), ("lateral.PKY4", 2.0)):
+        assert np.isnan(fit.std[fit.names.index(name)]) and fit.values[fit.names.index(name)] == value
     assert 55 <= fit.identified < len(fit.names)
 
 
@@ -50,49 +49,54 @@ def test_a_fit_to_the_reference_s_own_rows():
         assert fit.rmse[name] < 0.01 * fit.peak[name] < 0.05 * fit.peak[name] < fit.start_rmse[name]
 
 
+def noisy_table(channels, seed, rows=slice(None)):
+    """What a rig would measure of the reference tyre at the inputs of the shared table, with 2 % noise."""
+    inputs = io.read_rig_table(shared("mfeval_mf61.csv")).take(rows)
+    found, random = truth().forces(contact_of(inputs)), np.random.default_rng(seed)
+    measured = dict.fromkeys(("F_x", "F_y", "M_x", "M_y", "M_z"))
+    for name in channels:
+        clean = np.asarray(getattr(found, name))
+        measured[name] = clean + NOISE * peak(clean) * random.standard_normal(clean.shape)
+    return dataclasses.replace(inputs, **measured)
+
+
+def ordinary():
+    """A typical tyre with the load, pressure, speed and radius that the coefficients refer to, which comparing them needs."""
+    known = truth().structure
+    return tyres.typical_mf_tyre(known.FNOMIN, pressure=known.NOMPRES, speed=known.LONGVL, radius=known.UNLOADED_RADIUS)
+
+
+def covered(fits):
+    """Of 95 % intervals of what a fit says is identified, the share that hold the coefficient of the file, by name and pooled."""
+    form = fitting.canonical(truth())
+    true = np.array([float(leaf(form, name)) for name in fits[0].names])
+    values, std = (np.array([getattr(fit, name) for fit in fits]) for name in ("values", "std"))
+    known, held = np.isfinite(std), np.abs(values - true) < 1.96 * std
+    by_name = {name: held[known[:, i], i].mean() for i, name in enumerate(fits[0].names) if known[:, i].any()}
+    return by_name, held[known].mean()
+
+
+def test_intervals_of_pure_slip_cover():
+    """A small one: three fits to the shared table's sweeps of slip angle. PKY4 stands at 2 where the tyre has 2.74."""
+    pure = np.abs(io.read_rig_table(shared("mfeval_mf61.csv")).slip_ratio) < 1e-6
+    fits = [fitting.fit_rig(ordinary(), noisy_table(("F_y",), seed, pure), throw=False) for seed in range(3)]
+    by_name, pooled = covered(fits)
+    assert "lateral.PKY4" not in by_name and all(fit.values[fit.names.index("lateral.PKY4")] == 2.0 for fit in fits)
+    assert pooled > 0.85
+    start = ordinary()
+    for fit in fits:
+        for name in np.array(fit.names)[np.isnan(fit.std)]:
+            assert float(leaf(fit.tyre, name)) == float(leaf(start, name))
+
+
 @pytest.mark.full
 def test_standard_errors_cover():
-    """100 repetitions from one fit's end: 95 % intervals, pooled over what data identify, hold the truth in 90 to 98 %.
+    """60 fits from a generic start to the shared table's 2,172 rows: 93 % of the 95 % intervals hold the file's coefficients.
 
-    Of each coefficient, and of each direction in which the information at the truth has its axes (a combination of coefficients
-    that is chosen beforehand).
+    Least of PPY1 and PPY2 (80 and 37 %): with PKY4 at 2 the nearest tyre has other ones; of what the data hardly identify (PEY5,
+    PKY3, PDY3: 57 to 88 %), which counts as known where noise makes it large.
     """
-    columns, run = plan(points=50)
-    clean = measured_of(truth(), columns, CHANNELS)
-    noisy = lambda seed: table(clean, columns, run, NOISE, seed)
-    # Coefficients are those of a nominal load and pressure, which whoever compares them must know.
-    known = truth().structure
-    first = fitting.fit_rig(tyres.typical_mf_tyre(known.FNOMIN, pressure=known.NOMPRES, speed=known.LONGVL), noisy(0))
-    true = np.array([float(leaf(turned(truth(), first.tyre), name)) for name in first.names])
-    size = np.maximum(np.abs(true), 0.05)
-    axes = np.linalg.eigh(np.linalg.inv(at_truth(turned(truth(), first.tyre), noisy(0), first) / np.outer(size, size)))
-    seen = axes.eigenvalues > 1
-    coefficients, directions = [], []
-    for seed in range(1, 101):
-        fit = fitting.fit_rig(first.tyre, noisy(seed), staged=False)
-        assert fit.names == first.names
-        error = (fit.values - true) / size
-        known = np.isfinite(fit.std)
-        coefficients.append(np.abs(error * size / fit.std)[known] < 1.96)
-        spread = np.diag(axes.eigenvectors.T @ (fit.covariance / np.outer(size, size)) @ axes.eigenvectors)
-        directions.append((np.abs(axes.eigenvectors.T @ error) < 1.96 * np.sqrt(spread))[seen])
-    print("coefficients", np.mean(np.concatenate(coefficients)), "directions", np.mean(directions), seen.sum())
-    assert 0.90 < np.mean(np.concatenate(coefficients)) < 0.98
-    assert 0.90 < np.mean(directions) < 0.98
-
-
-def at_truth(tyre, data, first):
-    """The covariance of a fit that starts and stays at the truth."""
-    where = lambda law: [leaf(law, name) for name in first.names]
-    return fitting.fit_rig(tyre, data, where=where, staged=False, max_steps=1, throw=False).covariance
-
-
-def turned(tyre: tyres.MFTyre, like: tyres.MFTyre) -> tyres.MFTyre:
-    """The same tyre in the signs of another, where either sign is the same tyre."""
-    same = {name: jnp.sign(leaf(like, name)) * jnp.abs(leaf(tyre, name)) for name in SIGNLESS}
-    flips = jnp.sign(tyre.lateral.RVY6) * jnp.sign(like.lateral.RVY6)
-    same |= {name: flips * leaf(tyre, name) for name in ("lateral.RVY5", "lateral.RVY6")}
-    for name, value in same.items():
-        part, key = name.split(".")
-        tyre = dataclasses.replace(tyre, **{part: dataclasses.replace(getattr(tyre, part), **{key: value})})
-    return tyre
+    fits = [fitting.fit_rig(ordinary(), noisy_table(CHANNELS, seed), throw=False) for seed in range(60)]
+    by_name, pooled = covered(fits)
+    print(pooled, {name: share for name, share in by_name.items() if share < 0.9})
+    assert 0.92 < pooled < 0.98

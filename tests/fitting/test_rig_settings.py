@@ -52,7 +52,7 @@ def test_a_fit_has_converged_where_its_residuals_have_settled():
     hasty = {"max_steps": 2, "tolerance": 1e-30}
     best = fit_rig(truth, rig)
     assert fit_rig(best.tyre, rig, **hasty).stages[-1].converged
-    with pytest.raises(FilterError, match="stopped after 2 steps"):
+    with pytest.raises(FilterError, match=r"stopped after \d steps"):
         fit_rig(tyres.Brush(2e4, 2e4, 0.4), rig, **hasty)
 
 
@@ -73,7 +73,7 @@ def test_version_52_is_fitted_with_its_own_coefficients():
         for stage in stages_of(tyres.typical_mf_tyre(4e3, version=version), varied, channels, None)
         for name in stage.coefficients
     }
-    newer = {"PPY1", "PPZ1", "PPMX1", "QDZ10", "QDZ11", "QSX4", "QSX8", "PKY4", "PKY6"}
+    newer = {"PPY1", "PPZ1", "PPMX1", "QDZ10", "QDZ11", "QSX4", "QSX8", "PKY5", "PKY6"}
     assert newer <= names(61) and not newer & names(52)
     assert {"PKY3", "QDZ9", "QSX1", "QSX2", "QSX3"} <= names(52)
 

@@ -89,5 +89,5 @@ def test_a_slip_that_only_trembles_says_nothing():
 def test_bad_starts_are_named():
     with pytest.raises(InputError, match="model = 'mf99': must be one of .*mf61"):
         starting_tyre("mf99", rig_of())
-    with pytest.raises(InputError, match="F_y falls with slip_angle .*iso-w or ours"):
+    with pytest.raises(InputError, match="F_y falls with slip_angle.*iso-w or ours.*--start"):
         starting_tyre("brush", rig_of(sign=-1.0))

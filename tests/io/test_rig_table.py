@@ -91,13 +91,16 @@ def test_joined_files_tell_the_same_inputs(csv, tydex):
         ("Fz,Fy\n4000,1\n", "no slip among the columns Fz, Fy"),
         ("Fz,alpha\n4000,0.1\n", "no measurement: one of F_x"),
         ("Fz,alpha,Fy\n4000,0.1,\n", "no measurement: one of F_x"),
-        ("Fz,alpha,Fy\n-4000,0.1,1\n", "load = -4000 in the median: z points up"),
+        ("Fz,alpha,Fy\n-4000,0.1,1\n", "load = -4000 in the median: a wheel's load is positive .*--axes sae"),
         ("Fz,alpha,Fy\n4000,0.1,1\n4000,,1\n", "slip_angle = nan in row 1: must be finite"),
         ("Fz,alpha,Vx,Fy\n4000,0.1,-3,1\n", "speed = -3 in row 0: must be at least 0"),
         ("Fz,alpha,P,Fy\n4000,0.1,2e5,1\n4000,0.1,0,1\n", "pressure = 0 in row 1: must be positive"),
         ("Fz,alpha,phit,Fy\n4000,0.1,0.2,1\n", "phit is not 0 in every row"),
         ("Fz,alpha,Fy\n4000,fast,1\n", "'fast' is not a number"),
         ("Fz,alpha [kg],Fy\n4000,0.1,1\n", "unit 'kg' measures another thing"),
+        ("Fz,alpha,Fy\n4000,12,1\n", "alpha goes to 12 and names no unit.*name the column 'alpha [deg]'"),
+        ("Fz,in_kappa,camber,Fy\n4000,0.1,-4,1\n", "camber goes to 4 .*229 degrees.*'camber [deg]'"),
+        ("Fz,alpha [rad],Fy\n4000,2,1\n", "slip_angle = -2 in row 0: must be radians within a right angle"),
     ],
 )
 def test_bad_tables_are_named(csv, table, message):
@@ -106,16 +109,20 @@ def test_bad_tables_are_named(csv, table, message):
         io.read_rig_table(csv)
 
 
+def test_a_unit_in_the_name_is_believed(csv):
+    csv.write_text("Fz,alpha [deg],gamma [rad],Fy\n4000,12,1.25,1\n")
+    table = io.read_rig_table(csv)
+    np.testing.assert_allclose([table.slip_angle[0], table.camber[0]], [-np.radians(12), 1.25])
+
+
 def test_bad_arguments_are_named(csv, tydex, tmp_path):
-    with pytest.raises(InputError, match="axes = 'sae': must be one of"):
-        io.read_rig_table(csv, "sae")
-    with pytest.raises(InputError, match=r"TYDEX file, which knows its axes"):
-        io.read_rig_table(tydex, "ours")
+    with pytest.raises(InputError, match="axes = 'iso': must be one of 'sae', 'adapted-sae', 'iso-w', 'ours'"):
+        io.read_rig_table(csv, "iso")
     with pytest.raises(InputError, match="measured = 'F_q': must be one of"):
         io.read_rig_table(csv, measured=("F_q",))
     with pytest.raises(InputError, match="no file"):
         io.read_rig_table([])
     with pytest.raises(InputError, match="a rig table must end in one of"):
-        io.read_rig_table(tmp_path / "rig.mat")
+        io.read_rig_table(tmp_path / "rig.xlsx")
     with pytest.raises(InputError, match="must all be"):
         io.RigTable(np.zeros(2), np.zeros(3), np.ones(2), F_y=np.ones(2))

@@ -36,8 +36,8 @@ PLAIN = [
 ROWS = ["  2.0  1.5  4.0 -2000.  50.  90.", " -2.0  0.0  4.1  2010. NOTAVAIL  90."]
 
 
-def patch(channels, rows, constants=(), measured=MEASURED):
-    return contact_patch(parse_tydex(text(channels, rows, constants)), measured)
+def patch(channels, rows, constants=(), measured=MEASURED, axes="iso-w"):
+    return contact_patch(parse_tydex(text(channels, rows, constants)), measured, axes)
 
 
 def test_sections_header_and_comments():
@@ -49,9 +49,9 @@ def test_sections_header_and_comments():
     np.testing.assert_array_equal(file.channels["MZW"].values, [50.0, np.nan])
 
 
-def test_the_signs_and_units_of_the_package():
+def test_the_signs_of_the_file_and_the_units_of_the_package():
     found = patch(PLAIN, ROWS, [("INFLPRES", "bar", 2.5), ("INCLANGL", "deg", -1)])
-    np.testing.assert_allclose(found["slip_angle"], np.radians([-2.0, 2.0]))
+    np.testing.assert_allclose(found["slip_angle"], np.radians([2.0, -2.0]))
     np.testing.assert_allclose(found["slip_ratio"], [0.015, 0.0])
     np.testing.assert_allclose(found["load"], [4000.0, 4100.0])
     np.testing.assert_allclose(found["F_y"], [-2000.0, 2010.0])
@@ -61,7 +61,7 @@ def test_the_signs_and_units_of_the_package():
     np.testing.assert_allclose(found["camber"], np.radians([-1.0, -1.0]))
     assert found["F_x"] is None and found["M_x"] is None
     # As everywhere in the package: a positive slip angle gives a positive force.
-    assert np.all(np.sign(found["F_y"]) == np.sign(found["slip_angle"]))
+    assert np.all(np.sign(found["F_y"]) == -np.sign(found["slip_angle"]))
 
 
 @pytest.mark.parametrize(

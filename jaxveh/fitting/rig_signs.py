@@ -1,0 +1,100 @@
+"""The signs of rig data: slopes that every tyre has in one direction tell axes that were told wrongly.
+
+In this package's axes (z up) a positive slip angle gives a positive F_y, a positive slip ratio a positive F_x, the force of a
+slip angle acts behind the contact's centre, so that M_z falls with it, and a wheel is pushed to the side that its top leans
+to: camber, about x forwards, is positive to the right, where F_y is negative.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh.fitting.rig_stages import LEAST_SPREAD
+from jaxveh.io.rig_table import RigTable
+
+SMALL = {"slip_angle": np.radians(2.0), "slip_ratio": 0.02}
+"""Slips below which forces follow slip and camber, to the precision of a sign."""
+
+LEAST_ROWS, LEAST_LOAD = 8, 0.2
+"""Rows that a sign needs, and the share of the median load below which a row says nothing."""
+
+SURE = 3.0
+"""Standard errors that a slope must have the wrong sign by."""
+
+LEAST_SLOPE = {"F_y, slip_angle": 1.0, "F_x, slip_ratio": 1.0, "M_z, slip_angle": 0.02, "F_y, camber": 0.1}
+"""Slopes over load (1/rad, per slip ratio; m/rad for M_z) below which a wrong sign is none: an ordinary tyre's are 15,
+15, -0.5 and -1."""
+
+EXPECTED = {"F_y, slip_angle": 1.0, "F_x, slip_ratio": 1.0, "M_z, slip_angle": -1.0, "F_y, camber": -1.0}
+"""What each slope's sign must be."""
+
+WORDS = {
+    "F_y, slip_angle": "F_y falls with slip_angle: a positive slip angle must give a positive force",
+    "F_x, slip_ratio": "F_x falls with slip_ratio: a positive slip ratio must give a positive force",
+    "M_z, slip_angle": "M_z rises with slip_angle: a positive slip angle's force acts behind the centre and turns the wheel back",
+    "F_y, camber": "F_y rises with camber: a wheel is pushed to the side that it leans to, for a positive camber to the right",
+}
+
+
+class WrongSign(NamedTuple):
+    """A slope of the wrong sign: `pair` of what it is of (`F_y, camber`), the `slope` over load with its standard `error`, and
+    what is the matter in `words`."""
+
+    pair: str
+    slope: float
+    error: float
+    words: str
+
+
+def wrong_signs(rig: RigTable) -> tuple[WrongSign, ...]:
+    """The slopes of a rig table that no tyre has, as in data whose axes are others than those that were told."""
+    found = []
+    for pair, sign in EXPECTED.items():
+        channel, name = pair.split(", ")
+        slope, error = slope_of(rig, channel, name)
+        if -sign * slope > max(SURE * error, LEAST_SLOPE[pair]):
+            found.append(WrongSign(pair, slope, error, _in_words(rig, pair, slope, error)))
+    return tuple(found)
+
+
+def _in_words(rig: RigTable, pair: str, slope: float, error: float) -> str:
+    return (
+        f"{rig.source}: {WORDS[pair]} (slope over load {slope:.3g}, standard error {error:.1g}): are the axes of the data those "
+        "that were told (--axes sae, adapted-sae, iso-w or ours)?"
+    )
+
+
+def slope_of(rig: RigTable, channel: str, name: str) -> tuple[float, float]:
+    """The slope over load of a force or moment over slip angle, slip ratio or camber, where slips are small, and its
+    standard error.
+
+    Least squares with an offset and, for what acts sideways, slip angle and camber together; where few rows have a small slip,
+    the smallest of those that are swept. nan where the data do not tell.
+    """
+    values = getattr(rig, channel)
+    inputs = ["slip_ratio"] if name == "slip_ratio" else ["slip_angle", "camber"]
+    varied = [one for one in inputs if _varies(rig, one)]
+    if values is None or name not in varied:
+        return np.nan, np.nan
+    rows = np.isfinite(values) & (rig.load > LEAST_LOAD * np.median(rig.load))
+    for slip, most in SMALL.items():
+        size = np.abs(getattr(rig, slip))
+        if slip in varied and rows.sum() >= LEAST_ROWS:
+            most = max(most, float(np.sort(size[rows])[LEAST_ROWS - 1]))
+        rows &= size <= most
+    columns = np.stack([getattr(rig, one)[rows] for one in varied] + [np.ones(rows.sum())], axis=1)
+    if rows.sum() < LEAST_ROWS or np.linalg.matrix_rank(columns) < columns.shape[1]:
+        return np.nan, np.nan
+    target = values[rows] / rig.load[rows]
+    solution = np.linalg.lstsq(columns, target, rcond=None)[0]
+    left = target - columns @ solution
+    noise = np.sum(left**2) / max(rows.sum() - columns.shape[1], 1)
+    at = varied.index(name)
+    return float(solution[at]), float(np.sqrt(noise * np.linalg.inv(columns.T @ columns)[at, at]))
+
+
+def _varies(rig: RigTable, name: str) -> bool:
+    values = getattr(rig, name)
+    return values is not None and bool(np.ptp(np.percentile(values, [2, 98])) > LEAST_SPREAD[name])
