@@ -19,7 +19,7 @@ from jaxveh._core.parameter import pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
 from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study, tyres
-from jaxveh.experiments.tyre_apf.study import drive_once, guess_once, model_of
+from jaxveh.experiments.tyre_apf.study import auxiliary, drive_once, guess_once, model_of
 
 PAPERS_PARTICLES = 300
 """As printed."""
@@ -29,7 +29,7 @@ COUNTS = (100, PAPERS_PARTICLES)
 AGAIN = 8
 """How often each filter goes over the same drive, with other draws."""
 
-KINDS = {"PF": filters.ParticleFilter, "APF": filters.AuxiliaryParticleFilter}
+KINDS = {"PF": filters.ParticleFilter, "APF": auxiliary}
 
 SYSTEMATIC = "systematic"
 """What follows the name of a filter that resamples so."""
