@@ -123,7 +123,9 @@ class Guided(AbstractParticleFilter):
         share = jnp.asarray(unguided / self.particles, logs.dtype)
         mixed = jnp.logaddexp(jnp.log(share), jnp.log1p(-share) + oftener)
         weights, log_likelihood, alive = numerics.normalise(without(astray, logs - mixed))
-        belief = ParticleBelief(x, weights, jnp.arange(self.particles, dtype=jnp.int32), key, row.t, row.u, jnp.int32(1))
+        belief = ParticleBelief(
+            x, weights, jnp.arange(self.particles, dtype=jnp.int32), key, row.t, row.u, jnp.int32(1)
+        )
         uniform = jnp.full((self.particles,), 1 / self.particles, logs.dtype)
         became = fate(alive, astray)
         return belief, make_info(model, row, log_likelihood, residual, (uniform, weights), became)

@@ -22,7 +22,12 @@ MISLED = 0.5
 
 
 def _check_defensive(lookahead) -> None:
-    check(f"{type(lookahead).__name__}.defensive", lookahead.defensive, lambda s: (s >= 0) & (s < 1), "at least 0, below 1")
+    check(
+        f"{type(lookahead).__name__}.defensive",
+        lookahead.defensive,
+        lambda s: (s >= 0) & (s < 1),
+        "at least 0, below 1",
+    )
 
 
 class AbstractLookahead(eqx.Module):
@@ -128,7 +133,11 @@ WITHOUT_SLOPES = PointLookahead(defensive=0.5)
 
 def lookahead_for(model: StateSpace) -> AbstractLookahead:
     """What looks ahead where nothing is asked for: with the process noise where both noises are Gaussian."""
-    if model.process_noise is not None and is_gaussian(model.process_noise.law) and is_gaussian(model.measurement_noise):
+    if (
+        model.process_noise is not None
+        and is_gaussian(model.process_noise.law)
+        and is_gaussian(model.measurement_noise)
+    ):
         return PredictiveLikelihood()
     return WITHOUT_SLOPES
 
