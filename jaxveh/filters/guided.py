@@ -43,7 +43,7 @@ from jaxveh.statespace.noise import LOG_2PI
 RULES = ("extended", "unscented")
 
 UNGUIDED = 0.1
-"""The share of the first particles that are drawn from the prior alone, so that no weight is more than ten times the likelihood."""
+"""The share of the first particles that the prior alone draws, so that no weight is more than ten times the likelihood."""
 
 
 class Proposal(NamedTuple):
@@ -72,9 +72,9 @@ class Guided(AbstractParticleFilter):
     adapted filter (M. Pitt & N. Shephard 1999), whose weights are all equal. It pays where the measurement is sharper than the
     process noise; each particle costs a small Kalman update. **Where the observation is curved over the process noise, do not
     choose it**: with `"extended"` it loses what the slope does not see, and the effective sample size says nothing of it, for it
-    rises (the growth model, 40 rows, 1000 particles: log-likelihood AUX_LOSS too low, without `auxiliary` PLAIN_LOSS). Rows of
-    which the particles themselves show it have `info.remark = Result.lookahead_misled`. The process noise must be Gaussian, and
-    measurement noise have a covariance.
+    rises (one recording of the growth model, 40 rows, 1000 particles: log-likelihood 1.5 too low, scattered by 1.9, the ESS
+    700; without `auxiliary` 0.6, 0.8 and 550). Rows of which the particles themselves show it have
+    `info.remark = Result.lookahead_misled`. The process noise must be Gaussian, and measurement noise have a covariance.
     """
 
     particles: int = eqx.field(static=True)

@@ -1,4 +1,4 @@
-"""Every particle filter and every way to resample, against exact log-likelihoods: sharp, middle and coarse sensors, and two peaks.
+"""Every particle filter and way to resample against exact log-likelihoods: sharp, middle and coarse sensors, and two peaks.
 
 One model with different numbers is all four cases, so that each filter is compiled once. A new particle filter of
 `filters.__all__` must have a line in `FILTERS`, or a reason in `OTHERS`; a new scheme of `numerics` is taken by itself.
