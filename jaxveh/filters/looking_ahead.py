@@ -116,11 +116,9 @@ class PointLookahead(AbstractLookahead):
         return log_prob(model, row, ahead, measured, present)
 
     def moved(self, model, t0, t1, x, u):
-        move = model.transition if self.characteristic is None else self._characteristic(model)
-        return move(t0, t1, x, u)
-
-    def _characteristic(self, model):
-        return lambda t0, t1, x, u: self.characteristic(model, t0, t1, x, u)
+        if self.characteristic is None:
+            return model.transition(t0, t1, x, u)
+        return self.characteristic(model, t0, t1, x, u)
 
     @property
     def moves_by_transition(self):
@@ -167,6 +165,7 @@ def remark_of(weights: Any, log_drawn: Any) -> Any:
 
 def noises(model: StateSpace, dt: Any) -> tuple[AbstractNoise, Any]:
     """The law of the process noise over `dt`, and the covariance (m, m) of the measurement noise, by channel."""
+    assert model.process_noise is not None  # `PredictiveLikelihood.check` has seen to it
     return model.process_noise.over(dt), model.measurement_noise.covariance()
 
 
