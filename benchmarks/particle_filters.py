@@ -71,7 +71,10 @@ def _case_of_many(kind: str, dtype: str) -> Case:
 
 
 def _filter(auxiliary: bool, count: int) -> filters.AbstractParticleFilter:
-    return (filters.AuxiliaryParticleFilter if auxiliary else filters.ParticleFilter)(count)
+    if not auxiliary:
+        return filters.ParticleFilter(count)
+    # What the limit and the peers do: they look ahead to a point.
+    return filters.AuxiliaryParticleFilter(count, lookahead=filters.PointLookahead())
 
 
 def _build(auxiliary: bool, dtype: np.dtype, count: int, smoke: bool) -> Sequence[Contestant | Skipped]:

@@ -8,7 +8,10 @@ import jax.numpy as jnp
 
 
 class Result(IntEnum):
-    """What became of a computation; 0 is success and the first failure of a run is kept."""
+    """What became of a computation; 0 is success and the first failure of a run is kept.
+
+    The last two are remarks on a row (`filters.Info.remark`), after which a run goes on.
+    """
 
     successful = 0
     not_positive_definite = 1
@@ -18,6 +21,8 @@ class Result(IntEnum):
     not_converged = 5
     too_stiff = 6
     measurement_too_late = 7
+    lookahead_misled = 8
+    transport_not_converged = 9
 
     @property
     def message(self) -> str:
@@ -36,6 +41,11 @@ _MESSAGES = {
     Result.not_converged: "the solver stopped before its tolerance was met (more steps, or better start values)",
     Result.too_stiff: "the step is too long for the model's fastest pole (shorten the step or choose an implicit solver)",
     Result.measurement_too_late: "a measurement is older than the rows that are kept, and was left out (keep more: depth)",
+    Result.lookahead_misled: "the measurement contradicts what was looked ahead for: weights vary at least twice as much as "
+    "without, and the log-likelihood is low (look ahead with the process noise, PredictiveLikelihood, or not at all, "
+    "ParticleFilter)",
+    Result.transport_not_converged: "the transport plan did not converge, and particles were resampled systematically "
+    "instead (more iterations, or a larger epsilon)",
 }
 
 

@@ -36,6 +36,7 @@ from jaxveh.filters.gaussian import (
 )
 from jaxveh.filters.guided import Guided
 from jaxveh.filters.kernels import LiuWest, Regularised
+from jaxveh.filters.looking_ahead import AbstractLookahead, PointLookahead, PredictiveLikelihood
 from jaxveh.filters.marginalised import Marginalised, MarginalisedBelief
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, ParticleFilter
 from jaxveh.filters.smoothing import BackwardSampling, FixedLag, Genealogy, SmoothedEstimate, smooth
@@ -68,6 +69,7 @@ __all__ = [
     "AbstractFilter",
     "AbstractForm",
     "AbstractGaussianFilter",
+    "AbstractLookahead",
     "AbstractParticleFilter",
     "Accuracy",
     "AdaptiveNumber",
@@ -108,6 +110,8 @@ __all__ = [
     "ParticleBelief",
     "ParticleFilter",
     "Paused",
+    "PointLookahead",
+    "PredictiveLikelihood",
     "Regularised",
     "RobustStudentT",
     "Runs",

@@ -226,7 +226,7 @@ def _variances(law, dtype):
     return jnp.diagonal(law.covariance()) if law.has_covariance else jnp.full((len(law.names),), jnp.nan, dtype)
 
 
-def make_info(model, row, log_likelihood, residual, weights, became, within=None, particles=None):
+def make_info(model, row, log_likelihood, residual, weights, became, within=None, particles=None, remark=None):
     """The info of one step; `weights`: those of the prediction, whose residuals are given, and those after the row; `became`:
     its result code where the input is right; `within`: the variance by channel that the residuals lack, but for R; `particles`
     of the prediction, which noise that depends on the state is of."""
@@ -252,6 +252,7 @@ def make_info(model, row, log_likelihood, residual, weights, became, within=None
         nis=jnp.full((), jnp.nan, dtype),
         ess=numerics.ess(after),
         result=jnp.where(result == 0, became, result),
+        remark=code(Result.successful) if remark is None else remark,
     )
 
 
@@ -261,11 +262,13 @@ def mean_variances(model, weights, variances):
 
 
 class Drawn(NamedTuple):
-    """Particles before their measurement: where they came from, their weights and the logarithms of these, with derivatives."""
+    """Particles before their measurement: where they came from, their weights and the logarithms of these, with derivatives;
+    `remark`: the code of how they were chosen."""
 
     ancestors: Any
     weights: Any
     log_weights: Any
+    remark: Any
 
 
 class ParticleFilter(AbstractParticleFilter):
@@ -287,7 +290,7 @@ class ParticleFilter(AbstractParticleFilter):
         particles, key = start_particles(self, model, row, key)
         uniform = jnp.full((self.particles,), 1 / self.particles, particles[0].dtype)
         ancestors = jnp.arange(self.particles, dtype=jnp.int32)
-        drawn = Drawn(ancestors, uniform, log_of(uniform))
+        drawn = Drawn(ancestors, uniform, log_of(uniform), code(Result.successful))
         none = jnp.zeros(self.particles, bool)
         return self._weigh(model, row, particles, drawn, none, key, jnp.int32(0))
 
@@ -306,9 +309,11 @@ class ParticleFilter(AbstractParticleFilter):
         """The next particles before they move."""
         uniform = jnp.full((self.particles,), 1 / self.particles, belief.weights.dtype)
         logs = log_of(belief.weights)
+        remark = code(Result.successful)
         if isinstance(self.resampling, Transport):
-            particles, chosen = self.resampling.moved(belief.particles, belief.weights), log_of(uniform)
-            ancestors = jnp.arange(self.particles, dtype=jnp.int32)
+            particles, ancestors, chosen, converged = _transported(self, key, belief, logs)
+            chosen = log_of(uniform) + chosen
+            remark = jnp.where(converged, remark, code(Result.transport_not_converged))
             resampled = None if self.threshold >= 1 else numerics.ess(belief.weights) < self.threshold * self.particles
         else:
             ancestors, resampled = choose_ancestors(self, key, belief.weights)
@@ -319,7 +324,8 @@ class ParticleFilter(AbstractParticleFilter):
             particles = jax.tree.map(lambda new, old: jnp.where(resampled, new, old), particles, belief.particles)
             weights = jnp.where(resampled, weights, belief.weights)
             chosen = jnp.where(resampled, chosen, logs)
-        return particles, Drawn(ancestors, weights, chosen)
+            remark = jnp.where(resampled, remark, code(Result.successful))
+        return particles, Drawn(ancestors, weights, chosen, remark)
 
     def _weigh(self, model, row, particles, drawn, lost, key, count):
         measured, present = presence(model, row)
@@ -329,8 +335,22 @@ class ParticleFilter(AbstractParticleFilter):
         # normalise gives the log of the mean over N of what sums to the likelihood.
         log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
         became = fate(alive, lost)
-        about = (drawn.weights, weights)
-        return belief, make_info(model, row, log_likelihood, residual, about, became, particles=particles)
+        both = (drawn.weights, weights)
+        info = make_info(model, row, log_likelihood, residual, both, became, particles=particles, remark=drawn.remark)
+        return belief, info
+
+
+def _transported(filter_, key, belief, logs):
+    """Particles moved by the plan, their ancestors, what choosing adds to their log weights, and whether the plan converged:
+    else they are drawn systematically. `logs`: the log weights (N,)."""
+    moved, converged = filter_.resampling.moved(belief.particles, belief.weights)
+    weights = jax.lax.stop_gradient(belief.weights)
+    ancestors = checkpoint_name(numerics.systematic(key, weights, filter_.particles).astype(jnp.int32), KEPT)
+    drawn = gather(belief.particles, ancestors)
+    particles = jax.tree.map(lambda new, old: jnp.where(converged, new, old), moved, drawn)
+    chosen = jnp.where(converged, 0.0, log_chosen(filter_, logs, ancestors))
+    themselves = jnp.arange(filter_.particles, dtype=ancestors.dtype)
+    return particles, jnp.where(converged, themselves, ancestors), chosen, converged
 
 
 def need_key(filter_, key):

@@ -29,6 +29,7 @@ class Info(NamedTuple):
     measurement, (particle filters, else NaN). `result`: code, see `jaxveh.Result`. `whitened`, `log_scale`: innovations
     decorrelated in the order of the channels and the logarithm of what each was divided by, zero where missing (Gaussian
     filters, else None): `-0.5 whitened^2 - log_scale - 0.5 log(2 pi)` of the channels present add up to the log-likelihood.
+    `remark` (particle filters, else None): the code of what a person should know though the filter went on, else zero.
     """
 
     log_likelihood: Any
@@ -39,6 +40,7 @@ class Info(NamedTuple):
     result: Any
     whitened: Any = None
     log_scale: Any = None
+    remark: Any = None
 
 
 class AbstractBelief(eqx.Module):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import equinox as eqx
@@ -9,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import FilterError, is_concrete
+from jaxveh._core.errors import FilterError, JaxvehWarning, is_concrete
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
 from jaxveh.statespace.contract import KEPT, AbstractFilter, Info
@@ -52,13 +53,15 @@ def run(filter, model: StateSpace, recording: Recording, *, key=None, throw: boo
     checkpointed. Inside jit the checks are skipped, and failures are left in `result`.
 
     **Raises** `InputError` where model, filter and recording do not go together; `FilterError` with step, time and
-    reason where the filter failed, unless `throw=False`.
+    reason where the filter failed, and **warns** (`JaxvehWarning`) where it went on but remarks on rows (`info.remark`),
+    unless `throw=False`.
     """
     filter.check(model)
     estimate = scan(filter, model, model.rows(recording), key)
     estimate = eqx.tree_at(lambda e: e.time, estimate, recording.time)
     if throw:
         raise_failure(estimate, filter, model, recording)
+        warn_of_remarks(estimate, filter)
     return estimate
 
 
@@ -102,3 +105,23 @@ def raise_failure(estimate: Estimate, filter, model: StateSpace, recording: Reco
         f"{type(filter).__name__} failed in row {k} (t = {np.asarray(recording.time)[k]:.6g} s; {shown}): {reason.message}. "
         "throw=False returns what there is."
     )
+
+
+WORTH_TELLING = {Result.lookahead_misled: 0.05, Result.transport_not_converged: 0.0}
+"""The share of rows above which a remark is told: of a look-ahead, some surprises are chance."""
+
+
+def warn_of_remarks(estimate: Estimate, filter) -> None:
+    """Warn of what the filter remarked on in more rows than chance has it; tracers pass."""
+    remarks = estimate.info.remark
+    if remarks is None or not is_concrete(remarks):
+        return
+    remarks = np.asarray(remarks)
+    for reason, share in WORTH_TELLING.items():
+        rows = int((remarks == reason).sum())
+        if rows > share * remarks.size:
+            warnings.warn(
+                f"{type(filter).__name__}, in {rows} of {remarks.size} rows: {reason.message}.",
+                JaxvehWarning,
+                stacklevel=3,
+            )

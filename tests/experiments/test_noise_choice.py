@@ -9,7 +9,7 @@ import pytest
 import scipy.stats
 
 from jaxveh import Recording
-from jaxveh.experiments.tyre_apf import Study, noise
+from jaxveh.experiments.tyre_apf import Study, noise, predictive
 from jaxveh.experiments.tyre_apf.settings import Level
 
 SMALL = dataclasses.replace(Study(), rate=25.0, particles=40)
@@ -107,3 +107,15 @@ def test_its_drives_are_not_those_of_the_report(choice):
     honest, _ = jax.random.split(jax.random.key(0))
     shown = jax.random.key_data(jax.random.split(honest, 50))
     assert not (np.asarray(keys)[:, None] == np.asarray(shown)[None]).all(axis=-1).any()
+
+
+@pytest.mark.full
+def test_the_predictive_look_ahead_is_raced_at_noise_of_its_own_choice():
+    study = dataclasses.replace(SMALL, duration=6.0, rate=20.0)
+    levels, raced = predictive.race(
+        study, 2, jax.random.key(0), levels=[Level(0.02, 0.4, None)], candidates=CANDIDATES[:2], rounds=[noise.Round(2, 2)],
+        particles=40, again=2,
+    )  # fmt: skip
+    assert levels[0].noise in [noise.Noise(*candidate) for candidate in CANDIDATES[:2]]
+    assert (raced.found[40]["result"] == 0).all()
+    assert raced.found[40].compare("error", "filter", "APF", "PF").wins.shape == (1,)

@@ -83,7 +83,7 @@ def test_the_paper_resamples_multinomially_and_systematically_stands_beside_it()
     for name, filter_ in {**few, **paper}.items():
         systematic = name.endswith("systematic")
         assert filter_.resampling is (numerics.systematic if systematic else numerics.multinomial)
-        assert filter_.threshold == 1.0 and isinstance(filter_, sharpness.KINDS[name.split(",")[0]])
+        assert filter_.threshold == 1.0 and type(filter_) is type(sharpness.KINDS[name.split(",")[0]](2))
     design = sweeps.Design(filter={"prior": 0, **dict.fromkeys(paper, 1)}, level=[0.0])
     pairs = sharpness.pairs(sweeps.Swept(design, 2, {}))
     assert pairs == [("APF", "PF"), ("APF, systematic", "PF, systematic")]

@@ -63,14 +63,14 @@ class TestTransport:
         # Whole numbers of twentieths: particle i takes the place of as many.
         counts = rng.multinomial(20, np.full(20, 1 / 20))
         particles = record_type("P", ("x",))(jnp.asarray(x))
-        moved = filters.Transport(1e-4, 3000).moved(particles, jnp.asarray(counts / 20))
+        moved, _ = filters.Transport(1e-4, 3000).moved(particles, jnp.asarray(counts / 20))
         np.testing.assert_allclose(moved.x, np.repeat(x, counts), atol=0.02)
 
     def test_the_mean_stays_and_a_field_that_does_not_vary_is_left_alone(self):
         rng = np.random.default_rng(2)
         particles = record_type("P", ("x", "y"))(jnp.asarray(rng.normal(size=30)), jnp.full(30, 7.0))
         weights = jnp.asarray(rng.dirichlet(np.ones(30)))
-        moved = filters.Transport(0.2, 300).moved(particles, weights)
+        moved, _ = filters.Transport(0.2, 300).moved(particles, weights)
         np.testing.assert_allclose(jnp.mean(moved.x), jnp.sum(weights * particles.x), atol=1e-4)
         np.testing.assert_allclose(moved.y, 7.0, rtol=1e-12)
 

@@ -131,6 +131,13 @@ FILTERS = {
     ),
     "bootstrap": Line(lambda: PARTICLES, exact=False, differentiable=False, drawn=True),
     "auxiliary": Line(lambda: filters.AuxiliaryParticleFilter(N), exact=False, differentiable=False, drawn=True),
+    "auxiliary, to a point": Line(
+        lambda: filters.AuxiliaryParticleFilter(N, lookahead=filters.PointLookahead()),
+        exact=False,
+        differentiable=False,
+        drawn=True,
+        seldom=True,
+    ),
 }
 
 

@@ -17,7 +17,9 @@ KINDS = {
     "bootstrap": filters.ParticleFilter(N),
     "seldom resampled": filters.ParticleFilter(N, threshold=0.1),
     "auxiliary": filters.AuxiliaryParticleFilter(N),
-    "auxiliary, other lookahead": filters.AuxiliaryParticleFilter(N, lookahead=lambda model, t0, t1, x, u: x),
+    "auxiliary, other lookahead": filters.AuxiliaryParticleFilter(
+        N, lookahead=filters.PointLookahead(lambda model, t0, t1, x, u: x)
+    ),
     "guided": filters.Guided(N),
     "guided, auxiliary": filters.Guided(N, "unscented", auxiliary=True),
     "marginalised": filters.Marginalised(N, ("drift",)),

@@ -43,8 +43,8 @@ def runs(filter_, model, rows, keys):
 def test_likelihood_and_means_are_the_grid_s_within_their_scatter(name, model):
     if "guided" in name and model == "volatility":
         pytest.skip("its measurement noise has no covariance")
-    if "auxiliary" in name and model == "growth":
-        pytest.skip("what looks ahead from one peak misses the other: weights without useful variance")
+    if name == "guided, unscented, auxiliary" and model == "growth":
+        pytest.skip("what is guided from one peak misses the other: weights without useful variance")
     system, measured, total, means = answer(model)
     rows = system.rows(as_recording(measured))
     logs, found, results = runs(PARTICLE[name], system, rows, jax.random.split(jax.random.key(5), SEEDS))

@@ -149,7 +149,10 @@ def particle_runs(measured):
     """Log-likelihoods of our bootstrap and auxiliary filters, (RUNS,) each."""
     model, keys = _model(), jax.random.split(jax.random.key(0), RUNS)
     rows = model.rows(Recording(DT * np.arange(ROWS), {"sine": measured}))
-    kinds = {"bootstrap": filters.ParticleFilter(N), "auxiliary": filters.AuxiliaryParticleFilter(N)}
+    kinds = {
+        "bootstrap": filters.ParticleFilter(N),
+        "auxiliary": filters.AuxiliaryParticleFilter(N, lookahead=filters.PointLookahead()),
+    }
     runs = lambda filter_: jax.vmap(lambda key: filters.scan(filter_, model, rows, key).log_likelihood)(keys)
     return {name: np.asarray(runs(filter_)) for name, filter_ in kinds.items()}
 

@@ -23,7 +23,7 @@ from jaxveh._core.errors import InputError, check_at_least
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
 from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study
-from jaxveh.experiments.tyre_apf.sharpness import KINDS, PAPERS_PARTICLES, drive_at, several_passes
+from jaxveh.experiments.tyre_apf.sharpness import KINDS, PAPERS_PARTICLES, Kinds, drive_at, several_passes
 from jaxveh.experiments.tyre_apf.study import drive_once, filter_of, guess_once, model_of
 
 V_Y = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
@@ -90,6 +90,7 @@ def choose_level(
     rounds: Sequence[Round] = ROUNDS,
     keep: int = KEEP,
     seed: int = 2000,
+    kinds: Kinds | None = None,
     progress: Progress = silent,
 ) -> Choice:
     """Choose what both particle filters assume at a level of the sensors' noise, resampling as the paper does: the candidate with
@@ -99,10 +100,11 @@ def choose_level(
     as that. With sharp sensors 300 particles lose some drives whatever they assume: how badly (log-likelihoods of -1e9 where
     others have 4e3) would otherwise decide alone, while medians would not mind a third of all drives lost.
 
-    Each of the `rounds` (at least one) takes the `keep` best of the one before to drives of its own, and the last is returned.
+    `kinds`: the filters, by default the paper's. Each of the `rounds` (at least one) takes the `keep` best of the one before to
+    drives of its own, and the last is returned.
     """
     check_at_least("number of rounds", len(rounds), 1)
-    both = [kind(particles, numerics.multinomial) for kind in KINDS.values()]
+    both = [kind(particles, numerics.multinomial) for kind in (KINDS if kinds is None else kinds).values()]
     for i, (drives, again) in enumerate(rounds):
         told = part(progress, i / len(rounds), (i + 1) / len(rounds), f"round {i + 1}")
         log_likelihood = _of_level(study, level, both, candidates, again, (drives, seed + i), told)

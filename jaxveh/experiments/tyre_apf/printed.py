@@ -14,6 +14,7 @@ from jaxveh import estimators, filters, manoeuvres, numerics, sensors, vehicles
 from jaxveh._core.bijectors import Real
 from jaxveh._core.parameter import pick, resolve
 from jaxveh.experiments.tyre_apf.settings import tyres
+from jaxveh.experiments.tyre_apf.study import auxiliary
 from jaxveh.simulation import simulate
 from jaxveh.statespace import Continuous, Gaussian
 
@@ -89,7 +90,7 @@ def run_printed(printed: Printed, key) -> PrintedOutcome:
     series, ess = {}, {}
     for name, kind, k in (
         ("PF", filters.ParticleFilter(printed.particles, numerics.multinomial), pf_key),
-        ("APF", filters.AuxiliaryParticleFilter(printed.particles, numerics.multinomial), apf_key),
+        ("APF", auxiliary(printed.particles, numerics.multinomial), apf_key),
     ):
         estimate = filters.scan(kind, model, rows, k)
         series[name] = jnp.stack([getattr(estimate.mean, field) for field in fields])

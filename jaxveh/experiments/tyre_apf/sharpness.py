@@ -7,7 +7,7 @@ beside it: but for sharp sensors it gives the plain filter more than looking ahe
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import jax
@@ -19,7 +19,7 @@ from jaxveh._core.parameter import pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
 from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study, tyres
-from jaxveh.experiments.tyre_apf.study import drive_once, guess_once, model_of
+from jaxveh.experiments.tyre_apf.study import auxiliary, drive_once, guess_once, model_of
 
 PAPERS_PARTICLES = 300
 """As printed."""
@@ -29,7 +29,13 @@ COUNTS = (100, PAPERS_PARTICLES)
 AGAIN = 8
 """How often each filter goes over the same drive, with other draws."""
 
-KINDS = {"PF": filters.ParticleFilter, "APF": filters.AuxiliaryParticleFilter}
+Kinds = Mapping[str, Callable[..., filters.AbstractParticleFilter]]
+
+KINDS: Kinds = {"PF": filters.ParticleFilter, "APF": auxiliary}
+"""The paper's filters, which the criteria are about."""
+
+PREDICTIVE: Kinds = {"PF": filters.ParticleFilter, "APF": filters.AuxiliaryParticleFilter}
+"""The same with an auxiliary filter that looks ahead with the process noise: a contestant of its own (`predictive`)."""
 
 SYSTEMATIC = "systematic"
 """What follows the name of a filter that resamples so."""
@@ -50,24 +56,30 @@ def run_sharpness(
     *,
     counts: Sequence[int] = COUNTS,
     again: int = AGAIN,
+    kinds: Kinds | None = None,
+    levels: Sequence[Level] = LEVELS,
     progress: Progress = silent,
 ) -> Sharpness:
-    """Both filters with every number of particles at each level of noise, on the same drives from the same guesses."""
+    """Both filters (`kinds`, by default `KINDS`) with every number of particles at each of the `levels` of noise.
+
+    On the same drives, from the same guesses.
+    """
     found = {}
     for i, count in enumerate(counts):
-        runs = {name: _passes(study, filter_, again) for name, filter_ in contestants(count).items()}
-        design = sweeps.Design(filter={"prior": _prior(study), **runs}, level=range(len(LEVELS)))
+        runs = {name: _passes(study, filter_, again, levels) for name, filter_ in contestants(count, kinds).items()}
+        design = sweeps.Design(filter={"prior": _prior(study), **runs}, level=range(len(levels)))
         told = part(progress, i / len(counts), (i + 1) / len(counts), f"{count} particles")
         run = lambda point, key: point.filter(point.level, key)
         found[count] = sweeps.sweep(run, design, seeds, key, progress=told)
     return Sharpness(found)
 
 
-def contestants(count: int) -> dict[str, filters.AbstractParticleFilter]:
+def contestants(count: int, kinds: Kinds | None = None) -> dict[str, filters.AbstractParticleFilter]:
     """Both filters with `count` particles; with the paper's number, both ways to resample."""
-    chosen = {name: kind(count, numerics.multinomial) for name, kind in KINDS.items()}
+    kinds = KINDS if kinds is None else kinds
+    chosen = {name: kind(count, numerics.multinomial) for name, kind in kinds.items()}
     if count == PAPERS_PARTICLES:
-        chosen |= {f"{name}, {SYSTEMATIC}": kind(count, numerics.systematic) for name, kind in KINDS.items()}
+        chosen |= {f"{name}, {SYSTEMATIC}": kind(count, numerics.systematic) for name, kind in kinds.items()}
     return chosen
 
 
@@ -97,9 +109,9 @@ def _prior(study: Study):
     return run
 
 
-def _passes(study: Study, filter_, again: int):
+def _passes(study: Study, filter_, again: int, levels: Sequence[Level]):
     def run(level, key):
-        at = lambda which: jnp.asarray([which(one) for one in LEVELS])[level.astype(int)]
+        at = lambda which: jnp.asarray([which(one) for one in levels])[level.astype(int)]
         noise = Noise(*(at(lambda one, name=name: getattr(one.noise, name)) for name in ("v_y", "yaw_rate", "walk")))
         chosen = Level(at(lambda one: one.yaw_rate), at(lambda one: one.a_y), noise)
         last, likelihood, result = several_passes(study, filter_, chosen, again, key)

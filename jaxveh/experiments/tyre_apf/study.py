@@ -74,8 +74,13 @@ def filter_of(study: Study, name: str):
     """The filter called `PF`, `APF` or `UKF`, and the noise that its model assumes."""
     if name == "UKF":
         return filters.Unscented(), study.gaussian
-    kind = filters.ParticleFilter if name == "PF" else filters.AuxiliaryParticleFilter
-    return kind(study.particles), study.particle
+    plain = filters.ParticleFilter(study.particles)
+    return plain if name == "PF" else auxiliary(study.particles), study.particle
+
+
+def auxiliary(particles: int, resampling=numerics.systematic) -> filters.AuxiliaryParticleFilter:
+    """The paper's auxiliary filter: it looks ahead to a point of each particle's future."""
+    return filters.AuxiliaryParticleFilter(particles, resampling, lookahead=filters.PointLookahead())
 
 
 def with_tyres(values):
