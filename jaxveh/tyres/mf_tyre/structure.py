@@ -103,7 +103,8 @@ class Structure(eqx.Module):
         carries = jnp.maximum(carries * (1 + self.PFZ1 * dp_i), 1e-12)
         # q_2 x^2 + q_1 x = load, by the root's form that holds for q_2 = 0 as well.
         target = load / (carries * self.FNOMIN)
-        x = 2 * target / (q_1 + numerics.sqrt(q_1**2 + 4 * self.Q_FZ2 * target))
+        root = numerics.sqrt(jnp.maximum(q_1**2 + 4 * self.Q_FZ2 * target, 0.0))
+        x = 2 * target / unless_zero(q_1 + root)
         return jnp.maximum(x * self.UNLOADED_RADIUS, 0.0)
 
     def loaded_radius(self, load, camber, wheel: Wheel, dp_i, F_x, F_y):
