@@ -10,7 +10,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator, Sequence
 from typing import IO
@@ -86,7 +85,8 @@ def end_with_parent() -> None:
         return
 
     def watch() -> None:
-        sys.stdin.buffer.read()
+        while os.read(0, 1024):  # not sys.stdin, whose lock an ending interpreter would not get
+            pass
         done = threading.Event()
         os.kill(os.getpid(), signal.SIGINT)
         done.wait(GRACE)

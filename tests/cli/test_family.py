@@ -69,6 +69,20 @@ def test_children_end_with_their_parent(tmp_path, name):
     assert parent.returncode in codes[name]
 
 
+def test_a_child_that_is_done_ends_in_order():
+    source = (
+        LOAD
+        + """
+with family.Family().child([sys.executable, "-c", os.environ["CHILD"]], sys.stdout, OWN="1") as child:
+    said = child.stderr.read()
+sys.exit(f"{child.returncode} {said}" if child.returncode or said else 0)
+"""
+    )
+    env = {**os.environ, "CHILD": LOAD + "family.end_with_parent()\nassert os.environ['OWN'] == '1'\ntime.sleep(0.2)"}
+    done = subprocess.run([sys.executable, "-c", source], env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def wait_for(condition, seconds=60.0):
     end = time.monotonic() + seconds
     while not condition():
