@@ -273,7 +273,7 @@ BITS = ("arctan", "log", "sqrt")
     [
         ("scan", jnp.float32),
         ("checkpoint", jnp.float64),
-        ("solver", jnp.float64),
+        pytest.param("solver", jnp.float64, marks=pytest.mark.full),
         pytest.param("checkpoint", jnp.float32, marks=pytest.mark.full),
         pytest.param("solver", jnp.float32, marks=pytest.mark.full),
     ],
