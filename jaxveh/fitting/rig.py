@@ -12,12 +12,14 @@ import numpy as np
 
 from jaxveh._core.errors import FilterError, InputError, check_at_least, check_one_of, check_positive
 from jaxveh._core.names import check_names
-from jaxveh._core.parameter import Where, pick, resolve
+from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, silent
+from jaxveh.fitting.problem import Found, on_line, picked
+from jaxveh.fitting.result import AbstractFit
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
-from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered
-from jaxveh.fitting.rig_solve import covariance, information
+from jaxveh.fitting.rig_problem import RigProblem, contact_of, offered, spread_of
 from jaxveh.fitting.rig_stages import Stage, stages_of
+from jaxveh.fitting.solve import fit_at
 from jaxveh.io.rig_table import MEASURED, RigTable
 from jaxveh.tyres import AbstractTyre, MFTyre
 
@@ -27,24 +29,26 @@ KNOWN = ("nominal_load", "reference_load")
 """Parameters that say where others hold: known, not fitted unless `where` picks them."""
 
 
-class RigFit(eqx.Module):
-    """A tyre fitted to rig data.
+class RigFit(AbstractFit):
+    """A tyre fitted to rig data: a fit (see `AbstractFit`), and what the rig says of it.
 
-    `tyre`: the law with its coefficients. `names` (p,), `values`, `std` (p,): the coefficients that were fitted, in the law's
-    units; standard errors by the Gauss-Newton matrix of the joint stage with the noise estimated from residuals, nan where
-    one is larger than the coefficient's own size: data do not identify it; `identified`: how many directions they do.
-    `unconstrained`, `covariance` (p, p): on the line of each one's bijector. By channel (`F_x`, ...): `rmse` of residuals,
-    `peak` (the 99.5th percentile of what was measured), `start_rmse` before the fit, `noise` (standard deviation), and
-    `cross_validation`, the RMSE at rows that a fold's fit did not see (nan without). `residuals` (n,): fitted less measured, nan
-    without a measurement. `stages`: a report each.
+    `model`, also as `tyre`: the law with its coefficients; standard errors by the Gauss-Newton matrix of the joint stage with the
+    noise estimated from residuals, nan where one is larger than the coefficient's own size: data do not identify it;
+    `identified`: how many directions they do. By channel (`F_x`, ...): `rmse` of residuals, `peak` (the 99.5th percentile of
+    what was measured), `start_rmse` before the fit, `noise` (standard deviation), and `cross_validation`, the RMSE at rows that a
+    fold's fit did not see (nan without). `residuals` (n,): fitted less measured, nan without a measurement. `stages`: a report
+    each. `problem`: the joint stage's at the fit, for `solve` and `bootstrap`.
     """
 
-    tyre: AbstractTyre
-    names: tuple[str, ...] = eqx.field(static=True)
-    values: np.ndarray
-    std: np.ndarray
+    values: Any
+    std: Any
     unconstrained: np.ndarray
     covariance: np.ndarray
+    cost: Any
+    steps: Any
+    result: Any
+    model: AbstractTyre
+    parameters: tuple[Parameter, ...] = eqx.field(static=True)
     identified: int = eqx.field(static=True)
     rmse: dict[str, float]
     start_rmse: dict[str, float]
@@ -53,6 +57,12 @@ class RigFit(eqx.Module):
     noise: dict[str, float]
     residuals: dict[str, np.ndarray]
     stages: tuple[StageReport, ...] = eqx.field(static=True)
+    problem: RigProblem
+
+    @property
+    def tyre(self) -> AbstractTyre:
+        """The fitted law."""
+        return self.model
 
 
 def fit_rig(
@@ -60,6 +70,7 @@ def fit_rig(
     rig: RigTable,
     *,
     where: Where | None = None,
+    prior: float | Mapping[str, float] | None = None,
     measured: Sequence[str] | None = None,
     weights: Mapping[str, float] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -75,31 +86,23 @@ def fit_rig(
 
     MF-Tyre goes in stages (pure slip, combined slip, moments) over the coefficients that the data show (those of load where
     the load varies, and so on), then all of them together; other laws at once. `where` picks coefficients instead.
-    `measured`: the forces and moments to be compared; by default those that both data and law have. `weights`: by channel, on
-    top of one over the noise squared, which is estimated. `bounds`: by name, an interval that a coefficient stays in. `robust`:
-    residuals beyond two standard deviations count by their size. `folds`: parts for cross-validation, whole runs
-    where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law
-    that is near the data already.
+    `prior`: relative spreads around the law's own coefficients, one number or by name, as in all fits. `measured`: the forces
+    and moments to be compared; by default those that both data and law have. `weights`: by channel, on top of one over the
+    noise squared, which is estimated. `bounds`: by name, an interval that a coefficient stays in. `robust`: residuals beyond
+    two standard deviations count by their size. `folds`: parts for cross-validation, whole runs where the data number them,
+    blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law that is near the data already.
+
+    A program that looks at the data (which coefficients they show, how noisy they are) and goes through `LevenbergMarquardt` round
+    by round: for `jit`, `vmap` and `grad` see `pose_rig` and `solve`.
 
     **Raises** `InputError` for a channel, weight or bound that has no match, a start outside its bounds or without finite
     forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`;
     `FilterError` where the joint fit does not converge, unless `throw=False`.
     """
-    contact = contact_of(rig)
-    channels = _channels(law, rig, contact, measured)
-    extra = {} if weights is None else dict(weights)
-    check_names("weights", extra, channels)
-    for name, weight in extra.items():
-        check_positive(f"weights[{name!r}]", weight)
     check_at_least("max_steps", max_steps, 1)
-    chosen = None if where is None else tuple(p.name for p in resolve(law, where))
-    plan = stages_of(law, rig, channels, chosen)
-    names = _names(law, plan, chosen)
-    settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance)
-    data = RigData(rig, contact, channels, names, settings)
-    data.check(law)
+    data, plan = _prepared(law, rig, where, prior, measured, weights, bounds, robust, max_steps, tolerance)
     parts = fold_of(rig, folds) if folds else np.zeros(rig.load.shape)
-    joint = Stage(JOINT, channels, names, np.ones(rig.load.shape, bool))
+    joint = _joint(data)
     plan = [*(plan if staged else ()), joint]
     total = len(plan) + folds
     tyre, reports = law, []
@@ -112,12 +115,68 @@ def fit_rig(
         progress(len(plan) + k, total, "cross-validation")
         missed[:, parts == k] = _unseen(data, law, plan, parts == k)[:, parts == k]
     progress(total, total, JOINT)
-    validation = rms(channels, missed) if folds else dict.fromkeys(channels, float("nan"))
+    validation = rms(data.channels, missed) if folds else dict.fromkeys(data.channels, float("nan"))
     fit = _result(data, tyre, joint, tuple(reports), data.rmse(law), validation)
     if throw and not reports[-1].converged:
         steps = reports[-1].steps
         raise FilterError(f"fit to {rig.source} stopped after {steps} steps; throw=False returns it as it is.")
     return fit
+
+
+def pose_rig(
+    law: AbstractTyre,
+    rig: RigTable,
+    *,
+    noise: Mapping[str, float] | None = None,
+    where: Where | None = None,
+    prior: float | Mapping[str, float] | None = None,
+    measured: Sequence[str] | None = None,
+    weights: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    robust: bool = False,
+) -> RigProblem:
+    """The joint stage of `fit_rig` from where the law is, for `solve`: all coefficients, one noise level a channel.
+
+    `noise`: standard deviations by channel; by default those of the law's own residuals, so that a problem at a fitted law has the
+    fit's. Other arguments and errors as in `fit_rig`.
+    """
+    data, _ = _prepared(law, rig, where, prior, measured, weights, bounds, robust)
+    levels = data.noise(law) if noise is None else dict(noise)
+    check_names("noise", levels, data.channels)
+    missing = [name for name in data.channels if name not in levels]
+    if missing:
+        raise InputError(f"noise: no standard deviation for {', '.join(missing)}.")
+    for name, level in levels.items():
+        check_positive(f"noise[{name!r}]", level)
+    return data.problem(law, _joint(data), levels)
+
+
+def _prepared(
+    law, rig, where, prior, measured, weights, bounds, robust, max_steps: int = 500, tolerance: float = 1e-6
+) -> tuple[RigData, list[Stage]]:
+    """The data as all stages share them, after every check, and the stages before the joint one."""
+    contact = contact_of(rig)
+    channels = _channels(law, rig, contact, measured)
+    extra = {} if weights is None else dict(weights)
+    check_names("weights", extra, channels)
+    for name, weight in extra.items():
+        check_positive(f"weights[{name!r}]", weight)
+    parameters, shape = ((), None) if where is None else picked(law, where)
+    chosen = None if where is None else tuple(p.name for p in parameters)
+    plan = stages_of(law, rig, channels, chosen)
+    settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance, shape=shape)
+    data = RigData(rig, contact, channels, _names(law, plan, chosen), settings)
+    data.check(law)
+    if prior is not None:
+        fitted = data.parameters(law)
+        values = pick(law, fitted)
+        spread = jnp.stack(prior_spread(fitted, values, prior))
+        data.chosen = settings._replace(prior=(on_line(fitted, values), spread))
+    return data, plan
+
+
+def _joint(data: RigData) -> Stage:
+    return Stage(JOINT, data.channels, data.names, np.ones(data.rig.load.shape, bool))
 
 
 def _unseen(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarray) -> np.ndarray:
@@ -166,44 +225,36 @@ def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None)
 
 
 def _result(data: RigData, law, joint: Stage, reports, start_rmse, validation) -> RigFit:
-    parameters = data.parameters(law)
-    values = np.array([float(value) for value in pick(law, parameters)])
-    problem = data.problem(law, joint, data.noise(law))
+    problem, last = data.problem(law, joint, data.noise(law)), reports[-1]
+    fit, known = _summed_up(problem, jnp.asarray(last.steps), jnp.asarray(last.converged))
     # The noise is that of the fit, with the degrees of freedom that coefficients take.
     count = int(data.present.sum())
-    free = count / (count - len(parameters))
-    spread, known = _spread(data, law, joint, problem)
-    line = np.asarray(spread * problem.scale * problem.scale[:, None]) * free
-    unseen = np.asarray(jnp.diagonal(spread)) > 1.0
-    slopes = np.array([float(p.domain.slope(value)) for p, value in zip(parameters, values, strict=True)])
-    residual = data.residuals(law)
+    free = count / (count - len(fit.parameters))
+    wider = lambda std: np.asarray(std) * np.sqrt(free)
     return RigFit(
-        tyre=law,
-        names=joint.coefficients,
-        values=values,
-        std=np.where(unseen, np.nan, np.sqrt(np.diag(line)) * np.abs(slopes)),
-        unconstrained=np.asarray(problem.origin),
-        covariance=line,
+        values=jax.tree.map(np.asarray, fit.values),
+        std=jax.tree.map(wider, fit.std),
+        unconstrained=np.asarray(fit.unconstrained),
+        covariance=np.asarray(fit.covariance) * free,
+        cost=fit.cost,
+        steps=fit.steps,
+        result=fit.result,
+        model=law,
+        parameters=fit.parameters,
         identified=int(known),
         rmse=data.rmse(law),
         start_rmse=start_rmse,
         cross_validation=validation,
         peak=data.peak,
         noise=data.noise(law),
-        residuals=dict(zip(data.channels, residual, strict=True)),
+        residuals=dict(zip(data.channels, data.residuals(law), strict=True)),
         stages=reports,
+        problem=problem,
     )
 
 
-def _spread(data: RigData, law: AbstractTyre, joint: Stage, problem: RigProblem) -> tuple[Any, Any]:
-    """The covariance (p, p) in the problem's coordinates, and how many directions the data identify."""
-    zero = jnp.zeros(problem.origin.shape)
-    found = information(problem, zero)
-    spread, known = covariance(found)
-    if not data.chosen.weights:
-        return spread, known
-    # Weights of the user's change what is minimised, not what is known: the sandwich, and what the data know without them. The
-    # pull counts in its middle as in its ends: what data do not show stays unknown.
-    middle, plain = (information(data.problem(law, joint, data.noise(law), power), zero) for power in (1.0, 0.0))
-    middle = middle + PULL**2 * jnp.eye(middle.shape[0], dtype=middle.dtype)
-    return spread @ middle @ spread, covariance(plain)[1]
+@eqx.filter_jit
+def _summed_up(problem: RigProblem, steps, converged):
+    """The fit that ended where the problem starts, and how many directions of the coefficients the data identify."""
+    found = Found(problem.start(), steps, converged)
+    return fit_at(problem, found), spread_of(found.z, problem)[1]
