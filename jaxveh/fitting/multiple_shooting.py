@@ -17,7 +17,7 @@ from jaxveh._core.errors import InputError, check_positive, is_concrete
 from jaxveh._core.names import record
 from jaxveh._core.parameter import Parameter, Where, pick, put
 from jaxveh._core.recording import Recording
-from jaxveh.fitting.problem import AbstractProblem, Found, Shape, hessian_by_rows, in_units, on_line, picked
+from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units, on_line, picked
 from jaxveh.fitting.recorded import spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.segments import Segments, cut
@@ -75,9 +75,6 @@ class ShootingProblem(AbstractProblem):
 
     def cost(self, z):
         return 0.5 * jnp.sum(residuals(z, self) ** 2)
-
-    def hessian(self, z):
-        return hessian_by_rows(self.cost, z)
 
     def search(self, z, max_steps, tolerance):
         solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance)

@@ -18,7 +18,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
 from jaxveh.fitting.levenberg_marquardt import Quadratic
-from jaxveh.fitting.problem import AbstractProblem, Found, Shape, hessian_by_scan, in_units, on_line, picked
+from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units, on_line, picked
 from jaxveh.fitting.recorded import listed, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.scoring import FisherScoring
@@ -80,9 +80,6 @@ class PredictionErrorProblem(AbstractProblem):
 
     def cost(self, z):
         return _cost(self, self.parts(z)) + 0.5 * jnp.sum(((z - self.centre) / self.spread) ** 2)
-
-    def hessian(self, z):
-        return hessian_by_scan(self.cost, z)
 
     def unit(self):
         """What counts as one in a step: the prior's spread, without a prior one on the line, (p,)."""

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax import lax
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import Parameter, Where, pick, resolve
@@ -49,10 +48,6 @@ class AbstractProblem(eqx.Module):
         """The negative log-posterior at the coordinates z (n,), up to a constant: a scalar."""
 
     @abc.abstractmethod
-    def hessian(self, z):
-        """Second derivatives (n, n) of the cost."""
-
-    @abc.abstractmethod
     def search(self, z, max_steps: int, tolerance) -> Found:
         """The least cost from the coordinates z (n,), by a solver of optimistix."""
 
@@ -79,26 +74,6 @@ class AbstractProblem(eqx.Module):
     @abc.abstractmethod
     def counted(self, counts) -> "AbstractProblem":
         """The problem in which each part of the data counts so many times, (units,)."""
-
-
-def hessian_by_rows(cost, z):
-    """Second derivatives (n, n) of a cost over many rows: a pass forward over one backward for each coordinate, one after another."""
-    gradient = jax.grad(cost)
-    return lax.map(lambda direction: jax.jvp(gradient, (z,), (direction,))[1], jnp.eye(z.size, dtype=z.dtype))
-
-
-def hessian_by_scan(cost, z):
-    """Second derivatives (n, n) of a cost that goes through a long scan: passes forward over passes forward.
-
-    They keep nothing of the way, where a pass backward stores it all: three coordinates over a filter of 300 rows take a sixth of the
-    time, and two thirds of the time to compile.
-    """
-    each = jnp.eye(z.size, dtype=z.dtype)
-
-    def slopes(z):
-        return jax.vmap(lambda direction: jax.jvp(cost, (z,), (direction,))[1])(each)
-
-    return lax.map(lambda direction: jax.jvp(slopes, (z,), (direction,))[1], each)
 
 
 def shaped(shape: Shape | None, values):

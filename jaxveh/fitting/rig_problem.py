@@ -16,7 +16,7 @@ from jax import lax
 from jaxveh._core.bijectors import Real
 from jaxveh._core.parameter import Parameter, pick, put
 from jaxveh.fitting.levenberg_marquardt import LevenbergMarquardt, Quadratic
-from jaxveh.fitting.problem import AbstractProblem, Found, Shape, hessian_by_rows, in_units
+from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units
 from jaxveh.numerics import on_cpu
 from jaxveh.tyres import AbstractTyre, Contact
 
@@ -64,9 +64,6 @@ class RigProblem(AbstractProblem):
 
     def cost(self, z):
         return loss(z, self)
-
-    def hessian(self, z):
-        return hessian_by_rows(self.cost, z)
 
     def search(self, z, max_steps, tolerance):
         return descend(self, z, max_steps, tolerance).found

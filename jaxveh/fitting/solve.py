@@ -46,18 +46,29 @@ def optimum(problem: AbstractProblem, start, *, max_steps: int, tolerance: float
 @optimum.def_jvp
 def _of_optimum(primals, tangents, **settings):
     problem, start = primals
-    moved, _ = tangents
     found = optimum(problem, start, **settings)
+    moved, _ = tangents
     is_none = lambda leaf: leaf is None
     still = jax.tree.map(is_none, moved, is_leaf=is_none)
     held, free = eqx.partition(problem, still, is_leaf=is_none)
+    matrix, cross = curvature(lambda z, free: eqx.combine(free, held).cost(z), found.z, free)
+    parts = jax.tree.map(lambda row, tangent: jnp.tensordot(row, tangent, tangent.ndim), cross, moved)
+    change = sum(jax.tree.leaves(parts), start=jnp.zeros_like(found.z))
+    return found, Found(-jnp.linalg.solve(matrix, change), None, None)
 
-    def slope(free):
-        return jax.grad(eqx.combine(free, held).cost)(found.z)
 
-    _, change = jax.jvp(slope, (free,), (moved,))
-    z = -jnp.linalg.solve(problem.hessian(found.z), change)
-    return found, Found(z, None, None)
+def curvature(cost, z, free):
+    """Second derivatives of a cost of z (n,) and a tree of arrays: of z twice (n, n), and of z and each array (n, ...).
+
+    Both from one pass backward over one forward, a coordinate after another: it is compiled once, and nothing more is needed for the
+    derivative of an optimum in either mode, which is what keeps its compilation short.
+    """
+
+    def row(direction):
+        slope = lambda z, free: jax.jvp(lambda z: cost(z, free), (z,), (direction,))[1]
+        return jax.grad(slope, argnums=(0, 1))(z, free)
+
+    return lax.map(row, jnp.eye(z.size, dtype=z.dtype))
 
 
 def fit_at(problem: AbstractProblem, found: Found, standard_errors: bool = True) -> Fit:
