@@ -1,10 +1,11 @@
 """Fits on optimistix: rig data of tyres, residuals of recordings by multiple shooting, likelihoods of filters.
 
 A fit is a problem (`pose_rig`, `pose_shooting`, `pose_likelihood`, `pose_prediction_error`) and its solution by `solve`, a pure
-function under `jit`, `vmap` and `grad`: a solver of optimistix finds the optimum (its Levenberg-Marquardt and its BFGS; of our own in
-its form `LevenbergMarquardt` on normal equations, and `FisherScoring`), the implicit function theorem gives its derivatives with
-respect to data, noise levels and priors. `fit_rig`, `multiple_shooting`, `maximum_likelihood` and `prediction_error` are the programs
-on top, which check, tell how far they are, and raise. All return one shape of result, `AbstractFit`.
+function under `jit`, `vmap` and `grad`: a solver of optimistix finds the optimum (its Levenberg-Marquardt and its BFGS; of our
+own in its form `LevenbergMarquardt` on normal equations, and `FisherScoring`), the implicit function theorem gives its
+derivatives with respect to data, noise levels and priors. `fit_rig`, `multiple_shooting`, `maximum_likelihood` and
+`prediction_error` are the programs on top, which check, tell how far they are, and raise. All return one shape of result,
+`AbstractFit`.
 """
 
 from jaxveh.fitting.bootstrap import Bootstrap, bootstrap

@@ -19,8 +19,8 @@ LEAST_UNITS = 5
 
 
 class Bootstrap(NamedTuple):
-    """Fits to `count` data sets drawn anew: `values` in the shape of the fit's, with an axis (count,) in front; `std`, their spread: the
-    standard errors; `converged` (count,), those that are not being left out of it."""
+    """Fits to `count` data sets drawn anew: `values` in the shape of the fit's, with an axis (count,) in front; `std`, their
+    spread, which is their standard error; `converged` (count,): those that did not are left out of it."""
 
     values: Any
     std: Any
@@ -39,9 +39,9 @@ def bootstrap(
     """Standard errors by fitting `count` times to parts of the data drawn with replacement (B. Efron and R. J. Tibshirani, An
     Introduction to the Bootstrap, 1993, sec. 9.5: pairs): under `jit`, every fit in one program.
 
-    Parts are rows of rig data, or whole recordings. They say nothing of the noise's law, but take the parts for independent. `groups`
-    (rows,): numbers of what is drawn as one, such as the run of each row. Each fit starts where that to all the data ends.
-    `max_steps`, `tolerance` as in `solve`.
+    Parts are rows of rig data, or whole recordings. They say nothing of the noise's law, but take the parts for independent.
+    `groups` (rows,): numbers of what is drawn as one, such as the run of each row. Each fit starts where that to all the data
+    ends. `max_steps`, `tolerance` as in `solve`.
 
     **Raises** `InputError` for fewer than two fits, or fewer than five parts.
     """
@@ -73,4 +73,6 @@ def _drawn(problem, key, group, groups: int, count: int, max_steps: int, toleran
     share = converged / jnp.sum(converged)
     mean = share @ values
     std = jnp.sqrt(share @ (values - mean) ** 2 * count / (count - 1))
-    return Bootstrap(shaped(problem.shape, values.T) if problem.shape else values, shaped(problem.shape, std), converged)
+    return Bootstrap(
+        shaped(problem.shape, values.T) if problem.shape else values, shaped(problem.shape, std), converged
+    )

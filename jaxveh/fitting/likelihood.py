@@ -28,8 +28,8 @@ REJECTED = 1e8
 class LikelihoodProblem(AbstractProblem):
     """A filter's negative log-likelihood of recordings, and what of the model is to be fitted.
 
-    `rows`: a tuple, one a recording; `counts` (recordings,): how many times each counts. `centre`, `spread` (p,): the prior on the
-    line of the parameters' bijectors, a spread of infinity for none. `key`: of filters that draw particles.
+    `rows`: a tuple, one a recording; `counts` (recordings,): how many times each counts. `centre`, `spread` (p,): the prior on
+    the line of the parameters' bijectors, a spread of infinity for none. `key`: of filters that draw particles.
     """
 
     filter: AbstractFilter
@@ -80,8 +80,8 @@ class LikelihoodProblem(AbstractProblem):
 def hessian(cost, z):
     """Second derivatives (n, n) of a cost that goes through a long scan: passes forward over passes forward.
 
-    They keep nothing of the way, where a pass backward stores it all: three coordinates over a filter of 300 rows take a sixth of the
-    time, and two thirds of the time to compile.
+    They keep nothing of the way, where a pass backward stores it all: three coordinates over a filter of 300 rows take a sixth
+    of the time, and two thirds of the time to compile.
     """
     each = jnp.eye(z.size, dtype=z.dtype)
 
@@ -111,7 +111,9 @@ def pose_likelihood(
     values = pick(model, parameters)
     centre = on_line(parameters, values)
     spread = spread_on_line(parameters, values, prior)
-    return LikelihoodProblem(filter, model, rows, jnp.ones(len(rows), centre.dtype), centre, spread, key, parameters, shape)
+    return LikelihoodProblem(
+        filter, model, rows, jnp.ones(len(rows), centre.dtype), centre, spread, key, parameters, shape
+    )
 
 
 def maximum_likelihood(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -36,9 +35,9 @@ HAIR = 1e-6
 class ShootingProblem(AbstractProblem):
     """Residuals of simulations from the start of each of K segments, and what of the model is to be fitted.
 
-    Coordinates: the parameters (p,) on their bijectors' line, then each state at the K starts. `tie`: what a state without process
-    noise may jump between segments, over its prior's spread. `counts` (recordings,): how many times each counts. `centre` (p,) and
-    `prior` (p, p): mean and covariance of the parameters on their line; None where nothing was known of them.
+    Coordinates: the parameters (p,) on their bijectors' line, then each state at the K starts. `tie`: what a state without
+    process noise may jump between segments, over its prior's spread. `counts` (recordings,): how many times each counts.
+    `centre` (p,) and `prior` (p, p): mean and covariance of the parameters on their line; None where nothing was known of them.
     """
 
     model: StateSpace
@@ -170,11 +169,11 @@ def multiple_shooting(
     the prior that it has of them. `prior`: relative spreads around the present values, one number or by name; a model's own prior
     gives way to it. Without any: least squares.
 
-    The recordings are cut into segments of `window` seconds (Bock 1981); unknown are the parameters and the state at the
-    start of each. Residuals: measurements over their noise's standard deviation; the ends' mismatch with the next start,
-    over the process noise gathered in a window, or over `tie` times the prior's spread for states without process
-    noise; the first states and the parameters against the prior. Under `jit`, `vmap` and `grad` as it is, the first recording's time
-    being concrete; see `solve`.
+    The recordings are cut into segments of `window` seconds (Bock 1981); unknown are the parameters and the state at the start
+    of each. Residuals: measurements over their noise's standard deviation; the ends' mismatch with the next start, over the
+    process noise gathered in a window, or over `tie` times the prior's spread for states without process noise; the first states
+    and the parameters against the prior. Under `jit`, `vmap` and `grad` as it is, the first recording's time being concrete; see
+    `solve`.
 
     **Returns** a `Fit`; standard errors from the Jacobian at the optimum, the starts marginalised. **Raises** `InputError`
     for a model without parameters, or logs too short; `FilterError` where the solver does not converge (`throw`).

@@ -51,8 +51,8 @@ class _Name(eqx.Module):
 
 
 class PredictionErrorProblem(AbstractProblem):
-    """A Gaussian filter's negative log-likelihood of recordings of one length, as squares of its whitened innovations, and what of
-    the model is to be fitted.
+    """A Gaussian filter's negative log-likelihood of recordings of one length, as squares of its whitened innovations, and what
+    of the model is to be fitted.
 
     `rows` with (K, T) leaves; `counts` (K,): how many times each recording counts. `centre`, `spread` (p,): the prior on the line
     of the parameters' bijectors, a spread of infinity for none. The first `warm_up` rows of each do not count.

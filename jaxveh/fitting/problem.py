@@ -31,9 +31,9 @@ class Shape(NamedTuple):
 class AbstractProblem(eqx.Module):
     """A cost to be minimised, the negative log-posterior of `parameters` given data.
 
-    Everything that the optimum depends on is an array leaf (data, noise levels, prior spreads), so that `solve` has a derivative with
-    respect to each. Coordinates z (n,) are the solver's: the parameters, scaled as it likes, and what else is unknown. On the
-    line of their bijectors parameters are arrays (p,).
+    Everything that the optimum depends on is an array leaf (data, noise levels, prior spreads), so that `solve` has a derivative
+    with respect to each. Coordinates z (n,) are the solver's: the parameters, scaled as it likes, and what else is unknown. On
+    the line of their bijectors parameters are arrays (p,).
     """
 
     parameters: eqx.AbstractVar[tuple[Parameter, ...]]

@@ -20,9 +20,7 @@ def listed(recordings: Recording | Sequence[Recording]) -> list[Recording]:
     return recordings
 
 
-def spread_on_line(
-    parameters: tuple[Parameter, ...], values, prior: float | Mapping[str, float] | None
-) -> jax.Array:
+def spread_on_line(parameters: tuple[Parameter, ...], values, prior: float | Mapping[str, float] | None) -> jax.Array:
     """The prior's spreads (p,) on the line of each parameter's bijector, infinite without one."""
     if prior is None:
         return jnp.full((len(parameters),), jnp.inf, jnp.result_type(*values))

@@ -15,11 +15,11 @@ from jaxveh._core.result import Result
 class AbstractFit(eqx.Module):
     """What all fits return.
 
-    `values`, `std`: the fitted parameters in physical units and their standard errors, in the shape of what `where` picked (without
-    a `where`: an array (p,) in the order of `names`; of a model whose parameters are states, a tree as `Estimate.parameters`);
-    NaN for a standard error that the data do not give. `unconstrained` (p,), `covariance` (p, p): the same on the line of each
-    parameter's bijector. `cost`: the minimised negative log-posterior, up to a constant. `steps`: taken by the solver. `result`: a
-    code, see `jaxveh.Result`. `model`: what was fitted, with the values in place.
+    `values`, `std`: the fitted parameters in physical units and their standard errors, in the shape of what `where` picked
+    (without a `where`: an array (p,) in the order of `names`; of a model whose parameters are states, a tree as
+    `Estimate.parameters`); NaN for a standard error that the data do not give. `unconstrained` (p,), `covariance` (p, p): the
+    same on the line of each parameter's bijector. `cost`: the minimised negative log-posterior, up to a constant. `steps`: taken
+    by the solver. `result`: a code, see `jaxveh.Result`. `model`: what was fitted, with the values in place.
     """
 
     values: eqx.AbstractVar[Any]

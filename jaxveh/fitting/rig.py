@@ -92,8 +92,8 @@ def fit_rig(
     two standard deviations count by their size. `folds`: parts for cross-validation, whole runs where the data number them,
     blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law that is near the data already.
 
-    A program that looks at the data (which coefficients they show, how noisy they are) and goes through `LevenbergMarquardt` round
-    by round: for `jit`, `vmap` and `grad` see `pose_rig` and `solve`.
+    A program that looks at the data (which coefficients they show, how noisy they are) and goes through `LevenbergMarquardt`
+    round by round: for `jit`, `vmap` and `grad` see `pose_rig` and `solve`.
 
     **Raises** `InputError` for a channel, weight or bound that has no match, a start outside its bounds or without finite
     forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`;
@@ -137,8 +137,8 @@ def pose_rig(
 ) -> RigProblem:
     """The joint stage of `fit_rig` from where the law is, for `solve`: all coefficients, one noise level a channel.
 
-    `noise`: standard deviations by channel; by default those of the law's own residuals, so that a problem at a fitted law has the
-    fit's. Other arguments and errors as in `fit_rig`.
+    `noise`: standard deviations by channel; by default those of the law's own residuals, so that a problem at a fitted law has
+    the fit's. Other arguments and errors as in `fit_rig`.
     """
     data, _ = _prepared(law, rig, where, prior, measured, weights, bounds, robust)
     levels = data.noise(law) if noise is None else dict(noise)

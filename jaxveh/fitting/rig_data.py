@@ -15,8 +15,8 @@ from jaxveh._core.bijectors import Interval
 from jaxveh._core.errors import InputError, check_at_least, check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, resolve
-from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, descend, start_of
 from jaxveh.fitting.problem import Shape
+from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, descend, start_of
 from jaxveh.fitting.rig_stages import Stage
 from jaxveh.io.rig_table import RigTable
 from jaxveh.tyres import AbstractTyre, Contact
@@ -48,8 +48,8 @@ class StageReport(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """What a user chose: `weights` and `bounds` by name, `robust`, the most steps a stage, the solver's tolerance; the centre and the
-    spread (p,) of a `prior` on the coefficients' line; the `shape` in which their values are reported."""
+    """What a user chose: `weights` and `bounds` by name, `robust`, the most steps a stage, the solver's tolerance; the centre
+    and the spread (p,) of a `prior` on the coefficients' line; the `shape` in which their values are reported."""
 
     weights: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]

@@ -40,9 +40,9 @@ class _Search(NamedTuple):
 
 
 class FisherScoring(optx.AbstractMinimiser):
-    """Newton's steps with the expected information for curvature (Ljung 1999, ch. 10; Gupta & Mehra 1974), damped after Levenberg, and
-    corrected to the changes of the gradient that were seen (BFGS): the expected information is the curvature only on average;
-    where they differ, plain scoring creeps.
+    """Newton's steps with the expected information for curvature (Ljung 1999, ch. 10; Gupta & Mehra 1974), damped after
+    Levenberg, and corrected to the changes of the gradient that were seen (BFGS): the expected information is the curvature only
+    on average; where they differ, plain scoring creeps.
 
     `quadratic(y, args)`: the `Quadratic` of the cost at y (n,), its matrix the information. It ends when two steps in a row gain
     less than `atol` of cost, or cannot gain. `options` of `optimistix.minimise`: `unit` (n,), the length of each coordinate in
@@ -106,7 +106,7 @@ def _step(at: Quadratic, moves, changes, damping, unit):
 
 
 def with_secants(curvature, moves, changes):
-    """A curvature (n, n) corrected to steps (S, n) and changes of the gradient over them, oldest first (BFGS); zeros count not."""
+    """A curvature (n, n) corrected to steps (S, n) and changes of the gradient over them, oldest first (BFGS); zeros are none."""
     for move, change in zip(moves, changes, strict=True):
         along = curvature @ move
         fits = change @ move > 1e-2 * move @ along

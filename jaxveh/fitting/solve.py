@@ -60,8 +60,8 @@ def _of_optimum(primals, tangents, **settings):
 def curvature(cost, z, free):
     """Second derivatives of a cost of z (n,) and a tree of arrays: of z twice (n, n), and of z and each array (n, ...).
 
-    Both from one pass backward over one forward, a coordinate after another: it is compiled once, and nothing more is needed for the
-    derivative of an optimum in either mode, which is what keeps its compilation short.
+    Both from one pass backward over one forward, a coordinate after another: it is compiled once, and nothing more is needed for
+    the derivative of an optimum in either mode, which is what keeps its compilation short.
     """
 
     def row(direction):

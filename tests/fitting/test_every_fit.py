@@ -3,7 +3,6 @@
 A new fit is one line in `CASES`: its problem, its program on the same problem, and where the problem keeps data, noise and prior.
 """
 
-import inspect
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -37,7 +36,8 @@ def a_law():
 
 
 class Case(NamedTuple):
-    """`pose(prior)` makes the problem and `fit()` runs the program; `data`, `noise` and `prior` pick one leaf each of the problem."""
+    """`pose(prior)` makes the problem, `fit()` runs the program; `data`, `noise` and `prior` pick one leaf each of the
+    problem."""
 
     pose: Callable
     fit: Callable
@@ -71,11 +71,13 @@ CASES = {
     ),
 }  # fmt: skip
 
-FITS = [
-    name
-    for name in fitting.__all__
-    if name != "solve" and str(getattr(inspect.unwrap(getattr(fitting, name)), "__annotations__", {}).get("return", "")).endswith("Fit")
-]
+
+def returned(name):
+    """What a function says that it returns, as text."""
+    return str(getattr(getattr(fitting, name), "__annotations__", {}).get("return", ""))
+
+
+FITS = [name for name in fitting.__all__ if name != "solve" and returned(name).endswith("Fit")]
 PROBLEMS = [
     one
     for one in map(vars(fitting).get, fitting.__all__)
@@ -165,6 +167,14 @@ def test_a_gradient_is_a_program_of_at_most_three_fits(case, changed, core):
     assert length(jax.grad(lambda by: core(by)[0])) < 3 * length(fit)
 
 
+def test_parts_of_the_data_count_as_often_as_they_are_told(problem):
+    units = problem.units()
+    one, other = np.random.default_rng(0).integers(0, 4, (2, units)).astype(float)
+    cost = lambda counts: float(problem.counted(jnp.asarray(counts)).cost(problem.start()))
+    assert cost(one) + cost(other) == pytest.approx(cost(one + other) + cost(0 * one), rel=1e-9)
+    assert cost(np.ones(units)) == pytest.approx(float(problem.cost(problem.start())), rel=1e-12)
+
+
 def test_program_and_core_end_alike(case, problem):
     fit = case.fit()
     if isinstance(problem, fitting.RigProblem):
@@ -179,6 +189,8 @@ def test_program_and_core_end_alike(case, problem):
 def test_a_prior_is_a_number_or_numbers_by_name(case, problem, prior, message):
     with pytest.raises(InputError, match=message):
         case.pose(prior)
-    by_name = case.pose({name: 0.4 for name in [p.name for p in problem.parameters]})
-    for one, other in zip(*(jax.tree.leaves(eqx.filter(p, eqx.is_array)) for p in (by_name, case.pose(0.4))), strict=True):
+    by_name = case.pose(dict.fromkeys([p.name for p in problem.parameters], 0.4))
+    for one, other in zip(
+        *(jax.tree.leaves(eqx.filter(p, eqx.is_array)) for p in (by_name, case.pose(0.4))), strict=True
+    ):
         np.testing.assert_array_equal(one, other)

@@ -97,7 +97,8 @@ def test_a_prior_holds_what_it_knows():
     assert abs(float(held.values[0]) - 60.0) < 2.0
     assert np.isnan(held.std).all()
     around = [
-        eqx.tree_at(LEVELS, held.model, (held.values[0], held.values[1] * (1 + change))) for change in (-0.02, 0.0, 0.02)
+        eqx.tree_at(LEVELS, held.model, (held.values[0], held.values[1] * (1 + change)))
+        for change in (-0.02, 0.0, 0.02)
     ]
     low, best, high = (float(filters.run(filters.Unscented(), m, RECORDING).log_likelihood) for m in around)
     assert best > max(low, high)

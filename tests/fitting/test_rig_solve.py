@@ -30,7 +30,8 @@ def made(rows, noise=20.0, robust=False, start=START):
     origin, scale = start_of(start, parameters)
     none = jnp.full_like(origin, jnp.inf)
     return RigProblem(
-        start, contact, measured, weight, jnp.ones(1), origin, scale, origin, none, jnp.asarray(PULL), parameters, ("F_y",), robust
+        start, contact, measured, weight, jnp.ones(1), origin, scale, origin, none, jnp.asarray(PULL), parameters, ("F_y",),
+        robust,
     )  # fmt: skip
 
 
