@@ -90,7 +90,7 @@ class PredictionErrorProblem(AbstractProblem):
         return Found(found, state.steps, state.done)
 
     def covariance(self, z):
-        return jnp.linalg.pinv(quadratic(z, self).matrix, hermitian=True), jnp.ones(z.shape, bool)
+        return uncertainty(quadratic(z, self))
 
     def failed(self, cost):
         return ~jnp.isfinite(cost)
@@ -164,6 +164,11 @@ def quadratic(z, problem: PredictionErrorProblem) -> Quadratic:
     # With w = e / exp(s), dw = de / exp(s) - w ds, whose square holds one of the two ds^2 that (dlog S)^2 / 2 is made of.
     information = white @ white.T + levels @ levels.T + supervised @ supervised.T
     return Quadratic(cost, gradient, information + jnp.diag(1 / problem.spread**2))
+
+
+def uncertainty(at: Quadratic) -> tuple[jax.Array, jax.Array]:
+    """The covariance (p, p) that an information at the optimum says, and that every parameter is in it, (p,)."""
+    return jnp.linalg.pinv(at.matrix, hermitian=True), jnp.ones(at.gradient.shape, bool)
 
 
 def score(problem: PredictionErrorProblem, z, state, tolerance: float, limit):
@@ -255,7 +260,7 @@ def _stepwise(problem: PredictionErrorProblem, max_steps: int, tolerance: float,
         z, state = _block(problem, z, state, tolerance, jnp.asarray(limit))
         best = -float(state.at.cost)
         progress(int(state.steps), max_steps, f"fit: step {int(state.steps)}, log-posterior {best:.1f}")
-    return _concluded(problem, Found(z, state.steps, state.done))
+    return _concluded(problem, Found(z, state.steps, state.done), state.at)
 
 
 @eqx.filter_jit
@@ -264,8 +269,8 @@ def _block(problem: PredictionErrorProblem, z, state, tolerance: float, limit):
 
 
 @eqx.filter_jit
-def _concluded(problem: PredictionErrorProblem, found: Found) -> Fit:
-    return fit_at(problem, found)
+def _concluded(problem: PredictionErrorProblem, found: Found, at: Quadratic) -> Fit:
+    return fit_at(problem, found, at.cost, uncertainty(at))
 
 
 def _without_whitened(filter: Any) -> str | None:

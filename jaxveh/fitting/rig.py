@@ -257,4 +257,4 @@ def _result(data: RigData, law, joint: Stage, reports, start_rmse, validation) -
 def _summed_up(problem: RigProblem, steps, converged):
     """The fit that ended where the problem starts, and how many directions of the coefficients the data identify."""
     found = Found(problem.start(), steps, converged)
-    return fit_at(problem, found), spread_of(found.z, problem)[1]
+    return fit_at(problem, found, problem.cost(found.z), problem.covariance(found.z)), spread_of(found.z, problem)[1]

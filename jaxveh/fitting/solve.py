@@ -34,7 +34,7 @@ def solve(
     """
     start = problem.start() if start is None else start
     found = optimum(problem, lax.stop_gradient(start), max_steps=max_steps, tolerance=tolerance)
-    return fit_at(problem, found, standard_errors)
+    return fit_at(problem, found, problem.cost(found.z), problem.covariance(found.z) if standard_errors else None)
 
 
 @eqx.filter_custom_jvp
@@ -71,19 +71,16 @@ def curvature(cost, z, free):
     return lax.map(row, jnp.eye(z.size, dtype=z.dtype))
 
 
-def fit_at(problem: AbstractProblem, found: Found, standard_errors: bool = True) -> Fit:
-    """The fit that ended at these coordinates."""
+def fit_at(problem: AbstractProblem, found: Found, cost, uncertainty: tuple[jax.Array, jax.Array] | None) -> Fit:
+    """The fit that ended at these coordinates, with this cost and what the problem's `covariance` says, or nothing of it."""
     parameters, line = problem.parameters, problem.line(found.z)
     values = in_units(parameters, line)
-    if standard_errors:
-        covariance, known = problem.covariance(found.z)
-    else:
-        covariance, known = jnp.full((line.size, line.size), jnp.nan, line.dtype), jnp.zeros(line.shape, bool)
+    unknown = jnp.full((line.size, line.size), jnp.nan, line.dtype), jnp.zeros(line.shape, bool)
+    covariance, known = unknown if uncertainty is None else uncertainty
     variance = jnp.diagonal(covariance)
     known = known & (variance > 0)
     slopes = jnp.stack([p.domain.slope(value) for p, value in zip(parameters, values, strict=True)])
     std = jnp.where(known, jnp.abs(slopes) * jnp.sqrt(jnp.where(known, variance, 1.0)), jnp.nan)
-    cost = problem.cost(found.z)
     well = found.converged & ~problem.failed(cost)
     finite = jnp.all(jnp.isfinite(found.z)) & jnp.isfinite(cost)
     result = jnp.where(well, code(Result.successful), code(Result.not_converged))
