@@ -73,8 +73,9 @@ def ours_compiled(rig: Rig) -> tuple[RigProblem, Callable[[], Found]]:
     weight = jnp.full(rig.measured.shape, 1 / NOISE)
     once, none = jnp.ones(len(FORCES)), jnp.full_like(origin, jnp.inf)
     problem = RigProblem(
-        law, contact(rig.contacts), jnp.asarray(rig.measured), weight, once, origin, scale, origin, none,
-        jnp.asarray(rig_problem.PULL), parameters, FORCES, False,
+        law=law, contact=contact(rig.contacts), measured=jnp.asarray(rig.measured), weight=weight, emphasis=once, origin=origin,
+        scale=scale, centre=origin, spread=none, pull=jnp.asarray(rig_problem.PULL), parameters=parameters, channels=FORCES,
+        robust=False,
     )  # fmt: skip
     search = eqx.filter_jit(lambda problem: problem.search(problem.start(), STEPS, TOLERANCE))
     return problem, lambda: search(problem)

@@ -112,8 +112,9 @@ def pose_likelihood(
     centre = on_line(parameters, values)
     spread = spread_on_line(parameters, values, prior)
     return LikelihoodProblem(
-        filter, model, rows, jnp.ones(len(rows), centre.dtype), centre, spread, key, parameters, shape
-    )
+        filter=filter, model=model, rows=rows, counts=jnp.ones(len(rows), centre.dtype), centre=centre, spread=spread, key=key,
+        parameters=parameters, shape=shape,
+    )  # fmt: skip
 
 
 def maximum_likelihood(

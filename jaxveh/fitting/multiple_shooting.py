@@ -130,7 +130,16 @@ def pose_shooting(
     # A batch of segments does not tell how many recordings it is made of: then they are one.
     count = int(np.sum(segments.first)) if is_concrete(segments.first) else 1
     counts, tie = jnp.ones(count, centre.dtype), jnp.asarray(tie, centre.dtype)
-    return ShootingProblem(model, segments, tie, counts, centre, known, parameters, shape)
+    return ShootingProblem(
+        model=model,
+        segments=segments,
+        tie=tie,
+        counts=counts,
+        centre=centre,
+        prior=known,
+        parameters=parameters,
+        shape=shape,
+    )
 
 
 def _check_inside(parameters: tuple[Parameter, ...]) -> None:

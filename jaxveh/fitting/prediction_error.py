@@ -202,8 +202,9 @@ def pose_prediction_error(
     means = pick(model if centre is None else centre, parameters)
     line = on_line(parameters, means)
     return PredictionErrorProblem(
-        filter, model, rows, jnp.ones(len(recordings), line.dtype), line, spread_on_line(parameters, means, prior),
-        _target(target, recordings), warm_up, parameters, shape,
+        filter=filter, model=model, rows=rows, counts=jnp.ones(len(recordings), line.dtype), centre=line,
+        spread=spread_on_line(parameters, means, prior), target=_target(target, recordings), warm_up=warm_up,
+        parameters=parameters, shape=shape,
     )  # fmt: skip
 
 

@@ -131,10 +131,21 @@ class RigData:
         emphasis = np.array([self.chosen.weights.get(name, 1.0) for name in self.channels])
         centre, spread = self.chosen.prior or (origin, jnp.full_like(origin, jnp.inf))
         return RigProblem(
-            law, self.contact, jnp.asarray(self.measured), jnp.asarray(counts * np.array(size)[:, None]),
-            jnp.asarray(emphasis), origin, jnp.where(moves, scale, 0.0), centre, spread, jnp.asarray(PULL, origin.dtype),
-            parameters, self.channels, self.chosen.robust, self.chosen.shape,
-        )  # fmt: skip
+            law=law,
+            contact=self.contact,
+            measured=jnp.asarray(self.measured),
+            weight=jnp.asarray(counts * np.array(size)[:, None]),
+            emphasis=jnp.asarray(emphasis),
+            origin=origin,
+            scale=jnp.where(moves, scale, 0.0),
+            centre=centre,
+            spread=spread,
+            pull=jnp.asarray(PULL, origin.dtype),
+            parameters=parameters,
+            channels=self.channels,
+            robust=self.chosen.robust,
+            shape=self.chosen.shape,
+        )
 
     def residuals(self, law: AbstractTyre) -> np.ndarray:
         """Fitted less measured (m, n), nan without a measurement."""
