@@ -251,11 +251,12 @@ def tie_spread(problem: ShootingProblem, steps):
     model, tie, states = problem.model, problem.tie, problem.states
     own = dict(zip(model.states, numerics.sqrt(jnp.diagonal(model.prior.covariance())), strict=True))
     spread = {name: tie * own[name] * jnp.ones_like(steps[0]) for name in states}
-    if model.process_noise is not None:
+    noise = model.process_noise
+    if noise is not None:
         # Over the whole window, as if the noise added up without dynamics: the scale of a jump, not its exact law.
-        variances = jax.vmap(jax.vmap(lambda dt: jnp.diagonal(model.process_noise.over(dt).covariance())))(steps)
+        variances = jax.vmap(jax.vmap(lambda dt: jnp.diagonal(noise.over(dt).covariance())))(steps)
         gathered = jnp.sqrt(jnp.sum(variances, axis=0))
-        for i, name in enumerate(model.process_noise.law.names):
+        for i, name in enumerate(noise.law.names):
             if name in states:
                 spread[name] = jnp.maximum(gathered[:, i], spread[name] * 1e-3)
     return [spread[name] for name in states]
