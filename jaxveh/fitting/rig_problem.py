@@ -38,7 +38,7 @@ class RigProblem(AbstractProblem):
     (m, n), one over the standard deviation, zero where a row does not count; `emphasis` (m,), how many times a channel counts
     what its noise says. `scale` (p,): the step of each coefficient that counts as one, on its bijector's line, from `origin`
     (p,); zero where it is held: coordinates z (p,) are steps. `centre`, `spread` (p,): the prior on the line, a spread of
-    infinity for none. `pull`: in standard deviations a step, how hard a coefficient is pulled to the origin.
+    infinity for none. `pull`: in standard deviations a step, how hard coefficients are pulled to the origin, all or each (p,).
     """
 
     law: AbstractTyre
@@ -132,7 +132,7 @@ def loss(z, problem: RigProblem):
 def _known_before(z, problem: RigProblem) -> Quadratic:
     """What the prior and the pull add to the loss."""
     off, rate = (problem.line(z) - problem.centre) / problem.spread, problem.scale / problem.spread
-    cost = 0.5 * jnp.sum(off**2) + 0.5 * problem.pull**2 * jnp.sum(z**2)
+    cost = 0.5 * jnp.sum(off**2) + 0.5 * jnp.sum((problem.pull * z) ** 2)
     return Quadratic(cost, off * rate + problem.pull**2 * z, jnp.diag(rate**2 + problem.pull**2))
 
 
@@ -179,21 +179,23 @@ def spread_of(z, problem: RigProblem) -> tuple[jax.Array, jax.Array]:
     Emphasis changes what is minimised, not what is known: the sandwich, and what the data know without it. The pull counts in
     its middle as in its ends: what data do not show stays unknown.
     """
-    e, each = problem.emphasis, jnp.eye(z.size, dtype=z.dtype)
+    e, pull = problem.emphasis, jnp.broadcast_to(problem.pull, z.shape)
     matrix = lambda e: normal_equations(z, dataclasses.replace(problem, emphasis=e)).matrix
     found, middle, plain = jax.vmap(matrix)(jnp.stack([e, e**2, jnp.ones_like(e)]))
-    spread, _ = inverse_of(found - problem.pull**2 * each, problem.pull)
-    return spread @ middle @ spread, inverse_of(plain - problem.pull**2 * each, problem.pull)[1]
+    spread, _ = inverse_of(found - jnp.diag(pull**2), pull)
+    return spread @ middle @ spread, inverse_of(plain - jnp.diag(pull**2), pull)[1]
 
 
 def inverse_of(information, pull) -> tuple[jax.Array, jax.Array]:
-    """The inverse (p, p) of an information matrix with the pull, and how many directions it identifies.
+    """The inverse (p, p) of an information matrix with the pull (p,), and how many directions it identifies.
 
     A direction is identified where its standard error is below one step, a coefficient's own size: beyond, it is the pull's.
     """
-    values, vectors = jnp.linalg.eigh(information)
-    values = jnp.maximum(values, 0.0)
-    return (vectors / (values + pull**2)) @ vectors.T, jnp.sum(values > 1.0)
+    known = jnp.sum(jnp.linalg.eigvalsh(information) > 1.0)
+    # On scales on which the pull is one: no eigenvalue is lost in the largest one's rounding.
+    values, vectors = jnp.linalg.eigh(information / pull / pull[:, None])
+    inverse = (vectors / (jnp.maximum(values, 0.0) + 1.0)) @ vectors.T
+    return inverse / pull / pull[:, None], known
 
 
 def _in_blocks(problem: RigProblem) -> tuple[Any, Callable[[Any], RigProblem]]:
