@@ -70,9 +70,10 @@ def _drawn(problem, key, group, groups: int, count: int, max_steps: int, toleran
         return jnp.stack(in_units(problem.parameters, problem.line(found.z))), found.converged
 
     values, converged = jax.vmap(once)(jax.random.split(key, count))
-    share = converged / jnp.sum(converged)
-    mean = share @ values
-    std = jnp.sqrt(share @ (values - mean) ** 2 * count / (count - 1))
+    counted = converged.astype(values.dtype)
+    kept, many = jnp.where(converged[:, None], values, 0), jnp.sum(counted)
+    mean = counted @ kept / many
+    std = jnp.sqrt(counted @ (kept - mean) ** 2 / (many - 1))
     return Bootstrap(
         shaped(problem.shape, values.T) if problem.shape else values, shaped(problem.shape, std), converged
     )
