@@ -6,11 +6,13 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.parameter import resolve
-from jaxveh.fitting import rig_problem, rig_solve, rig_stages
+from jaxveh.fitting import RigProblem, rig_problem, rig_stages
+from jaxveh.fitting.problem import Found
 from jaxveh.fitting.rig_data import leaf_of
 from jaxveh.tyres import mf_tyre
 
@@ -63,20 +65,23 @@ def make_rig(count: int, seed: int = 0) -> Rig:
     return Rig(given, forces + NOISE * rng.standard_normal(forces.shape), start)
 
 
-def ours_compiled(rig: Rig) -> tuple[rig_problem.RigProblem, Callable[[], rig_solve.Solved]]:
+def ours_compiled(rig: Rig) -> tuple[RigProblem, Callable[[], Found]]:
     """The problem as the joint stage of `fit_rig` states it, and its fit."""
     law = _started(rig.start)
     parameters = resolve(law, lambda law: [leaf_of(law, name) for name in _names()])
     origin, scale = rig_problem.start_of(law, parameters)
     weight = jnp.full(rig.measured.shape, 1 / NOISE)
-    problem = rig_problem.RigProblem(
-        law, contact(rig.contacts), jnp.asarray(rig.measured), weight, origin, scale, parameters, FORCES, False
-    )
-    start = jnp.zeros_like(origin)
-    return problem, lambda: rig_solve.solve(problem, start, STEPS, TOLERANCE)
+    once, none = jnp.ones(len(FORCES)), jnp.full_like(origin, jnp.inf)
+    problem = RigProblem(
+        law=law, contact=contact(rig.contacts), measured=jnp.asarray(rig.measured), weight=weight, emphasis=once, origin=origin,
+        scale=scale, centre=origin, spread=none, pull=jnp.asarray(rig_problem.PULL), parameters=parameters, channels=FORCES,
+        robust=False,
+    )  # fmt: skip
+    search = eqx.filter_jit(lambda problem: problem.search(problem.start(), STEPS, TOLERANCE))
+    return problem, lambda: search(problem)
 
 
-def by_scipy(rig: Rig, problem: rig_problem.RigProblem, method: str) -> Callable[[], Any]:
+def by_scipy(rig: Rig, problem: RigProblem, method: str) -> Callable[[], Any]:
     """The same sum of squares by `scipy.optimize.least_squares`: same coordinates, start and tolerance, forward differences."""
     from scipy.optimize import least_squares
 

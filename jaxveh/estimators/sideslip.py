@@ -80,7 +80,7 @@ class Calibration(eqx.Module):
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Fitted values by name: `{"value", "std", "unit"}`."""
-        rows = zip(self.fit.parameters, self.fit.mean, self.fit.std, strict=True)
+        rows = zip(self.fit.parameters, self.fit.values, self.fit.std, strict=True)
         short = lambda name: name.removeprefix("system.").replace("process_noise.law.std", "process noise")
         return {
             short(p.name).replace("measurement_noise.std", "measurement noise"): {

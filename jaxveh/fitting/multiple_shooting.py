@@ -2,105 +2,219 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+import dataclasses
+from collections.abc import Mapping, Sequence
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optimistix as optx
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.errors import InputError, check_positive, is_concrete
+from jaxveh._core.names import record
+from jaxveh._core.parameter import Parameter, Where, pick, put
 from jaxveh._core.recording import Recording
-from jaxveh.fitting.result import Fit, make_fit, raise_unfinished
+from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units, on_line, picked
+from jaxveh.fitting.recorded import spread_on_line
+from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.segments import Segments, cut
-from jaxveh.statespace import StateSpace, start_from
+from jaxveh.fitting.solve import solve
+from jaxveh.statespace import StateSpace, parameter_view, start_from
 from jaxveh.statespace.contract import wrap_angle
 from jaxveh.statespace.noise import whiten
 
 LARGEST_RESIDUAL = 1e6
 """What a residual of a diverged segment is taken as: finite, so that the solver can step back."""
 
+HAIR = 1e-6
+"""What holds a parameter without a prior, in deviations a unit of its line: it keeps the solver's matrix regular."""
 
-class Unknowns(NamedTuple):
-    """Parameters on the real line (p,), and the state at the start of each segment: a tuple of (K,) arrays."""
 
-    parameters: jax.Array
-    starts: tuple
+class ShootingProblem(AbstractProblem):
+    """Residuals of simulations from the start of each of K segments, and what of the model is to be fitted.
+
+    Coordinates: the parameters (p,) on their bijectors' line, then each state at the K starts. `tie`: what a state without
+    process noise may jump between segments, over its prior's spread. `counts` (recordings,): how many times each counts.
+    `centre` (p,) and `prior` (p, p): mean and covariance of the parameters on their line; None where nothing was known of them.
+    """
+
+    model: StateSpace
+    segments: Segments
+    tie: jax.Array
+    counts: jax.Array
+    centre: jax.Array
+    prior: jax.Array | None
+    parameters: tuple[Parameter, ...] = eqx.field(static=True)
+    shape: Shape | None = eqx.field(static=True)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The model's own states: those that are no parameters."""
+        return self.model.states if self.model.chosen is None else self.model.chosen.states
+
+    def start(self):
+        count = self.segments.first.shape[0]
+        mean = self.model.prior.mean[: len(self.states)]
+        return jnp.concatenate([self.centre, *(jnp.broadcast_to(m, (count,)) for m in mean)])
+
+    def line(self, z):
+        return z[: len(self.parameters)]
+
+    def starts(self, z):
+        """The states at the start of each segment: an array (K,) each."""
+        return list(z[len(self.parameters) :].reshape(len(self.states), -1))
+
+    def filled(self, z):
+        values = in_units(self.parameters, self.line(z))
+        if self.model.chosen is None:
+            return put(self.model, self.parameters, values)
+        return start_from(self.model, **{p.field: v for p, v in zip(self.parameters, values, strict=True)})
+
+    def cost(self, z):
+        return 0.5 * jnp.sum(residuals(z, self) ** 2)
+
+    def search(self, z, max_steps, tolerance):
+        solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance)
+        found = optx.least_squares(residuals, solver, z, self, max_steps=max_steps, throw=False)
+        return Found(found.value, found.stats["num_steps"], found.result == optx.RESULTS.successful)
+
+    def covariance(self, z):
+        jacobian, p = jax.jacfwd(residuals)(z, self), len(self.parameters)
+        # R of the QR factorisation with the parameters last: its lower right block is the square root of their information.
+        reordered = jnp.concatenate([jacobian[:, p:], jacobian[:, :p]], axis=1)
+        root = jnp.linalg.qr(reordered, mode="r")[-p:, -p:]
+        inverse = jax.scipy.linalg.solve_triangular(root, jnp.eye(p, dtype=root.dtype))
+        return inverse @ inverse.T, jnp.ones((p,), bool)
+
+    def failed(self, cost):
+        # Residuals at their limit do not move with the unknowns: the solver takes a diverged start for an optimum.
+        return cost >= 0.5 * LARGEST_RESIDUAL**2
+
+    def units(self):
+        return self.counts.shape[0]
+
+    def counted(self, counts):
+        return dataclasses.replace(self, counts=counts)
+
+
+def pose_shooting(
+    model: StateSpace,
+    segments: Segments,
+    where: Where | None = None,
+    *,
+    prior: float | Mapping[str, float] | None = None,
+    tie=0.01,
+) -> ShootingProblem:
+    """What `multiple_shooting` solves over segments (see `cut`, `cut_rows`), for `solve`; arguments and errors as there."""
+    check_positive("tie", tie)
+    if model.chosen is None and where is None:
+        raise InputError("multiple_shooting: the model estimates no parameter; give `where=`, or `with_parameters`.")
+    if model.chosen is not None and where is not None:
+        raise InputError("multiple_shooting: the model's parameters are states already; leave `where` out.")
+    known = None
+    if model.chosen is None:
+        parameters, shape = picked(model, where)
+        _check_inside(parameters)
+        values = pick(model, parameters)
+        centre = on_line(parameters, values)
+    else:
+        parameters, shape = model.chosen.parameters, _shape_of_view(model)
+        n = len(model.chosen.states)
+        # States and parameters are independent in the prior that `with_parameters` makes, each among themselves may not be.
+        centre, known = jnp.stack(model.prior.mean[n:]), model.prior.covariance()[n:, n:]
+        values = in_units(parameters, centre)
+    if prior is not None:
+        known = jnp.diag(spread_on_line(parameters, values, prior) ** 2)
+    # A batch of segments does not tell how many recordings it is made of: then they are one.
+    count = int(np.sum(segments.first)) if is_concrete(segments.first) else 1
+    counts, tie = jnp.ones(count, centre.dtype), jnp.asarray(tie, centre.dtype)
+    return ShootingProblem(
+        model=model,
+        segments=segments,
+        tie=tie,
+        counts=counts,
+        centre=centre,
+        prior=known,
+        parameters=parameters,
+        shape=shape,
+    )
+
+
+def _check_inside(parameters: tuple[Parameter, ...]) -> None:
+    """Raise for what squares of residuals cannot tell, or what is unknown anyway."""
+    for p in parameters:
+        if not p.path.startswith("system"):
+            raise InputError(
+                f"multiple_shooting: where picked {p.name}; it fits what moves the system (`m.system...`): noise levels are for "
+                "maximum_likelihood, and first states are always found."
+            )
+
+
+def _shape_of_view(model: StateSpace) -> Shape:
+    """The tree in which an Estimate reports the parameters of a model whose parameters are states."""
+    places = record("Parameters", {p.field: i for i, p in enumerate(model.chosen.parameters)})
+    tree = parameter_view(model.system, model.chosen, places)
+    return Shape(jax.tree.structure(tree), tuple(jax.tree.leaves(tree)))
 
 
 def multiple_shooting(
     model: StateSpace,
     recordings: Recording | Sequence[Recording],
+    where: Where | None = None,
     *,
+    prior: float | Mapping[str, float] | None = None,
     window: float = 0.5,
-    prior: bool = True,
     tie: float = 0.01,
     max_steps: int = 100,
     tolerance: float = 1e-8,
+    standard_errors: bool = True,
     throw: bool = True,
 ) -> Fit:
-    """Fit the parameters of a model (see `statespace.with_parameters`) to recordings by Levenberg-Marquardt.
+    """Fit the leaves of a model that `where` picks to recordings, by Levenberg-Marquardt on short simulations.
 
-    The recordings are cut into segments of `window` seconds (Bock 1981); unknown are the parameters and the state at the
-    start of each. Residuals: measurements over their noise's standard deviation; the ends' mismatch with the next start,
-    over the process noise gathered in a window, or over `tie` times the prior's spread for states without process
-    noise; the first states and, with `prior`, the parameters against the prior (MAP; without: least squares).
+    `where` sees the StateSpace. Of a model whose parameters are states (see `statespace.with_parameters`) those are fitted, with
+    the prior that it has of them. `prior`: relative spreads around the present values, one number or by name; a model's own prior
+    gives way to it. Without any: least squares.
+
+    The recordings are cut into segments of `window` seconds (Bock 1981); unknown are the parameters and the state at the start
+    of each. Residuals: measurements over their noise's standard deviation; the ends' mismatch with the next start, over the
+    process noise gathered in a window, or over `tie` times the prior's spread for states without process noise; the first states
+    and the parameters against the prior. Under `jit`, `vmap` and `grad` as it is, the first recording's time being concrete; see
+    `solve`.
 
     **Returns** a `Fit`; standard errors from the Jacobian at the optimum, the starts marginalised. **Raises** `InputError`
     for a model without parameters, or logs too short; `FilterError` where the solver does not converge (`throw`).
     """
-    if model.chosen is None:
-        raise InputError("multiple_shooting: the model estimates no parameter; give `estimate=` or `with_parameters`.")
-    check_positive("tie", tie)
-    segments = cut(model, recordings, window)
-    fit = shoot(model, segments, jnp.asarray(tie, model.prior.mean[0].dtype), prior, max_steps, tolerance)
+    problem = pose_shooting(model, cut(model, recordings, window), where, prior=prior, tie=tie)
+    fit = solve(problem, max_steps=max_steps, tolerance=tolerance, standard_errors=standard_errors)
     if throw:
         raise_unfinished(fit)
     return fit
 
 
-@eqx.filter_jit
-def shoot(model: StateSpace, segments: Segments, tie, prior: bool, max_steps: int, tolerance: float) -> Fit:
-    """The compiled part of `multiple_shooting`."""
-    n = len(model.chosen.states)
-    count = segments.first.shape[0]
-    mean = model.prior.mean
-    start = Unknowns(jnp.stack(mean[n:]), tuple(jnp.broadcast_to(m, (count,)) for m in mean[:n]))
-    solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance)
-    residuals = lambda unknowns, args: _residuals(model, segments, tie, prior, unknowns)
-    solution = optx.least_squares(residuals, solver, start, max_steps=max_steps, throw=False)
-    found = solution.value
-    covariance, cost = _laplace(residuals, found)
-    physical = model.chosen.physical(list(found.parameters))
-    parameters = model.chosen.parameters
-    fitted = start_from(model, **{p.field: value for p, value in zip(parameters, physical, strict=True)})
-    # Residuals at their limit do not move with the unknowns: the solver takes a diverged start for an optimum.
-    bounded = cost < 0.5 * LARGEST_RESIDUAL**2
-    converged = (solution.result == optx.RESULTS.successful) & bounded
-    steps = solution.stats["num_steps"]
-    return make_fit(parameters, found.parameters, covariance, cost, steps, converged, fitted)
+def residuals(z, problem: ShootingProblem):
+    """What is to be least in squares, at the coordinates z: misfits, ties and deviations from the prior, in one array."""
+    starts = problem.starts(z)
+    ends, misfit = _simulate(problem, z, starts)
+    # Each recording as often as it counts: its segments follow one another from where it starts.
+    share = jnp.sqrt(problem.counts)[jnp.cumsum(problem.segments.first) - 1]
+    parts = share * misfit, share * _ties(problem, starts, ends), share * _first(problem, starts), _prior(problem, z)
+    stacked = jnp.concatenate([part.reshape(-1) for part in parts])
+    return jnp.clip(jnp.nan_to_num(stacked, nan=LARGEST_RESIDUAL), -LARGEST_RESIDUAL, LARGEST_RESIDUAL)
 
 
-def _residuals(model: StateSpace, segments: Segments, tie, prior: bool, unknowns: Unknowns):
-    ends, misfit = _simulate(model, segments, unknowns)
-    residuals = {
-        "misfit": misfit,
-        "ties": _ties(model, segments, tie, unknowns, ends),
-        "prior": _prior(model, segments, prior, unknowns),
-    }
-    finite = lambda r: jnp.clip(jnp.nan_to_num(r, nan=LARGEST_RESIDUAL), -LARGEST_RESIDUAL, LARGEST_RESIDUAL)
-    return jax.tree.map(finite, residuals)
-
-
-def _simulate(model, segments, unknowns):
-    """Ends of the segments (tuple of (K,)), and measurement residuals (W, m, K), zero where nothing was measured."""
-    noise = model.measurement_noise
+def _simulate(problem: ShootingProblem, z, starts):
+    """Ends of the segments (a list of (K,)), and measurement residuals (W, m, K), zero where nothing was measured."""
+    model, segments = problem.model, problem.segments
     count = segments.first.shape[0]
     wide = lambda value: jnp.broadcast_to(value, (count,))
-    parameters = [wide(value) for value in unknowns.parameters]
-    state = model.chosen.joint_type(*unknowns.starts, *parameters)
+    if model.chosen is None:
+        model, state = problem.filled(z), type(model.prior.mean)(*starts)
+    else:
+        state = model.chosen.joint_type(*starts, *map(wide, problem.line(z)))
+    noise = model.measurement_noise
 
     def body(state, rows):
         now, then = rows
@@ -119,57 +233,46 @@ def _simulate(model, segments, unknowns):
     rows = segments.rows
     pairs = jax.tree.map(lambda leaf: leaf[:-1], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
     end, misfit = jax.lax.scan(body, state, pairs)
-    return tuple(end)[: len(unknowns.starts)], misfit
+    return list(end)[: len(starts)], misfit
 
 
-def _ties(model, segments, tie, unknowns, ends):
-    """Mismatch of each end with the next start, in standard deviations; zero where nothing follows."""
-    spread = _tie_spread(model, tie, jnp.diff(segments.rows.t, axis=0))
+def _ties(problem: ShootingProblem, starts, ends):
+    """Mismatch (n, K) of each end with the next start, in standard deviations; zero where nothing follows."""
+    spread = tie_spread(problem, jnp.diff(problem.segments.rows.t, axis=0))
     out = []
-    for i, (start, end) in enumerate(zip(unknowns.starts, ends, strict=True)):
+    for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
         gap = jnp.roll(start, -1) - end
-        out.append(jnp.where(segments.linked, gap / spread[i], 0))
+        out.append(jnp.where(problem.segments.linked, gap / spread[i], 0))
     return jnp.stack(out)
 
 
-def _tie_spread(model, tie, steps):
+def tie_spread(problem: ShootingProblem, steps):
     """What a state may jump between segments whose rows lie `steps` (W, K) seconds apart, one (K,) array a state."""
-    states = model.chosen.states
+    model, tie, states = problem.model, problem.tie, problem.states
     own = dict(zip(model.states, numerics.sqrt(jnp.diagonal(model.prior.covariance())), strict=True))
     spread = {name: tie * own[name] * jnp.ones_like(steps[0]) for name in states}
-    if model.process_noise is not None:
+    noise = model.process_noise
+    if noise is not None:
         # Over the whole window, as if the noise added up without dynamics: the scale of a jump, not its exact law.
-        variances = jax.vmap(jax.vmap(lambda dt: jnp.diagonal(model.process_noise.over(dt).covariance())))(steps)
+        variances = jax.vmap(jax.vmap(lambda dt: jnp.diagonal(noise.over(dt).covariance())))(steps)
         gathered = jnp.sqrt(jnp.sum(variances, axis=0))
-        for i, name in enumerate(model.process_noise.law.names):
+        for i, name in enumerate(noise.law.names):
             if name in states:
                 spread[name] = jnp.maximum(gathered[:, i], spread[name] * 1e-3)
     return [spread[name] for name in states]
 
 
-def _prior(model, segments, prior: bool, unknowns):
-    """Deviations of the first states, and of the parameters, from the prior, whitened."""
-    n = len(model.chosen.states)
-    mean, covariance = jnp.stack(model.prior.mean), model.prior.covariance()
-    # States and parameters are independent in the prior that `with_parameters` makes, each among themselves may not be.
-    own, theirs = numerics.cholesky(covariance[:n, :n]), numerics.cholesky(covariance[n:, n:])
-    first = numerics.solve_lower(own, jnp.stack(unknowns.starts) - mean[:n, None])
-    deviation = numerics.solve_lower(theirs, unknowns.parameters - mean[n:])
-    # Least squares alone: the parameters are free, but for a hair that keeps the solver's matrix regular.
-    return {
-        "states": jnp.where(segments.first, first, 0),
-        "parameters": deviation if prior else 1e-6 * deviation,
-    }
+def _first(problem: ShootingProblem, starts):
+    """Deviations (n, K) of the first states of recordings from the prior, whitened."""
+    n, prior = len(starts), problem.model.prior
+    deviation = jnp.stack(starts) - jnp.stack(prior.mean[:n])[:, None]
+    whitened = numerics.solve_lower(numerics.cholesky(prior.covariance()[:n, :n]), deviation)
+    return jnp.where(problem.segments.first, whitened, 0)
 
 
-def _laplace(residuals, found: Unknowns):
-    """Covariance (p, p) of the parameters, the starts marginalised, from the Jacobian; and half the sum of squares."""
-    flat, unravel = jax.flatten_util.ravel_pytree(found)
-    stacked = lambda z: jax.flatten_util.ravel_pytree(residuals(unravel(z), None))[0]
-    jacobian = jax.jacfwd(stacked)(flat)
-    p = found.parameters.shape[0]
-    # R of the QR factorisation with the parameters last: its lower right block is the square root of their information.
-    reordered = jnp.concatenate([jacobian[:, p:], jacobian[:, :p]], axis=1)
-    root = jnp.linalg.qr(reordered, mode="r")[-p:, -p:]
-    inverse = jax.scipy.linalg.solve_triangular(root, jnp.eye(p, dtype=root.dtype))
-    return inverse @ inverse.T, 0.5 * jnp.sum(stacked(flat) ** 2)
+def _prior(problem: ShootingProblem, z):
+    """Deviations (p,) of the parameters from the prior, whitened."""
+    deviation = problem.line(z) - problem.centre
+    if problem.prior is None:
+        return HAIR * deviation
+    return numerics.solve_lower(numerics.cholesky(problem.prior), deviation)

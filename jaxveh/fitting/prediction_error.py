@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -9,25 +10,25 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optimistix as optx
 
-from jaxveh._core.errors import InputError, check_positive
-from jaxveh._core.parameter import Where, pick, prior_spread, put, resolve
+from jaxveh._core.errors import InputError, check_positive, is_concrete
+from jaxveh._core.parameter import Parameter, Where, pick, put
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
-from jaxveh.fitting.result import Fit, make_fit, raise_unfinished
+from jaxveh.fitting.levenberg_marquardt import Quadratic
+from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units, on_line, picked
+from jaxveh.fitting.recorded import listed, spread_on_line
+from jaxveh.fitting.result import Fit, raise_unfinished
+from jaxveh.fitting.scoring import FisherScoring
+from jaxveh.fitting.solve import fit_at, solve
 from jaxveh.statespace import StateSpace
 
 LOG_2PI = float(np.log(2 * np.pi))
 
-FIRST_DAMPING, RAISED, LOWERED = 1e-2, 5.0, 0.2
-"""Levenberg's damping at the start, and its factors after a step that raised and one that lowered the cost."""
-
-SECANTS = 10
-"""How many of the last steps correct the curvature."""
-
-LONGEST_STEP = 2.0
-"""In the prior's standard deviations (without a prior: on the real line): how far one step may move a parameter."""
+BLOCK = 1
+"""Steps between which the host tells how far it is: each is a pass over all the data."""
 
 
 class Target(NamedTuple):
@@ -41,6 +42,170 @@ class Target(NamedTuple):
     values: Any
     weight: float
     bend: float
+
+
+class _Name(eqx.Module):
+    """A string that is part of the structure, not an argument, of a compiled function."""
+
+    name: str = eqx.field(static=True)
+
+
+class PredictionErrorProblem(AbstractProblem):
+    """A Gaussian filter's negative log-likelihood of recordings of one length, as squares of its whitened innovations, and what
+    of the model is to be fitted.
+
+    `rows` with (K, T) leaves; `counts` (K,): how many times each recording counts. `centre`, `spread` (p,): the prior on the line
+    of the parameters' bijectors, a spread of infinity for none. The first `warm_up` rows of each do not count.
+    """
+
+    filter: AbstractFilter
+    model: StateSpace
+    rows: Any
+    counts: jax.Array
+    centre: jax.Array
+    spread: jax.Array
+    target: Any
+    warm_up: int = eqx.field(static=True)
+    parameters: tuple[Parameter, ...] = eqx.field(static=True)
+    shape: Shape | None = eqx.field(static=True)
+
+    def start(self):
+        return on_line(self.parameters, pick(self.model, self.parameters))
+
+    def line(self, z):
+        return z
+
+    def filled(self, z):
+        return put(self.model, self.parameters, in_units(self.parameters, z))
+
+    def cost(self, z):
+        return _cost(self, self.parts(z)) + 0.5 * jnp.sum(((z - self.centre) / self.spread) ** 2)
+
+    def unit(self):
+        """What counts as one in a step: the prior's spread, without a prior one on the line, (p,)."""
+        return jnp.where(jnp.isfinite(self.spread), self.spread, 1.0)
+
+    def search(self, z, max_steps, tolerance):
+        found, state = score(self, z, None, tolerance, jnp.asarray(max_steps))
+        return Found(found, state.steps, state.done)
+
+    def covariance(self, z):
+        return uncertainty(quadratic(z, self))
+
+    def failed(self, cost):
+        return ~jnp.isfinite(cost)
+
+    def units(self):
+        return self.rows.t.shape[0]
+
+    def counted(self, counts):
+        return dataclasses.replace(self, counts=counts)
+
+    def parts(self, z) -> Parts:
+        """What the cost at z is made of."""
+        model = self.filled(z)
+        if self.target is None:
+            return jax.vmap(lambda rows: self._one(model, rows, None))(self.rows)
+        return jax.vmap(lambda rows, values: self._one(model, rows, values))(self.rows, self.target.values)
+
+    def _one(self, model, rows, values):
+        estimate = scan(self.filter, model, rows)
+        counts = jnp.arange(rows.t.shape[0]) >= self.warm_up
+        present = jnp.stack([jnp.isfinite(getattr(rows.y, n)) & counts for n in model.channels], axis=1)
+        white = jnp.where(present, jnp.stack(estimate.info.whitened, axis=1), 0)
+        # The normal law's constant stands with each measurement, so that the cost is the likelihood's.
+        levels = jnp.where(present, jnp.stack(estimate.info.log_scale, axis=1), 0)
+        constant = 0.5 * LOG_2PI * jnp.sum(present, dtype=white.dtype)
+        return Parts(white, levels, self._supervised(estimate, values, counts, white.dtype), constant)
+
+    def _supervised(self, estimate, values, counts, dtype):
+        if values is None:
+            return jnp.zeros((0,), dtype)
+        known = jnp.isfinite(values) & counts
+        error = getattr(estimate.mean, self.target.name.name) - jnp.where(known, values, 0)
+        # The square root of twice the pseudo-Huber cost, with its sign: smooth at zero.
+        share = jnp.sqrt(2 / (jnp.sqrt(1 + (error / self.target.bend) ** 2) + 1))
+        return jnp.where(known, error * share / self.target.weight, 0)
+
+
+class Parts(NamedTuple):
+    """Whitened innovations and log-spreads (K, T, m), zero where nothing counts, the target's residuals (K, T), and the constants
+    (K,) of the normal laws."""
+
+    white: Any
+    levels: Any
+    supervised: Any
+    constant: Any
+
+
+def _cost(problem: PredictionErrorProblem, parts: Parts):
+    """The negative log-likelihood with the target's cost, without the prior's."""
+    by_recording = lambda leaf: jnp.sum(leaf, axis=tuple(range(1, leaf.ndim)))
+    squares = by_recording(parts.white**2) + by_recording(parts.supervised**2)
+    return jnp.sum(problem.counts * (0.5 * squares + by_recording(parts.levels) + parts.constant))
+
+
+def _cost_at(z, problem: PredictionErrorProblem):
+    return problem.cost(z)
+
+
+def quadratic(z, problem: PredictionErrorProblem) -> Quadratic:
+    """Cost, gradient (p,) and expected information (p, p) of the negative log-posterior at z, from one pass forward."""
+    push = lambda direction: jax.jvp(problem.parts, (z,), (direction,))
+    parts, slopes = jax.vmap(push, out_axes=(None, 0))(jnp.eye(z.size, dtype=z.dtype))
+    deviation = (z - problem.centre) / problem.spread
+    cost = _cost(problem, parts) + 0.5 * jnp.sum(deviation**2)
+    # Each recording as often as it counts: its square root on either side of a product.
+    weigh = lambda leaf: jnp.sqrt(problem.counts).reshape(-1, *(1,) * (leaf.ndim - 1)) * leaf
+    flat = lambda leaf: jax.vmap(weigh)(leaf).reshape(z.size, -1)
+    white, levels, supervised = (flat(leaf) for leaf in (slopes.white, slopes.levels, slopes.supervised))
+    gradient = white @ weigh(parts.white).reshape(-1) + supervised @ weigh(parts.supervised).reshape(-1)
+    gradient = gradient + levels @ weigh(jnp.ones_like(parts.levels)).reshape(-1) + deviation / problem.spread
+    # With w = e / exp(s), dw = de / exp(s) - w ds, whose square holds one of the two ds^2 that (dlog S)^2 / 2 is made of.
+    information = white @ white.T + levels @ levels.T + supervised @ supervised.T
+    return Quadratic(cost, gradient, information + jnp.diag(1 / problem.spread**2))
+
+
+def uncertainty(at: Quadratic) -> tuple[jax.Array, jax.Array]:
+    """The covariance (p, p) that an information at the optimum says, and that every parameter is in it, (p,)."""
+    return jnp.linalg.pinv(at.matrix, hermitian=True), jnp.ones(at.gradient.shape, bool)
+
+
+def score(problem: PredictionErrorProblem, z, state, tolerance: float, limit):
+    """Fisher scoring from z, or on from a `state`, until `limit` steps in all: where it ended, and its state."""
+    solver = FisherScoring(atol=tolerance, quadratic=quadratic)
+    options = {"unit": problem.unit(), "limit": limit} | ({} if state is None else {"state": state})
+    found = optx.minimise(_cost_at, solver, z, problem, options=options, max_steps=None, throw=False)
+    return found.value, found.state
+
+
+def pose_prediction_error(
+    filter: AbstractFilter,
+    model: StateSpace,
+    recordings: Recording | Sequence[Recording],
+    where: Where,
+    *,
+    prior: float | Mapping[str, float] | None = None,
+    centre: StateSpace | None = None,
+    target: Target | None = None,
+    warm_up: int = 0,
+) -> PredictionErrorProblem:
+    """What `prediction_error` solves, for `solve`; arguments and errors as there."""
+    recordings = listed(recordings)
+    if len({len(recording) for recording in recordings}) != 1:
+        raise InputError("recordings: must be one or several of the same number of rows; cut them to one length.")
+    if (mixture := _without_whitened(filter)) is not None:
+        raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
+    filter.check(model)
+    parameters, shape = picked(model, where)
+    rows = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[model.rows(recording) for recording in recordings])
+    means = pick(model if centre is None else centre, parameters)
+    line = on_line(parameters, means)
+    return PredictionErrorProblem(
+        filter=filter, model=model, rows=rows, counts=jnp.ones(len(recordings), line.dtype), centre=line,
+        spread=spread_on_line(parameters, means, prior), target=_target(target, recordings), warm_up=warm_up,
+        parameters=parameters, shape=shape,
+    )  # fmt: skip
 
 
 def prediction_error(
@@ -61,42 +226,52 @@ def prediction_error(
     """Maximise a Gaussian filter's likelihood (with `prior`: its posterior) over the leaves that `where` picks.
 
     The optimum of `maximum_likelihood` in a dozen steps, each from one forward-mode pass for all parameters (Fisher scoring
-    on innovations e with variance S: information `de de' / S + dlog S dlog S' / 2`; Ljung 1999, ch. 10; Gupta & Mehra
-    1974), damped after Levenberg. The steps are taken on the host, one compiled function serves them all.
+    on innovations e with variance S: information `de de' / S + dlog S dlog S' / 2`; see `FisherScoring`). `progress` is told
+    of each. Under `jit`, `vmap` and `grad` as it is, without telling; see `solve`.
 
-    `where` sees the StateSpace; `prior`: relative spreads as in `with_parameters`, around the values of `centre` (default:
+    `where` sees the StateSpace; `prior`: relative spreads, one number or by name, around the values of `centre` (default:
     the model's own). `target`: a reference that supervises the fit. Recordings of equal length run as one batch: a long log
     cut into pieces that overlap by `warm_up` rows, in which each filter finds its state and which do not count, is many
-    times faster than the log in one. Ends when two steps in a row gain less than `tolerance` of log-posterior.
+    times faster than the log in one. Ends when two steps in a row gain less than `tolerance` of log-posterior: for exact
+    derivatives give a small one.
 
     **Returns** a `Fit`; standard errors from the expected information. **Raises** `InputError` for a filter without
     whitened innovations, or recordings of different length; `FilterError` where it does not converge (`throw`).
     """
-    recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    if len({len(recording) for recording in recordings}) != 1:
-        raise InputError("recordings: must be one or several of the same number of rows; cut them to one length.")
     check_positive("tolerance", tolerance)
-    if (mixture := _without_whitened(filter)) is not None:
-        raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
-    filter.check(model)
-    parameters = resolve(model, where)
-    rows = _stack([model.rows(recording) for recording in recordings])
-    values, means = pick(model, parameters), pick(model if centre is None else centre, parameters)
-    line = lambda physical: jnp.stack([p.domain.inverse(v) for p, v in zip(parameters, physical, strict=True)])
-    spread = (
-        jnp.full((len(parameters),), jnp.inf) if prior is None else jnp.stack(prior_spread(parameters, means, prior))
+    problem = pose_prediction_error(
+        filter, model, recordings, where, prior=prior, centre=centre, target=target, warm_up=warm_up
     )
-    problem = _Problem(filter, model, rows, line(means), spread, _target(target, recordings), warm_up, parameters)
-    z, cost, information, steps, converged = _score(problem, line(values), max_steps, tolerance, progress)
-    counted = sum(int(np.isfinite(np.asarray(y)[:, warm_up:]).sum()) for y in rows.y)
-    cost += 0.5 * LOG_2PI * counted
-    covariance = jnp.asarray(np.linalg.pinv(information))
-    fit = make_fit(
-        parameters, z, covariance, jnp.asarray(cost), jnp.asarray(steps), jnp.asarray(converged), problem.filled(z)
-    )
+    if is_concrete(problem):
+        fit = _stepwise(problem, max_steps, tolerance, progress)
+    else:
+        fit = solve(problem, max_steps=max_steps, tolerance=tolerance)
     if throw:
         raise_unfinished(fit)
     return fit
+
+
+def _stepwise(problem: PredictionErrorProblem, max_steps: int, tolerance: float, progress: Progress) -> Fit:
+    """The fit of `solve`, a block of steps at a time."""
+    progress(0, max_steps, "fit (compiling first)")
+    z = problem.start()
+    state = FisherScoring(atol=tolerance, quadratic=quadratic).begin(z)
+    while not bool(state.done) and int(state.steps) < max_steps:
+        limit = min(int(state.steps) + BLOCK, max_steps)
+        z, state = _block(problem, z, state, tolerance, jnp.asarray(limit))
+        best = -float(state.at.cost)
+        progress(int(state.steps), max_steps, f"fit: step {int(state.steps)}, log-posterior {best:.1f}")
+    return _concluded(problem, Found(z, state.steps, state.done), state.at)
+
+
+@eqx.filter_jit
+def _block(problem: PredictionErrorProblem, z, state, tolerance: float, limit):
+    return score(problem, z, state, tolerance, limit)
+
+
+@eqx.filter_jit
+def _concluded(problem: PredictionErrorProblem, found: Found, at: Quadratic) -> Fit:
+    return fit_at(problem, found, at.cost, uncertainty(at))
 
 
 def _without_whitened(filter: Any) -> str | None:
@@ -108,10 +283,6 @@ def _without_whitened(filter: Any) -> str | None:
     return None
 
 
-def _stack(parts):
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *parts)
-
-
 def _target(target: Target | None, recordings) -> Target | None:
     if target is None:
         return None
@@ -119,109 +290,9 @@ def _target(target: Target | None, recordings) -> Target | None:
         raise InputError(f"target has {len(target.values)} value arrays for {len(recordings)} recordings; must agree.")
     check_positive("target weight", target.weight)
     values = jnp.stack([jnp.asarray(v) for v in target.values])
-    return target._replace(values=values, weight=jnp.asarray(target.weight, values.dtype), name=_Name(target.name))
-
-
-class _Name(eqx.Module):
-    """A string that is part of the structure, not an argument, of a compiled function."""
-
-    name: str = eqx.field(static=True)
-
-
-class _Problem(eqx.Module):
-    """What is to be minimised, over rows with (K, T) leaves."""
-
-    filter: AbstractFilter
-    model: StateSpace
-    rows: Any
-    centre: jax.Array
-    spread: jax.Array
-    target: Any
-    warm_up: int = eqx.field(static=True)
-    parameters: tuple = eqx.field(static=True)
-
-    def filled(self, z) -> StateSpace:
-        values = [p.domain.forward(value) for p, value in zip(self.parameters, z, strict=True)]
-        return put(self.model, self.parameters, values)
-
-    def parts(self, z):
-        """Whitened innovations and log-spreads (K, T, m), zero where nothing counts, and the target's residuals (K, T)."""
-        model = self.filled(z)
-        if self.target is None:
-            return jax.vmap(lambda rows: self._one(model, rows, None))(self.rows)
-        return jax.vmap(lambda rows, values: self._one(model, rows, values))(self.rows, self.target.values)
-
-    def _one(self, model, rows, values):
-        estimate = scan(self.filter, model, rows)
-        counts = jnp.arange(rows.t.shape[0]) >= self.warm_up
-        present = jnp.stack([jnp.isfinite(getattr(rows.y, n)) & counts for n in model.channels], axis=1)
-        white = jnp.where(present, jnp.stack(estimate.info.whitened, axis=1), 0)
-        levels = jnp.where(present, jnp.stack(estimate.info.log_scale, axis=1), 0)
-        return white, levels, self._supervised(estimate, values, counts, white.dtype)
-
-    def _supervised(self, estimate, values, counts, dtype):
-        if values is None:
-            return jnp.zeros((0,), dtype)
-        known = jnp.isfinite(values) & counts
-        error = getattr(estimate.mean, self.target.name.name) - jnp.where(known, values, 0)
-        # The square root of twice the pseudo-Huber cost, with its sign: smooth at zero.
-        share = jnp.sqrt(2 / (jnp.sqrt(1 + (error / self.target.bend) ** 2) + 1))
-        return jnp.where(known, error * share / self.target.weight, 0)
-
-
-@eqx.filter_jit
-def _linearised(problem: _Problem, z):
-    """Cost, gradient (p,) and expected information (p, p) of the negative log-posterior at z."""
-    push = lambda direction: jax.jvp(problem.parts, (z,), (direction,))
-    primal, tangents = jax.vmap(push, out_axes=(None, 0))(jnp.eye(z.size, dtype=z.dtype))
-    flat = lambda leaf: leaf.reshape(z.size, -1)
-    (white, levels, supervised), (d_white, d_levels, d_supervised) = primal, map(flat, tangents)
-    deviation = (z - problem.centre) / problem.spread
-    cost = 0.5 * (jnp.sum(white**2) + jnp.sum(supervised**2) + jnp.sum(deviation**2)) + jnp.sum(levels)
-    gradient = d_white @ white.reshape(-1) + d_supervised @ supervised.reshape(-1)
-    gradient = gradient + jnp.sum(d_levels, axis=1) + deviation / problem.spread
-    # With w = e / exp(s), dw = de / exp(s) - w ds, whose square holds one of the two ds^2 that (dlog S)^2 / 2 is made of.
-    information = d_white @ d_white.T + d_levels @ d_levels.T + d_supervised @ d_supervised.T
-    return cost, gradient, information + jnp.diag(1 / problem.spread**2)
-
-
-def _with_secants(information, pairs):
-    """The information corrected to the changes of the gradient (step, change) that were seen, oldest first (BFGS).
-
-    The expected information is the curvature only on average; where they differ, plain scoring creeps.
-    """
-    curvature = information
-    for step, change in pairs:
-        along = curvature @ step
-        if change @ step > 1e-2 * step @ along:
-            curvature = curvature + np.outer(change, change) / (change @ step) - np.outer(along, along) / (step @ along)
-    return curvature
-
-
-def _score(problem: _Problem, z, max_steps: int, tolerance: float, progress: Progress):
-    """Damped Fisher scoring with secant corrections: optimum, cost and information there, steps, whether it converged."""
-    unit = np.asarray(jnp.where(jnp.isfinite(problem.spread), problem.spread, 1.0))
-    damping, small = FIRST_DAMPING, 0
-    pairs: list[tuple[np.ndarray, np.ndarray]] = []
-    progress(0, max_steps, "fit (compiling first)")
-    cost, gradient, information = map(np.asarray, _linearised(problem, z))
-    for step in range(1, max_steps + 1):
-        curvature = _with_secants(information, pairs[-SECANTS:])
-        damped = curvature + damping * np.diag(np.diag(curvature))
-        move = -np.linalg.lstsq(damped, gradient, rcond=None)[0]
-        move *= min(1.0, LONGEST_STEP / max(np.max(np.abs(move / unit)), 1e-12))
-        trial = z + jnp.asarray(move, z.dtype)
-        found = tuple(map(np.asarray, _linearised(problem, trial)))
-        progress(step, max_steps, f"fit: step {step}, log-posterior {-float(min(cost, found[0])):.1f}")
-        if np.isfinite(found[1]).all():
-            pairs.append((np.asarray(trial - z), found[1] - gradient))
-        if all(np.isfinite(part).all() for part in found) and found[0] < cost:
-            small = small + 1 if cost - found[0] < tolerance else 0
-            z, (cost, gradient, information), damping = trial, found, damping * LOWERED
-        else:
-            # No step is small enough to gain: that is the optimum, to the last digit of the cost.
-            small = small + 1 if np.max(np.abs(move / unit)) < 1e-3 else 0
-            damping = max(damping * RAISED, 1e-3)
-        if small == 2:
-            return z, float(cost), information, step, True
-    return z, float(cost), information, max_steps, False
+    return target._replace(
+        values=values,
+        weight=jnp.asarray(target.weight, values.dtype),
+        bend=jnp.asarray(target.bend, values.dtype),
+        name=_Name(target.name),
+    )

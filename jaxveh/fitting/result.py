@@ -1,30 +1,57 @@
-"""What a fit returns: parameters by name with standard errors, and the model that carries them."""
+"""What a fit returns: fitted parameters with standard errors, in one shape whatever was fitted."""
 
-from __future__ import annotations
+# No postponed annotations here: equinox does not see an AbstractVar in a string.
 
 from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 
 from jaxveh._core.errors import FilterError, is_concrete
-from jaxveh._core.names import record
 from jaxveh._core.parameter import Parameter
-from jaxveh._core.result import Result, code
+from jaxveh._core.result import Result
 
 
-class Fit(eqx.Module):
-    """A fit of chosen parameters.
+class AbstractFit(eqx.Module):
+    """What all fits return.
 
-    `mean`, `std`: NamedTuples by field (`front_B`), physical units, standard errors by Laplace's approximation (the
-    curvature at the optimum, mapped through each bijector's slope; NaN where the curvature is not positive definite).
-    `unconstrained` (p,) and `covariance` (p, p): the same on the real line. `cost`: the minimised negative
-    log-posterior, up to a constant. `steps`: taken by the solver. `result`: code, see `jaxveh.Result`. `model`: the
-    StateSpace with the fitted values in place.
+    `values`, `std`: the fitted parameters in physical units and their standard errors, in the shape of what `where` picked
+    (without a `where`: an array (p,) in the order of `names`; of a model whose parameters are states, a tree as
+    `Estimate.parameters`); NaN for a standard error that the data do not give. `unconstrained` (p,), `covariance` (p, p): the
+    same on the line of each parameter's bijector. `cost`: the minimised negative log-posterior, up to a constant. `steps`: taken
+    by the solver. `result`: a code, see `jaxveh.Result`. `model`: what was fitted, with the values in place.
     """
 
-    mean: Any
+    values: eqx.AbstractVar[Any]
+    std: eqx.AbstractVar[Any]
+    unconstrained: eqx.AbstractVar[Any]
+    covariance: eqx.AbstractVar[Any]
+    cost: eqx.AbstractVar[Any]
+    steps: eqx.AbstractVar[Any]
+    result: eqx.AbstractVar[Any]
+    model: eqx.AbstractVar[Any]
+    parameters: eqx.AbstractVar[tuple[Parameter, ...]]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters' names, (p,)."""
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def converged(self):
+        """Whether the fit ended well: a truth value, or one a fit of a batch."""
+        return self.result == 0
+
+    @property
+    def reason(self) -> str:
+        """Why the fit ended, in words; for one fit, outside jit."""
+        return Result(int(self.result)).message
+
+
+class Fit(AbstractFit):
+    """A fit by `multiple_shooting`, `maximum_likelihood`, `prediction_error`, or by `solve` of any problem; see `AbstractFit`."""
+
+    values: Any
     std: Any
     unconstrained: jax.Array
     covariance: jax.Array
@@ -35,34 +62,10 @@ class Fit(eqx.Module):
     parameters: tuple[Parameter, ...] = eqx.field(static=True)
 
 
-def make_fit(parameters: tuple[Parameter, ...], unconstrained, covariance, cost, steps, converged, model) -> Fit:
-    """A Fit from the optimum on the real line."""
-    physical = [p.domain.forward(z) for p, z in zip(parameters, unconstrained, strict=True)]
-    slopes = [p.domain.slope(value) for p, value in zip(parameters, physical, strict=True)]
-    variances = jnp.diagonal(covariance)
-    spread = jnp.where(variances > 0, jnp.sqrt(jnp.where(variances > 0, variances, 1)), jnp.nan)
-    finite = jnp.all(jnp.isfinite(unconstrained)) & jnp.isfinite(cost)
-    result = jnp.where(converged, code(Result.successful), code(Result.not_converged))
-    result = jnp.where(finite, result, code(Result.non_finite_state))
-    fields = [p.field for p in parameters]
-    return Fit(
-        mean=record("Parameters", dict(zip(fields, physical, strict=True))),
-        std=record("Parameters", {f: s * d for f, s, d in zip(fields, slopes, spread, strict=True)}),
-        unconstrained=unconstrained,
-        covariance=covariance,
-        cost=cost,
-        steps=steps,
-        result=result,
-        model=model,
-        parameters=parameters,
-    )
-
-
-def raise_unfinished(fit: Fit) -> None:
+def raise_unfinished(fit: AbstractFit) -> None:
     """Raise `FilterError` where the fit did not end well; tracers pass."""
     if is_concrete(fit.result) and int(fit.result) != 0:
-        names = ", ".join(p.name for p in fit.parameters)
-        reason = Result(int(fit.result)).message
         raise FilterError(
-            f"fit of {names} stopped after {int(fit.steps)} steps: {reason}. throw=False returns it as it is."
+            f"fit of {', '.join(fit.names)} stopped after {int(fit.steps)} steps: {fit.reason}. "
+            "throw=False returns it as it is."
         )

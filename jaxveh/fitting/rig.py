@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,14 +13,16 @@ import numpy as np
 
 from jaxveh._core.errors import FilterError, InputError, check_at_least, check_one_of, check_positive
 from jaxveh._core.names import check_names
-from jaxveh._core.parameter import Where, pick, resolve
+from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, silent
+from jaxveh.fitting.problem import Found, on_line, picked, shaped
+from jaxveh.fitting.result import AbstractFit
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
 from jaxveh.fitting.rig_identify import settle, without
-from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered
+from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered, spread_of
 from jaxveh.fitting.rig_robust import inflation
-from jaxveh.fitting.rig_solve import covariance, information
 from jaxveh.fitting.rig_stages import HELD, Stage, stages_of
+from jaxveh.fitting.solve import fit_at
 from jaxveh.io.rig_table import MEASURED, RigTable
 from jaxveh.tyres import AbstractTyre, MFTyre
 
@@ -29,26 +32,28 @@ KNOWN = ("nominal_load", "reference_load")
 """Parameters that say where others hold: known, not fitted unless `where` picks them."""
 
 
-class RigFit(eqx.Module):
-    """A tyre fitted to rig data.
+class RigFit(AbstractFit):
+    """A tyre fitted to rig data: a fit (see `AbstractFit`), and what the rig says of it.
 
-    `tyre`: the law with its coefficients. `names` (p,), `values`, `std` (p,): the coefficients that were fitted, in the law's
-    units and in the canonical one of the tyre's twins (`rig_canonical`); standard errors by the Gauss-Newton matrix of the joint
-    stage with the noise estimated from residuals. nan for what stands at its start, because data do not identify it or because it
-    is held unless asked (`rig_stages.HELD`): in the others' errors it counts with a spread of its own size, or of what it is
-    among ordinary tyres. `identified`: how many directions the data do.
-    `unconstrained`, `covariance` (p, p): on the line of each one's bijector. By channel (`F_x`, ...): `rmse` of residuals,
-    `peak` (the 99.5th percentile of what was measured), `start_rmse` before the fit, `noise` (standard deviation), and
-    `cross_validation`, the RMSE at rows that a fold's fit did not see (nan without). `residuals` (n,): fitted less measured, nan
-    without a measurement. `stages`: a report each.
+    `model`, also as `tyre`: the law with its coefficients, in the canonical one of its twins (`rig_canonical`); standard errors
+    by the Gauss-Newton matrix of the joint stage with the noise estimated from residuals. nan for what stands at its start,
+    because data do not identify it or because it is held unless asked (`rig_stages.HELD`): in the others' errors it counts
+    with a spread of its own size, or of what it is among ordinary tyres. `identified`: how many directions the data do. By
+    channel (`F_x`, ...): `rmse` of residuals, `peak` (the 99.5th percentile of what was measured), `start_rmse` before the
+    fit, `noise` (standard deviation), and `cross_validation`, the RMSE at rows that a fold's fit did not see (nan without).
+    `residuals` (n,): fitted less measured, nan without a measurement. `stages`: a report each. `problem`: the joint stage's at
+    the fit, for `solve` and `bootstrap`, in which what is held stays.
     """
 
-    tyre: AbstractTyre
-    names: tuple[str, ...] = eqx.field(static=True)
-    values: np.ndarray
-    std: np.ndarray
+    values: Any
+    std: Any
     unconstrained: np.ndarray
     covariance: np.ndarray
+    cost: Any
+    steps: Any
+    result: Any
+    model: AbstractTyre
+    parameters: tuple[Parameter, ...] = eqx.field(static=True)
     identified: int = eqx.field(static=True)
     rmse: dict[str, float]
     start_rmse: dict[str, float]
@@ -57,6 +62,12 @@ class RigFit(eqx.Module):
     noise: dict[str, float]
     residuals: dict[str, np.ndarray]
     stages: tuple[StageReport, ...] = eqx.field(static=True)
+    problem: RigProblem
+
+    @property
+    def tyre(self) -> AbstractTyre:
+        """The fitted law."""
+        return self.model
 
 
 def fit_rig(
@@ -65,6 +76,7 @@ def fit_rig(
     *,
     where: Where | None = None,
     free: Sequence[str] = (),
+    prior: float | Mapping[str, float] | None = None,
     measured: Sequence[str] | None = None,
     weights: Mapping[str, float] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -78,39 +90,29 @@ def fit_rig(
 ) -> RigFit:
     """Fit a tyre to rig data, from the coefficients that it has.
 
-    MF-Tyre goes in stages (pure slip, combined slip, moments) over the coefficients that the data show (those of load where
-    the load varies, and so on), then all of them together; other laws at once. `where` picks coefficients instead. `free`:
-    names of those that are held unless asked (`lateral.PKY4`, the form of the cornering stiffness over load, which stays at what
-    the law has, 2 in a typical one). What the data do not identify stays at its start.
-    `measured`: the forces and moments to be compared; by default those that both data and law have. `weights`: by channel, on
-    top of one over the noise squared, which is estimated. `bounds`: by name, an interval that a coefficient stays in. `robust`:
-    residuals are taken for Student's t with 4 degrees of freedom, on the scale of their median size, so that outliers count
-    little. `folds`: parts for cross-validation, whole runs
+    MF-Tyre goes in stages (pure slip, combined slip, moments) over the coefficients that the data show (those of load where the
+    load varies, and so on), then all of them together; other laws at once. `where` picks coefficients instead. `free`: names
+    of those that are held unless asked (`lateral.PKY4`, the form of the cornering stiffness over load, which stays at what the
+    law has, 2 in a typical one). What the data do not identify stays at its start. `prior`: relative spreads around the law's
+    own coefficients, one number or by name, as in all fits. `measured`: the forces and moments to be compared; by default
+    those that both data and law have. `weights`: by channel, on top of one over the noise squared, which is estimated.
+    `bounds`: by name, an interval that a coefficient stays in. `robust`: residuals are taken for Student's t with 4 degrees of
+    freedom, on the scale of their median size, so that outliers count little. `folds`: parts for cross-validation, whole runs
     where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law
     that is near the data already.
+
+    A program that looks at the data (which coefficients they show, how noisy they are) and goes through `LevenbergMarquardt`
+    round by round: for `jit`, `vmap` and `grad` see `pose_rig` and `solve`.
 
     **Raises** `InputError` for a channel, weight or bound that has no match, a start outside its bounds or without finite
     forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`;
     `FilterError` where the joint fit does not converge, unless `throw=False`.
     """
-    contact = contact_of(rig)
-    channels = _channels(law, rig, contact, measured)
-    extra = {} if weights is None else dict(weights)
-    check_names("weights", extra, channels)
-    for name, weight in extra.items():
-        check_positive(f"weights[{name!r}]", weight)
     check_at_least("max_steps", max_steps, 1)
-    chosen = None if where is None else tuple(p.name for p in resolve(law, where))
-    plan = stages_of(law, rig, channels, chosen, free)
-    _check_free(free, plan)
-    fitted, aside = _names(law, plan, chosen), tuple(name for stage in plan for name in stage.aside)
-    names = (*fitted, *aside)
-    settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance)
-    data = RigData(rig, contact, channels, names, settings)
-    data.check(law)
+    data, plan, aside = _prepared(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
     parts = fold_of(rig, folds) if folds else np.zeros(rig.load.shape)
-    joint = Stage(JOINT, channels, names, np.ones(rig.load.shape, bool))
-    plan = [*(plan if staged else ()), joint._replace(coefficients=fitted)]
+    joint = _joint(data)
+    plan = [*(plan if staged else ()), without(joint, _held(data, aside), data.names)]
     total = len(plan) + folds
     tyre, reports = law, []
     for k, stage in enumerate(plan):
@@ -119,13 +121,13 @@ def fit_rig(
         reports.append(report)
     settled = settle(data, law, tyre, joint, aside, reports[-1])
     tyre, reports[-1] = settled.tyre, settled.report
-    plan = [without(stage, settled.held, names) for stage in plan]
+    plan = [without(stage, settled.held, data.names) for stage in plan]
     missed = np.full(data.measured.shape, np.nan)
     for k in range(folds):
         progress(len(plan) + k, total, "cross-validation")
         missed[:, parts == k] = _unseen(data, law, plan, parts == k)[:, parts == k]
     progress(total, total, JOINT)
-    validation = rms(channels, missed) if folds else dict.fromkeys(channels, float("nan"))
+    validation = rms(data.channels, missed) if folds else dict.fromkeys(data.channels, float("nan"))
     fit = _result(data, tyre, joint, settled.held, tuple(reports), data.rmse(law), validation)
     if throw and not reports[-1].converged:
         steps = reports[-1].steps
@@ -136,6 +138,70 @@ def fit_rig(
 def _check_free(free: Sequence[str], plan: list[Stage]) -> None:
     there = tuple(dict.fromkeys(name for stage in plan for name in stage.coefficients))
     check_names("free", dict.fromkeys(free), there)
+
+
+def _held(data: RigData, aside: Sequence[str]) -> np.ndarray:
+    return np.array([name in aside for name in data.names])
+
+
+def pose_rig(
+    law: AbstractTyre,
+    rig: RigTable,
+    *,
+    noise: Mapping[str, float] | None = None,
+    where: Where | None = None,
+    free: Sequence[str] = (),
+    prior: float | Mapping[str, float] | None = None,
+    measured: Sequence[str] | None = None,
+    weights: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    robust: bool = False,
+) -> RigProblem:
+    """The joint stage of `fit_rig` from where the law is, for `solve`: all coefficients but those held unless asked, one noise
+    level a channel.
+
+    `noise`: standard deviations by channel; by default those of the law's own residuals, so that a problem at a fitted law has
+    the fit's. Other arguments and errors as in `fit_rig`.
+    """
+    data, _, aside = _prepared(law, rig, where, free, prior, measured, weights, bounds, robust)
+    levels = data.noise(law) if noise is None else dict(noise)
+    check_names("noise", levels, data.channels)
+    missing = [name for name in data.channels if name not in levels]
+    if missing:
+        raise InputError(f"noise: no standard deviation for {', '.join(missing)}.")
+    for name, level in levels.items():
+        check_positive(f"noise[{name!r}]", level)
+    return data.problem(law, without(_joint(data), _held(data, aside), data.names), levels)
+
+
+def _prepared(
+    law, rig, where, free, prior, measured, weights, bounds, robust, max_steps: int = 500, tolerance: float = 1e-6
+) -> tuple[RigData, list[Stage], tuple[str, ...]]:
+    """The data as all stages share them, after every check, the stages before the joint one, and what is held unless asked."""
+    contact = contact_of(rig)
+    channels = _channels(law, rig, contact, measured)
+    extra = {} if weights is None else dict(weights)
+    check_names("weights", extra, channels)
+    for name, weight in extra.items():
+        check_positive(f"weights[{name!r}]", weight)
+    parameters, shape = ((), None) if where is None else picked(law, where)
+    chosen = None if where is None else tuple(p.name for p in parameters)
+    plan = stages_of(law, rig, channels, chosen, free)
+    _check_free(free, plan)
+    aside = tuple(name for stage in plan for name in stage.aside)
+    settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance, shape=shape)
+    data = RigData(rig, contact, channels, (*_names(law, plan, chosen), *aside), settings)
+    data.check(law)
+    if prior is not None:
+        fitted = data.parameters(law)
+        values = pick(law, fitted)
+        spread = jnp.stack(prior_spread(fitted, values, prior))
+        data.chosen = settings._replace(prior=(on_line(fitted, values), spread))
+    return data, plan, aside
+
+
+def _joint(data: RigData) -> Stage:
+    return Stage(JOINT, data.channels, data.names, np.ones(data.rig.load.shape, bool))
 
 
 def _unseen(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarray) -> np.ndarray:
@@ -184,53 +250,54 @@ def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None)
 
 
 def _result(data: RigData, law, joint: Stage, held: np.ndarray, reports, start_rmse, validation) -> RigFit:
-    parameters = data.parameters(law)
-    values = np.array([float(value) for value in pick(law, parameters)])
-    problem = data.problem(law, joint, data.noise(law))
+    noise, last = data.noise(law), reports[-1]
+    problem = _as_uncertain(data.problem(law, joint, noise), held, joint.coefficients)
+    fit, known = _summed_up(problem, jnp.asarray(last.steps), jnp.asarray(last.converged))
     # The noise is that of the fit, with the degrees of freedom that coefficients take.
     count = int(data.present.sum())
-    free = count / (count - int((~held).sum()))
-    noise = data.noise(law)
+    factor = count / (count - int((~held).sum()))
     if data.chosen.robust:
-        free *= inflation(data.residuals(law) / np.array([[noise[name]] for name in data.channels]))
-    spread, known = _spread(data, law, joint, problem, held)
-    line = np.asarray(spread * problem.scale * problem.scale[:, None]) * free
-    slopes = np.array([float(p.domain.slope(value)) for p, value in zip(parameters, values, strict=True)])
-    residual = data.residuals(law)
+        factor *= inflation(data.residuals(law) / np.array([[noise[name]] for name in data.channels]))
+    covariance = np.asarray(fit.covariance) * factor
+    values = pick(law, fit.parameters)
+    slopes = np.array([float(p.domain.slope(value)) for p, value in zip(fit.parameters, values, strict=True)])
+    std = np.where(held, np.nan, np.abs(slopes) * np.sqrt(np.diag(covariance)))
     return RigFit(
-        tyre=law,
-        names=joint.coefficients,
-        values=values,
-        std=np.where(held, np.nan, np.sqrt(np.diag(line)) * np.abs(slopes)),
-        unconstrained=np.asarray(problem.origin),
-        covariance=line,
+        values=jax.tree.map(np.asarray, fit.values),
+        std=shaped(problem.shape, std),
+        unconstrained=np.asarray(fit.unconstrained),
+        covariance=covariance,
+        cost=fit.cost,
+        steps=fit.steps,
+        result=fit.result,
+        model=law,
+        parameters=fit.parameters,
         identified=int(known),
         rmse=data.rmse(law),
         start_rmse=start_rmse,
         cross_validation=validation,
         peak=data.peak,
-        noise=data.noise(law),
-        residuals=dict(zip(data.channels, residual, strict=True)),
+        noise=noise,
+        residuals=dict(zip(data.channels, data.residuals(law), strict=True)),
         stages=reports,
+        problem=data.problem(law, without(joint, held, data.names), noise),
     )
 
 
-def _spread(data: RigData, law: AbstractTyre, joint: Stage, problem: RigProblem, held) -> tuple[Any, Any]:
-    """The covariance (p, p) in the problem's coordinates, and how many directions the data identify.
+def _as_uncertain(problem: RigProblem, held: np.ndarray, names: Sequence[str]) -> RigProblem:
+    """The problem in which what is held is not known for certain.
 
     What is held at its start for lack of data may be off by its own size, what is held unless asked by what `HELD` says, and what
     is confounded with it by as much.
     """
-    zero = jnp.zeros(problem.origin.shape)
-    found = information(problem, zero)
-    spreads = jnp.asarray([HELD.get(name, np.nan) for name in joint.coefficients])
+    spreads = jnp.asarray([HELD.get(name, np.nan) for name in names])
     size = jnp.where(jnp.isnan(spreads), 1.0, spreads / problem.scale)
-    prior = jnp.where(jnp.asarray(held), 1 / size**2, PULL**2)
-    spread, known = covariance(found, prior)
-    if not data.chosen.weights:
-        return spread, known
-    # Weights of the user's change what is minimised, not what is known: the sandwich, and what the data know without them. The
-    # pull counts in its middle as in its ends: what data do not show stays unknown.
-    middle, plain = (information(data.problem(law, joint, data.noise(law), power), zero) for power in (1.0, 0.0))
-    middle = middle + jnp.diag(prior.astype(middle.dtype))
-    return spread @ middle @ spread, covariance(plain)[1]
+    pull = jnp.where(jnp.asarray(held), 1 / size, PULL).astype(problem.origin.dtype)
+    return dataclasses.replace(problem, pull=pull)
+
+
+@eqx.filter_jit
+def _summed_up(problem: RigProblem, steps, converged):
+    """The fit that ended where the problem starts, and how many directions of the coefficients the data identify."""
+    found = Found(problem.start(), steps, converged)
+    return fit_at(problem, found, problem.cost(found.z), problem.covariance(found.z)), spread_of(found.z, problem)[1]

@@ -15,9 +15,9 @@ from jaxveh._core.bijectors import Interval
 from jaxveh._core.errors import InputError, check_at_least, check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, resolve
-from jaxveh.fitting.rig_problem import RigProblem, start_of
+from jaxveh.fitting.problem import Shape
+from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, descend, start_of
 from jaxveh.fitting.rig_robust import TO_DEVIATION
-from jaxveh.fitting.rig_solve import solve
 from jaxveh.fitting.rig_stages import Stage
 from jaxveh.io.rig_table import RigTable
 from jaxveh.tyres import AbstractTyre, Contact
@@ -49,13 +49,16 @@ class StageReport(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """What a user chose: `weights` and `bounds` by name, `robust`, the most steps a stage, the solver's tolerance."""
+    """What a user chose: `weights` and `bounds` by name, `robust`, the most steps a stage, the solver's tolerance; the centre
+    and the spread (p,) of a `prior` on the coefficients' line; the `shape` in which their values are reported."""
 
     weights: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]
     robust: bool
     max_steps: int
     tolerance: float
+    prior: tuple[Any, Any] | None = None
+    shape: Shape | None = None
 
 
 class RigData:
@@ -115,8 +118,8 @@ class RigData:
             raise InputError(f"bounds[{p.name!r}] = ({low:g}, {high:g}): the start {value:g} must lie inside.")
         return p._replace(domain=Interval(float(low), float(high)))
 
-    def problem(self, law: AbstractTyre, stage: Stage, noise: Mapping[str, float], power: float = 0.5) -> RigProblem:
-        """The stage's problem, weighted by one over the noise of each channel and its weight to a `power`.
+    def problem(self, law: AbstractTyre, stage: Stage, noise: Mapping[str, float]) -> RigProblem:
+        """The stage's problem, weighted by one over the noise of each channel.
 
         All stages have the same shapes, what a stage does not compare weighing nothing and what it does not fit being held:
         one compilation, which takes longer than all steps, serves them all.
@@ -124,15 +127,26 @@ class RigData:
         parameters = self.parameters(law)
         origin, scale = start_of(law, parameters)
         moves = np.array([name in stage.coefficients for name in self.names])
-        size = [
-            self.chosen.weights.get(name, 1.0) ** power / noise[name] if name in stage.channels else 0.0
-            for name in self.channels
-        ]
+        size = [1 / noise[name] if name in stage.channels else 0.0 for name in self.channels]
         counts = self.present & stage.rows
+        emphasis = np.array([self.chosen.weights.get(name, 1.0) for name in self.channels])
+        centre, spread = self.chosen.prior or (origin, jnp.full_like(origin, jnp.inf))
         return RigProblem(
-            law, self.contact, jnp.asarray(self.measured), jnp.asarray(counts * np.array(size)[:, None]), origin,
-            jnp.where(moves, scale, 0.0), parameters, self.channels, self.chosen.robust,
-        )  # fmt: skip
+            law=law,
+            contact=self.contact,
+            measured=jnp.asarray(self.measured),
+            weight=jnp.asarray(counts * np.array(size)[:, None]),
+            emphasis=jnp.asarray(emphasis),
+            origin=origin,
+            scale=jnp.where(moves, scale, 0.0),
+            centre=centre,
+            spread=spread,
+            pull=jnp.asarray(PULL, origin.dtype),
+            parameters=parameters,
+            channels=self.channels,
+            robust=self.chosen.robust,
+            shape=self.chosen.shape,
+        )
 
     def residuals(self, law: AbstractTyre) -> np.ndarray:
         """Fitted less measured (m, n), nan without a measurement."""
@@ -163,7 +177,7 @@ class RigData:
         """What the stage minimises, for several laws by the same noise; infinite where a force is not finite."""
         problem = self.problem(law, stage, noise)
         bent = problem.bent(problem.weight * jnp.asarray(np.where(self._counts(stage), self.residuals(law), 0.0)))[0]
-        return float(np.nan_to_num(jnp.sum(bent**2), nan=np.inf))
+        return float(np.nan_to_num(jnp.sum(problem.emphasis[:, None] * bent**2), nan=np.inf))
 
     def _counts(self, stage: Stage) -> np.ndarray:
         return self.present & stage.rows & np.array([[name in stage.channels] for name in self.channels])
@@ -193,9 +207,9 @@ class RigData:
         steps, alone = 0, not self.chosen.robust and len(stage.channels) == 1
         while steps < most:
             problem, limit = self.problem(law, stage, self.noise(law)), min(ROUND, most - steps)
-            solved = solve(problem, jnp.zeros(problem.origin.shape), jnp.asarray(limit), self.chosen.tolerance)
-            law, steps = problem.filled(solved.z), steps + int(solved.steps)
-            if 2 * float(solved.lowered) < SETTLED or (alone and bool(solved.converged)):
+            found, lowered = _descended(problem, jnp.asarray(limit), self.chosen.tolerance)
+            law, steps = problem.filled(found.z), steps + int(found.steps)
+            if 2 * float(lowered) < SETTLED or (alone and bool(found.converged)):
                 return law, steps, True
         return law, steps, False
 
@@ -230,6 +244,12 @@ def fold_of(rig: RigTable, folds: int) -> np.ndarray:
     rows = rig.load.size
     check_at_least(f"{rig.source}: rows for {folds} folds", rows, 4 * folds)
     return (np.arange(rows) * 4 * folds // rows) % folds
+
+
+@eqx.filter_jit
+def _descended(problem: RigProblem, limit, tolerance: float) -> Descent:
+    """So many steps from where the law is: a block between which the host looks at the noise."""
+    return descend(problem, problem.start(), None, tolerance, limit)
 
 
 @eqx.filter_jit

@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 from jaxveh.fitting.rig_canonical import canonical
 from jaxveh.fitting.rig_data import RigData, StageReport, leaf_of, with_leaf
-from jaxveh.fitting.rig_problem import start_of
-from jaxveh.fitting.rig_solve import covariance, information
+from jaxveh.fitting.rig_problem import spread_at_start, start_of
 from jaxveh.fitting.rig_stages import Stage
 from jaxveh.tyres import AbstractTyre, MFTyre
 
@@ -110,7 +108,7 @@ def _unseen(data: RigData, start, tyre, joint: Stage, held: np.ndarray, kept: np
     """
     free = without(joint, held, joint.coefficients)
     problem = data.problem(tyre, free, data.noise(tyre))
-    spread = np.array(covariance(information(problem, jnp.zeros(problem.origin.shape)))[0])
+    spread = np.array(spread_at_start(problem))
     scale = np.asarray(start_of(tyre, data.parameters(tyre))[1])
     away = np.asarray(problem.origin - start_of(start, data.parameters(start))[0]) / scale
     open_ = ~held & ~kept

@@ -10,10 +10,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optimistix as optx
 from jax import lax
 
 from jaxveh._core.bijectors import Real
 from jaxveh._core.parameter import Parameter, pick, put
+from jaxveh.fitting.levenberg_marquardt import LevenbergMarquardt, Quadratic
+from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units
 from jaxveh.numerics import on_cpu
 from jaxveh.tyres import AbstractTyre, Contact
 
@@ -29,28 +32,60 @@ BLOCK = 2000
 """Rows at a time on a CPU; an accelerator takes all at once."""
 
 
-class RigProblem(eqx.Module):
+class RigProblem(AbstractProblem):
     """Rig data, a law and what of it is to be fitted.
 
     `contact` (n,) arrays; `measured` (m, n), the forces and moments `channels`, zero where there is no measurement; `weight`
-    (m, n), one over the standard deviation, zero where a row does not count. `scale` (p,): the step of each coefficient that
-    counts as one, on its bijector's line, from `origin` (p,); zero where it is held.
+    (m, n), one over the standard deviation, zero where a row does not count; `emphasis` (m,), how many times a channel counts
+    what its noise says. `scale` (p,): the step of each coefficient that counts as one, on its bijector's line, from `origin`
+    (p,); zero where it is held: coordinates z (p,) are steps. `centre`, `spread` (p,): the prior on the line, a spread of
+    infinity for none. `pull`: in standard deviations a step, how hard coefficients are pulled to the origin, all or each (p,).
     """
 
     law: AbstractTyre
     contact: Contact
     measured: jax.Array
     weight: jax.Array
+    emphasis: jax.Array
     origin: jax.Array
     scale: jax.Array
+    centre: jax.Array
+    spread: jax.Array
+    pull: jax.Array
     parameters: tuple[Parameter, ...] = eqx.field(static=True)
     channels: tuple[str, ...] = eqx.field(static=True)
     robust: bool = eqx.field(static=True)
+    shape: Shape | None = eqx.field(static=True, default=None)
+
+    def start(self):
+        return jnp.zeros_like(self.origin)
+
+    def line(self, z):
+        return self.origin + self.scale * z
+
+    def cost(self, z):
+        return loss(z, self)
+
+    def search(self, z, max_steps, tolerance):
+        return descend(self, z, max_steps, tolerance).found
+
+    def covariance(self, z):
+        spread, _ = spread_of(z, self)
+        # A standard error above one step, a coefficient's own size, is the pull's.
+        return spread * self.scale * self.scale[:, None], jnp.diagonal(spread) <= 1.0
+
+    def failed(self, cost):
+        return jnp.asarray(False)
+
+    def units(self):
+        return self.measured.shape[1]
+
+    def counted(self, counts):
+        return dataclasses.replace(self, weight=self.weight * jnp.sqrt(counts))
 
     def values(self, z):
         """Coefficients (p,) at the coordinates z (p,)."""
-        line = self.origin + self.scale * z
-        return [p.domain.forward(line[i]) for i, p in enumerate(self.parameters)]
+        return in_units(self.parameters, self.line(z))
 
     def filled(self, z) -> AbstractTyre:
         """The law with the coefficients at z."""
@@ -73,21 +108,37 @@ class RigProblem(eqx.Module):
         return residual * shrink, 1 / ((1 + x) * shrink)
 
 
-class Normal(NamedTuple):
-    """Half the sum of squares `loss`, its `gradient` (p,) and its Gauss-Newton `matrix` (p, p) at a point."""
+class Descent(NamedTuple):
+    """Where a search ended, and by how much it `lowered` the loss."""
 
-    loss: Any
-    gradient: Any
-    matrix: Any
+    found: Found
+    lowered: Any
+
+
+def descend(problem: RigProblem, z, max_steps: int | None, tolerance: float, limit=None) -> Descent:
+    """Least squares from the coordinates z (p,), by `LevenbergMarquardt`; `limit`: the most steps as an array."""
+    solver = LevenbergMarquardt(rtol=tolerance, atol=tolerance, quadratic=normal_equations)
+    options = {} if limit is None else {"limit": limit}
+    found = optx.minimise(loss, solver, z, problem, options=options, max_steps=max_steps, throw=False)
+    lowered = loss(z, problem) - found.state.at.cost
+    return Descent(Found(found.value, found.stats["num_steps"], found.state.done), lowered)
 
 
 def loss(z, problem: RigProblem):
-    """Half the sum of squared residuals at the coordinates z (p,), in standard deviations, with the pull to the start."""
+    """Half the sum of squared residuals at the coordinates z (p,), in standard deviations, with the prior and the pull."""
     difference = problem.weight * (problem.forces(problem.filled(z)) - problem.measured)
-    return 0.5 * jnp.sum(problem.bent(difference)[0] ** 2) + 0.5 * PULL**2 * jnp.sum(z**2)
+    squares = jnp.sum(problem.bent(difference)[0] ** 2, axis=1)
+    return 0.5 * jnp.sum(problem.emphasis * squares) + _known_before(z, problem).cost
 
 
-def normal_equations(z, problem: RigProblem) -> Normal:
+def _known_before(z, problem: RigProblem) -> Quadratic:
+    """What the prior and the pull add to the loss."""
+    off, rate = (problem.line(z) - problem.centre) / problem.spread, problem.scale / problem.spread
+    cost = 0.5 * jnp.sum(off**2) + 0.5 * jnp.sum((problem.pull * z) ** 2)
+    return Quadratic(cost, off * rate + problem.pull**2 * z, jnp.diag(rate**2 + problem.pull**2))
+
+
+def normal_equations(z, problem: RigProblem) -> Quadratic:
     """The loss at z (p,) with its gradient and Gauss-Newton matrix.
 
     A row of data sees its own force alone, so that with coefficients as wide as the rows one pass backward a channel gives
@@ -97,16 +148,15 @@ def normal_equations(z, problem: RigProblem) -> Normal:
     """
     table, block = _in_blocks(problem)
 
-    def add(sums: Normal, some) -> tuple[Normal, None]:
+    def add(sums: Quadratic, some) -> tuple[Quadratic, None]:
         return jax.tree.map(jnp.add, sums, _of_data(z, block(some))), None
 
-    pull = Normal(0.5 * PULL**2 * jnp.sum(z**2), PULL**2 * z, PULL**2 * jnp.eye(z.size, dtype=z.dtype))
-    return lax.scan(add, pull, table)[0]
+    return lax.scan(add, _known_before(z, problem), table)[0]
 
 
-def _of_data(z, problem: RigProblem) -> Normal:
+def _of_data(z, problem: RigProblem) -> Quadratic:
     """The data's part of the normal equations."""
-    line = problem.origin + problem.scale * z
+    line = problem.line(z)
     rows = problem.measured.shape[1]
 
     def channels(*lines):
@@ -120,8 +170,41 @@ def _of_data(z, problem: RigProblem) -> Normal:
         # A row a coefficient: a Jacobian with its rows the other way round would be copied number by number.
         slopes = jnp.stack(pull(jnp.zeros_like(found).at[k].set(problem.weight[k] * slope[k])))
         slopes = slopes * problem.scale[:, None]
-        gradient, matrix = gradient + slopes @ value[k], matrix + slopes @ slopes.T
-    return Normal(0.5 * jnp.sum(value**2), gradient, matrix)
+        gradient = gradient + problem.emphasis[k] * (slopes @ value[k])
+        matrix = matrix + problem.emphasis[k] * (slopes @ slopes.T)
+    return Quadratic(0.5 * jnp.sum(problem.emphasis * jnp.sum(value**2, axis=1)), gradient, matrix)
+
+
+def spread_of(z, problem: RigProblem) -> tuple[jax.Array, jax.Array]:
+    """The covariance (p, p) of the coordinates at an optimum z (p,), and how many directions the data identify.
+
+    Emphasis changes what is minimised, not what is known: the sandwich, and what the data know without it. The pull counts in
+    its middle as in its ends: what data do not show stays unknown.
+    """
+    e, pull = problem.emphasis, jnp.broadcast_to(problem.pull, z.shape)
+    matrix = lambda e: normal_equations(z, dataclasses.replace(problem, emphasis=e)).matrix
+    found, middle, plain = jax.vmap(matrix)(jnp.stack([e, e**2, jnp.ones_like(e)]))
+    spread, _ = inverse_of(found - jnp.diag(pull**2), pull)
+    return spread @ middle @ spread, inverse_of(plain - jnp.diag(pull**2), pull)[1]
+
+
+@eqx.filter_jit
+def spread_at_start(problem: RigProblem) -> jax.Array:
+    """The covariance (p, p) of the coordinates where the problem starts, held ones at what the pull leaves them."""
+    pull = jnp.broadcast_to(problem.pull, problem.origin.shape)
+    return inverse_of(normal_equations(problem.start(), problem).matrix - jnp.diag(pull**2), pull)[0]
+
+
+def inverse_of(information, pull) -> tuple[jax.Array, jax.Array]:
+    """The inverse (p, p) of an information matrix with the pull (p,), and how many directions it identifies.
+
+    A direction is identified where its standard error is below one step, a coefficient's own size: beyond, it is the pull's.
+    """
+    known = jnp.sum(jnp.linalg.eigvalsh(information) > 1.0)
+    # On scales on which the pull is one: no eigenvalue is lost in the largest one's rounding.
+    values, vectors = jnp.linalg.eigh(information / pull / pull[:, None])
+    inverse = (vectors / (jnp.maximum(values, 0.0) + 1.0)) @ vectors.T
+    return inverse / pull / pull[:, None], known
 
 
 def _in_blocks(problem: RigProblem) -> tuple[Any, Callable[[Any], RigProblem]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
+from jaxveh.fitting.recorded import listed
 from jaxveh.statespace import Row, StateSpace
 
 
@@ -30,15 +31,15 @@ def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: 
 
     Raises `InputError` for a window that is not positive, or shorter than two steps.
     """
-    recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    if not recordings:
-        raise InputError("recordings: empty; give at least one recording.")
+    recordings = listed(recordings)
     time = np.asarray(recordings[0].time)
     length = round(window / float(np.median(np.diff(time)))) if window > 0 and len(time) > 1 else 0
     if length < 2:
         raise InputError(f"window = {window} s: must span at least two steps of the recording.")
     parts = [cut_rows(model.rows(recording), length) for recording in recordings]
-    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=-1), *parts)
+    # Which segments are whose is known before anything is traced.
+    join = lambda *leaves: (np if isinstance(leaves[0], np.ndarray) else jnp).concatenate(leaves, axis=-1)
+    return jax.tree.map(join, *parts)
 
 
 def cut_rows(rows: Row, length: int) -> Segments:
@@ -55,5 +56,5 @@ def cut_rows(rows: Row, length: int) -> Segments:
     step = (rows.t[-1] - rows.t[0]) / (count - 1)
     t = take(rows.t) + jnp.asarray(index - clipped, rows.t.dtype) * step
     y = jax.tree.map(lambda leaf: jnp.where(inside, take(leaf), jnp.nan), rows.y)
-    order = jnp.arange(segments)
+    order = np.arange(segments)
     return Segments(Row(t, jax.tree.map(take, rows.u), y), order < segments - 1, order == 0)

@@ -8,6 +8,7 @@ import pytest
 from programs import error_line, run
 
 from jaxveh import io, tyres
+from jaxveh._core.parameter import resolve
 from jaxveh.cli.tyre_fit_report import warnings_of
 from jaxveh.fitting import RigFit, StageReport
 
@@ -129,8 +130,15 @@ def fit_of(*converged, rmse=10.0, validated=11.0, std=0.1, identified=1):
     """A fit with stages that converged or not, so that no fit has to be made."""
     stages = tuple(StageReport(f"stage {i}", 9, 1, 1.0, 0.1, 7, one) for i, one in enumerate(converged))
     one, matrix = np.ones(1), np.eye(1)
-    by_channel = [{"F_y": value} for value in (rmse, 50.0, validated, 1e3, rmse)]
-    return RigFit(TRUTH, ("friction",), one, std * one, one, matrix, identified, *by_channel, {}, stages)
+    of_channel = {
+        name: {"F_y": value}
+        for name, value in dict(rmse=rmse, start_rmse=50.0, cross_validation=validated, peak=1e3, noise=rmse).items()
+    }
+    return RigFit(
+        values=one, std=std * one, unconstrained=one, covariance=matrix, cost=0.0, steps=7, result=0, model=TRUTH,
+        parameters=resolve(TRUTH, lambda law: law.friction), identified=identified, **of_channel, residuals={}, stages=stages,
+        problem=None,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -33,8 +33,9 @@ def see(system, t, x, u):
     return Seen(x.angle, x.rate)
 
 
-def model(k=3.0, d=0.7, prior=0.5, noise=None, process=None, law=None, see=see):
-    plain = ss.StateSpace(
+def plain(k=3.0, d=0.7, noise=None, process=None, law=None, see=see):
+    """The pendulum with its parameters in place."""
+    return ss.StateSpace(
         system=Pendulum(k, d),
         transition=ss.Propagate(derivatives),
         observation=see,
@@ -43,7 +44,11 @@ def model(k=3.0, d=0.7, prior=0.5, noise=None, process=None, law=None, see=see):
         prior=ss.Prior(State(*START), law or {"angle": PRIOR_STD[0], "rate": PRIOR_STD[1]}),
         inputs=("torque",),
     )
-    return ss.with_parameters(plain, lambda s: (s.k, s.d), prior=prior)
+
+
+def model(k=3.0, d=0.7, prior=0.5, **parts):
+    """The pendulum with its parameters among the states."""
+    return ss.with_parameters(plain(k, d, **parts), lambda s: (s.k, s.d), prior=prior)
 
 
 def rk4(f, x, dt):

@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh import Recording, filters, numerics
 from jaxveh import statespace as ss
 from jaxveh._core.parameter import positive
-from jaxveh.fitting import maximum_likelihood, multiple_shooting
+from jaxveh.fitting import cut, maximum_likelihood, pose_shooting, solve
 
 State = namedtuple("State", "slip")
 Steer = namedtuple("Steer", "steer")
@@ -60,7 +60,7 @@ def drive(rows=25):
 def test_standard_errors_of_the_likelihood_are_those_of_differences():
     recording, where = drive(), lambda m: (m.system.k, m.system.b)
     fit = maximum_likelihood(filters.Unscented(), model(), recording, where, tolerance=1e-8)
-    values = np.array([float(value) for value in fit.mean])
+    values = np.array([float(value) for value in fit.values])
 
     @jax.jit
     def gradient(logs):
@@ -83,7 +83,7 @@ def test_the_slope_of_a_shot_optimum_is_a_difference():
     def stiffness(noise):
         chosen = ss.with_parameters(model(), lambda system: (system.k, system.b), prior=0.3)
         chosen = eqx.tree_at(lambda m: m.measurement_noise.std.force, chosen, noise)
-        return multiple_shooting(chosen, recording, window=0.8, tolerance=1e-12, throw=False).mean.k
+        return solve(pose_shooting(chosen, cut(chosen, recording, 0.8)), tolerance=1e-12).values.k
 
     at, step = jnp.asarray(0.05, jnp.float64), 1e-4
     value = jax.jit(stiffness)

@@ -47,11 +47,11 @@ def fit():
 
 
 def test_noise_levels_of_the_nile(fit):
-    walk, noise = fit.mean
+    walk, noise = fit.values
     np.testing.assert_allclose([walk**2, noise**2], [1469.1, 15099.0], rtol=0.01)
-    assert fit.mean._fields == ("process_noise_law_std_level", "measurement_noise_std_flow")
+    assert fit.names == ("process_noise.law.std.level", "measurement_noise.std.flow")
     assert Result(int(fit.result)) is Result.successful
-    np.testing.assert_allclose(LEVELS(fit.model), fit.mean, rtol=1e-12)
+    np.testing.assert_allclose(LEVELS(fit.model), fit.values, rtol=1e-12)
     # The value printed for these variances is the largest, so that it is met from below within rounding of the print.
     assert abs(float(fit.cost) - 641.5855784594) < 1e-4
     np.testing.assert_allclose(filters.run(filters.Unscented(), fit.model, RECORDING).log_likelihood, -fit.cost)
@@ -81,12 +81,12 @@ def test_standard_errors_are_those_of_the_curvature(fit):
             hessian[i, j] = (corners[0] - corners[1] - corners[2] + corners[3]) / (4 * h * h)
     expected = np.linalg.inv(hessian)
     np.testing.assert_allclose(fit.covariance, expected, rtol=1e-3)
-    np.testing.assert_allclose(fit.std, np.sqrt(np.diagonal(expected)) * np.stack(fit.mean), rtol=1e-3)
+    np.testing.assert_allclose(fit.std, np.sqrt(np.diagonal(expected)) * np.stack(fit.values), rtol=1e-3)
 
 
 def test_two_recordings_count_twice(fit):
     both = maximum_likelihood(filters.Unscented(), model(), [RECORDING, RECORDING], LEVELS, standard_errors=False)
-    np.testing.assert_allclose(both.mean, fit.mean, rtol=2e-3)
+    np.testing.assert_allclose(both.values, fit.values, rtol=2e-3)
     np.testing.assert_allclose(both.cost, 2 * fit.cost, rtol=1e-6)
 
 
@@ -94,10 +94,11 @@ def test_a_prior_holds_what_it_knows():
     held = maximum_likelihood(
         filters.Unscented(), model(), RECORDING, LEVELS, prior={"level": 0.01, "flow": 0.5}, standard_errors=False
     )
-    assert abs(float(held.mean[0]) - 60.0) < 2.0
+    assert abs(float(held.values[0]) - 60.0) < 2.0
     assert np.isnan(held.std).all()
     around = [
-        eqx.tree_at(LEVELS, held.model, (held.mean[0], held.mean[1] * (1 + change))) for change in (-0.02, 0.0, 0.02)
+        eqx.tree_at(LEVELS, held.model, (held.values[0], held.values[1] * (1 + change)))
+        for change in (-0.02, 0.0, 0.02)
     ]
     low, best, high = (float(filters.run(filters.Unscented(), m, RECORDING).log_likelihood) for m in around)
     assert best > max(low, high)
@@ -118,8 +119,8 @@ def test_a_start_value_is_a_parameter_too():
         picked,
     )
     # A level that stays: the mean, known to a tenth of the noise.
-    assert float(found.mean.prior_mean_level) == pytest.approx(NILE.mean(), abs=0.01)
-    assert float(found.std.prior_mean_level) == pytest.approx(10.0, rel=1e-3)
+    assert float(found.values) == pytest.approx(NILE.mean(), abs=0.01)
+    assert float(found.std) == pytest.approx(10.0, rel=1e-3)
 
 
 def test_particle_likelihood_with_a_held_key():
@@ -134,7 +135,7 @@ def test_particle_likelihood_with_a_held_key():
         filters.ParticleFilter(500), near, short, noise, key=key, tolerance=1e-2, standard_errors=False, throw=False
     )
     exact = maximum_likelihood(filters.Unscented(), near, short, noise, standard_errors=False)
-    assert float(found.mean[0]) == pytest.approx(float(exact.mean[0]), rel=0.1)
+    assert float(found.values) == pytest.approx(float(exact.values), rel=0.1)
     with pytest.raises(InputError, match="ParticleFilter draws particles: give it a key"):
         maximum_likelihood(filters.ParticleFilter(500), near, short, noise)
 
@@ -168,5 +169,5 @@ def test_a_fit_that_does_not_finish_raises_unless_told():
 def test_float32_without_x64(float32):
     settings = dict(tolerance=1e-4, standard_errors=False, throw=False)
     found = maximum_likelihood(filters.Unscented(), model(), RECORDING, LEVELS, **settings)
-    assert found.mean[0].dtype == jnp.float32
-    np.testing.assert_allclose([found.mean[0] ** 2, found.mean[1] ** 2], [1469.1, 15099.0], rtol=0.1)
+    assert found.values[0].dtype == jnp.float32
+    np.testing.assert_allclose([found.values[0] ** 2, found.values[1] ** 2], [1469.1, 15099.0], rtol=0.1)

@@ -9,8 +9,7 @@ import scipy.optimize
 
 from jaxveh._core.parameter import resolve
 from jaxveh.fitting import rig_problem
-from jaxveh.fitting.rig_problem import PULL, RigProblem, loss, normal_equations, start_of
-from jaxveh.fitting.rig_solve import information, solve
+from jaxveh.fitting.rig_problem import PULL, RigProblem, loss, normal_equations, spread_of, start_of
 from jaxveh.tyres import Contact, MagicFormula
 
 TRUE = MagicFormula(B=9.0, C=1.4, D=4000.0, E=-0.6, S_h=0.004, S_v=60.0, nominal_load=4000.0)
@@ -29,7 +28,16 @@ def made(rows, noise=20.0, robust=False, start=START):
     weight = jnp.full((1, rows), 1 / 20.0).at[0, ::7].set(0.0)
     parameters = resolve(start, lambda law: (law.B, law.C, law.D, law.E, law.S_h, law.S_v))
     origin, scale = start_of(start, parameters)
-    return RigProblem(start, contact, measured, weight, origin, scale, parameters, ("F_y",), robust)
+    none = jnp.full_like(origin, jnp.inf)
+    return RigProblem(
+        start, contact, measured, weight, jnp.ones(1), origin, scale, origin, none, jnp.asarray(PULL), parameters, ("F_y",),
+        robust,
+    )  # fmt: skip
+
+
+@eqx.filter_jit
+def solve(problem, z, max_steps, tolerance):
+    return problem.search(z, max_steps, tolerance)
 
 
 def residuals(z, problem):
@@ -45,12 +53,15 @@ def test_normal_equations_are_those_of_all_rows_at_once(rows, robust, monkeypatc
     found = eqx.filter_jit(normal_equations)(z, problem)
     value, jacobian = eqx.filter_jit(lambda z: (residuals(z, problem), jax.jacfwd(residuals)(z, problem)))(z)
     total, gradient = eqx.filter_jit(lambda z: jax.value_and_grad(loss)(z, problem))(z)
-    np.testing.assert_allclose(found.loss, 0.5 * value @ value + 0.5 * PULL**2 * z @ z, rtol=1e-13)
-    np.testing.assert_allclose(found.loss, total, rtol=1e-13)
+    np.testing.assert_allclose(found.cost, 0.5 * value @ value + 0.5 * PULL**2 * z @ z, rtol=1e-13)
+    np.testing.assert_allclose(found.cost, total, rtol=1e-13)
     np.testing.assert_allclose(found.gradient, gradient, rtol=1e-10)
     np.testing.assert_allclose(found.gradient, jacobian.T @ value + PULL**2 * z, rtol=1e-10)
     np.testing.assert_allclose(found.matrix, jacobian.T @ jacobian + PULL**2 * np.eye(6), rtol=1e-10, atol=1e-8)
-    np.testing.assert_allclose(information(problem, z), jacobian.T @ jacobian, rtol=1e-10, atol=1e-8)
+    information = jacobian.T @ jacobian
+    spread, known = eqx.filter_jit(spread_of)(z, problem)
+    np.testing.assert_allclose(spread, np.linalg.inv(information + PULL**2 * np.eye(6)), rtol=1e-8, atol=1e-12)
+    assert known == np.sum(np.linalg.eigvalsh(information) > 1)
 
 
 def test_finds_the_least_squares_of_scipy():

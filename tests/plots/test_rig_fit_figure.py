@@ -30,7 +30,11 @@ def fit_of(rig, **residuals):
     rmse = {name: float(np.sqrt(np.nanmean(value**2))) for name, value in residuals.items()}
     peak = {name: 10.0 * value for name, value in rmse.items()}
     none = np.zeros(0)
-    return RigFit(Brush(9e4, 6e4), (), none, none, none, none, 0, rmse, rmse, rmse, peak, rmse, residuals, ())
+    return RigFit(
+        values=none, std=none, unconstrained=none, covariance=none, cost=0.0, steps=0, result=0, model=Brush(9e4, 6e4),
+        parameters=(), identified=0, rmse=rmse, start_rmse=rmse, cross_validation=rmse, peak=peak, noise=rmse,
+        residuals=residuals, stages=(), problem=None,
+    )  # fmt: skip
 
 
 @pytest.fixture

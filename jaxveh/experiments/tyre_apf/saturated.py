@@ -24,7 +24,7 @@ from jaxveh.diagnostics.observability import Observability
 from jaxveh.estimators.observability import predict_measurements
 from jaxveh.experiments.tyre_apf.settings import Study, tyres
 from jaxveh.experiments.tyre_apf.study import guess_once, model_of
-from jaxveh.fitting.multiple_shooting import shoot
+from jaxveh.fitting import pose_shooting, solve
 from jaxveh.fitting.segments import cut_rows
 from jaxveh.simulation import simulate
 from jaxveh.statespace import Row, StateSpace
@@ -143,9 +143,8 @@ def _estimators(study: Study, where) -> dict:
         # Short pieces tied loosely find the valley, the whole drive its floor.
         model, rows = started(key, drive, study.gaussian)
         segments = cut_rows(rows, round(study.window * study.rate))
-        fit = shoot(model, segments, jnp.asarray(0.01, rows.t.dtype), True, 100, 1e-8)
-        start = jnp.stack([p.domain.inverse(getattr(fit.mean, p.field)) for p in chosen])
-        found, converged = single_shooting(model, rows, start)
+        fit = solve(pose_shooting(model, segments), max_steps=100, standard_errors=False)
+        found, converged = single_shooting(model, rows, fit.unconstrained)
         return {
             "error": error([p.domain.forward(v) for p, v in zip(chosen, found, strict=True)]),
             "result": jnp.where(converged, 0, 1).astype(jnp.int32),

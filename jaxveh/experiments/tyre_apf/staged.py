@@ -32,8 +32,7 @@ from jaxveh.experiments.tyre_apf.study import (
     state_errors,
     with_tyres,
 )
-from jaxveh.fitting.multiple_shooting import shoot
-from jaxveh.fitting.segments import cut
+from jaxveh.fitting import cut, pose_shooting, solve
 from jaxveh.simulation import simulate
 
 FILTERS = ("PF", "APF", "UKF")
@@ -117,7 +116,7 @@ def _filter(study: Study, name: str) -> Callable:
 def _fit(study: Study) -> Callable:
     def one(guess, segments):
         model = model_of(study, guess, study.gaussian)
-        return shoot(model, segments, jnp.asarray(0.01, model.prior.mean[0].dtype), True, 100, 1e-8)
+        return solve(pose_shooting(model, segments), max_steps=100)
 
     return one
 
@@ -179,8 +178,7 @@ def _parameters(study: Study, guess, estimates: dict, fit) -> tuple[dict, dict]:
     for name, estimate in estimates.items():
         values[name] = jnp.stack([getattr(estimate.mean, field)[:, -1] for field in FIELDS], axis=1)
         spread[name] = jnp.stack([getattr(estimate.std, field)[:, -1] for field in FIELDS], axis=1)
-    values["MAP"] = jnp.stack([getattr(fit.mean, field) for field in FIELDS], axis=1)
-    spread["MAP"] = jnp.stack([getattr(fit.std, field) for field in FIELDS], axis=1)
+    values["MAP"], spread["MAP"] = (jnp.stack(pick(tree, chosen), axis=1) for tree in (fit.values, fit.std))
     return values, spread
 
 

@@ -1,0 +1,105 @@
+"""What a fit is: a cost over coordinates, how its optimum is searched, and what the optimum means."""
+
+# No postponed annotations here: equinox does not see an AbstractVar in a string.
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.parameter import Parameter, Where, pick, resolve
+
+
+class Found(NamedTuple):
+    """Where a search ended: the coordinates `z` (n,), the `steps` it took, and whether it `converged`."""
+
+    z: Any
+    steps: Any
+    converged: Any
+
+
+class Shape(NamedTuple):
+    """In which tree the values of parameters are reported: its structure, and which parameter stands at each of its leaves."""
+
+    structure: Any
+    order: tuple[int, ...]
+
+
+class AbstractProblem(eqx.Module):
+    """A cost to be minimised, the negative log-posterior of `parameters` given data.
+
+    Everything that the optimum depends on is an array leaf (data, noise levels, prior spreads), so that `solve` has a derivative
+    with respect to each. Coordinates z (n,) are the solver's: the parameters, scaled as it likes, and what else is unknown. On
+    the line of their bijectors parameters are arrays (p,).
+    """
+
+    parameters: eqx.AbstractVar[tuple[Parameter, ...]]
+    shape: eqx.AbstractVar[Shape | None]
+
+    @abc.abstractmethod
+    def start(self) -> jax.Array:
+        """The coordinates (n,) from which the search starts."""
+
+    @abc.abstractmethod
+    def cost(self, z):
+        """The negative log-posterior at the coordinates z (n,), up to a constant: a scalar."""
+
+    @abc.abstractmethod
+    def search(self, z, max_steps: int, tolerance) -> Found:
+        """The least cost from the coordinates z (n,), by a solver of optimistix."""
+
+    @abc.abstractmethod
+    def line(self, z) -> jax.Array:
+        """The parameters (p,) on the line of their bijectors."""
+
+    @abc.abstractmethod
+    def covariance(self, z) -> tuple[jax.Array, jax.Array]:
+        """The covariance (p, p) of the parameters on their line at an optimum, and which of them (p,) the data know."""
+
+    @abc.abstractmethod
+    def filled(self, z) -> Any:
+        """The model with the parameters at z in place."""
+
+    @abc.abstractmethod
+    def failed(self, cost) -> Any:
+        """Whether this cost is no optimum's, such as a diverged simulation's."""
+
+    @abc.abstractmethod
+    def units(self) -> int:
+        """How many parts the data have that could be drawn anew, one by one: rows of rig data, recordings."""
+
+    @abc.abstractmethod
+    def counted(self, counts) -> "AbstractProblem":
+        """The problem in which each part of the data counts so many times, (units,)."""
+
+
+def shaped(shape: Shape | None, values):
+    """Values (p,) in a tree; without one as they are."""
+    if shape is None:
+        return values
+    return jax.tree.unflatten(shape.structure, [values[i] for i in shape.order])
+
+
+def picked(model: Any, where: Where) -> tuple[tuple[Parameter, ...], Shape]:
+    """The scalar parameters that `where` picks from a model, and the shape in which it does.
+
+    **Raises** `InputError` as `resolve`, and for arrays.
+    """
+    parameters = resolve(model, where)
+    for p, value in zip(parameters, pick(model, parameters), strict=True):
+        if jnp.ndim(value) > 0:
+            raise InputError(f"where picked {p.name}, an array of shape {jnp.shape(value)}: a fit takes scalars.")
+    return parameters, Shape(jax.tree.structure(where(model)), tuple(range(len(parameters))))
+
+
+def on_line(parameters: tuple[Parameter, ...], physical) -> jax.Array:
+    """Physical values on the line of their bijectors, (p,)."""
+    return jnp.stack([p.domain.inverse(value) for p, value in zip(parameters, physical, strict=True)])
+
+
+def in_units(parameters: tuple[Parameter, ...], line) -> list:
+    """Values on the line of their bijectors in physical units."""
+    return [p.domain.forward(line[i]) for i, p in enumerate(parameters)]

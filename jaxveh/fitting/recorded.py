@@ -1,0 +1,27 @@
+"""What fits to recordings have in common: their recordings, and the prior on what is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.parameter import Parameter, prior_spread
+from jaxveh._core.recording import Recording
+
+
+def listed(recordings: Recording | Sequence[Recording]) -> list[Recording]:
+    """One recording or several, as a list; raises `InputError` for none."""
+    recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    if not recordings:
+        raise InputError("recordings: empty; give at least one recording.")
+    return recordings
+
+
+def spread_on_line(parameters: tuple[Parameter, ...], values, prior: float | Mapping[str, float] | None) -> jax.Array:
+    """The prior's spreads (p,) on the line of each parameter's bijector, infinite without one."""
+    if prior is None:
+        return jnp.full((len(parameters),), jnp.inf, jnp.result_type(*values))
+    return jnp.stack(prior_spread(parameters, values, prior))

@@ -1,0 +1,116 @@
+"""Damped Fisher scoring with secant corrections, as a minimiser of optimistix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import optimistix as optx
+
+from jaxveh.fitting.levenberg_marquardt import Quadratic, ended
+
+FIRST_DAMPING, RAISED, LOWERED, LEAST_RAISED = 1e-2, 5.0, 0.2, 1e-3
+"""Levenberg's damping at the start, its factors after a step that raised and one that lowered the cost, and its least value after
+one that raised it."""
+
+SECANTS = 10
+"""How many of the last steps correct the curvature."""
+
+LONGEST_STEP = 2.0
+"""In the parameters' units: how far one step may move one."""
+
+LEAST_STEP = 1e-3
+"""In the parameters' units: where a refused step is shorter, no step is small enough to gain."""
+
+
+class _Search(NamedTuple):
+    """The point's `at`, the `trial` to be looked at next, the last steps and the changes of the gradient over them (S, n), oldest
+    first, zero where there is none; `small`: how many steps in a row gained little."""
+
+    at: Quadratic
+    trial: Any
+    moves: Any
+    changes: Any
+    damping: Any
+    small: Any
+    steps: Any
+    done: Any
+
+
+class FisherScoring(optx.AbstractMinimiser):
+    """Newton's steps with the expected information for curvature (Ljung 1999, ch. 10; Gupta & Mehra 1974), damped after
+    Levenberg, and corrected to the changes of the gradient that were seen (BFGS): the expected information is the curvature only
+    on average; where they differ, plain scoring creeps.
+
+    `quadratic(y, args)`: the `Quadratic` of the cost at y (n,), its matrix the information. It ends when two steps in a row gain
+    less than `atol` of cost, or cannot gain. `options` of `optimistix.minimise`: `unit` (n,), the length of each coordinate in
+    which steps are bounded, by default one; `limit`, the most steps as an array; `state`, a search to be gone on with.
+    """
+
+    atol: float
+    quadratic: Callable = eqx.field(static=True)
+    rtol: float = 0.0
+    norm: Callable = eqx.field(static=True, default=optx.max_norm)
+
+    def init(self, fn, y, args, options, f_struct, aux_struct, tags):
+        """Nothing is computed before the first step, which looks at the start."""
+        if "state" in options:
+            return options["state"]
+        return self.begin(y)
+
+    def begin(self, y) -> _Search:
+        """A search that has not looked at anything."""
+        none, past = jnp.asarray(0), jnp.zeros((SECANTS, y.size), y.dtype)
+        at = Quadratic(jnp.full((), jnp.inf, y.dtype), jnp.zeros_like(y), jnp.zeros((y.size, y.size), y.dtype))
+        damping = jnp.full((), FIRST_DAMPING, y.dtype)
+        return _Search(at, y, past, past, damping, none, none - 1, jnp.asarray(False))
+
+    def step(self, fn, y, args, options, state, tags):
+        """A look at the trial, which is taken where it is better, and the next trial."""
+        first = state.steps < 0
+        unit = options.get("unit", jnp.ones_like(y))
+        found, move = self.quadratic(state.trial, args), state.trial - y
+        seen = jnp.all(jnp.isfinite(found.gradient))
+        last = lambda past, new: jnp.where(seen & ~first, jnp.concatenate([past[1:], new[None]]), past)
+        moves, changes = last(state.moves, move), last(state.changes, found.gradient - state.at.gradient)
+        better = seen & jnp.all(jnp.isfinite(found.matrix)) & (found.cost < state.at.cost)
+        # Without a finite cost there is nothing to be compared with: that is no small gain.
+        still = jnp.isfinite(state.at.cost) & (jnp.max(jnp.abs(move / unit)) < LEAST_STEP)
+        little = jnp.where(better, state.at.cost - found.cost < self.atol, still)
+        small = jnp.where(little, state.small + 1, 0)
+        damped = jnp.where(better, state.damping * LOWERED, jnp.maximum(state.damping * RAISED, LEAST_RAISED))
+        damping = jnp.where(first, state.damping, damped)
+        at = Quadratic(*(jnp.where(better, new, old) for new, old in zip(found, state.at, strict=True)))
+        y = jnp.where(better, state.trial, y)
+        trial = y + _step(at, moves, changes, damping, unit)
+        state = _Search(at, trial, moves, changes, damping, small, state.steps + 1, small == 2)
+        return y, state, None
+
+    def terminate(self, fn, y, args, options, state, tags):
+        """Where it is done, or has taken as many steps as `limit` says."""
+        return ended(state, options)
+
+    def postprocess(self, fn, y, aux, args, options, state, tags, result):
+        """The best point was kept."""
+        return y, aux, {}
+
+
+def _step(at: Quadratic, moves, changes, damping, unit):
+    """The damped step from a point, no longer than `LONGEST_STEP`."""
+    curvature = with_secants(at.matrix, moves, changes)
+    damped = curvature + damping * jnp.diag(jnp.diagonal(curvature))
+    move = -jnp.linalg.lstsq(damped, at.gradient)[0]
+    return move * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(jnp.max(jnp.abs(move / unit)), 1e-12))
+
+
+def with_secants(curvature, moves, changes):
+    """A curvature (n, n) corrected to steps (S, n) and changes of the gradient over them, oldest first (BFGS); zeros are none."""
+    for move, change in zip(moves, changes, strict=True):
+        along = curvature @ move
+        fits = change @ move > 1e-2 * move @ along
+        raised = jnp.outer(change, change) / jnp.where(fits, change @ move, 1.0)
+        lowered = jnp.outer(along, along) / jnp.where(fits, move @ along, 1.0)
+        curvature = jnp.where(fits, curvature + raised - lowered, curvature)
+    return curvature

@@ -1,0 +1,97 @@
+"""The core of every fit: a problem's optimum, with its derivatives by the implicit function theorem."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from jaxveh._core.result import Result, code
+from jaxveh.fitting.problem import AbstractProblem, Found, in_units, shaped
+from jaxveh.fitting.result import Fit
+
+MOST_STEPS = 200
+
+
+@eqx.filter_jit
+def solve(
+    problem: AbstractProblem,
+    start=None,
+    *,
+    max_steps: int = MOST_STEPS,
+    tolerance: float = 1e-8,
+    standard_errors: bool = True,
+) -> Fit:
+    """The fit of a problem: arrays in, arrays out, under `jit`, `vmap` and `grad`.
+
+    Every array of the `problem` has its derivative: with F the cost, an optimum z moves by -(d2F/dz2)^-1 d2F/dz d(data), so that
+    no derivative goes through the search. It holds where the search has converged. `start`: coordinates (n,), by default
+    the problem's own; the optimum does not depend on it, and has no derivative with respect to it. `tolerance`: of the
+    problem's solver. Without `standard_errors` they are NaN.
+
+    **Returns** a `Fit`; how it ended is its `result`.
+    """
+    start = problem.start() if start is None else start
+    found = optimum(problem, lax.stop_gradient(start), max_steps=max_steps, tolerance=tolerance)
+    return fit_at(problem, found, problem.cost(found.z), problem.covariance(found.z) if standard_errors else None)
+
+
+@eqx.filter_custom_jvp
+def optimum(problem: AbstractProblem, start, *, max_steps: int, tolerance: float) -> Found:
+    """Where a search from the coordinates `start` (n,) ends."""
+    return problem.search(start, max_steps, tolerance)
+
+
+@optimum.def_jvp
+def _of_optimum(primals, tangents, **settings):
+    problem, start = primals
+    found = optimum(problem, start, **settings)
+    moved, _ = tangents
+    is_none = lambda leaf: leaf is None
+    still = jax.tree.map(is_none, moved, is_leaf=is_none)
+    held, free = eqx.partition(problem, still, is_leaf=is_none)
+    matrix, cross = curvature(lambda z, free: eqx.combine(free, held).cost(z), found.z, free)
+    parts = jax.tree.map(lambda row, tangent: jnp.tensordot(row, tangent, tangent.ndim), cross, moved)
+    change = sum(jax.tree.leaves(parts), start=jnp.zeros_like(found.z))
+    return found, Found(-jnp.linalg.solve(matrix, change), None, None)
+
+
+def curvature(cost, z, free):
+    """Second derivatives of a cost of z (n,) and a tree of arrays: of z twice (n, n), and of z and each array (n, ...).
+
+    Both from one pass backward over one forward, a coordinate after another: it is compiled once, and nothing more is needed for
+    the derivative of an optimum in either mode, which is what keeps its compilation short.
+    """
+
+    def row(direction):
+        slope = lambda z, free: jax.jvp(lambda z: cost(z, free), (z,), (direction,))[1]
+        return jax.grad(slope, argnums=(0, 1))(z, free)
+
+    return lax.map(row, jnp.eye(z.size, dtype=z.dtype))
+
+
+def fit_at(problem: AbstractProblem, found: Found, cost, uncertainty: tuple[jax.Array, jax.Array] | None) -> Fit:
+    """The fit that ended at these coordinates, with this cost and what the problem's `covariance` says, or nothing of it."""
+    parameters, line = problem.parameters, problem.line(found.z)
+    values = in_units(parameters, line)
+    unknown = jnp.full((line.size, line.size), jnp.nan, line.dtype), jnp.zeros(line.shape, bool)
+    covariance, known = unknown if uncertainty is None else uncertainty
+    variance = jnp.diagonal(covariance)
+    known = known & (variance > 0)
+    slopes = jnp.stack([p.domain.slope(value) for p, value in zip(parameters, values, strict=True)])
+    std = jnp.where(known, jnp.abs(slopes) * jnp.sqrt(jnp.where(known, variance, 1.0)), jnp.nan)
+    well = found.converged & ~problem.failed(cost)
+    finite = jnp.all(jnp.isfinite(found.z)) & jnp.isfinite(cost)
+    result = jnp.where(well, code(Result.successful), code(Result.not_converged))
+    return Fit(
+        values=shaped(problem.shape, jnp.stack(values)),
+        std=shaped(problem.shape, std),
+        unconstrained=line,
+        covariance=covariance,
+        cost=cost,
+        steps=found.steps,
+        result=jnp.where(finite, result, code(Result.non_finite_state)),
+        model=problem.filled(found.z),
+        parameters=parameters,
+    )

@@ -1,0 +1,212 @@
+"""Every fit of `fitting.__all__`: one shape of result; its core under jit, vmap and grad, against differences.
+
+A new fit is one line in `CASES`: its problem, its program on the same problem, and where the problem keeps data, noise and prior.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from fit_systems import drive, plain
+from nile import NILE
+from rig_sweeps import brush, measured_of, small_plan, table
+from test_maximum_likelihood import LEVELS
+from test_maximum_likelihood import model as diffuse
+
+from jaxveh import InputError, Recording, filters, fitting, tyres
+from jaxveh.fitting.solve import curvature, optimum
+
+FILTER = filters.Unscented()
+YEARS = Recording(np.arange(1871.0, 1911.0), {"flow": NILE[:40]})
+PENDULUM = lambda m: (m.system.k, m.system.d)
+NOISE = {"F_x": 60.0, "F_y": 50.0, "M_z": 3.0}
+FRICTION = lambda tyre: {"along": tyre.slip_stiffness, "friction": tyre.friction}
+
+
+def nile():
+    """The Nile's level, of which something is known before: what that is shows in the fit."""
+    return eqx.tree_at(
+        lambda m: (m.prior.mean.level, m.prior.law.std.level), diffuse(), (jnp.asarray(1000.0), jnp.asarray(150.0))
+    )
+
+
+def a_rig(points=8):
+    columns, run = small_plan(points)
+    return table(measured_of(brush(), columns, tuple(NOISE)), columns, run, 0.02, 1)
+
+
+def a_law():
+    return tyres.Brush(jnp.asarray(8e4), jnp.asarray(7e4), jnp.asarray(0.9), jnp.asarray(0.06))
+
+
+class Case(NamedTuple):
+    """`pose(prior)` makes the problem, `fit()` runs the program; `data`, `noise` and `prior` pick one leaf each of the
+    problem."""
+
+    pose: Callable
+    fit: Callable
+    data: Callable
+    noise: Callable
+    prior: Callable
+    tolerance: float
+
+
+PIECES = [drive(21, seed=1), drive(21, seed=2)]
+CASES = {
+    "fit_rig": Case(
+        lambda prior=0.02: fitting.pose_rig(a_law(), a_rig(), noise=NOISE, where=FRICTION, prior=prior),
+        lambda: fitting.fit_rig(a_law(), a_rig(), where=FRICTION, prior=0.02),
+        lambda p: p.measured, lambda p: p.weight, lambda p: p.spread, 1e-12,
+    ),
+    "multiple_shooting": Case(
+        lambda prior=0.5: fitting.pose_shooting(plain(), fitting.cut(plain(), PIECES, 1.0), PENDULUM, prior=prior, tie=0.1),
+        lambda: fitting.multiple_shooting(plain(), PIECES, PENDULUM, prior=0.5, window=1.0, tie=0.1),
+        lambda p: p.segments.rows.y.rate, lambda p: p.model.measurement_noise.std.rate, lambda p: p.prior, 1e-12,
+    ),
+    "maximum_likelihood": Case(
+        lambda prior=0.3: fitting.pose_likelihood(FILTER, nile(), YEARS, LEVELS, prior=prior),
+        lambda: fitting.maximum_likelihood(FILTER, nile(), YEARS, LEVELS, prior=0.3),
+        lambda p: p.rows[0].y.flow, lambda p: p.model.prior.law.std.level, lambda p: p.spread, 1e-12,
+    ),
+    "prediction_error": Case(
+        lambda prior=0.3: fitting.pose_prediction_error(FILTER, nile(), YEARS, LEVELS, prior=prior),
+        lambda: fitting.prediction_error(FILTER, nile(), YEARS, LEVELS, prior=0.3, tolerance=1e-6),
+        lambda p: p.rows.y.flow, lambda p: p.model.prior.law.std.level, lambda p: p.spread, 1e-12,
+    ),
+}  # fmt: skip
+
+
+def returned(name):
+    """What a function says that it returns, as text."""
+    return str(getattr(getattr(fitting, name), "__annotations__", {}).get("return", ""))
+
+
+FITS = [name for name in fitting.__all__ if name != "solve" and returned(name).endswith("Fit")]
+PROBLEMS = [
+    one
+    for one in map(vars(fitting).get, fitting.__all__)
+    if isinstance(one, type) and issubclass(one, fitting.AbstractProblem) and one is not fitting.AbstractProblem
+]
+
+
+@pytest.fixture(scope="module", params=sorted({*FITS, *CASES}))
+def case(request):
+    return CASES[request.param]
+
+
+@pytest.fixture(scope="module")
+def problem(case):
+    return case.pose()
+
+
+@pytest.fixture(scope="module")
+def changed(case, problem):
+    """The problem with its data, noise and prior changed by the three numbers of an array, data each by another share."""
+
+    def change(by):
+        data, noise, prior = case.data(problem), case.noise(problem), case.prior(problem)
+        wave = 1 + by[0] * jnp.sin(jnp.arange(data.size, dtype=data.dtype)).reshape(data.shape)
+        new = jnp.where(jnp.isfinite(data), data, 0) * wave
+        new = jnp.where(jnp.isfinite(data), new, data), noise * jnp.exp(by[1]), prior * jnp.exp(by[2])
+        return eqx.tree_at(lambda p: (case.data(p), case.noise(p), case.prior(p)), problem, new)
+
+    return change
+
+
+@pytest.fixture(scope="module")
+def core(case, changed):
+    """The fitted parameters (p,) on their line, a function of the three numbers."""
+    return lambda by: fitting.solve(changed(by), tolerance=case.tolerance).unconstrained
+
+
+def test_every_fit_and_every_problem_has_a_case():
+    assert set(FITS) == set(CASES)
+    assert {type(case.pose()) for case in CASES.values()} == set(PROBLEMS)
+
+
+@pytest.mark.parametrize("by", ["program", "core"])
+def test_results_have_one_shape(case, problem, by):
+    fit = case.fit() if by == "program" else fitting.solve(problem)
+    p = len(fit.names)
+    assert isinstance(fit, fitting.AbstractFit) and p == 2 == len(fit.parameters)
+    assert jax.tree.structure(fit.values) == jax.tree.structure(fit.std) == problem.shape.structure
+    values, std = (np.asarray(jax.tree.leaves(tree)) for tree in (fit.values, fit.std))
+    assert values.shape == std.shape == fit.unconstrained.shape == (p,) and (std > 0).all()
+    assert fit.covariance.shape == (p, p)
+    np.testing.assert_allclose(fit.covariance, fit.covariance.T, rtol=1e-6)
+    lines = [q.domain.forward(z) for q, z in zip(fit.parameters, fit.unconstrained, strict=True)]
+    np.testing.assert_allclose(values, lines, rtol=1e-12)
+    slopes = [q.domain.slope(value) for q, value in zip(fit.parameters, values, strict=True)]
+    np.testing.assert_allclose(std, np.abs(slopes) * np.sqrt(np.diagonal(fit.covariance)), rtol=1e-9)
+    assert bool(fit.converged) and int(fit.steps) > 0 and fit.reason == "successful" and np.isfinite(fit.cost)
+
+
+def test_a_search_that_stops_short_says_so(case, problem):
+    fit = fitting.solve(problem, max_steps=1, tolerance=1e-14, standard_errors=False)
+    assert not bool(fit.converged) and "stopped before its tolerance" in fit.reason
+    assert all(np.isnan(leaf) for leaf in jax.tree.leaves(fit.std))
+
+
+def test_derivatives_equal_differences(case, changed, core):
+    """With respect to data, noise and prior, of parameters: in reverse mode, forward mode, and of a batch."""
+    h = 2e-3
+
+    def exactly(by):
+        # A search ends where its cost shows no more gain, half of the digits away from the optimum: a step of Newton's is the rest.
+        problem = changed(by)
+        z = optimum(problem, problem.start(), max_steps=200, tolerance=case.tolerance).z
+        matrix, _ = curvature(lambda z, free: problem.cost(z), z, ())
+        return problem.line(z - jnp.linalg.solve(matrix, jax.grad(problem.cost)(z)))
+
+    points = jnp.concatenate([step * jnp.eye(3) for step in (h, -h, 2 * h, -2 * h)])
+    near, back, far, behind = jax.jit(jax.vmap(exactly))(points).reshape(4, 3, -1)
+    differences = ((8 * (near - back) - (far - behind)) / (12 * h)).T
+    reverse = jax.jit(jax.jacrev(core))(jnp.zeros(3))
+    assert (np.abs(differences) > 1e-5).all()
+    np.testing.assert_allclose(reverse, differences, rtol=1e-4, atol=1e-9)
+    np.testing.assert_allclose(jax.jit(jax.jacfwd(core))(jnp.zeros(3)), reverse, rtol=1e-8)
+
+
+def test_a_batch_is_its_members(core):
+    points = jnp.asarray([[0.0, 0.0, 0.0], [0.02, -0.1, 0.1]])
+    alone = jax.jit(core)
+    np.testing.assert_allclose(jax.jit(jax.vmap(core))(points), [alone(point) for point in points], rtol=1e-6)
+
+
+def test_a_gradient_is_a_program_of_at_most_three_fits(case, changed, core):
+    length = lambda function: len(jax.jit(function).lower(jnp.zeros(3)).as_text())
+    fit = lambda by: jax.tree.leaves(eqx.filter(fitting.solve(changed(by), tolerance=case.tolerance), eqx.is_array))
+    assert length(jax.grad(lambda by: core(by)[0])) < 3 * length(fit)
+
+
+def test_parts_of_the_data_count_as_often_as_they_are_told(problem):
+    units = problem.units()
+    one, other = np.random.default_rng(0).integers(0, 4, (2, units)).astype(float)
+    cost = lambda counts: float(problem.counted(jnp.asarray(counts)).cost(problem.start()))
+    assert cost(one) + cost(other) == pytest.approx(cost(one + other) + cost(0 * one), rel=1e-9)
+    assert cost(np.ones(units)) == pytest.approx(float(problem.cost(problem.start())), rel=1e-12)
+
+
+def test_program_and_core_end_alike(case, problem):
+    fit = case.fit()
+    if isinstance(problem, fitting.RigProblem):
+        # Where the fit ended, with its noise: its last round pulled to where it began.
+        problem = fit.problem
+    core = fitting.solve(problem, tolerance=case.tolerance)
+    off = np.subtract(jax.tree.leaves(core.values), jax.tree.leaves(fit.values))
+    assert (np.abs(off) < 0.05 * np.asarray(jax.tree.leaves(fit.std))).all()
+
+
+@pytest.mark.parametrize(("prior", "message"), [(-1.0, "prior spread of"), ({"nothing": 1.0}, "prior: unknown")])
+def test_a_prior_is_a_number_or_numbers_by_name(case, problem, prior, message):
+    with pytest.raises(InputError, match=message):
+        case.pose(prior)
+    by_name = case.pose(dict.fromkeys([p.name for p in problem.parameters], 0.4))
+    for one, other in zip(
+        *(jax.tree.leaves(eqx.filter(p, eqx.is_array)) for p in (by_name, case.pose(0.4))), strict=True
+    ):
+        np.testing.assert_array_equal(one, other)
