@@ -156,7 +156,7 @@ def test_derivatives_equal_differences(case, changed, core):
     h = 2e-3
 
     def exactly(by):
-        # A search ends where its cost shows no more gain, half of the digits away from the optimum: a step of Newton's is the rest.
+        # A search ends where its cost shows no more gain, at half of the digits: a step of Newton's is the rest.
         problem = changed(by)
         z = optimum(problem, problem.start(), max_steps=200, tolerance=case.tolerance).z
         matrix, _ = curvature(lambda z, free: problem.cost(z), z, ())
