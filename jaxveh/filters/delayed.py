@@ -202,12 +202,13 @@ def _choose(condition: Any, a: Any, b: Any) -> Any:
 
 
 def _merged(infos: Info, real: Any, new: Any) -> Info:
-    """One info of all rows filtered anew: innovations and NIS of the new ones, the first failure of all."""
+    """One info of all rows filtered anew: innovations and NIS of the new ones, the first failure and the first remark of all."""
     pick = lambda values: jnp.sum(jnp.where(new & jnp.isfinite(values), values, 0), axis=0)
     seen = lambda values: jnp.any(new & jnp.isfinite(values), axis=0)
     by_channel = lambda tree: jax.tree.map(lambda v: jnp.where(seen(v), pick(v), jnp.nan), tree)
     failed = real & (infos.result != 0)
     result = jnp.where(jnp.any(failed), infos.result[jnp.argmax(failed)], code(Result.successful))
+    remarked = None if infos.remark is None else real & (infos.remark != 0)
     return Info(
         log_likelihood=jnp.sum(infos.log_likelihood),
         innovation=by_channel(infos.innovation),
@@ -215,4 +216,5 @@ def _merged(infos: Info, real: Any, new: Any) -> Info:
         nis=jnp.where(jnp.any(jnp.isfinite(infos.nis)), pick(infos.nis), jnp.nan),
         ess=infos.ess[-1],
         result=result,
+        remark=None if remarked is None else jnp.where(jnp.any(remarked), infos.remark[jnp.argmax(remarked)], 0),
     )

@@ -105,7 +105,7 @@ def side_of(file: PropertyFile) -> str:
     said = file.text("TYRESIDE").strip().lower()
     if said not in SIDES:
         raise InputError(
-            f"{file.source}: TYRESIDE = {file.text('TYRESIDE', 'nothing')!r}: must be 'LEFT' or 'RIGHT' (in [MODEL]) before the "
+            f"{file.source}: TYRESIDE = {file.text('TYRESIDE', '')!r}: must be 'LEFT' or 'RIGHT' (in [MODEL]) before the "
             "tyre can be mounted on a side; without `side` it is taken as it is."
         )
     return said

@@ -53,6 +53,11 @@ PLACES = {
     "filters/adaptive_number.py": {
         "stop_gradient": "how many particles are drawn, and the draws that say so: whole numbers"
     },
+    "filters/auxiliary.py": {
+        "stop_gradient": "the look-ahead, whose derivative cancels: gained in the choice, lost in the weights"
+    },
+    "filters/choosing.py": {"stop_gradient": "the largest logarithm, which cancels in the sum of exponentials"},
+    "filters/looking_ahead.py": {"stop_gradient": "a remark, which is a code"},
     "filters/particle.py": {
         "stop_gradient": "the draw of ancestors, whole numbers; the base of moments, which cancels"
     },
