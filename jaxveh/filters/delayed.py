@@ -206,15 +206,18 @@ def _merged(infos: Info, real: Any, new: Any) -> Info:
     pick = lambda values: jnp.sum(jnp.where(new & jnp.isfinite(values), values, 0), axis=0)
     seen = lambda values: jnp.any(new & jnp.isfinite(values), axis=0)
     by_channel = lambda tree: jax.tree.map(lambda v: jnp.where(seen(v), pick(v), jnp.nan), tree)
-    failed = real & (infos.result != 0)
-    result = jnp.where(jnp.any(failed), infos.result[jnp.argmax(failed)], code(Result.successful))
-    remarked = None if infos.remark is None else real & (infos.remark != 0)
     return Info(
         log_likelihood=jnp.sum(infos.log_likelihood),
         innovation=by_channel(infos.innovation),
         innovation_std=by_channel(infos.innovation_std),
         nis=jnp.where(jnp.any(jnp.isfinite(infos.nis)), pick(infos.nis), jnp.nan),
         ess=infos.ess[-1],
-        result=result,
-        remark=None if remarked is None else jnp.where(jnp.any(remarked), infos.remark[jnp.argmax(remarked)], 0),
+        result=_first(infos.result, real),
+        remark=None if infos.remark is None else _first(infos.remark, real),
     )
+
+
+def _first(codes: Any, real: Any) -> Any:
+    """The first of the codes (T,) that is not zero, of real rows; zero without one."""
+    told = real & (codes != 0)
+    return jnp.where(jnp.any(told), codes[jnp.argmax(told)], code(Result.successful))
