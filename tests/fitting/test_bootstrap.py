@@ -52,3 +52,10 @@ def test_errors_are_named(fit):
         fitting.bootstrap(fit.problem, key, groups=[0, 1, 2])
     with pytest.raises(InputError, match="the data have 3 parts to be drawn anew"):
         fitting.bootstrap(fit.problem, key, groups=RUN % 3)
+
+
+def test_fits_that_did_not_converge_are_left_out(fit):
+    found = fitting.bootstrap(fit.problem, jax.random.key(2), count=60, max_steps=4)
+    ended = np.asarray(found.converged)  # half of them, in four steps
+    assert 5 < ended.sum() < 55
+    np.testing.assert_allclose(found.std, np.std(np.asarray(found.values)[ended], axis=0, ddof=1), rtol=1e-9)
