@@ -116,15 +116,19 @@ def _one(name: str, asked: dict[str, Any], as_printed: bool, report: Progress, o
 
 
 def _show_checks(name: str, checks: Sequence[Check]) -> None:
-    """Criteria with value, bound and condition; below each as it was asked those that stand beside it, which are not counted."""
+    """Criteria with value, bound and the number of their condition, and the conditions below; below each criterion as it was
+    asked those that stand beside it, which are not counted."""
     from jaxveh.experiments.report import tally
 
+    notes = {condition: i for i, condition in enumerate(dict.fromkeys(c.condition for c in checks), 1)}
     rows = [
         (c.status.upper() if not c.holds else c.status, "  beside it: " + c.name if c.original else c.name,
-         number(c.value), number(c.bound), c.condition)
+         number(c.value), number(c.bound), str(notes[c.condition]))
         for c in checks
     ]  # fmt: skip
     table(f"{name}: criteria", ("status", "criterion", "value", "bound", "where"), rows, left=2)
+    for condition, i in notes.items():
+        results().print(f"where {i}: {condition}", markup=False)
     results().print(f"{tally(checks)} hold, as they were asked")
 
 
