@@ -69,10 +69,14 @@ def measured(root: Path, kept: Path, file: str, environment: dict[str, str], lim
 
 
 def choose(measurements: dict[str, dict], file: str, lines: set[int]) -> list[str]:
-    """The test files that execute one of the lines: those of its own room first, then the quick ones."""
+    """The test files that execute one of the lines: those of its own room first, of these the numbers on record, then the quick
+    ones."""
     room = Path(file).parts[1]
     hit = [name for name, about in measurements.items() if lines & set(about["lines"].get(file, ()))]
-    return sorted(hit, key=lambda name: (Path(name).parts[1] != room, measurements[name]["seconds"]))
+    recorded = lambda name: Path(name).name.startswith("test_recorded")
+    return sorted(
+        hit, key=lambda name: (Path(name).parts[1] != room, not recorded(name), measurements[name]["seconds"])
+    )
 
 
 def lines_beside(source: str, line: int) -> set[int]:

@@ -1,0 +1,75 @@
+"""What every filter makes of a short recording, by every setting that changes it, as recorded.
+
+Particles, too: their draws are of a key, and rounding moves an ancestor about once in a thousand million draws.
+"""
+
+import equinox as eqx
+import jax
+import pytest
+from recorded_numbers import check_recorded
+from test_every_filter import CHANGES, FILTERS, GROUPS, N, batch, noisier, same
+
+from jaxveh import filters, numerics
+from jaxveh.filters import SquareRoot
+
+FEW = filters.ParticleFilter(N, threshold=0.6)
+MORE = {
+    "Unscented, kappa": lambda: filters.Unscented(alpha=0.9, beta=1.5, kappa=1.0),
+    "Gauss-Hermite of order 5": lambda: filters.GaussHermite(5),
+    "gated, at once": lambda: filters.Gated(filters.Extended(), 1.0),
+    "Huber, at once": lambda: filters.Huber(filters.Extended(), 0.5),
+    "federated, fixed shares": lambda: filters.Federated(filters.Cubature(), GROUPS, (0.7, 0.3), reset=False),
+    "federated, isolating": lambda: filters.Federated(filters.Cubature(), GROUPS, isolate=1.2, forgetting=0.5),
+    "interacting, unequal start": lambda: filters.InteractingModels(
+        filters.Extended(SquareRoot()), (same, noisier), CHANGES, (0.8, 0.2)
+    ),
+    "wavelet noise, quickly": lambda: filters.HaarNoise(filters.Extended(), window=4, fewest=2, initial=2.0),
+    "Sage-Husa, quickly": lambda: filters.SageHusa(filters.Extended(), 0.7, 0.5, 2.0),
+    "variational Bayes, quickly": lambda: filters.VariationalBayes(filters.Extended(), 0.8, 3.0, 2),
+    "strong tracking, softly": lambda: filters.StrongTracking(filters.Extended(), 0.5, 1.5, 3.0),
+    "matched process, quickly": lambda: filters.MatchedProcess(filters.Extended(), {"x0": 0.1, "x1": 0.2}, 0.6),
+    "varying noise": lambda: filters.VaryingNoise(filters.Extended(), {"y0": "force"}, {"x0": "force"}),
+    "paused": lambda: filters.Paused(filters.Extended(), "force", {"x0": 0.5}),
+    "fixed lag, particles": lambda: filters.FixedLag(FEW, 2),
+    "regularised by a bandwidth": lambda: filters.Regularised(FEW, 0.2),
+    "Liu-West, all states": lambda: filters.LiuWest(FEW, 0.9, ("x0", "x1", "x2")),
+    "bootstrap, seldom resampled": lambda: FEW,
+    "bootstrap, multinomial": lambda: filters.ParticleFilter(N, numerics.multinomial),
+    "bootstrap, stratified": lambda: filters.ParticleFilter(N, numerics.stratified),
+    "bootstrap, residual": lambda: filters.ParticleFilter(N, numerics.residual),
+    "softened, seldom resampled": lambda: filters.ParticleFilter(N, filters.Soft(0.7), 0.6),
+    "optimal transport, seldom": lambda: filters.ParticleFilter(50, filters.Transport(0.2, 30), 0.6),
+    "auxiliary, seldom resampled": lambda: filters.AuxiliaryParticleFilter(N, threshold=0.6),
+    "auxiliary, wary": lambda: filters.AuxiliaryParticleFilter(
+        N, lookahead=filters.PredictiveLikelihood(defensive=0.6)
+    ),
+    "auxiliary, to a point, wary": lambda: filters.AuxiliaryParticleFilter(
+        N, lookahead=filters.PointLookahead(defensive=0.4)
+    ),
+    "guided, seldom resampled": lambda: filters.Guided(N, threshold=0.6),
+    "guided, fully adapted, seldom": lambda: filters.Guided(N, "extended", auxiliary=True, threshold=0.6),
+    "marginalised, seldom resampled": lambda: filters.Marginalised(N, ("x2",), threshold=0.6),
+    "adaptive number, rarely many": lambda: filters.AdaptiveNumber(
+        filters.ParticleFilter(N), {"x0": 0.5, "x1": 0.5, "x2": 0.5}, (20, 60, N), 0.1, 0.9
+    ),
+}
+MAKERS = {name: line.make for name, line in FILTERS.items()} | MORE
+ROWS = 12
+
+
+@eqx.filter_jit
+def short(filter_, model, rows, key):
+    """A recording's first rows, of which two say nothing."""
+    estimate = filters.scan(filter_, model, rows, key)
+    kept = estimate.mean, estimate.std, estimate.log_likelihood, estimate.info
+    return jax.tree.map(lambda leaf: leaf[2::3] if leaf.ndim else leaf, kept)
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_estimates_are_those_recorded(name):
+    filter_, linear = MAKERS[name](), name in FILTERS and FILTERS[name].linear
+    model, rows = batch("linear" if linear else "pendulum")
+    rows = jax.tree.map(lambda leaf: leaf[0, :ROWS], rows)
+    rows = rows._replace(u=jax.tree.map(lambda force: 0.1 + abs(force), rows.u))  # some filters take it for a spread
+    filter_.check(model)
+    check_recorded(__file__, name, short(filter_, model, rows, jax.random.key(5)))

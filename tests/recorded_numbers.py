@@ -1,0 +1,41 @@
+"""Numbers that were found once and stand in `tests/recorded/`, a file for each test file that asks.
+
+They say that nothing has changed, for every member of a family at once and cheaply; that it is right is said elsewhere, against
+closed forms, references and peers. Who changes a number on purpose records it anew and looks at the difference:
+
+    JAXVEH_RECORD=1 python -m pytest -n 0 -k recorded && git diff --stat tests/recorded
+"""
+
+import json
+import os
+from pathlib import Path
+
+import jax
+import numpy as np
+
+FOLDER = Path(__file__).parent / "recorded"
+
+
+def check_recorded(test_file, name, values, rtol=1e-7):
+    """Compare a tree of numbers with those on record for `name`, or record them where JAXVEH_RECORD is set.
+
+    `rtol` is of each leaf's largest number: rounding differs between machines and versions of jax, a changed formula shows.
+    """
+    path = FOLDER / f"{Path(test_file).stem}.json"
+    flat = {
+        jax.tree_util.keystr(at): np.asarray(leaf, float).ravel()
+        for at, leaf in jax.tree_util.tree_leaves_with_path(values)
+    }
+    known = json.loads(path.read_text()) if path.exists() else {}
+    if os.environ.get("JAXVEH_RECORD"):
+        known[name] = {at: [float(f"{number:.12g}") for number in leaf] for at, leaf in flat.items()}
+        path.write_text(json.dumps(dict(sorted(known.items())), indent=0) + "\n")
+        return
+    assert name in known, f"{name} has no numbers on record in {path.name}: see {Path(__file__).name}."
+    assert flat.keys() == known[name].keys()
+    for at, leaf in flat.items():
+        expected = np.asarray(known[name][at], float)
+        finite = np.abs(expected[np.isfinite(expected)])
+        np.testing.assert_allclose(
+            leaf, expected, rtol=rtol, atol=rtol * finite.max(initial=0.0), err_msg=f"{name}: {at}"
+        )

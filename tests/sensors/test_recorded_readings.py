@@ -1,0 +1,37 @@
+"""What every device says of one drive, and every number of the devices that come ready made, as recorded."""
+
+import jax
+import numpy as np
+import pytest
+from recorded_numbers import check_recorded
+from test_every_device import DEVICES, heard
+
+from jaxveh import sensors
+
+MADE = {
+    "production": sensors.production_car,
+    "production, wheels": lambda: sensors.production_car(0.31, steering_ratio=15.5, gnss=False),
+    "proving ground": sensors.proving_ground_car,
+    "proving ground, wheels": lambda: sensors.proving_ground_car(0.31, steering_ratio=15.5),
+    "ESC": sensors.esc,
+}
+
+
+@pytest.mark.parametrize("name", DEVICES)
+def test_readings_are_those_recorded(name):
+    """With noise and without."""
+    device = DEVICES[name].make(rate=50.0, delay=0.013, phase=0.004)
+    found = {"silent": heard(device), "noisy": heard(device, jax.random.key(4))}
+    few = jax.tree.map(lambda values: np.asarray(values)[::9], found)
+    check_recorded(__file__, name, {"channels": few, "times": np.asarray(device.sample_times(2.0))[:5]})
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_numbers_of_ready_made_devices_are_those_recorded(name):
+    suite = MADE[name]()
+    numbers = [leaf for leaf in jax.tree.leaves(suite) if isinstance(leaf, float | int | np.ndarray | jax.Array)]
+    clocks = [
+        [float(getattr(device, what, 0.0) or 0.0) for what in ("rate", "delay", "phase", "lowest")]
+        for device in getattr(suite, "devices", ())
+    ]
+    check_recorded(__file__, name, {"numbers": numbers, "clocks": clocks})

@@ -1,0 +1,79 @@
+"""Every vehicle's rates and outputs in general position, and every number of every car that is given by name, as recorded."""
+
+import dataclasses
+import inspect
+
+import jax
+import numpy as np
+import pytest
+from planar_cars import MAKERS, point
+from recorded_numbers import check_recorded
+from test_every_vehicle import CARS, ROUGH, made, stirred
+
+from jaxveh import InputError, vehicles
+from jaxveh.roads import LEVEL
+
+GIVEN = {
+    name: maker
+    for name, maker in {**vars(vehicles.sets), **vars(vehicles)}.items()
+    if inspect.isfunction(maker) and not name.startswith("_") and not [
+        one for one in inspect.signature(maker).parameters.values()
+        if one.default is one.empty and one.kind not in (one.VAR_KEYWORD, one.VAR_POSITIONAL)
+    ]
+}  # fmt: skip
+"""Functions that make a car, or the numbers of one, of nothing."""
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_motion_is_that_recorded(name):
+    """Stirred, on level ground and on a rough one; slowly, nearly standing; hard to the left."""
+    car, (x, u) = made(name), stirred(name)
+    slow = x._replace(**{n: 0.02 * getattr(x, n) for n in x._fields if n.startswith(("v_", "omega"))})
+    slow_u = u._replace(**{n: 0.02 * getattr(u, n) for n in u._fields if n.startswith(("v_x", "speed"))})
+    cases = {
+        "level": (x, u, LEVEL),
+        "rough": (x, u, ROUGH),
+        "slow": (slow, slow_u, ROUGH),
+        "other": (*stirred(name, 3), ROUGH),
+    }
+    found = {}
+    for what, case in cases.items():
+        rates, outputs = car.evaluate(0.0, *case)
+        found[what] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
+    check_recorded(__file__, name, found)
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_motion_of_planar_cars_is_that_recorded(name):
+    car = MAKERS[name]()
+    rates, outputs = car.evaluate(0.0, *point(car), ROUGH)
+    check_recorded(__file__, f"planar: {name}", {"rates": rates._asdict(), "outputs": outputs._asdict()})
+
+
+@pytest.mark.parametrize("name", GIVEN)
+def test_numbers_of_cars_given_by_name_are_those_recorded(name):
+    check_recorded(__file__, f"given: {name}", list(leaves(GIVEN[name]())))
+
+
+@pytest.mark.parametrize("name", vehicles.sets.CARS)
+def test_every_named_car_has_the_numbers_recorded(name):
+    """Its own, and those that it has in every fidelity that they reach."""
+    found = {"own": vehicles.sets.CARS[name]()}
+    for fidelity in vehicles.sets.FIDELITIES:
+        try:
+            found[fidelity] = vehicles.named_car(name, fidelity)
+        except InputError:
+            continue
+    check_recorded(__file__, f"named: {name}", {kind: list(leaves(one)) for kind, one in found.items()})
+
+
+def leaves(thing):
+    """All numbers in a tree, a dataclass or a tuple, in the order of their fields."""
+    if isinstance(thing, float | int | np.ndarray | jax.Array) and not isinstance(thing, bool):
+        yield np.asarray(thing, float)
+    elif dataclasses.is_dataclass(thing):
+        for field in dataclasses.fields(thing):
+            yield from leaves(getattr(thing, field.name))
+    elif isinstance(thing, tuple | list):
+        for one in thing:
+            yield from leaves(one)
