@@ -207,6 +207,21 @@ def test_the_first_row_is_guided():
         np.testing.assert_allclose(np.mean(mean), 11.0 * 400 / 400.04, atol=0.01)
 
 
+def test_a_tenth_of_the_first_particles_are_the_prior_s_own():
+    """Of a square measured from a prior on one side of it the slope sees one root; an eighth of the mass is about the other."""
+    system = model("two peaks")
+    system = eqx.tree_at(lambda m: (m.prior.mean.x, m.prior.law.std.x), system, (jnp.asarray(10.0), jnp.asarray(10.0)))
+    system = eqx.tree_at(lambda m: m.measurement_noise.std.y, system, jnp.asarray(2.0))
+    row, x = system.row(0.0, {}, {"y": 5.0}), np.linspace(-60.0, 80.0, 20001)
+    density = scipy.stats.norm(10.0, 10.0).pdf(x) * scipy.stats.norm(0.05 * x**2, 2.0).pdf(5.0)
+    exact, other = np.trapezoid(density, x), np.trapezoid(density * (x < 0), x)
+    first = lambda key: filters.Guided(2 * N).init(system, row, key)
+    belief, info = jax.vmap(first)(jax.random.split(jax.random.key(1), 60))
+    there = np.sum(np.asarray(belief.weights) * (np.asarray(belief.particles.x) < 0), axis=1)
+    np.testing.assert_allclose(np.median(there), other / exact, rtol=0.2)
+    np.testing.assert_allclose(np.median(info.log_likelihood), np.log(exact), atol=0.03)
+
+
 class TestTransport:
     filter_ = filters.ParticleFilter(100, filters.Transport(0.1, 40))
 

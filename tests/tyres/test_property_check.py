@@ -125,6 +125,7 @@ def test_a_good_file_gives_no_alarm(text):
         ("INFLPRES = 220000", "INFLPRES = 400000", "INFLPRES is 400000 Pa, outside PRESMIN to PRESMAX"),
         ("LMUX = 1", "LMUX = 0.8", "scaling LMUX = 0.8: not 1"),
         ("UNLOADED_RADIUS = 0.3135", "UNLOADED_RADIUS = 313.5", "UNLOADED_RADIUS is 313.5 m: wheels have"),
+        ("RIM_RADIUS = 0.1905", "RIM_RADIUS = 0.3135", "RIM_RADIUS is 0.3135 m, not less than UNLOADED_RADIUS"),
         ("RIM_RADIUS = 0.1905", "RIM_RADIUS = 0.381", "RIM_RADIUS is 0.381 m, not less than UNLOADED_RADIUS"),
         ("FNOMIN = 4000", "FNOMIN = 4", "FNOMIN is 4 N: wheels carry"),
         ("PCX1 = 1.6", "PCX1 = -1.6", "PCX1 gives a shape factor C of -1.6: must be positive"),
@@ -185,6 +186,9 @@ def test_many_coefficients_are_not_listed_in_full():
     assert "[ROLLING_COEFFICIENTS] PXX1, PXX2, PXX3 and 6 more: not read, and not neutral" in found(
         GOOD.replace("QSY1 = 0.01\n", f"QSY1 = 0.01\n{many}")
     )
+    few = "".join(f"PXX{k} = 1\n" for k in range(1, 7))
+    listed = "[ROLLING_COEFFICIENTS] PXX1, PXX2, PXX3, PXX4, PXX5, PXX6: not read, and not neutral"
+    assert listed in found(GOOD.replace("QSY1 = 0.01\n", f"QSY1 = 0.01\n{few}"))
 
 
 @pytest.mark.parametrize("name", shared_names("tyres", "*.tir"))
