@@ -28,8 +28,8 @@ def check_recorded(test_file, name, values, rtol=1e-7):
     }
     known = json.loads(path.read_text()) if path.exists() else {}
     if os.environ.get("JAXVEH_RECORD"):
-        known[name] = {at: [float(f"{number:.12g}") for number in leaf] for at, leaf in flat.items()}
-        path.write_text(json.dumps(dict(sorted(known.items())), indent=0) + "\n")
+        known[name] = {at: [float(f"{number:.10g}") for number in leaf] for at, leaf in flat.items()}
+        path.write_text(_one_leaf_a_line(known))
         return
     assert name in known, f"{name} has no numbers on record in {path.name}: see {Path(__file__).name}."
     assert flat.keys() == known[name].keys()
@@ -39,3 +39,12 @@ def check_recorded(test_file, name, values, rtol=1e-7):
         np.testing.assert_allclose(
             leaf, expected, rtol=rtol, atol=rtol * finite.max(initial=0.0), err_msg=f"{name}: {at}"
         )
+
+
+def _one_leaf_a_line(known):
+    """Text of which a difference can be read."""
+    entries = []
+    for name, leaves in sorted(known.items()):
+        lines = ",\n".join(f"  {json.dumps(at)}: {json.dumps(values)}" for at, values in leaves.items())
+        entries.append(f"{json.dumps(name)}: {{\n{lines}\n}}")
+    return "{\n" + ",\n".join(entries) + "\n}\n"

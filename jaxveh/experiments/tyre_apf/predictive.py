@@ -3,7 +3,8 @@
     python -m jaxveh.experiments.tyre_apf.predictive
 
 chooses the noise of each level by the likelihood of the plain filter and of this one, as `noise` does for the paper's, then races
-both at it, and prints what the report's criteria ask of the paper's filter. The report has no part of it.
+both at it, on drives of another key than the report's, and prints what the report's criteria ask of the paper's filter. The
+report has the noise (`settings.LOOKING_AHEAD`) and races it on its own drives.
 """
 
 from __future__ import annotations

@@ -15,12 +15,18 @@ from jaxveh._core.parameter import pick, resolve
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.diagnostics.observability import UNOBSERVABLE, Observability
 from jaxveh.experiments.report import Check, Table, above, at_least, at_most, stated
-from jaxveh.experiments.tyre_apf.criteria import CRITERIA
+from jaxveh.experiments.tyre_apf.criteria import AHEAD, CRITERIA, WHERE
 from jaxveh.experiments.tyre_apf.printed import Printed, closest_share, run_printed_seeds
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.saturated import SWEEP, over_bound, run_saturated
-from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER, Study, tyres
-from jaxveh.experiments.tyre_apf.sharpness import PAPERS_PARTICLES, Sharpness, likelihood_ratio, run_sharpness
+from jaxveh.experiments.tyre_apf.settings import LOOKING_AHEAD, STEP_STEER, Study, tyres
+from jaxveh.experiments.tyre_apf.sharpness import (
+    PAPERS_PARTICLES,
+    PREDICTIVE,
+    Sharpness,
+    likelihood_ratio,
+    run_sharpness,
+)
 from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
 from jaxveh.experiments.tyre_apf.study import FIELDS
 from jaxveh.experiments.tyre_apf.tables import tables_as_printed
@@ -46,12 +52,16 @@ def run(
     # Drives of their own, beside the study's.
     saturated_key, sharp_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 2))
     saturated = run_saturated(study, seeds, saturated_key, part(progress, 0.42, 0.65, "saturated"))
-    sharpness = run_sharpness(study, seeds, sharp_key, progress=part(progress, 0.65, 0.92, "sharpness"))
+    sharpness = run_sharpness(study, seeds, sharp_key, progress=part(progress, 0.65, 0.84, "sharpness"))
+    ahead = run_sharpness(
+        study, seeds, sharp_key, counts=(PAPERS_PARTICLES,), kinds=PREDICTIVE, levels=LOOKING_AHEAD,
+        progress=part(progress, 0.84, 0.92, "looking ahead with the noise"),
+    )  # fmt: skip
     progress(0.92, 1.0, "printed settings")
     found = jax.block_until_ready(run_printed_seeds(printed, jax.random.split(printed_key, seeds)))
     progress(1.0, 1.0, "done")
     return Reproduction(
-        study, seeds, staged.outcome, staged.steps, lane_change, saturated, sharpness, found, printed,
+        study, seeds, staged.outcome, staged.steps, lane_change, saturated, sharpness, ahead, found, printed,
         looked_at_the_truth(staged, printed),
     )  # fmt: skip
 
@@ -120,7 +130,7 @@ def check(result: Reproduction) -> list[Check]:
     for name in ("UKF", "MAP"):
         worst = over_bound(result.saturated, "D and B", name, SWEEP).max()
         add(f"{SWEEP}, D and B: {name}'s largest RMSE over its Cramer-Rao bound", worst, 2.0)
-    checks += _sharpness_checks(result.sharpness)
+    checks += _sharpness_checks(result.sharpness) + _sharpness_checks(result.ahead, AHEAD)
     truth = np.asarray(result.printed.truth)[0]
     walk = np.abs(_median(result.printed.by_rule["walk"]) / truth - 1)
     worst = {"D": 0.0005, "B": 0.003, "C": 0.003}
@@ -134,7 +144,7 @@ def check(result: Reproduction) -> list[Check]:
     return stated(checks, CRITERIA)
 
 
-def _sharpness_checks(found: Sharpness) -> list[Check]:
+def _sharpness_checks(found: Sharpness, which: str = "APF") -> list[Check]:
     """At the paper's number of particles and with its resampling: the APF over the PF, paired.
 
     Three do not hold with the noise that `noise.choose_level` takes: with sharp sensors the APF errs 0.98 times as much as the PF
@@ -143,12 +153,11 @@ def _sharpness_checks(found: Sharpness) -> list[Check]:
     passes each: 0.87, 90 % interval 0.77 to 0.99), a fully adapted filter's 0.81: one row ahead tells little of eight parameters.
     """
     compared, checks = found.found[PAPERS_PARTICLES].compare("error", "filter", "APF", "PF"), []
-    where = [f"yaw rate {level.yaw_rate:g} rad/s, a_y {level.a_y:g} m/s^2" for level in LEVELS]
     for i, bound in enumerate((0.95, 1.1, 1.1)):
-        name = f"{where[i]}: APF over PF, parameter RMSE, paired"
+        name = f"{WHERE[i]}: {which} over PF, parameter RMSE, paired"
         checks.append(at_most(name, compared.ratio.value[i], bound))
         if i == 0:
-            checks.append(at_least(f"{where[i]}: share of seeds that the APF wins", compared.wins[i], 0.6))
-    ratio = likelihood_ratio(found, PAPERS_PARTICLES, len(LEVELS) - 1)
-    checks.append(at_most(f"{where[-1]}: APF over PF, spread of the log-likelihood", ratio, 0.8))
+            checks.append(at_least(f"{WHERE[i]}: share of seeds that the {which} wins", compared.wins[i], 0.6))
+    ratio = likelihood_ratio(found, PAPERS_PARTICLES, len(WHERE) - 1)
+    checks.append(at_most(f"{WHERE[-1]}: {which} over PF, spread of the log-likelihood", ratio, 0.8))
     return checks

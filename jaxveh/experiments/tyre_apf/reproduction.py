@@ -16,8 +16,9 @@ class Reproduction(NamedTuple):
     """Everything the experiment found; leaves over seeds.
 
     `outcome` of the honest lane change, `steps`: errors of step steers by degrees; `lane_change`: what it can tell of eight
-    parameters; `saturated`, `sharpness`: the further drives and sweeps. `printed`: what the printed settings do. `peeked`: the
-    honest filters' parameters, (seeds, 8), by the paper's final rule, which looks at the truth.
+    parameters; `saturated`, `sharpness`: the further drives and sweeps, `ahead` the last
+    with a filter that looks ahead with the process noise. `printed`: what the printed settings do. `peeked`: the honest filters'
+    parameters, (seeds, 8), by the paper's final rule, which looks at the truth.
     """
 
     study: Study
@@ -27,6 +28,7 @@ class Reproduction(NamedTuple):
     lane_change: Observability
     saturated: Saturated
     sharpness: Sharpness
+    ahead: Sharpness
     printed: PrintedOutcome
     printed_settings: Printed
     peeked: dict

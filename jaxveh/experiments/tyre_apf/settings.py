@@ -73,6 +73,13 @@ LEVELS = (
 )
 """From sharp sensors to coarse ones; the middle is the study's."""
 
+LOOKING_AHEAD = (
+    Level(0.001, 0.02, Noise(v_y=0.05, yaw_rate=0.001, walk=0.1)),
+    Level(0.005, 0.1, Noise(v_y=0.02, yaw_rate=0.002, walk=0.1)),
+    Level(0.02, 0.4, Noise(v_y=0.01, yaw_rate=0.002, walk=0.1)),
+)
+"""The same, chosen with an auxiliary filter that looks ahead with the process noise (`predictive`)."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Study:

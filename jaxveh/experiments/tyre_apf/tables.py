@@ -23,6 +23,8 @@ def tables(result: Reproduction) -> list[Table]:
         _saturated_table(result),
         _error_table(result.sharpness),
         _likelihood_table(result.sharpness),
+        _error_table(result.ahead, AHEAD_TITLE),
+        _likelihood_table(result.ahead),
         _truth_table(result),
         *tables_as_printed(result.printed, result.printed_settings),
     ]
@@ -92,7 +94,11 @@ def _saturated_table(result: Reproduction) -> Table:
 HEADS = tuple(f"{level.yaw_rate:g} rad/s, {level.a_y:g} m/s^2" for level in LEVELS)
 
 
-def _error_table(found: Sharpness) -> Table:
+ERROR_TITLE = "Eight parameters by the sensors' noise: RMSE in prior standard deviations, median [quartiles]"
+AHEAD_TITLE = ERROR_TITLE + "; the APF looks ahead with the process noise"
+
+
+def _error_table(found: Sharpness, title: str = ERROR_TITLE) -> Table:
     rows = []
     for count, runs in found.found.items():
         rows += [(count, name, *[spread(v) for v in runs.at("error", filter=name)]) for name in _names(runs)]
@@ -101,7 +107,6 @@ def _error_table(found: Sharpness) -> Table:
             ratios = [Interval(*numbers) for numbers in zip(*compared.ratio, strict=True)]
             cells = [f"{interval(ratio)}, {wins:.0%}" for ratio, wins in zip(ratios, compared.wins, strict=True)]
             rows.append((count, f"{auxiliary} over plain (95 %), wins", *cells))
-    title = "Eight parameters by the sensors' noise: RMSE in prior standard deviations, median [quartiles]"
     return Table(title, ("particles", "filter", *HEADS), rows)
 
 
