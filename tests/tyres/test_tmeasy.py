@@ -80,6 +80,17 @@ def test_one_load_alone_is_proportional_to_it():
     assert one.M_z == 0.0
 
 
+def test_friction_scales_slips_and_forces_down_to_a_millionth():
+    """Below, where slips are divided by no less, the forces alone."""
+    for direction in ("F_x", "F_y"):
+        for friction in (0.3, 1.1e-6):
+            whole = along(direction, 0.08)
+            np.testing.assert_allclose(
+                along(direction, 0.08 * friction, friction=friction), friction * whole, rtol=1e-9
+            )
+        np.testing.assert_allclose(along(direction, 0.08e-6, friction=1e-7), 1e-7 * whole, rtol=1e-9)
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.4, 1.0, 1.3, math.pi / 2])
 def test_combined_slip_is_rills(angle):
     bends = 3300 / 90e3 + 3100 / 75e3

@@ -4,6 +4,7 @@ import dataclasses
 import inspect
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from planar_cars import MAKERS, point
@@ -41,6 +42,17 @@ def test_motion_is_that_recorded(name):
         rates, outputs = car.evaluate(0.0, *case)
         found[what] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
     check_recorded(__file__, name, found)
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_a_batch_of_states_gives_a_batch_of_everything(name):
+    """But for loads that nothing moves, which are one number for all."""
+    car, (x, u) = made(name), stirred(name)
+    many = lambda tree: jax.tree.map(lambda value: value + jnp.zeros(3), tree)
+    for ground in (LEVEL, ROUGH):
+        rates, outputs = car.evaluate(0.0, many(x), many(u), ground)
+        for field, value in {**rates._asdict(), **outputs._asdict()}.items():
+            assert value.shape == (3,) or (value.shape == () and field.startswith("load_")), field
 
 
 @pytest.mark.parametrize("name", MAKERS)
