@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from filter_systems import nile_model
+from filter_systems import linear_model, linear_recording, nile_model
 
 from jaxveh import InputError, Recording, filters
 from jaxveh import statespace as ss
@@ -192,6 +192,19 @@ class TestMatchedProcess:
         for k in range(1, 4):
             belief, _ = filter_.step(base, belief, row(k))
         np.testing.assert_allclose(belief.memory[0], [4.0], rtol=1e-12)
+
+    def test_a_process_noise_with_correlations_gets_the_same_more(self):
+        """Written as a matrix without correlations it gives the same numbers; what it does not name is added."""
+        base, extra = linear_model(3, 2, seed=4), {"x0": 0.3, "x2": 0.2}
+        stds, recording = {"x0": 0.2, "x1": 0.1}, linear_recording(base, rows=20, seed=2)
+        matrix = ss.MultivariateGaussian(tuple(stds), np.diag(np.square(list(stds.values()))))
+        for wrap in (filters.MatchedProcess, filters.ShrinkingProcess):
+            both = []
+            for law in (ss.Gaussian(stds), matrix):
+                changed = eqx.tree_at(lambda m: m.process_noise, base, ss.Continuous(law))
+                both.append(filters.run(wrap(filters.Kalman(), extra), changed, recording))
+            np.testing.assert_allclose(both[0].log_likelihood, both[1].log_likelihood, rtol=1e-10)
+            np.testing.assert_allclose(np.stack(both[0].std), np.stack(both[1].std), rtol=1e-9)
 
     def test_bad_input_is_named(self):
         with pytest.raises(InputError, match="most is empty"):
