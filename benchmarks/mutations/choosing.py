@@ -68,12 +68,14 @@ def measured(root: Path, kept: Path, file: str, environment: dict[str, str], lim
     return result
 
 
-def choose(measurements: dict[str, dict], file: str, lines: set[int]) -> list[str]:
+def choose(measurements: dict[str, dict], file: str, lines: set[int], own: bool = False) -> list[str]:
     """The test files that execute one of the lines: those of its own room first, of these the numbers on record, then the quick
-    ones."""
+    ones. `own`: no others."""
     room = Path(file).parts[1]
     hit = [name for name, about in measurements.items() if lines & set(about["lines"].get(file, ()))]
     recorded = lambda name: Path(name).name.startswith("test_recorded")
+    if own:
+        hit = [name for name in hit if Path(name).parts[1] == room]
     return sorted(
         hit, key=lambda name: (Path(name).parts[1] != room, not recorded(name), measurements[name]["seconds"])
     )

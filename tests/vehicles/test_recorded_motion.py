@@ -69,9 +69,9 @@ def test_numbers_of_cars_given_by_name_are_those_recorded(name):
 
 @pytest.mark.parametrize("name", vehicles.sets.CARS)
 def test_every_named_car_has_the_numbers_recorded(name):
-    """Its own, and those that it has as the simplest and as the fullest of cars, where they reach."""
+    """Its own, and those that it has as a simple car, as one that rolls and as the fullest, where they reach."""
     found = {"own": vehicles.sets.CARS[name]()}
-    for fidelity in ("single-track", list(vehicles.sets.FIDELITIES)[-1]):
+    for fidelity in ("single-track", "roll-4dof", list(vehicles.sets.FIDELITIES)[-1]):
         try:
             found[fidelity] = vehicles.named_car(name, fidelity)
         except InputError:  # its numbers do not reach
