@@ -6,6 +6,8 @@ closed forms, references and peers. Who changes a number on purpose records it a
     JAXVEH_RECORD=1 python -m pytest -n 0 -k recorded && git diff --stat tests/recorded
 """
 
+import dataclasses
+import inspect
 import json
 import os
 from pathlib import Path
@@ -14,6 +16,36 @@ import jax
 import numpy as np
 
 FOLDER = Path(__file__).parent / "recorded"
+
+
+def classes_of(*modules):
+    """Every class with fields of these modules, by name."""
+    found = {name: one for module in modules for name, one in vars(module).items() if not name.startswith("_")}
+    return {name: one for name, one in sorted(found.items()) if inspect.isclass(one) and dataclasses.is_dataclass(one)}
+
+
+def check_declared(test_file, one):
+    """Compare what a class declares of its fields with what is on record: the unit, the domain, the scale, and the default
+    where it is a number or a word.
+
+    A scale is the step of a random walk and of a search: nothing but its size depends on it, so that no other test would notice.
+    """
+    found = {}
+    for field in dataclasses.fields(one):
+        about = {
+            key: field.metadata.get(key) for key in ("unit", "scale", "domain") if field.metadata.get(key) is not None
+        }
+        if isinstance(field.default, bool | int | float | str | np.ndarray):
+            about["default"] = field.default
+        found[field.name] = " ".join(f"{key}={value}" for key, value in about.items())
+    path, name = FOLDER / f"{Path(test_file).stem}_declared.json", one.__name__
+    known = json.loads(path.read_text()) if path.exists() else {}
+    if os.environ.get("JAXVEH_RECORD"):
+        known[name] = found
+        path.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n")
+        return
+    assert name in known, f"{name} is not on record in {path.name}: see {Path(__file__).name}."
+    assert found == known[name]
 
 
 def check_recorded(test_file, name, values, rtol=1e-7):

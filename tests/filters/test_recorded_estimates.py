@@ -6,10 +6,10 @@ Particles, too: their draws are of a key, and rounding moves an ancestor about o
 import equinox as eqx
 import jax
 import pytest
-from recorded_numbers import check_recorded
+from recorded_numbers import check_declared, check_recorded, classes_of
 from test_every_filter import CHANGES, FILTERS, GROUPS, N, batch, noisier, same
 
-from jaxveh import filters, numerics
+from jaxveh import filters, numerics, statespace
 from jaxveh.filters import SquareRoot
 
 FEW = filters.ParticleFilter(N, threshold=0.6)
@@ -73,3 +73,11 @@ def test_estimates_are_those_recorded(name):
     rows = rows._replace(u=jax.tree.map(lambda force: 0.1 + abs(force), rows.u))  # some filters take it for a spread
     filter_.check(model)
     check_recorded(__file__, name, short(filter_, model, rows, jax.random.key(5)))
+
+
+DECLARED = classes_of(filters, statespace)
+
+
+@pytest.mark.parametrize("name", DECLARED)
+def test_parameters_are_declared_as_recorded(name):
+    check_declared(__file__, DECLARED[name])

@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 import pytest
-from recorded_numbers import check_recorded
+from recorded_numbers import check_declared, check_recorded, classes_of
 from test_every_device import DEVICES, heard
 
 from jaxveh import sensors
@@ -35,3 +35,11 @@ def test_numbers_of_ready_made_devices_are_those_recorded(name):
         for device in getattr(suite, "devices", ())
     ]
     check_recorded(__file__, name, {"numbers": numbers, "clocks": clocks})
+
+
+DECLARED = classes_of(sensors)
+
+
+@pytest.mark.parametrize("name", DECLARED)
+def test_parameters_are_declared_as_recorded(name):
+    check_declared(__file__, DECLARED[name])

@@ -7,7 +7,7 @@ import pytest
 import test_every_dynamic_tyre
 import test_every_tyre
 import test_wrappers
-from recorded_numbers import check_recorded
+from recorded_numbers import check_declared, check_recorded, classes_of
 from shared_data import shared
 
 from jaxveh import tyres
@@ -84,3 +84,11 @@ def test_forces_are_those_recorded(name):
     tyre = TYRES[name]()
     numbers = [leaf for leaf in jax.tree.leaves(tyre) if leaf.size == 1]
     check_recorded(__file__, name, {"law": said(tyre, contacts()), "coefficients": jnp.stack(numbers)})
+
+
+DECLARED = classes_of(tyres, tyres.mf_tyre)
+
+
+@pytest.mark.parametrize("name", DECLARED)
+def test_parameters_are_declared_as_recorded(name):
+    check_declared(__file__, DECLARED[name])

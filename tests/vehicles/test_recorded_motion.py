@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from planar_cars import MAKERS, point
-from recorded_numbers import check_recorded
+from recorded_numbers import check_declared, check_recorded, classes_of
 from test_every_vehicle import CARS, ROUGH, made, stirred
 
 from jaxveh import InputError, vehicles
@@ -89,3 +89,11 @@ def leaves(thing):
     elif isinstance(thing, tuple | list):
         for one in thing:
             yield from leaves(one)
+
+
+DECLARED = classes_of(vehicles, vehicles.sets)
+
+
+@pytest.mark.parametrize("name", DECLARED)
+def test_parameters_are_declared_as_recorded(name):
+    check_declared(__file__, DECLARED[name])
