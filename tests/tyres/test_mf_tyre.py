@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from shared_data import shared, shared_names
 
-from jaxveh import tyres
+from jaxveh import InputError, tyres
 from jaxveh.tyres import Contact
 from jaxveh.tyres.evaluation import evaluate
 
@@ -191,6 +191,13 @@ def test_version_62_is_the_reference_s():
     found = evaluate(version_62(), inputs)
     for name, expected in answers.items():
         np.testing.assert_allclose(found[name], expected, rtol=1e-9 if name in FORCES else 1e-8, err_msg=name)
+
+
+def test_a_number_that_is_none_is_named_with_its_row():
+    inputs, _ = known(mfeval_rows.VERSION_62, 121)
+    inputs["in_Fz"] = np.where(np.arange(len(inputs["in_Fz"])) == 2, np.nan, inputs["in_Fz"])
+    with pytest.raises(InputError, match="in_Fz = nan in row 2: must be finite"):
+        evaluate(version_62(), inputs)
 
 
 def test_version_52_is_the_reference_s():

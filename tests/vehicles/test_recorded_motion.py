@@ -3,20 +3,22 @@
 import dataclasses
 import inspect
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from planar_cars import MAKERS, point
 from recorded_numbers import check_declared, check_recorded, classes_of
-from test_every_vehicle import CARS, ROUGH, made, stirred
+from test_every_vehicle import CARS, ROUGH, made, start, stirred
 
 from jaxveh import InputError, vehicles
 from jaxveh.roads import LEVEL
+from jaxveh.vehicles.sets import commonroad_cars
 
 GIVEN = {
     name: maker
-    for name, maker in {**vars(vehicles.sets), **vars(vehicles)}.items()
+    for name, maker in {**vars(commonroad_cars), **vars(vehicles.sets), **vars(vehicles)}.items()
     if inspect.isfunction(maker) and not name.startswith("_") and not [
         one for one in inspect.signature(maker).parameters.values()
         if one.default is one.empty and one.kind not in (one.VAR_KEYWORD, one.VAR_POSITIONAL)
@@ -37,11 +39,19 @@ def test_motion_is_that_recorded(name):
         "slow": (slow, slow_u, ROUGH),
         "other": (*stirred(name, 3), ROUGH),
     }
-    found = {}
+    found = {"start": start(name)[0]._asdict(), "motion": car.motion(x, u)._asdict(), "wheels": car.wheel_positions}
     for what, case in cases.items():
         rates, outputs = car.evaluate(0.0, *case)
         found[what] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
+    if hasattr(car, "rear"):
+        rates, outputs = uneven(car).evaluate(0.0, x, u, ROUGH)
+        found["uneven"] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
     check_recorded(__file__, name, found)
+
+
+def uneven(car):
+    """With other tyres behind: all their numbers a tenth smaller."""
+    return eqx.tree_at(lambda c: c.rear, car, jax.tree.map(lambda number: 0.9 * number, car.rear))
 
 
 @pytest.mark.parametrize("name", CARS)
@@ -86,8 +96,8 @@ def leaves(thing):
     elif dataclasses.is_dataclass(thing):
         for field in dataclasses.fields(thing):
             yield from leaves(getattr(thing, field.name))
-    elif isinstance(thing, tuple | list):
-        for one in thing:
+    elif isinstance(thing, tuple | list | dict):
+        for one in thing.values() if isinstance(thing, dict) else thing:
             yield from leaves(one)
 
 
