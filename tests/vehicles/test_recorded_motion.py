@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from planar_cars import MAKERS, point
 from recorded_numbers import check_declared, check_recorded, classes_of
-from test_every_vehicle import CARS, ROUGH, made, start, stirred
+from test_every_vehicle import CARS, ROUGH, made, seven, shifted_mf, start, stirred
 
 from jaxveh import InputError, vehicles
 from jaxveh.roads import LEVEL
@@ -47,6 +47,21 @@ def test_motion_is_that_recorded(name):
         rates, outputs = uneven(car).evaluate(0.0, x, u, ROUGH)
         found["uneven"] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
     check_recorded(__file__, name, found)
+
+
+def test_long_laws_with_other_numbers_behind_move_as_recorded():
+    """Four wheels in one call of the law, each with its axle's numbers."""
+    x, u = stirred("SevenDOF")
+    weaker = eqx.tree_at(
+        lambda t: (t.lateral.PDY1, t.longitudinal.PKX1), shifted_mf(), (jnp.asarray(0.7), jnp.asarray(15.0))
+    )
+    even, other = (eqx.tree_at(lambda c: c.rear, seven(shifted_mf()), rear) for rear in (shifted_mf(), weaker))
+    found = {}
+    for what, car in (("even", even), ("weaker behind", other)):
+        rates, outputs = car.evaluate(0.0, x, u, ROUGH)
+        found[what] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
+    assert abs(found["even"]["rates"]["yaw_rate"] - found["weaker behind"]["rates"]["yaw_rate"]) > 0.01
+    check_recorded(__file__, "SevenDOF on MF-Tyres", found)
 
 
 def uneven(car):
