@@ -157,3 +157,39 @@ def test_bad_tyres_are_refused():
 def test_sections_hold_each_coefficient_once():
     names = [name for section in property_writer.SECTIONS.values() for name in section]
     assert len(names) == len(set(names))
+
+
+IN_OTHER_UNITS = {
+    **dict.fromkeys(("UNLOADED_RADIUS", "WIDTH", "RIM_RADIUS", "BOTTOM_OFFST"), 1e3),  # mm
+    **dict.fromkeys(("LONGVL", "VXLOW"), 1.0),  # mm/ms
+    **dict.fromkeys(("FNOMIN", "FZMIN", "FZMAX"), 1e-3),  # kN
+    **dict.fromkeys(("VERTICAL_STIFFNESS", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS"), 1e-6),  # kN/mm
+    **dict.fromkeys(("NOMPRES", "INFLPRES", "PRESMIN", "PRESMAX"), 1e-9),  # kN/mm^2
+}
+
+
+NOT_IN_52 = {"NOMPRES", "INFLPRES", "PRESMIN", "PRESMAX", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS"}
+
+
+@pytest.mark.parametrize("version", [52, 61, 62])
+def test_a_file_in_other_units_is_the_same_tyre(version):
+    """Every number with a dimension, one at a time where it stands, in millimetres, kilonewtons and milliseconds."""
+    tyre = tyres.typical_mf_tyre(4000.0, version=version)
+    numbers = {"VERTICAL_STIFFNESS": 2e5, "LONGITUDINAL_STIFFNESS": 4e5, "LATERAL_STIFFNESS": 1e5, "BOTTOM_OFFST": 0.01,
+               "RIM_RADIUS": 0.19, "WIDTH": 0.2, "FZMIN": 100.0, "FZMAX": 9e3, "PRESMIN": 1e5, "PRESMAX": 4e5}  # fmt: skip
+    had = [part for part in ("structure", "ranges") if hasattr(tyre, part)]
+    for name, value in numbers.items():
+        part = next(part for part in had if hasattr(getattr(tyre, part), name))
+        tyre = eqx.tree_at(lambda t, part=part, name=name: getattr(getattr(t, part), name), tyre, jnp.asarray(value))
+    lines, changed = [], set()
+    for line in "".join(tyres.to_property_file(tyre).lines).splitlines():
+        key = line.partition("=")[0].strip()
+        if key in IN_OTHER_UNITS:
+            changed.add(key)
+            line = f"{key} = {float(line.partition('=')[2].split('$')[0]) * IN_OTHER_UNITS[key]!r}"
+        line = {"LENGTH": "LENGTH = 'mm'", "FORCE": "FORCE = 'kN'", "TIME": "TIME = 'millisecond'"}.get(key, line)
+        lines.append(line)
+    assert changed == set(IN_OTHER_UNITS)
+    again = tyres.from_property_file(parse_property_file("\n".join(lines) + "\n"))
+    for one, other in zip(jax.tree.leaves(tyre), jax.tree.leaves(again), strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-9)
