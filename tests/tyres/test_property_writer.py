@@ -168,9 +168,6 @@ IN_OTHER_UNITS = {
 }
 
 
-NOT_IN_52 = {"NOMPRES", "INFLPRES", "PRESMIN", "PRESMAX", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS"}
-
-
 @pytest.mark.parametrize("version", [52, 61, 62])
 def test_a_file_in_other_units_is_the_same_tyre(version):
     """Every number with a dimension, one at a time where it stands, in millimetres, kilonewtons and milliseconds."""
