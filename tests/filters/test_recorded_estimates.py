@@ -5,11 +5,12 @@ Particles, too: their draws are of a key, and rounding moves an ancestor about o
 
 import equinox as eqx
 import jax
+import numpy as np
 import pytest
 from recorded_numbers import check_declared, check_recorded, classes_of
-from test_every_filter import CHANGES, FILTERS, GROUPS, N, batch, noisier, same
+from test_every_filter import CHANGES, FILTERS, GROUPS, MODELS, N, batch, noisier, recordings, same
 
-from jaxveh import filters, numerics, statespace
+from jaxveh import Recording, filters, numerics, statespace
 from jaxveh.filters import SquareRoot
 
 FEW = filters.ParticleFilter(N, threshold=0.6)
@@ -73,6 +74,31 @@ def test_estimates_are_those_recorded(name):
     rows = rows._replace(u=jax.tree.map(lambda force: 0.1 + abs(force), rows.u))  # some filters take it for a spread
     filter_.check(model)
     check_recorded(__file__, name, short(filter_, model, rows, jax.random.key(5)))
+
+
+SMOOTHERS = {
+    "Extended": (filters.Extended(), None, None),
+    "Cubature, square root": (filters.Cubature(form=SquareRoot()), None, None),
+    "Cubature, singular values": (filters.Cubature(form=filters.SingularValues()), None, None),
+    "Gated": (filters.Gated(filters.Extended(), 2.0), None, None),
+    "matched process": (filters.MatchedProcess(filters.Extended(), {"x0": 0.1}), None, None),
+    "backward sampling": (filters.ParticleFilter(N), filters.BackwardSampling(20), None),
+    "genealogy": (filters.AuxiliaryParticleFilter(N), filters.Genealogy(), None),
+    "lag": (filters.Extended(), None, 3),
+    "lag of particles": (filters.ParticleFilter(N), None, 3),
+}
+
+
+@pytest.mark.parametrize("name", SMOOTHERS)
+def test_smoothed_estimates_are_those_recorded(name):
+    filter_, method, lag = SMOOTHERS[name]
+    model, recording = MODELS["pendulum"](), recordings("pendulum")[0]
+    short = Recording(
+        np.asarray(recording.time)[:ROWS], {n: np.asarray(recording[n])[:ROWS] for n in ("y0", "y1", "force")}
+    )
+    found = filters.smooth(filter_, model, short, key=jax.random.key(3), method=method, lag=lag)
+    kept = jax.tree.map(lambda leaf: leaf[::3], (found.mean, found.std))
+    check_recorded(__file__, f"smoothed: {name}", kept)
 
 
 DECLARED = classes_of(filters, statespace)

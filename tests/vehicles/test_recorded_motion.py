@@ -89,7 +89,7 @@ def test_motion_of_planar_cars_is_that_recorded(name):
 
 @pytest.mark.parametrize("name", GIVEN)
 def test_numbers_of_cars_given_by_name_are_those_recorded(name):
-    check_recorded(__file__, f"given: {name}", np.stack([0.0, *leaves(GIVEN[name]())]))
+    check_recorded(__file__, f"given: {name}", np.stack([0.0, *leaves(GIVEN[name]())]), given=True)
 
 
 @pytest.mark.parametrize("name", vehicles.sets.CARS)
@@ -101,7 +101,9 @@ def test_every_named_car_has_the_numbers_recorded(name):
             found[fidelity] = vehicles.named_car(name, fidelity)
         except InputError:  # its numbers do not reach
             continue
-    check_recorded(__file__, f"named: {name}", {kind: np.stack(list(leaves(one))) for kind, one in found.items()})
+    check_recorded(
+        __file__, f"named: {name}", {kind: np.stack(list(leaves(one))) for kind, one in found.items()}, given=True
+    )
 
 
 def leaves(thing):
