@@ -31,6 +31,11 @@ def test_each_record_names_its_source_and_itself(name):
     assert numbers == sets.CARS[name]()
 
 
+@pytest.mark.parametrize(("name", "number"), [("compact_car", 1), ("sedan", 2), ("van", 3), ("semi_trailer", 4)])
+def test_cars_of_commonroad_name_its_vehicle(name, number):
+    assert f"CommonRoad vehicle {number} (" in sets.CARS[name]().source
+
+
 @pytest.mark.parametrize("name", WITH_MASS)
 def test_no_car_oversteers_on_its_linear_tyres_and_the_single_track_has_the_same_slopes(name):
     numbers = sets.CARS[name]()
