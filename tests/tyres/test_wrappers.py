@@ -227,3 +227,12 @@ def test_the_roads_friction_can_be_estimated():
 def test_bad_input_is_named(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_similar_forces_scale_with_friction_down_to_a_thousandth():
+    """F(s; m) = m F(s / m; 1); below, where slips are divided by no less, the forces alone."""
+    tyre = tyres.Similarity(lateral(), LOAD, 5000.0)
+    force = lambda slip, friction: float(tyre.forces(contact(np.arctan(slip), friction=friction)).F_y)
+    for friction in (0.4, 1.1e-3):
+        np.testing.assert_allclose(force(0.05 * friction, friction), friction * force(0.05, 1.0), rtol=1e-9)
+    np.testing.assert_allclose(force(0.05e-3, 1e-4), 1e-4 * force(0.05, 1.0), rtol=1e-9)
