@@ -19,12 +19,14 @@ FOLDER = Path(__file__).parent / "recorded"
 
 
 def classes_of(*modules):
-    """Every class with fields of these modules, by name."""
-    found = {name: one for module in modules for name, one in vars(module).items() if not name.startswith("_")}
+    """Every class with fields of these modules, by module and name: two rooms' words may be one."""
+    found = {
+        f"{module.__name__.rpartition('.')[2]}.{name}": one for module in modules for name, one in vars(module).items()
+    }
     return {name: one for name, one in sorted(found.items()) if inspect.isclass(one) and dataclasses.is_dataclass(one)}
 
 
-def check_declared(test_file, one):
+def check_declared(test_file, name, one):
     """Compare what a class declares of its fields with what is on record: the unit, the domain, the scale, and the default
     where it is a number or a word.
 
@@ -38,7 +40,7 @@ def check_declared(test_file, one):
         if isinstance(field.default, bool | int | float | str | np.ndarray):
             about["default"] = field.default
         found[field.name] = " ".join(f"{key}={value}" for key, value in about.items())
-    path, name = FOLDER / f"{Path(test_file).stem}_declared.json", one.__name__
+    path = FOLDER / f"{Path(test_file).stem}_declared.json"
     known = json.loads(path.read_text()) if path.exists() else {}
     if os.environ.get("JAXVEH_RECORD"):
         known[name] = found

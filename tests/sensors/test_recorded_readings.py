@@ -42,4 +42,4 @@ DECLARED = classes_of(sensors)
 
 @pytest.mark.parametrize("name", DECLARED)
 def test_parameters_are_declared_as_recorded(name):
-    check_declared(__file__, DECLARED[name])
+    check_declared(__file__, name, DECLARED[name])

@@ -92,4 +92,4 @@ DECLARED = classes_of(tyres, tyres.mf_tyre)
 
 @pytest.mark.parametrize("name", DECLARED)
 def test_parameters_are_declared_as_recorded(name):
-    check_declared(__file__, DECLARED[name])
+    check_declared(__file__, name, DECLARED[name])

@@ -123,4 +123,4 @@ DECLARED = classes_of(vehicles, vehicles.sets)
 
 @pytest.mark.parametrize("name", DECLARED)
 def test_parameters_are_declared_as_recorded(name):
-    check_declared(__file__, DECLARED[name])
+    check_declared(__file__, name, DECLARED[name])
