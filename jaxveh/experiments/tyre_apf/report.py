@@ -147,10 +147,11 @@ def check(result: Reproduction) -> list[Check]:
 def _sharpness_checks(found: Sharpness, which: str = "APF") -> list[Check]:
     """At the paper's number of particles and with its resampling: the APF over the PF, paired; `which` is its name.
 
-    Of the paper's three do not hold with the noise that `noise.choose_level` takes: with sharp sensors the APF errs 0.98 times as much as the PF
-    and wins 55 % of drives (over 40 others, 16 passes each: 0.99 [0.94, 1.03], 53 %; with twice that noise in the yaw rate, less
-    likely, 0.92 [0.88, 0.95], 75 %); and with coarse ones its log-likelihood spreads 0.85 times as much (over 40 others, 48
-    passes each: 0.87, 90 % interval 0.77 to 0.99), a fully adapted filter's 0.81: one row ahead tells little of eight parameters.
+    Three of the paper's do not hold with the noise that `noise.choose_level` takes: with sharp sensors the APF errs 0.98 times as
+    much as the PF and wins 55 % of drives (over 40 others, 16 passes each: 0.99 [0.94, 1.03], 53 %; with twice that noise in the
+    yaw rate, less likely, 0.92 [0.88, 0.95], 75 %); and with coarse ones its log-likelihood spreads 0.85 times as much (over 40
+    others, 48 passes each: 0.87, 90 % interval 0.77 to 0.99), a fully adapted filter's 0.81: one row ahead tells little of eight
+    parameters.
     """
     compared, checks = found.found[PAPERS_PARTICLES].compare("error", "filter", "APF", "PF"), []
     for i, bound in enumerate((0.95, 1.1, 1.1)):
