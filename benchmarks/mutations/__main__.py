@@ -67,7 +67,9 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = draw(options.count, options.seed, options.only)
     with concurrent.futures.ThreadPoolExecutor(options.workers) as pool:
         look = lambda file: measured(ROOT, options.kept, file, environment(ROOT, options.kept), LONGEST)
-        asked = [file for file in test_files(ROOT) if options.tests in file]
+        rooms = {Path(room).name for room in ROOMS}
+        near = lambda file: not options.own or Path(file).parts[1] in rooms
+        asked = [file for file in test_files(ROOT) if options.tests in file and near(file)]
         measurements = dict(zip(asked, pool.map(look, asked), strict=True))
     results = judge(chosen, measurements, options, end)
     return report(chosen, results, options.kept / f"results-{options.seed}-{options.count}.json")
