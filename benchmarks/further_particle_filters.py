@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from jaxveh import filters
+from jaxveh.statespace.contract import innermost
 
 from .compared import LOOPS, OURS, PROBLEMS, Compared, contestants, same
 from .measure import Bound, Case, Contestant, Skipped
@@ -64,7 +65,7 @@ def _compared(
     smoother: Callable | None = None,
     **settings: object,
 ) -> Compared:
-    count = (filter_.filter if isinstance(filter_, filters.LiuWest) else filter_).particles
+    count = innermost(filter_).particles
     return Compared(title, filter_, problem, peers, smoother, {"count": count, **settings}, random=True)
 
 

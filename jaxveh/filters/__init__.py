@@ -61,7 +61,8 @@ from jaxveh.filters.wrappers import (
     VariationalBayes,
     VaryingNoise,
 )
-from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info, Smoothing
+from jaxveh.statespace.belief import AbstractBelief, Info
+from jaxveh.statespace.contract import AbstractFilter, Smoothing
 from jaxveh.statespace.driver import Estimate, run, scan
 
 __all__ = [

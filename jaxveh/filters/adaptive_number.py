@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -15,9 +15,8 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import check_names
 from jaxveh.filters.choosing import Transport
-from jaxveh.filters.marginalised import Marginalised
-from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, gather
-from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, check_all_particles, gather
+from jaxveh.statespace.contract import AbstractWrapper
 
 BINS = 0x62696E73
 """Folded into the step's key for the draw that counts bins."""
@@ -26,8 +25,8 @@ BINS = 0x62696E73
 HASH = np.uint32(2654435761)
 
 
-class AdaptiveNumber(AbstractFilter):
-    """`filter`, each step with one of the `sizes` of particles, by how many `bins` the belief fills (D. Fox 2003: KLD-sampling).
+class AdaptiveNumber(AbstractWrapper):
+    """`inner`, each step with one of the `sizes` of particles, by how many `bins` the belief fills (D. Fox 2003: KLD-sampling).
 
     So many particles that, with the `confidence` (-), the Kullback-Leibler distance between the drawn and the true distribution
     over the k filled bins is below `error`, with z the normal quantile:
@@ -39,7 +38,9 @@ class AdaptiveNumber(AbstractFilter):
     beliefs of the largest size with weights of zero behind. Under `vmap` all branches run, and nothing is saved.
     """
 
-    filter: AbstractParticleFilter
+    noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
+    inner: AbstractParticleFilter
     bins: tuple[tuple[str, float], ...] = eqx.field(static=True)
     sizes: tuple[int, ...] = eqx.field(static=True)
     error: float = eqx.field(static=True)
@@ -47,18 +48,15 @@ class AdaptiveNumber(AbstractFilter):
 
     def __init__(
         self,
-        filter: AbstractParticleFilter,
+        inner: AbstractParticleFilter,
         bins: Mapping[str, float],
         sizes: tuple[int, ...] | None = None,
         error: float = 0.05,
         confidence: float = 0.99,
     ):
-        if not isinstance(filter, AbstractParticleFilter) or isinstance(filter, Marginalised):
-            raise InputError(
-                f"AdaptiveNumber: {type(filter).__name__} inside: must be ParticleFilter, AuxiliaryParticleFilter or Guided."
-            )
-        n = filter.particles
-        self.filter, self.error, self.confidence = filter, error, confidence
+        check_all_particles("AdaptiveNumber", inner)
+        n = inner.particles
+        self.inner, self.error, self.confidence = inner, error, confidence
         self.bins = tuple(sorted(dict(bins).items()))
         self.sizes = tuple(sizes) if sizes is not None else tuple(max(2, n // part) for part in (8, 4, 2, 1))
 
@@ -69,21 +67,21 @@ class AdaptiveNumber(AbstractFilter):
         check("AdaptiveNumber.confidence", self.confidence, lambda v: (v > 0) & (v < 1), "between 0 and 1")
         if not self.bins:
             raise InputError("AdaptiveNumber.bins is empty: give the width of at least one state's bins.")
-        if sorted(set(self.sizes)) != list(self.sizes) or self.sizes[-1] != self.filter.particles or self.sizes[0] < 2:
+        if sorted(set(self.sizes)) != list(self.sizes) or self.sizes[-1] != self.inner.particles or self.sizes[0] < 2:
             raise InputError(
-                f"AdaptiveNumber.sizes = {self.sizes}: must rise from at least 2 to the filter's {self.filter.particles}."
+                f"AdaptiveNumber.sizes = {self.sizes}: must rise from at least 2 to the filter's {self.inner.particles}."
             )
-        if self.filter.threshold < 1 or isinstance(self.filter.resampling, Transport):
+        if self.inner.threshold < 1 or isinstance(self.inner.resampling, Transport):
             raise InputError("AdaptiveNumber: its filter must resample in every step (threshold = 1) by a draw.")
 
     def check(self, model):
-        self.filter.check(model)
+        self.inner.check(model)
         check_names("AdaptiveNumber.bins", [name for name, _ in self.bins], model.states)
 
-    def init(self, model, row, key=None):
-        return self.filter.init(model, row, key)
+    def _init(self, model, row, key):
+        return self.inner._init(model, row, key)
 
-    def step(self, model, belief, row):
+    def _step(self, model, belief, row):
         needed = self.number(belief)
         place = jnp.sum(needed > jnp.asarray(self.sizes[:-1], needed.dtype))
         return jax.lax.switch(place, [self._branch(size) for size in self.sizes], model, belief, row)
@@ -100,9 +98,9 @@ class AdaptiveNumber(AbstractFilter):
     def filled(self, belief: ParticleBelief) -> Any:
         """How many bins draws from the belief fill."""
         key = jax.random.fold_in(jax.random.fold_in(belief.key, BINS), belief.count)
-        ancestors = numerics.systematic(key, jax.lax.stop_gradient(belief.weights), self.filter.particles)
+        ancestors = numerics.systematic(key, jax.lax.stop_gradient(belief.weights), self.inner.particles)
         drawn = jax.lax.stop_gradient(gather(belief.particles, ancestors))
-        hashed = jnp.zeros(self.filter.particles, jnp.uint32)
+        hashed = jnp.zeros(self.inner.particles, jnp.uint32)
         for name, width in self.bins:
             index = jnp.floor(getattr(drawn, name) / width).astype(jnp.int32).astype(jnp.uint32)
             hashed = (hashed ^ index) * HASH
@@ -110,11 +108,11 @@ class AdaptiveNumber(AbstractFilter):
         return 1 + jnp.sum(ordered[1:] != ordered[:-1])
 
     def _branch(self, size: int):
-        inside = dataclasses.replace(self.filter, particles=size)
-        more = self.filter.particles - size
+        inside = dataclasses.replace(self.inner, particles=size)
+        more = self.inner.particles - size
 
         def run(model, belief, row):
-            after, info = inside.step(model, belief, row)
+            after, info = inside._step(model, belief, row)
             # Copies of the first, without weight: any number that the model can take.
             longer = lambda field: jnp.concatenate([field, jnp.broadcast_to(field[:1], (more,))])
             particles = jax.tree.map(longer, after.particles)

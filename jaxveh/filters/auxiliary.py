@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -16,6 +16,7 @@ from jaxveh.filters.choosing import log_of
 from jaxveh.filters.looking_ahead import AbstractLookahead, lookahead_for, remark_of, softened
 from jaxveh.filters.particle import (
     AbstractParticleFilter,
+    Expected,
     ParticleBelief,
     ParticleFilter,
     add_noise,
@@ -28,10 +29,35 @@ from jaxveh.filters.particle import (
     log_chosen,
     log_prob,
     make_info,
-    need_key,
     without,
 )
-from jaxveh.statespace.contract import Smoothing, apart, presence, wrap_angle
+from jaxveh.statespace.contract import Smoothing
+from jaxveh.statespace.measurements import presence, wrap_angle
+
+
+class FirstStage(NamedTuple):
+    """The choice of ancestors: the log look-ahead `ahead` (N,), the first-stage `weights` (N,) and the logarithm of their mean
+    before they were normalised, `ancestors` (N,), whether they were drawn (`resampled`, None: always), and whether any particle
+    was `alive`."""
+
+    ahead: Any
+    weights: Any
+    log_mean: Any
+    ancestors: Any
+    resampled: Any
+    alive: Any
+
+
+class LookedAhead(NamedTuple):
+    """Particles that wait for their second-stage weights: moved from the belief `before`, some of them `lost` (N,); where each of
+    the belief's had been judged, `characteristic`, its `residual` there by channel, and the first `stage`."""
+
+    particles: Any
+    lost: Any
+    before: ParticleBelief
+    characteristic: Any
+    residual: Any
+    stage: FirstStage
 
 
 class AuxiliaryParticleFilter(AbstractParticleFilter):
@@ -68,15 +94,10 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         if self.lookahead is not None:
             self.lookahead.check(model)
 
-    def init(self, model, row, key=None):
-        return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient).init(
-            model, row, need_key(self, key)
-        )
+    def _start(self, model, row, key):
+        return self._bootstrap()._start(model, row, key)
 
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
-
-    def _step(self, model, belief, row):
+    def _predict(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         measured, present = presence(model, row)
@@ -91,7 +112,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         if self.gradient == "score":
             # Its derivative is none of the likelihood's: what is gained in the choice is lost in the weights.
             ahead = jax.lax.stop_gradient(ahead)
-        first, log_first, alive_first = numerics.normalise(without(lost, ahead + log_weights))
+        first, log_first, alive = numerics.normalise(without(lost, ahead + log_weights))
         ancestors, resampled = choose_ancestors(self, draw, first)
         if lookahead.moves_by_transition:
             moved, lost = gather((characteristic, lost), ancestors)
@@ -99,26 +120,38 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
             chosen = gather(belief.particles, ancestors)
             moved, lost = found_again(model.transition(*to, chosen, u), chosen)
         moved, lost = numerics.barrier((add_noise(model, noise, moved, row.t - belief.t), lost))
+        stage = FirstStage(ahead, first, log_first, ancestors, resampled, alive)
+        return LookedAhead(moved, lost, belief, characteristic, residual, stage)
+
+    def _update(self, model, ahead, row):
+        if isinstance(ahead, Expected):  # the first row, before which there is nothing to choose from
+            return self._bootstrap()._update(model, ahead, row)
+        moved, lost, before, characteristic, residual, stage = ahead
+        measured, present = presence(model, row)
         logs, after = log_prob(model, row, moved, measured, present)
-        chosen_ahead = gather((ahead,), ancestors)[0]
+        chosen_ahead = gather((stage.ahead,), stage.ancestors)[0]
         # Of the particles before, of which a number that adapts may have left others than it takes.
-        n = jnp.asarray(belief.weights.shape[0], logs.dtype)
-        drawn = logs - chosen_ahead + log_chosen(self, log_of(first), ancestors)
+        n = jnp.asarray(before.weights.shape[0], logs.dtype)
+        drawn = logs - chosen_ahead + log_chosen(self, log_of(stage.weights), stage.ancestors)
+        log_first = stage.log_mean
         oftener = chosen_ahead - (log_first + jnp.log(n))
-        if resampled is not None:
+        if stage.resampled is not None:
             # Without a draw: an ordinary importance step from the weights that were there.
-            drawn = jnp.where(resampled, drawn, logs + log_weights + jnp.log(n))
-            log_first = jnp.where(resampled, log_first, -jnp.log(n))
-            oftener = jnp.where(resampled, oftener, 0.0)
-        weights, log_second, alive_second = numerics.normalise(without(lost, drawn))
+            drawn = jnp.where(stage.resampled, drawn, logs + log_of(before.weights) + jnp.log(n))
+            log_first = jnp.where(stage.resampled, log_first, -jnp.log(n))
+            oftener = jnp.where(stage.resampled, oftener, 0.0)
+        weights, log_second, alive = numerics.normalise(without(lost, drawn))
         log_likelihood = log_first + jnp.log(n) + log_second
-        found = ParticleBelief(moved, weights, ancestors, belief.key, row.t, row.u, belief.count + 1)
-        alive = alive_first & alive_second
-        within = _scatter(model, after, gather(residual, ancestors))
+        found = ParticleBelief(moved, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
+        alive = alive & stage.alive
+        within = _scatter(model, after, gather(residual, stage.ancestors))
         remark = jnp.where(alive, remark_of(weights, oftener), code(Result.successful))
-        both = (belief.weights, weights)
+        both = (before.weights, weights)
         info = make_info(model, row, log_likelihood, residual, both, fate(alive, lost), within, characteristic, remark)
         return found, info
+
+    def _bootstrap(self) -> ParticleFilter:
+        return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)
 
 
 def _scatter(model, residual, ahead):

@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh.io.files import replacing
-from jaxveh.statespace.contract import AbstractBelief
+from jaxveh.statespace.belief import AbstractBelief
 
 STATES = "states"
 """Where the file has their names: no path into a belief, which starts with a dot."""

@@ -12,9 +12,9 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.names import check_names
 from jaxveh._core.result import Result, code
-from jaxveh.filters.wrappers.process_noise import MatchedProcess, ShrinkingProcess
 from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info
+from jaxveh.statespace.belief import AbstractBelief, Info
+from jaxveh.statespace.contract import AbstractFilter, AbstractWrapper, check_rows_between
 
 
 class DelayedBelief(AbstractBelief):
@@ -62,8 +62,8 @@ class DelayedBelief(AbstractBelief):
         return self.inside.moments(model)
 
 
-class Delayed(AbstractFilter):
-    """Any `filter`, with measurements taken in the order of their own times, not of their arrival (Y. Bar-Shalom, X. Li & T.
+class Delayed(AbstractWrapper):
+    """Any `inner`, with measurements taken in the order of their own times, not of their arrival (Y. Bar-Shalom, X. Li & T.
     Kirubarajan 2001, on out-of-sequence measurements: by going back and filtering anew, which is exact).
 
     `delays`: by channel, how long before the row's time its value was measured (s): `{"gnss_speed": 0.12}`. And `step` takes rows
@@ -75,12 +75,12 @@ class Delayed(AbstractFilter):
     their time. Process noise must be continuous in time: an extra row in a step must not be an extra draw.
     """
 
-    filter: AbstractFilter
+    inner: AbstractFilter
     delays: tuple[tuple[str, float], ...] = eqx.field(static=True)
     depth: int = eqx.field(static=True)
 
-    def __init__(self, filter: AbstractFilter, delays: Mapping[str, float] | None = None, depth: int = 20):
-        self.filter, self.delays, self.depth = filter, tuple(sorted((delays or {}).items())), depth
+    def __init__(self, inner: AbstractFilter, delays: Mapping[str, float] | None = None, depth: int = 20):
+        self.inner, self.delays, self.depth = inner, tuple(sorted((delays or {}).items())), depth
 
     def __check_init__(self):
         for name, delay in self.delays:
@@ -95,24 +95,18 @@ class Delayed(AbstractFilter):
                 "Delayed: a part of the process noise is a law a step (Discrete, or an input's white error), and a row put in "
                 "between would add it once more. It must be Continuous; give uncertain inputs a correlation time."
             )
-        inner = self.filter
-        while inner is not None:
-            if isinstance(inner, ShrinkingProcess | MatchedProcess):
-                raise InputError(
-                    f"Delayed: {type(inner).__name__} inside it adds noise a step, and so once more a late row."
-                )
-            inner = getattr(inner, "filter", None)
+        check_rows_between("Delayed", self.inner)
         if model.input_path != "held":
             raise InputError(f"Delayed: the model's inputs run {model.input_path}: input_path must be 'held'.")
-        self.filter.check(model)
+        self.inner.check(model)
 
-    def init(self, model, row, key=None):
-        inside, info = self.filter.init(model, self._prompt(row), key)
+    def _init(self, model, row, key):
+        inside, info = self.inner._init(model, self._prompt(row), key)
         rows = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (self.depth, *jnp.shape(leaf))), row)
         said = info.log_likelihood
         return DelayedBelief(inside, inside, rows, jnp.zeros(self.depth, bool), said, said, row.t), _bare(info)
 
-    def step(self, model, belief, row):
+    def _step(self, model, belief, row):
         before, too_late = belief, jnp.asarray(False)
         in_order = row.t >= before.inside.t
         pieces = [self._late(belief, row, name, delay) for name, delay in self.delays]
@@ -131,7 +125,7 @@ class Delayed(AbstractFilter):
 
     def _onward(self, model, before, belief, row) -> tuple[Any, Any, Info]:
         """One step from the newest belief."""
-        inside, info = self.filter.step(model, before.inside, row)
+        inside, info = self.inner._step(model, before.inside, row)
         return inside, before.said + info.log_likelihood, _bare(info)
 
     def _anew(self, model, before, belief, row) -> tuple[Any, Any, Info]:
@@ -140,7 +134,7 @@ class Delayed(AbstractFilter):
         def forward(carry, given):
             inside, said = carry
             row, real = given
-            after, info = self.filter.step(model, inside, row)
+            after, info = self.inner._step(model, inside, row)
             inside, more = _choose(real, (after, info.log_likelihood), (inside, jnp.zeros_like(said)))
             new = real & ((row.t == newest) | _among(row.t, times))
             return (inside, said + more), (_bare(info), real, new)
@@ -177,7 +171,7 @@ class Delayed(AbstractFilter):
         oldest = jax.tree.map(lambda leaf: leaf[0], rows)
 
         def absorb(base, said):
-            after, info = self.filter.step(model, base, oldest)
+            after, info = self.inner._step(model, base, oldest)
             return after, said + info.log_likelihood
 
         base, said = jax.lax.cond(reals[0], absorb, lambda base, said: (base, said), belief.base, belief.base_said)

@@ -15,9 +15,11 @@ from jaxveh.filters.gaussian.filter import check_covariances, innovation_info, u
 from jaxveh.filters.gaussian.forms import masked_factor
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import times
-from jaxveh.filters.particle import add_noise, need_key
+from jaxveh.filters.particle import add_noise
 from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info, always, apart, input_result, presence
+from jaxveh.statespace.belief import AbstractBelief, Info
+from jaxveh.statespace.contract import AbstractTwoPartFilter
+from jaxveh.statespace.measurements import input_result, presence
 
 
 class EnsembleBelief(AbstractBelief):
@@ -55,7 +57,7 @@ class EnsembleBelief(AbstractBelief):
         return jax.tree.map(jnp.mean, shown), jax.tree.map(_std, shown)
 
 
-class Ensemble(AbstractFilter):
+class Ensemble(AbstractTwoPartFilter):
     """The ensemble Kalman filter of `members` samples (G. Evensen 1994; G. Burgers, P. van Leeuwen & G. Evensen 1998).
 
     Every member is propagated with a draw of the process noise and moved by the gain of the ensemble's own covariances towards
@@ -68,6 +70,8 @@ class Ensemble(AbstractFilter):
     """
 
     whitens: ClassVar[bool] = True
+    noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
     members: int = eqx.field(static=True)
     perturbed: bool = eqx.field(static=True, default=False)
 
@@ -77,19 +81,25 @@ class Ensemble(AbstractFilter):
     def check(self, model):
         check_covariances(type(self).__name__, model)
 
-    def init(self, model, row, key=None):
-        return apart(self._init, always(row.t), model, row, need_key(self, key))
+    @property
+    def needs_key(self):
+        return True
 
-    def _init(self, model, row, key):
+    def _start(self, model, row, key):
         draw, key = jax.random.split(key)
-        belief = EnsembleBelief(model.prior.sample(draw, (self.members,)), key, row.t, row.u, jnp.int32(0))
-        return self.update(model, belief, row)
+        return EnsembleBelief(model.prior.sample(draw, (self.members,)), key, row.t, row.u, jnp.int32(0))
 
     def predict(self, model: StateSpace, belief: EnsembleBelief, t) -> EnsembleBelief:
         """The belief at time `t`, propagated with the inputs that the belief carries (held)."""
-        return self._predict(model, belief, t, belief.u)
+        return self._moved(model, belief, t, belief.u)
 
-    def _predict(self, model, belief, t, u_next):
+    def _predict(self, model, belief, row):
+        return self._moved(model, belief, row.t, row.u)
+
+    def _update(self, model, ahead, row):
+        return self.update(model, ahead, row)
+
+    def _moved(self, model, belief, t, u_next):
         u = model.step_inputs(belief.t, t, belief.u, u_next)
         moved = model.transition(belief.t, t, belief.members, u)
         # Another key each time: between two rows there may be several predictions.
@@ -130,12 +140,6 @@ class Ensemble(AbstractFilter):
         lost = ~(jnp.all(jnp.isfinite(moved)) & jnp.all(jnp.isfinite(factor)))
         result = jnp.where((result == 0) & lost, code(Result.non_finite_state), result)
         return after, innovation_info(model, row, innovation, white, factor, result)
-
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
-
-    def _step(self, model, belief, row):
-        return self.update(model, self._predict(model, belief, row.t, row.u), row)
 
 
 def _deviations(values):

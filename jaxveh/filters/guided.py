@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
+from jaxveh.filters.auxiliary import FirstStage
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, is_gaussian, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
@@ -21,6 +22,7 @@ from jaxveh.filters.looking_ahead import remark_of
 from jaxveh.filters.particle import (
     SHORTEST,
     AbstractParticleFilter,
+    Expected,
     ParticleBelief,
     ParticleFilter,
     check_particle_settings,
@@ -33,12 +35,12 @@ from jaxveh.filters.particle import (
     log_prob,
     make_info,
     mean_variances,
-    need_key,
     without,
 )
 from jaxveh.numerics import sigma_points
 from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import Smoothing, always, apart, presence
+from jaxveh.statespace.contract import Smoothing
+from jaxveh.statespace.measurements import presence
 from jaxveh.statespace.noise import LOG_2PI
 
 RULES = ("extended", "unscented")
@@ -55,6 +57,32 @@ class Proposal(NamedTuple):
     factor: Any
     log_ahead: Any
     variances: Any
+
+
+class FirstGuided(NamedTuple):
+    """The first particles, some of them `astray` (N,); how much oftener each was drawn than by the prior, `log_drawn` (N,); those
+    that the prior alone would have drawn, `unmeasured`; and the filter's `key`."""
+
+    particles: Any
+    astray: Any
+    log_drawn: Any
+    unmeasured: Any
+    key: Any
+
+
+class Proposed(NamedTuple):
+    """Particles that wait for their weights: drawn from their proposals, some of them `astray` (N,), with log p(e) / q(e) in
+    `ratio` (N,); the belief `before`, where the transition took its particles (`moved`), which of these it `lost`, the
+    `variances` (N, m) of their proposals, and the first `stage`."""
+
+    particles: Any
+    astray: Any
+    ratio: Any
+    before: ParticleBelief
+    moved: Any
+    lost: Any
+    variances: Any
+    stage: FirstStage
 
 
 class Guided(AbstractParticleFilter):
@@ -99,14 +127,10 @@ class Guided(AbstractParticleFilter):
         check_covariances("Guided", model)
         check_gaussian("Guided", "process noise", model.process_noise.law)
 
-    def init(self, model, row, key=None):
-        return apart(self._init, always(row.t), model, row, need_key(self, key))
-
-    def _init(self, model, row, key):
+    def _start(self, model, row, key):
         if not is_gaussian(model.prior.law):
-            return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient).init(model, row, key)
+            return self._bootstrap()._start(model, row, key)
         draw, key = jax.random.split(key)
-        measured, present = presence(model, row)
         covariance = model.prior.covariance()
         prior = Spread(numerics.cholesky(covariance), covariance)
         names, start = model.states, model.prior.mean
@@ -119,31 +143,18 @@ class Guided(AbstractParticleFilter):
         wide = jax.tree.map(lambda m: jnp.full(self.particles, m), start)
         moved = lambda e: _moved(wide, names, e)
         x, astray = found_again(moved(e), wide)
-        logs, _ = log_prob(model, row, x, measured, present)
-        unmeasured = moved(blind)
-        _, residual = log_prob(model, row, unmeasured, measured, present)
         oftener = _log_normal(numerics.solve_lower(proposal.factor, e - proposal.mean[:, None]), proposal.factor)
         oftener = oftener - _log_normal(numerics.solve_lower(prior.factor, e), prior.factor)
-        share = jnp.asarray(unguided / self.particles, logs.dtype)
+        share = jnp.asarray(unguided / self.particles, covariance.dtype)
         mixed = jnp.logaddexp(jnp.log(share), jnp.log1p(-share) + oftener)
-        weights, log_likelihood, alive = numerics.normalise(without(astray, logs - mixed))
-        belief = ParticleBelief(
-            x, weights, jnp.arange(self.particles, dtype=jnp.int32), key, row.t, row.u, jnp.int32(1)
-        )
-        uniform = jnp.full((self.particles,), 1 / self.particles, logs.dtype)
-        became = fate(alive, astray)
-        about = (uniform, weights)
-        return belief, make_info(model, row, log_likelihood, residual, about, became, particles=unmeasured)
+        return FirstGuided(x, astray, mixed, moved(blind), key)
 
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
-
-    def _step(self, model, belief, row):
+    def _predict(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
-        measured, present = presence(model, row)
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved = model.transition(belief.t, row.t, belief.particles, u)
         moved, lost = found_again(moved, belief.particles)
+        assert model.process_noise is not None  # `check` has seen to it
         law = model.process_noise.over(jnp.maximum(row.t - belief.t, SHORTEST))
         covariance = law.covariance()
         prior = Spread(numerics.cholesky(covariance), covariance)
@@ -151,7 +162,7 @@ class Guided(AbstractParticleFilter):
         propose = jax.vmap(lambda x: _proposal(model, rule, row, x, law.names, prior))
         proposals = numerics.barrier(propose(moved))
         logs = without(lost, log_of(belief.weights))
-        first, log_first, alive_first = numerics.normalise(logs + proposals.log_ahead if self.auxiliary else logs)
+        first, log_first, alive = numerics.normalise(logs + proposals.log_ahead if self.auxiliary else logs)
         ancestors, resampled = choose_ancestors(self, draw, first)
         taken = lambda tree: jax.tree.map(lambda leaf: leaf[ancestors], tree)
         chosen, start = taken(proposals), gather(moved, ancestors)
@@ -160,27 +171,55 @@ class Guided(AbstractParticleFilter):
         x = _moved(start, law.names, e)
         # A proposal, too, may have no value.
         x, astray = found_again(x, start)
+        ratio = _log_normal(numerics.solve_lower(prior.factor, e), prior.factor) - _log_normal(white, chosen.factor)
+        stage = FirstStage(proposals.log_ahead, first, log_first, ancestors, resampled, alive)
+        return Proposed(x, astray, ratio, belief, moved, lost, proposals.variances, stage)
+
+    def _update(self, model, ahead, row):
+        if isinstance(ahead, Expected):
+            return self._bootstrap()._update(model, ahead, row)
+        if isinstance(ahead, FirstGuided):
+            return self._first_update(model, ahead, row)
+        x, astray, ratio, before, moved, lost, variances, stage = ahead
+        measured, present = presence(model, row)
         after, _ = log_prob(model, row, x, measured, present)
         _, residual = log_prob(model, row, moved, measured, present)
-        ratio = _log_normal(numerics.solve_lower(prior.factor, e), prior.factor) - _log_normal(white, chosen.factor)
-        kept = log_chosen(self, log_of(first), ancestors)
-        n = jnp.log(jnp.asarray(belief.weights.shape[0], logs.dtype))
-        drawn = after + ratio + kept - (chosen.log_ahead if self.auxiliary else 0.0)
-        oftener = chosen.log_ahead - (log_first + n) if self.auxiliary else jnp.zeros_like(logs)
-        if resampled is not None:
-            drawn = jnp.where(resampled, drawn, after + ratio + logs + n)
-            log_first = jnp.where(resampled, log_first, -n)
-            oftener = jnp.where(resampled, oftener, 0.0)
+        kept = log_chosen(self, log_of(stage.weights), stage.ancestors)
+        n = jnp.log(jnp.asarray(before.weights.shape[0], after.dtype))
+        log_first, chosen_ahead = stage.log_mean, stage.ahead[stage.ancestors]
+        drawn = after + ratio + kept - (chosen_ahead if self.auxiliary else 0.0)
+        oftener = chosen_ahead - (log_first + n) if self.auxiliary else jnp.zeros_like(after)
+        if stage.resampled is not None:
+            logs = without(lost, log_of(before.weights))
+            drawn = jnp.where(stage.resampled, drawn, after + ratio + logs + n)
+            log_first = jnp.where(stage.resampled, log_first, -n)
+            oftener = jnp.where(stage.resampled, oftener, 0.0)
         weights, log_second, alive = numerics.normalise(without(astray, drawn))
-        found = ParticleBelief(x, weights, ancestors, belief.key, row.t, row.u, belief.count + 1)
-        alive = alive & alive_first
+        found = ParticleBelief(x, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
+        alive = alive & stage.alive
         became = fate(alive, lost)
         remark = jnp.where(alive, remark_of(weights, oftener), code(Result.successful))
-        within = mean_variances(model, belief.weights, proposals.variances)
+        within = mean_variances(model, before.weights, variances)
         total = log_first + n + log_second
-        about = (belief.weights, weights)
+        about = (before.weights, weights)
         info = make_info(model, row, total, residual, about, became, within, moved, remark)
         return found, info
+
+    def _first_update(self, model, ahead, row):
+        x, astray, log_drawn, unmeasured, key = ahead
+        measured, present = presence(model, row)
+        logs, _ = log_prob(model, row, x, measured, present)
+        _, residual = log_prob(model, row, unmeasured, measured, present)
+        weights, log_likelihood, alive = numerics.normalise(without(astray, logs - log_drawn))
+        ancestors = jnp.arange(self.particles, dtype=jnp.int32)
+        belief = ParticleBelief(x, weights, ancestors, key, row.t, row.u, jnp.int32(1))
+        uniform = jnp.full((self.particles,), 1 / self.particles, logs.dtype)
+        about = (uniform, weights)
+        became = fate(alive, astray)
+        return belief, make_info(model, row, log_likelihood, residual, about, became, particles=unmeasured)
+
+    def _bootstrap(self) -> ParticleFilter:
+        return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)
 
 
 def _moved(particles, names, e):

@@ -1,9 +1,7 @@
 """Particles smeared by a kernel, so that what carries no noise does not degenerate."""
 
-from __future__ import annotations
-
 import abc
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -12,29 +10,23 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
 from jaxveh._core.names import as_names, check_names
-from jaxveh.filters.marginalised import Marginalised
-from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
+from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, check_all_particles
 from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractFilter, apart
+from jaxveh.statespace.contract import AbstractTwoPartWrapper
 
 KERNEL = 0x6B65726E
 """Folded into the step's key for the kernel's draws, so that they are none of the filter's."""
 
 
-class AbstractKernel(AbstractFilter):
+class AbstractKernel(AbstractTwoPartWrapper):
     """A particle filter whose particles are replaced, before each step, by draws from kernels about them."""
 
-    def __check_init__(self):
-        if not isinstance(self.inside, AbstractParticleFilter) or isinstance(self.inside, Marginalised):
-            raise InputError(
-                f"{type(self).__name__}: {type(self.inside).__name__} inside: must be ParticleFilter, AuxiliaryParticleFilter "
-                "or Guided."
-            )
+    # No postponed annotations in this file: they would make fields of these.
+    noise_by_row: ClassVar[bool] = True
+    inner: eqx.AbstractVar[AbstractParticleFilter]
 
-    @property
-    @abc.abstractmethod
-    def inside(self) -> AbstractParticleFilter:
-        """The particle filter."""
+    def __check_init__(self):
+        check_all_particles(type(self).__name__, self.inner)
 
     @abc.abstractmethod
     def smeared(self, model: StateSpace) -> tuple[str, ...]:
@@ -44,17 +36,11 @@ class AbstractKernel(AbstractFilter):
     def kernel(self, dimension: int) -> tuple[float, float]:
         """How far each particle keeps its distance from the mean, and the kernel's spread over the particles'."""
 
-    def init(self, model, row, key=None):
-        return self.inside.init(model, row, key)
-
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
-
-    def _step(self, model, belief, row):
+    def _predict(self, model, belief, row):
         names = self.smeared(model)
         if names:
             belief = eqx.tree_at(lambda b: b.particles, belief, self._drawn(belief, names))
-        return self.inside.step(model, belief, row)
+        return self.inner._predict(model, belief, row)
 
     def _drawn(self, belief: ParticleBelief, names: tuple[str, ...]) -> Any:
         keeps, spread = self.kernel(len(names))
@@ -68,7 +54,7 @@ class AbstractKernel(AbstractFilter):
 
 
 class LiuWest(AbstractKernel):
-    """`filter` with parameters drawn from a mixture of kernels about them, shrunk so that mean and covariance stay.
+    """`inner` with parameters drawn from a mixture of kernels about them, shrunk so that mean and covariance stay.
 
         theta <- a theta_i + (1 - a) mean + N(0, (1 - a^2) V),    a = (3 discount - 1) / (2 discount)
 
@@ -78,19 +64,16 @@ class LiuWest(AbstractKernel):
     for it to become sharp: compare discounts.
     """
 
-    filter: AbstractParticleFilter
+    rows_between: ClassVar[bool] = True
+    inner: AbstractParticleFilter
     discount: float = eqx.field(static=True, default=0.98)
     names: tuple[str, ...] | None = eqx.field(static=True, default=None, converter=as_names)
 
     def __check_init__(self):
         check("LiuWest.discount", self.discount, lambda d: (d > 1 / 3) & (d < 1), "above 1/3 and below 1")
 
-    @property
-    def inside(self):
-        return self.filter
-
     def check(self, model):
-        self.filter.check(model)
+        self.inner.check(model)
         check_names("LiuWest.names", self.names or (), model.states)
         if not self.smeared(model):
             raise InputError("LiuWest: every state has process noise, so that none is a parameter. Give `names`.")
@@ -107,27 +90,20 @@ class LiuWest(AbstractKernel):
 
 
 class Regularised(AbstractKernel):
-    """`filter` whose particles are drawn from Gaussian kernels about them (C. Musso, N. Oudjane & F. Le Gland 2001).
+    """`inner` whose particles are drawn from Gaussian kernels about them (C. Musso, N. Oudjane & F. Le Gland 2001).
 
     `bandwidth`: the kernel's spread over the particles'; None: the best for a Gaussian of n states and N particles,
     (4 / (n + 2))^(1 / (n + 4)) N^(-1 / (n + 4)), times `share`. Nothing is shrunk, so that covariances grow by the bandwidth's
     square in each step.
     """
 
-    filter: AbstractParticleFilter
+    inner: AbstractParticleFilter
     bandwidth: float | None = eqx.field(static=True, default=None)
     share: float = eqx.field(static=True, default=0.5)
 
     def __check_init__(self):
         check("Regularised.bandwidth", self.bandwidth, lambda v: v > 0, "positive")
         check("Regularised.share", self.share, lambda v: v > 0, "positive")
-
-    @property
-    def inside(self):
-        return self.filter
-
-    def check(self, model):
-        self.filter.check(model)
 
     def smeared(self, model):
         return model.states
@@ -136,4 +112,4 @@ class Regularised(AbstractKernel):
         if self.bandwidth is not None:
             return 1.0, self.bandwidth
         power = 1.0 / (dimension + 4.0)
-        return 1.0, self.share * (4.0 / (dimension + 2.0)) ** power * self.filter.particles**-power
+        return 1.0, self.share * (4.0 / (dimension + 2.0)) ** power * self.inner.particles**-power

@@ -14,7 +14,7 @@ from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.filter import check_gaussian, is_gaussian, kind_of_law
 from jaxveh.filters.particle import log_prob
 from jaxveh.statespace import StateDependent, StateSpace
-from jaxveh.statespace.contract import wrap_angle
+from jaxveh.statespace.measurements import wrap_angle
 from jaxveh.statespace.noise import LOG_2PI, AbstractNoise, Gaussian, Independent
 
 MISLED = 0.5

@@ -29,12 +29,12 @@ from jaxveh.filters.particle import (
     log_chosen,
     make_info,
     mean_variances,
-    need_key,
     without,
 )
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import AbstractBelief, always, apart, presence
+from jaxveh.statespace import StateSpace
+from jaxveh.statespace.belief import AbstractBelief
 from jaxveh.statespace.dependent_noise import check_fixed
+from jaxveh.statespace.measurements import presence
 from jaxveh.statespace.noise import LOG_2PI
 
 
@@ -148,10 +148,7 @@ class Marginalised(AbstractParticleFilter):
             )
         _check_linear_in(self.linear, model)
 
-    def init(self, model, row, key=None):
-        return apart(self._init, always(row.t), model, row, need_key(self, key))
-
-    def _init(self, model, row, key):
+    def _start(self, model, row, key):
         draw, key = jax.random.split(key)
         dtype = model.prior.mean[0].dtype
         n, others = self.particles, _others(self, model)
@@ -161,14 +158,11 @@ class Marginalised(AbstractParticleFilter):
         white = numerics.normal(draw, (len(others), n), dtype)
         drawn = jax.vmap(lambda w: _given_first(mean, joint, w), in_axes=1)(white)
         weights = jnp.full((n,), 1 / n, dtype)
-        start = Cloud(_named(self, model, drawn.z.T, drawn.x.T), drawn.P)
+        start = _named(self, model, drawn.z.T, drawn.x.T), drawn.P
         ancestors = jnp.arange(n, dtype=jnp.int32)
-        return self._weigh(model, row, start, Prior(ancestors, weights, log_of(weights)), key, jnp.int32(0))
+        return Cloud(*start, Prior(ancestors, weights, log_of(weights)), key, jnp.int32(0))
 
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
-
-    def _step(self, model, belief, row):
+    def _predict(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         ancestors, resampled = choose_ancestors(self, draw, belief.weights)
         uniform = jnp.full((self.particles,), 1 / self.particles, belief.weights.dtype)
@@ -182,6 +176,7 @@ class Marginalised(AbstractParticleFilter):
             jax.tree.map(lambda leaf: leaf[ancestors], t) for t in (belief.particles, belief.covariances)
         )
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
+        assert model.process_noise is not None  # `check` has seen to it
         law = model.process_noise.over(jnp.maximum(row.t - belief.t, SHORTEST))
         others = _others(self, model)
         Q = covariance_in(law, (*others, *self.linear), weights.dtype)
@@ -196,12 +191,12 @@ class Marginalised(AbstractParticleFilter):
         moved = numerics.barrier(moved)
         particles, lost = found_again(_named(self, model, moved.z.T, moved.x.T), points)
         lost = lost | ~jnp.all(jnp.isfinite(moved.P), axis=(1, 2))
-        cloud = Cloud(particles, jnp.where(lost[:, None, None], covariances, moved.P))
-        return self._weigh(
-            model, row, cloud, Prior(ancestors, weights, without(lost, chosen)), belief.key, belief.count
-        )
+        P = jnp.where(lost[:, None, None], covariances, moved.P)
+        return Cloud(particles, P, Prior(ancestors, weights, without(lost, chosen)), belief.key, belief.count)
 
-    def _weigh(self, model, row: Row, cloud, prior, key, count):
+    def _update(self, model, ahead, row):
+        cloud: Cloud = ahead
+        prior = cloud.prior
         measured, present = presence(model, row)
         here = jnp.stack([present[name] for name in model.channels])
         given = jnp.stack([measured[name] for name in model.channels])
@@ -226,7 +221,9 @@ class Marginalised(AbstractParticleFilter):
         P = jnp.where(astray[:, None, None], cloud.covariances, P)
         weights, log_mean, alive = numerics.normalise(without(astray, logs + prior.log_weights))
         log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
-        belief = MarginalisedBelief(particles, P, weights, prior.ancestors, key, row.t, row.u, count + 1, self.linear)
+        belief = MarginalisedBelief(
+            particles, P, weights, prior.ancestors, cloud.key, row.t, row.u, cloud.count + 1, self.linear
+        )
         by_name = dict(zip(model.channels, residual.T, strict=True))
         within = mean_variances(model, prior.weights, variances)
         became = fate(alive, jnp.isneginf(prior.log_weights))
@@ -235,10 +232,14 @@ class Marginalised(AbstractParticleFilter):
 
 
 class Cloud(NamedTuple):
-    """Particles before their measurement: the state's NamedTuple with (N,) fields, covariances (N, l, l)."""
+    """Particles before their measurement: the state's NamedTuple with (N,) fields, covariances (N, l, l), their weights in
+    `prior`, the filter's `key`, and the `count` of rows before."""
 
     particles: Any
     covariances: Any
+    prior: Any
+    key: Any
+    count: Any
 
 
 class Prior(NamedTuple):

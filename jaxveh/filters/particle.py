@@ -13,19 +13,9 @@ from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import Soft, Transport, log_of, score
 from jaxveh.statespace import StateDependent, StateSpace
-from jaxveh.statespace.contract import (
-    KEPT,
-    AbstractBelief,
-    AbstractFilter,
-    Info,
-    Smoothing,
-    always,
-    apart,
-    by_channel,
-    input_result,
-    presence,
-    wrap_angle,
-)
+from jaxveh.statespace.belief import AbstractBelief, Info
+from jaxveh.statespace.contract import KEPT, AbstractTwoPartFilter, Smoothing, smoothing_of
+from jaxveh.statespace.measurements import by_channel, input_result, presence, wrap_angle
 
 SHORTEST = 1e-9
 """Of two rows at one time, seconds for which the noise between them is taken where its covariance must have a factor."""
@@ -92,7 +82,7 @@ def _std(weights, deviation):
     return numerics.sqrt(numerics.total(weights * deviation**2))
 
 
-class AbstractParticleFilter(AbstractFilter):
+class AbstractParticleFilter(AbstractTwoPartFilter):
     """Shared by particle filters: `particles` (at least 2), `resampling` scheme, `threshold` of the ESS, `gradient`.
 
     `resampling(key, weights, n) -> ancestors` (see `numerics.systematic`, `stratified`, `multinomial`, `residual`), `Soft(...)`
@@ -104,13 +94,28 @@ class AbstractParticleFilter(AbstractFilter):
     """
 
     # No postponed annotations in this file: they would make fields of these.
+    noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
     particles: eqx.AbstractVar[int]
     resampling: eqx.AbstractVar[Callable]
     threshold: eqx.AbstractVar[float]
     gradient: eqx.AbstractVar[str]
 
+    @property
+    def needs_key(self):
+        return True
+
     def check(self, model):
         del model
+
+
+def check_all_particles(who: str, filter: Any) -> None:
+    """Raise `InputError` unless weighted particles are all that a filter knows of a row."""
+    if not isinstance(filter, AbstractParticleFilter) or smoothing_of(filter) is not Smoothing.particles:
+        raise InputError(
+            f"{who}: {type(filter).__name__} inside: must be a filter of which particles are all it knows (ParticleFilter, "
+            "AuxiliaryParticleFilter, Guided)."
+        )
 
 
 def check_particle_settings(particles: int, threshold: float, gradient: str = "score") -> None:
@@ -271,6 +276,17 @@ class Drawn(NamedTuple):
     remark: Any
 
 
+class Expected(NamedTuple):
+    """Particles that wait for their measurement: as they were `drawn`, which the model `lost` (N,), the filter's `key`, and the
+    `count` of rows before."""
+
+    particles: Any
+    drawn: Drawn
+    lost: Any
+    key: Any
+    count: Any
+
+
 class ParticleFilter(AbstractParticleFilter):
     """The bootstrap particle filter (Gordon, Salmond & Smith 1993; Sarkka 2013, algorithm 7.4, the transition as proposal)."""
 
@@ -283,27 +299,21 @@ class ParticleFilter(AbstractParticleFilter):
     def __check_init__(self):
         check_particle_settings(self.particles, self.threshold, self.gradient)
 
-    def init(self, model, row, key=None):
-        return apart(self._init, always(row.t), model, row, need_key(self, key))
-
-    def _init(self, model, row, key):
+    def _start(self, model, row, key):
         particles, key = start_particles(self, model, row, key)
         uniform = jnp.full((self.particles,), 1 / self.particles, particles[0].dtype)
         ancestors = jnp.arange(self.particles, dtype=jnp.int32)
         drawn = Drawn(ancestors, uniform, log_of(uniform), code(Result.successful))
         none = jnp.zeros(self.particles, bool)
-        return self._weigh(model, row, particles, drawn, none, key, jnp.int32(0))
+        return Expected(particles, drawn, none, key, jnp.int32(0))
 
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
-
-    def _step(self, model, belief, row):
+    def _predict(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         particles, drawn = self._drawn(draw, belief)
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved, lost = found_again(model.transition(belief.t, row.t, particles, u), particles)
         moved, lost = numerics.barrier((add_noise(model, noise, moved, row.t - belief.t), lost))
-        return self._weigh(model, row, moved, drawn, lost, belief.key, belief.count)
+        return Expected(moved, drawn, lost, belief.key, belief.count)
 
     def _drawn(self, key, belief):
         """The next particles before they move."""
@@ -327,7 +337,8 @@ class ParticleFilter(AbstractParticleFilter):
             remark = jnp.where(resampled, remark, code(Result.successful))
         return particles, Drawn(ancestors, weights, chosen, remark)
 
-    def _weigh(self, model, row, particles, drawn, lost, key, count):
+    def _update(self, model, ahead, row):
+        particles, drawn, lost, key, count = ahead
         measured, present = presence(model, row)
         logs, residual = log_prob(model, row, particles, measured, present)
         weights, log_mean, alive = numerics.normalise(without(lost, logs + drawn.log_weights))
@@ -351,10 +362,3 @@ def _transported(filter_, key, belief, logs):
     chosen = jnp.where(converged, 0.0, log_chosen(filter_, logs, ancestors))
     themselves = jnp.arange(filter_.particles, dtype=ancestors.dtype)
     return particles, jnp.where(converged, themselves, ancestors), chosen, converged
-
-
-def need_key(filter_, key):
-    """The key, or an `InputError` that says who needs one."""
-    if key is None:
-        raise InputError(f"{type(filter_).__name__} draws particles: give it a key, e.g. key=jax.random.key(0).")
-    return key

@@ -22,7 +22,7 @@ from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.segments import Segments, cut
 from jaxveh.fitting.solve import solve
 from jaxveh.statespace import StateSpace, parameter_view, start_from
-from jaxveh.statespace.contract import wrap_angle
+from jaxveh.statespace.measurements import wrap_angle
 from jaxveh.statespace.noise import whiten
 
 LARGEST_RESIDUAL = 1e6

@@ -24,6 +24,7 @@ from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.scoring import FisherScoring
 from jaxveh.fitting.solve import fit_at, solve
 from jaxveh.statespace import StateSpace
+from jaxveh.statespace.contract import who_lacks
 
 LOG_2PI = float(np.log(2 * np.pi))
 
@@ -194,7 +195,7 @@ def pose_prediction_error(
     recordings = listed(recordings)
     if len({len(recording) for recording in recordings}) != 1:
         raise InputError("recordings: must be one or several of the same number of rows; cut them to one length.")
-    if (mixture := _without_whitened(filter)) is not None:
+    if (mixture := who_lacks(filter, "whitens")) is not None:
         raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
     filter.check(model)
     parameters, shape = picked(model, where)
@@ -272,15 +273,6 @@ def _block(problem: PredictionErrorProblem, z, state, tolerance: float, limit):
 @eqx.filter_jit
 def _concluded(problem: PredictionErrorProblem, found: Found, at: Quadratic) -> Fit:
     return fit_at(problem, found, at.cost, uncertainty(at))
-
-
-def _without_whitened(filter: Any) -> str | None:
-    """The name of the filter, or of one that it goes around, whose innovations are not whitened."""
-    while filter is not None:
-        if not filter.whitens:
-            return type(filter).__name__
-        filter = getattr(filter, "filter", None)
-    return None
 
 
 def _target(target: Target | None, recordings) -> Target | None:

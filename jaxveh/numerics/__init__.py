@@ -3,6 +3,7 @@
 All are safe to jit, batch and differentiate.
 """
 
+from jaxveh.numerics.apart import always, apart
 from jaxveh.numerics.blocks import sum_in_blocks
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
 from jaxveh.numerics.harmonics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
@@ -27,6 +28,8 @@ from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
 from jaxveh.numerics.triangular import lower_factor
 
 __all__ = [
+    "always",
+    "apart",
     "arctan",
     "arctan2",
     "band_harmonics",

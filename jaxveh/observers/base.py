@@ -1,7 +1,7 @@
 """What an observer is: a model that is pulled towards the measurements, without a covariance."""
 
 import abc
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -10,17 +10,9 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check_finite
 from jaxveh._core.result import Result, code
 from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import (
-    AbstractBelief,
-    AbstractFilter,
-    Info,
-    always,
-    apart,
-    by_channel,
-    input_result,
-    presence,
-    wrap_angle,
-)
+from jaxveh.statespace.belief import AbstractBelief, Info
+from jaxveh.statespace.contract import AbstractTwoPartFilter
+from jaxveh.statespace.measurements import by_channel, input_result, presence, wrap_angle
 
 
 class PointBelief(AbstractBelief):
@@ -46,7 +38,7 @@ class PointBelief(AbstractBelief):
         )
 
 
-class AbstractObserver(AbstractFilter):
+class AbstractObserver(AbstractTwoPartFilter):
     """An observer moves its state by the model's transition, then by a correction of what the measurement says against it:
 
         x- = f(x, u),    e = y - h(x-, u),    x = x- + correction(e)
@@ -55,7 +47,9 @@ class AbstractObserver(AbstractFilter):
     `init` starts at the prior's mean and corrects it, `run` is that of filters.
     """
 
-    # No postponed annotations in this file: they would make a field of it.
+    # No postponed annotations in this file: they would make fields of class variables.
+    noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
 
     @abc.abstractmethod
     def start(self, model: StateSpace) -> Any:
@@ -72,23 +66,16 @@ class AbstractObserver(AbstractFilter):
         The belief holds the predicted state and memory; its `t` is still the last row's (at the first row, this one's).
         """
 
-    def init(self, model, row, key=None):
-        del key
-        return apart(self._init, always(row.t), model, row)
-
-    def _init(self, model, row):
+    def _start(self, model, row, key):
         vector, kind = jnp.stack(model.prior.mean), type(model.prior.mean)
-        return self._measured(model, PointBelief(vector, self.start(model), row.t, row.u, jnp.int32(0), kind), row)
+        return PointBelief(vector, self.start(model), row.t, row.u, jnp.int32(0), kind)
 
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
-
-    def _step(self, model, belief, row):
+    def _predict(self, model, belief, row):
         vector, memory = self.predict(model, belief, row)
-        predicted = PointBelief(vector, memory, belief.t, belief.u, belief.count, belief.state_type)
-        return self._measured(model, predicted, row)
+        return PointBelief(vector, memory, belief.t, belief.u, belief.count, belief.state_type)
 
-    def _measured(self, model, belief: PointBelief, row: Row):
+    def _update(self, model, ahead, row):
+        belief = ahead
         measured, present = presence(model, row)
         here = jnp.stack([present[name] for name in model.channels])
         error = jnp.stack([measured[name] for name in model.channels]) - observed(model, row, belief.vector)

@@ -1,73 +1,20 @@
 """What a filter is: `init` applies the first row, `step` propagates and applies the next; both report an info."""
 
-from __future__ import annotations
+# No postponed annotations in this file: they would make fields of class variables.
 
 import abc
 import enum
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, final
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 
-from jaxveh import numerics
 from jaxveh._core.errors import InputError
-from jaxveh._core.names import record
-from jaxveh._core.result import Result, code
+from jaxveh.numerics import always, apart
+from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.model import Row, StateSpace
 
 KEPT = "kept for the backward pass"
 """Name (`jax.ad_checkpoint.checkpoint_name`) of what a step keeps for its gradient: small, and long to compute again."""
-
-
-class Info(NamedTuple):
-    """What a person wants to know of one step.
-
-    `log_likelihood`: the increment, log p(y_k | y_0..k-1). `innovation`, `innovation_std`: measurement less prediction
-    and its predicted spread, NamedTuples by channel, NaN where missing. `nis`: normalised innovation squared over the
-    channels present (Gaussian filters; expected value: their number). `ess`: effective sample size after the
-    measurement, (particle filters, else NaN). `result`: code, see `jaxveh.Result`. `whitened`, `log_scale`: innovations
-    decorrelated in the order of the channels and the logarithm of what each was divided by, zero where missing (Gaussian
-    filters, else None): `-0.5 whitened^2 - log_scale - 0.5 log(2 pi)` of the channels present add up to the log-likelihood.
-    `remark` (particle filters, else None): the code of what a person should know though the filter went on, else zero.
-    """
-
-    log_likelihood: Any
-    innovation: Any
-    innovation_std: Any
-    nis: Any
-    ess: Any
-    result: Any
-    whitened: Any = None
-    log_scale: Any = None
-    remark: Any = None
-
-
-class AbstractBelief(eqx.Module):
-    """What a filter knows after a row: all that the next step needs, its `t`, `u` and the `count` of rows included."""
-
-    @abc.abstractmethod
-    def moments(self, model: StateSpace) -> tuple[Any, Any]:
-        """Mean and standard deviation of `model.report` under the belief: two NamedTuples of scalars."""
-
-    @property
-    def mean(self) -> Any:
-        """The state's mean (parameters on the real line), the state's NamedTuple."""
-        raise self._lacks("mean")
-
-    @property
-    def covariance(self) -> Any:
-        """(n, n) in the order of the state's fields."""
-        raise self._lacks("covariance")
-
-    def sample(self, key, draws: int) -> Any:
-        """Draws: the state's NamedTuple with (draws,) in each field; of a Gaussian, unless the belief is something else."""
-        mean = jnp.stack(self.mean)
-        white = numerics.normal(key, (mean.shape[0], draws), mean.dtype)
-        return type(self.mean)(*(mean[:, None] + numerics.cholesky(self.covariance) @ white))
-
-    def _lacks(self, what: str) -> InputError:
-        return InputError(f"{type(self).__name__} has no {what} of the state: take a filter whose belief has one.")
 
 
 class Smoothing(enum.Enum):
@@ -86,32 +33,159 @@ class AbstractFilter(eqx.Module):
     `init(model, row, key) -> (belief, info)` takes the prior as the belief at the first row's time and applies its
     measurement, without propagation. `step(model, belief, row) -> (belief, info)` propagates with the inputs of the
     previous row over the time between, then applies the row's measurement with its own inputs. Both return the
-    info of their row, so that the log-likelihoods add up to that of all measurements. `whitens`: whether its infos carry
-    whitened innovations. `smooths`: how it can be smoothed, which each class declares for itself: what predicts otherwise
-    than the class it comes from would be smoothed wrongly without a word, so that this is not inherited (`smoothing_of`).
+    info of their row, so that the log-likelihoods add up to that of all measurements.
+
+    Both are final: they run `_init` and `_step`, which a filter writes, as programs of their own, so that a scan, a live loop and
+    a resumed run agree bit for bit. Most filters predict and then update: they are an `AbstractTwoPartFilter`.
+
+    What a filter can is declared where it is true, and is *no* otherwise:
+
+    - `whitens`: its infos carry whitened innovations.
+    - `smooths`: how it can be smoothed. Each class declares it for itself: what predicts otherwise than the class it comes from
+      would be smoothed wrongly without a word, so that this is not inherited (`smoothing_of`).
+    - `noise_by_row`: the model's measurement noise may be another in each row, and is taken as it is there. (Not where a filter
+      learns a noise of its own.)
+    - `rows_between`: rows may be put between others, since what it does in a step depends on the time that passes alone. (Not
+      where each step adds noise, or learns of one.)
+
+    A wrapper can what it declares and what the filters inside it can, too (`AbstractWrapper`).
     """
 
     whitens: ClassVar[bool] = False
     smooths: ClassVar[Smoothing] = Smoothing.none
+    noise_by_row: ClassVar[bool] = False
+    rows_between: ClassVar[bool] = False
+
+    def __init_subclass__(cls, **given):
+        super().__init_subclass__(**given)
+        for name in ("init", "step"):
+            if name in vars(cls):
+                raise TypeError(f"{cls.__name__}.{name}: is final. Write _{name}, which it runs.")
+
+    @property
+    def needs_key(self) -> bool:
+        """Whether it draws random numbers, so that `init` needs a key."""
+        return False
+
+    @final
+    def init(self, model: StateSpace, row: Row, key=None) -> tuple[AbstractBelief, Info]:
+        """The belief after the first row.
+
+        **Raises** `InputError` without a key where the filter draws random numbers.
+        """
+        return apart(self._init, always(row.t), model, row, key_for(self, key))
+
+    @final
+    def step(self, model: StateSpace, belief: Any, row: Row) -> tuple[AbstractBelief, Info]:
+        """The belief after the next row."""
+        return apart(self._step, belief.count >= 0, model, belief, row)
 
     @abc.abstractmethod
     def check(self, model: StateSpace) -> None:
         """Raise `InputError` early, by name, where the model asks for what this filter cannot."""
 
     @abc.abstractmethod
-    def init(self, model: StateSpace, row: Row, key=None) -> tuple[AbstractBelief, Info]:
-        """The belief after the first row."""
+    def _init(self, model: StateSpace, row: Row, key: Any) -> tuple[AbstractBelief, Info]:
+        """The belief after the first row; `key` is None where the filter needs none."""
 
     @abc.abstractmethod
-    def step(self, model: StateSpace, belief: AbstractBelief, row: Row) -> tuple[AbstractBelief, Info]:
+    def _step(self, model: StateSpace, belief: Any, row: Row) -> tuple[AbstractBelief, Info]:
         """The belief after the next row."""
 
 
+class AbstractTwoPartFilter(AbstractFilter):
+    """A filter that predicts, then updates: a wrapper that changes one of the two writes that one alone.
+
+    What `_start` and `_predict` hand to `_update` is the filter's own business (a belief, or particles that wait for their
+    weights), and opaque to wrappers.
+    """
+
+    @abc.abstractmethod
+    def _start(self, model: StateSpace, row: Row, key: Any) -> Any:
+        """The prior at the row's time, before its measurement."""
+
+    @abc.abstractmethod
+    def _predict(self, model: StateSpace, belief: Any, row: Row) -> Any:
+        """What is known at the row's time, before its measurement."""
+
+    @abc.abstractmethod
+    def _update(self, model: StateSpace, ahead: Any, row: Row) -> tuple[AbstractBelief, Info]:
+        """The belief after the row's measurement, of what was known `ahead` of it."""
+
+    @final
+    def _init(self, model, row, key):
+        return self._update(model, self._start(model, row, key), row)
+
+    @final
+    def _step(self, model, belief, row):
+        return self._update(model, self._predict(model, belief, row), row)
+
+
+class AbstractWrapper(AbstractFilter):
+    """A filter around another, `inner`."""
+
+    inner: eqx.AbstractVar[AbstractFilter]
+
+    @property
+    def needs_key(self):
+        return self.inner.needs_key
+
+
+class AbstractTwoPartWrapper(AbstractTwoPartFilter, AbstractWrapper):
+    """A wrapper that changes the prediction, the update, or both: what it does not write is that of the filter `inner`."""
+
+    inner: eqx.AbstractVar[AbstractTwoPartFilter]
+
+    def __check_init__(self):
+        if not isinstance(self.inner, AbstractTwoPartFilter):
+            raise InputError(
+                f"{type(self).__name__}: {type(self.inner).__name__} inside: must be a filter whose step is a prediction and an "
+                "update (AbstractTwoPartFilter)."
+            )
+
+    def check(self, model):
+        self.inner.check(model)
+
+    def _start(self, model, row, key):
+        return self.inner._start(model, row, key)
+
+    def _predict(self, model, belief, row):
+        return self.inner._predict(model, belief, row)
+
+    def _update(self, model, ahead, row):
+        return self.inner._update(model, ahead, row)
+
+
+def layers(filter: Any) -> tuple[Any, ...]:
+    """A filter and all inside it, from the outermost to the innermost."""
+    found = [filter]
+    while isinstance(found[-1], AbstractWrapper):
+        found.append(found[-1].inner)
+    return tuple(found)
+
+
+def innermost(filter: Any) -> Any:
+    """The filter inside all wrappers."""
+    return layers(filter)[-1]
+
+
+def key_for(filter: AbstractFilter, key: Any) -> Any:
+    """The key, None where the filter needs none.
+
+    **Raises** `InputError` where it needs one and there is none.
+    """
+    if not filter.needs_key:
+        return None
+    if key is None:
+        who = type(innermost(filter)).__name__
+        raise InputError(f"{who} draws random numbers: give it a key, e.g. key=jax.random.key(0).")
+    return key
+
+
 def smoothing_of(filter: Any) -> Smoothing:
-    """How a filter can be smoothed: as its own class declares, and the filter inside, if it is a wrapper, allows."""
-    own = vars(type(filter)).get("smooths", Smoothing.none)
-    inside = getattr(filter, "filter", None)
-    return own if inside is None or smoothing_of(inside) is own else Smoothing.none
+    """How a filter can be smoothed: as its own class and those of all filters inside declare, if they agree."""
+    kinds = {_declared(layer) for layer in layers(filter)}
+    return kinds.pop() if len(kinds) == 1 else Smoothing.none
 
 
 def check_smooths(who: str, filter: Any) -> Smoothing:
@@ -119,9 +193,7 @@ def check_smooths(who: str, filter: Any) -> Smoothing:
     kind = smoothing_of(filter)
     if kind is not Smoothing.none:
         return kind
-    while vars(type(filter)).get("smooths", Smoothing.none) is not Smoothing.none:
-        filter = filter.filter
-    name = type(filter).__name__
+    name = type(next((layer for layer in layers(filter) if _declared(layer) is Smoothing.none), filter)).__name__
     raise InputError(
         f"{who}: {name} has no smoother: its class does not declare one (`smooths`, which is not inherited). Take a Gaussian "
         "filter or a particle filter that does; a filter of your own declares smooths = Smoothing.gaussian where it predicts as "
@@ -129,74 +201,31 @@ def check_smooths(who: str, filter: Any) -> Smoothing:
     )
 
 
-@eqx.filter_jit
-def apart(function, condition, *operands):
-    """`function(*operands)` as a program of its own, so that a step's bits do not depend on what surrounds it.
-
-    XLA fuses a step with its surroundings, differently in a scan, in a live loop and beside other outputs, and rounds
-    differently with it. It never fuses across a conditional: `condition` holds for every input, and XLA must not be able
-    to know that. Called outside jit, this is compiled once as well. Transformations pass through; under differentiation
-    there is no conditional, which would cost a copy of all that the backward pass needs.
-    """
-    arrays, rest = eqx.partition((function, operands), eqx.is_array)
-    leaves, structure = jax.tree.flatten(arrays)
-
-    def together(*leaves):
-        function, operands = eqx.combine(jax.tree.unflatten(structure, leaves), rest)
-        return function(*operands)
-
-    @jax.custom_jvp
-    def alone(condition, *leaves):
-        never = lambda *_: jax.tree.map(_zeros, jax.eval_shape(together, *leaves))
-        return jax.lax.cond(condition, together, never, *leaves)
-
-    @alone.defjvp
-    def _(primals, tangents):
-        condition, *leaves = primals
-        # In a batch the condition makes every result a batch. The selection does so here, where jax counts on the same.
-        selected = lambda *leaves: jax.tree.map(lambda x: jnp.where(condition, x, _zeros(x)), together(*leaves))
-        return jax.jvp(selected, tuple(leaves), tuple(tangents[1:]))
-
-    return alone(condition, *leaves)
+def who_lacks(filter: Any, capability: str) -> str | None:
+    """The name of the outermost filter, of a filter and all inside it, that does not declare a capability (`whitens`,
+    `noise_by_row`, `rows_between`), or None."""
+    return next((type(layer).__name__ for layer in layers(filter) if not getattr(layer, capability)), None)
 
 
-def _zeros(like):
-    if jnp.issubdtype(like.dtype, jax.dtypes.prng_key):
-        # The only generator that `numerics` draws from.
-        return jax.random.wrap_key_data(jnp.zeros((*like.shape, 2), jnp.uint32), impl="threefry2x32")
-    return jnp.zeros(like.shape, like.dtype)
+def check_noise_by_row(who: str, filter: Any) -> None:
+    """Raise `InputError` where a filter inside takes a measurement noise of its own for the one that it is given."""
+    kind = who_lacks(filter, "noise_by_row")
+    if kind is not None:
+        raise InputError(
+            f"{who}: {kind} inside it does not take its measurement noise row by row (`noise_by_row`), and would replace what "
+            f"{who} says. Put {who} inside: {kind}({who}(...))."
+        )
 
 
-def always(t):
-    """True for every time, NaN included, as a condition on its bits: all but one of the NaNs that arithmetic never makes."""
-    unsigned, odd = (jnp.uint32, 0x7FA55A5A) if t.dtype == jnp.float32 else (jnp.uint64, 0x7FF55A5A5A5A5A5A)
-    return jax.lax.bitcast_convert_type(t, unsigned) != jnp.asarray(odd, unsigned)
+def check_rows_between(who: str, filter: Any) -> None:
+    """Raise `InputError` where a filter's step is another with a row put in between."""
+    kind = who_lacks(filter, "rows_between")
+    if kind is not None:
+        raise InputError(
+            f"{who}: {kind} inside it takes no late rows (`rows_between`): what it does in each step it would do once more. "
+            "Take a filter that does, or give the rows in their order."
+        )
 
 
-def presence(model: StateSpace, row: Row) -> tuple[dict, dict]:
-    """Measurements with missing ones replaced by zero, and which are present: two mappings by channel.
-
-    NaN means missing; so does infinity here, and `input_result` reports it.
-    """
-    values = {name: getattr(row.y, name) for name in model.channels}
-    present = {name: jnp.isfinite(value) for name, value in values.items()}
-    filled = {name: jnp.where(present[name], value, jnp.zeros_like(value)) for name, value in values.items()}
-    return filled, present
-
-
-def input_result(model: StateSpace, row: Row):
-    """`non_finite_input` where an input or the time is not finite, or a measurement is infinite."""
-    bad = [~jnp.isfinite(leaf) for leaf in jax.tree.leaves((row.t, row.u))]
-    bad += [jnp.isinf(getattr(row.y, name)) for name in model.channels]
-    return jnp.where(jnp.any(jnp.stack(bad)), code(Result.non_finite_input), code(Result.successful))
-
-
-def wrap_angle(angle):
-    """The same angle in [-pi, pi)."""
-    return angle - 2 * jnp.pi * jnp.floor(angle / (2 * jnp.pi) + 0.5)
-
-
-def by_channel(model: StateSpace, values, present: dict):
-    """A NamedTuple by channel, NaN where the channel is missing; `values` in the order of the channels."""
-    pairs = zip(model.channels, values, strict=True)
-    return record("Measurements", {name: jnp.where(present[name], value, jnp.nan) for name, value in pairs})
+def _declared(filter: Any) -> Smoothing:
+    return vars(type(filter)).get("smooths", Smoothing.none)

@@ -13,7 +13,8 @@ import numpy as np
 from jaxveh._core.errors import FilterError, JaxvehWarning, is_concrete
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
-from jaxveh.statespace.contract import KEPT, AbstractFilter, Info
+from jaxveh.statespace.belief import Info
+from jaxveh.statespace.contract import KEPT, AbstractFilter
 from jaxveh.statespace.model import Row, StateSpace
 from jaxveh.statespace.parameters import parameter_view
 

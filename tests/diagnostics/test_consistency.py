@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from jaxveh import InputError, Result, diagnostics
-from jaxveh.statespace.contract import Info
+from jaxveh.statespace.belief import Info
 
 Pair = namedtuple("Pair", "a b")
 

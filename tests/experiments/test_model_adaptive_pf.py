@@ -30,7 +30,8 @@ from jaxveh.experiments.model_adaptive_pf.contestants import (
     redesigned,
     told,
 )
-from jaxveh.statespace.contract import AbstractBelief, AbstractFilter
+from jaxveh.statespace.belief import AbstractBelief
+from jaxveh.statespace.contract import AbstractFilter
 from jaxveh.tyres import Contact, Linear, Relaxed
 
 SMALL = experiment.Study(duration=2.5, periods=0.6, particles=60, max_step=0.005)
@@ -367,7 +368,7 @@ def test_the_printed_variance_grows_to_a_standard_deviation():
         measurement_noise=models.mixture(study),
         prior=ss.Prior(models.BodyState(0.0, 0.0, 0.0), dict.fromkeys(("v_x", "v_y", "yaw_rate"), 1.0)),
     )  # fmt: skip
-    window = printed.first_window(filter_.filter, own)
+    window = printed.first_window(filter_.inner, own)
     seen = jax.jit(filter_._seen)
     Measured = models.record_type("Measurements", study.stds)
     for k in range(400):

@@ -111,7 +111,7 @@ class TestDelayed:
             ),
             (
                 lambda: filters.Delayed(filters.ShrinkingProcess(filters.Kalman(), {"x0": 0.1})).check(MODEL),
-                "ShrinkingProcess inside it adds noise a step",
+                "ShrinkingProcess inside it takes no late rows",
             ),
         ],
     )
@@ -157,7 +157,7 @@ class TestVaryingNoise:
         assert float(found.std.x1[13]) > 1.2 * float(plain.std.x1[13])
         # Told of the time behind it, the row itself is the first to know.
         behind = filters.run(
-            filters.VaryingNoise(filter_.filter, process={"x1": "told"}, process_of="after"), model, recording
+            filters.VaryingNoise(filter_.inner, process={"x1": "told"}, process_of="after"), model, recording
         )
         np.testing.assert_allclose(behind.mean.x1[:12], plain.mean.x1[:12], rtol=1e-12)
         moved = filters.run(filter_, model, recording.replace(told=np.append(stds[1:], 0.3)))

@@ -19,7 +19,7 @@ from nonlinear_systems import X, Y, as_recording, grid_filter, simulate
 from jaxveh import JaxvehWarning, Result, filters, numerics
 from jaxveh import statespace as ss
 from jaxveh.numerics import resampling
-from jaxveh.statespace.contract import presence
+from jaxveh.statespace.measurements import presence
 
 N, SEEDS, ROWS = 500, 16, 40
 CASES = ("sharp", "middle", "coarse", "two peaks")

@@ -181,7 +181,7 @@ def test_settings_are_checked():
     for kind in (filters.ParticleFilter, filters.AuxiliaryParticleFilter):
         with pytest.raises(InputError, match=r"threshold = 1\.5: must be from 0"):
             kind(10, threshold=1.5)
-        with pytest.raises(InputError, match=f"{kind.__name__} draws particles: give it a key"):
+        with pytest.raises(InputError, match=f"{kind.__name__} draws random numbers: give it a key"):
             filters.run(kind(10), nile_model(), nile_recording())
 
 

@@ -103,14 +103,14 @@ def test_what_declares_it_is_smoothed_by_the_equations(name):
 class Inflated(AbstractStateless):
     """Of a user: predictions wider by a factor; nothing is declared."""
 
-    filter: filters.AbstractGaussianFilter
+    inner: filters.AbstractGaussianFilter
     factor: float = eqx.field(static=True, default=1.1)
 
     def predict_between(self, model, belief, t, u_next):
-        return self.filter.predict_between(model, belief, t, u_next).inflated(jnp.asarray(self.factor))
+        return self.inner.predict_between(model, belief, t, u_next).inflated(jnp.asarray(self.factor))
 
     def update(self, model, belief, row):
-        return self.filter.update(model, belief, row)
+        return self.inner.update(model, belief, row)
 
 
 class Shifted(filters.Extended):
@@ -126,7 +126,7 @@ class Renamed(Inflated):
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
 
     def predict_between(self, model, belief, t, u_next):
-        return self.filter.predict_between(model, belief, t, u_next)
+        return self.inner.predict_between(model, belief, t, u_next)
 
 
 def test_a_wrapper_of_a_user_is_smoothed_only_where_it_says_so():

@@ -136,7 +136,7 @@ def test_particle_likelihood_with_a_held_key():
     )
     exact = maximum_likelihood(filters.Unscented(), near, short, noise, standard_errors=False)
     assert float(found.values) == pytest.approx(float(exact.values), rel=0.1)
-    with pytest.raises(InputError, match="ParticleFilter draws particles: give it a key"):
+    with pytest.raises(InputError, match="ParticleFilter draws random numbers: give it a key"):
         maximum_likelihood(filters.ParticleFilter(500), near, short, noise)
 
 

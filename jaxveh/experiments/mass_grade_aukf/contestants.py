@@ -15,9 +15,10 @@ from jaxveh._core.names import record_type
 from jaxveh.estimators import mass_and_grade
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, model_car, times
 from jaxveh.experiments.mass_grade_aukf.settings import Study
-from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, with_spread
-from jaxveh.filters.wrappers.base import Remembering
+from jaxveh.filters.gaussian.filter import with_spread
+from jaxveh.filters.wrappers.base import AbstractStateless, Remembering
 from jaxveh.statespace import Gaussian, Prior, Row, StateSpace
+from jaxveh.statespace.contract import innermost
 from jaxveh.vehicles import GRAVITY
 
 
@@ -133,35 +134,20 @@ def _adaptive(freeze: bool):
     return run
 
 
-class Frozen(AbstractGaussianFilter):
+class Frozen(AbstractStateless):
     """A `ShrinkingProcess` that scales the mass's covariances by its lambda after every row, as eq 25 prints (with e = 1, 2, 3,
     the variance itself included)."""
 
-    filter: filters.ShrinkingProcess
-
-    def check(self, model):
-        self.filter.check(model)
-
-    def prior(self, model, row):
-        return self.filter.prior(model, row)
-
-    def predict_between(self, model, belief, t, u_next):
-        return self.filter.predict_between(model, belief, t, u_next)
-
-    def observe(self, model, belief, row):
-        return self.filter.observe(model, belief, row)
-
-    def adapted(self, model, belief):
-        return self.filter.adapted(model, belief)
+    inner: filters.ShrinkingProcess
 
     def update(self, model, belief, row):
-        after, info = self.filter.update(model, belief, row)
+        after, info = self.inner.update(model, belief, row)
         before, now = belief.memory[0], after.memory[0]
         shrink = jnp.where(before > 0, now / jnp.where(before > 0, before, 1.0), 1.0)
         place = model.states.index("mass")
         P = after.inside.covariance
         scales = jnp.ones_like(P).at[place, :].set(shrink).at[:, place].set(shrink)
-        form = self.filter.filter.form
+        form = innermost(self).form
         inside = with_spread(after.inside, after.inside.vector, form.start(P * scales))
         return Remembering(inside, after.memory), info
 

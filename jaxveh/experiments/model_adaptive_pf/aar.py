@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh.experiments.model_adaptive_pf.models import BodyState
 from jaxveh.filters.wrappers.base import Remembering
 from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractFilter, always, apart
+from jaxveh.statespace.contract import AbstractFilter, AbstractWrapper
 
 
 class Learned(NamedTuple):
@@ -22,8 +22,8 @@ class Learned(NamedTuple):
     spread: BodyState
 
 
-class AutoRegressive(AbstractFilter):
-    """`filter` of an `autoregression` model whose coefficients follow the filter's own means (eqs 20 to 25, order p = 1).
+class AutoRegressive(AbstractWrapper):
+    """`inner` of an `autoregression` model whose coefficients follow the filter's own means (eqs 20 to 25, order p = 1).
 
     With X the mean of the row before, e = X_t - a X and U = `update`, state by state:
 
@@ -34,31 +34,25 @@ class AutoRegressive(AbstractFilter):
     Either starts at a = 1; P at `1 / first^2`, as if the state had been about `first` once (m/s, m/s, rad/s).
     """
 
-    filter: AbstractFilter
+    inner: AbstractFilter
     update: float = eqx.field(static=True, default=0.02)
     as_printed: bool = eqx.field(static=True, default=False)
     first: tuple[float, float, float] = eqx.field(static=True, default=(10.0, 0.1, 0.1))
 
     def check(self, model):
-        self.filter.check(model)
-
-    def init(self, model, row, key=None):
-        return apart(self._init, always(row.t), model, row, key)
+        self.inner.check(model)
 
     def _init(self, model, row, key):
-        inside, info = self.filter.init(model, row, key)
+        inside, info = self.inner._init(model, row, key)
         squares = BodyState(
             *(jnp.full_like(value, size**2) for value, size in zip(inside.mean, self.first, strict=True))
         )
         spread = squares if self.as_printed else jax.tree.map(lambda square: 1.0 / square, squares)
         return Remembering(inside, Learned(model.system.keeps, spread)), info
 
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
-
     def _step(self, model, belief, row):
         before = belief.inside.mean
-        inside, info = self.filter.step(_told(model, belief.memory), belief.inside, row)
+        inside, info = self.inner._step(_told(model, belief.memory), belief.inside, row)
         pairs = [self._learned(*values) for values in zip(*belief.memory, before, inside.mean, strict=True)]
         memory = Learned(*(BodyState(*values) for values in zip(*pairs, strict=True)))
         return Remembering(inside, memory), info

@@ -29,14 +29,14 @@ from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
 from jaxveh.experiments.report import Table, interval, spread
 from jaxveh.filters.wrappers.base import Remembering
 from jaxveh.filters.wrappers.wavelet import MEDIAN, Window, first_window, measured, seen
-from jaxveh.statespace.contract import AbstractFilter, always, apart
+from jaxveh.statespace.contract import AbstractWrapper
 from jaxveh.tyres import Contact
 
 SHOWN = {"constant": CASES["constant"], "both": CASES["both"], "both, 5 degrees of steer": LIMIT["right tyre"]}
 
 
-class PrintedNoise(AbstractFilter):
-    """`filter` of a mixture whose Gaussian part follows eqs 15 and 16 as printed.
+class PrintedNoise(AbstractWrapper):
+    """The filter of `inner`, for a mixture whose Gaussian part follows eqs 15 and 16 as printed.
 
     `delta = median |d| / 0.627`, then `R = 0.9 R + 0.1 delta`: a standard deviation is mixed into a variance, so that R ends at
     delta, which is 200 times a variance of 0.005^2. `density="eq 14"` takes eq 14 to the letter, `exp(-x^2 / (4 R^2))`, whose
@@ -44,36 +44,30 @@ class PrintedNoise(AbstractFilter):
     deviation 1.5 times too wide. `density="variance"` takes R for the variance that it is called.
     """
 
-    filter: filters.HaarParticles
+    inner: filters.HaarParticles
     density: str = eqx.field(static=True, default="eq 14")
 
     def check(self, model):
-        self.filter.check(model)
-
-    def init(self, model, row, key=None):
-        return apart(self._init, always(row.t), model, row, key)
+        self.inner.check(model)
 
     def _init(self, model, row, key):
         own = jnp.square(jnp.stack(model.measurement_noise.std))
-        memory = self._seen(model, first_window(self.filter, own), row)
-        inside, info = self.filter.filter.init(self._told(model, memory), row, key)
+        memory = self._seen(model, first_window(self.inner, own), row)
+        inside, info = self.inner.inner._init(self._told(model, memory), row, key)
         return Remembering(inside, memory), info
-
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
 
     def _step(self, model, belief, row):
         memory = self._seen(model, belief.memory, row)
-        inside, info = self.filter.filter.step(self._told(model, memory), belief.inside, row)
+        inside, info = self.inner.inner._step(self._told(model, memory), belief.inside, row)
         return Remembering(inside, memory), info
 
     def _seen(self, model, memory: Window, row) -> Window:
         """The window after a row; its `variances` hold the paper's R."""
-        forgetting, R = self.filter.forgetting, memory.variances
-        now = seen(self.filter, jnp.square(jnp.stack(model.measurement_noise.std)), memory, measured(model, row))
+        forgetting, R = self.inner.forgetting, memory.variances
+        now = seen(self.inner, jnp.square(jnp.stack(model.measurement_noise.std)), memory, measured(model, row))
         variance = (now.variances - forgetting * R) / (1.0 - forgetting)
         delta = jnp.sqrt(jnp.maximum(variance, 0.0)) * (MEDIAN / PRINTED_DIVISOR)
-        full = now.count >= self.filter.window
+        full = now.count >= self.inner.window
         return now._replace(variances=jnp.where(full, forgetting * R + (1.0 - forgetting) * delta, R))
 
     def _told(self, model, memory: Window) -> Any:

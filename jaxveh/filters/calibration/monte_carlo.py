@@ -13,7 +13,8 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
 from jaxveh.filters.calibration.batches import check_truth, in_batches
-from jaxveh.statespace.contract import AbstractFilter, Info
+from jaxveh.statespace.belief import Info
+from jaxveh.statespace.contract import AbstractFilter
 from jaxveh.statespace.draw import draw_rows, schedule_rows
 from jaxveh.statespace.driver import scan_and_keep
 from jaxveh.statespace.model import StateSpace

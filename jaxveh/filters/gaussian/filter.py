@@ -17,21 +17,13 @@ from jaxveh.filters.gaussian.forms import AbstractForm, Spread
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Image
 from jaxveh.statespace import Row, StateDependent, StateSpace
-from jaxveh.statespace.contract import (
-    AbstractBelief,
-    AbstractFilter,
-    Info,
-    always,
-    apart,
-    by_channel,
-    input_result,
-    presence,
-    wrap_angle,
-)
+from jaxveh.statespace.belief import AbstractBelief, Info
+from jaxveh.statespace.contract import AbstractTwoPartFilter
+from jaxveh.statespace.measurements import by_channel, input_result, presence, wrap_angle
 from jaxveh.statespace.noise import LOG_2PI, AbstractNoise, Gaussian, Independent, MultivariateGaussian
 
 
-class AbstractGaussianFilter(AbstractFilter):
+class AbstractGaussianFilter(AbstractTwoPartFilter):
     """A filter whose belief is a Gaussian, with additive noises that have covariances (S. Sarkka, 2013, ch. 5 and 6).
 
     A step is `predict_between`, then `update`; both are public, for sensors of different rates, as is `observe`, what a
@@ -60,22 +52,18 @@ class AbstractGaussianFilter(AbstractFilter):
     def adapted(self, model: StateSpace, belief: Any) -> StateSpace:
         """The model with the noises that this filter takes for true, given what it has seen."""
 
-    def init(self, model, row, key=None):
-        del key
-        return apart(self._init, always(row.t), model, row)
-
-    def _init(self, model, row):
-        return self.update(model, self.prior(model, row), row)
-
     def predict(self, model: StateSpace, belief: Any, t) -> Any:
         """The belief at time `t`, propagated with the inputs that the belief carries (held)."""
         return self.predict_between(model, belief, t, belief.u)
 
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
+    def _start(self, model, row, key):
+        return self.prior(model, row)
 
-    def _step(self, model, belief, row):
-        return self.update(model, self.predict_between(model, belief, row.t, row.u), row)
+    def _predict(self, model, belief, row):
+        return self.predict_between(model, belief, row.t, row.u)
+
+    def _update(self, model, ahead, row):
+        return self.update(model, ahead, row)
 
 
 class AbstractRuleFilter(AbstractGaussianFilter):
@@ -88,6 +76,8 @@ class AbstractRuleFilter(AbstractGaussianFilter):
     """
 
     # No postponed annotations in this file: they would make a field of it.
+    noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
     form: eqx.AbstractVar[AbstractForm]
 
     @abc.abstractmethod

@@ -11,20 +11,15 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import check_whole
-from jaxveh.filters.gaussian.filter import (
-    AbstractGaussianFilter,
-    AbstractRuleFilter,
-    check_kind,
-    corrected,
-    with_spread,
-)
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, corrected, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import Image, product, times
+from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
 from jaxveh.statespace.contract import Smoothing
 
 
-class Iterated(AbstractGaussianFilter):
-    """`filter`, whose update is repeated with the observation linearised under the last posterior.
+class Iterated(AbstractGaussianWrapper):
+    """`inner`, whose update is repeated with the observation linearised under the last posterior.
 
     With `Extended` the iterated extended Kalman filter, Gauss-Newton for the most probable state (B. Bell & F. Cathey 1993);
     with points iterated posterior linearisation (A. Garcia-Fernandez, L. Svensson, M. Morelande & S. Sarkka 2015): the
@@ -33,36 +28,35 @@ class Iterated(AbstractGaussianFilter):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    filter: AbstractRuleFilter
+    noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
+    inner: AbstractRuleFilter
     iterations: int = eqx.field(static=True, default=4)
 
     def __check_init__(self):
-        check_kind("Iterated", self.filter, AbstractRuleFilter)
+        check_kind("Iterated", self.inner, AbstractRuleFilter)
         check_whole("iterations", self.iterations)
 
-    def check(self, model):
-        self.filter.check(model)
-
     def prior(self, model, row):
-        return self.filter.prior(model, row)
+        return self.inner.prior(model, row)
 
     def predict_between(self, model, belief, t, u_next):
-        return self.filter.predict_between(model, belief, t, u_next)
+        return self.inner.predict_between(model, belief, t, u_next)
 
     def observe(self, model, belief, row):
-        return self.filter.observe(model, belief, row)
+        return self.inner.observe(model, belief, row)
 
     def adapted(self, model, belief):
         return model
 
     def update(self, model, belief, row):
-        posterior, info = corrected(self.filter.form, model, belief, row, self.observe(model, belief, row))
+        posterior, info = corrected(self.inner.form, model, belief, row, self.observe(model, belief, row))
 
         def again(gaussian, _):
             vector, spread = gaussian
             seen = self.observe(model, with_spread(belief, vector, spread), row)
             line = linearised(seen, vector, spread.factor, belief)
-            found, _ = corrected(self.filter.form, model, belief, row, line)
+            found, _ = corrected(self.inner.form, model, belief, row, line)
             return (found.vector, Spread(found.factor, found.matrix)), None
 
         start = posterior.vector, Spread(posterior.factor, posterior.matrix)

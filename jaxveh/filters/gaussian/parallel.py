@@ -16,7 +16,7 @@ from jaxveh.filters.gaussian.iterated import line_through
 from jaxveh.filters.gaussian.noises import covariance_in, law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, product
 from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import input_result, presence
+from jaxveh.statespace.measurements import input_result, presence
 
 
 class Lines(NamedTuple):

@@ -9,14 +9,14 @@ import equinox as eqx
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.recording import Recording
 from jaxveh.filters.choosing import Transport
-from jaxveh.filters.particle import AbstractParticleFilter, need_key
+from jaxveh.filters.particle import AbstractParticleFilter
 from jaxveh.filters.smoothing.backward_sampling import check_density, sample_backwards
 from jaxveh.filters.smoothing.fixed_lag import check_lag, smooth_with_lag
 from jaxveh.filters.smoothing.genealogy import trace_genealogy
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate
 from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractFilter, Smoothing, check_smooths
+from jaxveh.statespace.contract import AbstractFilter, Smoothing, check_smooths, key_for
 from jaxveh.statespace.driver import raise_failure
 
 
@@ -63,7 +63,7 @@ def smooth(
             raise InputError("smooth: a lag has a method of its own; give one of both.")
         found = smooth_with_lag(filter, model, rows, key, lag)
     elif kind is Smoothing.particles:
-        found = _particles(filter, model, rows, need_key(filter, key), method)
+        found = _particles(filter, model, rows, key_for(filter, key), method)
     elif method is not None:
         raise InputError(
             f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has its own."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -15,7 +15,8 @@ from jaxveh.filters.smoothing.rauch_tung_striebel import given_later
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.filters.wrappers.base import gaussian_of
 from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Smoothing, check_smooths, smoothing_of
+from jaxveh.statespace.belief import AbstractBelief
+from jaxveh.statespace.contract import AbstractFilter, AbstractWrapper, Smoothing, check_smooths, smoothing_of
 from jaxveh.statespace.driver import scan_and_keep
 
 
@@ -46,8 +47,8 @@ class LaggedBelief(AbstractBelief):
         return self.shown
 
 
-class FixedLag(AbstractFilter):
-    """`filter`, whose estimate is that of the row `lag` rows back, given all up to now; in the first rows, of the first.
+class FixedLag(AbstractWrapper):
+    """`inner`, whose estimate is that of the row `lag` rows back, given all up to now; in the first rows, of the first.
 
     A live smoother of constant memory: for what may come late, by `lag` rows, and should be good. Gaussian filters go back by
     their own Rauch-Tung-Striebel steps, particle filters by their ancestors (G. Kitagawa 1996), whose lines are still many over
@@ -56,27 +57,28 @@ class FixedLag(AbstractFilter):
     `smooth(filter, model, recording, lag=...)` does the same with each row's estimate in its own place.
     """
 
-    filter: AbstractFilter
+    noise_by_row: ClassVar[bool] = True
+    inner: AbstractFilter
     lag: int = eqx.field(static=True)
 
     def __check_init__(self):
-        check_lag(self.filter, self.lag)
+        check_lag(self.inner, self.lag)
 
     def check(self, model):
-        self.filter.check(model)
+        self.inner.check(model)
 
-    def init(self, model, row, key=None):
-        belief, info = self.filter.init(model, row, key)
+    def _init(self, model, row, key):
+        belief, info = self.inner._init(model, row, key)
         past = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (self.lag + 1, *jnp.shape(leaf))), belief)
         return LaggedBelief(belief, past, belief.moments(model)), info
 
-    def step(self, model, belief, row):
-        inside, info = self.filter.step(model, belief.inside, row)
+    def _step(self, model, belief, row):
+        inside, info = self.inner._step(model, belief.inside, row)
         longer = lambda past, new: jnp.concatenate([past[1:], new[None]])
         past = jax.tree.map(longer, belief.past, inside)
         # Before there are so many rows the oldest are copies of the first.
         real = jnp.arange(self.lag, dtype=jnp.int32) >= self.lag + 1 - inside.count
-        return LaggedBelief(inside, past, first_of(self.filter, model, past, real)), info
+        return LaggedBelief(inside, past, first_of(self.inner, model, past, real)), info
 
 
 def check_lag(filter: Any, lag: int) -> None:

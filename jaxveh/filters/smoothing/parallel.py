@@ -17,7 +17,7 @@ from jaxveh.filters.gaussian.forms import Covariance
 from jaxveh.filters.gaussian.parallel import infos_of, pass_over
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.statespace import Row, StateSpace, parameter_view
-from jaxveh.statespace.contract import Smoothing, smoothing_of
+from jaxveh.statespace.contract import Smoothing, innermost, smoothing_of
 from jaxveh.statespace.driver import Estimate, raise_failure
 
 
@@ -38,9 +38,8 @@ def smooth_parallel(
 
     **Raises** as `run`, and `InputError` for other filters and forms.
     """
-    inner = filter.filter if isinstance(filter, Iterated) else filter
     declared = smoothing_of(filter) is Smoothing.gaussian
-    if not declared or not isinstance(filter, (Kalman, Iterated)) or not isinstance(inner.form, Covariance):
+    if not declared or not isinstance(filter, (Kalman, Iterated)) or not isinstance(innermost(filter).form, Covariance):
         raise InputError(
             f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...) itself, of the form Covariance()."
         )
@@ -59,7 +58,7 @@ def smooth_parallel(
 
 @eqx.filter_jit
 def _smooth(filter, model, rows: Row) -> SmoothedEstimate:
-    rule = (filter.filter if isinstance(filter, Iterated) else filter).rule(len(model.states))
+    rule = innermost(filter).rule(len(model.states))
     wide = lambda leaf: jnp.broadcast_to(leaf, (*rows.t.shape, *leaf.shape))
     path = wide(jnp.stack(model.prior.mean)), wide(model.prior.covariance())
 

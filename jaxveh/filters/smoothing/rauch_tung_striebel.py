@@ -12,8 +12,9 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import transition_image, with_spread
 from jaxveh.filters.gaussian.forms import Later, Spread
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
-from jaxveh.filters.wrappers.base import gaussian_of, rule_filter_of
+from jaxveh.filters.wrappers.base import gaussian_of
 from jaxveh.statespace import Row, StateSpace
+from jaxveh.statespace.contract import innermost
 from jaxveh.statespace.driver import scan_and_keep
 
 
@@ -47,5 +48,5 @@ def given_later(
     law = None if own.process_noise is None else own.process_noise.over(t - gaussian.t)
     known = Later(later.vector - image.mean, Spread(later.factor, later.matrix))
     before = Spread(gaussian.factor, gaussian.matrix)
-    found = rule_filter_of(filter).form.smooth(image, law, model.states, before, known)
+    found = innermost(filter).form.smooth(image, law, model.states, before, known)
     return with_spread(gaussian, gaussian.vector + found.shift, found.spread)

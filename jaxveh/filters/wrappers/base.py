@@ -8,35 +8,29 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, AbstractRuleFilter, check_kind
+from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
 from jaxveh.statespace import Gaussian, Row, StateSpace
-from jaxveh.statespace.contract import AbstractBelief, Info
+from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.dependent_noise import check_fixed
 
 
-class AbstractStateless(AbstractGaussianFilter):
-    """A filter around another, `filter`, that remembers nothing: its belief is that of its filter."""
+class AbstractStateless(AbstractGaussianWrapper):
+    """A filter around another, `inner`, that remembers nothing: its belief is that of its filter."""
 
-    # No postponed annotations in this file: they would make a field of it.
-    filter: eqx.AbstractVar[AbstractGaussianFilter]
-
-    def __check_init__(self):
-        check_kind(type(self).__name__, self.filter, AbstractGaussianFilter)
-
-    def check(self, model):
-        self.filter.check(model)
+    # No postponed annotations in this file: they would make fields of class variables.
+    noise_by_row: ClassVar[bool] = True
 
     def prior(self, model, row):
-        return self.filter.prior(model, row)
+        return self.inner.prior(model, row)
 
     def predict_between(self, model, belief, t, u_next):
-        return self.filter.predict_between(model, belief, t, u_next)
+        return self.inner.predict_between(model, belief, t, u_next)
 
     def observe(self, model, belief, row):
-        return self.filter.observe(model, belief, row)
+        return self.inner.observe(model, belief, row)
 
     def adapted(self, model, belief):
-        return self.filter.adapted(model, belief)
+        return self.inner.adapted(model, belief)
 
 
 class Remembering(AbstractBelief):
@@ -83,15 +77,8 @@ class Remembering(AbstractBelief):
         return self.inside.moments(model)
 
 
-class AbstractRemembering(AbstractGaussianFilter):
+class AbstractRemembering(AbstractGaussianWrapper):
     """A filter around another that remembers what it has seen, and gives its filter a model with other noises."""
-
-    filter: eqx.AbstractVar[AbstractGaussianFilter]
-    learns_variances: ClassVar[bool] = False
-    """Whether it replaces the measurement noise by one of its own."""
-
-    def __check_init__(self):
-        check_kind(type(self).__name__, self.filter, AbstractGaussianFilter)
 
     @abc.abstractmethod
     def start(self, model: StateSpace) -> Any:
@@ -103,21 +90,21 @@ class AbstractRemembering(AbstractGaussianFilter):
 
     def prior(self, model, row):
         memory = self.start(model)
-        return Remembering(self.filter.prior(self.believed(model, memory), row), memory)
+        return Remembering(self.inner.prior(self.believed(model, memory), row), memory)
 
     def predict_between(self, model, belief, t, u_next):
         own = self.believed(model, belief.memory)
-        return Remembering(self.filter.predict_between(own, belief.inside, t, u_next), belief.memory)
+        return Remembering(self.inner.predict_between(own, belief.inside, t, u_next), belief.memory)
 
     def observe(self, model, belief, row):
-        return self.filter.observe(self.believed(model, belief.memory), belief.inside, row)
+        return self.inner.observe(self.believed(model, belief.memory), belief.inside, row)
 
     def adapted(self, model, belief):
-        return self.filter.adapted(self.believed(model, belief.memory), belief.inside)
+        return self.inner.adapted(self.believed(model, belief.memory), belief.inside)
 
     def update_inside(self, model: StateSpace, belief: Remembering, row: Row) -> tuple[Remembering, Info]:
         """The filter's own update with the noises that the memory says."""
-        after, info = self.filter.update(self.believed(model, belief.memory), belief.inside, row)
+        after, info = self.inner.update(self.believed(model, belief.memory), belief.inside, row)
         return Remembering(after, belief.memory), info
 
 
@@ -135,30 +122,12 @@ def with_gaussian(belief: Any, gaussian: GaussianBelief) -> Any:
     return Remembering(with_gaussian(belief.inside, gaussian), belief.memory)
 
 
-def rule_filter_of(filter: Any) -> AbstractRuleFilter:
-    """The filter that wrappers go around."""
-    while not isinstance(filter, AbstractRuleFilter):
-        filter = filter.filter
-    return filter
-
-
 def check_independent(who: str, model: StateSpace) -> None:
     """Raise `InputError` unless the measurement noise is one standard deviation a channel."""
     check_fixed(who, model.measurement_noise, "Take the filter inside by itself, or a particle filter.")
     if not isinstance(model.measurement_noise, Gaussian):
         kind = type(model.measurement_noise).__name__
         raise InputError(f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation a channel.")
-
-
-def check_variances_count(who: str, filter: Any) -> None:
-    """Raise `InputError` where a filter inside takes measurement noise of its own for the one that it is given."""
-    while filter is not None:
-        if getattr(filter, "learns_variances", False):
-            kind = type(filter).__name__
-            raise InputError(
-                f"{who}: {kind} inside it would replace its variances. Put {who} inside: {kind}({who}(...))."
-            )
-        filter = getattr(filter, "filter", None)
 
 
 def variances_of(model: StateSpace) -> Any:

@@ -18,7 +18,7 @@ from jaxveh.statespace.contract import Smoothing
 
 
 class Consider(AbstractStateless):
-    """`filter`, whose updates leave the states `names` as they are (S. F. Schmidt 1966: the consider filter).
+    """`inner`, whose updates leave the states `names` as they are (S. F. Schmidt 1966: the consider filter).
 
     Their mean and covariance stay those of the prediction; how the others depend on them is kept, so that the others' spreads
     say what not knowing them costs:
@@ -28,26 +28,27 @@ class Consider(AbstractStateless):
     For parameters that the data cannot tell, such as a mass on a level road.
     """
 
-    filter: AbstractRuleFilter
+    rows_between: ClassVar[bool] = True
+    inner: AbstractRuleFilter
     names: tuple[str, ...] = eqx.field(static=True, converter=as_names)
 
     def __check_init__(self):
-        check_kind("Consider", self.filter, AbstractRuleFilter)
+        check_kind("Consider", self.inner, AbstractRuleFilter)
 
     def check(self, model):
         check_names("Consider.names", self.names, model.states)
-        self.filter.check(model)
+        self.inner.check(model)
 
     def update(self, model, belief, row):
-        after, info = self.filter.update(model, belief, row)
+        after, info = self.inner.update(model, belief, row)
         kept = _among(model, self.names)
         vector = jnp.where(kept, belief.vector, after.vector)
         both = kept[:, None] & kept[None, :]
-        return _with_covariance(self.filter, after, vector, jnp.where(both, belief.covariance, after.covariance)), info
+        return _with_covariance(self.inner, after, vector, jnp.where(both, belief.covariance, after.covariance)), info
 
 
 class Dual(AbstractStateless):
-    """`filter` of a joint model, with states and parameters estimated apart: dual estimation (E. Wan & A. Nelson 2001).
+    """`inner` of a joint model, with states and parameters estimated apart: dual estimation (E. Wan & A. Nelson 2001).
 
     After every row the covariances between the blocks of `groups` (tuples of states; one for the rest is added) are forgotten, so
     that each block is corrected by what a measurement says through this step's prediction alone. By default the blocks are the
@@ -56,11 +57,11 @@ class Dual(AbstractStateless):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    filter: AbstractRuleFilter
+    inner: AbstractRuleFilter
     groups: tuple[tuple[str, ...], ...] | None = eqx.field(static=True, default=None, converter=as_groups)
 
     def __check_init__(self):
-        check_kind("Dual", self.filter, AbstractRuleFilter)
+        check_kind("Dual", self.inner, AbstractRuleFilter)
 
     def check(self, model):
         for group in self._blocks(model):
@@ -68,14 +69,14 @@ class Dual(AbstractStateless):
         names = [name for group in self._blocks(model) for name in group]
         if len(set(names)) < len(names):
             raise InputError("Dual.groups: a state stands in more than one group.")
-        self.filter.check(model)
+        self.inner.check(model)
 
     def update(self, model, belief, row):
-        after, info = self.filter.update(model, belief, row)
+        after, info = self.inner.update(model, belief, row)
         blocks = self._blocks(model)
         place = np.array([next(i for i, group in enumerate(blocks) if name in group) for name in model.states])
         together = place[:, None] == place[None, :]
-        return _with_covariance(self.filter, after, after.vector, jnp.where(together, after.covariance, 0)), info
+        return _with_covariance(self.inner, after, after.vector, jnp.where(together, after.covariance, 0)), info
 
     def _blocks(self, model: StateSpace) -> tuple[tuple[str, ...], ...]:
         given = self.groups

@@ -15,14 +15,15 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.wrappers.base import AbstractStateless, check_independent, variances_of, with_variances
 from jaxveh.filters.wrappers.interacting import mixed_covariance
-from jaxveh.statespace.contract import Info, Smoothing
+from jaxveh.statespace.belief import Info
+from jaxveh.statespace.contract import Smoothing
 
 MOST_CHANNELS = 6
 """Of which 64 cases are made."""
 
 
 class Contaminated(AbstractStateless):
-    """`filter` for noise of which a `share` is `factor` times as wide, channel by channel (J. Tukey's law, 1960):
+    """`inner` for noise of which a `share` is `factor` times as wide, channel by channel (J. Tukey's law, 1960):
 
         e ~ (1 - share) N(0, sigma^2) + share N(0, factor^2 sigma^2)
 
@@ -37,13 +38,14 @@ class Contaminated(AbstractStateless):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
+    rows_between: ClassVar[bool] = True
     whitens: ClassVar[bool] = False
-    filter: AbstractRuleFilter
+    inner: AbstractRuleFilter
     share: jax.Array = eqx.field(converter=float_array, default=0.05)
     factor: jax.Array = eqx.field(converter=float_array, default=10.0)
 
     def __check_init__(self):
-        check_kind("Contaminated", self.filter, AbstractRuleFilter)
+        check_kind("Contaminated", self.inner, AbstractRuleFilter)
         check("Contaminated.share", self.share, lambda p: (p > 0) & (p < 1), "between 0 and 1")
         check("Contaminated.factor", self.factor, lambda f: f > 1, "above 1")
 
@@ -55,7 +57,7 @@ class Contaminated(AbstractStateless):
                 f"Contaminated: {count} channels ({', '.join(model.channels)}) make {2**count} cases: must be at most "
                 f"{MOST_CHANNELS}. Use RobustStudentT or Gated."
             )
-        self.filter.check(model)
+        self.inner.check(model)
 
     def update(self, model, belief, row):
         wild = jnp.asarray(list(itertools.product((False, True), repeat=len(model.channels))))
@@ -63,12 +65,12 @@ class Contaminated(AbstractStateless):
         share, factor = self.share.astype(own.dtype), self.factor.astype(own.dtype)
         variances = jnp.where(wild, jnp.square(factor), 1) * own
         before = jnp.sum(jnp.where(wild, jnp.log(share), jnp.log1p(-share)), axis=-1)
-        case = lambda values: _by_case(*self.filter.update(with_variances(model, values), belief, row))
+        case = lambda values: _by_case(*self.inner.update(with_variances(model, values), belief, row))
         vectors, covariances, infos = jax.vmap(case)(variances)
         logs = before + infos.log_likelihood
         weights = jax.nn.softmax(logs)
         mean, covariance = mixed_covariance(weights, vectors, covariances)
-        after = with_spread(belief, mean, self.filter.form.start(covariance), t=row.t, u=row.u, count=belief.count + 1)
+        after = with_spread(belief, mean, self.inner.form.start(covariance), t=row.t, u=row.u, count=belief.count + 1)
         return after, _info(infos, jnp.exp(before), jax.nn.logsumexp(logs))
 
 

@@ -18,7 +18,8 @@ from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_
 from jaxveh.filters.gaussian.forms import SingularValues, Spread
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, always, apart
+from jaxveh.statespace.belief import AbstractBelief
+from jaxveh.statespace.contract import AbstractWrapper
 from jaxveh.statespace.process import AbstractProcessNoise
 
 
@@ -65,8 +66,8 @@ class FederatedBelief(AbstractBelief):
         return self.master.moments(model)
 
 
-class Federated(AbstractFilter):
-    """N. Carlson's federated filter (IEEE Trans. Aerospace and Electronic Systems 26, 1990) with `locals` of the same `filter`.
+class Federated(AbstractWrapper):
+    """N. Carlson's federated filter (IEEE Trans. Aerospace and Electronic Systems 26, 1990) with `locals` of the same `inner`.
 
     Every local has all states, the sensors of its own `groups` entry (tuples of channels), the prior's and the process noise's
     covariance over its share, and so no information that another has:
@@ -93,7 +94,9 @@ class Federated(AbstractFilter):
     """
 
     whitens: ClassVar[bool] = True
-    filter: AbstractRuleFilter
+    noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
+    inner: AbstractRuleFilter
     groups: tuple[tuple[str, ...], ...] = eqx.field(static=True, converter=as_groups)
     shares: tuple[float, ...] | None = eqx.field(static=True, default=None)
     by_trace: bool = eqx.field(static=True, default=False)
@@ -104,7 +107,7 @@ class Federated(AbstractFilter):
     overlapping: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
-        check_kind("Federated", self.filter, AbstractRuleFilter)
+        check_kind("Federated", self.inner, AbstractRuleFilter)
         if len(self.groups) < 2:
             raise InputError(f"Federated.groups: {len(self.groups)}; must be at least two tuples of channels.")
         names = [name for group in self.groups for name in group]
@@ -125,37 +128,30 @@ class Federated(AbstractFilter):
         check("Federated.forgetting", self.forgetting, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
 
     def check(self, model):
-        self.filter.check(model)
+        self.inner.check(model)
         names = [name for group in self.groups for name in group]
         check_names("Federated.groups", names, model.channels)
         left = [name for name in model.channels if name not in names]
         if left:
             raise InputError(f"Federated.groups: no group has {', '.join(left)}.")
 
-    def init(self, model, row, key=None):
-        del key
-        return apart(self._init, always(row.t), model, row)
-
-    def _init(self, model, row):
-        prior = self.filter.prior(model, row)
+    def _init(self, model, row, key):
+        prior = self.inner.prior(model, row)
         k = len(self.groups)
         shares = self.shares or (1 / k,) * k
         shares = jnp.asarray(shares, prior.vector.dtype)
         start = FederatedBelief(prior, (prior,) * k, shares, jnp.ones_like(shares))
         return self._measured(model, start, prior, self._handed_out(prior, shares), row)
 
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
-
     def _step(self, model, belief, row):
         if self.common:
-            predicted = self.filter.predict_between(model, belief.master, row.t, row.u)
+            predicted = self.inner.predict_between(model, belief.master, row.t, row.u)
             return self._measured(model, belief, predicted, self._handed_out(predicted, belief.shares), row)
         # All locals by one program: they differ in numbers alone.
         before = self._handed_out(belief.master, belief.shares) if self.reset else _together(belief.locals)
 
         def ahead(local, share):
-            return self.filter.predict_between(_with_process_noise_over(model, share), local, row.t, row.u)
+            return self.inner.predict_between(_with_process_noise_over(model, share), local, row.t, row.u)
 
         alone = jax.vmap(ahead)(before, belief.shares)
         return self._measured(model, belief, self._fused(alone, belief.master), alone, row)
@@ -166,7 +162,7 @@ class Federated(AbstractFilter):
 
     def _measured(self, model, belief: FederatedBelief, predicted: GaussianBelief, ahead: GaussianBelief, row):
         rows = _together([_only(model, row, group).y for group in self.groups])
-        own = lambda local, y: self.filter.update(model, local, row._replace(y=y))
+        own = lambda local, y: self.inner.update(model, local, row._replace(y=y))
         found, _ = jax.vmap(own)(ahead, rows)
         # A local's own prediction is wide, and seldom surprised: sensors are judged by the fused one.
         every = jax.tree.map(lambda one, some: jnp.concatenate([one[None], some]), row.y, rows)
@@ -208,12 +204,12 @@ class Federated(AbstractFilter):
             information, pull = information - again * once, pull - again * pulled
         factor = numerics.cholesky(information)
         mean = numerics.solve_psd(factor, pull)
-        return with_spread(like, mean, self.filter.form.start(numerics.inverse_psd(factor)), t=beliefs.t[0])
+        return with_spread(like, mean, self.inner.form.start(numerics.inverse_psd(factor)), t=beliefs.t[0])
 
     def _information(self, belief: GaussianBelief) -> tuple[Any, Any]:
         """P^-1 (n, n) and P^-1 x (n,)."""
         # Singular vectors make no triangular factor.
-        singular = isinstance(self.filter.form, SingularValues)
+        singular = isinstance(self.inner.form, SingularValues)
         information = numerics.inverse_psd(numerics.lower_factor(belief.factor) if singular else belief.factor)
         return information, times(information, belief.vector)
 

@@ -16,7 +16,7 @@ from jaxveh.statespace.contract import Smoothing
 
 
 class Gated(AbstractStateless):
-    """`filter`, to which a channel is missing where its innovation exceeds `limit` standard deviations of the prediction.
+    """`inner`, to which a channel is missing where its innovation exceeds `limit` standard deviations of the prediction.
 
     One sensor's fault leaves the others in use (Y. Bar-Shalom, X. Li & T. Kirubarajan, Estimation with Applications to Tracking
     and Navigation, sec. 5.4: validation). A filter that is wrong gates what could set it right: keep the limit wide, 3 to 5, and
@@ -24,15 +24,16 @@ class Gated(AbstractStateless):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    filter: AbstractGaussianFilter
+    rows_between: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     limit: float = eqx.field(static=True, default=4.0)
 
     def __check_init__(self):
         check_positive("Gated.limit", self.limit)
 
     def update(self, model, belief, row):
-        found = innovation(self.filter, model, belief, row)
+        found = innovation(self.inner, model, belief, row)
         wild = jnp.square(found.error) > self.limit**2 * (found.expected + found.noise)
         kept = [jnp.where(wild[i], jnp.nan, getattr(row.y, name)) for i, name in enumerate(model.channels)]
         y = record("Measurements", dict(zip(model.channels, kept, strict=True)))
-        return self.filter.update(model, belief, row._replace(y=y))
+        return self.inner.update(model, belief, row._replace(y=y))

@@ -16,7 +16,7 @@ from jaxveh.filters.wrappers.base import AbstractStateless
 
 
 class HInfinity(AbstractStateless):
-    """`filter` that bounds the worst ratio of the estimate's error to all disturbances by 1 / `bound` (D. Simon, Optimal State
+    """`inner` that bounds the worst ratio of the estimate's error to all disturbances by 1 / `bound` (D. Simon, Optimal State
     Estimation, 2006, eq 11.89).
 
         P~ = (P^-1 - bound S)^-1,    then the Kalman update with P~
@@ -27,18 +27,18 @@ class HInfinity(AbstractStateless):
     bound 0 it is the Kalman filter. Log-likelihoods are those of the wider prediction.
     """
 
-    filter: AbstractRuleFilter
+    inner: AbstractRuleFilter
     bound: jax.Array = eqx.field(converter=lambda v: float_array(v if eqx.is_array(v) else np.asarray(v, float)))
     scales: tuple[tuple[str, float], ...] = eqx.field(static=True, converter=lambda v: tuple(dict(v).items()))
 
     def __check_init__(self):
-        check_kind("HInfinity", self.filter, AbstractRuleFilter)
+        check_kind("HInfinity", self.inner, AbstractRuleFilter)
         check("HInfinity.bound", self.bound, lambda b: b >= 0, "at least 0")
         for name, scale in self.scales:
             check(f"HInfinity.scales of {name}", scale, lambda s: s > 0, "positive")
 
     def check(self, model):
-        self.filter.check(model)
+        self.inner.check(model)
         check_names("HInfinity.scales", [name for name, _ in self.scales], model.states)
 
     def update(self, model, belief, row):
@@ -47,7 +47,7 @@ class HInfinity(AbstractStateless):
         information = numerics.inverse_psd(numerics.lower_factor(belief.factor))
         information = information - jnp.diag(self.bound.astype(dtype) * weights)
         wider = numerics.inverse_psd(numerics.cholesky(information))
-        after, info = self.filter.update(model, with_spread(belief, belief.vector, self.filter.form.start(wider)), row)
+        after, info = self.inner.update(model, with_spread(belief, belief.vector, self.inner.form.start(wider)), row)
         # What the bound has made of a finite covariance is no divergence of the model.
         too_large = jnp.all(jnp.isfinite(belief.factor)) & ~jnp.all(jnp.isfinite(wider))
         return after, info._replace(result=jnp.where(too_large, code(Result.not_positive_definite), info.result))

@@ -10,7 +10,7 @@ from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innov
 from jaxveh.filters.gaussian.noises import covariance_in, law_at
 from jaxveh.filters.gaussian.rules import Image
 from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import presence
+from jaxveh.statespace.measurements import presence
 
 
 class Innovation(NamedTuple):

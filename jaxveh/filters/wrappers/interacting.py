@@ -17,7 +17,9 @@ from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractBelief, AbstractFilter, Info, always, apart, by_channel, presence
+from jaxveh.statespace.belief import AbstractBelief, Info
+from jaxveh.statespace.contract import AbstractWrapper
+from jaxveh.statespace.measurements import by_channel, presence
 
 
 class MixtureBelief(AbstractBelief):
@@ -68,10 +70,10 @@ class MixtureBelief(AbstractBelief):
         return _mixed(self.probabilities, [mode.moments(model) for mode in self.modes])
 
 
-class InteractingModels(AbstractFilter):
+class InteractingModels(AbstractWrapper):
     """The interacting multiple model filter (H. Blom & Y. Bar-Shalom 1988; Bar-Shalom, Li & Kirubarajan, sec. 11.6.6).
 
-    **Arguments**: `filter`, of the family that all modes share; `variants`: functions from the model to each mode's model, such
+    **Arguments**: `inner`, of the family that all modes share; `variants`: functions from the model to each mode's model, such
     as `lambda model: eqx.tree_at(where_friction, model, 0.3)`, which must keep states and channels; `transition` (r, r): row i
     has the probabilities of going from mode i to each within a step; `start` (r,): probabilities before the first row (equal).
 
@@ -79,8 +81,8 @@ class InteractingModels(AbstractFilter):
     and weighs them by their likelihoods. `belief.probabilities` are those after the last row. Innovations are the mixture's.
     """
 
-    whitens: ClassVar[bool] = False
-    filter: AbstractRuleFilter
+    noise_by_row: ClassVar[bool] = True
+    inner: AbstractRuleFilter
     variants: tuple[Callable[[StateSpace], StateSpace], ...] = eqx.field(static=True)
     transition: jax.Array = eqx.field(converter=lambda m: float_array(m if eqx.is_array(m) else np.asarray(m, float)))
     start: jax.Array | None = eqx.field(
@@ -89,7 +91,7 @@ class InteractingModels(AbstractFilter):
     )
 
     def __check_init__(self):
-        check_kind("InteractingModels", self.filter, AbstractRuleFilter)
+        check_kind("InteractingModels", self.inner, AbstractRuleFilter)
         r = len(self.variants)
         if r < 2:
             raise InputError(f"InteractingModels.variants: {r}; must be at least two.")
@@ -102,22 +104,15 @@ class InteractingModels(AbstractFilter):
     def check(self, model):
         for variant in self.variants:
             mode = variant(model)
-            self.filter.check(mode)
+            self.inner.check(mode)
             if (mode.states, mode.channels, mode.inputs) != (model.states, model.channels, model.inputs):
                 raise InputError("InteractingModels: a variant changes the model's states, channels or inputs.")
 
-    def init(self, model, row, key=None):
-        del key
-        return apart(self._init, always(row.t), model, row)
-
-    def _init(self, model, row):
+    def _init(self, model, row, key):
         r, dtype = len(self.variants), row.t.dtype
         before = jnp.full((r,), 1 / r, dtype) if self.start is None else self.start.astype(dtype)
-        found = [self.filter.update(mode, self.filter.prior(mode, row), row) for mode in self._modes(model)]
+        found = [self.inner.update(mode, self.inner.prior(mode, row), row) for mode in self._modes(model)]
         return self._weighed(model, row, before, found)
-
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
 
     def _step(self, model, belief, row):
         joint = self.transition.astype(row.t.dtype) * belief.probabilities[:, None]
@@ -128,7 +123,7 @@ class InteractingModels(AbstractFilter):
         found = []
         for j, mode in enumerate(self._modes(model)):
             mixed = self._mix(belief, from_each[:, j], j)
-            found.append(self.filter.update(mode, self.filter.predict_between(mode, mixed, row.t, row.u), row))
+            found.append(self.inner.update(mode, self.inner.predict_between(mode, mixed, row.t, row.u), row))
         return self._weighed(model, row, ahead, found)
 
     def _modes(self, model):
@@ -137,7 +132,7 @@ class InteractingModels(AbstractFilter):
     def _mix(self, belief: MixtureBelief, weights, j: int) -> GaussianBelief:
         """The Gaussian with the mixture's moments, for mode j."""
         mean, covariance = _of_modes(weights, belief.modes)
-        return with_spread(belief.modes[j], mean, self.filter.form.start(covariance))
+        return with_spread(belief.modes[j], mean, self.inner.form.start(covariance))
 
     def _weighed(self, model, row, before, found):
         beliefs, infos = zip(*found, strict=True)

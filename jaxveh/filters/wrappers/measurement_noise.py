@@ -23,7 +23,7 @@ from jaxveh.statespace.contract import Smoothing
 
 
 class SageHusa(AbstractRemembering):
-    """`filter` with measurement variances by matching the innovations' (A. Sage & G. Husa 1969, in fading form).
+    """`inner` with measurement variances by matching the innovations' (A. Sage & G. Husa 1969, in fading form).
 
         R <- (1 - d) R + d (e^2 - H P H^T),    d = (1 - b) / (1 - b^(k+1)),    b = `forgetting`
 
@@ -33,8 +33,8 @@ class SageHusa(AbstractRemembering):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    learns_variances: ClassVar[bool] = True
-    filter: AbstractGaussianFilter
+    rows_between: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)
     floor: float = eqx.field(static=True, default=0.01)
     ceiling: float = eqx.field(static=True, default=100.0)
@@ -46,7 +46,7 @@ class SageHusa(AbstractRemembering):
 
     def check(self, model):
         check_independent("SageHusa", model)
-        self.filter.check(model)
+        self.inner.check(model)
 
     def start(self, model):
         variances = variances_of(model)
@@ -57,7 +57,7 @@ class SageHusa(AbstractRemembering):
         return with_variances(model, memory[0])
 
     def update(self, model, belief, row):
-        found = innovation(self.filter, self.believed(model, belief.memory), belief.inside, row)
+        found = innovation(self.inner, self.believed(model, belief.memory), belief.inside, row)
         after, info = self.update_inside(model, belief, row)
         variances, rows = belief.memory
         share = (1.0 - self.forgetting) / (1.0 - self.forgetting ** (rows + 1.0))
@@ -77,7 +77,7 @@ class Precisions(NamedTuple):
 
 
 class VariationalBayes(AbstractRemembering):
-    """`filter` with measurement variances as unknowns of inverse-gamma laws (S. Sarkka & A. Nummenmaa 2009).
+    """`inner` with measurement variances as unknowns of inverse-gamma laws (S. Sarkka & A. Nummenmaa 2009).
 
     Between rows the laws forget: shape and scale times `forgetting`, so that 1 / (1 - forgetting) rows are remembered. In a row
     the state, given the variances scale / shape, and the variances, given the state, are found in turns:
@@ -89,8 +89,8 @@ class VariationalBayes(AbstractRemembering):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    learns_variances: ClassVar[bool] = True
-    filter: AbstractGaussianFilter
+    rows_between: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)
     weight: float = eqx.field(static=True, default=10.0)
     iterations: int = eqx.field(static=True, default=3)
@@ -102,7 +102,7 @@ class VariationalBayes(AbstractRemembering):
 
     def check(self, model):
         check_independent("VariationalBayes", model)
-        self.filter.check(model)
+        self.inner.check(model)
 
     def start(self, model):
         variances = variances_of(model)
@@ -119,8 +119,8 @@ class VariationalBayes(AbstractRemembering):
 
         def again(scale, _):
             own = self.believed(model, Precisions(shape, scale))
-            after, _ = self.filter.update(own, belief.inside, row)
-            expected = expected_squares(self.filter, model, after, row)
+            after, _ = self.inner.update(own, belief.inside, row)
+            expected = expected_squares(self.inner, model, after, row)
             return jnp.where(here, before.scale + 0.5 * expected, scale), None
 
         start = before.scale * (shape / before.shape)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -13,13 +13,13 @@ from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
-from jaxveh.filters.wrappers.base import gaussian_of, rule_filter_of, with_gaussian
+from jaxveh.filters.wrappers.base import gaussian_of, with_gaussian
 from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractFilter, always, apart
+from jaxveh.statespace.contract import AbstractWrapper, innermost
 
 
-class Paused(AbstractFilter):
-    """`filter`, held while the input `channel` is above 0.5: no prediction, no measurement, as estimators of mass and
+class Paused(AbstractWrapper):
+    """`inner`, held while the input `channel` is above 0.5: no prediction, no measurement, as estimators of mass and
     grade wait while braking.
 
     The channel holds from its row to the next, whatever the model's `input_path`: the time before a pause's first row is still
@@ -29,41 +29,35 @@ class Paused(AbstractFilter):
     innovation.
     """
 
-    filter: AbstractGaussianFilter
+    noise_by_row: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     channel: str = eqx.field(static=True)
     widen: tuple[tuple[str, float], ...] = eqx.field(static=True)
 
-    def __init__(self, filter: AbstractGaussianFilter, channel: str, widen: Mapping[str, float]):
-        self.filter, self.channel, self.widen = filter, channel, tuple(sorted(dict(widen).items()))
+    def __init__(self, inner: AbstractGaussianFilter, channel: str, widen: Mapping[str, float]):
+        self.inner, self.channel, self.widen = inner, channel, tuple(sorted(dict(widen).items()))
 
     def __check_init__(self):
-        check_kind("Paused", self.filter, AbstractGaussianFilter)
+        check_kind("Paused", self.inner, AbstractGaussianFilter)
         for name, spread in self.widen:
             check_positive(f"Paused.widen of {name}", spread)
 
     def check(self, model):
-        self.filter.check(model)
+        self.inner.check(model)
         check_names("Paused.channel", (self.channel,), model.inputs)
         check_names("Paused.widen", [name for name, _ in self.widen], model.states)
 
-    def init(self, model, row, key=None):
-        del key
-        return apart(self._init, always(row.t), model, row)
-
-    def _init(self, model, row):
-        prior = self.filter.prior(model, row)
-        after, info = self.filter.update(model, prior, self._silent(model, row))
+    def _init(self, model, row, key):
+        prior = self.inner.prior(model, row)
+        after, info = self.inner.update(model, prior, self._silent(model, row))
         return _choose(self._waits(row.u), _after(prior, row), after), info
-
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
 
     def _step(self, model, belief, row):
         waits, waited = self._waits(row.u), self._waits(belief.u)
-        ahead = self.filter.predict_between(model, belief, row.t, row.u)
+        ahead = self.inner.predict_between(model, belief, row.t, row.u)
         here = _choose(waits, belief, self._widened(model, belief))
         start = _choose(waited, _at(here, t=row.t), ahead)
-        after, info = self.filter.update(model, start, self._silent(model, row))
+        after, info = self.inner.update(model, start, self._silent(model, row))
         return _choose(waits, _after(start, row), after), info
 
     def _waits(self, u):
@@ -76,7 +70,7 @@ class Paused(AbstractFilter):
     def _widened(self, model: StateSpace, belief: Any) -> Any:
         extra, gaussian = dict(self.widen), gaussian_of(belief)
         added = jnp.diag(jnp.asarray([extra.get(name, 0.0) ** 2 for name in model.states], gaussian.vector.dtype))
-        spread = rule_filter_of(self.filter).form.start(gaussian.covariance + added)
+        spread = innermost(self.inner).form.start(gaussian.covariance + added)
         return with_gaussian(belief, with_spread(gaussian, gaussian.vector, spread))
 
 

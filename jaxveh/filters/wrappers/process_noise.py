@@ -20,7 +20,7 @@ from jaxveh.statespace.process import AbstractProcessNoise
 
 
 class ShrinkingProcess(AbstractRemembering):
-    """`filter` with an extra process noise a step on some states, which shrinks: as an adaptive unscented filter of mass and
+    """`inner` with an extra process noise a step on some states, which shrinks: as an adaptive unscented filter of mass and
     road grade has it (the experiment `mass-grade-aukf`).
 
     The variance of a state is q_c + q_v: the model's own, and q_v, at first the square of `extra` (standard deviations a step
@@ -35,18 +35,19 @@ class ShrinkingProcess(AbstractRemembering):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    filter: AbstractGaussianFilter
+    noise_by_row: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     extra: tuple[tuple[str, float], ...] = eqx.field(static=True)
 
-    def __init__(self, filter: AbstractGaussianFilter, extra: Mapping[str, float]):
-        self.filter, self.extra = filter, tuple(sorted(dict(extra).items()))
+    def __init__(self, inner: AbstractGaussianFilter, extra: Mapping[str, float]):
+        self.inner, self.extra = inner, tuple(sorted(dict(extra).items()))
 
     def __check_init__(self):
         _check_levels("ShrinkingProcess.extra", self.extra)
 
     def check(self, model):
         _check_states("ShrinkingProcess.extra", self.extra, model)
-        self.filter.check(model)
+        self.inner.check(model)
 
     def start(self, model):
         return jnp.asarray([std**2 for _, std in self.extra], model.prior.mean[0].dtype)
@@ -63,7 +64,7 @@ class ShrinkingProcess(AbstractRemembering):
 
 
 class MatchedProcess(AbstractRemembering):
-    """`filter` with an extra process noise on some states that matches the corrections (R. Mehra 1972; S. Akhlaghi, N. Zhou &
+    """`inner` with an extra process noise on some states that matches the corrections (R. Mehra 1972; S. Akhlaghi, N. Zhou &
     Z. Huang 2017).
 
         q <- b q + (1 - b) (d^2 - Q),    b = `forgetting`
@@ -74,12 +75,13 @@ class MatchedProcess(AbstractRemembering):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    filter: AbstractGaussianFilter
+    noise_by_row: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     most: tuple[tuple[str, float], ...] = eqx.field(static=True)
     forgetting: float = eqx.field(static=True)
 
-    def __init__(self, filter: AbstractGaussianFilter, most: Mapping[str, float], forgetting: float = 0.95):
-        self.filter, self.most, self.forgetting = filter, tuple(sorted(dict(most).items())), forgetting
+    def __init__(self, inner: AbstractGaussianFilter, most: Mapping[str, float], forgetting: float = 0.95):
+        self.inner, self.most, self.forgetting = inner, tuple(sorted(dict(most).items())), forgetting
 
     def __check_init__(self):
         _check_levels("MatchedProcess.most", self.most)
@@ -87,7 +89,7 @@ class MatchedProcess(AbstractRemembering):
 
     def check(self, model):
         _check_states("MatchedProcess.most", self.most, model)
-        self.filter.check(model)
+        self.inner.check(model)
 
     def start(self, model):
         nothing = jnp.zeros(len(self.most), model.prior.mean[0].dtype)

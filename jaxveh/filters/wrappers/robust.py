@@ -13,16 +13,16 @@ from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innov
 from jaxveh.filters.wrappers.base import (
     AbstractStateless,
     check_independent,
-    check_variances_count,
     variances_of,
     with_variances,
 )
 from jaxveh.filters.wrappers.innovation import innovation, spread_of
-from jaxveh.statespace.contract import Smoothing, presence
+from jaxveh.statespace.contract import Smoothing, check_noise_by_row
+from jaxveh.statespace.measurements import presence
 
 
 class Huber(AbstractStateless):
-    """`filter` with Huber's loss of the innovations: linear beyond `threshold` standard deviations of the prediction.
+    """`inner` with Huber's loss of the innovations: linear beyond `threshold` standard deviations of the prediction.
 
     Each channel's noise variance is divided by the weight `min(1, threshold / |e|)`, e the innovation over its predicted
     spread (P. Huber 1964; after the reweighting of C. Karlgaard & H. Schaub 2007, who scale by the noise's spread and repeat).
@@ -31,7 +31,8 @@ class Huber(AbstractStateless):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    filter: AbstractGaussianFilter
+    rows_between: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     threshold: float = eqx.field(static=True, default=1.345)
 
     def __check_init__(self):
@@ -39,19 +40,19 @@ class Huber(AbstractStateless):
 
     def check(self, model):
         check_independent("Huber", model)
-        check_variances_count("Huber", self.filter)
-        self.filter.check(model)
+        check_noise_by_row("Huber", self.inner)
+        self.inner.check(model)
 
     def update(self, model, belief, row):
-        found = innovation(self.filter, model, belief, row)
+        found = innovation(self.inner, model, belief, row)
         squared = jnp.square(found.error) / (found.expected + found.noise)
         large = squared > self.threshold**2
         weight = jnp.where(large, self.threshold / jnp.sqrt(jnp.where(large, squared, 1)), 1)
-        return self.filter.update(with_variances(model, variances_of(model) / weight), belief, row)
+        return self.inner.update(with_variances(model, variances_of(model) / weight), belief, row)
 
 
 class RobustStudentT(AbstractStateless):
-    """`filter` for noise of Student's t law with `dof` degrees of freedom and the model's standard deviations as scales.
+    """`inner` for noise of Student's t law with `dof` degrees of freedom and the model's standard deviations as scales.
 
     A t law is a Gaussian whose precision is itself random; variational Bayes finds the precision and the state in turns, with
     y - h the residual under the state's belief and H P H^T what it spreads (R. Piche, S. Sarkka & J. Hartikainen 2012):
@@ -63,7 +64,8 @@ class RobustStudentT(AbstractStateless):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    filter: AbstractGaussianFilter
+    rows_between: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     dof: float = eqx.field(static=True, default=4.0)
     iterations: int = eqx.field(static=True, default=3)
 
@@ -73,19 +75,19 @@ class RobustStudentT(AbstractStateless):
 
     def check(self, model):
         check_independent("RobustStudentT", model)
-        check_variances_count("RobustStudentT", self.filter)
-        self.filter.check(model)
+        check_noise_by_row("RobustStudentT", self.inner)
+        self.inner.check(model)
 
     def update(self, model, belief, row):
         scale = variances_of(model)
 
         def again(variances, _):
-            after, _ = self.filter.update(with_variances(model, variances), belief, row)
-            expected = expected_squares(self.filter, model, after, row)
+            after, _ = self.inner.update(with_variances(model, variances), belief, row)
+            expected = expected_squares(self.inner, model, after, row)
             return scale * (self.dof + expected / scale) / (self.dof + 1.0), None
 
         variances, _ = jax.lax.scan(jax.checkpoint(again), scale, length=self.iterations)
-        return self.filter.update(with_variances(model, variances), belief, row)
+        return self.inner.update(with_variances(model, variances), belief, row)
 
 
 def expected_squares(filter: AbstractGaussianFilter, model: Any, belief: Any, row: Any) -> Any:

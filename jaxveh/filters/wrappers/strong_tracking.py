@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -12,7 +14,7 @@ from jaxveh.filters.wrappers.innovation import innovation
 
 
 class StrongTracking(AbstractRemembering):
-    """`filter` whose predicted covariance is inflated where innovations exceed it (D. Zhou & P. Frank 1996).
+    """`inner` whose predicted covariance is inflated where innovations exceed it (D. Zhou & P. Frank 1996).
 
         V <- (rho V + e e^T) / (1 + rho),    lambda = max(1, trace(V - beta R) / trace(H P H^T))
 
@@ -21,7 +23,9 @@ class StrongTracking(AbstractRemembering):
     source leaves out the process noise. It follows sudden changes that the model does not know of, and takes outliers for such.
     """
 
-    filter: AbstractGaussianFilter
+    noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.95)
     softening: float = eqx.field(static=True, default=1.0)
     ceiling: float = eqx.field(static=True, default=100.0)
@@ -32,7 +36,7 @@ class StrongTracking(AbstractRemembering):
         check("StrongTracking.ceiling", self.ceiling, lambda v: v >= 1, "at least 1")
 
     def check(self, model):
-        self.filter.check(model)
+        self.inner.check(model)
 
     def start(self, model):
         dtype = model.prior.mean[0].dtype
@@ -43,7 +47,7 @@ class StrongTracking(AbstractRemembering):
         return model
 
     def update(self, model, belief, row):
-        found = innovation(self.filter, model, belief.inside, row)
+        found = innovation(self.inner, model, belief.inside, row)
         squared = jnp.square(found.error) / found.noise
         old = belief.memory
         mixed = jnp.where(old < 0, squared, (self.forgetting * old + squared) / (1.0 + self.forgetting))
@@ -53,5 +57,5 @@ class StrongTracking(AbstractRemembering):
         some = expected > 0
         factor = jnp.where(some, jnp.sum(excess) / jnp.where(some, expected, 1.0), 1.0)
         factor = jnp.clip(factor, 1.0, self.ceiling)
-        after, info = self.filter.update(model, belief.inside.inflated(factor), row)
+        after, info = self.inner.update(model, belief.inside.inflated(factor), row)
         return Remembering(after, squares), info

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.names import check_names
-from jaxveh.filters.wrappers.base import check_variances_count
 from jaxveh.statespace import Continuous, Gaussian, StateSpace
-from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.statespace.contract import AbstractFilter, AbstractWrapper, check_noise_by_row
 from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.process import Discrete
 
 
-class VaryingNoise(AbstractFilter):
-    """Any `filter`, with standard deviations that inputs of the model say, row by row.
+class VaryingNoise(AbstractWrapper):
+    """Any `inner`, with standard deviations that inputs of the model say, row by row.
 
     `measurement`: the input that is a channel's standard deviation (its unit), by channel (`{"gnss_speed":
     "gnss_speed_accuracy"}`), that of the same row. `process`: the input that is a state's process noise (unit per root second,
@@ -27,19 +26,22 @@ class VaryingNoise(AbstractFilter):
     standard deviation a field; the fields not named keep theirs. Numbers that are not positive end in a result code.
     """
 
-    filter: AbstractFilter
+    whitens: ClassVar[bool] = True
+    noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
+    inner: AbstractFilter
     measurement: tuple[tuple[str, str], ...] = eqx.field(static=True)
     process: tuple[tuple[str, str], ...] = eqx.field(static=True)
     process_of: str = eqx.field(static=True)
 
     def __init__(
         self,
-        filter: AbstractFilter,
+        inner: AbstractFilter,
         measurement: Mapping[str, str] | None = None,
         process: Mapping[str, str] | None = None,
         process_of: str = "before",
     ):
-        self.filter, self.process_of = filter, process_of
+        self.inner, self.process_of = inner, process_of
         self.measurement, self.process = (
             tuple(sorted((measurement or {}).items())),
             tuple(sorted((process or {}).items())),
@@ -68,15 +70,15 @@ class VaryingNoise(AbstractFilter):
                 kind = type(law).__name__
                 raise InputError(f"VaryingNoise: the {what} is {kind}: must be Gaussian, a standard deviation a field.")
         if self.measurement:
-            check_variances_count("VaryingNoise", self.filter)
-        self.filter.check(model)
+            check_noise_by_row("VaryingNoise", self.inner)
+        self.inner.check(model)
 
-    def init(self, model, row, key=None):
-        return self.filter.init(self._told(model, row.u, row.u), row, key)
+    def _init(self, model, row, key):
+        return self.inner._init(self._told(model, row.u, row.u), row, key)
 
-    def step(self, model, belief, row):
+    def _step(self, model, belief, row):
         moved = row.u if self.process_of == "after" else belief.u
-        return self.filter.step(self._told(model, row.u, moved), belief, row)
+        return self.inner._step(self._told(model, row.u, moved), belief, row)
 
     def _told(self, model: StateSpace, now: Any, moved: Any) -> StateSpace:
         """The model with what the inputs `now` say of the measurement, and those `moved` of the process."""

@@ -18,7 +18,7 @@ from jaxveh.filters.wrappers.base import (
     with_variances,
 )
 from jaxveh.statespace import CauchyGaussianMixture, Gaussian
-from jaxveh.statespace.contract import AbstractFilter, Smoothing, always, apart
+from jaxveh.statespace.contract import AbstractWrapper, Smoothing
 from jaxveh.statespace.dependent_noise import check_fixed
 
 # The median of the absolute value of a standard normal number.
@@ -35,7 +35,7 @@ class Window(NamedTuple):
 
 
 class HaarNoise(AbstractRemembering):
-    """`filter` with measurement variances from the Haar wavelet's highest band of the last `window` samples
+    """`inner` with measurement variances from the Haar wavelet's highest band of the last `window` samples
     (Qin et al. 2014).
 
         d_j = (y_{2j+1} - y_{2j}) / sqrt(2),    sigma = median |d| / 0.6745,    R <- b R + (1 - b) sigma^2
@@ -53,8 +53,8 @@ class HaarNoise(AbstractRemembering):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    learns_variances: ClassVar[bool] = True
-    filter: AbstractGaussianFilter
+    rows_between: ClassVar[bool] = True
+    inner: AbstractGaussianFilter
     window: int = eqx.field(static=True, default=64)
     forgetting: float = eqx.field(static=True, default=0.9)
     floor: float = eqx.field(static=True, default=0.01)
@@ -67,7 +67,7 @@ class HaarNoise(AbstractRemembering):
 
     def check(self, model):
         check_independent("HaarNoise", model)
-        self.filter.check(model)
+        self.inner.check(model)
 
     def start(self, model):
         return first_window(self, variances_of(model))
@@ -80,8 +80,8 @@ class HaarNoise(AbstractRemembering):
         return self.update_inside(model, Remembering(belief.inside, memory), row)
 
 
-class HaarParticles(AbstractFilter):
-    """What `HaarNoise` does, around a particle `filter`, whose likelihood need not be Gaussian.
+class HaarParticles(AbstractWrapper):
+    """What `HaarNoise` does, around a particle `inner`, whose likelihood need not be Gaussian.
 
     The settings are those of `HaarNoise`. Of a `CauchyGaussianMixture` the variances are those of its Gaussian part (Qin et al.
     2014); `follows="both"` scales the Cauchy part by the same factor, `"gaussian"` (the default, as the paper has it) leaves
@@ -90,7 +90,8 @@ class HaarParticles(AbstractFilter):
     **Raises** `InputError` for settings out of range, a filter without particles, or a law of another kind.
     """
 
-    filter: AbstractParticleFilter
+    rows_between: ClassVar[bool] = True
+    inner: AbstractParticleFilter
     window: int = eqx.field(static=True, default=64)
     forgetting: float = eqx.field(static=True, default=0.9)
     floor: float = eqx.field(static=True, default=0.01)
@@ -100,8 +101,8 @@ class HaarParticles(AbstractFilter):
     follows: str = eqx.field(static=True, default="gaussian")
 
     def __check_init__(self):
-        if not isinstance(self.filter, AbstractParticleFilter):
-            kind = type(self.filter).__name__
+        if not isinstance(self.inner, AbstractParticleFilter):
+            kind = type(self.inner).__name__
             raise InputError(
                 f"HaarParticles: {kind} inside: must be a particle filter; HaarNoise is for Gaussian ones."
             )
@@ -116,23 +117,17 @@ class HaarParticles(AbstractFilter):
                 f"HaarParticles: the measurement noise is {type(law).__name__}: must be Gaussian, a standard deviation a "
                 "channel, or CauchyGaussianMixture."
             )
-        self.filter.check(model)
-
-    def init(self, model, row, key=None):
-        return apart(self._init, always(row.t), model, row, key)
+        self.inner.check(model)
 
     def _init(self, model, row, key):
         own = variances_of(model)
         memory = seen(self, own, first_window(self, own), measured(model, row))
-        inside, info = self.filter.init(self._told(model, memory), row, key)
+        inside, info = self.inner._init(self._told(model, memory), row, key)
         return Remembering(inside, memory), info
-
-    def step(self, model, belief, row):
-        return apart(self._step, belief.count >= 0, model, belief, row)
 
     def _step(self, model, belief, row):
         memory = seen(self, variances_of(model), belief.memory, measured(model, row))
-        inside, info = self.filter.step(self._told(model, memory), belief.inside, row)
+        inside, info = self.inner._step(self._told(model, memory), belief.inside, row)
         return Remembering(inside, memory), info
 
     def _told(self, model, memory: Window):

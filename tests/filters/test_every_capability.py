@@ -1,0 +1,252 @@
+"""What a filter declares is what it does: each of `FILTERS`, each capability, both ways."""
+
+import inspect
+from typing import ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import scipy.linalg
+from test_every_filter import FILTERS, linear, recordings
+
+from jaxveh import InputError, filters, observers
+from jaxveh import statespace as ss
+from jaxveh._core.names import record_type
+from jaxveh.statespace.contract import (
+    AbstractFilter,
+    AbstractTwoPartWrapper,
+    AbstractWrapper,
+    Smoothing,
+    innermost,
+    layers,
+    who_lacks,
+)
+
+CLASSES = [
+    cls
+    for room in (filters, observers)
+    for cls in (getattr(room, name) for name in room.__all__)
+    if isinstance(cls, type) and issubclass(cls, AbstractFilter) and not inspect.isabstract(cls)
+]
+FLAGS = ("whitens", "noise_by_row", "rows_between")
+HUGE, ROW = 1e6, 12
+
+# Capabilities are those of classes: of lines of the same classes the first.
+KINDS = {tuple(type(layer) for layer in layers(line.make())): name for name, line in reversed(FILTERS.items())}
+ONCE = [name for name in FILTERS if name in KINDS.values()]
+# Of an earlier row is what one shows that is late.
+NOW = [name for name in ONCE if not FILTERS[name].late]
+DRAWN, NOT_DRAWN = [n for n in ONCE if FILTERS[n].drawn], [n for n in NOW if not FILTERS[n].drawn]
+# Its second mode sets a noise itself.
+SETS_NOISE = "interacting"
+
+
+def filter_named(name):
+    return FILTERS[name].make()
+
+
+def able(name, flag):
+    return who_lacks(filter_named(name), flag) is None
+
+
+def scanned(filter_, model, rows):
+    return filters.scan(filter_, model, rows, jax.random.key(0))
+
+
+def told_model():
+    """The linear model, with an input that tells the spread of its first channel."""
+    model = linear()
+    return ss.StateSpace(
+        system=model.system, transition=model.transition_function, observation=model.observation_function,
+        process_noise=model.process_noise, measurement_noise=model.measurement_noise, prior=model.prior,
+        inputs=("force", "told"),
+    )  # fmt: skip
+
+
+def told_rows(model, values, y0=None):
+    recording = recordings("linear")[0]
+    channels = {name: np.array(recording[name]) for name in (*model.channels, "force")}
+    if y0 is not None:
+        channels["y0"][ROW] = y0
+    return model.rows(recording.replace(**channels, told=values))
+
+
+@pytest.mark.parametrize("name", [n for n in NOW if able(n, "noise_by_row") and n != SETS_NOISE])
+def test_noise_of_a_row_is_taken_as_it_is_told(name):
+    """A channel of a huge spread in one row is as good as missing there, and has the model's own spread in all others."""
+    model, own = told_model(), 0.4
+    values = np.full(25, own)
+    values[ROW] = HUGE
+    told = scanned(filters.VaryingNoise(filter_named(name), {"y0": "told"}), model, told_rows(model, values, y0=0.5))
+    missing = scanned(filter_named(name), model, told_rows(model, values, y0=np.nan))
+    for found, expected in zip(told.mean, missing.mean, strict=True):
+        np.testing.assert_allclose(found[: ROW + 1], expected[: ROW + 1], rtol=1e-4, atol=1e-4)
+    given = scanned(filter_named(name), model, told_rows(model, values, y0=5.0))
+    assert abs(given.mean.x0[ROW] - missing.mean.x0[ROW]) > 1e-3
+
+
+@pytest.mark.parametrize("name", [n for n in ONCE if not able(n, "noise_by_row")])
+def test_a_filter_with_a_noise_of_its_own_is_refused(name):
+    model, kind = told_model(), who_lacks(filter_named(name), "noise_by_row")
+    for outer in (lambda f: filters.VaryingNoise(f, {"y0": "told"}), filters.Huber, filters.RobustStudentT):
+        if outer in (filters.Huber, filters.RobustStudentT) and not isinstance(
+            filter_named(name), filters.AbstractGaussianFilter
+        ):
+            continue
+        with pytest.raises(InputError, match=rf"{kind} inside it does not take .* Put \w+ inside: {kind}\("):
+            outer(filter_named(name)).check(model)
+
+
+def turn(system, t0, t1, x, u):
+    """exp(A dt) x: two steps are exactly one over both."""
+    moved = jax.scipy.linalg.expm(system["A"] * (t1 - t0)) @ jnp.stack(x)
+    return type(x)(*moved)
+
+
+def turning():
+    names = ("x0", "x1", "x2")
+    model = linear()
+    A = np.array([[0.0, 2.0, 0.3], [-2.0, -0.2, 0.0], [0.0, 0.0, -0.1]])
+    assert np.allclose(scipy.linalg.expm(A * 0.3), scipy.linalg.expm(A * 0.1) @ scipy.linalg.expm(A * 0.2))
+    return ss.StateSpace(
+        system={**model.system, "A": jnp.asarray(A)}, transition=turn, observation=model.observation_function,
+        process_noise=None, measurement_noise=model.measurement_noise,
+        prior=ss.Prior(record_type("X", names)(0.5, 0.0, 0.1), dict.fromkeys(names, 1.0)), inputs=("force",),
+    )  # fmt: skip
+
+
+def with_empty_rows(rows, count):
+    """`count` rows without a measurement put between each two, at which the inputs are still those of the row before."""
+    parts = np.arange(count + 1) / (count + 1)
+    t = np.asarray(rows.t)
+    times = np.append((t[:-1, None] + np.diff(t)[:, None] * parts).reshape(-1), t[-1])
+    place = np.arange(times.size) // (count + 1)
+    real = np.arange(times.size) % (count + 1) == 0
+    taken = jax.tree.map(lambda leaf: leaf[place], rows)
+    y = jax.tree.map(lambda leaf: jnp.where(real, leaf, jnp.nan), taken.y)
+    return taken._replace(t=jnp.asarray(times), y=y)
+
+
+def beside(name):
+    """Estimates of the rows that both have: as they are, and with two empty rows between each two."""
+    model, filter_ = turning(), filter_named(name)
+    rows = model.rows(recordings("linear")[0])
+    plain, longer = scanned(filter_, model, rows), scanned(filter_, model, with_empty_rows(rows, 2))
+    shown = jnp.stack([*plain.mean, *plain.std])
+    return np.asarray(shown), np.asarray(jnp.stack([*longer.mean, *longer.std])[:, ::3])
+
+
+@pytest.mark.parametrize("name", [n for n in NOT_DRAWN if able(n, "rows_between")])
+def test_empty_rows_between_change_nothing(name):
+    plain, longer = beside(name)
+    np.testing.assert_allclose(longer, plain, rtol=1e-6, atol=1e-6)
+
+
+# It keeps rows of its own, and no others: rows put between them would push them out.
+UNCHANGED = "delayed, in order"
+
+
+@pytest.mark.parametrize("name", [n for n in NOT_DRAWN if not able(n, "rows_between") and n != UNCHANGED])
+def test_what_acts_in_each_step_is_changed_by_empty_rows_and_refused(name):
+    plain, longer = beside(name)
+    assert np.abs(longer - plain).max() > 1e-4
+    with pytest.raises(InputError, match=f"{who_lacks(filter_named(name), 'rows_between')} inside it takes no late rows"):
+        filters.Delayed(filter_named(name)).check(turning())
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_the_spread_of_particles_without_measurements_depends_on_time_alone(name):
+    """Over 40 rows as over 4: their own number of draws makes spreads scatter by 5 %."""
+    model = linear()
+    rows = model.rows(recordings("linear")[0])
+    few = jax.tree.map(lambda leaf: leaf[:4], rows)
+    few = few._replace(y=jax.tree.map(lambda leaf: jnp.full_like(leaf, jnp.nan), few.y))
+    ends = []
+    for given in (few, with_empty_rows(few, 12)):
+        found = eqx.filter_vmap(lambda key, given=given: filters.scan(filter_named(name), model, given, key))(
+            jax.random.split(jax.random.key(1), 4)
+        )
+        ends.append(np.sqrt(np.mean([std[:, -1] ** 2 for std in found.std], axis=1)))
+    # The transition is Heun's or Euler's, whose steps are not those of their sum: the spread of it differs by a little.
+    ratio = ends[1] / ends[0]
+    if able(name, "rows_between"):
+        assert np.all(np.abs(ratio - 1.0) < 0.25), ratio
+    else:
+        assert np.any(ratio > 1.3), ratio
+
+
+@pytest.mark.parametrize("name", NOT_DRAWN)
+def test_whitened_innovations_add_up_where_they_are_declared(name):
+    model = linear()
+    found = scanned(filter_named(name), model, model.rows(recordings("linear")[0]))
+    if not able(name, "whitens"):
+        assert found.info.whitened is None
+        return
+    white, scale = jnp.stack(found.info.whitened), jnp.stack(found.info.log_scale)
+    here = jnp.isfinite(jnp.stack(found.info.innovation))
+    sums = jnp.sum(jnp.where(here, -0.5 * white**2 - scale - 0.5 * np.log(2 * np.pi), 0.0))
+    np.testing.assert_allclose(sums, found.log_likelihood, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_what_draws_needs_a_key_and_nothing_else_does(name):
+    filter_, model = filter_named(name), linear()
+    assert filter_.needs_key
+    row = jax.tree.map(lambda leaf: leaf[0], model.rows(recordings("linear")[0]))
+    with pytest.raises(InputError, match=f"{type(innermost(filter_)).__name__} draws random numbers: give it a key"):
+        filter_.init(model, row)
+
+
+def test_nothing_else_needs_a_key():
+    assert not [name for name, line in FILTERS.items() if line.make().needs_key and not line.drawn]
+
+
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
+def test_what_goes_around_a_filter_calls_it_inner(cls):
+    fields = {field.name: field for field in cls.__dataclass_fields__.values()}
+    around = "inner" in fields
+    assert around == issubclass(cls, AbstractWrapper)
+    assert "filter" not in fields
+    for flag in FLAGS:
+        assert isinstance(getattr(cls, flag), bool)
+    assert isinstance(cls.smooths, Smoothing)
+
+
+def test_layers_end_with_what_goes_around_nothing():
+    for name in FILTERS:
+        found = layers(filter_named(name))
+        assert not isinstance(found[-1], AbstractWrapper) and found[-1] is innermost(found[0])
+        assert all(isinstance(layer, AbstractWrapper) for layer in found[:-1])
+
+
+@pytest.mark.parametrize("method", ["init", "step"])
+def test_init_and_step_are_final(method):
+    with pytest.raises(TypeError, match=f"{method}: is final. Write _{method}"):
+        type("Own", (filters.Kalman,), {method: lambda self, *given: None})
+
+
+class Wider(AbstractTwoPartWrapper):
+    """Of a user: predictions wider by a factor."""
+
+    inner: filters.AbstractGaussianFilter
+    factor: float = eqx.field(static=True, default=2.0)
+    noise_by_row: ClassVar[bool] = True
+
+    def _predict(self, model, belief, row):
+        return self.inner._predict(model, belief, row).inflated(jnp.asarray(self.factor))
+
+
+def test_a_wrapper_of_one_part_changes_that_part_alone():
+    model = linear()
+    rows = model.rows(recordings("linear")[0])
+    found, plain = scanned(Wider(filters.Kalman()), model, rows), scanned(filters.Kalman(), model, rows)
+    np.testing.assert_array_equal(found.mean.x0[0], plain.mean.x0[0])
+    assert found.std.x0[5] > 1.05 * plain.std.x0[5]
+    one = scanned(Wider(filters.Kalman(), 1.0), model, rows)
+    np.testing.assert_allclose(one.mean.x0, plain.mean.x0, rtol=1e-12)
+    with pytest.raises(InputError, match="Wider inside it takes no late rows"):
+        filters.Delayed(Wider(filters.Kalman())).check(model)
+    with pytest.raises(InputError, match="Wider: FixedLag inside: must be a filter whose step is a prediction"):
+        Wider(filters.FixedLag(filters.Kalman(), 2))
