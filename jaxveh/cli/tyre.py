@@ -16,7 +16,7 @@ from jaxveh import InputError, io, tyres
 from jaxveh.cli import options
 from jaxveh.cli.console import messages, number, printable, results, table
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
-from jaxveh.tyres.evaluation import INPUTS, evaluate
+from jaxveh.tyres.evaluation import EVALUATION_INPUTS, evaluate
 
 TYRE = typer.Argument(metavar="FILE", help="A tyre property file (.tir).", show_default=False)
 PRODUCT = typer.Option("-o", metavar="FILE", help="The outputs: .csv.", show_default=False)
@@ -125,13 +125,13 @@ def evaluate_table(
     _say_what_is_beyond(tyre, found)
     import pandas as pd
 
-    with io.replacing(product, overwrite=force) as part:
+    with io.replacing_file(product, overwrite=force) as part:
         pd.DataFrame(found).to_csv(part, index=False)
     results().print(f"{product}: {len(frame)} rows, {', '.join(found)}")
 
 
 def _wanted(name: str) -> bool:
-    return name == "useMode" or any(name in names for names in INPUTS.values())
+    return name == "useMode" or any(name in names for names in EVALUATION_INPUTS.values())
 
 
 def _read(path: Path) -> Any:

@@ -17,8 +17,8 @@ from jaxveh.cli.console import progress, results
 from jaxveh.cli.failure import say
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
 from jaxveh.fitting.rig_ranges import measured_ranges, widened_ranges
-from jaxveh.fitting.rig_start import STARTS
-from jaxveh.io.rig_table import MEASURED
+from jaxveh.fitting.rig_start import RIG_STARTS
+from jaxveh.io.rig_table import RIG_CHANNELS
 
 DEFAULT = "mf61"
 SHAPE_OF_BOUNDS, SHAPE_OF_WEIGHT = "NAME=LOW:HIGH, such as PCY1=1:2", "CHANNEL=NUMBER, such as F_x=2"
@@ -49,7 +49,7 @@ PRODUCT = typer.Option("-o", metavar="FILE", show_default=False, help="The tyre:
 MODEL = typer.Option(
     "--model",
     metavar="LAW",
-    help=f"The law, started from what the data show: {', '.join(STARTS)} ({DEFAULT} by default).",
+    help=f"The law, started from what the data show: {', '.join(RIG_STARTS)} ({DEFAULT} by default).",
 )
 START = typer.Option(
     "--start",
@@ -67,7 +67,7 @@ AXES = typer.Option(
 CHANNELS = typer.Option(
     "--measured",
     metavar="F_x,F_y,...",
-    help=f"Compare these alone, of {', '.join(MEASURED)}; by default all there are.",
+    help=f"Compare these alone, of {', '.join(RIG_CHANNELS)}; by default all there are.",
 )
 BOUNDS = typer.Option("--bounds", metavar="NAME=LOW:HIGH", help="Keep a coefficient inside; repeatable.")
 WEIGHT = typer.Option(
@@ -141,7 +141,7 @@ def fit_table(
     _check_side(side, origin)
     chosen = _channels(measured)
     limits, weights = _bounds(bounds), _weights(weight)
-    rig = io.read_rig_table(data, None if axes is None else axes.value, measured=chosen or MEASURED)
+    rig = io.read_rig_table(data, None if axes is None else axes.value, measured=chosen or RIG_CHANNELS)
     law = _law(origin, rig)
     with progress("fit") as report:
         fit = fitting.fit_rig(
@@ -165,7 +165,7 @@ def fit_table(
 def _origin(model: str | None, start: Path | None) -> Origin:
     if start is None:
         model = DEFAULT if model is None else model
-        check_one_of("--model", model, tuple(STARTS))
+        check_one_of("--model", model, tuple(RIG_STARTS))
         return Origin(model)
     if model is not None:
         raise InputError(f"--model {model}: --start {start} tells the law; leave one of the two out.")
@@ -230,9 +230,9 @@ def _channels(text: str | None) -> tuple[str, ...] | None:
         return None
     found = tuple(name.strip() for name in text.split(",") if name.strip())
     if not found:
-        raise InputError(f"--measured {text!r}: must name one of {', '.join(MEASURED)}.")
+        raise InputError(f"--measured {text!r}: must name one of {', '.join(RIG_CHANNELS)}.")
     for name in found:
-        check_one_of("--measured", name, MEASURED)
+        check_one_of("--measured", name, RIG_CHANNELS)
     return tuple(dict.fromkeys(found))
 
 

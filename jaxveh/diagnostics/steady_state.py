@@ -8,9 +8,16 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import LONGEST_GAP, channel, seconds, sideslip, sideslip_channels, within_gaps
+from jaxveh.diagnostics.drive_channels import (
+    LONGEST_GAP,
+    channel_values,
+    sideslip,
+    sideslip_channels,
+    time_of,
+    within_gaps,
+)
 
-LINEAR = 4.0
+LINEAR_A_Y = 4.0
 """m/s^2: the lateral acceleration up to which passenger cars are taken as linear."""
 
 SLOWEST = 2.0
@@ -54,8 +61,8 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
     **Raises** `InputError` for a channel that is not there, a wheelbase that is not positive, or where no row is steady.
     """
     check_positive("steady", steady, "m/s^3")
-    v_x = channel(recording, "v_x")
-    moves = (v_x >= SLOWEST) & _settled(seconds(recording), channel(recording, "a_y"), steady)
+    v_x = channel_values(recording, "v_x")
+    moves = (v_x >= SLOWEST) & _settled(time_of(recording), channel_values(recording, "a_y"), steady)
     used = {"v_x", "a_y", "steer", *sideslip_channels(recording)} | ({"yaw_rate"} if wheelbase is not None else set())
     for name in sorted(used):
         moves &= ~within_gaps(recording, name)
@@ -68,9 +75,12 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
     geometric = None
     if wheelbase is not None:
         check_positive("wheelbase", wheelbase, "m")
-        geometric = float(wheelbase) * channel(recording, "yaw_rate")[moves] / v_x[moves]
+        geometric = float(wheelbase) * channel_values(recording, "yaw_rate")[moves] / v_x[moves]
     return SteadyTurns(
-        channel(recording, "a_y")[moves], channel(recording, "steer")[moves], sideslip(recording)[moves], geometric
+        channel_values(recording, "a_y")[moves],
+        channel_values(recording, "steer")[moves],
+        sideslip(recording)[moves],
+        geometric,
     )
 
 
@@ -85,7 +95,7 @@ def _settled(time: np.ndarray, a_y: np.ndarray, steady: float) -> np.ndarray:
     return time - last > SETTLED
 
 
-def understeer(turns: SteadyTurns, *, above: float = 0.2, linear: float = LINEAR) -> Understeer:
+def understeer(turns: SteadyTurns, *, above: float = 0.2, linear: float = LINEAR_A_Y) -> Understeer:
     """The gradients of ISO 4138 in the linear range, by least squares over rows with `above` <= |a_y| <= `linear` (m/s^2).
 
     **Raises** `InputError` without a wheelbase, or with too few rows in the range.

@@ -8,9 +8,9 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, peak, seconds
+from jaxveh.diagnostics.drive_channels import channel_values, check_gaps, crossing, peak, time_of
 
-RISEN = 0.9
+RESPONSE_SHARE = 0.9
 """Share of the steady value at which the response time is taken."""
 
 
@@ -43,7 +43,7 @@ def step_response(recording: Recording, output: str = "yaw_rate", *, average: fl
     the averaging begins before the steer is held.
     """
     check_positive("average", average, "s")
-    time, steer, values = seconds(recording), channel(recording, "steer"), channel(recording, output)
+    time, steer, values = time_of(recording), channel_values(recording, "steer"), channel_values(recording, output)
     for name in ("steer", output):
         check_gaps(recording, name, time[0], time[-1], "step_response")
     last = time >= time[-1] - average
@@ -66,7 +66,7 @@ def step_response(recording: Recording, output: str = "yaw_rate", *, average: fl
         steer=height,
         steady=steady,
         gain=steady / height,
-        response_time=crossing(time, risen, RISEN, reference) - reference,
+        response_time=crossing(time, risen, RESPONSE_SHARE, reference) - reference,
         peak=top * steady if peaks else float("nan"),
         peak_response_time=when - reference if peaks else float("nan"),
         overshoot=top - 1 if peaks else 0.0,

@@ -14,7 +14,7 @@ STEER_RATE = 3.0
 A_X_CUTOFF = 1.6
 """Hz: the axle loads follow the longitudinal acceleration, not its vibration."""
 
-BLIND = ("steer", "v_x", "a_x", "a_y", "yaw_rate")
+BLIND_CHANNELS = ("steer", "v_x", "a_x", "a_y", "yaw_rate")
 """The channels that sideslip is estimated from, blind."""
 
 
@@ -26,10 +26,10 @@ def clean(recording: Recording) -> Recording:
 
     **Raises** `InputError` where a channel is missing, or an input is NaN (fill it on request first).
     """
-    missing = [name for name in BLIND if name not in recording]
+    missing = [name for name in BLIND_CHANNELS if name not in recording]
     if missing:
         raise InputError(
-            f"log lacks {', '.join(missing)}: sideslip is estimated from {', '.join(BLIND)}. Name them in a channel map."
+            f"log lacks {', '.join(missing)}: sideslip is estimated from {', '.join(BLIND_CHANNELS)}. Name them in a channel map."
         )
     for name in ("steer", "v_x", "a_x"):
         gaps = int(np.isnan(np.asarray(recording[name])).sum())

@@ -37,7 +37,7 @@ PRIOR = {
 SHORTEST = 20.0
 """s: a span shorter than this holds too few corners to calibrate a car on."""
 
-PIECE = 8.0
+PIECE_LENGTH = 8.0
 """s: calibration runs the filter on pieces of about this length side by side,"""
 
 WARM_UP = 2.0
@@ -186,7 +186,7 @@ def _blank(log: Recording, rows: slice) -> Recording:
 
 
 def _fit(filter, model, log, weight, progress, centre=None) -> Fit:
-    pieces, warm_up = cut_pieces(log, PIECE, WARM_UP)
+    pieces, warm_up = cut_pieces(log, PIECE_LENGTH, WARM_UP)
     # A blind fit has a reference without values: one compiled function serves all fits.
     silent_one = lambda piece: jnp.full(len(piece), jnp.nan)
     values = tuple(map(silent_one if weight is None else reference_sideslip, pieces))

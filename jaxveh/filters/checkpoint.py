@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh.io.files import replacing
+from jaxveh.io.files import replacing_file
 from jaxveh.statespace.belief import AbstractBelief
 
 STATES = "states"
@@ -33,7 +33,7 @@ def save_belief(path: str | Path, belief: AbstractBelief) -> Path:
         raise InputError(f"path = {path}: must end in .npz.")
     arrays = {name: np.asarray(_words(leaf)) for name, leaf in _named(belief).items()}
     arrays[STATES] = np.asarray(_states(belief))
-    with replacing(path, overwrite=True) as part:
+    with replacing_file(path, overwrite=True) as part:
         np.savez(part, **arrays)
     return path
 

@@ -21,9 +21,9 @@ from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
 from jaxveh.fitting.rig_identify import settle, without
 from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered, spread_of
 from jaxveh.fitting.rig_robust import inflation
-from jaxveh.fitting.rig_stages import HELD, Stage, stages_of
+from jaxveh.fitting.rig_stages import HELD_COEFFICIENTS, Stage, stages_of
 from jaxveh.fitting.solve import fit_at
-from jaxveh.io.rig_table import MEASURED, RigTable
+from jaxveh.io.rig_table import RIG_CHANNELS, RigTable
 from jaxveh.tyres import AbstractTyre, MFTyre
 
 JOINT = "joint"
@@ -37,8 +37,8 @@ class RigFit(AbstractFit):
 
     `model`, also as `tyre`: the law with its coefficients, in the canonical one of its twins (`rig_canonical`); standard errors
     by the Gauss-Newton matrix of the joint stage with the noise estimated from residuals. nan for what stands at its start,
-    because data do not identify it or because it is held unless asked (`rig_stages.HELD`): in the others' errors it counts
-    with a spread of its own size, or of what it is among ordinary tyres. `identified`: how many directions the data do. By
+    because data do not identify it or because it is held unless asked (`rig_stages.HELD_COEFFICIENTS`): in the others' errors it
+    counts with a spread of its own size, or of what it is among ordinary tyres. `identified`: how many directions the data do. By
     channel (`F_x`, ...): `rmse` of residuals, `peak` (the 99.5th percentile of what was measured), `start_rmse` before the
     fit, `noise` (standard deviation), and `cross_validation`, the RMSE at rows that a fold's fit did not see (nan without).
     `residuals` (n,): fitted less measured, nan without a measurement. `stages`: a report each. `problem`: the joint stage's at
@@ -215,7 +215,7 @@ def _unseen(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarra
 
 def _channels(law: AbstractTyre, rig: RigTable, contact: Any, measured: Sequence[str] | None) -> tuple[str, ...]:
     has = offered(law, contact)
-    there = tuple(name for name in MEASURED if getattr(rig, name) is not None)
+    there = tuple(name for name in RIG_CHANNELS if getattr(rig, name) is not None)
     if measured is None:
         found = tuple(name for name in there if name in has)
         if not found:
@@ -224,7 +224,7 @@ def _channels(law: AbstractTyre, rig: RigTable, contact: Any, measured: Sequence
             )
         return found
     for name in measured:
-        check_one_of("measured", name, MEASURED)
+        check_one_of("measured", name, RIG_CHANNELS)
         if name not in there:
             raise InputError(f"measured: {name} is not in {rig.source}; there are: {', '.join(there)}.")
         if name not in has:
@@ -290,7 +290,7 @@ def _as_uncertain(problem: RigProblem, held: np.ndarray, names: Sequence[str]) -
     What is held at its start for lack of data may be off by its own size, what is held unless asked by what `HELD` says, and what
     is confounded with it by as much.
     """
-    spreads = jnp.asarray([HELD.get(name, np.nan) for name in names])
+    spreads = jnp.asarray([HELD_COEFFICIENTS.get(name, np.nan) for name in names])
     size = jnp.where(jnp.isnan(spreads), 1.0, spreads / problem.scale)
     pull = jnp.where(jnp.asarray(held), 1 / size, PULL).astype(problem.origin.dtype)
     return dataclasses.replace(problem, pull=pull)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh.fitting.rig_stages import varying
+from jaxveh.fitting.rig_stages import varying_inputs
 from jaxveh.io.rig_table import RigTable
 from jaxveh.tyres import MFTyre
 
@@ -39,7 +39,7 @@ def measured_ranges(tyre: MFTyre, rig: RigTable) -> MFTyre:
     Slips and camber reach as far to either side; loads go down to zero, where a wheel lifts. An input that does not vary in the
     data leaves its range as it is.
     """
-    varies = varying(rig)
+    varies = varying_inputs(rig)
     found = {}
     for name, (low, high) in RANGES.items():
         if name not in varies:

@@ -13,7 +13,7 @@ import numpy as np
 
 from jaxveh.fitting.rig_problem import KINK
 
-FAR = 4.0
+FAR_RESIDUAL = 4.0
 """Robust standard deviations beyond which a residual is far: of normal noise, 0.006 % of rows."""
 
 LEAST_SHARE, LEAST_ROWS = 0.002, 3
@@ -41,7 +41,7 @@ def heavy_tails(residuals: np.ndarray) -> Tails | None:
     deviation = TO_DEVIATION * float(np.median(np.abs(known))) if known.size else 0.0
     if deviation == 0:
         return None
-    far = np.abs(known) > FAR * deviation
+    far = np.abs(known) > FAR_RESIDUAL * deviation
     if far.sum() < max(LEAST_ROWS, LEAST_SHARE * known.size):
         return None
     return Tails(float(far.mean()), deviation, float(np.sqrt(np.mean(known**2)) / deviation))

@@ -39,7 +39,7 @@ there; in combined slip the shape C has a good end on either side of 1; a typica
 what they multiply."""
 
 
-HELD = {"lateral.PKY4": 0.5}
+HELD_COEFFICIENTS = {"lateral.PKY4": 0.5}
 """Coefficients that are held where the law has them unless somebody asks, and how far from there an ordinary tyre's may be
 (standard deviation). PKY4, the form of the cornering stiffness over load, is 2 in the book's simple form (4.E25); beside PKY1 and
 PKY2 the three or four loads of a rig hardly show it, and all three run along one valley."""
@@ -117,7 +117,7 @@ ROLLING = Group("rolling", "M_y", "QSY1", "QSY7", "QSY5 QSY6", "QSY8", "QSY3 QSY
 ROLLING_52 = Group("rolling", "M_y", "QSY1", "", "", "", "QSY3 QSY4")
 
 
-def varying(rig: RigTable) -> set[str]:
+def varying_inputs(rig: RigTable) -> set[str]:
     """The inputs that vary enough to show their coefficients."""
     found = set()
     for name, least in LEAST_SPREAD.items():
@@ -145,7 +145,7 @@ def stages_of(
     """
     if not isinstance(law, MFTyre):
         return []
-    varies = varying(rig)
+    varies = varying_inputs(rig)
     every = np.ones(rig.load.shape, bool)
     across, along = np.abs(rig.slip_angle) <= PURE_ANGLE, np.abs(rig.slip_ratio) <= PURE_RATIO
     old = law.version == 52

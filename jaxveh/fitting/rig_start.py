@@ -121,7 +121,7 @@ def _of_stiffness(law: type) -> Callable[[RigFacts], AbstractTyre]:
     return lambda facts: law(facts.slip_stiffness, facts.cornering_stiffness, facts.friction)
 
 
-STARTS: dict[str, Callable[[RigFacts], AbstractTyre]] = {
+RIG_STARTS: dict[str, Callable[[RigFacts], AbstractTyre]] = {
     "mf61": _mf(61),
     "mf52": _mf(52),
     "mf62": _mf(62),
@@ -146,7 +146,7 @@ def starting_tyre(model: str, rig: RigTable) -> AbstractTyre:
     **Raises** `InputError` for an unknown name, and for a slope that no tyre has, as in data of other axes
     (`rig_signs.wrong_signs`): who knows such a tyre starts from one of his own.
     """
-    check_one_of("model", model, tuple(STARTS))
+    check_one_of("model", model, tuple(RIG_STARTS))
     for wrong in wrong_signs(rig):
         raise InputError(f"{wrong.words} If they are, start from a tyre of your own (--start).")
-    return STARTS[model](rig_facts(rig))
+    return RIG_STARTS[model](rig_facts(rig))

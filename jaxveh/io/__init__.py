@@ -8,7 +8,7 @@ from jaxveh.io.canonical import CANONICAL, CanonicalChannel, canonical_unit
 from jaxveh.io.car import AxleTyre, CarSpecification, read_car, write_car
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.commonroad import CommonRoadSpecification, read_commonroad
-from jaxveh.io.files import check_readable, making_folder, replacing, write_text
+from jaxveh.io.files import check_readable, making_folder, replacing_file, write_text
 from jaxveh.io.frames import to_frame, write_frame
 from jaxveh.io.merge import resample
 from jaxveh.io.property_file import PropertyFile, read_property_file, write_property_file
@@ -41,7 +41,7 @@ __all__ = [
     "read_rig_table",
     "read_road",
     "read_tydex",
-    "replacing",
+    "replacing_file",
     "resample",
     "to_frame",
     "with_units_in_names",

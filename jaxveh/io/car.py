@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check
 from jaxveh.io.files import write_text
-from jaxveh.io.toml import check_keys, number, quoted, read_toml, text
+from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
 
 SCHEMA = """\
 # A car. SI units; axes x forward, y left, z up; steer positive to the left.
@@ -177,7 +177,9 @@ def _lines(values: Any) -> list[str]:
         value, unit = getattr(values, entry.name), entry.metadata.get("unit")
         if value is None or isinstance(value, AxleTyre):
             continue
-        shown = quoted(value) if isinstance(value, str) else str(list(value) if isinstance(value, tuple) else value)
+        shown = (
+            toml_string(value) if isinstance(value, str) else str(list(value) if isinstance(value, tuple) else value)
+        )
         lines.append(f"{entry.name} = {shown}{f'  # {unit}' if unit else ''}")
     return lines
 
@@ -186,18 +188,18 @@ def _value(key: str, value: Any, folder: Path) -> Any:
     if key in ("front", "rear"):
         check_keys(f"[{key}]", value, [entry.name for entry in fields(AxleTyre)])
         try:
-            return _build(AxleTyre, {name: number(name, item) for name, item in value.items()})
+            return _build(AxleTyre, {name: toml_number(name, item) for name, item in value.items()})
         except InputError as error:
             raise InputError(f"[{key}]: {error}") from error
     if key == "name":
-        return text(key, value)
+        return toml_text(key, value)
     if key in ("front_tyre", "rear_tyre"):
-        return str(folder / text(key, value))
+        return str(folder / toml_text(key, value))
     if key == "sensor_position":
         if not isinstance(value, list) or len(value) != 3:
             raise InputError(f"{key} = {value!r}: must be [x, y, z] in metres.")
-        return tuple(number(key, item) for item in value)
-    return number(key, value)
+        return tuple(toml_number(key, item) for item in value)
+    return toml_number(key, value)
 
 
 def _build(kind: type, values: Mapping[str, Any]) -> Any:

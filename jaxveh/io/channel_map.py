@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxveh._core.errors import InputError, check, check_finite, check_one_of
-from jaxveh.io.toml import check_keys, number, read_toml, shortened, text
+from jaxveh.io.toml import check_keys, read_toml, shortened, toml_number, toml_text
 
 SCHEMA = """\
 # A channel map. Everything but `column` is optional.
@@ -93,8 +93,8 @@ def read_channel_map(path: str | os.PathLike) -> ChannelMap:
     return ChannelMap(
         channels={name: _entry(f"{path}: [channels.{name}]", entry) for name, entry in channels.items()},
         time=_entry(f"{path}: time", content["time"]) if "time" in content else None,
-        separator=text(f"{path}: separator", csv["separator"]) if "separator" in csv else None,
-        decimal=text(f"{path}: decimal", csv.get("decimal", ".")),
+        separator=toml_text(f"{path}: separator", csv["separator"]) if "separator" in csv else None,
+        decimal=toml_text(f"{path}: decimal", csv.get("decimal", ".")),
         source=str(path),
     )
 
@@ -114,11 +114,11 @@ def _entry(where: str, entry: Any) -> Channel:
         raise InputError(f"{where}: group = {shortened(group)}: must be a whole number from 0 to {MOST_GROUPS - 1}.")
     try:
         return Channel(
-            column=text(f"{where}: column", entry["column"]),
-            unit=text(f"{where}: unit", entry["unit"]) if "unit" in entry else None,
-            sign=number(f"{where}: sign", entry.get("sign", 1)),
-            scale=number(f"{where}: scale", entry.get("scale", 1.0)),
-            offset=number(f"{where}: offset", entry.get("offset", 0.0)),
+            column=toml_text(f"{where}: column", entry["column"]),
+            unit=toml_text(f"{where}: unit", entry["unit"]) if "unit" in entry else None,
+            sign=toml_number(f"{where}: sign", entry.get("sign", 1)),
+            scale=toml_number(f"{where}: scale", entry.get("scale", 1.0)),
+            offset=toml_number(f"{where}: offset", entry.get("offset", 0.0)),
             group=group,
         )
     except InputError as error:

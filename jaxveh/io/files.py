@@ -37,7 +37,7 @@ def check_suffix(path: Path, allowed: Iterable[str], kind: str = "file") -> str:
 
 
 @contextlib.contextmanager
-def replacing(path: str | os.PathLike, overwrite: bool = False) -> Iterator[Path]:
+def replacing_file(path: str | os.PathLike, overwrite: bool = False) -> Iterator[Path]:
     """Yield a path to write to; it takes the place of `path` in one step when the block ends without an error.
 
     A failure, an interrupt included, leaves what was there before: never half a file, and nothing beside it. What a program
@@ -83,7 +83,7 @@ def making_folder(path: str | os.PathLike) -> Iterator[Path]:
 
 def write_text(text: str, path: str | os.PathLike, overwrite: bool = False) -> None:
     """Write a text file in UTF-8, all or nothing."""
-    with replacing(path, overwrite) as part:
+    with replacing_file(path, overwrite) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
 
 

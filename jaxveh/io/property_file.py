@@ -10,9 +10,9 @@ from pathlib import Path
 
 from jaxveh._core.errors import InputError
 from jaxveh.io.decimals import decimal
-from jaxveh.io.files import check_readable, replacing
+from jaxveh.io.files import check_readable, replacing_file
 
-UNITS = {
+PROPERTY_UNITS = {
     "LENGTH": {"meter": 1.0, "metre": 1.0, "m": 1.0, "mm": 1e-3, "millimeter": 1e-3, "cm": 1e-2, "inch": 0.0254},
     "FORCE": {"newton": 1.0, "n": 1.0, "kn": 1e3, "pound_force": 4.4482216152605},
     "ANGLE": {"radian": 1.0, "radians": 1.0, "rad": 1.0},
@@ -119,7 +119,7 @@ class PropertyFile:
         entry = _one(self.source, quantity, [e for e in self._by_key.get(quantity, []) if e.section == "UNITS"])
         if entry is None:
             return 1.0
-        known, said = UNITS[quantity], str(entry.value).strip().lower()
+        known, said = PROPERTY_UNITS[quantity], str(entry.value).strip().lower()
         if said not in known:
             raise InputError(
                 f"{self.source}, line {entry.line}: {quantity} = {entry.shown}: must be one of {', '.join(known)}."
@@ -197,7 +197,7 @@ def write_property_file(file: PropertyFile, path: str | Path, *, overwrite: bool
     **Raises** `InputError` where the file exists and `overwrite` is not set.
     """
     with (
-        replacing(path, overwrite) as part,
+        replacing_file(path, overwrite) as part,
         open(part, "w", encoding="utf-8", errors="surrogateescape", newline="") as out,
     ):
         out.write("".join(file.lines))

@@ -14,7 +14,7 @@ from jaxveh._core.recording import Recording
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.csv_log import open_csv, write_csv
-from jaxveh.io.files import check_readable, check_suffix, replacing
+from jaxveh.io.files import check_readable, check_suffix, replacing_file
 from jaxveh.io.log import Column, Log, apply
 from jaxveh.io.mdf_log import open_mdf, write_mdf
 from jaxveh.io.merge import merge, resample
@@ -109,7 +109,7 @@ def write_columns(
     suffix = check_suffix(path, _WRITE, "recording")
     if "time" in columns:
         raise InputError(f"{path}: a channel is named `time`, which is the name of the time column; rename it.")
-    with replacing(path, overwrite) as part:
+    with replacing_file(path, overwrite) as part:
         _WRITE[suffix](part, np.asarray(time, dtype=np.float64), columns, units, note)
 
 

@@ -21,7 +21,7 @@ from jaxveh.io.tydex_axes import contact_patch
 from jaxveh.io.units import convert, given
 
 INPUTS = ("slip_angle", "slip_ratio", "load", "camber", "speed", "pressure")
-MEASURED = ("F_x", "F_y", "M_x", "M_y", "M_z")
+RIG_CHANNELS = ("F_x", "F_y", "M_x", "M_y", "M_z")
 TYDEX_SUFFIXES = (".tdx", ".tyd", ".tydex")
 
 COLUMNS = {
@@ -79,7 +79,7 @@ class RigTable:
         self._check_shapes()
         for name in (*INPUTS, "run"):
             self._check_rows(name, np.isfinite, "must be finite in every row: leave out the rows without it")
-        for name in MEASURED:
+        for name in RIG_CHANNELS:
             self._check_rows(name, lambda v: ~np.isinf(v), "must be finite, or NaN where nothing was measured")
         if np.median(self.load) <= 0:
             raise InputError(
@@ -99,8 +99,8 @@ class RigTable:
             raise InputError(f"{self.source}: shapes {shapes}: must all be (n,).")
         if shapes["load"] == (0,):
             raise InputError(f"{self.source}: holds no row.")
-        if not any(np.isfinite(getattr(self, name)).any() for name in MEASURED if name in shapes):
-            raise InputError(f"{self.source}: no measurement: one of {', '.join(MEASURED)} is needed.")
+        if not any(np.isfinite(getattr(self, name)).any() for name in RIG_CHANNELS if name in shapes):
+            raise InputError(f"{self.source}: no measurement: one of {', '.join(RIG_CHANNELS)} is needed.")
 
     def _check_rows(self, name: str, holds, allowed: str) -> None:
         values = getattr(self, name)
@@ -116,7 +116,7 @@ class RigTable:
 
 
 def read_rig_table(
-    path: str | Path | Sequence[str | Path], axes: str | None = None, *, measured: Sequence[str] = MEASURED
+    path: str | Path | Sequence[str | Path], axes: str | None = None, *, measured: Sequence[str] = RIG_CHANNELS
 ) -> RigTable:
     """Read rig data; several files are joined, each one its run. What a file is, its suffix and its columns tell:
 
@@ -136,7 +136,7 @@ def read_rig_table(
     if axes is not None:
         check_one_of("axes", axes, AXES)
     for name in measured:
-        check_one_of("measured", name, MEASURED)
+        check_one_of("measured", name, RIG_CHANNELS)
     paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
     if not paths:
         raise InputError("read_rig_table: no file; name at least one.")
@@ -150,7 +150,7 @@ def join(tables: Sequence[RigTable]) -> RigTable:
     **Raises** `InputError` where only some of them tell of an input.
     """
     joined: dict[str, np.ndarray | None] = {}
-    for name in (*INPUTS, *MEASURED):
+    for name in (*INPUTS, *RIG_CHANNELS):
         parts = [getattr(table, name) for table in tables]
         having = [part is not None for part in parts]
         if name in INPUTS and any(having) and not all(having):
@@ -173,7 +173,7 @@ def _read(path: Path, axes: str | None, measured: tuple[str, ...]) -> RigTable:
         columns, usual = contact_patch(read_tydex(path), measured, axes or "iso-w"), "iso-w"
     elif suffix in TTC_SUFFIXES or names_line(path) is not None:
         found = read_ttc(path).columns
-        columns = {name: values for name, values in found.items() if name not in MEASURED or name in measured}
+        columns = {name: values for name, values in found.items() if name not in RIG_CHANNELS or name in measured}
         usual = _ttc_axes(path, columns["load"]) if axes is None else axes
     else:
         columns, usual = _read_csv(path, measured), "iso-w"
@@ -198,7 +198,7 @@ def _read_csv(path: Path, measured: tuple[str, ...]) -> dict[str, np.ndarray | N
     found: dict[str, np.ndarray | None] = {}
     for field, (names, unit) in COLUMNS.items():
         name = next((name for name in names if name in columns), None)
-        if name is None or (field in MEASURED and field not in measured):
+        if name is None or (field in RIG_CHANNELS and field not in measured):
             continue
         values = numeric(columns[name], f"{path}: column {name!r}")
         if not given(units[name]):

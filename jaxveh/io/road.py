@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_one_of
 from jaxveh.io.files import write_text
-from jaxveh.io.toml import check_keys, number, quoted, read_toml, text
+from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
 
 SCHEMA = """\
 # A road along the x axis. SI units; y left, z up.
@@ -102,14 +102,14 @@ def write_road(road: RoadSpecification, path: str | os.PathLike, *, note: str = 
     for entry in fields(road):
         value = getattr(road, entry.name)
         if value is not None:
-            shown = quoted(value) if isinstance(value, str) else list(value) if isinstance(value, tuple) else value
+            shown = toml_string(value) if isinstance(value, str) else list(value) if isinstance(value, tuple) else value
             lines.append(f"{entry.name} = {shown}")
     write_text("\n".join(lines) + "\n", path, overwrite)
 
 
 def _value(key: str, value: Any) -> Any:
     if key in ("interpolation", "name"):
-        return text(key, value)
+        return toml_text(key, value)
     if isinstance(value, list):
-        return tuple(number(f"{key}[{index}]", item) for index, item in enumerate(value))
-    return number(key, value)
+        return tuple(toml_number(f"{key}[{index}]", item) for index, item in enumerate(value))
+    return toml_number(key, value)

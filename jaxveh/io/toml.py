@@ -35,7 +35,7 @@ def check_keys(where: str, table: object, allowed: Iterable[str]) -> None:
         check_known(where, "key", key, allowed)
 
 
-def number(where: str, value: object) -> float:
+def toml_number(where: str, value: object) -> float:
     """A TOML number as a finite float; raises for anything else (true and false included)."""
     try:
         number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
@@ -52,14 +52,14 @@ def shortened(value: object) -> str:
     return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}..."
 
 
-def text(where: str, value: object) -> str:
+def toml_text(where: str, value: object) -> str:
     """A TOML string; raises for anything else."""
     if not isinstance(value, str):
         raise InputError(f"{where} = {value!r}: must be a string in quotes.")
     return value
 
 
-def quoted(value: str) -> str:
+def toml_string(value: str) -> str:
     """A string as TOML writes it."""
     escaped = value.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'

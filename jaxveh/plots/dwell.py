@@ -9,7 +9,7 @@ import numpy as np
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import SineWithDwellTest, drive_channels
 from jaxveh.diagnostics import sine_with_dwell as measure
-from jaxveh.diagnostics.sine_with_dwell import DISPLACED_AFTER, DISPLACED_FROM, DISPLACEMENT, LIMITS
+from jaxveh.diagnostics.sine_with_dwell import DISPLACED_AFTER, DISPLACED_FROM, DISPLACEMENT, YAW_RATE_LIMITS
 from jaxveh.plots.panels import GREY, line, note, stack
 from jaxveh.plots.style import CYCLE, SHADE, label_above, legend, style
 
@@ -36,7 +36,7 @@ def sine_with_dwell(
     found = measure(
         recording, steering_ratio=steering_ratio, steer_at_03g=steer_at_03g, displacement_limit=displacement_limit
     )
-    placed = drive_channels.has(recording, "x", "y", "yaw")
+    placed = drive_channels.has_channels(recording, "x", "y", "yaw")
     with style():
         figure, axes = stack(figure, 3 if placed else 2, 1.7)
         line(axes[0], recording, "steer")
@@ -63,11 +63,11 @@ def _words(found: SineWithDwellTest) -> str:
 
 
 def _mark_yaw(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
-    time, yaw_rate = drive_channels.seconds(recording), np.degrees(drive_channels.channel(recording, "yaw_rate"))
+    time, yaw_rate = drive_channels.time_of(recording), np.degrees(drive_channels.channel_values(recording, "yaw_rate"))
     at_peak = float(np.interp(found.peak_at, time, yaw_rate))
     side = np.sign(at_peak) or 1.0
     ax.plot([found.peak_at], [at_peak], "s", color=GREY, markersize=4.5, label="first peak after the reversal")
-    for (after, limit), ratio in zip(LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True):
+    for (after, limit), ratio in zip(YAW_RATE_LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True):
         at = found.completed + after
         top = side * limit * np.degrees(found.peak)
         ax.plot([at, at], [0.0, top], color=FORBIDDEN, linewidth=1.4)
@@ -76,7 +76,7 @@ def _mark_yaw(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
     ax.axvline(found.completed, color=GREY, linewidth=0.7, linestyle=":")
     words = [
         f"{round(100 * ratio) + 0:d} % of the peak after {after:g} s (at most {100 * limit:.0f} %)"
-        for (after, limit), ratio in zip(LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True)
+        for (after, limit), ratio in zip(YAW_RATE_LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True)
     ]
     note(ax, ",  ".join(words))
 
@@ -88,8 +88,8 @@ def _dot(ax: Any, at: float, value: float, allowed: bool) -> None:
 
 def _way(ax: Any, recording: Recording, found: SineWithDwellTest, limit: float) -> None:
     """How far the car is left of its initial straight path."""
-    time, yaw = drive_channels.seconds(recording), drive_channels.channel(recording, "yaw")[0]
-    x, y = (drive_channels.channel(recording, name) for name in ("x", "y"))
+    time, yaw = drive_channels.time_of(recording), drive_channels.channel_values(recording, "yaw")[0]
+    x, y = (drive_channels.channel_values(recording, name) for name in ("x", "y"))
     left = y * np.cos(yaw) - x * np.sin(yaw)
     left = left - left[0]
     at = found.begins + DISPLACED_AFTER

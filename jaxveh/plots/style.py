@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxveh._core.errors import InputError
-from jaxveh.io import replacing
+from jaxveh.io import replacing_file
 from jaxveh.io.optional import require
 
 # M. Okabe and K. Ito, Color Universal Design (2008); the truth is black.
@@ -28,7 +28,7 @@ CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 SHADE = "#f7f1df"
 """For series without a role, and the shade of spans of time."""
 
-WIDTH = 7.2
+PAGE_WIDTH = 7.2
 """Inches: the width of a page's text."""
 
 DPI = 150
@@ -77,7 +77,7 @@ def style() -> Iterator[None]:
         yield
 
 
-def new_figure(height: float, width: float = WIDTH) -> Any:
+def new_figure(height: float, width: float = PAGE_WIDTH) -> Any:
     """An empty figure of our own class, in inches; needs no window and no pyplot."""
     require("matplotlib", "drawing figures", "plot")
     from jaxveh.plots.figure import Figure
@@ -100,7 +100,7 @@ def save(figure: Any, path: str | os.PathLike, *, dpi: int = DPI) -> Path:
         metadata = {"CreationDate": None}
     with style():
         figure.savefig(content, format=path.suffix[1:].lower(), dpi=dpi, metadata=metadata)
-    with replacing(path, overwrite=True) as part:
+    with replacing_file(path, overwrite=True) as part:
         part.write_bytes(content.getvalue())
     return path
 

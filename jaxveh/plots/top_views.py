@@ -10,11 +10,11 @@ import numpy as np
 
 from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel, seconds
+from jaxveh.diagnostics.drive_channels import channel_values, time_of
 from jaxveh.manoeuvres import Course, cones
 from jaxveh.plots.car_outline import WHEEL, Footprint, footprint, turned, wheel_angles, wheel_forces
 from jaxveh.plots.panels import round_number
-from jaxveh.plots.style import CYCLE, SHADE, WIDTH, label_above, new_figure, style
+from jaxveh.plots.style import CYCLE, PAGE_WIDTH, SHADE, label_above, new_figure, style
 
 SNAPSHOTS = 12
 """How often the car is shown, about, unless told."""
@@ -57,7 +57,7 @@ def top_view(
     """
     check_one_of("colour", colour, ("speed", "time"))
     feet = footprint(recording, car, wheelbase, track)
-    time, x, y = seconds(recording), channel(recording, "x"), channel(recording, "y")
+    time, x, y = time_of(recording), channel_values(recording, "x"), channel_values(recording, "y")
     every = round_number(max(time[-1] - time[0], 1e-3) / SNAPSHOTS * 1.5) if every is None else every
     check_positive("every", every, "s")
     at = _snapshots(time, x, y, every)
@@ -65,7 +65,7 @@ def top_view(
     with style():
         figure = new_figure(height) if figure is None else figure
         axes = figure.subplots(len(boxes), 1, squeeze=False)[:, 0]
-        coloured = channel(recording, "v_x") if colour == "speed" else time
+        coloured = channel_values(recording, "v_x") if colour == "speed" else time
         forces = wheel_forces(recording, feet)
         scale = _metres_per_newton(forces, feet)
         for ax, (left, right, low, high) in zip(axes, boxes, strict=True):
@@ -91,7 +91,7 @@ def _snapshots(time: np.ndarray, x: np.ndarray, y: np.ndarray, every: float) -> 
 def top_view_height(recording: Recording, course: Course | None = None) -> float:
     """Inches of height that the view takes of its own accord."""
     feet = footprint(recording, None, None, None)
-    return _rows(channel(recording, "x"), channel(recording, "y"), course, feet)[1]
+    return _rows(channel_values(recording, "x"), channel_values(recording, "y"), course, feet)[1]
 
 
 def _rows(x: np.ndarray, y: np.ndarray, course: Course | None, car: Footprint) -> tuple[list, float]:
@@ -101,7 +101,7 @@ def _rows(x: np.ndarray, y: np.ndarray, course: Course | None, car: Footprint) -
     limits = [side for lane in course.lanes for side in (lane.left, lane.right)] if course else []
     sides = [*y, *filter(math.isfinite, limits)]
     low, high = float(np.min(sides)) - 3.0, float(np.max(sides)) + 3.0
-    inches = lambda count: count * ((WIDTH - BESIDE) * (high - low) * count / (right - left) + EACH)
+    inches = lambda count: count * ((PAGE_WIDTH - BESIDE) * (high - low) * count / (right - left) + EACH)
     count = 1
     while count < MOST_ROWS and inches(count + 1) <= TALL:
         count += 1
@@ -158,12 +158,14 @@ def _car(ax: Any, recording: Recording, car: Footprint, k: int, every: float) ->
     flat = high - low < FLAT * (right - left)
     under = low + 0.2 if flat else float(np.max(body[:, 1])) + 0.25
     if left <= place[0] <= right:
-        ax.text(place[0], under, f"{seconds(recording)[k]:.{decimals}f} s", fontsize=6.5, color="#666666", ha="center",
+        ax.text(place[0], under, f"{time_of(recording)[k]:.{decimals}f} s", fontsize=6.5, color="#666666", ha="center",
                 va="bottom", clip_on=True)  # fmt: skip
 
 
 def _place(recording: Recording, k: int) -> tuple[np.ndarray, float]:
-    return np.array([channel(recording, name)[k] for name in ("x", "y")]), float(channel(recording, "yaw")[k])
+    return np.array([channel_values(recording, name)[k] for name in ("x", "y")]), float(
+        channel_values(recording, "yaw")[k]
+    )
 
 
 def _metres_per_newton(forces: dict[str, np.ndarray], car: Footprint) -> float:

@@ -13,7 +13,7 @@ from jaxveh._core.errors import InputError, check_one_of
 from jaxveh.tyres.base import Contact
 from jaxveh.tyres.mf_tyre import MFTyre
 
-INPUTS = {
+EVALUATION_INPUTS = {
     "Fz": ("in_Fz", "Fz", "load"),
     "kappa": ("in_kappa", "kappa", "slip_ratio"),
     "alpha": ("in_alpha", "alpha", "slip_angle"),
@@ -44,13 +44,17 @@ def evaluate(tyre: MFTyre, columns: Mapping[str, np.ndarray], *, axes: str = "is
     **Raises** `InputError` for a table without a load, an unknown mode or negative speeds.
     """
     check_one_of("axes", axes, AXES)
-    given = {name: _column(columns, names) for name, names in INPUTS.items()}
+    given = {name: _column(columns, names) for name, names in EVALUATION_INPUTS.items()}
     if given["Fz"] is None:
-        raise InputError(f"no load among the columns {', '.join(columns)}: one of {', '.join(INPUTS['Fz'])} is needed.")
+        raise InputError(
+            f"no load among the columns {', '.join(columns)}: one of {', '.join(EVALUATION_INPUTS['Fz'])} is needed."
+        )
     rows = len(given["Fz"])
     for name, value in given.items():
         if value is not None and len(value) != rows:
-            raise InputError(f"{INPUTS[name][0]}: {len(value)} rows, {INPUTS['Fz'][0]} has {rows}; must be as many.")
+            raise InputError(
+                f"{EVALUATION_INPUTS[name][0]}: {len(value)} rows, {EVALUATION_INPUTS['Fz'][0]} has {rows}; must be as many."
+            )
     _refuse(given["Vx"], lambda x: x < 0, "speed", "must be at least 0: turn the wheel's axes instead")
     filled = {name: np.zeros(rows) if value is None else value for name, value in given.items()}
     if given["Vx"] is None:

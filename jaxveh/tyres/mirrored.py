@@ -11,7 +11,7 @@ ODD_INPUTS = ("slip_angle", "camber", "turn_slip", "lateral_slip")
 """What of a contact changes sign in the mirror of the wheel's x-z plane; all else stays."""
 
 
-def turned(contact: Contact) -> Contact:
+def mirrored_contact(contact: Contact) -> Contact:
     """The contact, seen in a mirror."""
     odd = {name: getattr(contact, name) for name in ODD_INPUTS}
     return contact._replace(**{name: -value for name, value in odd.items() if value is not None})
@@ -37,5 +37,5 @@ class Mirrored(AbstractTyre):
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """Forces (N) and moments (N m) at a contact, in the axes of the wheel as it is mounted."""
-        found = self.tyre.forces(turned(contact), state)
+        found = self.tyre.forces(mirrored_contact(contact), state)
         return found._replace(F_y=-found.F_y, M_x=-found.M_x, M_z=-found.M_z)

@@ -23,7 +23,7 @@ from jaxveh.tyres.mf_tyre import (
     Structure,
     TurnSlip,
 )
-from jaxveh.tyres.mf_tyre.typical import TYPICAL
+from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
 from jaxveh.tyres.mirrored import Mirrored
 
 SIDES = ("left", "right")
@@ -173,7 +173,7 @@ def tells(file: PropertyFile, key: str) -> bool:
 def _numbers(file: PropertyFile, kind: type, size: dict[str, float]) -> dict[str, float]:
     """The coefficients of one section: the file's, typical ones where it is silent."""
     names = [field.name for field in dataclasses.fields(kind)]
-    found = {name: TYPICAL[name] for name in names if name in TYPICAL}
+    found = {name: TYPICAL_COEFFICIENTS[name] for name in names if name in TYPICAL_COEFFICIENTS}
     found |= {name: _number(file, name, size.get(name, 1.0)) for name in names if tells(file, name)}
     if kind is Structure and "INFLPRES" not in found and "NOMPRES" in found:
         found["INFLPRES"] = found["NOMPRES"]

@@ -17,7 +17,7 @@ from jaxveh.tyres.mf_tyre import (
     Structure,
     TurnSlip,
 )
-from jaxveh.tyres.mf_tyre.typical import TYPICAL
+from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
 
 SLIP_RATIO = 1.5
 """Beyond it slip ratios are held, as in most property files."""
@@ -30,7 +30,7 @@ def typical_mf_tyre(
 
     `load` (N) is its nominal load, `pressure` (Pa) its nominal and inflation pressure, `radius` (m) the unloaded one, `speed`
     (m/s) that at which it counts as measured; `limits` as in `MFTyre`. Coefficients are those which a property file means
-    where it is silent (`mf_tyre.typical.TYPICAL`); forces scale with the load.
+    where it is silent (`mf_tyre.typical.TYPICAL_COEFFICIENTS`); forces scale with the load.
 
     **Raises** `InputError` for numbers that are not positive, and for another version.
     """
@@ -39,7 +39,7 @@ def typical_mf_tyre(
     ):  # fmt: skip
         check_positive(f"typical_mf_tyre: {name}", value, unit)
     own = {"FNOMIN": load, "NOMPRES": pressure, "INFLPRES": pressure, "UNLOADED_RADIUS": radius, "LONGVL": speed}
-    known = {**TYPICAL, **own, "KPUMIN": -SLIP_RATIO, "KPUMAX": SLIP_RATIO}
+    known = {**TYPICAL_COEFFICIENTS, **own, "KPUMIN": -SLIP_RATIO, "KPUMAX": SLIP_RATIO}
 
     def section(kind):
         return kind(**{field.name: known[field.name] for field in dataclasses.fields(kind) if field.name in known})

@@ -10,7 +10,7 @@ import jax
 
 from jaxveh._core.errors import check
 from jaxveh._core.parameter import parameter
-from jaxveh.vehicles.wheels import Wheels, front_rear, named, of
+from jaxveh.vehicles.wheels import Wheels, front_rear, wheel_names, wheels_of
 
 
 class AbstractDrive(eqx.Module):
@@ -49,7 +49,7 @@ class AxleDrive(AbstractDrive):
 class FourMotors(AbstractDrive):
     """A motor a wheel: `torque_fl`, `torque_fr`, `torque_rl`, `torque_rr` (N m), negative where the motor brakes."""
 
-    inputs: ClassVar[tuple[str, ...]] = named("torque")
+    inputs: ClassVar[tuple[str, ...]] = wheel_names("torque")
 
     def torques(self, u):
-        return of(u, "torque"), Wheels(0.0, 0.0, 0.0, 0.0)
+        return wheels_of(u, "torque"), Wheels(0.0, 0.0, 0.0, 0.0)

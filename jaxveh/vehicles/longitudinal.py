@@ -12,7 +12,7 @@ from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.base import AbstractVehicle, Motion
 from jaxveh.vehicles.two_track import air_drag
-from jaxveh.vehicles.wheels import gravity, opposing
+from jaxveh.vehicles.wheels import gravity, travel_direction
 
 
 class LongitudinalState(NamedTuple):
@@ -105,7 +105,7 @@ class Longitudinal(AbstractVehicle):
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
         g_x, _, g_z = gravity(ground)
-        against = opposing(x.v_x)
+        against = travel_direction(x.v_x)
         drive_force = u.drive_torque / self.wheel_radius
         brake_force = -against * u.brake_torque / self.wheel_radius
         rolling_force = against * self.rolling_resistance * self.mass * g_z

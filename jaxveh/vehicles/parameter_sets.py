@@ -11,7 +11,7 @@ from jaxveh.tyres import AbstractTyre, Contact, Linear, MagicFormula, cornering_
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.single_track import SingleTrack
 
-GENERIC = {"mu": 1.0, "C": 1.3, "E": -0.5}
+GENERIC_TYRE = {"mu": 1.0, "C": 1.3, "E": -0.5}
 """Friction coefficient and shape of an ordinary tyre, for a specification that gives cornering stiffness alone."""
 
 
@@ -53,8 +53,10 @@ def axle_from_stiffness(stiffness, load) -> MagicFormula:
     Peak force D is the load (friction coefficient 1), C 1.3 and E -0.5 are those of an ordinary tyre, and
     `B = stiffness / (C D)`. The force scales with load (`nominal_load` is the static load).
     """
-    D = GENERIC["mu"] * load
-    return MagicFormula(B=stiffness / (GENERIC["C"] * D), C=GENERIC["C"], D=D, E=GENERIC["E"], nominal_load=load)
+    D = GENERIC_TYRE["mu"] * load
+    return MagicFormula(
+        B=stiffness / (GENERIC_TYRE["C"] * D), C=GENERIC_TYRE["C"], D=D, E=GENERIC_TYRE["E"], nominal_load=load
+    )
 
 
 def linear(car: SingleTrack) -> SingleTrack:

@@ -30,7 +30,7 @@ from jaxveh.vehicles.two_track import (
     tyres_of,
     wheel_outputs,
 )
-from jaxveh.vehicles.wheels import gravity, pushed
+from jaxveh.vehicles.wheels import body_forces, gravity
 
 STATES = ("v_y", "yaw", "yaw_rate", "roll", "roll_rate")
 
@@ -113,7 +113,7 @@ class Roll3DOF(AbstractRollingTwoTrack):
         contacts, moves = self._contacts(x, u, ground)
         centre, states = self.motion(x, u), tyres.states(x)
         forces = tyres.forces(contacts, states)
-        push = pushed(positions_of(self), moves, forces)
+        push = body_forces(positions_of(self), moves, forces)
         g_x, g_y, g_z = gravity(ground)
         a_x, a_y = longitudinal_acceleration(centre, u, g_x), push.F_y / self.mass
         # The force along the car is the one that the given speed takes.

@@ -31,7 +31,7 @@ from jaxveh.vehicles.two_track import (
     tyres_of,
     wheel_outputs,
 )
-from jaxveh.vehicles.wheels import gravity, pushed
+from jaxveh.vehicles.wheels import body_forces, gravity
 
 STATES = ("v_x", "v_y", "yaw", "yaw_rate", "roll", "roll_rate")
 
@@ -122,7 +122,7 @@ class Roll4DOF(AbstractRollingTwoTrack):
         contacts, moves = self._contacts(x, u, ground)
         states = tyres.states(x)
         forces = driven_wheels(self, tyres.forces(contacts, states), contacts, moves, drive, brake)
-        push = pushed(positions_of(self), moves, forces)
+        push = body_forces(positions_of(self), moves, forces)
         g_x, g_y, g_z = gravity(ground)
         X = push.F_x - air_drag(self.drag, x.v_x)
         a_x, a_y = X / self.mass, push.F_y / self.mass

@@ -25,9 +25,17 @@ from jaxveh.vehicles.two_track import (
     tyres_of,
     wheel_outputs,
 )
-from jaxveh.vehicles.wheels import each, gravity, named, of, opposing, pushed, total
+from jaxveh.vehicles.wheels import (
+    body_forces,
+    each_wheel,
+    gravity,
+    sum_of_wheels,
+    travel_direction,
+    wheel_names,
+    wheels_of,
+)
 
-SPINS = named("omega")
+SPINS = wheel_names("omega")
 STATES = ("v_x", "v_y", "yaw", "yaw_rate", *SPINS)
 
 
@@ -100,38 +108,40 @@ class SevenDOF(AbstractPlanarTwoTrack):
         contacts, moves = self._contacts(x, u, ground)
         states = tyres.states(x)
         forces = tyres.forces(contacts, states)
-        push = pushed(positions_of(self), moves, forces)
+        push = body_forces(positions_of(self), moves, forces)
         g_x, g_y, _ = gravity(ground)
         # Multiplied by inverses, which belong to the car and not to the instant: a division costs five multiplications.
         inverse_mass = 1.0 / self.mass
         a_x = (push.F_x - air_drag(self.drag, x.v_x)) * inverse_mass
         a_y = push.F_y * inverse_mass
         yaw_acceleration = push.M_z * (1.0 / self.yaw_inertia)
-        omegas = of(x, "omega")
+        omegas = wheels_of(x, "omega")
         drive, brake = self.drive.torques(u)
-        spins = each(self._spin, omegas, contacts, forces, drive, brake)
+        spins = each_wheel(self._spin, omegas, contacts, forces, drive, brake)
         rates = (
             a_x + g_x + x.v_y * x.yaw_rate, a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration, *spins,
             *self.load_transfer.rates(x, push.F_x * inverse_mass, a_y), *tyres.rates(contacts, states),
         )  # fmt: skip
         shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, u.steer, push)
         shown |= wheel_outputs(contacts, forces, omegas)
-        shown["drive_power"] = total(each(lambda torque, omega: torque * omega, drive, omegas))
+        shown["drive_power"] = sum_of_wheels(each_wheel(lambda torque, omega: torque * omega, drive, omegas))
         return self.state_type(*rates), record("SevenDOFOutputs", filled(shown, push.F_y))
 
     def _contacts(self, x, u, ground: Ground):
         moves = rolling_wheels(self, x.v_x, x.v_y, x.yaw_rate, u.steer)
         a_x, a_y = self.load_transfer.felt(x, u, self._steady(x, u, ground))
         loads = planar_loads(self, a_x, a_y, gravity(ground)[2])
-        speeds = each(lambda omega: omega * self.wheel_radius, of(x, "omega"))
+        speeds = each_wheel(lambda omega: omega * self.wheel_radius, wheels_of(x, "omega"))
         return touching(self, moves, loads, ground, speeds), moves
 
     def _steady(self, x, u, ground: Ground):
         """Accelerations of a steady turn under these torques, m/s^2; what no load transfer asks for is never computed."""
         drive, brake = self.drive.torques(u)
-        torque = total(drive) - total(brake) * opposing(x.v_x)
+        torque = sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(x.v_x)
         return torque * (1.0 / (self.mass * self.wheel_radius)), x.v_x * x.yaw_rate - gravity(ground)[1]
 
     def _spin(self, omega, at, force, drive, brake):
-        slowing = (brake + self.rolling_resistance * at.load * self.wheel_radius) * opposing(omega * self.wheel_radius)
+        slowing = (brake + self.rolling_resistance * at.load * self.wheel_radius) * travel_direction(
+            omega * self.wheel_radius
+        )
         return (drive - slowing - self.wheel_radius * force.F_x) * (1.0 / self.wheel_inertia)

@@ -18,7 +18,7 @@ from jaxveh.vehicles.axles import AxleTyres
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
-from jaxveh.vehicles.wheels import gravity, opposing
+from jaxveh.vehicles.wheels import gravity, travel_direction
 
 
 class SingleTrackState(NamedTuple):
@@ -229,7 +229,7 @@ class SingleTrack(AbstractVehicle):
             friction=0.5 * (ground.friction_fl + ground.friction_fr),
             speed=jnp.abs(along_wheel),
             slip_speed=regularised_speed(along_wheel, self.crawl_speed),
-            direction=opposing(along_wheel),
+            direction=travel_direction(along_wheel),
         )
         rear = Contact(
             slip_angle=slip_angle(u.v_x, x.v_y - self.rear_axle_to_cg * x.yaw_rate, self.crawl_speed),
@@ -237,7 +237,7 @@ class SingleTrack(AbstractVehicle):
             friction=0.5 * (ground.friction_rl + ground.friction_rr),
             speed=jnp.abs(u.v_x),
             slip_speed=regularised_speed(u.v_x, self.crawl_speed),
-            direction=opposing(u.v_x),
+            direction=travel_direction(u.v_x),
         )
         return front, rear
 

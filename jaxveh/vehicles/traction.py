@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh.roads import Ground
 from jaxveh.tyres import Contact, Forces
-from jaxveh.vehicles.wheels import Wheels, each, frictions, gravity, opposing, total
+from jaxveh.vehicles.wheels import Wheels, each_wheel, frictions, gravity, sum_of_wheels, travel_direction
 
 LEAST_SHARE = 0.1
 """The share of its lateral force that a wheel keeps however large the torque (as `tyres.Fiala` does): F_x ends at
@@ -51,22 +51,24 @@ def driven(car: Any, forces: Forces, at: Contact, along: Any, drive: Any, brake:
     """
     load = jnp.maximum(at.load, 0.0)
     slowing = brake + car.rolling_resistance * load * car.wheel_radius
-    wish = (drive - slowing * opposing(along)) / car.wheel_radius
+    wish = (drive - slowing * travel_direction(along)) / car.wheel_radius
     return within_grip(forces, wish, car.grip * at.friction * load)
 
 
 def torque_acceleration(car: Any, drive: Wheels, brake: Wheels, v_x: Any, ground: Ground) -> Any:
     """a_x, m/s^2, that the torques make, as far as grip allows: what loads can follow without knowing a force."""
-    push = (total(drive) - total(brake) * opposing(v_x)) / car.wheel_radius
-    limit = car.grip * car.mass * (-gravity(ground)[2] * 0.25 * total(frictions(ground)))
+    push = (sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(v_x)) / car.wheel_radius
+    limit = car.grip * car.mass * (-gravity(ground)[2] * 0.25 * sum_of_wheels(frictions(ground)))
     return limit * saturated(push / jnp.maximum(limit, _LEAST_LIMIT)) / car.mass
 
 
 def driven_wheels(car: Any, forces: Wheels, contacts: Wheels, moves: Wheels, drive: Wheels, brake: Wheels) -> Wheels:
     """The forces of all wheels under their torques, as `driven`."""
-    return each(lambda f, at, m, *torques: driven(car, f, at, m.along, *torques), forces, contacts, moves, drive, brake)
+    return each_wheel(
+        lambda f, at, m, *torques: driven(car, f, at, m.along, *torques), forces, contacts, moves, drive, brake
+    )
 
 
 def drive_power(car: Any, drive: Wheels, moves: Wheels) -> Any:
     """Power of the driving torques, W, on wheels that roll without slip."""
-    return total(each(lambda torque, move: torque * move.along, drive, moves)) / car.wheel_radius
+    return sum_of_wheels(each_wheel(lambda torque, move: torque * move.along, drive, moves)) / car.wheel_radius

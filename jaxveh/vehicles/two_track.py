@@ -13,17 +13,27 @@ from jaxveh._core.parameter import check_parameters
 from jaxveh.roads import Ground
 from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.base import AbstractVehicle, Motion
-from jaxveh.vehicles.wheels import Pushed, Tyres, Wheels, contact, corners, each, frictions, named, rolling
+from jaxveh.vehicles.wheels import (
+    BodyForces,
+    Tyres,
+    Wheels,
+    contact,
+    corners,
+    each_wheel,
+    frictions,
+    rolling,
+    wheel_names,
+)
 
 UNITS = {
     **dict.fromkeys(("v_x", "v_y"), "m/s"),
     **dict.fromkeys(("a_x", "a_y", "a_x_felt", "a_y_felt", "v_x_rate"), "m/s^2"),
-    **dict.fromkeys(("steer", "yaw", "roll", "sideslip", *named("slip_angle")), "rad"),
-    **dict.fromkeys(("yaw_rate", "roll_rate", *named("omega")), "rad/s"),
+    **dict.fromkeys(("steer", "yaw", "roll", "sideslip", *wheel_names("slip_angle")), "rad"),
+    **dict.fromkeys(("yaw_rate", "roll_rate", *wheel_names("omega")), "rad/s"),
     **dict.fromkeys(("yaw_acceleration", "roll_acceleration"), "rad/s^2"),
-    **dict.fromkeys(named("slip_ratio"), "-"),
-    **dict.fromkeys(("F_x", "F_y", *named("load"), *named("F_x"), *named("F_y")), "N"),
-    **dict.fromkeys(("M_z", "drive_torque", "brake_torque", *named("torque"), *named("M_z")), "N m"),
+    **dict.fromkeys(wheel_names("slip_ratio"), "-"),
+    **dict.fromkeys(("F_x", "F_y", *wheel_names("load"), *wheel_names("F_x"), *wheel_names("F_y")), "N"),
+    **dict.fromkeys(("M_z", "drive_torque", "brake_torque", *wheel_names("torque"), *wheel_names("M_z")), "N m"),
     "drive_power": "W",
 }
 """Units of what two-track cars have as states, inputs and outputs."""
@@ -76,13 +86,13 @@ def rolling_wheels(car: Any, v_x: Any, v_y: Any, yaw_rate: Any, steer: Any) -> W
     """How the wheels move over the road; both front wheels turn by the steer (rad)."""
     turn = numerics.barrier((numerics.cos(steer), numerics.sin(steer)))
     turned = Wheels(turn, turn, (1.0, 0.0), (1.0, 0.0))
-    return each(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), positions_of(car), turned)
+    return each_wheel(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), positions_of(car), turned)
 
 
 def touching(car: Any, moves: Wheels, loads: Wheels, ground: Ground, speeds: Wheels | None = None) -> Wheels:
     """How the wheels touch the road; `speeds` are `omega r_e` (m/s), None where all roll freely."""
     speeds = Wheels(None, None, None, None) if speeds is None else speeds
-    return each(
+    return each_wheel(
         lambda m, load, mu, v: contact(m, load, mu, car.crawl_speed, v), moves, loads, frictions(ground), speeds
     )
 
@@ -118,13 +128,13 @@ def wheel_outputs(contacts: Wheels, forces: Wheels, omegas: Wheels | None = None
     """What each wheel says, in its own axes: slips, loads, forces, aligning moments, spins; without `omegas` no slip ratio."""
     shown = {}
     for name in ("slip_angle", "load") if omegas is None else ("slip_angle", "slip_ratio", "load"):
-        shown |= zip(named(name), (getattr(at, name) for at in contacts), strict=True)
+        shown |= zip(wheel_names(name), (getattr(at, name) for at in contacts), strict=True)
     for name in ("F_x", "F_y", "M_z"):
-        shown |= zip(named(name), (getattr(f, name) for f in forces), strict=True)
-    return shown if omegas is None else shown | dict(zip(named("omega"), omegas, strict=True))
+        shown |= zip(wheel_names(name), (getattr(f, name) for f in forces), strict=True)
+    return shown if omegas is None else shown | dict(zip(wheel_names("omega"), omegas, strict=True))
 
 
-def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steer: Any, push: Pushed) -> dict:
+def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steer: Any, push: BodyForces) -> dict:
     """What the body says: speeds, accelerations (of an ideal accelerometer), sideslip, and the wheels' forces on it."""
     return {
         "v_x": moves.v_x,

@@ -24,7 +24,7 @@ from jaxveh.vehicles.two_track import (
     tyres_of,
     wheel_outputs,
 )
-from jaxveh.vehicles.wheels import gravity, pushed
+from jaxveh.vehicles.wheels import body_forces, gravity
 
 STATES = ("v_y", "yaw", "yaw_rate")
 
@@ -85,7 +85,7 @@ class TwoTrack2DOF(AbstractPlanarTwoTrack):
         contacts, moves = self._contacts(x, u, ground)
         states = tyres.states(x)
         forces = tyres.forces(contacts, states)
-        push = pushed(positions_of(self), moves, forces)
+        push = body_forces(positions_of(self), moves, forces)
         g_x, g_y, _ = gravity(ground)
         a_x, a_y = longitudinal_acceleration(x, u, g_x), push.F_y / self.mass
         yaw_acceleration = push.M_z / self.yaw_inertia

@@ -26,7 +26,7 @@ from jaxveh.vehicles.two_track import (
     tyres_of,
     wheel_outputs,
 )
-from jaxveh.vehicles.wheels import gravity, pushed
+from jaxveh.vehicles.wheels import body_forces, gravity
 
 STATES = ("v_x", "v_y", "yaw", "yaw_rate")
 
@@ -98,7 +98,7 @@ class TwoTrack3DOF(AbstractPlanarTwoTrack):
         contacts, moves = self._contacts(x, u, ground)
         states = tyres.states(x)
         forces = driven_wheels(self, tyres.forces(contacts, states), contacts, moves, drive, brake)
-        push = pushed(positions_of(self), moves, forces)
+        push = body_forces(positions_of(self), moves, forces)
         g_x, g_y, _ = gravity(ground)
         a_x = (push.F_x - air_drag(self.drag, x.v_x)) / self.mass
         a_y = push.F_y / self.mass

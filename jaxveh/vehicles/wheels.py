@@ -13,7 +13,7 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh.roads import Ground
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces
-from jaxveh.tyres.mirrored import turned
+from jaxveh.tyres.mirrored import mirrored_contact
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.slip import regularised_speed
 from jaxveh.vehicles.together import alike, long_law, together
@@ -31,7 +31,7 @@ class Wheels(NamedTuple):
     rr: Any
 
 
-def each(function: Callable, *wheels: Wheels) -> Wheels:
+def each_wheel(function: Callable, *wheels: Wheels) -> Wheels:
     """`function` of each wheel's values."""
     return Wheels(*[function(*values) for values in zip(*wheels, strict=True)])
 
@@ -41,17 +41,17 @@ def front_rear(front: Any, rear: Any) -> Wheels:
     return Wheels(front, front, rear, rear)
 
 
-def named(prefix: str) -> tuple[str, ...]:
+def wheel_names(prefix: str) -> tuple[str, ...]:
     """`prefix_fl`, `prefix_fr`, `prefix_rl`, `prefix_rr`."""
     return tuple(f"{prefix}_{corner}" for corner in CORNERS)
 
 
-def of(values: Any, prefix: str) -> Wheels:
+def wheels_of(values: Any, prefix: str) -> Wheels:
     """The four fields `prefix_fl` ... of a NamedTuple."""
-    return Wheels(*[getattr(values, name) for name in named(prefix)])
+    return Wheels(*[getattr(values, name) for name in wheel_names(prefix)])
 
 
-def total(wheels: Wheels) -> Any:
+def sum_of_wheels(wheels: Wheels) -> Any:
     """The sum over the wheels."""
     return (wheels.fl + wheels.fr) + (wheels.rl + wheels.rr)
 
@@ -63,7 +63,7 @@ def corners(a: Any, b: Any, track_front: Any, track_rear: Any) -> Wheels:
 
 def frictions(ground: Ground) -> Wheels:
     """The road's friction under each wheel."""
-    return of(ground, "friction")
+    return wheels_of(ground, "friction")
 
 
 def gravity(ground: Ground) -> tuple[Any, Any, Any]:
@@ -120,7 +120,7 @@ def contact(
         friction=friction,
         speed=jnp.abs(moves.along),
         slip_speed=slip_speed,
-        direction=opposing(moves.along),
+        direction=travel_direction(moves.along),
     )
 
 
@@ -166,14 +166,16 @@ class Tyres(NamedTuple):
         A wheel on the right is the mirror image of the one on the left, its tyre's states included.
         """
         found = self._each(lambda tyre, at, state: tyre.forces(at, state), self._seen(contacts), states)
-        return each(lambda forces, right: _turned_back(forces) if right else forces, each(stored, found), self.right)
+        return each_wheel(
+            lambda forces, right: _turned_back(forces) if right else forces, each_wheel(stored, found), self.right
+        )
 
     def rates(self, contacts: Wheels, states: Wheels) -> tuple:
         """The time derivatives, in the order of `state_names`; of a wheel on the right in the mirror."""
         return self._gather(lambda tyre, at, state: tyre.derivatives(at, state), self._seen(contacts), states)
 
     def _seen(self, contacts: Wheels) -> Wheels:
-        return each(lambda at, right: turned(at) if right else at, contacts, self.right)
+        return each_wheel(lambda at, right: mirrored_contact(at) if right else at, contacts, self.right)
 
     def _each(self, function: Callable, *wheels: Wheels) -> Wheels:
         """`function(tyre, ...)` of each wheel; by as few calls as there are long laws."""
@@ -211,7 +213,7 @@ def _state(corner: str, tyre: AbstractTyre, x: Any) -> Any:
     return record_type("TyreState", names)(*[getattr(x, f"{corner}_{name}") for name in names]) if names else None
 
 
-class Pushed(NamedTuple):
+class BodyForces(NamedTuple):
     """What the road does to the car through all wheels: forces along its x and y (N), moment about its z (N m); and each
     wheel's forces along the car's x and y."""
 
@@ -222,19 +224,19 @@ class Pushed(NamedTuple):
     F_y_wheels: Wheels
 
 
-def pushed(positions: Wheels, moves: Wheels, forces: Wheels) -> Pushed:
+def body_forces(positions: Wheels, moves: Wheels, forces: Wheels) -> BodyForces:
     """The wheels' forces turned into the car's directions and summed."""
-    along = each(lambda m, f: f.F_x * m.cosine - f.F_y * m.sine, moves, forces)
-    across = each(lambda m, f: f.F_x * m.sine + f.F_y * m.cosine, moves, forces)
-    turning = each(lambda p, X, Y, f: p[0] * Y - p[1] * X + f.M_z, positions, along, across, forces)
-    return Pushed(total(along), total(across), total(turning), along, across)
+    along = each_wheel(lambda m, f: f.F_x * m.cosine - f.F_y * m.sine, moves, forces)
+    across = each_wheel(lambda m, f: f.F_x * m.sine + f.F_y * m.cosine, moves, forces)
+    turning = each_wheel(lambda p, X, Y, f: p[0] * Y - p[1] * X + f.M_z, positions, along, across, forces)
+    return BodyForces(sum_of_wheels(along), sum_of_wheels(across), sum_of_wheels(turning), along, across)
 
 
 STANDSTILL = 15 / 16
 """m/s: below it brakes and rolling resistance turn round smoothly, so that standstill is an ordinary point."""
 
 
-def opposing(speed: Any) -> Any:
+def travel_direction(speed: Any) -> Any:
     """-1 ... 1: the direction that brakes and rolling resistance push against, their whole from `STANDSTILL` (m/s) upwards.
 
     Below, `(15 s - 10 s^3 + 3 s^5) / 8` with `s = speed / STANDSTILL`: twice continuously differentiable, with a slope of 2

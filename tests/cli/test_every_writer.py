@@ -189,7 +189,7 @@ def test_an_interrupt_that_a_library_swallows_is_raised(tmp_path):
     path.write_text("old")
 
     def write():
-        with io.replacing(path, overwrite=True) as part:
+        with io.replacing_file(path, overwrite=True) as part:
             part.write_text("half")
             with contextlib.suppress(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)
@@ -230,7 +230,7 @@ def test_what_a_killed_program_left_goes_with_the_next_writing(tmp_path):
     source = f"""
         import os, signal
         from jaxveh.io import files
-        with files.replacing({str(tmp_path / "file.txt")!r}) as part:
+        with files.replacing_file({str(tmp_path / "file.txt")!r}) as part:
             part.write_text("half")
             os.kill(os.getpid(), signal.SIGKILL)
     """
@@ -238,7 +238,7 @@ def test_what_a_killed_program_left_goes_with_the_next_writing(tmp_path):
     assert done.returncode == -signal.SIGKILL and len(list(tmp_path.glob(".writing-*"))) == 1
     io.write_text("of another name", tmp_path / "other.txt")
     assert len(list(tmp_path.glob(".writing-*"))) == 1
-    with io.replacing(tmp_path / "file.txt") as part:  # one that lives, beside it
+    with io.replacing_file(tmp_path / "file.txt") as part:  # one that lives, beside it
         io.write_text("whole", tmp_path / "file.txt")
         assert len(list(tmp_path.glob(".writing-*"))) == 1
         part.write_text("later")
@@ -283,10 +283,10 @@ def test_nothing_else_opens_a_file_to_write():
 
 
 def _writes(node, inside):
-    """The words of calls that write, outside of `with replacing(...)` and `with making_folder(...)`."""
+    """The words of calls that write, outside of `with replacing_file(...)` and `with making_folder(...)`."""
     if isinstance(node, ast.With):
         words = {_word(item.context_expr) for item in node.items}
-        inside = inside or bool(words & {"replacing", "making_folder"})
+        inside = inside or bool(words & {"replacing_file", "making_folder"})
     if isinstance(node, ast.Call) and not inside and _word(node) in OPENERS and not (_reads(node) or _ours(node)):
         yield _word(node)
     for child in ast.iter_child_nodes(node):
@@ -318,7 +318,7 @@ def _reads(call):
 def test_every_writer_is_tried():
     """Those that call what replaces a file are those of the table above, and those that hand on to one of them."""
     calling = set()
-    names = {"replacing", "making_folder", "write_columns", "write_text"}
+    names = {"replacing_file", "making_folder", "write_columns", "write_text"}
     for file in ROOT.rglob("*.py"):
         text = file.read_text("utf-8")
         for function in ast.walk(ast.parse(text)) if any(name in text for name in names) else ():

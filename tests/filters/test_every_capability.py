@@ -152,7 +152,9 @@ UNCHANGED = "delayed, in order"
 def test_what_acts_in_each_step_is_changed_by_empty_rows_and_refused(name):
     plain, longer = beside(name)
     assert np.abs(longer - plain).max() > 1e-4
-    with pytest.raises(InputError, match=f"{who_lacks(filter_named(name), 'rows_between')} inside it takes no late rows"):
+    with pytest.raises(
+        InputError, match=f"{who_lacks(filter_named(name), 'rows_between')} inside it takes no late rows"
+    ):
         filters.Delayed(filter_named(name)).check(turning())
 
 

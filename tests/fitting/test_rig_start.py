@@ -9,7 +9,7 @@ import pytest
 from jaxveh import InputError, tyres
 from jaxveh.fitting import fit_rig, starting_tyre
 from jaxveh.fitting.rig_problem import offered
-from jaxveh.fitting.rig_start import GENERIC, STARTS, rig_facts
+from jaxveh.fitting.rig_start import GENERIC, RIG_STARTS, rig_facts
 from jaxveh.io import RigTable
 
 TRUTH = tyres.Brush(slip_stiffness=80e3, cornering_stiffness=60e3, friction=0.9)
@@ -46,7 +46,7 @@ def test_silent_directions_take_the_other_one_s():
     assert quiet.slip_stiffness == GENERIC["stiffness"] * 4000.0 and quiet.friction == GENERIC["friction"]
 
 
-@pytest.mark.parametrize("name", STARTS)
+@pytest.mark.parametrize("name", RIG_STARTS)
 def test_every_start_explains_most_of_the_lateral_force(name):
     rig = rig_of()
     law = starting_tyre(name, rig)

@@ -38,7 +38,7 @@ def test_the_reference_s_table_as_it_is():
 
 def test_names_of_inputs_are_those_of_the_evaluator():
     ours = [set(names) for names, _ in COLUMNS.values()]
-    assert all(set(names) in ours for name, names in evaluation.INPUTS.items() if name != "phit")
+    assert all(set(names) in ours for name, names in evaluation.EVALUATION_INPUTS.items() if name != "phit")
 
 
 def test_signs_missing_cells_and_absent_columns(csv):

@@ -11,7 +11,7 @@ from jaxveh import InputError, tyres
 from jaxveh.roads import Ground
 from jaxveh.vehicles import GRAVITY, FourMotors, Travelling
 from jaxveh.vehicles.fourteen_dof.tyre_contact import axles
-from jaxveh.vehicles.wheels import named
+from jaxveh.vehicles.wheels import wheel_names
 
 OTHER_SIDE = {"fl": "fr", "fr": "fl", "rl": "rr", "rr": "rl"}
 SMALL = 1e-9
@@ -19,7 +19,7 @@ SMALL = 1e-9
 
 
 def wheels(values, prefix):
-    return np.array([float(getattr(values, name)) for name in named(prefix)])
+    return np.array([float(getattr(values, name)) for name in wheel_names(prefix)])
 
 
 def test_static_loads_are_the_closed_form():
@@ -48,7 +48,7 @@ def test_it_stands_where_it_was_put():
     rest = car.start(0.0, inputs())
     states, _ = roll_out(car, car.start(0.0, inputs(), z=0.62, roll=0.03, pitch=0.02), held(inputs()))
     assert np.ptp(np.asarray(states.z)) > 0.03
-    for name in ("z", "roll", "pitch", *named("travel")):
+    for name in ("z", "roll", "pitch", *wheel_names("travel")):
         np.testing.assert_allclose(getattr(states, name)[-1], getattr(rest, name), atol=1e-4)
 
 
@@ -125,7 +125,7 @@ def test_values_and_gradients_are_finite(where):
     values = {
         "standing": {},
         "in the air": {"z": 1.2, "v_x": 10.0},
-        "locked": {"v_x": 10.0} | dict.fromkeys(named("omega"), 0.0),
+        "locked": {"v_x": 10.0} | dict.fromkeys(wheel_names("omega"), 0.0),
     }[where]
     x = car.start(0.0, u, **values)
 
@@ -244,4 +244,4 @@ def test_unknown_states_are_named():
 
 def test_its_inputs_are_its_drives():
     assert make().inputs == ("steer", "drive_torque", "brake_torque")
-    assert make(drive=FourMotors()).inputs == ("steer", *named("torque"))
+    assert make(drive=FourMotors()).inputs == ("steer", *wheel_names("torque"))

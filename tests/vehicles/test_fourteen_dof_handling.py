@@ -8,12 +8,21 @@ from fourteen_dof_cars import brush, evaluate, held, inputs, make, roll_out
 from fourteen_dof_lagrange import Mechanism, body_to_world
 
 from jaxveh.vehicles import GRAVITY, AxleDrive, SevenDOF
-from jaxveh.vehicles.wheels import named
+from jaxveh.vehicles.wheels import wheel_names
 
-UNKNOWN = ("v_y", "z", "roll", "pitch", "yaw_rate", *named("travel"), *named("omega"))
+UNKNOWN = ("v_y", "z", "roll", "pitch", "yaw_rate", *wheel_names("travel"), *wheel_names("omega"))
 POINT = brush(half_length=1e-9)
 """A tyre without aligning moment: where the roll axis is inclined, or wheels lean, that moment turns the body too."""
-BALANCED = ("v_x", "v_y", "v_z", "roll_rate", "pitch_rate", "yaw_rate", *named("travel_rate"), *named("omega"))
+BALANCED = (
+    "v_x",
+    "v_y",
+    "v_z",
+    "roll_rate",
+    "pitch_rate",
+    "yaw_rate",
+    *wheel_names("travel_rate"),
+    *wheel_names("omega"),
+)
 
 
 @eqx.filter_jit
@@ -50,10 +59,10 @@ def test_load_transfer_of_a_steady_turn_balances_the_moments():
     masses = np.array([1370.0, *mechanism.masses])
     rate = float(x.yaw_rate)
     accelerations = np.array([-rate * float(x.v_y), rate * float(x.v_x)]) - rate**2 * places[:, :2]
-    loads = np.array([float(getattr(shown, name)) for name in named("load")])
+    loads = np.array([float(getattr(shown, name)) for name in wheel_names("load")])
     R = np.asarray(body_to_world(q))
     turned = R @ np.asarray(mechanism.inertia) @ R.T
-    spin = np.sum([1.3 * float(w) * R[:, 1] for w in [getattr(x, name) for name in named("omega")]][2:], axis=0)
+    spin = np.sum([1.3 * float(w) * R[:, 1] for w in [getattr(x, name) for name in wheel_names("omega")]][2:], axis=0)
     front = np.array([-np.sin(0.03), np.cos(0.03), 0.0])
     spin = spin + 1.3 * float(x.omega_fl + x.omega_fr) * R @ front
     momentum = np.cross([0.0, 0.0, rate], turned @ [0.0, 0.0, rate] + spin)
@@ -64,7 +73,7 @@ def test_load_transfer_of_a_steady_turn_balances_the_moments():
     roll += np.sum(masses * places[:, 2] * accelerations[:, 1]) - momentum[0]
     # The arm of longitudinal forces about an axle that rolls and pitches: rolling radius instead of the slant.
     slants = np.asarray(Mechanism(car, 0.03).slants(q))
-    F_x = np.array([float(getattr(shown, name)) for name in named("F_x")])
+    F_x = np.array([float(getattr(shown, name)) for name in wheel_names("F_x")])
     roll += np.sum((slants - 0.33 + (0.33 - slants) / 3) * F_x * axes[:, 0])
     transfer = abs(loads[1] + loads[3] - loads[0] - loads[2]) * 0.76
     assert transfer > 3000
@@ -89,7 +98,7 @@ def test_roll_gradient_is_the_closed_form(centres):
     axis = (1.57 * front + 1.11 * rear) / (1.11 + 1.57)
     K = 1.54**2 * (26e3 / 2 + 13e3) + 1.51**2 * (23e3 / 2 + 6e3)
     weights = GRAVITY * (1370.0 * (0.58 - 2 * axis) + 160.0 * 0.33)
-    spin = 1.3 * sum(float(getattr(x, name)) for name in named("omega")) * float(x.yaw_rate)
+    spin = 1.3 * sum(float(getattr(x, name)) for name in wheel_names("omega")) * float(x.yaw_rate)
     expected = (float(shown.a_y) * (1370.0 * (0.58 - axis) + 160.0 * 0.33) + spin) / (K - weights)
     assert float(x.roll) > 0
     np.testing.assert_allclose(float(x.roll), expected, rtol=1e-3)

@@ -9,7 +9,7 @@ from four_wheel_cars import asymmetric, brush, car_of, drive, inputs, state
 
 from jaxveh import tyres, vehicles
 from jaxveh.roads import LEVEL
-from jaxveh.vehicles.wheels import opposing
+from jaxveh.vehicles.wheels import travel_direction
 
 pytestmark = pytest.mark.product
 
@@ -157,5 +157,5 @@ def test_the_direction_goes_through_standstill_smoothly():
     at = lambda v: car.evaluate(0.0, state(car, v_x=v, v_y=0.001 * v), U)[1]
     for v in (0.3, 0.6, 20.0):
         ahead, back = at(jnp.asarray(v)), at(jnp.asarray(-v))
-        trail = 0.06 / 3 * opposing(jnp.asarray(v))
+        trail = 0.06 / 3 * travel_direction(jnp.asarray(v))
         np.testing.assert_allclose([ahead.M_zf / ahead.F_yf, back.M_zf / back.F_yf], [-trail, trail], rtol=1e-2)

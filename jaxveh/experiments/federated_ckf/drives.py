@@ -19,11 +19,11 @@ from jaxveh.simulation import simulate
 from jaxveh.statespace import Gaussian, RolledRK4
 from jaxveh.tyres import Dugoff, MagicFormula, Similarity
 from jaxveh.vehicles import SevenDOF, sets
-from jaxveh.vehicles.parameter_sets import GENERIC
-from jaxveh.vehicles.wheels import named
+from jaxveh.vehicles.parameter_sets import GENERIC_TYRE
+from jaxveh.vehicles.wheels import wheel_names
 
-WHEELS = named("omega")
-PULLS = named("pull")
+WHEELS = wheel_names("omega")
+PULLS = wheel_names("pull")
 
 
 class Drive(NamedTuple):
@@ -78,7 +78,7 @@ def peaked() -> Similarity:
     numbers = sets.ev()
     assert numbers.front is not None and numbers.front.slip_stiffness is not None
     load, stiffness = 0.5 * sum(numbers.wheel_loads()), numbers.front.cornering_stiffness
-    C, E = GENERIC["C"], GENERIC["E"]
+    C, E = GENERIC_TYRE["C"], GENERIC_TYRE["E"]
     curve = MagicFormula(B=stiffness / (C * load), C=C, D=load, E=E)
     return Similarity(curve, load, slip_stiffness_ratio=numbers.front.slip_stiffness / stiffness)
 
@@ -109,7 +109,7 @@ def drive_once(study: Study, steer, speed_std, key, *, magic_formula: bool = Fal
         yaw_rate=said["yaw_rate"],
         omega=jnp.stack([said[name] for name in WHEELS], axis=-1),
         steer=found["steer"],
-        torque=jnp.stack([found[name] for name in named("torque")], axis=-1),
+        torque=jnp.stack([found[name] for name in wheel_names("torque")], axis=-1),
         true_v_x=found["true.v_x"],
         true_v_y=found["true.v_y"],
         true_yaw_rate=found["true.yaw_rate"],

@@ -10,7 +10,7 @@ from jaxveh.experiments.federated_ckf.report import SHORT, Reproduction
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS
 from jaxveh.experiments.federated_ckf.study import Raced, truth
 from jaxveh.plots.figure import Figure
-from jaxveh.plots.style import COLOURS, CYCLE, SHADE, WIDTH, style
+from jaxveh.plots.style import COLOURS, CYCLE, PAGE_WIDTH, SHADE, style
 
 EVERY = 0.1
 """s between the rows that are kept."""
@@ -44,7 +44,7 @@ def _those(raced: Raced, colours: dict[str, str]) -> dict[str, str]:
 
 def parameters_figure(raced: Raced, case: str = "printed start") -> Any:
     """The four parameters over time: medians over seeds and quartiles as bands."""
-    figure = Figure(figsize=(WIDTH, 5.0), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, 5.0), layout="constrained")
     with style():
         panels = figure.subplots(2, 2, sharex=True)
         for i, (axes, name) in enumerate(zip(panels.flat, PARAMETERS, strict=True)):
@@ -71,7 +71,7 @@ def parameters_figure(raced: Raced, case: str = "printed start") -> Any:
 
 def drive_figure(raced: Raced, seed: int = 0) -> Any:
     """One drive: steer, speed, lateral acceleration, sideslip, and the errors of the sideslip from the printed start."""
-    figure = Figure(figsize=(WIDTH, 6.6), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, 6.6), layout="constrained")
     place = raced.cases.index("printed start")
     drive = type(raced.drives)(*(leaf[place, seed] for leaf in raced.drives))
     time = raced.study.dt * np.arange(len(drive.steer))
@@ -101,7 +101,7 @@ FAULTY = {"joint": CYCLE[0], "joint, gated": CYCLE[2], "redesigned": CYCLE[1], "
 
 def fault_figure(raced: Raced) -> Any:
     """The sideslip's error over time with the fault: the median of its size over seeds."""
-    figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, 3.4), layout="constrained")
     study, step = raced.study, round(EVERY / raced.study.dt)
     true = np.rad2deg(raced.drives.true_sideslip[raced.cases.index("fault")][:, ::step])
     with style():
@@ -123,7 +123,7 @@ def fault_figure(raced: Raced) -> Any:
 
 def line_figure(result: Reproduction) -> Any:
     """Bounds of friction and mass over the steer amplitude, by how much the speed varies, and what the joint filter finds."""
-    figure = Figure(figsize=(WIDTH, 3.8), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, 3.8), layout="constrained")
     bounds = {name: np.array([[one.bounds for one in row] for row in rows]) for name, rows in result.seen.items()}
     with style():
         left, right = figure.subplots(1, 2)

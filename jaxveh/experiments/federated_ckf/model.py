@@ -18,7 +18,7 @@ from jaxveh.tyres import Dugoff, Forces
 from jaxveh.vehicles import GRAVITY, sets
 from jaxveh.vehicles.load_transfer import planar_loads
 from jaxveh.vehicles.two_track import air_drag, positions_of, rolling_wheels
-from jaxveh.vehicles.wheels import Wheels, each, of, pushed
+from jaxveh.vehicles.wheels import Wheels, body_forces, each_wheel, wheels_of
 
 INPUTS = ("steer", "a_x_felt", "a_y_felt", *PULLS)
 CHANNELS = ("a_x", "a_y", "yaw_rate", *WHEELS)
@@ -83,25 +83,25 @@ class Planar(eqx.Module):
     def pushed(self, x: State, u: Any) -> Pushed:
         """What the wheels do to the car in the state x with the inputs u (`steer`, `pull_fl` ...)."""
         moves = rolling_wheels(self, x.v_x, x.v_y, x.yaw_rate, u.steer)
-        pulls = of(u, "pull")
+        pulls = wheels_of(u, "pull")
         loads = planar_loads(self, u.a_x_felt, u.a_y_felt, -GRAVITY)
-        pulls = each(lambda pull, load: pull - self.rolling_resistance * load, pulls, loads)
+        pulls = each_wheel(lambda pull, load: pull - self.rolling_resistance * load, pulls, loads)
         friction = self.friction if isinstance(self.friction, Wheels) else Wheels(*[self.friction] * 4)
         found = self._wheels(moves, loads, pulls, friction, self._slips(moves, u) if self.measured_slip else None)
-        push = pushed(positions_of(self), moves, each(lambda wheel: wheel[0], found))
-        omega = each(lambda move, wheel: move.along * (1.0 + wheel[1]) / self.wheel_radius, moves, found)
+        push = body_forces(positions_of(self), moves, each_wheel(lambda wheel: wheel[0], found))
+        omega = each_wheel(lambda move, wheel: move.along * (1.0 + wheel[1]) / self.wheel_radius, moves, found)
         drag = air_drag(self.drag, x.v_x)
         return Pushed((push.F_x - drag) / self.mass, push.F_y / self.mass, push.M_z, omega)
 
     def _slips(self, moves: Wheels, u: Any) -> Wheels:
         """Slip ratios of the measured wheel speeds (eq 14)."""
         slip = lambda move, omega: (omega * self.wheel_radius - move.along) / jnp.maximum(move.along, LEAST_SPEED)
-        return each(slip, moves, of(u, "omega"))
+        return each_wheel(slip, moves, wheels_of(u, "omega"))
 
     def _wheels(self, moves: Wheels, loads: Wheels, pulls: Wheels, friction: Wheels, slips: Wheels | None) -> Wheels:
         """Forces and slip ratios of the wheels, all four by one call: a fourth of the program."""
-        along = each(lambda m: m.along, moves)
-        across = each(lambda m: m.across, moves)
+        along = each_wheel(lambda m: m.along, moves)
+        across = each_wheel(lambda m: m.across, moves)
         told = pulls if slips is None else slips
         flat = jnp.broadcast_arrays(*along, *across, *loads, *told, *friction)
         stacked = [jnp.stack(flat[i : i + 4]) for i in range(0, 20, 4)]

@@ -17,7 +17,7 @@ from jaxveh.experiments.federated_ckf.interleaved import Member, Told, stays, ta
 from jaxveh.experiments.federated_ckf.model import INPUTS, State, planar, rows_of
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
 from jaxveh.statespace import Discrete, Gaussian, Prior, Row, StateSpace
-from jaxveh.vehicles.wheels import Wheels, named
+from jaxveh.vehicles.wheels import Wheels, wheel_names
 
 FIRST, SECOND = ("a_x_1", "a_y_1", "yaw_rate_1"), ("a_y_2", "yaw_rate_2")
 """Z_1 and Z_2: the same sensors under two names, since the two locals are told different noise."""
@@ -29,7 +29,7 @@ EXACT = 1e-8
 
 STATE = ("v_x", "v_y", "a_x", "a_y", "yaw_rate", "moment")
 BODY = ("mass", "yaw_inertia", "front_axle_to_cg")
-MUS = named("friction")
+MUS = wheel_names("friction")
 
 STATE_R = dict(zip((*FIRST, *SECOND), (EXACT, 0.1, 1.5, EXACT, 0.01), strict=True))
 """0.1 diag(0.0, 1, 15) and 0.01 diag(0.0, 1)."""

@@ -14,7 +14,7 @@ from jaxveh.experiments.model_adaptive_pf.report import Reproduction, against
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, Study
 from jaxveh.experiments.model_adaptive_pf.study import Raced
 from jaxveh.plots.figure import Figure
-from jaxveh.plots.style import COLOURS, CYCLE, WIDTH, style
+from jaxveh.plots.style import COLOURS, CYCLE, PAGE_WIDTH, style
 from jaxveh.tyres import Contact
 
 SHOWN = {CUBATURE: "#e0c8b8", "open loop": "#7f7f7f", "AAR": CYCLE[3], PLAIN: CYCLE[0], REDESIGNED: CYCLE[2]}
@@ -41,7 +41,7 @@ def _drive(raced: Raced, case: str, seed: int) -> Drive:
 
 def measured_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = None) -> Any:
     """What the sensors say on one drive, and the truth."""
-    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained") if figure is None else figure
+    figure = Figure(figsize=(PAGE_WIDTH, 4.6), layout="constrained") if figure is None else figure
     drive, t = _drive(raced, case, seed), np.asarray(times(raced.study))
     channels = {"v_x": ("v_x [m/s]", 1.0), "a_y": ("a_y [m/s²]", 1.0), "yaw_rate": ("yaw rate [°/s]", 180.0 / np.pi)}
     with style():
@@ -64,7 +64,7 @@ def measured_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any
 
 def sideslip_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = None) -> Any:
     """Sideslip of one drive as estimated, and the errors below, as the paper's figure 4."""
-    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained") if figure is None else figure
+    figure = Figure(figsize=(PAGE_WIDTH, 4.6), layout="constrained") if figure is None else figure
     drive, t = _drive(raced, case, seed), np.asarray(times(raced.study))
     with style():
         above, below = figure.subplots(2, 1, sharex=True)
@@ -85,7 +85,7 @@ def sideslip_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any
 def ablation_figure(raced: Raced, figure: Any = None) -> Any:
     """Sideslip RMSE of every estimator, median and quartiles, under each kind of noise."""
     names = raced.found.design.axis("estimator").labels
-    figure = Figure(figsize=(WIDTH, 0.32 * len(names) + 1.2), layout="constrained") if figure is None else figure
+    figure = Figure(figsize=(PAGE_WIDTH, 0.32 * len(names) + 1.2), layout="constrained") if figure is None else figure
     with style():
         axes = figure.subplots()
         for i, (case, colour) in enumerate(zip(CASES, CYCLE, strict=False)):
@@ -110,7 +110,7 @@ def gain_figure(raced: Raced, figure: Any = None) -> Any:
     """Paired ratios to the plain particle filter in every case, with bootstrap intervals."""
     shown = (REDESIGNED, "PF, wavelet", "PF, mixture", ROBUST, TOLD, "PF, no relaxation", "open loop")
     cases = {**CASES, **LIMIT}
-    figure = Figure(figsize=(WIDTH, 4.0), layout="constrained") if figure is None else figure
+    figure = Figure(figsize=(PAGE_WIDTH, 4.0), layout="constrained") if figure is None else figure
     with style():
         axes = figure.subplots()
         for i, name in enumerate(shown):
@@ -133,7 +133,7 @@ def gain_figure(raced: Raced, figure: Any = None) -> Any:
 
 def pressed_figure(raced: Raced, figure: Any = None) -> Any:
     """Sideslip RMSE over the process noise that filters assume: medians and quartiles."""
-    figure = Figure(figsize=(WIDTH, 3.4), layout="constrained") if figure is None else figure
+    figure = Figure(figsize=(PAGE_WIDTH, 3.4), layout="constrained") if figure is None else figure
     shares = [case.process for case in raced.cases.values()]
     with style():
         axes = figure.subplots()
@@ -156,7 +156,7 @@ def pressed_figure(raced: Raced, figure: Any = None) -> Any:
 
 def tyre_figure(study: Study, figure: Any = None) -> Any:
     """The printed Fiala tyre, the corrected one and the true one on a front wheel: lateral force and aligning moment."""
-    figure = Figure(figsize=(WIDTH, 3.2), layout="constrained") if figure is None else figure
+    figure = Figure(figsize=(PAGE_WIDTH, 3.2), layout="constrained") if figure is None else figure
     load = numbers_of(study).wheel_loads()[0]
     alpha = np.radians(np.linspace(0.0, 16.0, 641))
     contact = Contact(

@@ -28,7 +28,7 @@ from jaxveh.experiments.model_adaptive_pf.settings import (
 from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
 from jaxveh.experiments.report import Table, interval, spread
 from jaxveh.filters.wrappers.base import Remembering
-from jaxveh.filters.wrappers.wavelet import MEDIAN, Window, first_window, measured, seen
+from jaxveh.filters.wrappers.wavelet import NORMAL_MEDIAN, Window, first_window, row_values, window_after
 from jaxveh.statespace.contract import AbstractWrapper
 from jaxveh.tyres import Contact
 
@@ -64,9 +64,11 @@ class PrintedNoise(AbstractWrapper):
     def _seen(self, model, memory: Window, row) -> Window:
         """The window after a row; its `variances` hold the paper's R."""
         forgetting, R = self.inner.forgetting, memory.variances
-        now = seen(self.inner, jnp.square(jnp.stack(model.measurement_noise.std)), memory, measured(model, row))
+        now = window_after(
+            self.inner, jnp.square(jnp.stack(model.measurement_noise.std)), memory, row_values(model, row)
+        )
         variance = (now.variances - forgetting * R) / (1.0 - forgetting)
-        delta = jnp.sqrt(jnp.maximum(variance, 0.0)) * (MEDIAN / PRINTED_DIVISOR)
+        delta = jnp.sqrt(jnp.maximum(variance, 0.0)) * (NORMAL_MEDIAN / PRINTED_DIVISOR)
         full = now.count >= self.inner.window
         return now._replace(variances=jnp.where(full, forgetting * R + (1.0 - forgetting) * delta, R))
 

@@ -12,7 +12,7 @@ from jaxveh.experiments.sideslip_review.report import Reproduction
 from jaxveh.experiments.sideslip_review.study import EVERY, Raced
 from jaxveh.experiments.sideslip_review.verdicts import CONTRADICTS, SUPPORTS, verdicts
 from jaxveh.plots.figure import Figure
-from jaxveh.plots.style import COLOURS, CYCLE, WIDTH, style
+from jaxveh.plots.style import COLOURS, CYCLE, PAGE_WIDTH, style
 
 SHOWN = ("open loop", "integration", "linear Kalman", "EKF", "pseudo-integration", "handling")
 """The methods of the figures."""
@@ -35,7 +35,7 @@ def figures(result: Reproduction) -> dict[str, Any]:
 
 def marks_figure(raced: Raced) -> Any:
     """Every cell of the review's table: its number over what is still good, with its interval."""
-    figure = Figure(figsize=(WIDTH, 4.0), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, 4.0), layout="constrained")
     cells = verdicts(raced)
     with style():
         axes = figure.subplots()
@@ -60,7 +60,7 @@ def marks_figure(raced: Raced) -> Any:
 
 def errors_figure(raced: Raced) -> Any:
     """Sideslip RMSE of every method by scenario: medians and quartiles over seeds."""
-    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, 4.6), layout="constrained")
     with style():
         panels = figure.subplots(2, 4, sharey=True, sharex=True).ravel()
         names = list(WHAT)
@@ -87,7 +87,7 @@ def errors_figure(raced: Raced) -> Any:
 
 def drive_figure(raced: Raced, scenario: str, seed: int = 0) -> Any:
     """One drive: true and estimated sideslip, and the errors below."""
-    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, 4.4), layout="constrained")
     place = raced.scenarios.index(scenario)
     true = np.rad2deg(raced.drives.sideslip[place, seed, ::EVERY])
     time = raced.drives.time[place, seed, ::EVERY]
@@ -111,7 +111,7 @@ def drive_figure(raced: Raced, scenario: str, seed: int = 0) -> Any:
 
 def log_figure(logged: Logged) -> Any:
     """The real log: errors of every method, and a stretch of courses."""
-    figure = Figure(figsize=(WIDTH, 5.6), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, 5.6), layout="constrained")
     order = sorted(logged.rmse, key=lambda name: -logged.rmse[name])
     with style():
         above, below = figure.subplots(2, 1, height_ratios=(3, 2))

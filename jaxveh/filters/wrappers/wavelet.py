@@ -22,7 +22,7 @@ from jaxveh.statespace.contract import AbstractWrapper, Smoothing
 from jaxveh.statespace.dependent_noise import check_fixed
 
 # The median of the absolute value of a standard normal number.
-MEDIAN = 0.6744897501960817
+NORMAL_MEDIAN = 0.6744897501960817
 
 
 class Window(NamedTuple):
@@ -76,7 +76,7 @@ class HaarNoise(AbstractRemembering):
         return with_variances(model, memory.variances)
 
     def update(self, model, belief, row):
-        memory = seen(self, variances_of(model), belief.memory, measured(model, row))
+        memory = window_after(self, variances_of(model), belief.memory, row_values(model, row))
         return self.update_inside(model, Remembering(belief.inside, memory), row)
 
 
@@ -121,12 +121,12 @@ class HaarParticles(AbstractWrapper):
 
     def _init(self, model, row, key):
         own = variances_of(model)
-        memory = seen(self, own, first_window(self, own), measured(model, row))
+        memory = window_after(self, own, first_window(self, own), row_values(model, row))
         inside, info = self.inner._init(self._told(model, memory), row, key)
         return Remembering(inside, memory), info
 
     def _step(self, model, belief, row):
-        memory = seen(self, variances_of(model), belief.memory, measured(model, row))
+        memory = window_after(self, variances_of(model), belief.memory, row_values(model, row))
         inside, info = self.inner._step(self._told(model, memory), belief.inside, row)
         return Remembering(inside, memory), info
 
@@ -162,12 +162,12 @@ def first_window(settings: Any, own: Any) -> Window:
     return Window(jnp.zeros((settings.window, m), own.dtype), jnp.zeros(m, jnp.int32), settings.initial * own)
 
 
-def measured(model: Any, row: Any) -> Any:
+def row_values(model: Any, row: Any) -> Any:
     """The row's measurements, (m,), in the order of the channels."""
     return jnp.stack([getattr(row.y, name) for name in model.channels])
 
 
-def seen(settings: Any, own: Any, memory: Window, given: Any) -> Window:
+def window_after(settings: Any, own: Any, memory: Window, given: Any) -> Window:
     """The window after the measurements `given` (m,), NaN where missing, of a model with its `own` variances (m,)."""
     here = jnp.isfinite(given)
     longer = jnp.concatenate([memory.values[1:], jnp.where(here, given, 0.0)[None]])
@@ -175,7 +175,7 @@ def seen(settings: Any, own: Any, memory: Window, given: Any) -> Window:
     count = memory.count + here.astype(jnp.int32)
     # Pairs as the window lies now, not as they fell: each row is in one.
     details = (values[1::2] - values[::2]) * 0.5**0.5
-    found = jnp.square(_median_of_last(jnp.abs(details), count // 2) / MEDIAN)
+    found = jnp.square(_median_of_last(jnp.abs(details), count // 2) / NORMAL_MEDIAN)
     found = jnp.clip(found, settings.floor * own, settings.ceiling * own)
     mixed = settings.forgetting * memory.variances + (1.0 - settings.forgetting) * found
     fewest = settings.window if settings.fewest is None else settings.fewest

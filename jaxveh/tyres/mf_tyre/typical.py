@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-TYPICAL = {
+TYPICAL_COEFFICIENTS = {
     "BREFF": 8.4, "DREFF": 0.27, "FREFF": 0.07, "Q_RA1": 0.5, "Q_RA2": 1.0, "Q_RB1": 1.0, "Q_RB2": -1.0,
     "PCX1": 1.65, "PDX1": 1.3, "PDX2": -0.15, "PKX1": 20.0, "RBX1": 20.0, "RBX2": 15.0, "RCX1": 1.0,
     "PCY1": 1.3, "PDY1": 1.1, "PDY2": -0.15, "PKY1": -20.0, "PKY2": 1.0, "PKY4": 2.0, "PKY6": -1.0,

@@ -37,11 +37,21 @@ from jaxveh.vehicles.two_track import (
     tyres_of,
     wheel_outputs,
 )
-from jaxveh.vehicles.wheels import Wheels, each, frictions, gravity, named, of, opposing, pushed, total
+from jaxveh.vehicles.wheels import (
+    Wheels,
+    body_forces,
+    each_wheel,
+    frictions,
+    gravity,
+    sum_of_wheels,
+    travel_direction,
+    wheel_names,
+    wheels_of,
+)
 
 BODY = ("v_x", "v_y", "v_z", "z", "roll", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate")
-SPINS = named("omega")
-STATES = (*BODY, *named("travel"), *named("travel_rate"), *SPINS)
+SPINS = wheel_names("omega")
+STATES = (*BODY, *wheel_names("travel"), *wheel_names("travel_rate"), *SPINS)
 
 
 class FourteenDOF(AbstractTwoTrack):
@@ -161,7 +171,7 @@ class FourteenDOF(AbstractTwoTrack):
         given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
         zero = jnp.zeros(jnp.shape(u.steer), dtype)
         speed = given.get("v_x", zero)
-        spins = each(lambda sunk: speed / (self.wheel_radius - ROLLING_SHARE * sunk), sunk_at_rest(self))
+        spins = each_wheel(lambda sunk: speed / (self.wheel_radius - ROLLING_SHARE * sunk), sunk_at_rest(self))
         rest = {"z": self.cg_height + zero, **dict(zip(SPINS, spins, strict=True))}
         x = record("Body", {name: given.get(name, rest.get(name, zero)) for name in STATES})
         if not tyres_of(self).state_names:
@@ -170,10 +180,10 @@ class FourteenDOF(AbstractTwoTrack):
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        tyres, stand, omegas = tyres_of(self), self._stand(x, u, ground), of(x, "omega")
+        tyres, stand, omegas = tyres_of(self), self._stand(x, u, ground), wheels_of(x, "omega")
         body, states, g = stand.body, tyres.states(x), Vector(*gravity(ground))
         forces = tyres.forces(stand.contacts, states)
-        roads = each(
+        roads = each_wheel(
             lambda at, how, f, omega: reaction(self, body, at, how, f, omega),
             stand.contacts,
             stand.touches,
@@ -181,35 +191,37 @@ class FourteenDOF(AbstractTwoTrack):
             omegas,
         )
         roads, shafts = numerics.stored((roads, self._shafts(stand, u, omegas)))
-        suspension, damping = suspension_forces(self, of(x, "travel"), of(x, "travel_rate"))
+        suspension, damping = suspension_forces(self, wheels_of(x, "travel"), wheels_of(x, "travel_rate"))
         found = self._accelerate(x, stand, roads, shafts, suspension, omegas, g)
         roll, pitch, yaw = angle_accelerations(body.axes, x, body.omega, found.angular)
         linear = to_road(body.axes, found.linear)
-        spins = each(lambda road, shaft: (road.spin + shaft.torque) / self.wheel_inertia, roads, shafts)
+        spins = each_wheel(lambda road, shaft: (road.spin + shaft.torque) / self.wheel_inertia, roads, shafts)
         rates = (
             linear.x + x.v_y * x.yaw_rate, linear.y - x.v_x * x.yaw_rate, linear.z, x.v_z,
             x.roll_rate, x.pitch_rate, x.yaw_rate, roll, pitch, yaw,
-            *of(x, "travel_rate"), *found.travels, *spins, *tyres.rates(stand.contacts, states),
+            *wheels_of(x, "travel_rate"), *found.travels, *spins, *tyres.rates(stand.contacts, states),
         )  # fmt: skip
         felt = minus(linear, g)
-        push = pushed(
-            each(lambda wheel, how: _below(body, wheel, how), stand.wheels, stand.touches),
-            each(lambda how: how.moves, stand.touches),
+        push = body_forces(
+            each_wheel(lambda wheel, how: _below(body, wheel, how), stand.wheels, stand.touches),
+            each_wheel(lambda how: how.moves, stand.touches),
             forces,
         )
         shown = body_outputs(self.motion(x, u), felt.x, felt.y, yaw, u.steer, push)
         shown |= attitude_outputs(x, roll, pitch, felt.z)
         shown |= wheel_outputs(stand.contacts, forces, omegas) | moments(forces)
         shown |= by_wheel(
-            camber=each(lambda at: at.camber, stand.contacts), travel=of(x, "travel"),
-            travel_rate=of(x, "travel_rate"), suspension_force=suspension,
-            omega_to_body=each(lambda shaft: shaft.turns, shafts),
+            camber=each_wheel(lambda at: at.camber, stand.contacts), travel=wheels_of(x, "travel"),
+            travel_rate=wheels_of(x, "travel_rate"), suspension_force=suspension,
+            omega_to_body=each_wheel(lambda shaft: shaft.turns, shafts),
         )  # fmt: skip
         shown |= {
-            "drive_power": total(each(lambda shaft: shaft.drive_power, shafts)),
-            "tyre_dissipation": total(each(lambda road: road.dissipation, roads)),
-            "damper_dissipation": total(each(lambda force, rate: force * rate, damping, of(x, "travel_rate"))),
-            "brake_dissipation": total(each(lambda shaft: shaft.brake_power, shafts)),
+            "drive_power": sum_of_wheels(each_wheel(lambda shaft: shaft.drive_power, shafts)),
+            "tyre_dissipation": sum_of_wheels(each_wheel(lambda road: road.dissipation, roads)),
+            "damper_dissipation": sum_of_wheels(
+                each_wheel(lambda force, rate: force * rate, damping, wheels_of(x, "travel_rate"))
+            ),
+            "brake_dissipation": sum_of_wheels(each_wheel(lambda shaft: shaft.brake_power, shafts)),
             "drag_dissipation": air_drag(self.drag, x.v_x) * x.v_x,
         }
         return self.state_type(*rates), record("FourteenDOFOutputs", filled(shown, push.F_y))
@@ -217,14 +229,14 @@ class FourteenDOF(AbstractTwoTrack):
     def _stand(self, x, u, ground: Ground) -> Stand:
         """How the car stands on the road, before any tyre force."""
         body = numerics.stored(body_of(x))
-        wheels = each(
+        wheels = each_wheel(
             lambda joint, travel, rate: wheel_at(joint, travel, rate, body),
-            joints(self), of(x, "travel"), of(x, "travel_rate"),
+            joints(self), wheels_of(x, "travel"), wheels_of(x, "travel_rate"),
         )  # fmt: skip
         turned = axles(self, u.steer)
-        both = each(
+        both = each_wheel(
             lambda wheel, axis, omega, mu: touch(self, body, wheel, axis, omega, mu),
-            wheels, turned, of(x, "omega"), frictions(ground),
+            wheels, turned, wheels_of(x, "omega"), frictions(ground),
         )  # fmt: skip
         stand = Stand(body, wheels, turned, Wheels(*[b[0] for b in both]), Wheels(*[b[1] for b in both]))
         return numerics.stored(stand)
@@ -235,20 +247,20 @@ class FourteenDOF(AbstractTwoTrack):
 
         def one(axis, how, omega, driving, braking):
             turns = omega - dot(axis, stand.body.omega)
-            slowing = braking * opposing(turns * how.radius)
+            slowing = braking * travel_direction(turns * how.radius)
             return Shaft(driving - slowing, turns, driving * turns, slowing * turns)
 
-        return each(one, stand.axles, stand.touches, omegas, drive, brake)
+        return each_wheel(one, stand.axles, stand.touches, omegas, drive, brake)
 
     def _accelerate(self, x, stand: Stand, roads, shafts, suspension, omegas, g: Vector) -> Accelerations:
         """Gravity, drag and the reactions of torques on the body; gravity and the road on the wheels."""
         axes = stand.body.axes
         g = to_body(axes, g)
         force = add(scaled(self.sprung_mass, g), scaled(-air_drag(self.drag, x.v_x), axes.forward))
-        moments = each(
+        moments = each_wheel(
             lambda road, shaft, axis: minus(road.moment, scaled(shaft.torque, axis)), roads, shafts, stand.axles
         )
-        momentum = each(lambda omega, axis: scaled(self.wheel_inertia * omega, axis), omegas, stand.axles)
+        momentum = each_wheel(lambda omega, axis: scaled(self.wheel_inertia * omega, axis), omegas, stand.axles)
         return accelerations(
             Inertia(self.sprung_mass, self.roll_inertia, self.pitch_inertia, self.yaw_inertia, self.roll_yaw_product),
             joints(self),
@@ -257,7 +269,7 @@ class FourteenDOF(AbstractTwoTrack):
             add(*momentum),
             force,
             add(*moments),
-            each(lambda road, mass: add(road.force, scaled(mass, g)), roads, unsprung(self)),
+            each_wheel(lambda road, mass: add(road.force, scaled(mass, g)), roads, unsprung(self)),
             suspension,
         )
 

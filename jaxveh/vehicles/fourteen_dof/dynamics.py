@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from jaxveh.numerics import solve_scalars, stored
 from jaxveh.vehicles.fourteen_dof.suspension import Joint, Wheel
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
-from jaxveh.vehicles.wheels import Wheels, each, total
+from jaxveh.vehicles.wheels import Wheels, each_wheel, sum_of_wheels
 
 
 class Inertia(NamedTuple):
@@ -51,8 +51,8 @@ def accelerations(
     and leaves for the body a symmetric system in (a, alpha), in which each wheel has the inertia of a point mass across its
     joint: m_u (J^T J - q q^T / |d|^2) with J = (1, -[r]x).
     """
-    on_wheel = each(lambda joint, wheel, F: minus(F, scaled(joint.mass, wheel.bias)), joints, wheels, on_wheels)
-    ways = each(lambda joint, wheel: (*joint.slope, *cross(wheel.place, joint.slope)), joints, wheels)
+    on_wheel = each_wheel(lambda joint, wheel, F: minus(F, scaled(joint.mass, wheel.bias)), joints, wheels, on_wheels)
+    ways = each_wheel(lambda joint, wheel: (*joint.slope, *cross(wheel.place, joint.slope)), joints, wheels)
     matrix = _matrix(inertia, joints, wheels, ways)
     b = _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension)
     matrix, b = stored((matrix, b))
@@ -63,18 +63,20 @@ def accelerations(
         carried = add(linear, cross(angular, wheel.place))
         return (dot(joint.slope, minus(G, scaled(joint.mass, carried))) - S) / (joint.mass * joint.square)
 
-    return Accelerations(linear, angular, each(travel, joints, wheels, on_wheel, suspension))
+    return Accelerations(linear, angular, each_wheel(travel, joints, wheels, on_wheel, suspension))
 
 
 def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> list:
     """Rows up to the diagonal of the system in (a, alpha): all as one rigid body, less what the joints leave free."""
-    m = each(lambda joint: joint.mass, joints)
-    moment = each(lambda mass, wheel: scaled(mass, wheel.place), m, wheels)
+    m = each_wheel(lambda joint: joint.mass, joints)
+    moment = each_wheel(lambda mass, wheel: scaled(mass, wheel.place), m, wheels)
     s = add(*moment)
-    second = lambda a, b: total(each(lambda f, wheel: getattr(f, a) * getattr(wheel.place, b), moment, wheels))
+    second = lambda a, b: sum_of_wheels(
+        each_wheel(lambda f, wheel: getattr(f, a) * getattr(wheel.place, b), moment, wheels)
+    )
     xx, yy, zz = second("x", "x"), second("y", "y"), second("z", "z")
     xy, xz, yz = second("x", "y"), second("x", "z"), second("y", "z")
-    mass = inertia.mass + total(m)
+    mass = inertia.mass + sum_of_wheels(m)
     rigid = [
         [mass],
         [0.0, mass],
@@ -83,8 +85,8 @@ def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> l
         [s.z, 0.0, -s.x, -xy, inertia.y + (xx + zz)],
         [-s.y, s.x, 0.0, -inertia.xz - xz, -yz, inertia.z + (xx + yy)],
     ]
-    shares = each(lambda joint, q: [joint.mass / joint.square * e for e in q], joints, ways)
-    free = lambda i, j: total(each(lambda share, q: share[i] * q[j], shares, ways))
+    shares = each_wheel(lambda joint, q: [joint.mass / joint.square * e for e in q], joints, ways)
+    free = lambda i, j: sum_of_wheels(each_wheel(lambda share, q: share[i] * q[j], shares, ways))
     return [[entry - free(i, j) for j, entry in enumerate(row)] for i, row in enumerate(rigid)]
 
 
@@ -93,7 +95,7 @@ def _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wh
     I, w = inertia, omega
     turns = Vector(I.x * w.x - I.xz * w.z, I.y * w.y, I.z * w.z - I.xz * w.x)
     rest = minus(moment, cross(w, add(turns, spin)))
-    levers = each(lambda wheel, G: cross(wheel.place, G), wheels, on_wheel)
-    along = each(lambda joint, G, S: (dot(joint.slope, G) - S) / joint.square, joints, on_wheel, suspension)
+    levers = each_wheel(lambda wheel, G: cross(wheel.place, G), wheels, on_wheel)
+    along = each_wheel(lambda joint, G, S: (dot(joint.slope, G) - S) / joint.square, joints, on_wheel, suspension)
     right = [*add(force, *on_wheel), *add(rest, *levers)]
-    return [entry - total(each(lambda l, q: l * q[i], along, ways)) for i, entry in enumerate(right)]  # noqa: B023
+    return [entry - sum_of_wheels(each_wheel(lambda l, q: l * q[i], along, ways)) for i, entry in enumerate(right)]  # noqa: B023

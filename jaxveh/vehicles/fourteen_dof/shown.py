@@ -5,18 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from jaxveh.vehicles.two_track import UNITS as TWO_TRACK
-from jaxveh.vehicles.wheels import Wheels, named
+from jaxveh.vehicles.wheels import Wheels, wheel_names
 
 UNITS = {
     **TWO_TRACK,
-    **dict.fromkeys(("z", *named("travel")), "m"),
-    **dict.fromkeys(("v_z", *named("travel_rate")), "m/s"),
+    **dict.fromkeys(("z", *wheel_names("travel")), "m"),
+    **dict.fromkeys(("v_z", *wheel_names("travel_rate")), "m/s"),
     "a_z": "m/s^2",
-    **dict.fromkeys(("roll", "pitch", *named("camber")), "rad"),
-    **dict.fromkeys(("roll_rate", "pitch_rate", *named("omega_to_body")), "rad/s"),
+    **dict.fromkeys(("roll", "pitch", *wheel_names("camber")), "rad"),
+    **dict.fromkeys(("roll_rate", "pitch_rate", *wheel_names("omega_to_body")), "rad/s"),
     **dict.fromkeys(("roll_acceleration", "pitch_acceleration"), "rad/s^2"),
-    **dict.fromkeys(named("suspension_force"), "N"),
-    **dict.fromkeys((*named("M_x"), *named("M_y")), "N m"),
+    **dict.fromkeys(wheel_names("suspension_force"), "N"),
+    **dict.fromkeys((*wheel_names("M_x"), *wheel_names("M_y")), "N m"),
     **dict.fromkeys(("tyre_dissipation", "damper_dissipation", "brake_dissipation", "drag_dissipation"), "W"),
 }
 """Units of states, inputs and outputs."""
@@ -24,7 +24,7 @@ UNITS = {
 
 def by_wheel(**values: Wheels) -> dict:
     """Outputs `<name>_fl` ... of each wheel's values."""
-    return {name: v for prefix, wheels in values.items() for name, v in zip(named(prefix), wheels, strict=True)}
+    return {name: v for prefix, wheels in values.items() for name, v in zip(wheel_names(prefix), wheels, strict=True)}
 
 
 def moments(forces: Wheels) -> dict:

@@ -9,7 +9,7 @@ from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.fourteen_dof.kinematics import Body
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, scaled
 from jaxveh.vehicles.two_track import positions_of
-from jaxveh.vehicles.wheels import Wheels, each, front_rear
+from jaxveh.vehicles.wheels import Wheels, each_wheel, front_rear
 
 LEFT = Wheels(1.0, -1.0, 1.0, -1.0)
 """1 for a wheel on the left, -1 on the right."""
@@ -47,12 +47,12 @@ def unsprung(car: Any) -> Wheels:
 
 def static_loads(car: Any) -> Wheels:
     """Wheel loads at rest on a level road, N."""
-    return each(lambda spring, mass: spring + GRAVITY * mass, spring_loads(car), unsprung(car))
+    return each_wheel(lambda spring, mass: spring + GRAVITY * mass, spring_loads(car), unsprung(car))
 
 
 def sunk_at_rest(car: Any) -> Wheels:
     """By how much each tyre is compressed at rest, m, in the plane of its wheel, which camber inclines."""
-    return each(lambda load, lean: load * lean / car.tyre_stiffness, static_loads(car), leans(car))
+    return each_wheel(lambda load, lean: load * lean / car.tyre_stiffness, static_loads(car), leans(car))
 
 
 def leans(car: Any) -> Wheels:
@@ -76,7 +76,7 @@ def joints(car: Any) -> Wheels:
         return Joint(Vector(x, y, lean * (car.wheel_radius - sunk) - car.cg_height), slope, dot(slope, slope), mass)
 
     masses, sunk = unsprung(car), sunk_at_rest(car)
-    return each(one, positions_of(car), LEFT, centres, tracks, pitch_slopes, masses, sunk, leans(car))
+    return each_wheel(one, positions_of(car), LEFT, centres, tracks, pitch_slopes, masses, sunk, leans(car))
 
 
 def wheel_at(joint: Joint, travel: Any, rate: Any, body: Body) -> Wheel:
@@ -96,8 +96,8 @@ def suspension_forces(car: Any, travels: Wheels, rates: Wheels) -> tuple[Wheels,
     springs, dampers = front_rear(car.spring_front, car.spring_rear), front_rear(car.damper_front, car.damper_rear)
     bars = front_rear(car.anti_roll_front, car.anti_roll_rear)
     other = Wheels(travels.fr, travels.fl, travels.rr, travels.rl)
-    damping = each(lambda damper, rate: damper * rate, dampers, rates)
-    force = each(
+    damping = each_wheel(lambda damper, rate: damper * rate, dampers, rates)
+    force = each_wheel(
         lambda load, k, bar, travel, opposite, damped: load + k * travel + bar * (travel - opposite) + damped,
         spring_loads(car), springs, bars, travels, other, damping,
     )  # fmt: skip

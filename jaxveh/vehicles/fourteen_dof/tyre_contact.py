@@ -11,7 +11,7 @@ from jaxveh.tyres import Contact, Forces
 from jaxveh.vehicles.fourteen_dof.kinematics import Body, to_body, to_road
 from jaxveh.vehicles.fourteen_dof.suspension import LEFT, Wheel
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
-from jaxveh.vehicles.wheels import Rolling, Wheels, contact, each, front_rear, opposing
+from jaxveh.vehicles.wheels import Rolling, Wheels, contact, each_wheel, front_rear, travel_direction
 
 ROLLING_SHARE = 1.0 / 3.0
 """Of a tyre's compression the part by which its effective rolling radius shrinks: a belt that hardly stretches."""
@@ -34,7 +34,7 @@ def axles(car: Any, steer: Any) -> Wheels:
         return Vector(-lean * numerics.sin(angle), lean * numerics.cos(angle), -side * numerics.sin(camber))
 
     steers = Wheels(front(1.0), front(-1.0), 0.0, 0.0)
-    return each(
+    return each_wheel(
         one, LEFT, steers, front_rear(car.toe_front, car.toe_rear), front_rear(car.camber_front, car.camber_rear)
     )
 
@@ -103,12 +103,12 @@ def reaction(car: Any, body: Body, at: Contact, how: Touch, forces: Forces, omeg
     moves, axis = how.moves, how.axis
     c, s = moves.cosine, moves.sine
     # Tyres know no direction of travel: their rolling resistance is that of rolling forwards.
-    rolling_moment = forces.M_y * opposing(moves.along)
+    rolling_moment = forces.M_y * travel_direction(moves.along)
     push = Vector(forces.F_x * c - forces.F_y * s, forces.F_x * s + forces.F_y * c, at.load)
     own = Vector(forces.M_x * c - rolling_moment * s, forces.M_x * s + rolling_moment * c, forces.M_z)
     whole = add(own, cross(how.arm, push))
     on_body = minus(whole, scaled(dot(whole, axis), axis))
-    resisting = car.rolling_resistance * at.load * how.radius * opposing(omega * how.radius)
+    resisting = car.rolling_resistance * at.load * how.radius * travel_direction(omega * how.radius)
     turning = dot(own, axis) - resisting
     own_on_body = minus(own, scaled(dot(own, axis), axis))
     taken = (

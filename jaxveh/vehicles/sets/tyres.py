@@ -8,8 +8,8 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh.tyres import AbstractTyre, MagicFormula, MFTyre, from_property_file, mf_tyre, typical_mf_tyre
-from jaxveh.tyres.mf_tyre.typical import TYPICAL
-from jaxveh.vehicles.parameter_sets import GENERIC
+from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
+from jaxveh.vehicles.parameter_sets import GENERIC_TYRE
 from jaxveh.vehicles.sets.numbers import TyreNumbers
 
 STRAIGHT = 1e4
@@ -33,13 +33,13 @@ def wheel_tyre(numbers: TyreNumbers, load: float, radius: float | None = None) -
     tyre = typical_mf_tyre(load, radius=radius)
     along = numbers.cornering_stiffness if numbers.slip_stiffness is None else numbers.slip_stiffness
     scales = {
-        "LKY": numbers.cornering_stiffness / (-TYPICAL["PKY1"] * load),
+        "LKY": numbers.cornering_stiffness / (-TYPICAL_COEFFICIENTS["PKY1"] * load),
         # Camber's stiffness goes with the slip's, as that of one carcass: with the typical tyre's own, a softened front axle
         # would have twice the rear's camber thrust, and a leaning car 8 % less yaw gain.
-        "LKYC": numbers.cornering_stiffness / (-TYPICAL["PKY1"] * load),
-        "LKX": along / (TYPICAL["PKX1"] * load),
-        "LMUX": numbers.friction / TYPICAL["PDX1"],
-        "LMUY": numbers.friction / TYPICAL["PDY1"],
+        "LKYC": numbers.cornering_stiffness / (-TYPICAL_COEFFICIENTS["PKY1"] * load),
+        "LKX": along / (TYPICAL_COEFFICIENTS["PKX1"] * load),
+        "LMUX": numbers.friction / TYPICAL_COEFFICIENTS["PDX1"],
+        "LMUY": numbers.friction / TYPICAL_COEFFICIENTS["PDY1"],
         # The car's own number says how hard it rolls.
         "LMY": 0.0,
     }
@@ -53,9 +53,9 @@ def axle_tyre(numbers: TyreNumbers, load: float) -> MagicFormula:
     static `load` (N) and of ordinary shape (`GENERIC`), with force proportional to load."""
     if numbers.axle_formula is not None:
         return MagicFormula(*numbers.axle_formula)
-    D, C = numbers.friction * load, GENERIC["C"]
+    D, C = numbers.friction * load, GENERIC_TYRE["C"]
     B = 2.0 * numbers.cornering_stiffness / (C * D)
-    return MagicFormula(B=B, C=C, D=D, E=GENERIC["E"], nominal_load=load)
+    return MagicFormula(B=B, C=C, D=D, E=GENERIC_TYRE["E"], nominal_load=load)
 
 
 def _pac2002(coefficients, load: float, radius: float) -> MFTyre:
