@@ -150,8 +150,8 @@ def _tails_in_words(name: str, residual: np.ndarray, robust: bool) -> str:
         )
     return (
         f"{name}: residuals have heavy tails: {100 * tails.share:.2g} % of the rows lie beyond {FAR_RESIDUAL:g} standard "
-        f"deviations ({number(tails.deviation)} {UNITS[name]} by their median size; of noise 0.006 %), and their RMS is {tails.ratio:.2g} "
-        "of them: outliers, which pull the fit, or rows that the law cannot meet; compare with --robust"
+        f"deviations ({number(tails.deviation)} {UNITS[name]} by their median size; of noise 0.006 %), and their RMS is "
+        f"{tails.ratio:.2g} of them: outliers, which pull the fit, or rows that the law cannot meet; compare with --robust"
     )
 
 

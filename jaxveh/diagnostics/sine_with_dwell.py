@@ -102,8 +102,8 @@ def sine_with_dwell(
     begins, reverses, completed = _instants(time, steer, BEGINNING / steering_ratio, time[before][-1])
     if time[-1] < completed + max(YAW_RATE_LIMITS):
         raise InputError(
-            f"sine_with_dwell: the drive ends at {time[-1]:g} s, but is looked at {max(YAW_RATE_LIMITS):g} s after the completion "
-            f"of steer at {completed:.3f} s: drive longer."
+            f"sine_with_dwell: the drive ends at {time[-1]:g} s, but is looked at {max(YAW_RATE_LIMITS):g} s after the "
+            f"completion of steer at {completed:.3f} s: drive longer."
         )
     for name in ("steer", "yaw_rate"):
         check_gaps(recording, name, time[before][0], completed + max(YAW_RATE_LIMITS), "sine_with_dwell")
