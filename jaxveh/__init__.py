@@ -1,7 +1,23 @@
 """jaxveh: estimate what a car cannot measure, in JAX, differentiable end to end."""
 
-from jaxveh import estimators, filters, fitting, manoeuvres, observers, roads, sensors, statespace, tyres, vehicles
+from jaxveh import (
+    diagnostics,
+    estimators,
+    filters,
+    fitting,
+    io,
+    manoeuvres,
+    numerics,
+    observers,
+    roads,
+    sensors,
+    simulation,
+    statespace,
+    tyres,
+    vehicles,
+)
 from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
+from jaxveh._core.lazy import submodules
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
 from jaxveh.simulation import simulate
@@ -18,16 +34,26 @@ __all__ = [
     "Result",
     "__version__",
     "cast",
+    "diagnostics",
     "estimators",
+    "experiments",
     "filters",
     "fitting",
+    "io",
     "manoeuvres",
+    "numerics",
     "observers",
+    "plots",
     "roads",
     "run",
     "sensors",
     "simulate",
+    "simulation",
     "statespace",
+    "sweeps",
     "tyres",
     "vehicles",
 ]
+
+# Imported when first asked for: they take longer, or need an extra.
+__getattr__ = submodules(__name__, ("experiments", "plots", "sweeps"))

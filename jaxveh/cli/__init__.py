@@ -8,6 +8,8 @@ from collections.abc import Sequence
 
 from jaxveh.cli.family import end_with_parent
 
+__all__ = ["main"]
+
 VECTOR_WIDTH = "--xla_cpu_prefer_vector_width"
 
 

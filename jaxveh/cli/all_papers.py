@@ -77,11 +77,11 @@ def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None) -> 
 
 
 def _held(done: Done) -> str:
-    from jaxveh.experiments.report import Tally
+    from jaxveh.experiments import report
 
     if done.code != 0:
         return "failed"
-    return str(Tally(**done.numbers["tally"])) if done.numbers.get("checks") else "none made"
+    return str(report.Tally(**done.numbers["tally"])) if done.numbers.get("checks") else "none made"
 
 
 def run_program(name: str, asked: Mapping[str, Any], folder: Path, tell: Callable[[str], None], family: Family) -> Done:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh import InputError, Recording
 from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
-from jaxveh.estimators.cleaning import BLIND_CHANNELS
+from jaxveh.estimators import kit
 
 INPUTS = ("steer", "v_x", "a_x")
 """Channels that must be known in every row."""
@@ -23,11 +23,11 @@ def filled(recording: Recording, max_gap: float | None) -> Recording:
     """
     if max_gap is not None:
         check_positive("--fill", max_gap, "s")
-    missing = [name for name in BLIND_CHANNELS if name not in recording]
+    missing = [name for name in kit.BLIND_CHANNELS if name not in recording]
     if missing:
         raise InputError(
-            f"log lacks {', '.join(missing)}, and needs {', '.join(BLIND_CHANNELS)}; say which columns they are with --channels "
-            "(jaxveh schema channels)."
+            f"log lacks {', '.join(missing)}, and needs {', '.join(kit.BLIND_CHANNELS)}; say which columns they are with "
+            "--channels (jaxveh schema channels)."
         )
     for name in INPUTS:
         if max_gap is not None and np.isfinite(np.asarray(recording[name])).any():
@@ -85,7 +85,7 @@ def calibration_part(recording: Recording, span: tuple[float, float] | None, cal
 
 
 def _seen(recording: Recording, more: tuple[str, ...], truth: str | None) -> Recording:
-    kept = recording.select([name for name in recording.names if name in BLIND_CHANNELS or name in more])
+    kept = recording.select([name for name in recording.names if name in kit.BLIND_CHANNELS or name in more])
     if truth is not None and truth in kept and truth not in more:
         return kept.replace(**{truth: np.full(len(kept), np.nan)})
     return kept

@@ -16,9 +16,7 @@ from jaxveh._core.errors import check_at_least
 from jaxveh.cli import options
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.output import check_report, make_folder, write_numbers
-from jaxveh.experiments.tyre_apf.settings import Study
-from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
-from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS
+from jaxveh.experiments import tyre_apf
 
 COUNT = typer.Option("--seeds", help="Drives, each with its own noise and prior; tables show medians.", min=1)
 OUT = typer.Option("--out", metavar="DIR", help="The figures' folder.")
@@ -28,7 +26,7 @@ PARTICLES = typer.Option("--particles", help="Of both particle filters, at least
 def demo(
     seeds: Annotated[int, COUNT] = 1,
     seed: options.Seed = 0,
-    particles: Annotated[int, PARTICLES] = Study().particles,
+    particles: Annotated[int, PARTICLES] = tyre_apf.Study().particles,
     out: Annotated[Path, OUT] = Path("jaxveh-demo"),
     numbers: options.Numbers = None,
 ) -> None:
@@ -42,10 +40,10 @@ def demo(
     """
     check_report(out, numbers)
     check_at_least("--particles", particles, 2)
-    study = Study(particles=particles)
+    study = tyre_apf.Study(particles=particles)
     start = time.perf_counter()
     with progress("demo") as report:
-        found = run_staged(study, jax.random.split(jax.random.key(seed), seeds), report)
+        found = tyre_apf.run_staged(study, jax.random.split(jax.random.key(seed), seeds), report)
         report(1, 1, "drawing")
         paths = _draw(found, study, out)
     _print(found, study, seeds)
@@ -57,19 +55,18 @@ def demo(
     write_numbers(numbers, {**_numbers(found), "total_s": took, "figures": paths}, configuration, seed)
 
 
-def _draw(found: Staged, study: Study, out: Path) -> list[Path]:
+def _draw(found: tyre_apf.Staged, study: tyre_apf.Study, out: Path) -> list[Path]:
     from jaxveh import plots
-    from jaxveh.experiments.tyre_apf import figures
 
     make_folder(out)
     return [
-        plots.save(figures.curves_figure(found.outcome, study), out / "force_curves.png"),
-        plots.save(figures.parameters_figure(found.outcome, study), out / "parameters.png"),
-        plots.save(figures.states_figure(found), out / "states.png"),
+        plots.save(tyre_apf.figures.curves_figure(found.outcome, study), out / "force_curves.png"),
+        plots.save(tyre_apf.figures.parameters_figure(found.outcome, study), out / "parameters.png"),
+        plots.save(tyre_apf.figures.states_figure(found), out / "states.png"),
     ]
 
 
-def _print(found: Staged, study: Study, seeds: int) -> None:
+def _print(found: tyre_apf.Staged, study: tyre_apf.Study, seeds: int) -> None:
     results().print(
         f"Double lane change, {np.degrees(study.steer):g} degrees at the road wheels, {study.speed:g} m/s, {study.rate:g} Hz; "
         f"prior {100 * study.prior:g} % (E {2 * study.prior:g}), {study.particles} particles, "
@@ -86,28 +83,27 @@ def _print(found: Staged, study: Study, seeds: int) -> None:
     _print_failures(found)
 
 
-def _print_parameters(found: Staged, study: Study, seeds: int) -> None:
-    from jaxveh.experiments.tyre_apf.figures import NAMES, true_spread, truth
+def _print_parameters(found: tyre_apf.Staged, study: tyre_apf.Study, seeds: int) -> None:
 
-    true, scale = truth(), true_spread(study)
-    values = {n: np.asarray(found.outcome.parameters[n]) for n in ESTIMATORS}
-    spreads = {n: np.asarray(found.outcome.spread[n]) for n in ESTIMATORS}
+    true, scale = tyre_apf.figures.truth(), tyre_apf.figures.true_spread(study)
+    values = {n: np.asarray(found.outcome.parameters[n]) for n in tyre_apf.ESTIMATORS}
+    spreads = {n: np.asarray(found.outcome.spread[n]) for n in tyre_apf.ESTIMATORS}
     rows = []
-    for i, name in enumerate(NAMES):
-        cells = [spread(np.median(values[n][:, i]), np.median(spreads[n][:, i]), "\n") for n in ESTIMATORS]
+    for i, name in enumerate(tyre_apf.figures.NAMES):
+        cells = [spread(np.median(values[n][:, i]), np.median(spreads[n][:, i]), "\n") for n in tyre_apf.ESTIMATORS]
         rows.append((name, f"{true[i]:g}", *cells))
     what = "estimate ± standard deviation" if seeds == 1 else "medians of estimate ± standard deviation"
-    table(f"Parameters: {what}", ("parameter", "truth", *ESTIMATORS), rows)
+    table(f"Parameters: {what}", ("parameter", "truth", *tyre_apf.ESTIMATORS), rows)
     rows = []
-    for i, name in enumerate(NAMES):
-        errors = [np.median(np.abs(values[n][:, i] - true[i])) / scale[i] for n in ESTIMATORS]
+    for i, name in enumerate(tyre_apf.figures.NAMES):
+        errors = [np.median(np.abs(values[n][:, i] - true[i])) / scale[i] for n in tyre_apf.ESTIMATORS]
         rows.append((name, *[f"{error:.2f}" for error in errors]))
-    table("Error of each parameter, in standard deviations of the prior", ("parameter", *ESTIMATORS), rows)
+    table("Error of each parameter, in standard deviations of the prior", ("parameter", *tyre_apf.ESTIMATORS), rows)
 
 
-def _print_errors(found: Staged) -> None:
+def _print_errors(found: tyre_apf.Staged) -> None:
     outcome, rows = found.outcome, []
-    for name in ESTIMATORS:
+    for name in tyre_apf.ESTIMATORS:
         curve, states = _median(outcome.curve_error[name]), _median(outcome.states[name])
         steps = [_median(found.steps[degrees][name])[1] for degrees in found.steps]
         rows.append(
@@ -122,12 +118,12 @@ def _print_errors(found: Staged) -> None:
     )
 
 
-def _print_seconds(found: Staged) -> None:
+def _print_seconds(found: tyre_apf.Staged) -> None:
     rows = [(name, f"{s.compile:.1f}", f"{s.run:.3f}") for name, s in found.seconds.items()]
     table("Time of each stage, s (compiled two at a time)", ("stage", "compile", "run"), rows)
 
 
-def _print_failures(found: Staged) -> None:
+def _print_failures(found: tyre_apf.Staged) -> None:
     for name, codes in found.outcome.result.items():
         codes = np.asarray(codes)
         for code in np.unique(codes[codes != 0]):
@@ -139,14 +135,13 @@ def _median(values) -> np.ndarray:
     return np.median(np.asarray(values), axis=0)
 
 
-def _numbers(found: Staged) -> dict[str, Any]:
-    from jaxveh.experiments.tyre_apf.figures import truth
+def _numbers(found: tyre_apf.Staged) -> dict[str, Any]:
 
     outcome, seen = found.outcome, found.observability
-    fields = lambda array: dict(zip(FIELDS, np.moveaxis(np.asarray(array), -1, 0), strict=True))
+    fields = lambda array: dict(zip(tyre_apf.FIELDS, np.moveaxis(np.asarray(array), -1, 0), strict=True))
     pair = lambda names, array: dict(zip(names, np.moveaxis(np.asarray(array), -1, 0), strict=True))
     return {
-        "truth": fields(truth()),
+        "truth": fields(tyre_apf.figures.truth()),
         "estimators": {
             name: {
                 "parameters": fields(outcome.parameters[name]),
@@ -157,11 +152,11 @@ def _numbers(found: Staged) -> dict[str, Any]:
                 "log_likelihood": outcome.log_likelihood[name],
                 "result": outcome.result[name],
             }
-            for name in ESTIMATORS
+            for name in tyre_apf.ESTIMATORS
         },
         "medians": {
             "curve_rmse_percent_of_D": {
-                n: pair(("front", "rear"), 100 * _median(outcome.curve_error[n])) for n in ESTIMATORS
+                n: pair(("front", "rear"), 100 * _median(outcome.curve_error[n])) for n in tyre_apf.ESTIMATORS
             }
         },
         "observability": {

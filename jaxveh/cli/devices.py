@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from jaxveh import sensors
 from jaxveh._core.errors import check_one_of
-from jaxveh.vehicles.wheels import wheel_names
+from jaxveh.vehicles import kit
 
 
 class Noise(NamedTuple):
@@ -50,5 +50,5 @@ def devices_of(name: str, car: Any, noise: Noise) -> Any:
 
 def _radius(car: Any) -> float | None:
     """The radius of wheels that spin, m; None for a car without, which has no wheel speeds to measure."""
-    spins = set(wheel_names("omega")) <= set(car.state_type._fields)
+    spins = set(kit.wheel_names("omega")) <= set(car.state_type._fields)
     return float(car.wheel_radius) if spins else None

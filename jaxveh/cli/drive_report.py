@@ -12,9 +12,9 @@ from jaxveh.cli.console import number, results
 from jaxveh.cli.failure import say
 from jaxveh.cli.manoeuvre import Asked, course_of, understeer_of, width_of
 from jaxveh.cli.output import make_folder
-from jaxveh.diagnostics.drive_channels import channel_values, has_channels
+from jaxveh.diagnostics import drive_channels
 from jaxveh.manoeuvres import clearance
-from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles import GRAVITY
 
 BODY = 4.5
 """m: length of the car between cones, assumed; its width is the one that the course was made for."""
@@ -53,8 +53,8 @@ def numbers_of(recording: Recording, asked: Asked, car: Any) -> dict[str, dict[s
         found = diagnostics.drive_numbers(recording)
     shown = {title: one._asdict() for title, one in found.items()}
     course = course_of(asked)
-    if course is not None and has_channels(recording, "x", "y", "yaw"):
-        x, y, yaw = (channel_values(recording, name) for name in ("x", "y", "yaw"))
+    if course is not None and drive_channels.has(recording, "x", "y", "yaw"):
+        x, y, yaw = (drive_channels.channel(recording, name) for name in ("x", "y", "yaw"))
         width = width_of(asked)
         body = f"body of {BODY:g} m x {width:g} m centred on the centre of gravity"
         shown[f"{course.name} ({body})"] = {"clearance": float(clearance(x, y, yaw, width, BODY, course))}
@@ -94,9 +94,9 @@ def draw(recording: Recording, asked: Asked, car: Any, out: Path) -> list[Path]:
     except InputError as error:
         say("warning", "yellow", f"no figure of {asked.name}, what the car does instead: {error}")
         figures["drive"] = plots.overview(recording)
-    if has_channels(recording, "x", "y", "yaw"):
+    if drive_channels.has(recording, "x", "y", "yaw"):
         figures["top_view"] = plots.top_view(recording, course, car=car)
-    if has_channels(recording, "load_fl") or has_channels(recording, "load_front"):
+    if drive_channels.has(recording, "load_fl") or drive_channels.has(recording, "load_front"):
         figures["loads"] = plots.loads(recording)
     figures["channels"] = plots.recording(recording)
     return [plots.save(figure, out / f"{name}.png") for name, figure in figures.items()]

@@ -19,7 +19,7 @@ from jaxveh.cli.console import number, progress, results, table
 from jaxveh.cli.output import check_report, make_folder, write_numbers
 
 if TYPE_CHECKING:
-    from jaxveh.experiments.report import Check
+    from jaxveh import experiments
 
 PAPERS = {
     "tyre-apf": "Magic Formula parameters by auxiliary particle filter (Bao, Sabbioni et al. 2015)",
@@ -91,7 +91,7 @@ def reproduce(
 
 def _one(name: str, asked: dict[str, Any], as_printed: bool, report: Progress, out: Path | None) -> dict[str, Any]:
     """Run one paper as `asked` and show it; what it found, for JSON."""
-    from jaxveh.experiments.report import tally
+    from jaxveh import experiments
 
     _every_core()
     experiment = _experiment(name)
@@ -109,16 +109,16 @@ def _one(name: str, asked: dict[str, Any], as_printed: bool, report: Progress, o
         _draw(experiment, found, out)
     return {
         "checks": [check._asdict() for check in checks],
-        "tally": tally(checks)._asdict(),
+        "tally": experiments.report.tally(checks)._asdict(),
         "tables": [one._asdict() for one in tables],
         "settings": settings,
     }
 
 
-def _show_checks(name: str, checks: Sequence[Check]) -> None:
+def _show_checks(name: str, checks: Sequence[experiments.report.Check]) -> None:
     """Criteria with value, bound and the number of their condition, and the conditions below; below each criterion as it was
     asked those that stand beside it, which are not counted."""
-    from jaxveh.experiments.report import tally
+    from jaxveh import experiments
 
     notes = {condition: i for i, condition in enumerate(dict.fromkeys(c.condition for c in checks), 1)}
     rows = [
@@ -129,7 +129,7 @@ def _show_checks(name: str, checks: Sequence[Check]) -> None:
     table(f"{name}: criteria", ("status", "criterion", "value", "bound", "where"), rows, left=2)
     for condition, i in notes.items():
         results().print(f"where {i}: {condition}", markup=False)
-    results().print(f"{tally(checks)} hold, as they were asked")
+    results().print(f"{experiments.report.tally(checks)} hold, as they were asked")
 
 
 def _draw(experiment: ModuleType, found: Any, out: Path) -> None:

@@ -7,9 +7,7 @@ from typing import Annotated
 
 import typer
 
-from jaxveh.io import CANONICAL
-from jaxveh.io import car as car_file
-from jaxveh.io import channel_map as channel_file
+from jaxveh.io import CANONICAL, kit
 
 
 class File(StrEnum):
@@ -25,9 +23,9 @@ def schema(file: Annotated[File, typer.Argument(help="The car, or the channel ma
     Both examples can be read as they are: [bold]jaxveh schema car > car.toml[/] is a start.
     """
     if file is File.car:
-        typer.echo(car_file.SCHEMA, nl=False)
+        typer.echo(kit.CAR_SCHEMA, nl=False)
         return
-    typer.echo(channel_file.SCHEMA)
+    typer.echo(kit.CHANNEL_MAP_SCHEMA)
     typer.echo("# Channels that jaxveh knows by name, and their units:")
     for name, channel in CANONICAL.items():
         typer.echo(f"#   {name:<26}{channel.unit:<9}{channel.meaning}")

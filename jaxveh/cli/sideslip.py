@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh import Recording, filters, vehicles
 from jaxveh._core.progress import Progress
 from jaxveh.estimators import open_loop as drive_open_loop
-from jaxveh.estimators import sideslip as library
+from jaxveh.estimators import sideslip
 from jaxveh.io import CarSpecification
 
 SCORED = ("v_y", "sideslip")
@@ -24,20 +24,22 @@ def filter_of(name: str, particles: int) -> filters.AbstractFilter:
     return (filters.AuxiliaryParticleFilter if name == "apf" else filters.ParticleFilter)(particles)
 
 
-def calibrate(part: Recording, car: CarSpecification, uses: tuple[str, ...], progress: Progress) -> library.Calibration:
+def calibrate(
+    part: Recording, car: CarSpecification, uses: tuple[str, ...], progress: Progress
+) -> sideslip.Calibration:
     """Tyres, noises and steering offset fitted on a span."""
-    return library.calibrate(part, car, uses=uses, progress=progress)
+    return sideslip.calibrate(part, car, uses=uses, progress=progress)
 
 
 def estimate(
     part: Recording,
-    source: library.Calibration | CarSpecification,
+    source: sideslip.Calibration | CarSpecification,
     kind: str = "ukf",
     particles: int = 1000,
     seed: int = 0,
 ) -> filters.Estimate:
     """The states along the rows of `part`, of a calibration or of a car's file taken at its word."""
-    return library.estimate(part, source, filter=filter_of(kind, particles), key=jax.random.key(seed))
+    return sideslip.estimate(part, source, filter=filter_of(kind, particles), key=jax.random.key(seed))
 
 
 def truth_of(seen: Recording, name: str) -> dict[str, np.ndarray]:
@@ -50,7 +52,7 @@ def truth_of(seen: Recording, name: str) -> dict[str, np.ndarray]:
 
 def score(found: filters.Estimate, seen: Recording, name: str, car: CarSpecification) -> dict[str, float]:
     """RMSEs and the coverage of the 95 % band, next to the open-loop linear model's, by the names of the JSON file."""
-    return library.score(found, seen.replace(v_y=truth_of(seen, name)["v_y"]), car)
+    return sideslip.score(found, seen.replace(v_y=truth_of(seen, name)["v_y"]), car)
 
 
 def open_loop(seen: Recording, car: CarSpecification) -> dict[str, np.ndarray]:
@@ -58,7 +60,7 @@ def open_loop(seen: Recording, car: CarSpecification) -> dict[str, np.ndarray]:
     return drive_open_loop(seen, vehicles.from_specification(car))
 
 
-def fitted(calibration: library.Calibration | None) -> dict[str, Any]:
+def fitted(calibration: sideslip.Calibration | None) -> dict[str, Any]:
     """The fitted parameters by name (value, std, unit) and the choice of the reference's weight, for the JSON file."""
     if calibration is None:
         return {}
@@ -71,12 +73,12 @@ def fitted(calibration: library.Calibration | None) -> dict[str, Any]:
     }
 
 
-def fitted_car(calibration: library.Calibration, car: CarSpecification) -> CarSpecification:
+def fitted_car(calibration: sideslip.Calibration, car: CarSpecification) -> CarSpecification:
     """The specification with the fitted values in place."""
     return calibration.specification(car)
 
 
-def curves(calibration: library.Calibration, car: CarSpecification, part: Recording) -> tuple[dict, dict]:
+def curves(calibration: sideslip.Calibration, car: CarSpecification, part: Recording) -> tuple[dict, dict]:
     """Cars before and after, and the slip angles that the span visited, for `plots.force_curves`."""
     cars = {
         "car file": vehicles.from_specification(car),

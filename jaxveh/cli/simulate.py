@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import jax
 import typer
 
-from jaxveh import InputError, Recording, io, roads, simulation
+from jaxveh import InputError, Recording, io, roads, simulation, vehicles
 from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh.cli import manoeuvre as driving
 from jaxveh.cli import options
@@ -16,9 +16,8 @@ from jaxveh.cli.console import progress, results, table
 from jaxveh.cli.devices import DEVICES, Noise, devices_of
 from jaxveh.cli.drive_report import draw, numbers_of, print_numbers
 from jaxveh.cli.output import check_product, check_report, write_numbers
-from jaxveh.cli.vehicle import BUILT_IN, FIDELITIES, first_line, vehicle_of
+from jaxveh.cli.vehicle import BUILT_IN, first_line, vehicle_of
 from jaxveh.manoeuvres import MANOEUVRES, manoeuvre_options
-from jaxveh.simulation.simulate import SOLVERS
 
 EVENTS = {"standstill": simulation.standstill, "wheel-lift": simulation.wheel_lift}
 
@@ -26,11 +25,13 @@ PRODUCT = typer.Option("-o", metavar="FILE", help="The recording: .csv, .parquet
 VEHICLE = typer.Option(
     "--vehicle", metavar="CAR", help=f"A car file (jaxveh schema car), or one of {', '.join(BUILT_IN)}."
 )
-FIDELITY = typer.Option("--fidelity", metavar="NAME", help=f"What is made of the car: {', '.join(FIDELITIES)}.")
+FIDELITY = typer.Option(
+    "--fidelity", metavar="NAME", help=f"What is made of the car: {', '.join(vehicles.kit.FIDELITIES)}."
+)
 MANOEUVRE = typer.Option("--manoeuvre", metavar="NAME", help="What the driver does (--list).")
 ROAD = typer.Option("--road", metavar="ROAD", help=f"A road file (.toml), or one of {', '.join(roads.ROADS)}.")
 FITTED = typer.Option("--devices", metavar="NAME", help=f"What measures: {', '.join(DEVICES)}.")
-SOLVER = typer.Option("--solver", metavar="NAME", help=f"{', '.join(SOLVERS)}.")
+SOLVER = typer.Option("--solver", metavar="NAME", help=f"{', '.join(simulation.kit.SOLVERS)}.")
 UNTIL = typer.Option("--until", metavar="EVENT", help=f"End early at {' or '.join(EVENTS)}.", show_default=False)
 SET = typer.Option(
     "--set", metavar="NAME=VALUE", help="An option of the manoeuvre (--list); repeatable.", show_default=False
@@ -127,7 +128,7 @@ def _check(product, vehicle, road, force, out, numbers, solver, until, rate) -> 
         )
     check_product(product, io.SUFFIXES, force, (Path(vehicle), Path(road)))
     check_report(out, numbers)
-    check_one_of("--solver", solver, SOLVERS)
+    check_one_of("--solver", solver, simulation.kit.SOLVERS)
     if until is not None:
         check_one_of("--until", until, EVENTS)
     check_positive("--rate", rate, "Hz")
@@ -141,7 +142,7 @@ def _list() -> None:
     table(
         "Fidelities (--fidelity)",
         ("name", "what"),
-        [(name, first_line(kind)) for name, kind in FIDELITIES.items()],
+        [(name, first_line(kind)) for name, kind in vehicles.kit.FIDELITIES.items()],
         left=2,
     )
     rows = []

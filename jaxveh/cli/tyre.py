@@ -16,7 +16,7 @@ from jaxveh import InputError, io, tyres
 from jaxveh.cli import options
 from jaxveh.cli.console import messages, number, printable, results, table
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
-from jaxveh.tyres.evaluation import EVALUATION_INPUTS, evaluate
+from jaxveh.tyres import kit
 
 TYRE = typer.Argument(metavar="FILE", help="A tyre property file (.tir).", show_default=False)
 PRODUCT = typer.Option("-o", metavar="FILE", help="The outputs: .csv.", show_default=False)
@@ -121,7 +121,7 @@ def evaluate_table(
     check_product(product, (".csv",), force, (file, inputs))
     tyre = tyres.from_property_file(io.read_property_file(file))
     frame = _read(inputs)
-    found = evaluate(tyre, {name: frame[name].to_numpy() for name in frame if _wanted(name)}, axes=axes.value)
+    found = kit.evaluate(tyre, {name: frame[name].to_numpy() for name in frame if _wanted(name)}, axes=axes.value)
     _say_what_is_beyond(tyre, found)
     import pandas as pd
 
@@ -131,7 +131,7 @@ def evaluate_table(
 
 
 def _wanted(name: str) -> bool:
-    return name == "useMode" or any(name in names for names in EVALUATION_INPUTS.values())
+    return name == "useMode" or any(name in names for names in kit.EVALUATION_INPUTS.values())
 
 
 def _read(path: Path) -> Any:

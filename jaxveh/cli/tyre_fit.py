@@ -16,9 +16,8 @@ from jaxveh.cli import options, tyre_fit_report
 from jaxveh.cli.console import progress, results
 from jaxveh.cli.failure import say
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
-from jaxveh.fitting.rig_ranges import measured_ranges, widened_ranges
-from jaxveh.fitting.rig_start import RIG_STARTS
-from jaxveh.io.rig_table import RIG_CHANNELS
+from jaxveh.fitting import kit as fitting_kit
+from jaxveh.io import kit as io_kit
 
 DEFAULT = "mf61"
 SHAPE_OF_BOUNDS, SHAPE_OF_WEIGHT = "NAME=LOW:HIGH, such as PCY1=1:2", "CHANNEL=NUMBER, such as F_x=2"
@@ -49,7 +48,7 @@ PRODUCT = typer.Option("-o", metavar="FILE", show_default=False, help="The tyre:
 MODEL = typer.Option(
     "--model",
     metavar="LAW",
-    help=f"The law, started from what the data show: {', '.join(RIG_STARTS)} ({DEFAULT} by default).",
+    help=f"The law, started from what the data show: {', '.join(fitting_kit.RIG_STARTS)} ({DEFAULT} by default).",
 )
 START = typer.Option(
     "--start",
@@ -67,7 +66,7 @@ AXES = typer.Option(
 CHANNELS = typer.Option(
     "--measured",
     metavar="F_x,F_y,...",
-    help=f"Compare these alone, of {', '.join(RIG_CHANNELS)}; by default all there are.",
+    help=f"Compare these alone, of {', '.join(io_kit.RIG_CHANNELS)}; by default all there are.",
 )
 BOUNDS = typer.Option("--bounds", metavar="NAME=LOW:HIGH", help="Keep a coefficient inside; repeatable.")
 WEIGHT = typer.Option(
@@ -141,7 +140,7 @@ def fit_table(
     _check_side(side, origin)
     chosen = _channels(measured)
     limits, weights = _bounds(bounds), _weights(weight)
-    rig = io.read_rig_table(data, None if axes is None else axes.value, measured=chosen or RIG_CHANNELS)
+    rig = io.read_rig_table(data, None if axes is None else axes.value, measured=chosen or io_kit.RIG_CHANNELS)
     law = _law(origin, rig)
     with progress("fit") as report:
         fit = fitting.fit_rig(
@@ -165,7 +164,7 @@ def fit_table(
 def _origin(model: str | None, start: Path | None) -> Origin:
     if start is None:
         model = DEFAULT if model is None else model
-        check_one_of("--model", model, tuple(RIG_STARTS))
+        check_one_of("--model", model, tuple(fitting_kit.RIG_STARTS))
         return Origin(model)
     if model is not None:
         raise InputError(f"--model {model}: --start {start} tells the law; leave one of the two out.")
@@ -193,7 +192,7 @@ def _law(origin: Origin, rig: io.RigTable) -> tyres.AbstractTyre:
     law = origin.tyre
     assert law is not None
     if isinstance(law, tyres.MFTyre):
-        law, widened = widened_ranges(law, rig)
+        law, widened = fitting_kit.widened_ranges(law, rig)
         if widened:
             listed = ", ".join(f"{one.name} from {one.before:g} to {one.after:g}" for one in widened)
             say("warning", "yellow", f"ranges of --start are widened, to hold the data: {listed}")
@@ -209,7 +208,7 @@ def _write(
         tyres.write_parameters(tyre, product, note=note, overwrite=force)
         return []
     if origin.file is None:
-        tyre = measured_ranges(tyre, rig)
+        tyre = fitting_kit.measured_ranges(tyre, rig)
         note += "\nAn ordinary tyre's, not from these data: radius, stiffness, contact patch, coefficients that do not show."
     file = tyres.to_property_file(tyre, like=origin.file, side=None if side is None else side.value, note=note)
     io.write_property_file(file, product, overwrite=force)
@@ -230,9 +229,9 @@ def _channels(text: str | None) -> tuple[str, ...] | None:
         return None
     found = tuple(name.strip() for name in text.split(",") if name.strip())
     if not found:
-        raise InputError(f"--measured {text!r}: must name one of {', '.join(RIG_CHANNELS)}.")
+        raise InputError(f"--measured {text!r}: must name one of {', '.join(io_kit.RIG_CHANNELS)}.")
     for name in found:
-        check_one_of("--measured", name, RIG_CHANNELS)
+        check_one_of("--measured", name, io_kit.RIG_CHANNELS)
     return tuple(dict.fromkeys(found))
 
 

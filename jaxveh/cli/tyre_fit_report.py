@@ -10,10 +10,7 @@ from jaxveh import tyres
 from jaxveh._core.parameter import Parameter, resolve
 from jaxveh.cli.console import number, table
 from jaxveh.cli.failure import say
-from jaxveh.fitting import RigFit, heavy_tails
-from jaxveh.fitting.rig_data import LEAST_NOISE
-from jaxveh.fitting.rig_robust import FAR_RESIDUAL
-from jaxveh.fitting.rig_stages import HELD_COEFFICIENTS
+from jaxveh.fitting import RigFit, heavy_tails, kit
 
 UNCERTAIN = 0.2
 """Standard error over a coefficient's own size above which it is marked."""
@@ -108,7 +105,7 @@ def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
     elif stopped:
         found.append(f"stages that stopped before they converged: {', '.join(stopped)}")
     still = [name for name, std in zip(fit.names, fit.std, strict=True) if np.isnan(std)]
-    unseen = [name for name in still if name not in HELD_COEFFICIENTS]
+    unseen = [name for name in still if name not in kit.HELD_COEFFICIENTS]
     if fit.identified < len(fit.names) - (len(still) - len(unseen)):
         found.append(
             f"the data tell {fit.identified} of {len(fit.names)} directions of the coefficients apart"
@@ -117,7 +114,7 @@ def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
     worse = [name for name in fit.rmse if fit.rmse[name] > fit.start_rmse[name]]
     if worse:
         found.append(f"residuals larger than at the start: {', '.join(worse)}")
-    exact = [name for name in fit.rmse if fit.rmse[name] < LEAST_NOISE * fit.peak[name]]
+    exact = [name for name in fit.rmse if fit.rmse[name] < kit.LEAST_NOISE * fit.peak[name]]
     if exact:
         found.append(
             f"met to the last digits: {', '.join(exact)}: computed data, or as few distinct values as coefficients; "
@@ -134,7 +131,7 @@ def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
 def _mark(name: str, share: float) -> str:
     """What to say of a coefficient whose standard error is this share of its size."""
     if np.isnan(share):
-        return SET if name in HELD_COEFFICIENTS else UNSEEN
+        return SET if name in kit.HELD_COEFFICIENTS else UNSEEN
     return WEAK if share > UNCERTAIN else ""
 
 
@@ -145,11 +142,11 @@ def _tails_in_words(name: str, residual: np.ndarray, robust: bool) -> str:
         return ""
     if robust:
         return (
-            f"{name}: {100 * tails.share:.2g} % of the rows lie beyond {FAR_RESIDUAL:g} standard deviations of the others "
+            f"{name}: {100 * tails.share:.2g} % of the rows lie beyond {kit.FAR_RESIDUAL:g} standard deviations of the others "
             f"({number(tails.deviation)} {UNITS[name]}) and counted little: outliers, or what the law cannot meet"
         )
     return (
-        f"{name}: residuals have heavy tails: {100 * tails.share:.2g} % of the rows lie beyond {FAR_RESIDUAL:g} standard "
+        f"{name}: residuals have heavy tails: {100 * tails.share:.2g} % of the rows lie beyond {kit.FAR_RESIDUAL:g} standard "
         f"deviations ({number(tails.deviation)} {UNITS[name]} by their median size; of noise 0.006 %), and their RMS is "
         f"{tails.ratio:.2g} of them: outliers, which pull the fit, or rows that the law cannot meet; compare with --robust"
     )

@@ -8,12 +8,12 @@ from typing import Any
 
 from jaxveh import InputError, io, vehicles
 from jaxveh._core.errors import check_one_of
-from jaxveh.vehicles.sets import CARS, FIDELITIES
+from jaxveh.vehicles import kit
 
 AS_PRINTED = "passenger_car_as_printed"
 """A single track alone: it is there to reproduce a paper."""
 
-BUILT_IN = {**CARS, AS_PRINTED: vehicles.passenger_car_as_printed}
+BUILT_IN = {**kit.CARS, AS_PRINTED: vehicles.passenger_car_as_printed}
 """What makes each car that comes with the package: its numbers, or the vehicle itself."""
 
 
@@ -22,8 +22,8 @@ def vehicle_of(name: str, fidelity: str = "single-track") -> vehicles.AbstractVe
 
     Raises `InputError` for names that are not there, and where the car's numbers do not reach for the fidelity.
     """
-    check_one_of("--fidelity", fidelity, FIDELITIES)
-    if name in CARS:
+    check_one_of("--fidelity", fidelity, kit.FIDELITIES)
+    if name in kit.CARS:
         return vehicles.named_car(name, fidelity)
     if name == AS_PRINTED:
         check_one_of(f"--fidelity of {AS_PRINTED}", fidelity, ("single-track",))
@@ -33,7 +33,7 @@ def vehicle_of(name: str, fidelity: str = "single-track") -> vehicles.AbstractVe
     specification = io.read_car(name)
     if fidelity == "single-track":
         return vehicles.from_specification(specification)
-    return vehicles.build(vehicles.numbers_of(specification), FIDELITIES[fidelity])
+    return vehicles.build(vehicles.numbers_of(specification), kit.FIDELITIES[fidelity])
 
 
 def first_line(of: Any) -> str:

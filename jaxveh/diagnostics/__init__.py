@@ -1,6 +1,7 @@
 """Diagnoses: whether a log is fit to estimate from, what a recording can tell about parameters at all, whether an estimate is as
 good as it says, and the numbers that standards take from a drive."""
 
+from jaxveh.diagnostics import drive_channels, kit
 from jaxveh.diagnostics.braking_test import BrakingTest, braking_test
 from jaxveh.diagnostics.chi_squared import chi_squared_band, chi_squared_quantile, chi_squared_tails
 from jaxveh.diagnostics.consistency import Consistency, nees, nis, nis_by_channel
@@ -9,7 +10,7 @@ from jaxveh.diagnostics.frequency_response import FrequencyResponse, frequency_r
 from jaxveh.diagnostics.log_check import check_log
 from jaxveh.diagnostics.log_findings import SEVERITIES, Finding
 from jaxveh.diagnostics.log_plausibility import check_car
-from jaxveh.diagnostics.observability import Observability, from_sensitivities
+from jaxveh.diagnostics.observability import Observability, from_sensitivities, observability_at
 from jaxveh.diagnostics.particles import Ancestry, ParticleHealth, ancestry, particle_health
 from jaxveh.diagnostics.sine_with_dwell import SineWithDwellTest, sine_with_dwell
 from jaxveh.diagnostics.steady_state import SteadyTurns, Understeer, steady_turns, understeer
@@ -38,12 +39,15 @@ __all__ = [
     "chi_squared_band",
     "chi_squared_quantile",
     "chi_squared_tails",
+    "drive_channels",
     "drive_numbers",
     "frequency_response",
     "from_sensitivities",
+    "kit",
     "nees",
     "nis",
     "nis_by_channel",
+    "observability_at",
     "particle_health",
     "peaks",
     "sine_with_dwell",

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel_values, check_gaps, crossing, has_channels, time_of
+from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, has, seconds
 
 PRESSED = 0.01
 """Share of the greatest brake torque from which on the brake is pressed; without that channel, share of the initial speed
@@ -43,7 +43,7 @@ def braking_test(recording: Recording) -> BrakingTest:
     **Raises** `InputError` where `v_x` is missing, the car does not brake, or a channel has a gap of more than `LONGEST_GAP`
     (0.5 s) where the brake is pressed or while the car brakes.
     """
-    time, v_x = time_of(recording), channel_values(recording, "v_x")
+    time, v_x = seconds(recording), channel(recording, "v_x")
     begins = _begins(recording, time, v_x)
     speed = float(np.interp(begins, time, v_x))
     way = np.concatenate([[0.0], np.cumsum(np.diff(time) * (v_x[1:] + v_x[:-1]) / 2)])
@@ -54,12 +54,10 @@ def braking_test(recording: Recording) -> BrakingTest:
     check_gaps(recording, "v_x", begins, end, "braking_test")
     rate = -np.gradient(v_x, time)
     braked = (time >= begins) & (v_x > v_e)
-    slips = [
-        f"slip_ratio_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has_channels(recording, f"slip_ratio_{wheel}")
-    ]
+    slips = [f"slip_ratio_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has(recording, f"slip_ratio_{wheel}")]
     for name in slips:
         check_gaps(recording, name, begins, end, "braking_test")
-    most = max((float(np.max(np.abs(channel_values(recording, name)[braked]))) for name in slips), default=float("nan"))
+    most = max((float(np.max(np.abs(channel(recording, name)[braked]))) for name in slips), default=float("nan"))
     return BrakingTest(
         begins, speed, (v_b**2 - v_e**2) / (2 * (place(at_e) - place(at_b))), place(at_e) - place(begins),
         float(np.max(rate[braked])), most,
@@ -67,14 +65,12 @@ def braking_test(recording: Recording) -> BrakingTest:
 
 
 def _begins(recording: Recording, time: np.ndarray, v_x: np.ndarray) -> float:
-    if has_channels(recording, "brake_torque"):
-        torque = channel_values(recording, "brake_torque")
+    if has(recording, "brake_torque"):
+        torque = channel(recording, "brake_torque")
         begins = crossing(time, torque, PRESSED * float(np.max(torque))) if np.max(torque) > 0 else float("nan")
     else:
         begins = crossing(time, v_x[0] - v_x, PRESSED * v_x[0])
     if not np.isfinite(begins) or not begins < time[-1]:
         raise InputError("braking_test: the car does not brake in this drive.")
-    check_gaps(
-        recording, "brake_torque" if has_channels(recording, "brake_torque") else "v_x", begins, begins, "braking_test"
-    )
+    check_gaps(recording, "brake_torque" if has(recording, "brake_torque") else "v_x", begins, begins, "braking_test")
     return begins

@@ -11,12 +11,12 @@ LONGEST_GAP = 0.5
 """s: gaps that are bridged where a standard's number is taken; ours. Satellite navigation of 5 Hz passes, an outage does not."""
 
 
-def has_channels(recording: Recording, *names: str) -> bool:
+def has(recording: Recording, *names: str) -> bool:
     """Whether the recording has all of these channels, as truth or as measured."""
     return all(TRUTH + name in recording or name in recording for name in names)
 
 
-def channel_values(recording: Recording, name: str) -> np.ndarray:
+def channel(recording: Recording, name: str) -> np.ndarray:
     """A channel (T,) in SI units: a simulation's truth where there is one, else what was measured.
 
     Rows without a sample are filled along lines between their neighbours (devices of several rates leave such gaps), however
@@ -25,7 +25,7 @@ def channel_values(recording: Recording, name: str) -> np.ndarray:
 
     **Raises** `InputError` for a channel that is not there, or that has no finite sample.
     """
-    if not has_channels(recording, name):
+    if not has(recording, name):
         names = ", ".join(dict.fromkeys(one.removeprefix(TRUTH) for one in recording.names))
         raise InputError(f"recording: no channel {name!r} to look at; there are: {names}.")
     values = _samples(recording, name)
@@ -34,7 +34,7 @@ def channel_values(recording: Recording, name: str) -> np.ndarray:
         raise InputError(f"recording: {name} has no finite sample.")
     if known.all():
         return values
-    time = time_of(recording)
+    time = seconds(recording)
     return np.interp(time, time[known], values[known])
 
 
@@ -52,7 +52,7 @@ def check_gaps(recording: Recording, name: str, start: float, end: float, asked_
 
 def within_gaps(recording: Recording, name: str) -> np.ndarray:
     """Whether each row (T,) lies in a gap of a channel that is longer than `LONGEST_GAP`."""
-    time = time_of(recording)
+    time = seconds(recording)
     rows = np.zeros(time.size, bool)
     for before, after in _gaps(recording, name):
         rows |= (time > before) & (time < after)
@@ -61,7 +61,7 @@ def within_gaps(recording: Recording, name: str) -> np.ndarray:
 
 def _gaps(recording: Recording, name: str) -> list[tuple[float, float]]:
     """The last sample before and the first after each gap that is too long (s); infinite where there is none."""
-    time = time_of(recording)
+    time = seconds(recording)
     known = time[np.isfinite(_samples(recording, name))]
     too_long = LONGEST_GAP + 1e-6  # Rows half a second apart are within it, whatever their rounding.
     inner = np.flatnonzero(np.diff(known) > too_long)
@@ -77,21 +77,21 @@ def _samples(recording: Recording, name: str) -> np.ndarray:
     return np.asarray(recording[TRUTH + name if TRUTH + name in recording else name], np.float64)
 
 
-def time_of(recording: Recording) -> np.ndarray:
+def seconds(recording: Recording) -> np.ndarray:
     """The recording's own time, s."""
     return np.asarray(recording.time, np.float64)
 
 
 def sideslip_channels(recording: Recording) -> tuple[str, ...]:
     """What the sideslip is taken from: the channel, else `v_x` and `v_y`."""
-    return ("sideslip",) if has_channels(recording, "sideslip") else ("v_x", "v_y")
+    return ("sideslip",) if has(recording, "sideslip") else ("v_x", "v_y")
 
 
 def sideslip(recording: Recording) -> np.ndarray:
     """Sideslip at the centre of gravity (T,), rad: the channel, else from `v_x` and `v_y`."""
-    if has_channels(recording, "sideslip"):
-        return channel_values(recording, "sideslip")
-    return np.arctan2(channel_values(recording, "v_y"), channel_values(recording, "v_x"))
+    if has(recording, "sideslip"):
+        return channel(recording, "sideslip")
+    return np.arctan2(channel(recording, "v_y"), channel(recording, "v_x"))
 
 
 def crossing(time: np.ndarray, values: np.ndarray, level: float, after: float = -np.inf) -> float:

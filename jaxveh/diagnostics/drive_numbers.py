@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.braking_test import braking_test
-from jaxveh.diagnostics.drive_channels import channel_values, has_channels, sideslip
+from jaxveh.diagnostics.drive_channels import channel, has, sideslip
 from jaxveh.diagnostics.frequency_response import frequency_response
 from jaxveh.diagnostics.sine_with_dwell import sine_with_dwell
 from jaxveh.diagnostics.steady_state import steady_turns, understeer
@@ -39,15 +39,15 @@ class LowestFrequency(NamedTuple):
 
 def peaks(recording: Recording) -> Peaks:
     """The greatest sizes in a drive, of the samples that there are; NaN for what the recording does not have."""
-    loads = [f"load_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has_channels(recording, f"load_{wheel}")]
+    loads = [f"load_{wheel}" for wheel in ("fl", "fr", "rl", "rr") if has(recording, f"load_{wheel}")]
     size = lambda values: float(np.max(np.abs(values)))
-    of = lambda name: size(channel_values(recording, name)) if has_channels(recording, name) else float("nan")
-    slides = has_channels(recording, "sideslip") or has_channels(recording, "v_x", "v_y")
+    of = lambda name: size(channel(recording, name)) if has(recording, name) else float("nan")
+    slides = has(recording, "sideslip") or has(recording, "v_x", "v_y")
     return Peaks(
         of("a_y"),
         of("yaw_rate"),
         size(sideslip(recording)) if slides else float("nan"),
-        min((float(np.min(channel_values(recording, name))) for name in loads), default=float("nan")),
+        min((float(np.min(channel(recording, name))) for name in loads), default=float("nan")),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel_values, check_gaps, time_of
+from jaxveh.diagnostics.drive_channels import channel, check_gaps, seconds
 
 LONGEST = 20.0
 """Seconds of a segment at most unless told: a resolution of 0.05 Hz."""
@@ -46,7 +46,7 @@ def frequency_response(
     **Raises** `InputError` for missing channels or gaps in them of more than `LONGEST_GAP` (0.5 s), an input that does not move,
     or a segment that is out of range.
     """
-    time = time_of(recording)
+    time = seconds(recording)
     length = float(time[-1] - time[0])
     segment = float(min(length / 4, LONGEST)) if segment is None else segment
     check_positive("segment", segment, "s")
@@ -55,7 +55,7 @@ def frequency_response(
     even = time[0] + step * np.arange(int(length / step + 0.5) + 1)
     for name in (input, output):
         check_gaps(recording, name, time[0], time[-1], "frequency_response")
-    u, y = (np.interp(even, time, channel_values(recording, name)) for name in (input, output))
+    u, y = (np.interp(even, time, channel(recording, name)) for name in (input, output))
     rows = min(round(segment / step), even.size)
     if rows < 8:
         raise InputError(f"segment = {segment:g} s: has {rows} rows; there must be at least 8.")

@@ -10,7 +10,7 @@ from jaxveh.diagnostics.log_samples import check_samples
 from jaxveh.diagnostics.log_sampling import check_sampling
 from jaxveh.diagnostics.log_signs import check_signs, check_units
 from jaxveh.diagnostics.log_steering import check_steering
-from jaxveh.io.car import CarSpecification
+from jaxveh.io import CarSpecification
 
 CHECKS = (check_sampling, check_samples, check_units, check_signs, check_delays, check_steering, check_plausibility)
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.io.car import CarSpecification
+from jaxveh.io import CarSpecification
 
 SEVERITIES = ("ok", "note", "warning", "error")
 """From nothing to do, over worth knowing, to: estimates will suffer, estimates will be wrong."""

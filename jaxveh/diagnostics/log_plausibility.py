@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from jaxveh.diagnostics.log_findings import GRAVITY, Finding, LogView
-from jaxveh.io.car import CarSpecification
+from jaxveh.io import CarSpecification
 
 FRICTION = 1.3
 """Lateral acceleration over gravity that tyres reach without downforce, racing tyres included."""

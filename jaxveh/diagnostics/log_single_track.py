@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.io.car import CarSpecification
+from jaxveh.io import CarSpecification
 
 SLOW = 3.0
 """m/s below which the lateral motion is held at zero."""

@@ -79,7 +79,7 @@ def _list(names) -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
 
 
-def observability(
+def observability_at(
     predict: Callable[[jax.Array], jax.Array], at: jax.Array, names: tuple[str, ...], spread, nuisance: int = 0
 ) -> Observability:
     """The observability of parameters from whitened predictions.

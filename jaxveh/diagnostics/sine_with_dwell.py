@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel_values, check_gaps, crossing, has_channels, peak, time_of
+from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, has, peak, seconds
 
 YAW_RATE_LIMITS = {1.0: 0.35, 1.75: 0.20}
 """Seconds after the completion of steer, and the share of the peak yaw rate that may be left then (S5.2.1, S5.2.2)."""
@@ -94,10 +94,10 @@ def sine_with_dwell(
     """
     check_positive("steering_ratio", steering_ratio)
     check_positive("displacement_limit", displacement_limit, "m")
-    time, steer = time_of(recording), channel_values(recording, "steer")
+    time, steer = seconds(recording), channel(recording, "steer")
     before = _before(time, steer * steering_ratio)
     steer = steer - np.mean(steer[before])
-    yaw_rate = channel_values(recording, "yaw_rate")
+    yaw_rate = channel(recording, "yaw_rate")
     yaw_rate = yaw_rate - np.mean(yaw_rate[before])
     begins, reverses, completed = _instants(time, steer, BEGINNING / steering_ratio, time[before][-1])
     if time[-1] < completed + max(YAW_RATE_LIMITS):
@@ -182,14 +182,14 @@ def _first_peak(time: np.ndarray, turned: np.ndarray, after: float) -> tuple[flo
 def _displacement(recording: Recording, time: np.ndarray, before: np.ndarray, begins: float) -> float:
     """How far left of the initial straight path the car is, m, in time after the beginning of steer."""
     at = begins + DISPLACED_AFTER
-    used = ("x", "y", "yaw") if has_channels(recording, "x", "y", "yaw") else ("a_y",)
+    used = ("x", "y", "yaw") if has(recording, "x", "y", "yaw") else ("a_y",)
     for name in used:
         check_gaps(recording, name, time[before][0], at, "sine_with_dwell")
     if len(used) > 1:
-        yaw = channel_values(recording, "yaw")[0]
-        left = channel_values(recording, "y") * math.cos(yaw) - channel_values(recording, "x") * math.sin(yaw)
+        yaw = channel(recording, "yaw")[0]
+        left = channel(recording, "y") * math.cos(yaw) - channel(recording, "x") * math.sin(yaw)
         return float(np.interp(at, time, left) - left[0])
-    a_y = channel_values(recording, "a_y")
+    a_y = channel(recording, "a_y")
     a_y = np.where(time >= begins, a_y - np.mean(a_y[before]), 0.0)
     return float(np.interp(at, time, _integral(time, _integral(time, a_y))))
 

@@ -10,10 +10,10 @@ from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.drive_channels import (
     LONGEST_GAP,
-    channel_values,
+    channel,
+    seconds,
     sideslip,
     sideslip_channels,
-    time_of,
     within_gaps,
 )
 
@@ -61,8 +61,8 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
     **Raises** `InputError` for a channel that is not there, a wheelbase that is not positive, or where no row is steady.
     """
     check_positive("steady", steady, "m/s^3")
-    v_x = channel_values(recording, "v_x")
-    moves = (v_x >= SLOWEST) & _settled(time_of(recording), channel_values(recording, "a_y"), steady)
+    v_x = channel(recording, "v_x")
+    moves = (v_x >= SLOWEST) & _settled(seconds(recording), channel(recording, "a_y"), steady)
     used = {"v_x", "a_y", "steer", *sideslip_channels(recording)} | ({"yaw_rate"} if wheelbase is not None else set())
     for name in sorted(used):
         moves &= ~within_gaps(recording, name)
@@ -75,10 +75,10 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
     geometric = None
     if wheelbase is not None:
         check_positive("wheelbase", wheelbase, "m")
-        geometric = float(wheelbase) * channel_values(recording, "yaw_rate")[moves] / v_x[moves]
+        geometric = float(wheelbase) * channel(recording, "yaw_rate")[moves] / v_x[moves]
     return SteadyTurns(
-        channel_values(recording, "a_y")[moves],
-        channel_values(recording, "steer")[moves],
+        channel(recording, "a_y")[moves],
+        channel(recording, "steer")[moves],
         sideslip(recording)[moves],
         geometric,
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel_values, check_gaps, crossing, peak, time_of
+from jaxveh.diagnostics.drive_channels import channel, check_gaps, crossing, peak, seconds
 
 RESPONSE_SHARE = 0.9
 """Share of the steady value at which the response time is taken."""
@@ -43,7 +43,7 @@ def step_response(recording: Recording, output: str = "yaw_rate", *, average: fl
     the averaging begins before the steer is held.
     """
     check_positive("average", average, "s")
-    time, steer, values = time_of(recording), channel_values(recording, "steer"), channel_values(recording, output)
+    time, steer, values = seconds(recording), channel(recording, "steer"), channel(recording, output)
     for name in ("steer", output):
         check_gaps(recording, name, time[0], time[-1], "step_response")
     last = time >= time[-1] - average

@@ -1,5 +1,6 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
+from jaxveh.estimators import kit, sideslip
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.handling import Handling, handling_model
 from jaxveh.estimators.linear_baseline import open_loop
@@ -19,10 +20,12 @@ __all__ = [
     "handling_car",
     "handling_model",
     "held_rows",
+    "kit",
     "mass_and_grade",
     "observe",
     "open_loop",
     "predict_measurements",
     "score",
+    "sideslip",
     "state_space",
 ]

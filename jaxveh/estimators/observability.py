@@ -7,9 +7,8 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.observability import Observability, observability
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.noise import whiten
+from jaxveh.diagnostics import Observability, observability_at
+from jaxveh.statespace import Row, StateSpace, kit
 
 
 def predict_measurements(model: StateSpace, rows: Row, start) -> tuple[dict, dict]:
@@ -49,9 +48,9 @@ def observe(model: StateSpace, recording: Recording, known_start: bool = True) -
     def predict(z):
         full = mean.at[order[:used]].set(z)
         predicted, present = predict_measurements(model, rows, type(model.prior.mean)(*full))
-        white = whiten(model.measurement_noise, predicted, present)
+        white = kit.whiten(model.measurement_noise, predicted, present)
         return jnp.concatenate([white[name] for name in model.channels])
 
     names = tuple(p.name for p in model.chosen.parameters)
     at, spread = mean[order[:used]], spread[order[:used]]
-    return observability(predict, at, names, spread, nuisance=0 if known_start else n)
+    return observability_at(predict, at, names, spread, nuisance=0 if known_start else n)

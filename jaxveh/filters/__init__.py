@@ -1,5 +1,6 @@
 """Filters as `lax.scan` loops behind one contract: `init`, `step`, and the driver `run`."""
 
+from jaxveh.filters import kit
 from jaxveh.filters.adaptive_number import AdaptiveNumber
 from jaxveh.filters.auxiliary import AuxiliaryParticleFilter
 from jaxveh.filters.calibration import (
@@ -61,9 +62,7 @@ from jaxveh.filters.wrappers import (
     VariationalBayes,
     VaryingNoise,
 )
-from jaxveh.statespace.belief import AbstractBelief, Info
-from jaxveh.statespace.contract import AbstractFilter, Smoothing
-from jaxveh.statespace.driver import Estimate, run, scan
+from jaxveh.statespace import AbstractBelief, AbstractFilter, Estimate, Info, Smoothing, run, scan
 
 __all__ = [
     "AbstractBelief",
@@ -131,6 +130,7 @@ __all__ = [
     "VariationalBayes",
     "VaryingNoise",
     "export_filter",
+    "kit",
     "load_belief",
     "log_likelihood_spread",
     "monte_carlo",

@@ -16,7 +16,7 @@ from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import check_names
 from jaxveh.filters.choosing import Transport
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, check_all_particles, gather
-from jaxveh.statespace.contract import AbstractWrapper
+from jaxveh.statespace import AbstractWrapper
 
 BINS = 0x62696E73
 """Folded into the step's key for the draw that counts bins."""

@@ -31,8 +31,7 @@ from jaxveh.filters.particle import (
     make_info,
     without,
 )
-from jaxveh.statespace.contract import Smoothing
-from jaxveh.statespace.measurements import presence, wrap_angle
+from jaxveh.statespace import Smoothing, kit
 
 
 class FirstStage(NamedTuple):
@@ -100,7 +99,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
     def _predict(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
-        measured, present = presence(model, row)
+        measured, present = kit.presence(model, row)
         lookahead = lookahead_for(model) if self.lookahead is None else self.lookahead
         to = (belief.t, row.t)
         characteristic, lost = numerics.barrier(
@@ -127,7 +126,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         if isinstance(ahead, Expected):  # the first row, before which there is nothing to choose from
             return self._bootstrap()._update(model, ahead, row)
         moved, lost, before, characteristic, residual, stage = ahead
-        measured, present = presence(model, row)
+        measured, present = kit.presence(model, row)
         logs, after = log_prob(model, row, moved, measured, present)
         chosen_ahead = gather((stage.ahead,), stage.ancestors)[0]
         # Of the particles before, of which a number that adapts may have left others than it takes.
@@ -157,4 +156,6 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
 def _scatter(model, residual, ahead):
     """By channel, the variance that the step's noise makes: how far particles came from where their ancestors were to be."""
     gone = {name: residual[name] - ahead[name] for name in model.channels}
-    return {name: jnp.mean(jnp.square(wrap_angle(d) if name in model.angles else d)) for name, d in gone.items()}
+    return {
+        name: jnp.mean(jnp.square(numerics.wrap_angle(d) if name in model.angles else d)) for name, d in gone.items()
+    }

@@ -11,8 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh.io.files import replacing_file
-from jaxveh.statespace.belief import AbstractBelief
+from jaxveh.io import replacing_file
+from jaxveh.statespace import AbstractBelief
 
 STATES = "states"
 """Where the file has their names: no path into a belief, which starts with a dot."""

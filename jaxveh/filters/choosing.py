@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_whole
-from jaxveh.numerics.tangents import derivative_alone
+from jaxveh.numerics import derivative_alone
 
 
 def score(log_probability):

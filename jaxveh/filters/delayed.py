@@ -12,9 +12,7 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.names import check_names
 from jaxveh._core.result import Result, code
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.belief import AbstractBelief, Info
-from jaxveh.statespace.contract import AbstractFilter, AbstractWrapper, check_rows_between
+from jaxveh.statespace import AbstractBelief, AbstractFilter, AbstractWrapper, Info, Row, StateSpace, kit
 
 
 class DelayedBelief(AbstractBelief):
@@ -95,7 +93,7 @@ class Delayed(AbstractWrapper):
                 "Delayed: a part of the process noise is a law a step (Discrete, or an input's white error), and a row put in "
                 "between would add it once more. It must be Continuous; give uncertain inputs a correlation time."
             )
-        check_rows_between("Delayed", self.inner)
+        kit.check_rows_between("Delayed", self.inner)
         if model.input_path != "held":
             raise InputError(f"Delayed: the model's inputs run {model.input_path}: input_path must be 'held'.")
         self.inner.check(model)

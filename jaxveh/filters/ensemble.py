@@ -16,10 +16,7 @@ from jaxveh.filters.gaussian.forms import masked_factor
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.filters.particle import add_noise
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.belief import AbstractBelief, Info
-from jaxveh.statespace.contract import AbstractTwoPartFilter
-from jaxveh.statespace.measurements import input_result, presence
+from jaxveh.statespace import AbstractBelief, AbstractTwoPartFilter, Info, Row, StateSpace, kit
 
 
 class EnsembleBelief(AbstractBelief):
@@ -109,7 +106,7 @@ class Ensemble(AbstractTwoPartFilter):
 
     def update(self, model: StateSpace, belief: EnsembleBelief, row: Row) -> tuple[EnsembleBelief, Info]:
         """The belief after the row's measurement, at the belief's own time."""
-        measured, present = presence(model, row)
+        measured, present = kit.presence(model, row)
         here = jnp.stack([present[name] for name in model.channels])
         observed = model.observation(row.t, belief.members, row.u)
         rows = [jnp.broadcast_to(getattr(observed, name), belief.members[0].shape) for name in model.channels]
@@ -136,7 +133,7 @@ class Ensemble(AbstractTwoPartFilter):
             moved = mean[:, None] + (self.members - 1) ** 0.5 * (X - times(lesser, E))
         white = numerics.solve_lower(factor, innovation)
         after = EnsembleBelief(type(belief.members)(*moved), belief.key, row.t, row.u, belief.count + 1)
-        result = input_result(model, row)
+        result = kit.input_result(model, row)
         lost = ~(jnp.all(jnp.isfinite(moved)) & jnp.all(jnp.isfinite(factor)))
         result = jnp.where((result == 0) & lost, code(Result.non_finite_state), result)
         return after, innovation_info(model, row, innovation, white, factor, result)

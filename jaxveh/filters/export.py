@@ -13,10 +13,8 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
-from jaxveh.io.files import making_folder
-from jaxveh.io.optional import require
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.io import kit, making_folder
+from jaxveh.statespace import AbstractFilter, Row, StateSpace
 
 NUMBERS = ("log_likelihood", "nis", "ess", "result")
 
@@ -41,7 +39,7 @@ def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace,
     if folder.exists():
         raise InputError(f"folder = {folder}: exists already; nothing is overwritten.")
     filter.check(model)
-    require("flatbuffers", "the file of an exported program", "export")
+    kit.require("flatbuffers", "the file of an exported program", "export")
     dtype = model.prior.mean[0].dtype
     like = (
         jax.ShapeDtypeStruct((), dtype),

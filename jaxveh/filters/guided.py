@@ -38,10 +38,7 @@ from jaxveh.filters.particle import (
     without,
 )
 from jaxveh.numerics import sigma_points
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import Smoothing
-from jaxveh.statespace.measurements import presence
-from jaxveh.statespace.noise import LOG_2PI
+from jaxveh.statespace import Smoothing, StateSpace, kit
 
 RULES = ("extended", "unscented")
 
@@ -181,7 +178,7 @@ class Guided(AbstractParticleFilter):
         if isinstance(ahead, FirstGuided):
             return self._first_update(model, ahead, row)
         x, astray, ratio, before, moved, lost, variances, stage = ahead
-        measured, present = presence(model, row)
+        measured, present = kit.presence(model, row)
         after, _ = log_prob(model, row, x, measured, present)
         _, residual = log_prob(model, row, moved, measured, present)
         kept = log_chosen(self, log_of(stage.weights), stage.ancestors)
@@ -207,7 +204,7 @@ class Guided(AbstractParticleFilter):
 
     def _first_update(self, model, ahead, row):
         x, astray, log_drawn, unmeasured, key = ahead
-        measured, present = presence(model, row)
+        measured, present = kit.presence(model, row)
         logs, _ = log_prob(model, row, x, measured, present)
         _, residual = log_prob(model, row, unmeasured, measured, present)
         weights, log_likelihood, alive = numerics.normalise(without(astray, logs - log_drawn))
@@ -233,7 +230,7 @@ def _rule_of(name: str, count: int) -> AbstractRule:
 
 def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: Spread) -> Proposal:
     """The proposal of one particle that the transition took to `moved`, for the noise on `names`."""
-    measured, present = presence(model, row)
+    measured, present = kit.presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])
 
     def see(e):
@@ -251,7 +248,7 @@ def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: S
     count = jnp.sum(here.astype(innovation.dtype))
     distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
     variances = jnp.diagonal(product(image.deviations, image.deviations, image.signs))
-    return Proposal(found.shift, found.spread.factor, -0.5 * (distance + count * LOG_2PI), variances)
+    return Proposal(found.shift, found.spread.factor, -0.5 * (distance + count * kit.LOG_2PI), variances)
 
 
 def _log_normal(white, factor):

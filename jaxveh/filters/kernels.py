@@ -11,8 +11,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
 from jaxveh._core.names import as_names, check_names
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, check_all_particles
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractTwoPartWrapper
+from jaxveh.statespace import AbstractTwoPartWrapper, StateSpace
 
 KERNEL = 0x6B65726E
 """Folded into the step's key for the kernel's draws, so that they are none of the filter's."""

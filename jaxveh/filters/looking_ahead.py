@@ -13,9 +13,7 @@ from jaxveh._core.errors import InputError, check
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.filter import check_gaussian, is_gaussian, kind_of_law
 from jaxveh.filters.particle import log_prob
-from jaxveh.statespace import StateDependent, StateSpace
-from jaxveh.statespace.measurements import wrap_angle
-from jaxveh.statespace.noise import LOG_2PI, AbstractNoise, Gaussian, Independent
+from jaxveh.statespace import AbstractNoise, Gaussian, Independent, StateDependent, StateSpace, kit
 
 MISLED = 0.5
 """Below this share of the effective sample size that a choice by the weights alone would have left, looking ahead misled."""
@@ -85,12 +83,12 @@ class PredictiveLikelihood(AbstractLookahead):
         seen, slopes = slopes_of(model, row, ahead, law.names)
         residual = {name: measured[name] - value for name, value in zip(model.channels, seen, strict=True)}
         for name in model.angles:
-            residual[name] = wrap_angle(residual[name])
+            residual[name] = numerics.wrap_angle(residual[name])
         here = [present[name] for name in model.channels]
         filled = [jnp.where(h, residual[name], 0.0) for h, name in zip(here, model.channels, strict=True)]
         spread = _marginal(_image(law, slopes), R, here)
         count = sum(h.astype(R.dtype) for h in here)
-        logs = _log_normal(spread, filled) - 0.5 * LOG_2PI * count
+        logs = _log_normal(spread, filled) - 0.5 * kit.LOG_2PI * count
         return numerics.barrier(logs), residual
 
 

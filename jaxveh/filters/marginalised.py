@@ -31,11 +31,7 @@ from jaxveh.filters.particle import (
     mean_variances,
     without,
 )
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.belief import AbstractBelief
-from jaxveh.statespace.dependent_noise import check_fixed
-from jaxveh.statespace.measurements import presence
-from jaxveh.statespace.noise import LOG_2PI
+from jaxveh.statespace import AbstractBelief, StateSpace, kit
 
 
 class MarginalisedBelief(AbstractBelief):
@@ -133,7 +129,7 @@ class Marginalised(AbstractParticleFilter):
     def check(self, model):
         check_names("Marginalised.linear", self.linear, model.states)
         check_covariances("Marginalised", model)
-        check_fixed("Marginalised", model.measurement_noise, "Take Guided or ParticleFilter.")
+        kit.check_fixed("Marginalised", model.measurement_noise, "Take Guided or ParticleFilter.")
         check_gaussian("Marginalised", "measurement noise", model.measurement_noise)
         check_gaussian("Marginalised", "prior", model.prior.law)
         if model.process_noise is None:
@@ -197,7 +193,7 @@ class Marginalised(AbstractParticleFilter):
     def _update(self, model, ahead, row):
         cloud: Cloud = ahead
         prior = cloud.prior
-        measured, present = presence(model, row)
+        measured, present = kit.presence(model, row)
         here = jnp.stack([present[name] for name in model.channels])
         given = jnp.stack([measured[name] for name in model.channels])
 
@@ -213,7 +209,7 @@ class Marginalised(AbstractParticleFilter):
             present_ = jnp.sum(here.astype(innovation.dtype))
             distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
             variances = jnp.diagonal(product(image.deviations, image.deviations, None))
-            return -0.5 * (distance + present_ * LOG_2PI), innovation, variances, found.shift, found.spread.matrix
+            return -0.5 * (distance + present_ * kit.LOG_2PI), innovation, variances, found.shift, found.spread.matrix
 
         logs, residual, variances, shift, P = jax.vmap(see)(cloud.particles, cloud.covariances)
         linear = {name: getattr(cloud.particles, name) + shift[:, i] for i, name in enumerate(self.linear)}

@@ -12,10 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import Soft, Transport, log_of, score
-from jaxveh.statespace import StateDependent, StateSpace
-from jaxveh.statespace.belief import AbstractBelief, Info
-from jaxveh.statespace.contract import KEPT, AbstractTwoPartFilter, Smoothing, smoothing_of
-from jaxveh.statespace.measurements import by_channel, input_result, presence, wrap_angle
+from jaxveh.statespace import AbstractBelief, AbstractTwoPartFilter, Info, Smoothing, StateDependent, StateSpace, kit
 
 SHORTEST = 1e-9
 """Of two rows at one time, seconds for which the noise between them is taken where its covariance must have a factor."""
@@ -111,7 +108,7 @@ class AbstractParticleFilter(AbstractTwoPartFilter):
 
 def check_all_particles(who: str, filter: Any) -> None:
     """Raise `InputError` unless weighted particles are all that a filter knows of a row."""
-    if not isinstance(filter, AbstractParticleFilter) or smoothing_of(filter) is not Smoothing.particles:
+    if not isinstance(filter, AbstractParticleFilter) or kit.smoothing_of(filter) is not Smoothing.particles:
         raise InputError(
             f"{who}: {type(filter).__name__} inside: must be a filter of which particles are all it knows (ParticleFilter, "
             "AuxiliaryParticleFilter, Guided)."
@@ -142,7 +139,7 @@ def log_prob(model: StateSpace, row, particles, measured, present):
     predicted = {name: jnp.broadcast_to(getattr(observed, name), (n,)) for name in model.channels}
     residual = {name: measured[name] - predicted[name] for name in model.channels}
     for name in model.angles:
-        residual[name] = wrap_angle(residual[name])
+        residual[name] = numerics.wrap_angle(residual[name])
     if isinstance(model.measurement_noise, StateDependent):
         of = lambda x, r: model.measurement_law(row.t, x, row.u).log_prob(r, present)
         logs = jax.vmap(of)(particles, residual)
@@ -199,7 +196,7 @@ def gather(particles, ancestors):
 def choose_ancestors(filter_, key, weights):
     """Ancestors (N,) int32 and whether resampling took place (None: always, known when compiling)."""
     drawn = filter_.resampling(key, jax.lax.stop_gradient(weights), filter_.particles)
-    drawn = checkpoint_name(drawn.astype(jnp.int32), KEPT)
+    drawn = checkpoint_name(drawn.astype(jnp.int32), kit.KEPT)
     if filter_.threshold >= 1:
         return drawn, None
     resampled = numerics.ess(weights) < filter_.threshold * filter_.particles
@@ -247,13 +244,13 @@ def make_info(model, row, log_likelihood, residual, weights, became, within=None
         spread = {name: spread[name] + within[name] for name in model.channels}
     noise = noise_variances(model, row, particles, before * whole)
     std = [numerics.sqrt(spread[name] + noise[i]) for i, name in enumerate(model.channels)]
-    result = input_result(model, row)
+    result = kit.input_result(model, row)
     dtype = after.dtype
-    _, present = presence(model, row)
+    _, present = kit.presence(model, row)
     return Info(
         log_likelihood=log_likelihood,
-        innovation=by_channel(model, [mean[name] for name in model.channels], present),
-        innovation_std=by_channel(model, std, present),
+        innovation=kit.by_channel(model, [mean[name] for name in model.channels], present),
+        innovation_std=kit.by_channel(model, std, present),
         nis=jnp.full((), jnp.nan, dtype),
         ess=numerics.ess(after),
         result=jnp.where(result == 0, became, result),
@@ -339,7 +336,7 @@ class ParticleFilter(AbstractParticleFilter):
 
     def _update(self, model, ahead, row):
         particles, drawn, lost, key, count = ahead
-        measured, present = presence(model, row)
+        measured, present = kit.presence(model, row)
         logs, residual = log_prob(model, row, particles, measured, present)
         weights, log_mean, alive = numerics.normalise(without(lost, logs + drawn.log_weights))
         belief = ParticleBelief(particles, weights, drawn.ancestors, key, row.t, row.u, count + 1)
@@ -356,7 +353,7 @@ def _transported(filter_, key, belief, logs):
     else they are drawn systematically. `logs`: the log weights (N,)."""
     moved, converged = filter_.resampling.moved(belief.particles, belief.weights)
     weights = jax.lax.stop_gradient(belief.weights)
-    ancestors = checkpoint_name(numerics.systematic(key, weights, filter_.particles).astype(jnp.int32), KEPT)
+    ancestors = checkpoint_name(numerics.systematic(key, weights, filter_.particles).astype(jnp.int32), kit.KEPT)
     drawn = gather(belief.particles, ancestors)
     particles = jax.tree.map(lambda new, old: jnp.where(converged, new, old), moved, drawn)
     chosen = jnp.where(converged, 0.0, log_chosen(filter_, logs, ancestors))

@@ -8,6 +8,7 @@ derivatives with respect to data, noise levels and priors. `fit_rig`, `multiple_
 `AbstractFit`.
 """
 
+from jaxveh.fitting import kit
 from jaxveh.fitting.bootstrap import Bootstrap, bootstrap
 from jaxveh.fitting.levenberg_marquardt import LevenbergMarquardt, Quadratic
 from jaxveh.fitting.likelihood import LikelihoodProblem, maximum_likelihood, pose_likelihood
@@ -53,6 +54,7 @@ __all__ = [
     "cut",
     "fit_rig",
     "heavy_tails",
+    "kit",
     "maximum_likelihood",
     "multiple_shooting",
     "pose_likelihood",

@@ -21,9 +21,7 @@ from jaxveh.fitting.recorded import spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.segments import Segments, cut
 from jaxveh.fitting.solve import solve
-from jaxveh.statespace import StateSpace, parameter_view, start_from
-from jaxveh.statespace.measurements import wrap_angle
-from jaxveh.statespace.noise import whiten
+from jaxveh.statespace import StateSpace, kit, parameter_view, start_from
 
 LARGEST_RESIDUAL = 1e6
 """What a residual of a diverged segment is taken as: finite, so that the solver can step back."""
@@ -224,8 +222,8 @@ def _simulate(problem: ShootingProblem, z, starts):
             measured = getattr(now.y, name)
             present[name] = jnp.isfinite(measured)
             difference = jnp.where(present[name], measured, 0) - getattr(observed, name)
-            residual[name] = wrap_angle(difference) if name in model.angles else difference
-        white = whiten(noise, residual, present)
+            residual[name] = numerics.wrap_angle(difference) if name in model.angles else difference
+        white = kit.whiten(noise, residual, present)
         u = model.step_inputs(now.t, then.t, now.u, then.u)
         moved = model.transition(now.t, then.t, state, u)
         return jax.tree.map(wide, moved), jnp.stack([white[name] for name in noise.names])

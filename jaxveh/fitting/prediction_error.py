@@ -23,8 +23,7 @@ from jaxveh.fitting.recorded import listed, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.scoring import FisherScoring
 from jaxveh.fitting.solve import fit_at, solve
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import who_lacks
+from jaxveh.statespace import StateSpace, kit
 
 LOG_2PI = float(np.log(2 * np.pi))
 
@@ -195,7 +194,7 @@ def pose_prediction_error(
     recordings = listed(recordings)
     if len({len(recording) for recording in recordings}) != 1:
         raise InputError("recordings: must be one or several of the same number of rows; cut them to one length.")
-    if (mixture := who_lacks(filter, "whitens")) is not None:
+    if (mixture := kit.who_lacks(filter, "whitens")) is not None:
         raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
     filter.check(model)
     parameters, shape = picked(model, where)

@@ -23,7 +23,7 @@ from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered, sp
 from jaxveh.fitting.rig_robust import inflation
 from jaxveh.fitting.rig_stages import HELD_COEFFICIENTS, Stage, stages_of
 from jaxveh.fitting.solve import fit_at
-from jaxveh.io.rig_table import RIG_CHANNELS, RigTable
+from jaxveh.io import RigTable, kit
 from jaxveh.tyres import AbstractTyre, MFTyre
 
 JOINT = "joint"
@@ -215,7 +215,7 @@ def _unseen(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarra
 
 def _channels(law: AbstractTyre, rig: RigTable, contact: Any, measured: Sequence[str] | None) -> tuple[str, ...]:
     has = offered(law, contact)
-    there = tuple(name for name in RIG_CHANNELS if getattr(rig, name) is not None)
+    there = tuple(name for name in kit.RIG_CHANNELS if getattr(rig, name) is not None)
     if measured is None:
         found = tuple(name for name in there if name in has)
         if not found:
@@ -224,7 +224,7 @@ def _channels(law: AbstractTyre, rig: RigTable, contact: Any, measured: Sequence
             )
         return found
     for name in measured:
-        check_one_of("measured", name, RIG_CHANNELS)
+        check_one_of("measured", name, kit.RIG_CHANNELS)
         if name not in there:
             raise InputError(f"measured: {name} is not in {rig.source}; there are: {', '.join(there)}.")
         if name not in has:

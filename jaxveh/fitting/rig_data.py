@@ -19,7 +19,7 @@ from jaxveh.fitting.problem import Shape
 from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, descend, start_of
 from jaxveh.fitting.rig_robust import TO_DEVIATION
 from jaxveh.fitting.rig_stages import Stage
-from jaxveh.io.rig_table import RigTable
+from jaxveh.io import RigTable
 from jaxveh.tyres import AbstractTyre, Contact
 
 LEAST_NOISE = 1e-4

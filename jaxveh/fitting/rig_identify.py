@@ -78,10 +78,10 @@ def _fixed(data: RigData, joint: Stage) -> list[str]:
 
 
 def _sections():
-    from jaxveh.tyres.mf_tyre import Aligning, Lateral, Longitudinal, Overturning
+    from jaxveh.tyres import Longitudinal, kit
 
     for name, kind in (
-        ("longitudinal", Longitudinal), ("lateral", Lateral), ("aligning", Aligning), ("overturning", Overturning),
+        ("longitudinal", Longitudinal), ("lateral", kit.Lateral), ("aligning", kit.Aligning), ("overturning", kit.Overturning),
     ):  # fmt: skip
         yield name, kind.__dataclass_fields__
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh.fitting.rig_stages import varying_inputs
-from jaxveh.io.rig_table import RigTable
+from jaxveh.io import RigTable
 from jaxveh.tyres import MFTyre
 
 RANGES = {

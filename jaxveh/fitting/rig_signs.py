@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh.fitting.rig_stages import LEAST_SPREAD
-from jaxveh.io.rig_table import RigTable
+from jaxveh.io import RigTable
 
 SMALL = {"slip_angle": np.radians(2.0), "slip_ratio": 0.02}
 """Slips below which forces follow slip and camber, to the precision of a sign."""

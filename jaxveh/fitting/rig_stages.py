@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxveh.io.rig_table import RigTable
+from jaxveh.io import RigTable
 from jaxveh.tyres import AbstractTyre, MFTyre
 
 PURE_ANGLE, PURE_RATIO = np.radians(0.5), 0.01

@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh.fitting.rig_signs import SMALL, wrong_signs
 from jaxveh.fitting.rig_stages import LEAST_SPREAD
-from jaxveh.io.rig_table import RigTable
+from jaxveh.io import RigTable
 from jaxveh.tyres import (
     HSRI,
     AbstractTyre,

@@ -4,6 +4,7 @@ property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, T
 pandas, pyarrow, asammdf, pint, pyyaml and scipy are the extra `io`, imported where they are used.
 """
 
+from jaxveh.io import kit
 from jaxveh.io.canonical import CANONICAL, CanonicalChannel, canonical_unit
 from jaxveh.io.car import AxleTyre, CarSpecification, read_car, write_car
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
@@ -32,6 +33,7 @@ __all__ = [
     "TydexFile",
     "canonical_unit",
     "check_readable",
+    "kit",
     "making_folder",
     "read_car",
     "read_channel_map",

@@ -14,7 +14,7 @@ from jaxveh._core.errors import InputError, check
 from jaxveh.io.files import write_text
 from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
 
-SCHEMA = """\
+CAR_SCHEMA = """\
 # A car. SI units; axes x forward, y left, z up; steer positive to the left.
 mass = 1500.0                        # kg
 yaw_inertia = 2500.0                 # kg m^2, about the vertical axis through the centre of gravity
@@ -87,7 +87,7 @@ class AxleTyre:
 
 @dataclass(frozen=True)
 class CarSpecification:
-    """What a car file says: plain floats in SI units, None where the file is silent. See `car.SCHEMA`.
+    """What a car file says: plain floats in SI units, None where the file is silent. See `car.CAR_SCHEMA`.
 
     Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
     `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`: x, y, z
@@ -142,7 +142,7 @@ class CarSpecification:
 
 
 def read_car(path: str | os.PathLike) -> CarSpecification:
-    """Read a car from TOML (`car.SCHEMA`).
+    """Read a car from TOML (`car.CAR_SCHEMA`).
 
     **Raises** `InputError` naming the file and: the line of broken TOML, a key that is missing or unknown (with the
     near ones), or a value with its allowed range.

@@ -11,7 +11,7 @@ from typing import Any
 from jaxveh._core.errors import InputError, check, check_finite, check_one_of
 from jaxveh.io.toml import check_keys, read_toml, shortened, toml_number, toml_text
 
-SCHEMA = """\
+CHANNEL_MAP_SCHEMA = """\
 # A channel map. Everything but `column` is optional.
 time = "Time"               # the time column; or { column = "Time", unit = "ms" }. MDF4 has time of its own.
 
@@ -54,7 +54,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class ChannelMap:
-    """Which columns of a log to read, by channel name; see `channel_map.SCHEMA` for the file.
+    """Which columns of a log to read, by channel name; see `channel_map.CHANNEL_MAP_SCHEMA` for the file.
 
     `channels`: name to `Channel` (a string is short for `Channel(column)`); `time`: the time column, None for the usual
     names; `separator`, `decimal`: of a CSV file; `source`: where the map came from, for messages.
@@ -77,7 +77,7 @@ class ChannelMap:
 
 
 def read_channel_map(path: str | os.PathLike) -> ChannelMap:
-    """Read a channel map from TOML (`channel_map.SCHEMA`).
+    """Read a channel map from TOML (`channel_map.CHANNEL_MAP_SCHEMA`).
 
     **Raises** `InputError` naming file and line of broken TOML, unknown keys with the near ones, values of a wrong
     kind.

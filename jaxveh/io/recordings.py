@@ -41,7 +41,7 @@ def read_recording(
 ) -> Recording:
     """Read a log: `.csv`, `.parquet`, `.mf4` or `.mdf`.
 
-    **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.SCHEMA`); without it every column
+    **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.CHANNEL_MAP_SCHEMA`); without it every column
     is a channel of the name it has, and time is the column `time`, `timestamps`, `timestamp` or `t`. `raster`: the name
     of a channel whose samples become the rows, the others filled there by `method` (`linear`, `hold`; `io.resample`).
 

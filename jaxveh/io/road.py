@@ -13,7 +13,7 @@ from jaxveh._core.errors import InputError, check, check_one_of
 from jaxveh.io.files import write_text
 from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
 
-SCHEMA = """\
+ROAD_SCHEMA = """\
 # A road along the x axis. SI units; y left, z up.
 # Each table has a value for each distance and is held before the first and after the last. One number instead of a
 # table holds for all the way.
@@ -38,7 +38,7 @@ _RANGES = {
 
 @dataclass(frozen=True)
 class RoadSpecification:
-    """What a road file says: numbers, or tuples over `distance`, in SI units. See `road.SCHEMA`.
+    """What a road file says: numbers, or tuples over `distance`, in SI units. See `road.ROAD_SCHEMA`.
 
     **Raises** `InputError` with name, value and allowed range for distances that do not rise, tables of another
     length, and values that no road has.
@@ -79,7 +79,7 @@ class RoadSpecification:
 
 
 def read_road(path: str | os.PathLike) -> RoadSpecification:
-    """Read a road from TOML (`road.SCHEMA`).
+    """Read a road from TOML (`road.ROAD_SCHEMA`).
 
     **Raises** `InputError` naming the file and: the line of broken TOML, a key that is unknown (with the near ones), or
     a value with its allowed range.

@@ -3,6 +3,8 @@
 All are safe to jit, batch and differentiate.
 """
 
+from jaxveh.numerics import polynomials, sigma_points
+from jaxveh.numerics.angles import wrap_angle
 from jaxveh.numerics.apart import always, apart
 from jaxveh.numerics.blocks import sum_in_blocks
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
@@ -25,6 +27,7 @@ from jaxveh.numerics.small_systems import solve_scalars
 from jaxveh.numerics.smooth import smooth_bump, smooth_clip, smooth_ramp, smooth_step
 from jaxveh.numerics.sums import total
 from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
+from jaxveh.numerics.tangents import derivative_alone
 from jaxveh.numerics.triangular import lower_factor
 
 __all__ = [
@@ -38,6 +41,7 @@ __all__ = [
     "cauchy",
     "cholesky",
     "cos",
+    "derivative_alone",
     "ess",
     "exponential",
     "gauss_markov_harmonics",
@@ -55,8 +59,10 @@ __all__ = [
     "normalise",
     "normals",
     "on_cpu",
+    "polynomials",
     "residual",
     "secant",
+    "sigma_points",
     "sin",
     "smooth_bump",
     "smooth_clip",
@@ -77,4 +83,5 @@ __all__ = [
     "tan",
     "total",
     "uniform",
+    "wrap_angle",
 ]

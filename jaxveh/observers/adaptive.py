@@ -14,8 +14,7 @@ from jaxveh._core.errors import InputError, check, check_at_least, check_positiv
 from jaxveh._core.names import check_names
 from jaxveh.observers.base import AbstractObserver, advanced, check_gain, observed
 from jaxveh.observers.luenberger import array
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.dependent_noise import check_fixed
+from jaxveh.statespace import StateSpace, kit
 
 
 def _gains(given: Mapping[str, Any]) -> dict[str, jax.Array]:
@@ -82,7 +81,7 @@ class Adaptive(AbstractObserver):
     def check(self, model):
         check_names("Adaptive.rate", self.rate, model.states)
         check_gain("Adaptive.gain", self.gain, model, tuple(name for name in model.states if name not in self.rate))
-        check_fixed("Adaptive", model.measurement_noise, "Take a filter.")
+        kit.check_fixed("Adaptive", model.measurement_noise, "Take a filter.")
         if not model.measurement_noise.has_covariance:
             raise InputError("Adaptive: the measurement noise has no covariance, which weighs the channels.")
         for name, low, high in self.bounds:

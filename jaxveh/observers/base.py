@@ -7,12 +7,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_finite
 from jaxveh._core.result import Result, code
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.belief import AbstractBelief, Info
-from jaxveh.statespace.contract import AbstractTwoPartFilter
-from jaxveh.statespace.measurements import by_channel, input_result, presence, wrap_angle
+from jaxveh.statespace import AbstractBelief, AbstractTwoPartFilter, Info, Row, StateSpace, kit
 
 
 class PointBelief(AbstractBelief):
@@ -76,11 +74,11 @@ class AbstractObserver(AbstractTwoPartFilter):
 
     def _update(self, model, ahead, row):
         belief = ahead
-        measured, present = presence(model, row)
+        measured, present = kit.presence(model, row)
         here = jnp.stack([present[name] for name in model.channels])
         error = jnp.stack([measured[name] for name in model.channels]) - observed(model, row, belief.vector)
         wraps = jnp.asarray([name in model.angles for name in model.channels])
-        error = jnp.where(here, jnp.where(wraps, wrap_angle(error), error), 0)
+        error = jnp.where(here, jnp.where(wraps, numerics.wrap_angle(error), error), 0)
         correction, memory = self.correct(model, belief, row, error, here)
         vector = belief.vector + correction
         after = PointBelief(vector, memory, row.t, row.u, belief.count + 1, belief.state_type)
@@ -102,12 +100,12 @@ def observed(model: StateSpace, row: Row, vector: Any) -> Any:
 
 def _info(model, row, error, present, vector) -> Info:
     nothing = jnp.full((), jnp.nan, vector.dtype)
-    result = input_result(model, row)
+    result = kit.input_result(model, row)
     lost = ~jnp.all(jnp.isfinite(vector))
     return Info(
         log_likelihood=nothing,
-        innovation=by_channel(model, error, present),
-        innovation_std=by_channel(model, jnp.full_like(error, jnp.nan), present),
+        innovation=kit.by_channel(model, error, present),
+        innovation_std=kit.by_channel(model, jnp.full_like(error, jnp.nan), present),
         nis=nothing,
         ess=nothing,
         result=jnp.where((result == 0) & lost, code(Result.non_finite_state), result),

@@ -9,8 +9,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.observers.luenberger import Luenberger
 from jaxveh.observers.poles import place_poles
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.disturbances import PREFIX
+from jaxveh.statespace import StateSpace, kit
 
 
 def extended_state(
@@ -31,7 +30,7 @@ def extended_state(
     **Raises** `InputError` for a model without disturbances, a bandwidth that is not positive, and what `place_poles` raises
     for: a disturbance needs a channel that it reaches, and no more of them than channels can be told apart.
     """
-    if not any(name.startswith(PREFIX) for name in model.states):
+    if not any(name.startswith(kit.DISTURBANCE_PREFIX) for name in model.states):
         raise InputError("extended_state: the model has no disturbances; statespace.with_disturbances adds them.")
     check_positive("bandwidth", bandwidth, "1/s")
     poles = np.full(len(model.states) - len(set(leave)), -float(bandwidth))

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check
 from jaxveh.observers.base import AbstractObserver, advanced, observed
 from jaxveh.observers.luenberger import array
-from jaxveh.statespace.dependent_noise import check_fixed
+from jaxveh.statespace import kit
 
 
 class RecursiveLeastSquares(AbstractObserver):
@@ -43,7 +43,7 @@ class RecursiveLeastSquares(AbstractObserver):
                 f"RecursiveLeastSquares.forgetting has shape {self.forgetting.shape}: must be one, or one for each of "
                 f"{', '.join(model.states)}."
             )
-        check_fixed("RecursiveLeastSquares", model.measurement_noise, "Take a filter.")
+        kit.check_fixed("RecursiveLeastSquares", model.measurement_noise, "Take a filter.")
         if not model.measurement_noise.has_covariance:
             raise InputError("RecursiveLeastSquares: the measurement noise has no variances, which weigh the channels.")
 

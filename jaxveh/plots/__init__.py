@@ -6,6 +6,7 @@ is. Give `figure=` (a `Figure` or a `SubFigure`) to draw into one of your own. A
 show a simulation's truth where the recording has it, else what was measured.
 """
 
+from jaxveh.plots import kit
 from jaxveh.plots.braking_drives import braking
 from jaxveh.plots.drives import drive
 from jaxveh.plots.dwell import sine_with_dwell
@@ -35,6 +36,7 @@ __all__ = [
     "friction_ellipse",
     "gradient_map",
     "handling_diagram",
+    "kit",
     "loads",
     "overview",
     "parameters",

@@ -24,9 +24,9 @@ def braking(recording: Recording, *, wheel_radius: float | None = None, figure: 
     if wheel_radius is not None:
         check_positive("wheel_radius", wheel_radius, "m")
     found = braking_test(recording)
-    time, v_x = drive_channels.time_of(recording), drive_channels.channel_values(recording, "v_x")
+    time, v_x = drive_channels.seconds(recording), drive_channels.channel(recording, "v_x")
     panels = {"speed": True, "slip": has_wheels(recording, "slip_ratio"), "deceleration": True,
-              "torque": drive_channels.has_channels(recording, "brake_torque")}  # fmt: skip
+              "torque": drive_channels.has(recording, "brake_torque")}  # fmt: skip
     with style():
         figure, axes = stack(figure, sum(panels.values()))
         at = dict(zip([name for name, there in panels.items() if there], axes, strict=True))
@@ -42,7 +42,7 @@ def braking(recording: Recording, *, wheel_radius: float | None = None, figure: 
         label_above(at["deceleration"], "deceleration [m/s²]")
         note(at["deceleration"], f"at most {found.peak_deceleration:.2f} m/s²")
         if panels["torque"]:
-            torque = drive_channels.channel_values(recording, "brake_torque")
+            torque = drive_channels.channel(recording, "brake_torque")
             at["torque"].plot(time, torque / 1e3, color=CYCLE[3], linewidth=1.2)
             label_above(at["torque"], "brake torque, all wheels [kN m]")
         for ax in axes:
@@ -64,7 +64,7 @@ def _radii(recording: Recording, v_x: np.ndarray, given: float | None) -> dict[s
     """What turns a wheel's spin into a speed, m, by wheel."""
     if given is not None:
         return dict.fromkeys(WHEELS, float(given))
-    spins = {wheel: float(drive_channels.channel_values(recording, f"omega_{wheel}")[0]) for wheel in WHEELS}
+    spins = {wheel: float(drive_channels.channel(recording, f"omega_{wheel}")[0]) for wheel in WHEELS}
     if not v_x[0] > 0 or not all(spin > 0 for spin in spins.values()):
         raise InputError("plots.braking: the wheels do not turn in the first row; give their `wheel_radius` (m).")
     return {wheel: float(v_x[0]) / spin for wheel, spin in spins.items()}

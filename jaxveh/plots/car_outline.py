@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel_values, has_channels
+from jaxveh.diagnostics import drive_channels
 
 TYPICAL = {"front": 1.2, "rear": 1.5, "track": 1.55}
 """m: places of axles and the track of an ordinary passenger car, for recordings that come without the car."""
@@ -76,7 +76,10 @@ def footprint(recording: Recording, car: Any, wheelbase: float | None, track: fl
         for axle in ("front", "rear")
     ]
     return Footprint(
-        front, rear, *tracks, single=not has_channels(recording, "F_y_fl") and has_channels(recording, "F_yf")
+        front,
+        rear,
+        *tracks,
+        single=not drive_channels.has(recording, "F_y_fl") and drive_channels.has(recording, "F_yf"),
     )
 
 
@@ -94,8 +97,8 @@ def wheel_angles(recording: Recording, footprint: Footprint) -> dict[str, np.nda
         own = {"fl": "steer_left", "fr": "steer_right"}.get(name, "steer")
         front = name[0] == "f"
         found[name] = (
-            channel_values(recording, own if has_channels(recording, own) else "steer")
-            if front and has_channels(recording, "steer")
+            drive_channels.channel(recording, own if drive_channels.has(recording, own) else "steer")
+            if front and drive_channels.has(recording, "steer")
             else straight
         )
     return found
@@ -107,10 +110,10 @@ def wheel_forces(recording: Recording, footprint: Footprint) -> dict[str, np.nda
     angles = wheel_angles(recording, footprint)
     for name in footprint.wheels:
         along, across = (f"F_x{name}", f"F_y{name}") if footprint.single else (f"F_x_{name}", f"F_y_{name}")
-        if not has_channels(recording, across):
+        if not drive_channels.has(recording, across):
             return {}
-        F_y = channel_values(recording, across)
-        F_x = channel_values(recording, along) if has_channels(recording, along) else np.zeros_like(F_y)
+        F_y = drive_channels.channel(recording, across)
+        F_x = drive_channels.channel(recording, along) if drive_channels.has(recording, along) else np.zeros_like(F_y)
         cosine, sine = np.cos(angles[name]), np.sin(angles[name])
         forces[name] = np.stack([F_x * cosine - F_y * sine, F_x * sine + F_y * cosine], axis=1)
     return forces

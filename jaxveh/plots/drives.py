@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxveh._core.errors import check_one_of
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel_values, has_channels
+from jaxveh.diagnostics import drive_channels
 from jaxveh.manoeuvres import MANOEUVRES, Course
 from jaxveh.plots.braking_drives import braking
 from jaxveh.plots.car_outline import footprint
@@ -85,7 +85,7 @@ def linear_response(recording: Recording, car: Any) -> dict[str, Callable[[np.nd
         linear = linear_single_track(car)
     else:
         return {}
-    system = linear.system(jnp.asarray(np.mean(channel_values(recording, "v_x")), jnp.result_type(linear.mass)))
+    system = linear.system(jnp.asarray(np.mean(drive_channels.channel(recording, "v_x")), jnp.result_type(linear.mass)))
 
     def response(name: str) -> Callable[[np.ndarray], Any]:
         return lambda frequency: getattr(
@@ -96,7 +96,7 @@ def linear_response(recording: Recording, car: Any) -> dict[str, Callable[[np.nd
 
 
 def _path(seen: Seen) -> Any:
-    if not has_channels(seen.recording, "x", "y", "yaw"):
+    if not drive_channels.has(seen.recording, "x", "y", "yaw"):
         return _overview(seen)
     with style():
         heights = [top_view_height(seen.recording, seen.course), OVERVIEW_HEIGHT]

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics import SineWithDwellTest, drive_channels
+from jaxveh.diagnostics import SineWithDwellTest, drive_channels, kit
 from jaxveh.diagnostics import sine_with_dwell as measure
-from jaxveh.diagnostics.sine_with_dwell import DISPLACED_AFTER, DISPLACED_FROM, DISPLACEMENT, YAW_RATE_LIMITS
 from jaxveh.plots.panels import GREY, line, note, stack
 from jaxveh.plots.style import CYCLE, SHADE, label_above, legend, style
 
@@ -21,7 +20,7 @@ def sine_with_dwell(
     *,
     steering_ratio: float = 16.0,
     steer_at_03g: float | None = None,
-    displacement_limit: float = DISPLACEMENT,
+    displacement_limit: float = kit.DISPLACEMENT,
     figure: Any = None,
 ) -> Any:
     """Steer, yaw rate and, where the recording has a position, the lateral way, with the criteria of FMVSS 126 in words.
@@ -36,7 +35,7 @@ def sine_with_dwell(
     found = measure(
         recording, steering_ratio=steering_ratio, steer_at_03g=steer_at_03g, displacement_limit=displacement_limit
     )
-    placed = drive_channels.has_channels(recording, "x", "y", "yaw")
+    placed = drive_channels.has(recording, "x", "y", "yaw")
     with style():
         figure, axes = stack(figure, 3 if placed else 2, 1.7)
         line(axes[0], recording, "steer")
@@ -55,7 +54,7 @@ def sine_with_dwell(
 
 def _words(found: SineWithDwellTest) -> str:
     if found.passed:
-        return "passed" if found.responsive else f"passed (no limit of displacement below {DISPLACED_FROM:g} A)"
+        return "passed" if found.responsive else f"passed (no limit of displacement below {kit.DISPLACED_FROM:g} A)"
     if found.passed is None:
         return "yaw rate within its limits; displacement not judged without the steer at 0.3 g"
     failed = ["yaw rate left too high"] * (not found.stable) + ["displacement too small"] * (found.responsive is False)
@@ -63,11 +62,11 @@ def _words(found: SineWithDwellTest) -> str:
 
 
 def _mark_yaw(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
-    time, yaw_rate = drive_channels.time_of(recording), np.degrees(drive_channels.channel_values(recording, "yaw_rate"))
+    time, yaw_rate = drive_channels.seconds(recording), np.degrees(drive_channels.channel(recording, "yaw_rate"))
     at_peak = float(np.interp(found.peak_at, time, yaw_rate))
     side = np.sign(at_peak) or 1.0
     ax.plot([found.peak_at], [at_peak], "s", color=GREY, markersize=4.5, label="first peak after the reversal")
-    for (after, limit), ratio in zip(YAW_RATE_LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True):
+    for (after, limit), ratio in zip(kit.YAW_RATE_LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True):
         at = found.completed + after
         top = side * limit * np.degrees(found.peak)
         ax.plot([at, at], [0.0, top], color=FORBIDDEN, linewidth=1.4)
@@ -76,7 +75,7 @@ def _mark_yaw(ax: Any, recording: Recording, found: SineWithDwellTest) -> None:
     ax.axvline(found.completed, color=GREY, linewidth=0.7, linestyle=":")
     words = [
         f"{round(100 * ratio) + 0:d} % of the peak after {after:g} s (at most {100 * limit:.0f} %)"
-        for (after, limit), ratio in zip(YAW_RATE_LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True)
+        for (after, limit), ratio in zip(kit.YAW_RATE_LIMITS.items(), (found.ratio_1_00, found.ratio_1_75), strict=True)
     ]
     note(ax, ",  ".join(words))
 
@@ -88,11 +87,11 @@ def _dot(ax: Any, at: float, value: float, allowed: bool) -> None:
 
 def _way(ax: Any, recording: Recording, found: SineWithDwellTest, limit: float) -> None:
     """How far the car is left of its initial straight path."""
-    time, yaw = drive_channels.time_of(recording), drive_channels.channel_values(recording, "yaw")[0]
-    x, y = (drive_channels.channel_values(recording, name) for name in ("x", "y"))
+    time, yaw = drive_channels.seconds(recording), drive_channels.channel(recording, "yaw")[0]
+    x, y = (drive_channels.channel(recording, name) for name in ("x", "y"))
     left = y * np.cos(yaw) - x * np.sin(yaw)
     left = left - left[0]
-    at = found.begins + DISPLACED_AFTER
+    at = found.begins + kit.DISPLACED_AFTER
     there = float(np.interp(at, time, left))
     side = np.sign(there) * np.sign(found.displacement) or 1.0
     ax.plot(time, left, color=CYCLE[0], linewidth=1.2)
@@ -109,4 +108,4 @@ def _way(ax: Any, recording: Recording, found: SineWithDwellTest, limit: float) 
     low, high = ax.get_ylim()
     ax.set_ylim(max(low, -reach), min(high, reach))
     words = f"at least {limit:g} m" if asked else "not judged"
-    note(ax, f"{found.displacement:.2f} m {DISPLACED_AFTER:g} s after the steer begins ({words})")
+    note(ax, f"{found.displacement:.2f} m {kit.DISPLACED_AFTER:g} s after the steer begins ({words})")

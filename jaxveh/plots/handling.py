@@ -9,8 +9,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics import SteadyTurns, steady_turns, understeer
-from jaxveh.diagnostics.steady_state import LINEAR_A_Y
+from jaxveh.diagnostics import SteadyTurns, kit, steady_turns, understeer
 from jaxveh.plots.panels import GREY
 from jaxveh.plots.style import colour, label_above, legend, new_figure, style
 
@@ -19,7 +18,7 @@ def handling_diagram(
     recordings: Recording | Mapping[str, Recording],
     wheelbase: float | Mapping[str, float] | None = None,
     *,
-    linear: float = LINEAR_A_Y,
+    linear: float = kit.LINEAR_A_Y,
     figure: Any = None,
 ) -> Any:
     """Steer and sideslip over lateral acceleration of one drive, or of several by label.

@@ -32,7 +32,7 @@ def shown(name: str) -> Quantity:
 
 def values(recording: Recording, name: str) -> np.ndarray:
     """A channel in the unit of its axis."""
-    taken = drive_channels.sideslip(recording) if name == "sideslip" else drive_channels.channel_values(recording, name)
+    taken = drive_channels.sideslip(recording) if name == "sideslip" else drive_channels.channel(recording, name)
     return shown(name).show(taken)
 
 
@@ -47,24 +47,24 @@ def stack(figure: Any, count: int, each: float = 1.35) -> tuple[Any, np.ndarray]
 def line(ax: Any, recording: Recording, name: str, **style: Any) -> None:
     """One channel over time, with its label above."""
     ax.plot(
-        drive_channels.time_of(recording), values(recording, name), **{"color": CYCLE[0], "linewidth": 1.2, **style}
+        drive_channels.seconds(recording), values(recording, name), **{"color": CYCLE[0], "linewidth": 1.2, **style}
     )
     label_above(ax, shown(name).label)
 
 
 def wheels(ax: Any, recording: Recording, prefix: str, factor: Any, label: str) -> None:
     """A channel of each wheel over time, times a factor (a number, or one by wheel)."""
-    time = drive_channels.time_of(recording)
+    time = drive_channels.seconds(recording)
     for wheel, words in WHEELS.items():
         scale = factor[wheel] if isinstance(factor, dict) else factor
-        of_wheel = scale * drive_channels.channel_values(recording, f"{prefix}_{wheel}")
+        of_wheel = scale * drive_channels.channel(recording, f"{prefix}_{wheel}")
         ax.plot(time, of_wheel, linewidth=1.1, label=words, **WHEEL_STYLE[wheel])
     label_above(ax, label)
 
 
 def has_wheels(recording: Recording, prefix: str) -> bool:
     """Whether the recording has this channel of all four wheels."""
-    return drive_channels.has_channels(recording, *[f"{prefix}_{wheel}" for wheel in WHEELS])
+    return drive_channels.has(recording, *[f"{prefix}_{wheel}" for wheel in WHEELS])
 
 
 def note(ax: Any, text: str) -> None:
@@ -93,6 +93,4 @@ def overview(recording: Recording, *, figure: Any = None) -> Any:
 
 
 def _there(recording: Recording, name: str) -> bool:
-    return drive_channels.has_channels(recording, name) or (
-        name == "sideslip" and drive_channels.has_channels(recording, "v_x", "v_y")
-    )
+    return drive_channels.has(recording, name) or (name == "sideslip" and drive_channels.has(recording, "v_x", "v_y"))

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import check_one_of
-from jaxveh.fitting import RigFit
-from jaxveh.fitting.rig_stages import varying_inputs
+from jaxveh.fitting import RigFit, kit
 from jaxveh.io import RigTable
 from jaxveh.plots.style import new_figure, style
 
@@ -75,7 +74,7 @@ def rig_fit(fit: RigFit, rig: RigTable, channels: Sequence[str] | None = None, *
 def slip_of(name: str, rig: RigTable) -> str:
     """The slip over which a channel is drawn: its own, or the other one where only that varies."""
     own = QUANTITIES[name].slip
-    varies = varying_inputs(rig)
+    varies = kit.varying_inputs(rig)
     other = "slip_angle" if own == "slip_ratio" else "slip_ratio"
     return other if own not in varies and other in varies else own
 

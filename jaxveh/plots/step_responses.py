@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics import StepResponse, drive_channels
+from jaxveh.diagnostics import StepResponse, drive_channels, kit
 from jaxveh.diagnostics import step_response as measure
-from jaxveh.diagnostics.step_response import RESPONSE_SHARE
 from jaxveh.plots.panels import GREY, line, note, shown, stack, values
 from jaxveh.plots.style import CYCLE, legend, style
 
@@ -57,7 +56,7 @@ def _mark(ax: Any, recording: Recording, name: str, found: StepResponse) -> None
     words = [f"steady {place(1.0) - before:.3g} {unit.unit}"]
     if np.isfinite(found.response_time):
         at = found.reference + found.response_time
-        ax.plot([at], [place(RESPONSE_SHARE)], "o", color=CYCLE[1], markersize=4.5, label="90 % of it")
+        ax.plot([at], [place(kit.RESPONSE_SHARE)], "o", color=CYCLE[1], markersize=4.5, label="90 % of it")
         words.append(f"90 % after {found.response_time:.3f} s")
     if np.isfinite(found.peak):
         at = found.reference + found.peak_response_time

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxveh._core.errors import InputError
-from jaxveh.io import replacing_file
-from jaxveh.io.optional import require
+from jaxveh.io import kit, replacing_file
 
 # M. Okabe and K. Ito, Color Universal Design (2008); the truth is black.
 COLOURS = {
@@ -72,14 +71,14 @@ _RC = {
 @contextlib.contextmanager
 def style() -> Iterator[None]:
     """matplotlib's settings for figures of this package, restored at the end: also for a user's own figures."""
-    matplotlib = require("matplotlib", "drawing figures", "plot")
+    matplotlib = kit.require("matplotlib", "drawing figures", "plot")
     with matplotlib.rc_context(_RC):
         yield
 
 
 def new_figure(height: float, width: float = PAGE_WIDTH) -> Any:
     """An empty figure of our own class, in inches; needs no window and no pyplot."""
-    require("matplotlib", "drawing figures", "plot")
+    kit.require("matplotlib", "drawing figures", "plot")
     from jaxveh.plots.figure import Figure
 
     return Figure(figsize=(width, height), dpi=DPI, layout="constrained")

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.drive_channels import channel_values, time_of
+from jaxveh.diagnostics import drive_channels
 from jaxveh.manoeuvres import Course, cones
 from jaxveh.plots.car_outline import WHEEL, Footprint, footprint, turned, wheel_angles, wheel_forces
 from jaxveh.plots.panels import round_number
@@ -57,7 +57,11 @@ def top_view(
     """
     check_one_of("colour", colour, ("speed", "time"))
     feet = footprint(recording, car, wheelbase, track)
-    time, x, y = time_of(recording), channel_values(recording, "x"), channel_values(recording, "y")
+    time, x, y = (
+        drive_channels.seconds(recording),
+        drive_channels.channel(recording, "x"),
+        drive_channels.channel(recording, "y"),
+    )
     every = round_number(max(time[-1] - time[0], 1e-3) / SNAPSHOTS * 1.5) if every is None else every
     check_positive("every", every, "s")
     at = _snapshots(time, x, y, every)
@@ -65,7 +69,7 @@ def top_view(
     with style():
         figure = new_figure(height) if figure is None else figure
         axes = figure.subplots(len(boxes), 1, squeeze=False)[:, 0]
-        coloured = channel_values(recording, "v_x") if colour == "speed" else time
+        coloured = drive_channels.channel(recording, "v_x") if colour == "speed" else time
         forces = wheel_forces(recording, feet)
         scale = _metres_per_newton(forces, feet)
         for ax, (left, right, low, high) in zip(axes, boxes, strict=True):
@@ -91,7 +95,7 @@ def _snapshots(time: np.ndarray, x: np.ndarray, y: np.ndarray, every: float) -> 
 def top_view_height(recording: Recording, course: Course | None = None) -> float:
     """Inches of height that the view takes of its own accord."""
     feet = footprint(recording, None, None, None)
-    return _rows(channel_values(recording, "x"), channel_values(recording, "y"), course, feet)[1]
+    return _rows(drive_channels.channel(recording, "x"), drive_channels.channel(recording, "y"), course, feet)[1]
 
 
 def _rows(x: np.ndarray, y: np.ndarray, course: Course | None, car: Footprint) -> tuple[list, float]:
@@ -158,13 +162,13 @@ def _car(ax: Any, recording: Recording, car: Footprint, k: int, every: float) ->
     flat = high - low < FLAT * (right - left)
     under = low + 0.2 if flat else float(np.max(body[:, 1])) + 0.25
     if left <= place[0] <= right:
-        ax.text(place[0], under, f"{time_of(recording)[k]:.{decimals}f} s", fontsize=6.5, color="#666666", ha="center",
-                va="bottom", clip_on=True)  # fmt: skip
+        label = f"{drive_channels.seconds(recording)[k]:.{decimals}f} s"
+        ax.text(place[0], under, label, fontsize=6.5, color="#666666", ha="center", va="bottom", clip_on=True)
 
 
 def _place(recording: Recording, k: int) -> tuple[np.ndarray, float]:
-    return np.array([channel_values(recording, name)[k] for name in ("x", "y")]), float(
-        channel_values(recording, "yaw")[k]
+    return np.array([drive_channels.channel(recording, name)[k] for name in ("x", "y")]), float(
+        drive_channels.channel(recording, "yaw")[k]
     )
 
 

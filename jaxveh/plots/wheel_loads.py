@@ -23,13 +23,13 @@ def loads(recording: Recording, *, figure: Any = None) -> Any:
 
     **Returns** the figure. **Raises** `InputError` where the recording has no loads.
     """
-    axles = drive_channels.has_channels(recording, "load_front", "load_rear")
+    axles = drive_channels.has(recording, "load_front", "load_rear")
     if not has_wheels(recording, "load") and not axles:
         raise InputError(
             "plots.loads: the recording has neither load_fl, load_fr, load_rl, load_rr nor load_front, load_rear."
         )
-    time = drive_channels.time_of(recording)
-    accelerations = [name for name in ("a_y", "a_x") if drive_channels.has_channels(recording, name)]
+    time = drive_channels.seconds(recording)
+    accelerations = [name for name in ("a_y", "a_x") if drive_channels.has(recording, name)]
     with style():
         figure, axes = stack(figure, 1 + len(accelerations), 1.5)
         if has_wheels(recording, "load"):
@@ -37,7 +37,7 @@ def loads(recording: Recording, *, figure: Any = None) -> Any:
             _shade_lift(axes[0], recording, time)
         else:
             for index, axle in enumerate(("front", "rear")):
-                load = drive_channels.channel_values(recording, f"load_{axle}") / 1e3
+                load = drive_channels.channel(recording, f"load_{axle}") / 1e3
                 axes[0].plot(time, load, color=CYCLE[index], label=f"{axle} axle")
             label_above(axes[0], "axle loads [kN]")
         axes[0].set_ylim(bottom=0)
@@ -49,7 +49,7 @@ def loads(recording: Recording, *, figure: Any = None) -> Any:
 
 def lifted(recording: Recording) -> np.ndarray:
     """Whether any wheel is off the ground, (T,)."""
-    each = np.stack([drive_channels.channel_values(recording, f"load_{wheel}") for wheel in WHEELS])
+    each = np.stack([drive_channels.channel(recording, f"load_{wheel}") for wheel in WHEELS])
     return np.min(each, axis=0) < LIFTED * np.mean(each)
 
 
@@ -60,6 +60,6 @@ def _shade_lift(ax: Any, recording: Recording, time: np.ndarray) -> None:
         ax.axvspan(
             time[start], time[min(end, time.size - 1)], color=SHADE, linewidth=0, zorder=0, label="a wheel lifts"
         )
-    each = {words: drive_channels.channel_values(recording, f"load_{wheel}") for wheel, words in WHEELS.items()}
+    each = {words: drive_channels.channel(recording, f"load_{wheel}") for wheel, words in WHEELS.items()}
     lightest = min(each, key=lambda words: float(np.min(each[words])))
     note(ax, f"least: {float(np.min(each[lightest])) / 1e3:.2f} kN, {lightest}")

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import jax
 
 from jaxveh._core.errors import InputError
-from jaxveh.io.road import read_road
+from jaxveh.io import read_road
 from jaxveh.roads.base import AbstractRoad
 from jaxveh.roads.friction import Level, MuJump, SplitMu
 from jaxveh.roads.profile import Profile
@@ -52,7 +52,7 @@ def from_specification(spec: Any) -> AbstractRoad:
 
 
 def named_road(name: str | os.PathLike, key: jax.Array | None = None) -> AbstractRoad:
-    """A road by its name in `ROADS`, or from a file ending in .toml (`jaxveh.io.road.SCHEMA`).
+    """A road by its name in `ROADS`, or from a file ending in .toml (`jaxveh.io.road.ROAD_SCHEMA`).
 
     `key` draws a random road ("hills"; default `jax.random.key(0)`).
 

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles import GRAVITY
 
 Vector = tuple[Any, Any, Any]
 

@@ -13,7 +13,7 @@ from jaxveh.sensors.signal import Signal
 from jaxveh.sensors.steering_angle import SteeringAngle
 from jaxveh.sensors.suite import Suite
 from jaxveh.sensors.wheel_speeds import WHEELS, WheelSpeeds
-from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles import GRAVITY
 
 _DEGREE = math.pi / 180
 _KMH = 1 / 3.6

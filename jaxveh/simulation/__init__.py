@@ -1,5 +1,6 @@
 """Drives: vehicle, road, driver and sensors through diffrax, into a Recording."""
 
+from jaxveh.simulation import kit
 from jaxveh.simulation.driven import Driven, DrivenState
 from jaxveh.simulation.events import Event, standstill, wheel_lift
 from jaxveh.simulation.fixed_steps import fixed_steps
@@ -18,6 +19,7 @@ __all__ = [
     "fastest_pole",
     "fixed_steps",
     "grid_through",
+    "kit",
     "simulate",
     "solve",
     "standstill",

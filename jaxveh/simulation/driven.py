@@ -11,11 +11,11 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh.manoeuvres import AbstractDriver, AbstractManoeuvre, OpenLoop, SpeedControl, as_driver
-from jaxveh.manoeuvres.speed_control import AIR_DENSITY
+from jaxveh.manoeuvres import kit as manoeuvres_kit
 from jaxveh.sensors import Instrumented
 from jaxveh.statespace import cast
 from jaxveh.vehicles import AbstractVehicle, Motion, Steered
-from jaxveh.vehicles.wheels import travel_direction, wheel_names
+from jaxveh.vehicles import kit as vehicles_kit
 
 
 class DrivenState(NamedTuple):
@@ -96,8 +96,8 @@ def adapted(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
     for name in missing:
         if name == "steering_wheel" and "steer" in given._fields:
             found[name] = given.steer * steering_ratio(vehicle)
-        elif name in wheel_names("torque") and "drive_torque" in given._fields:
-            found[name] = 0.25 * (given.drive_torque - given.brake_torque * travel_direction(moves.v_x))
+        elif name in vehicles_kit.wheel_names("torque") and "drive_torque" in given._fields:
+            found[name] = 0.25 * (given.drive_torque - given.brake_torque * vehicles_kit.travel_direction(moves.v_x))
     return record("DriverInputs", {**given._asdict(), **found}) if found else given
 
 
@@ -151,7 +151,7 @@ def with_pedals(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: Abstract
     driver = as_driver(manoeuvre)
     moves = _still(vehicle)
     given = eqx.filter_eval_shape(lambda: driver.inputs(0.0, moves, driver.start(0.0, moves)))._fields
-    torques = {"drive_torque", *wheel_names("torque")}
+    torques = {"drive_torque", *vehicles_kit.wheel_names("torque")}
     own = torques & set(given) and not _adds_to_pedals(driver)
     if not torques & set(vehicle.inputs) or own or "v_x" not in given:
         return driver
@@ -160,7 +160,7 @@ def with_pedals(manoeuvre: AbstractManoeuvre | AbstractDriver, vehicle: Abstract
         driver,
         car.mass,
         wheel_radius=car.wheel_radius,
-        drag_area=jnp.maximum(car.drag * (2.0 / AIR_DENSITY), LEAST),
+        drag_area=jnp.maximum(car.drag * (2.0 / manoeuvres_kit.AIR_DENSITY), LEAST),
         rolling_resistance=jnp.maximum(car.rolling_resistance, LEAST),
     )
     return cast(control, dtype_of(vehicle))

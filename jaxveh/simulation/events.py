@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.simulation.driven import Driven
 from jaxveh.simulation.falling import Falling
-from jaxveh.vehicles.wheels import wheel_names
+from jaxveh.vehicles import kit
 
 
 class Event(eqx.Module):
@@ -63,9 +63,9 @@ class _Lighter(eqx.Module):
 
     def __call__(self, driven: Driven, t, x):
         outputs = driven.see(t, x)[1]
-        if not set(wheel_names("load")) <= set(outputs._fields):
+        if not set(kit.wheel_names("load")) <= set(outputs._fields):
             raise InputError(f"wheel_lift: the car has no loads a wheel; its outputs are {', '.join(outputs._fields)}.")
         least = outputs.load_fl
-        for name in wheel_names("load")[1:]:
+        for name in kit.wheel_names("load")[1:]:
             least = jnp.minimum(least, getattr(outputs, name))
         return least - self.load

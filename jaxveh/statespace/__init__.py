@@ -1,5 +1,14 @@
 """The one contract that a filter sees: models by name, noise laws, discretisation, chosen parameters as states."""
 
+from jaxveh.statespace import kit
+from jaxveh.statespace.belief import AbstractBelief, Info
+from jaxveh.statespace.contract import (
+    AbstractFilter,
+    AbstractTwoPartFilter,
+    AbstractTwoPartWrapper,
+    AbstractWrapper,
+    Smoothing,
+)
 from jaxveh.statespace.cramer_rao import PosteriorBound, posterior_cramer_rao
 from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.disturbances import with_disturbances
@@ -21,8 +30,13 @@ from jaxveh.statespace.uncertain_inputs import uncertain_inputs
 
 __all__ = [
     "RK4",
+    "AbstractBelief",
+    "AbstractFilter",
     "AbstractNoise",
     "AbstractProcessNoise",
+    "AbstractTwoPartFilter",
+    "AbstractTwoPartWrapper",
+    "AbstractWrapper",
     "CauchyGaussianMixture",
     "Continuous",
     "Discrete",
@@ -31,6 +45,7 @@ __all__ = [
     "Gaussian",
     "Heun",
     "Independent",
+    "Info",
     "LinearInput",
     "MeasurementNoise",
     "MultivariateGaussian",
@@ -40,11 +55,13 @@ __all__ = [
     "Propagate",
     "RolledRK4",
     "Row",
+    "Smoothing",
     "StateDependent",
     "StateSpace",
     "StudentT",
     "cast",
     "draw",
+    "kit",
     "parameter_view",
     "posterior_cramer_rao",
     "put_parameters",

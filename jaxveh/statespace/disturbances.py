@@ -15,7 +15,7 @@ from jaxveh.statespace.model import Prior, StateSpace
 from jaxveh.statespace.noise import Gaussian, combine
 from jaxveh.statespace.process import Continuous, join
 
-PREFIX = "disturbance_"
+DISTURBANCE_PREFIX = "disturbance_"
 """A disturbance's state is called this and the state that it pushes."""
 
 
@@ -28,7 +28,7 @@ class Disturbances(eqx.Module):
     @property
     def names(self) -> tuple[str, ...]:
         """The disturbances' own states."""
-        return tuple(PREFIX + name for name in self.states)
+        return tuple(DISTURBANCE_PREFIX + name for name in self.states)
 
     def split(self, x, kind):
         """The model's own state, and each disturbance by the state that it pushes."""
@@ -121,8 +121,14 @@ def with_disturbances(
     kind, dtype = type(model.prior.mean), model.prior.mean[0].dtype
     scalar = lambda value: jnp.asarray(value, dtype)
     joint = record_type("State", (*model.states, *disturbances.names))
-    law = combine(model.prior.law, Gaussian({PREFIX + name: scalar(value) for name, value in prior.items()}))
-    walking = Continuous(Gaussian({PREFIX + name: scalar(value) for name, value in walk.items()})) if walk else None
+    law = combine(
+        model.prior.law, Gaussian({DISTURBANCE_PREFIX + name: scalar(value) for name, value in prior.items()})
+    )
+    walking = (
+        Continuous(Gaussian({DISTURBANCE_PREFIX + name: scalar(value) for name, value in walk.items()}))
+        if walk
+        else None
+    )
     report = model.report_function
     wrap = lambda form, function: form(function, disturbances, kind)
     return StateSpace(

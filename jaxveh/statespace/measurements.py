@@ -28,11 +28,6 @@ def input_result(model: StateSpace, row: Row):
     return jnp.where(jnp.any(jnp.stack(bad)), code(Result.non_finite_input), code(Result.successful))
 
 
-def wrap_angle(angle):
-    """The same angle in [-pi, pi)."""
-    return angle - 2 * jnp.pi * jnp.floor(angle / (2 * jnp.pi) + 0.5)
-
-
 def by_channel(model: StateSpace, values, present: dict):
     """A NamedTuple by channel, NaN where the channel is missing; `values` in the order of the channels."""
     pairs = zip(model.channels, values, strict=True)

@@ -1,5 +1,6 @@
 """Force laws of one wheel (or one axle) at one instant: contact in, forces out."""
 
+from jaxveh.tyres import kit, mf_tyre
 from jaxveh.tyres.arctangent import Arctangent
 from jaxveh.tyres.base import AbstractDynamicTyre, AbstractTyre, Contact, Forces, cornering_stiffness
 from jaxveh.tyres.brush import Brush
@@ -65,6 +66,8 @@ __all__ = [
     "check_property_file",
     "cornering_stiffness",
     "from_property_file",
+    "kit",
+    "mf_tyre",
     "read_parameters",
     "to_property_file",
     "typical_mf_tyre",

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh.io import write_text
-from jaxveh.io.naming import check_known
-from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
+from jaxveh.io import kit, write_text
 from jaxveh.tyres.arctangent import Arctangent
 from jaxveh.tyres.base import AbstractTyre
 from jaxveh.tyres.brush import Brush
@@ -50,13 +48,13 @@ def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", ov
             f"write_parameters: tyre = {name}: must be one of {', '.join(MODELS)}; for MFTyre there is to_property_file."
         )
     lines = [f"# {line}".rstrip() for line in note.splitlines()]
-    lines += ["# SI units and radians.", "[tyre]", f"model = {toml_string(name)}"]
+    lines += ["# SI units and radians.", "[tyre]", f"model = {kit.toml_string(name)}"]
     entries = [(field, getattr(tyre, field.name)) for field in dataclasses.fields(tyre)]
     entries = [(field, value) for field, value in entries if value is not None]
     width = max(len(field.name) for field, _ in entries)
     for field, value in entries:
         if isinstance(value, str):
-            lines.append(f"{field.name:<{width}} = {toml_string(value)}")
+            lines.append(f"{field.name:<{width}} = {kit.toml_string(value)}")
             continue
         value = np.asarray(value)
         if value.shape != () or not np.isfinite(value):
@@ -74,24 +72,24 @@ def read_parameters(path: str | Path) -> AbstractTyre:
     range.
     """
     path = Path(path)
-    content = read_toml(path)
+    content = kit.read_toml(path)
     if "tyre" not in content:
         raise InputError(f"{path}: has no table [tyre]; it needs one with `model = ...` and the parameters.")
-    check_keys(str(path), content, ("tyre",))
+    kit.check_keys(str(path), content, ("tyre",))
     table = content["tyre"]
     where = f"{path}: [tyre]"
     if not isinstance(table, dict) or "model" not in table:
         raise InputError(f"{where}: has no `model`; it must be one of {', '.join(MODELS)}.")
-    name = toml_text(f"{where} model", table["model"])
-    check_known(where, "model", name, MODELS)
+    name = kit.toml_text(f"{where} model", table["model"])
+    kit.check_known(where, "model", name, MODELS)
     fields = {field.name: field for field in dataclasses.fields(MODELS[name])}
-    check_keys(f"{where} of {name}", table, ("model", *fields))
+    kit.check_keys(f"{where} of {name}", table, ("model", *fields))
     for field in fields.values():
         if field.default is dataclasses.MISSING and field.name not in table:
             raise InputError(f"{where}: {field.name} is missing; {name} needs it ({field.metadata['unit']}).")
     values: dict[str, Any] = {
         # What has no unit is a choice in words.
-        key: (toml_number if "unit" in fields[key].metadata else toml_text)(f"{where} {key}", value)
+        key: (kit.toml_number if "unit" in fields[key].metadata else kit.toml_text)(f"{where} {key}", value)
         for key, value in table.items()
         if key != "model"
     }

@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh.io.property_file import PROPERTY_UNITS, PropertyFile, read_property_file
+from jaxveh.io import PropertyFile, kit, read_property_file
 from jaxveh.tyres.base import Contact
 from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.property_file import SIDES, from_property_file, tells
@@ -92,7 +92,7 @@ def _model(file: PropertyFile, version: int) -> Iterator[Finding]:
     if "UNITS" not in file.sections:
         yield Finding("[UNITS]", "is missing: SI units and radians are taken")
     angle = str(file.sections.get("UNITS", {}).get("ANGLE", "radian")).strip().lower()
-    if angle not in PROPERTY_UNITS["ANGLE"]:
+    if angle not in kit.PROPERTY_UNITS["ANGLE"]:
         yield Finding("ANGLE", f"is {angle!r}: ranges and coefficients are taken in radians all the same")
 
 

@@ -10,7 +10,7 @@ import jax
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of
-from jaxveh.io.property_file import PropertyFile, read_property_file
+from jaxveh.io import PropertyFile, read_property_file
 from jaxveh.tyres.mf_tyre import (
     Aligning,
     Lateral,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import equinox as eqx
 
-from jaxveh.io.property_file import Entry, PropertyFile
+from jaxveh.io import PropertyFile, kit
 from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.property_file import NOT_MEASURED
 
@@ -34,7 +34,7 @@ class Finding(NamedTuple):
     says: str
 
 
-def first_of(file: PropertyFile, key: str) -> Entry | None:
+def first_of(file: PropertyFile, key: str) -> kit.Entry | None:
     """The first entry of that name that has a value, whatever others say (`PropertyFile.find` objects where they differ)."""
     return next((entry for entry in file.entries if entry.key == key and entry.value != ""), None)
 
@@ -77,7 +77,7 @@ def _texts(file: PropertyFile) -> Iterator[Finding]:
 
 def _twice(file: PropertyFile) -> Iterator[Finding]:
     """Entries that contradict each other, of which the tyre has no need (else there were no tyre)."""
-    first: dict[tuple[str, str], Entry] = {}
+    first: dict[tuple[str, str], kit.Entry] = {}
     for entry in file.entries:
         section = "" if entry.key in (*WORDS, "USE_MODE") else entry.section
         before = first.setdefault((section, entry.key), entry)
@@ -87,7 +87,7 @@ def _twice(file: PropertyFile) -> Iterator[Finding]:
 
 def _unread(file: PropertyFile, known: set[str]) -> Iterator[Finding]:
     """Coefficients of forces and moments that do something, and that are not read; names in small letters; tables."""
-    unread: dict[str, list[Entry]] = {}
+    unread: dict[str, list[kit.Entry]] = {}
     for entry in file.entries:
         if entry.key in known or entry.key in DYNAMIC or isinstance(entry.value, str):
             continue
@@ -103,7 +103,7 @@ def _unread(file: PropertyFile, known: set[str]) -> Iterator[Finding]:
         yield Finding(DEFLECTIONS, "is not read: the deflection follows VERTICAL_STIFFNESS")
 
 
-def _listed(entries: Iterable[Entry]) -> str:
+def _listed(entries: Iterable[kit.Entry]) -> str:
     keys = list(dict.fromkeys(entry.key for entry in entries))
     return (
         ", ".join(keys)

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of
-from jaxveh.io.property_file import PropertyFile, parse_property_file
+from jaxveh.io import PropertyFile, kit
 from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.property_file import DIMENSIONS, SIDES, from_property_file, size_of, version_of
 
@@ -133,7 +133,7 @@ def _new(tyre: MFTyre, coefficients: list[_Coefficient], side: str | None) -> Pr
         if section != "MODEL" and inside:
             lines.append(f"[{section}]")
         lines += [_line(inside[name], _number(inside[name].value)) for name in names]
-    return parse_property_file("\n".join(lines) + "\n", f"MF-Tyre {tyre.version / 10:g}")
+    return kit.parse_property_file("\n".join(lines) + "\n", f"MF-Tyre {tyre.version / 10:g}")
 
 
 def _line(one: _Coefficient, number: float) -> str:
@@ -194,7 +194,7 @@ def _added(file: PropertyFile, section: str, lines: list[str]) -> PropertyFile:
     before = list(file.lines[:last])
     if not before[-1].endswith(("\n", "\r")):
         before[-1] += end
-    return parse_property_file("".join([*before, *(line + end for line in lines), *file.lines[last:]]), file.source)
+    return kit.parse_property_file("".join([*before, *(line + end for line in lines), *file.lines[last:]]), file.source)
 
 
 def _noted(file: PropertyFile, note: str) -> PropertyFile:
@@ -205,4 +205,4 @@ def _noted(file: PropertyFile, note: str) -> PropertyFile:
     heading = next(i for i, line in enumerate(file.lines) if line.lstrip().startswith("["))
     comments = [f"$ {line}".rstrip() + end for line in note.splitlines()]
     lines = [*file.lines[: heading + 1], *comments, *file.lines[heading + 1 :]]
-    return parse_property_file("".join(lines), file.source)
+    return kit.parse_property_file("".join(lines), file.source)

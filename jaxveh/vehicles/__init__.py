@@ -1,6 +1,6 @@
 """Equations of motion and outputs of one vehicle at one instant; named parameter sets."""
 
-from jaxveh.vehicles import sets
+from jaxveh.vehicles import kit, sets
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
 from jaxveh.vehicles.commanded import Commanded
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive, FourMotors
@@ -97,6 +97,7 @@ __all__ = [
     "commonroad_limits",
     "from_commonroad",
     "from_specification",
+    "kit",
     "linear",
     "linear_single_track",
     "named_car",

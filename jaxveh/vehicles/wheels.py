@@ -12,8 +12,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh.roads import Ground
-from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces
-from jaxveh.tyres.mirrored import mirrored_contact
+from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces, kit
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.slip import regularised_speed
 from jaxveh.vehicles.together import alike, long_law, together
@@ -175,7 +174,7 @@ class Tyres(NamedTuple):
         return self._gather(lambda tyre, at, state: tyre.derivatives(at, state), self._seen(contacts), states)
 
     def _seen(self, contacts: Wheels) -> Wheels:
-        return each_wheel(lambda at, right: mirrored_contact(at) if right else at, contacts, self.right)
+        return each_wheel(lambda at, right: kit.mirrored_contact(at) if right else at, contacts, self.right)
 
     def _each(self, function: Callable, *wheels: Wheels) -> Wheels:
         """`function(tyre, ...)` of each wheel; by as few calls as there are long laws."""

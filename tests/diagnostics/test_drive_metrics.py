@@ -18,7 +18,7 @@ from jaxveh.diagnostics import (
     step_response,
     understeer,
 )
-from jaxveh.diagnostics.drive_channels import channel_values, crossing, peak
+from jaxveh.diagnostics.drive_channels import channel, crossing, peak
 
 TIME = 0.01 * np.arange(1001)
 
@@ -102,12 +102,12 @@ def test_the_truth_is_looked_at_first_and_gaps_are_bridged():
     rows = np.arange(10.0)
     gaps = np.where(np.arange(10) % 2 == 0, rows, np.nan)
     log = Recording(rows, {"a_y": gaps, "yaw_rate": 0 * rows, "true.yaw_rate": rows, "v_x": np.full(10, np.nan)})
-    np.testing.assert_array_equal(channel_values(log, "a_y")[:9], rows[:9])
-    np.testing.assert_array_equal(channel_values(log, "yaw_rate"), rows)
+    np.testing.assert_array_equal(channel(log, "a_y")[:9], rows[:9])
+    np.testing.assert_array_equal(channel(log, "yaw_rate"), rows)
     with pytest.raises(InputError, match="no channel 'steer' to look at; there are: a_y, yaw_rate, v_x"):
-        channel_values(log, "steer")
+        channel(log, "steer")
     with pytest.raises(InputError, match="v_x has no finite sample"):
-        channel_values(log, "v_x")
+        channel(log, "v_x")
 
 
 def test_crossings_and_peaks_lie_between_rows():

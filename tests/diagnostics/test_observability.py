@@ -9,7 +9,7 @@ import pytest
 
 from jaxveh import FilterError, InputError, Recording
 from jaxveh import statespace as ss
-from jaxveh.diagnostics.observability import from_sensitivities, observability
+from jaxveh.diagnostics.observability import from_sensitivities, observability_at
 from jaxveh.estimators.observability import observe
 
 RNG = np.random.default_rng(0)
@@ -19,7 +19,7 @@ SPREAD = np.array([0.5, 1.0, 2.0])
 
 
 def test_a_linear_model_has_its_closed_form():
-    found = observability(lambda z: jnp.asarray(DESIGN) @ z, jnp.zeros(3), NAMES, SPREAD)
+    found = observability_at(lambda z: jnp.asarray(DESIGN) @ z, jnp.zeros(3), NAMES, SPREAD)
     fisher = DESIGN.T @ DESIGN
     np.testing.assert_allclose(found.bounds, np.sqrt(np.diag(np.linalg.inv(fisher))), rtol=1e-10)
     np.testing.assert_allclose(found.bounds_alone, 1 / np.sqrt(np.diag(fisher)), rtol=1e-10)
@@ -32,17 +32,17 @@ def test_a_linear_model_has_its_closed_form():
 
 
 def test_start_states_as_nuisance_are_marginalised():
-    found = observability(lambda z: jnp.asarray(DESIGN) @ z, jnp.zeros(3), ("a", "b"), SPREAD, nuisance=1)
+    found = observability_at(lambda z: jnp.asarray(DESIGN) @ z, jnp.zeros(3), ("a", "b"), SPREAD, nuisance=1)
     known = DESIGN.T @ DESIGN + np.diag([0.0, 0.0, 1 / SPREAD[2] ** 2])
     np.testing.assert_allclose(found.bounds, np.sqrt(np.diag(np.linalg.inv(known))[:2]), rtol=1e-10)
-    everything = observability(lambda z: jnp.asarray(DESIGN)[:, :2] @ z, jnp.zeros(2), ("a", "b"), SPREAD[:2])
+    everything = observability_at(lambda z: jnp.asarray(DESIGN)[:, :2] @ z, jnp.zeros(2), ("a", "b"), SPREAD[:2])
     assert (everything.bounds < found.bounds).all()
 
 
 def test_a_product_trades_and_the_words_name_both():
     time = jnp.linspace(0, 3, 50)
     predict = lambda z: jnp.concatenate([jnp.exp(z[0] + z[1]) * jnp.sin(time), 30 * z[2] * jnp.cos(time)])
-    found = observability(predict, jnp.asarray([0.2, 0.3, 1.0]), ("gain", "mass", "drag"), np.full(3, 0.1))
+    found = observability_at(predict, jnp.asarray([0.2, 0.3, 1.0]), ("gain", "mass", "drag"), np.full(3, 0.1))
     assert found.condition_number > 1e20
     assert "gain" in found.trade()
     assert "mass" in found.trade()
@@ -53,11 +53,11 @@ def test_a_product_trades_and_the_words_name_both():
     assert found.observable() == ("drag",)
     # Opposite signs in the measurement: they rise together.
     ratio = lambda z: jnp.exp(z[0] - z[1]) * jnp.sin(time)
-    assert "rising with it" in observability(ratio, jnp.zeros(2), ("gain", "mass"), np.full(2, 0.1)).trade()
+    assert "rising with it" in observability_at(ratio, jnp.zeros(2), ("gain", "mass"), np.full(2, 0.1)).trade()
 
 
 def test_a_parameter_without_any_trace():
-    found = observability(lambda z: 20 * z[:1] * jnp.ones(9), jnp.zeros(2), ("seen", "hidden"), np.ones(2))
+    found = observability_at(lambda z: 20 * z[:1] * jnp.ones(9), jnp.zeros(2), ("seen", "hidden"), np.ones(2))
     assert found.trade() == "hidden alone leaves no trace in the measurements"
     assert found.bounds[1] > 1e100
     np.testing.assert_allclose(found.bounds_with_prior[1], 1.0)
@@ -77,11 +77,11 @@ def test_fewer_measurements_than_parameters_leave_a_direction_unseen():
 
 def test_observability_errors():
     with pytest.raises(InputError, match=r"at \(3,\), spread \(2,\): must be \(3,\) for a, b, c"):
-        observability(lambda z: z, jnp.zeros(3), NAMES, np.ones(2))
+        observability_at(lambda z: z, jnp.zeros(3), NAMES, np.ones(2))
     with pytest.raises(InputError, match="spread = .*: must be positive"):
-        observability(lambda z: z, jnp.zeros(3), NAMES, np.array([1.0, 0.0, 1.0]))
+        observability_at(lambda z: z, jnp.zeros(3), NAMES, np.array([1.0, 0.0, 1.0]))
     with pytest.raises(FilterError, match="a sensitivity is not finite"):
-        observability(lambda z: z / 0.0, jnp.zeros(3), NAMES, np.ones(3))
+        observability_at(lambda z: z / 0.0, jnp.zeros(3), NAMES, np.ones(3))
 
 
 Line = namedtuple("Line", "x")

@@ -10,7 +10,7 @@ import pytest
 from jaxveh import filters, sweeps
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record_type
-from jaxveh.diagnostics.observability import observability
+from jaxveh.diagnostics.observability import observability_at
 from jaxveh.experiments import federated_ckf as experiment
 from jaxveh.experiments.federated_ckf import contestants, criteria, drives, model, observed, printed, report, study
 from jaxveh.experiments.federated_ckf.interleaved import Member, Told, stays, take_turns
@@ -102,7 +102,7 @@ def test_small_steer_says_nothing_of_friction(driven):
     assert np.abs(small[:, 0]).max() == 0.0 < np.abs(large[:, 0]).max()
     assert np.abs(small[:, 1:4]).max(axis=0).min() > 0.0
     spread = np.array([0.8, 0.4, 0.3, 0.1, 0.1, 0.1, 0.05, 0.3])
-    bounds = observability(lambda z: jnp.asarray(large) @ z, jnp.zeros(8), PARAMETERS, spread, nuisance=4)
+    bounds = observability_at(lambda z: jnp.asarray(large) @ z, jnp.zeros(8), PARAMETERS, spread, nuisance=4)
     assert bounds.unobservable() == ()
 
 

@@ -7,7 +7,7 @@ import pytest
 from shared_data import shared
 
 from jaxveh import InputError, io
-from jaxveh.io.car import SCHEMA
+from jaxveh.io.car import CAR_SCHEMA
 
 PLAIN = """
 mass = 1500
@@ -40,7 +40,7 @@ def test_plain_car(toml):
 
 
 def test_the_schema_is_a_car(toml):
-    car = io.read_car(toml(SCHEMA))
+    car = io.read_car(toml(CAR_SCHEMA))
     assert car.front == io.AxleTyre(10.0, 1.3, 8000.0, 0.2, 0.0, 0.0, 8175.0)
     assert car.rear == io.AxleTyre(12.0, 1.3, 6600.0, 0.2)
     assert car.sensor_position == (0.1, 0.0, 0.3)
@@ -49,13 +49,13 @@ def test_the_schema_is_a_car(toml):
         entry.name for entry in dataclasses.fields(io.AxleTyre)
     }
     # Paths are commented out, as the files that they name are not there.
-    assert all(any(f"\n{start}" in SCHEMA for start in (f"{key} =", f"[{key}]", f'# {key} = "')) for key in keys)
+    assert all(any(f"\n{start}" in CAR_SCHEMA for start in (f"{key} =", f"[{key}]", f'# {key} = "')) for key in keys)
     assert (car.wheel_radius, car.wheel_inertia, car.drag) == (0.32, 1.2, 0.4)
     assert (car.rolling_resistance, car.front_drive, car.front_brake) == (0.01, 1.0, 0.65)
 
 
 def test_stiffness_from_the_tyre(toml):
-    text = "\n".join(line for line in SCHEMA.splitlines() if "_cornering_stiffness =" not in line)
+    text = "\n".join(line for line in CAR_SCHEMA.splitlines() if "_cornering_stiffness =" not in line)
     car = io.read_car(toml(text))
     assert car.front_cornering_stiffness == pytest.approx(10.0 * 1.3 * 8000.0)
     assert car.rear_cornering_stiffness == pytest.approx(12.0 * 1.3 * 6600.0)
@@ -69,7 +69,7 @@ def test_tyre_files_are_found_from_the_folder_of_the_car(toml, tmp_path):
     assert io.read_car(tmp_path / "elsewhere" / "car.toml") == car
 
 
-@pytest.mark.parametrize("source", [PLAIN, SCHEMA], ids=["plain", "full"])
+@pytest.mark.parametrize("source", [PLAIN, CAR_SCHEMA], ids=["plain", "full"])
 def test_round_trip(toml, tmp_path, source):
     car = io.read_car(toml(source))
     odd = dataclasses.replace(car, mass=np.float32(1234.567), yaw_inertia=1e3 / 3, name='a "car"\\\n2')

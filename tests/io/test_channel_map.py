@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from jaxveh import InputError, io
-from jaxveh.io.channel_map import SCHEMA
+from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
 from jaxveh.io.units import convert
 
 
@@ -71,7 +71,7 @@ def test_columns_out_of_the_map_may_hold_words(tmp_path):
 
 
 def test_the_schema_is_a_map(toml):
-    channels = io.read_channel_map(toml(SCHEMA))
+    channels = io.read_channel_map(toml(CHANNEL_MAP_SCHEMA))
     assert channels.channels["yaw_rate"] == io.Channel("Gierrate", "deg/s", -1, 1.0, 0.0, 3)
     assert channels.channels["v_x"] == io.Channel("Speed")
     assert channels.time == io.Channel("Time")

@@ -77,9 +77,9 @@ def read_commonroad(path, tyre=None):
 
 
 KINDS = {
-    "car": (io.read_car, "toml", [car.SCHEMA, car.SCHEMA[: car.SCHEMA.index("# All that")]]),
-    "road": (io.read_road, "toml", [road.SCHEMA, "friction = 0.5\n"]),
-    "channel map": (io.read_channel_map, "toml", [channel_map.SCHEMA, MAP]),
+    "car": (io.read_car, "toml", [car.CAR_SCHEMA, car.CAR_SCHEMA[: car.CAR_SCHEMA.index("# All that")]]),
+    "road": (io.read_road, "toml", [road.ROAD_SCHEMA, "friction = 0.5\n"]),
+    "channel map": (io.read_channel_map, "toml", [channel_map.CHANNEL_MAP_SCHEMA, MAP]),
     "tyre parameters": (tyres.read_parameters, "toml", [PARAMETERS]),
     "log": (read_log, "csv", [LOG, LOG.replace("\n", "\r\n"), LOG.replace(",", "\t")]),
     "log by map": (read_log_by_map, "csv", [SEMICOLONS]),

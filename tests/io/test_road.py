@@ -3,7 +3,7 @@
 import pytest
 
 from jaxveh import InputError, io
-from jaxveh.io.road import SCHEMA
+from jaxveh.io.road import ROAD_SCHEMA
 
 
 def read(tmp_path, text):
@@ -13,7 +13,7 @@ def read(tmp_path, text):
 
 
 def test_the_schema_reads_as_it_stands(tmp_path):
-    road = read(tmp_path, SCHEMA)
+    road = read(tmp_path, ROAD_SCHEMA)
     assert road.distance == (0.0, 100.0, 200.0) and road.friction == (1.0, 1.0, 0.4)
     assert road.grade == (0.0, 0.05, 0.0) and road.bank == 0.02
     assert road.name == "wet hill" and road.interpolation == "smooth"

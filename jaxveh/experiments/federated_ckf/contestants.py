@@ -23,8 +23,7 @@ from jaxveh.experiments.federated_ckf.model import (
     states_model,
 )
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
-from jaxveh.statespace import Continuous, Gaussian, Prior, StateSpace
-from jaxveh.statespace.driver import scan_and_keep
+from jaxveh.statespace import Continuous, Gaussian, Prior, StateSpace, kit
 
 GROUPS = (("a_x", "a_y"), ("yaw_rate",), WHEELS)
 """Disjoint sensors, a group for each device: accelerometers, gyroscope, wheel speeds."""
@@ -98,7 +97,7 @@ BLOCKS = (State._fields, ("mass", "yaw_inertia", "front_axle_to_cg"), ("friction
 def _guess(study: Study, start: Any, drive: Drive) -> Found:
     model = states_model(study, planar(study, start), drive)
     keep = lambda belief: (jnp.stack(belief.mean), belief.covariance)
-    _, (mean, covariance) = scan_and_keep(filters.Cubature(), model, rows_of(study, drive), None, keep)
+    _, (mean, covariance) = kit.scan_and_keep(filters.Cubature(), model, rows_of(study, drive), None, keep)
     guess = jnp.log(jnp.stack([jnp.asarray(getattr(start, name)) for name in PARAMETERS]))
     vector = jnp.concatenate([mean, jnp.broadcast_to(guess, (mean.shape[0], 4))], axis=1)
     return _found(vector, jnp.pad(covariance, ((0, 0), (0, 4), (0, 4))))
@@ -108,7 +107,7 @@ def _joint(filter_: Any):
     def run(study, start, drive):
         model = joint_model(study, start, drive)
         keep = lambda belief: (jnp.stack(belief.mean), belief.covariance)
-        _, (mean, covariance) = scan_and_keep(filter_, model, rows_of(study, drive), None, keep)
+        _, (mean, covariance) = kit.scan_and_keep(filter_, model, rows_of(study, drive), None, keep)
         return _found(mean, covariance)
 
     return run

@@ -12,18 +12,16 @@ import numpy as np
 from jaxveh import manoeuvres, numerics, roads, vehicles
 from jaxveh._core.parameter import parameter
 from jaxveh.experiments.federated_ckf.settings import Study
-from jaxveh.manoeuvres import AbstractManoeuvre
-from jaxveh.manoeuvres.base import DriverInputs, as_time
-from jaxveh.manoeuvres.speeds import AbstractSpeed
+from jaxveh.manoeuvres import AbstractManoeuvre, AbstractSpeed, DriverInputs
+from jaxveh.manoeuvres import kit as manoeuvres_kit
 from jaxveh.simulation import simulate
 from jaxveh.statespace import Gaussian, RolledRK4
 from jaxveh.tyres import Dugoff, MagicFormula, Similarity
 from jaxveh.vehicles import SevenDOF, sets
-from jaxveh.vehicles.parameter_sets import GENERIC_TYRE
-from jaxveh.vehicles.wheels import wheel_names
+from jaxveh.vehicles import kit as vehicles_kit
 
-WHEELS = wheel_names("omega")
-PULLS = wheel_names("pull")
+WHEELS = vehicles_kit.wheel_names("omega")
+PULLS = vehicles_kit.wheel_names("pull")
 
 
 class Drive(NamedTuple):
@@ -55,7 +53,7 @@ class Slalom(AbstractManoeuvre):
     steer: jax.Array = parameter("rad", scale=0.1)
 
     def inputs(self, t: Any) -> DriverInputs:
-        t = as_time(t, self.steer)
+        t = manoeuvres_kit.as_time(t, self.steer)
         v_x, v_x_rate = self.speed.at(t)
         wave = numerics.sin(2.0 * np.pi * self.frequency * t) * numerics.smooth_step(t)
         return DriverInputs(steer=self.steer * wave, v_x=v_x, v_x_rate=v_x_rate)
@@ -78,7 +76,7 @@ def peaked() -> Similarity:
     numbers = sets.ev()
     assert numbers.front is not None and numbers.front.slip_stiffness is not None
     load, stiffness = 0.5 * sum(numbers.wheel_loads()), numbers.front.cornering_stiffness
-    C, E = GENERIC_TYRE["C"], GENERIC_TYRE["E"]
+    C, E = vehicles_kit.GENERIC_TYRE["C"], vehicles_kit.GENERIC_TYRE["E"]
     curve = MagicFormula(B=stiffness / (C * load), C=C, D=load, E=E)
     return Similarity(curve, load, slip_stiffness_ratio=numbers.front.slip_stiffness / stiffness)
 
@@ -109,7 +107,7 @@ def drive_once(study: Study, steer, speed_std, key, *, magic_formula: bool = Fal
         yaw_rate=said["yaw_rate"],
         omega=jnp.stack([said[name] for name in WHEELS], axis=-1),
         steer=found["steer"],
-        torque=jnp.stack([found[name] for name in wheel_names("torque")], axis=-1),
+        torque=jnp.stack([found[name] for name in vehicles_kit.wheel_names("torque")], axis=-1),
         true_v_x=found["true.v_x"],
         true_v_y=found["true.v_y"],
         true_yaw_rate=found["true.yaw_rate"],

@@ -9,8 +9,7 @@ import numpy as np
 from jaxveh.experiments.federated_ckf.report import SHORT, Reproduction
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS
 from jaxveh.experiments.federated_ckf.study import Raced, truth
-from jaxveh.plots.figure import Figure
-from jaxveh.plots.style import COLOURS, CYCLE, PAGE_WIDTH, SHADE, style
+from jaxveh.plots import COLOURS, kit, style
 
 EVERY = 0.1
 """s between the rows that are kept."""
@@ -19,10 +18,10 @@ UNITS = {"friction": "-", "mass": "kg", "yaw_inertia": "kg m²", "front_axle_to_
 
 SHOWN = {
     "first guess": COLOURS["prior"],
-    "three federated, shared sensors": CYCLE[3],
-    "three interleaved": CYCLE[4],
-    "joint": CYCLE[0],
-    "redesigned": CYCLE[1],
+    "three federated, shared sensors": kit.CYCLE[3],
+    "three interleaved": kit.CYCLE[4],
+    "joint": kit.CYCLE[0],
+    "redesigned": kit.CYCLE[1],
 }
 """The estimators of the figures and their colours."""
 
@@ -44,7 +43,7 @@ def _those(raced: Raced, colours: dict[str, str]) -> dict[str, str]:
 
 def parameters_figure(raced: Raced, case: str = "printed start") -> Any:
     """The four parameters over time: medians over seeds and quartiles as bands."""
-    figure = Figure(figsize=(PAGE_WIDTH, 5.0), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 5.0), layout="constrained")
     with style():
         panels = figure.subplots(2, 2, sharex=True)
         for i, (axes, name) in enumerate(zip(panels.flat, PARAMETERS, strict=True)):
@@ -71,7 +70,7 @@ def parameters_figure(raced: Raced, case: str = "printed start") -> Any:
 
 def drive_figure(raced: Raced, seed: int = 0) -> Any:
     """One drive: steer, speed, lateral acceleration, sideslip, and the errors of the sideslip from the printed start."""
-    figure = Figure(figsize=(PAGE_WIDTH, 6.6), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 6.6), layout="constrained")
     place = raced.cases.index("printed start")
     drive = type(raced.drives)(*(leaf[place, seed] for leaf in raced.drives))
     time = raced.study.dt * np.arange(len(drive.steer))
@@ -96,17 +95,22 @@ def drive_figure(raced: Raced, seed: int = 0) -> Any:
     return figure
 
 
-FAULTY = {"joint": CYCLE[0], "joint, gated": CYCLE[2], "redesigned": CYCLE[1], "redesigned, isolating": CYCLE[5]}
+FAULTY = {
+    "joint": kit.CYCLE[0],
+    "joint, gated": kit.CYCLE[2],
+    "redesigned": kit.CYCLE[1],
+    "redesigned, isolating": kit.CYCLE[5],
+}
 
 
 def fault_figure(raced: Raced) -> Any:
     """The sideslip's error over time with the fault: the median of its size over seeds."""
-    figure = Figure(figsize=(PAGE_WIDTH, 3.4), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.4), layout="constrained")
     study, step = raced.study, round(EVERY / raced.study.dt)
     true = np.rad2deg(raced.drives.true_sideslip[raced.cases.index("fault")][:, ::step])
     with style():
         axes = figure.subplots()
-        axes.axvspan(study.fault_at, study.fault_at + study.fault_time, color=SHADE, zorder=0, label="fault")
+        axes.axvspan(study.fault_at, study.fault_at + study.fault_time, color=kit.SHADE, zorder=0, label="fault")
         for who, colour in _those(raced, FAULTY).items():
             error = np.abs(np.rad2deg(raced.at("sideslip", who, "fault")) - true)
             dashes = (0, (4, 3)) if who.startswith("redesigned") else "-"
@@ -123,12 +127,12 @@ def fault_figure(raced: Raced) -> Any:
 
 def line_figure(result: Reproduction) -> Any:
     """Bounds of friction and mass over the steer amplitude, by how much the speed varies, and what the joint filter finds."""
-    figure = Figure(figsize=(PAGE_WIDTH, 3.8), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.8), layout="constrained")
     bounds = {name: np.array([[one.bounds for one in row] for row in rows]) for name, rows in result.seen.items()}
     with style():
         left, right = figure.subplots(1, 2)
         for j, speed in enumerate(result.spreads):
-            colour, label = CYCLE[j], f"speed varied by {speed:g} m/s"
+            colour, label = kit.CYCLE[j], f"speed varied by {speed:g} m/s"
             left.plot(result.steers, 100.0 * bounds["known"][:, j, 0], color=colour, label=label)
             right.plot(result.steers, 100.0 * bounds["known"][:, j, 1], color=colour, linestyle=":")
             right.plot(result.steers, 100.0 * bounds["unknown"][:, j, 1], color=colour)

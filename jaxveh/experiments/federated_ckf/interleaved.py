@@ -10,8 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh.experiments.federated_ckf.model import MOVE, Planar, State, seen
-from jaxveh.statespace import LinearInput, Row, StateSpace
-from jaxveh.statespace.contract import AbstractFilter
+from jaxveh.statespace import AbstractFilter, LinearInput, Row, StateSpace
 
 
 class Told(NamedTuple):

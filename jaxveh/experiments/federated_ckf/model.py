@@ -15,10 +15,7 @@ from jaxveh.experiments.federated_ckf.drives import PULLS, WHEELS, Drive, dugoff
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
 from jaxveh.statespace import Continuous, Gaussian, Prior, Propagate, RolledRK4, Row, StateSpace, with_parameters
 from jaxveh.tyres import Dugoff, Forces
-from jaxveh.vehicles import GRAVITY, sets
-from jaxveh.vehicles.load_transfer import planar_loads
-from jaxveh.vehicles.two_track import air_drag, positions_of, rolling_wheels
-from jaxveh.vehicles.wheels import Wheels, body_forces, each_wheel, wheels_of
+from jaxveh.vehicles import GRAVITY, kit, sets
 
 INPUTS = ("steer", "a_x_felt", "a_y_felt", *PULLS)
 CHANNELS = ("a_x", "a_y", "yaw_rate", *WHEELS)
@@ -47,7 +44,7 @@ class Pushed(NamedTuple):
     a_x: Any
     a_y: Any
     moment: Any
-    omega: Wheels
+    omega: kit.Wheels
 
 
 class Planar(eqx.Module):
@@ -82,31 +79,33 @@ class Planar(eqx.Module):
 
     def pushed(self, x: State, u: Any) -> Pushed:
         """What the wheels do to the car in the state x with the inputs u (`steer`, `pull_fl` ...)."""
-        moves = rolling_wheels(self, x.v_x, x.v_y, x.yaw_rate, u.steer)
-        pulls = wheels_of(u, "pull")
-        loads = planar_loads(self, u.a_x_felt, u.a_y_felt, -GRAVITY)
-        pulls = each_wheel(lambda pull, load: pull - self.rolling_resistance * load, pulls, loads)
-        friction = self.friction if isinstance(self.friction, Wheels) else Wheels(*[self.friction] * 4)
+        moves = kit.rolling_wheels(self, x.v_x, x.v_y, x.yaw_rate, u.steer)
+        pulls = kit.wheels_of(u, "pull")
+        loads = kit.planar_loads(self, u.a_x_felt, u.a_y_felt, -GRAVITY)
+        pulls = kit.each_wheel(lambda pull, load: pull - self.rolling_resistance * load, pulls, loads)
+        friction = self.friction if isinstance(self.friction, kit.Wheels) else kit.Wheels(*[self.friction] * 4)
         found = self._wheels(moves, loads, pulls, friction, self._slips(moves, u) if self.measured_slip else None)
-        push = body_forces(positions_of(self), moves, each_wheel(lambda wheel: wheel[0], found))
-        omega = each_wheel(lambda move, wheel: move.along * (1.0 + wheel[1]) / self.wheel_radius, moves, found)
-        drag = air_drag(self.drag, x.v_x)
+        push = kit.body_forces(kit.positions_of(self), moves, kit.each_wheel(lambda wheel: wheel[0], found))
+        omega = kit.each_wheel(lambda move, wheel: move.along * (1.0 + wheel[1]) / self.wheel_radius, moves, found)
+        drag = kit.air_drag(self.drag, x.v_x)
         return Pushed((push.F_x - drag) / self.mass, push.F_y / self.mass, push.M_z, omega)
 
-    def _slips(self, moves: Wheels, u: Any) -> Wheels:
+    def _slips(self, moves: kit.Wheels, u: Any) -> kit.Wheels:
         """Slip ratios of the measured wheel speeds (eq 14)."""
         slip = lambda move, omega: (omega * self.wheel_radius - move.along) / jnp.maximum(move.along, LEAST_SPEED)
-        return each_wheel(slip, moves, wheels_of(u, "omega"))
+        return kit.each_wheel(slip, moves, kit.wheels_of(u, "omega"))
 
-    def _wheels(self, moves: Wheels, loads: Wheels, pulls: Wheels, friction: Wheels, slips: Wheels | None) -> Wheels:
+    def _wheels(
+        self, moves: kit.Wheels, loads: kit.Wheels, pulls: kit.Wheels, friction: kit.Wheels, slips: kit.Wheels | None
+    ) -> kit.Wheels:
         """Forces and slip ratios of the wheels, all four by one call: a fourth of the program."""
-        along = each_wheel(lambda m: m.along, moves)
-        across = each_wheel(lambda m: m.across, moves)
+        along = kit.each_wheel(lambda m: m.along, moves)
+        across = kit.each_wheel(lambda m: m.across, moves)
         told = pulls if slips is None else slips
         flat = jnp.broadcast_arrays(*along, *across, *loads, *told, *friction)
         stacked = [jnp.stack(flat[i : i + 4]) for i in range(0, 20, 4)]
         F_y, slip_ratio = self._slipping(*stacked) if slips is None else self._slipped(*stacked)
-        return Wheels(*[(Forces(F_x=pull, F_y=F_y[i]), slip_ratio[i]) for i, pull in enumerate(pulls)])
+        return kit.Wheels(*[(Forces(F_x=pull, F_y=F_y[i]), slip_ratio[i]) for i, pull in enumerate(pulls)])
 
     def _slipping(self, along, across, load, pull, friction) -> tuple[Any, Any]:
         """Lateral force (N) and slip ratio of wheels that pull with `pull` (N): Dugoff's law solved for the slip.

@@ -7,8 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh.diagnostics import Observability
-from jaxveh.diagnostics.observability import observability
+from jaxveh.diagnostics import Observability, observability_at
 from jaxveh.experiments.federated_ckf.drives import Drive
 from jaxveh.experiments.federated_ckf.model import MOVE, State, noise_levels, planar, rows_of, seen
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
@@ -59,6 +58,6 @@ def observed(study: Study, true: Start, drives: Drive) -> dict[str, list[list[Ob
 
     def one(J, resistance):
         spread = np.array([*own, *START_SPREAD, resistance])
-        return observability(lambda z: jnp.asarray(J) @ z, jnp.zeros(8), PARAMETERS, spread, nuisance=4)
+        return observability_at(lambda z: jnp.asarray(J) @ z, jnp.zeros(8), PARAMETERS, spread, nuisance=4)
 
     return {name: [[one(J, value) for J in row] for row in every] for name, value in RESISTANCE.items()}

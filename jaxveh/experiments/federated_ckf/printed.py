@@ -17,7 +17,7 @@ from jaxveh.experiments.federated_ckf.interleaved import Member, Told, stays, ta
 from jaxveh.experiments.federated_ckf.model import INPUTS, State, planar, rows_of
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
 from jaxveh.statespace import Discrete, Gaussian, Prior, Row, StateSpace
-from jaxveh.vehicles.wheels import Wheels, wheel_names
+from jaxveh.vehicles import kit
 
 FIRST, SECOND = ("a_x_1", "a_y_1", "yaw_rate_1"), ("a_y_2", "yaw_rate_2")
 """Z_1 and Z_2: the same sensors under two names, since the two locals are told different noise."""
@@ -29,7 +29,7 @@ EXACT = 1e-8
 
 STATE = ("v_x", "v_y", "a_x", "a_y", "yaw_rate", "moment")
 BODY = ("mass", "yaw_inertia", "front_axle_to_cg")
-MUS = wheel_names("friction")
+MUS = kit.wheel_names("friction")
 
 STATE_R = dict(zip((*FIRST, *SECOND), (EXACT, 0.1, 1.5, EXACT, 0.01), strict=True))
 """0.1 diag(0.0, 1, 15) and 0.01 diag(0.0, 1)."""
@@ -50,7 +50,7 @@ LEAST_FRICTION, LEAST_MASS = 1e-3, 1.0
 def as_printed(study: Study, start: Any, drive: Drive) -> Found:
     """The paper's estimators: fusion-reset, shares by traces (1/2 at first: printed are zeros, which divide by zero), singular
     values, additive parameters, four frictions."""
-    car = eqx.tree_at(lambda c: c.friction, planar(study, start, measured_slip=True), Wheels(*[start.friction] * 4))
+    car = eqx.tree_at(lambda c: c.friction, planar(study, start, measured_slip=True), kit.Wheels(*[start.friction] * 4))
     rows = _printed_rows(study, drive)
     filter_ = filters.Federated(filters.Cubature(form=filters.SingularValues()), (FIRST, SECOND), by_trace=True)
     members = (_states(filter_, study), _friction(filter_, start), _body(filter_, start))
@@ -131,7 +131,7 @@ def _through(put):
 
 
 def _put_friction(car, x):
-    mus = Wheels(*[jnp.maximum(mu, LEAST_FRICTION) for mu in x])
+    mus = kit.Wheels(*[jnp.maximum(mu, LEAST_FRICTION) for mu in x])
     return eqx.tree_at(lambda c: c.friction, car, mus)
 
 

@@ -20,8 +20,7 @@ from jaxveh.experiments.federated_ckf.printed import as_printed as printed_filte
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, PRINTED_START, Start, Study
 from jaxveh.experiments.federated_ckf.study import drives_of, truth
 from jaxveh.experiments.report import Table, spread
-from jaxveh.statespace import Gaussian
-from jaxveh.statespace.driver import scan_and_keep
+from jaxveh.statespace import Gaussian, kit
 
 SHOWN = ("first guess", "three federated, shared sensors", "joint")
 """What stands beside the printed settings."""
@@ -114,7 +113,7 @@ def _twice(study: Study, drives: Drive, seeds: int, progress: Progress) -> sweep
             model = eqx.tree_at(lambda m: m.measurement_noise, model, law)
             rows = rows_of(study, drive)
             rows = rows._replace(y=record_type("Measurements", Z_1)(*[getattr(rows.y, name) for name in Z_1]))
-            _, P = scan_and_keep(filter_, model, rows, None, lambda belief: belief.covariance)
+            _, P = kit.scan_and_keep(filter_, model, rows, None, lambda belief: belief.covariance)
             return {"trace": jnp.sum(jnp.diagonal(P[-1]) / jnp.diagonal(model.prior.covariance()))}
 
         return run

@@ -15,10 +15,9 @@ from jaxveh._core.names import record_type
 from jaxveh.estimators import mass_and_grade
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, model_car, times
 from jaxveh.experiments.mass_grade_aukf.settings import Study
-from jaxveh.filters.gaussian.filter import with_spread
-from jaxveh.filters.wrappers.base import AbstractStateless, Remembering
+from jaxveh.filters import kit as filters_kit
 from jaxveh.statespace import Gaussian, Prior, Row, StateSpace
-from jaxveh.statespace.contract import innermost
+from jaxveh.statespace import kit as statespace_kit
 from jaxveh.vehicles import GRAVITY
 
 
@@ -134,7 +133,7 @@ def _adaptive(freeze: bool):
     return run
 
 
-class Frozen(AbstractStateless):
+class Frozen(filters_kit.AbstractStateless):
     """A `ShrinkingProcess` that scales the mass's covariances by its lambda after every row, as eq 25 prints (with e = 1, 2, 3,
     the variance itself included)."""
 
@@ -147,9 +146,9 @@ class Frozen(AbstractStateless):
         place = model.states.index("mass")
         P = after.inside.covariance
         scales = jnp.ones_like(P).at[place, :].set(shrink).at[:, place].set(shrink)
-        form = innermost(self).form
-        inside = with_spread(after.inside, after.inside.vector, form.start(P * scales))
-        return Remembering(inside, after.memory), info
+        form = statespace_kit.innermost(self).form
+        inside = filters_kit.with_spread(after.inside, after.inside.vector, form.start(P * scales))
+        return filters_kit.Remembering(inside, after.memory), info
 
 
 OVER = 1.0

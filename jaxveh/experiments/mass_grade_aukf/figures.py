@@ -8,13 +8,12 @@ import numpy as np
 
 from jaxveh.experiments.mass_grade_aukf.report import Reproduction
 from jaxveh.experiments.mass_grade_aukf.study import Raced
-from jaxveh.plots.figure import Figure
-from jaxveh.plots.style import COLOURS, CYCLE, PAGE_WIDTH, style
+from jaxveh.plots import COLOURS, kit, style
 
 SHOWN = ("first guess", "UKF", "AUKF", "grade rate", "accelerometer")
 """The estimators of the figures."""
 
-SPELLS = ("#7f7f7f", CYCLE[0], CYCLE[3], CYCLE[2], CYCLE[1])
+SPELLS = ("#7f7f7f", kit.CYCLE[0], kit.CYCLE[3], kit.CYCLE[2], kit.CYCLE[1])
 
 
 def figures(result: Reproduction) -> dict[str, Any]:
@@ -34,7 +33,7 @@ def _raced(raced: Raced) -> list[tuple[str, str]]:
 
 def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
     """The mass's error over time from one first guess: medians over seeds, and quartiles as bands."""
-    figure = Figure(figsize=(PAGE_WIDTH, 3.6), layout="constrained") if figure is None else figure
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.6), layout="constrained") if figure is None else figure
     with style():
         axes = figure.subplots()
         for name, colour in _raced(raced):
@@ -56,7 +55,7 @@ def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
 
 def grade_figure(raced: Raced, seed: int = 0, guess: int = 0, figure: Any = None) -> Any:
     """True and estimated grade of one drive, and the speed above it."""
-    figure = Figure(figsize=(PAGE_WIDTH, 4.4), layout="constrained") if figure is None else figure
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.4), layout="constrained") if figure is None else figure
     every = round(1.0 / raced.study.dt)
     with style():
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
@@ -75,7 +74,7 @@ def grade_figure(raced: Raced, seed: int = 0, guess: int = 0, figure: Any = None
 
 def activity_figure(*raced: Raced, figure: Any = None) -> Any:
     """Final mass error against pedal activity, of races of one vehicle: medians and quartiles over seeds and guesses."""
-    figure = Figure(figsize=(PAGE_WIDTH, 3.4), layout="constrained") if figure is None else figure
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.4), layout="constrained") if figure is None else figure
     pedals = [p for one in raced for p in one.pedals]
     with style():
         axes = figure.subplots()

@@ -16,8 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.names import record_type
-from jaxveh.diagnostics import Observability
-from jaxveh.diagnostics.observability import observability
+from jaxveh.diagnostics import Observability, observability_at
 from jaxveh.experiments.mass_grade_aukf.contestants import WALK
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, model_car, times
 from jaxveh.experiments.mass_grade_aukf.settings import Study
@@ -95,7 +94,7 @@ def bound_of_mass(study: Study, drive: Drive, knot: float = WIDE_KNOT) -> Observ
     order = np.array([0, 2, 1, *range(3, at.size)])
     spread = np.concatenate([[MASS_SPREAD, GRADE_SPREAD, 1.0], np.full(at.size - 3, WALK * knot**0.5)])
     ordered = lambda z: predict(z[order])
-    return observability(ordered, jnp.asarray(at[order]), ("mass", "grade"), spread, nuisance=at.size - 2)
+    return observability_at(ordered, jnp.asarray(at[order]), ("mass", "grade"), spread, nuisance=at.size - 2)
 
 
 def predictions(study: Study, drive: Drive, smooth: bool, knot: float = KNOT):

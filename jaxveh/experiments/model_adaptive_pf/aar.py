@@ -9,9 +9,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh.experiments.model_adaptive_pf.models import BodyState
-from jaxveh.filters.wrappers.base import Remembering
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractFilter, AbstractWrapper
+from jaxveh.filters import kit
+from jaxveh.statespace import AbstractFilter, AbstractWrapper, StateSpace
 
 
 class Learned(NamedTuple):
@@ -48,14 +47,14 @@ class AutoRegressive(AbstractWrapper):
             *(jnp.full_like(value, size**2) for value, size in zip(inside.mean, self.first, strict=True))
         )
         spread = squares if self.as_printed else jax.tree.map(lambda square: 1.0 / square, squares)
-        return Remembering(inside, Learned(model.system.keeps, spread)), info
+        return kit.Remembering(inside, Learned(model.system.keeps, spread)), info
 
     def _step(self, model, belief, row):
         before = belief.inside.mean
         inside, info = self.inner._step(_told(model, belief.memory), belief.inside, row)
         pairs = [self._learned(*values) for values in zip(*belief.memory, before, inside.mean, strict=True)]
         memory = Learned(*(BodyState(*values) for values in zip(*pairs, strict=True)))
-        return Remembering(inside, memory), info
+        return kit.Remembering(inside, memory), info
 
     def _learned(self, a, spread, X, now):
         """The coefficient and its spread after a row."""

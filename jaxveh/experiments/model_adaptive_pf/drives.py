@@ -14,8 +14,7 @@ from jaxveh.experiments.model_adaptive_pf.settings import Case, Study
 from jaxveh.simulation import simulate
 from jaxveh.statespace import RolledRK4
 from jaxveh.tyres import AbstractTyre, FialaPolynomial, Relaxed
-from jaxveh.vehicles import SevenDOF, TwoTrack3DOF, sets
-from jaxveh.vehicles.load_transfer import QuasiStatic
+from jaxveh.vehicles import QuasiStatic, SevenDOF, TwoTrack3DOF, sets
 
 START = 1.0
 """s of straight running before the slalom."""

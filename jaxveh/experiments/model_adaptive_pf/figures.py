@@ -13,11 +13,16 @@ from jaxveh.experiments.model_adaptive_pf.printed import printed_tyre
 from jaxveh.experiments.model_adaptive_pf.report import Reproduction, against
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, Study
 from jaxveh.experiments.model_adaptive_pf.study import Raced
-from jaxveh.plots.figure import Figure
-from jaxveh.plots.style import COLOURS, CYCLE, PAGE_WIDTH, style
+from jaxveh.plots import COLOURS, kit, style
 from jaxveh.tyres import Contact
 
-SHOWN = {CUBATURE: "#e0c8b8", "open loop": "#7f7f7f", "AAR": CYCLE[3], PLAIN: CYCLE[0], REDESIGNED: CYCLE[2]}
+SHOWN = {
+    CUBATURE: "#e0c8b8",
+    "open loop": "#7f7f7f",
+    "AAR": kit.CYCLE[3],
+    PLAIN: kit.CYCLE[0],
+    REDESIGNED: kit.CYCLE[2],
+}
 """The estimators of the drive's figure, and their colours."""
 
 
@@ -41,7 +46,7 @@ def _drive(raced: Raced, case: str, seed: int) -> Drive:
 
 def measured_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = None) -> Any:
     """What the sensors say on one drive, and the truth."""
-    figure = Figure(figsize=(PAGE_WIDTH, 4.6), layout="constrained") if figure is None else figure
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.6), layout="constrained") if figure is None else figure
     drive, t = _drive(raced, case, seed), np.asarray(times(raced.study))
     channels = {"v_x": ("v_x [m/s]", 1.0), "a_y": ("a_y [m/s²]", 1.0), "yaw_rate": ("yaw rate [°/s]", 180.0 / np.pi)}
     with style():
@@ -51,7 +56,7 @@ def measured_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any
             std = unit * raced.study.stds[name]
             band = std * drive.level
             axes.fill_between(t, truth - band, truth + band, color="#e8dfc2", linewidth=0, label="noise, one std")
-            axes.plot(t, said, ".", color=CYCLE[0], markersize=1.5, label="measured")
+            axes.plot(t, said, ".", color=kit.CYCLE[0], markersize=1.5, label="measured")
             axes.plot(t, truth, color=COLOURS["truth"], label="truth")
             # Outliers leave the picture.
             reach = np.max(np.abs(truth - truth.mean())) + 20.0 * std
@@ -64,7 +69,7 @@ def measured_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any
 
 def sideslip_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = None) -> Any:
     """Sideslip of one drive as estimated, and the errors below, as the paper's figure 4."""
-    figure = Figure(figsize=(PAGE_WIDTH, 4.6), layout="constrained") if figure is None else figure
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.6), layout="constrained") if figure is None else figure
     drive, t = _drive(raced, case, seed), np.asarray(times(raced.study))
     with style():
         above, below = figure.subplots(2, 1, sharex=True)
@@ -85,10 +90,14 @@ def sideslip_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any
 def ablation_figure(raced: Raced, figure: Any = None) -> Any:
     """Sideslip RMSE of every estimator, median and quartiles, under each kind of noise."""
     names = raced.found.design.axis("estimator").labels
-    figure = Figure(figsize=(PAGE_WIDTH, 0.32 * len(names) + 1.2), layout="constrained") if figure is None else figure
+    figure = (
+        kit.Figure(figsize=(kit.PAGE_WIDTH, 0.32 * len(names) + 1.2), layout="constrained")
+        if figure is None
+        else figure
+    )
     with style():
         axes = figure.subplots()
-        for i, (case, colour) in enumerate(zip(CASES, CYCLE, strict=False)):
+        for i, (case, colour) in enumerate(zip(CASES, kit.CYCLE, strict=False)):
             values = np.stack([raced.of("sideslip", name, case) for name in names])
             values = np.where(np.isfinite(values), values, 1e9)
             low, mid, high = np.percentile(values, [25, 50, 75], axis=1)
@@ -110,7 +119,7 @@ def gain_figure(raced: Raced, figure: Any = None) -> Any:
     """Paired ratios to the plain particle filter in every case, with bootstrap intervals."""
     shown = (REDESIGNED, "PF, wavelet", "PF, mixture", ROBUST, TOLD, "PF, no relaxation", "open loop")
     cases = {**CASES, **LIMIT}
-    figure = Figure(figsize=(PAGE_WIDTH, 4.0), layout="constrained") if figure is None else figure
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.0), layout="constrained") if figure is None else figure
     with style():
         axes = figure.subplots()
         for i, name in enumerate(shown):
@@ -118,7 +127,7 @@ def gain_figure(raced: Raced, figure: Any = None) -> Any:
             mid = np.array([float(one.value) for one in found])
             bars = mid - np.array([float(one.low) for one in found]), np.array([float(one.high) for one in found]) - mid
             x = np.arange(len(cases)) + 0.11 * (i - 3.0)
-            axes.errorbar(x, mid, bars, fmt="o", markersize=3, capsize=2, color=(*CYCLE, "#7f7f7f")[i], label=name)
+            axes.errorbar(x, mid, bars, fmt="o", markersize=3, capsize=2, color=(*kit.CYCLE, "#7f7f7f")[i], label=name)
         axes.axhline(1.0, color="#444444", linewidth=0.6)
         axes.axvspan(len(CASES) - 0.5, len(cases) - 0.5, color="#f7f1df", zorder=0)
         labels = [name.replace(" % ", " %\n") for name in cases]
@@ -133,14 +142,14 @@ def gain_figure(raced: Raced, figure: Any = None) -> Any:
 
 def pressed_figure(raced: Raced, figure: Any = None) -> Any:
     """Sideslip RMSE over the process noise that filters assume: medians and quartiles."""
-    figure = Figure(figsize=(PAGE_WIDTH, 3.4), layout="constrained") if figure is None else figure
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.4), layout="constrained") if figure is None else figure
     shares = [case.process for case in raced.cases.values()]
     with style():
         axes = figure.subplots()
         for i, name in enumerate(raced.found.design.axis("estimator").labels):
             values = np.stack([raced.of("sideslip", name, case) for case in raced.cases])
             low, mid, high = np.percentile(values, [25, 50, 75], axis=1)
-            colour = ("#7f7f7f", *CYCLE)[i]
+            colour = ("#7f7f7f", *kit.CYCLE)[i]
             axes.plot(shares, mid, marker="o", markersize=3, color=colour, label=name)
             axes.fill_between(shares, low, high, color=colour, alpha=0.12, linewidth=0)
         axes.set(
@@ -156,7 +165,7 @@ def pressed_figure(raced: Raced, figure: Any = None) -> Any:
 
 def tyre_figure(study: Study, figure: Any = None) -> Any:
     """The printed Fiala tyre, the corrected one and the true one on a front wheel: lateral force and aligning moment."""
-    figure = Figure(figsize=(PAGE_WIDTH, 3.2), layout="constrained") if figure is None else figure
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.2), layout="constrained") if figure is None else figure
     load = numbers_of(study).wheel_loads()[0]
     alpha = np.radians(np.linspace(0.0, 16.0, 641))
     contact = Contact(
@@ -164,8 +173,8 @@ def tyre_figure(study: Study, figure: Any = None) -> Any:
     )  # fmt: skip
     laws = {
         "truth (Magic Formula)": (true_car(study).front.tyre, COLOURS["truth"], "-"),
-        "Fiala, errata corrected": (fiala(study), CYCLE[2], "-"),
-        "Fiala as printed": (printed_tyre(study), CYCLE[1], "--"),
+        "Fiala, errata corrected": (fiala(study), kit.CYCLE[2], "-"),
+        "Fiala as printed": (printed_tyre(study), kit.CYCLE[1], "--"),
     }
     with style():
         left, right = figure.subplots(1, 2)

@@ -27,9 +27,8 @@ from jaxveh.experiments.model_adaptive_pf.settings import (
 )
 from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
 from jaxveh.experiments.report import Table, interval, spread
-from jaxveh.filters.wrappers.base import Remembering
-from jaxveh.filters.wrappers.wavelet import NORMAL_MEDIAN, Window, first_window, row_values, window_after
-from jaxveh.statespace.contract import AbstractWrapper
+from jaxveh.filters import kit
+from jaxveh.statespace import AbstractWrapper
 from jaxveh.tyres import Contact
 
 SHOWN = {"constant": CASES["constant"], "both": CASES["both"], "both, 5 degrees of steer": LIMIT["right tyre"]}
@@ -52,27 +51,27 @@ class PrintedNoise(AbstractWrapper):
 
     def _init(self, model, row, key):
         own = jnp.square(jnp.stack(model.measurement_noise.std))
-        memory = self._seen(model, first_window(self.inner, own), row)
+        memory = self._seen(model, kit.first_window(self.inner, own), row)
         inside, info = self.inner.inner._init(self._told(model, memory), row, key)
-        return Remembering(inside, memory), info
+        return kit.Remembering(inside, memory), info
 
     def _step(self, model, belief, row):
         memory = self._seen(model, belief.memory, row)
         inside, info = self.inner.inner._step(self._told(model, memory), belief.inside, row)
-        return Remembering(inside, memory), info
+        return kit.Remembering(inside, memory), info
 
-    def _seen(self, model, memory: Window, row) -> Window:
+    def _seen(self, model, memory: kit.Window, row) -> kit.Window:
         """The window after a row; its `variances` hold the paper's R."""
         forgetting, R = self.inner.forgetting, memory.variances
-        now = window_after(
-            self.inner, jnp.square(jnp.stack(model.measurement_noise.std)), memory, row_values(model, row)
+        now = kit.window_after(
+            self.inner, jnp.square(jnp.stack(model.measurement_noise.std)), memory, kit.row_values(model, row)
         )
         variance = (now.variances - forgetting * R) / (1.0 - forgetting)
-        delta = jnp.sqrt(jnp.maximum(variance, 0.0)) * (NORMAL_MEDIAN / PRINTED_DIVISOR)
+        delta = jnp.sqrt(jnp.maximum(variance, 0.0)) * (kit.NORMAL_MEDIAN / PRINTED_DIVISOR)
         full = now.count >= self.inner.window
         return now._replace(variances=jnp.where(full, forgetting * R + (1.0 - forgetting) * delta, R))
 
-    def _told(self, model, memory: Window) -> Any:
+    def _told(self, model, memory: kit.Window) -> Any:
         R = memory.variances
         stds = math.sqrt(2.0) * R if self.density == "eq 14" else jnp.sqrt(R)
         kind = type(model.measurement_noise.std)

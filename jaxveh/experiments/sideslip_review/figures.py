@@ -11,15 +11,14 @@ from jaxveh.experiments.sideslip_review.recorded import BEST, READY, Logged
 from jaxveh.experiments.sideslip_review.report import Reproduction
 from jaxveh.experiments.sideslip_review.study import EVERY, Raced
 from jaxveh.experiments.sideslip_review.verdicts import CONTRADICTS, SUPPORTS, verdicts
-from jaxveh.plots.figure import Figure
-from jaxveh.plots.style import COLOURS, CYCLE, PAGE_WIDTH, style
+from jaxveh.plots import COLOURS, kit, style
 
 SHOWN = ("open loop", "integration", "linear Kalman", "EKF", "pseudo-integration", "handling")
 """The methods of the figures."""
 
-LINES = (COLOURS["prior"], CYCLE[1], CYCLE[5], CYCLE[0], CYCLE[2], CYCLE[3])
+LINES = (COLOURS["prior"], kit.CYCLE[1], kit.CYCLE[5], kit.CYCLE[0], kit.CYCLE[2], kit.CYCLE[3])
 
-VERDICT_COLOURS = {SUPPORTS: CYCLE[2], CONTRADICTS: CYCLE[1]}
+VERDICT_COLOURS = {SUPPORTS: kit.CYCLE[2], CONTRADICTS: kit.CYCLE[1]}
 
 
 def figures(result: Reproduction) -> dict[str, Any]:
@@ -35,7 +34,7 @@ def figures(result: Reproduction) -> dict[str, Any]:
 
 def marks_figure(raced: Raced) -> Any:
     """Every cell of the review's table: its number over what is still good, with its interval."""
-    figure = Figure(figsize=(PAGE_WIDTH, 4.0), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.0), layout="constrained")
     cells = verdicts(raced)
     with style():
         axes = figure.subplots()
@@ -60,7 +59,7 @@ def marks_figure(raced: Raced) -> Any:
 
 def errors_figure(raced: Raced) -> Any:
     """Sideslip RMSE of every method by scenario: medians and quartiles over seeds."""
-    figure = Figure(figsize=(PAGE_WIDTH, 4.6), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.6), layout="constrained")
     with style():
         panels = figure.subplots(2, 4, sharey=True, sharex=True).ravel()
         names = list(WHAT)
@@ -87,7 +86,7 @@ def errors_figure(raced: Raced) -> Any:
 
 def drive_figure(raced: Raced, scenario: str, seed: int = 0) -> Any:
     """One drive: true and estimated sideslip, and the errors below."""
-    figure = Figure(figsize=(PAGE_WIDTH, 4.4), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.4), layout="constrained")
     place = raced.scenarios.index(scenario)
     true = np.rad2deg(raced.drives.sideslip[place, seed, ::EVERY])
     time = raced.drives.time[place, seed, ::EVERY]
@@ -111,11 +110,11 @@ def drive_figure(raced: Raced, scenario: str, seed: int = 0) -> Any:
 
 def log_figure(logged: Logged) -> Any:
     """The real log: errors of every method, and a stretch of courses."""
-    figure = Figure(figsize=(PAGE_WIDTH, 5.6), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 5.6), layout="constrained")
     order = sorted(logged.rmse, key=lambda name: -logged.rmse[name])
     with style():
         above, below = figure.subplots(2, 1, height_ratios=(3, 2))
-        colours = [CYCLE[1] if name in READY else CYCLE[0] for name in order]
+        colours = [kit.CYCLE[1] if name in READY else kit.CYCLE[0] for name in order]
         above.barh(range(len(order)), [logged.rmse[name] for name in order], color=colours, height=0.6)
         above.set_yticks(range(len(order)), order, fontsize=7)
         above.axvline(BEST, color="#444444", linewidth=0.6, linestyle=":")
@@ -124,7 +123,9 @@ def log_figure(logged: Logged) -> Any:
         time = logged.time - logged.time[0]
         rows = (time > 30.0) & (time < 60.0)
         below.plot(time[rows], np.rad2deg(logged.courses["true"][rows]), color=COLOURS["truth"], label="measured")
-        for name, colour in zip(("EKF", READY[1], logged.best), (CYCLE[0], CYCLE[1], CYCLE[2]), strict=True):
+        for name, colour in zip(
+            ("EKF", READY[1], logged.best), (kit.CYCLE[0], kit.CYCLE[1], kit.CYCLE[2]), strict=True
+        ):
             below.plot(time[rows], np.rad2deg(logged.courses[name][rows]), color=colour, label=name)
         below.set(xlabel="time in the second half [s]", ylabel="sideslip [°]")
         figure.legend(*below.get_legend_handles_labels(), loc="outside lower center", ncols=4)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from jaxveh import estimators, sensors, vehicles
 from jaxveh._core.names import record_type
-from jaxveh.estimators.handling import Handling, handling_model
+from jaxveh.estimators import Handling, handling_model
 from jaxveh.experiments.sideslip_review.drives import Drive, numbers_of
 from jaxveh.experiments.sideslip_review.settings import Noise
 from jaxveh.statespace import Continuous, Gaussian, Heun, Prior, Propagate, Row, StateSpace

@@ -14,7 +14,7 @@ import numpy as np
 from jaxveh import estimators, filters, io
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.sideslip import PIECE_LENGTH, WARM_UP, cut_pieces, handling_car
+from jaxveh.estimators import handling_car, kit
 from jaxveh.experiments.sideslip_review.contestants import WHAT, groups, pseudo_integrated, switched, weighted
 from jaxveh.experiments.sideslip_review.contestants import Found as Estimated
 from jaxveh.experiments.sideslip_review.drives import Drive
@@ -130,10 +130,10 @@ def drive_of(blind: Recording, whole: Recording) -> Drive:
 
 def fitted_noise(cars: Cars, start: Noise, log: Recording, speed: float) -> Noise:
     """The noise levels of the greatest posterior on pieces of a cleaned log, about wide priors."""
-    pieces, warm_up = cut_pieces(log, PIECE_LENGTH, WARM_UP)
+    pieces, warm_up = kit.cut_pieces(log, kit.PIECE_LENGTH, kit.WARM_UP)
     # The kinematics takes accelerations for inputs, which must be there.
-    held, _ = cut_pieces(
-        log.fill("a_y", "hold", max_gap=1.0).fill("yaw_rate", "hold", max_gap=1.0), PIECE_LENGTH, WARM_UP
+    held, _ = kit.cut_pieces(
+        log.fill("a_y", "hold", max_gap=1.0).fill("yaw_rate", "hold", max_gap=1.0), kit.PIECE_LENGTH, kit.WARM_UP
     )
     models, found = models_of(cars, start, speed), {}
     for name, method in (

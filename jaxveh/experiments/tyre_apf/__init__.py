@@ -1,5 +1,6 @@
 """Bao, Sabbioni et al. (2015): an auxiliary particle filter for Magic Formula parameters and vehicle states."""
 
+from jaxveh._core.lazy import submodules
 from jaxveh.experiments.report import Check, Table
 from jaxveh.experiments.tyre_apf.criteria import CRITERIA
 from jaxveh.experiments.tyre_apf.printed import Printed, run_printed_seeds
@@ -7,11 +8,14 @@ from jaxveh.experiments.tyre_apf.report import as_printed, check, run, settings
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.settings import CITATION, Study, tyres
 from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
+from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS
 from jaxveh.experiments.tyre_apf.tables import tables
 
 __all__ = [
     "CITATION",
     "CRITERIA",
+    "ESTIMATORS",
+    "FIELDS",
     "Check",
     "Printed",
     "Reproduction",
@@ -20,6 +24,7 @@ __all__ = [
     "Table",
     "as_printed",
     "check",
+    "figures",
     "run",
     "run_printed_seeds",
     "run_staged",
@@ -27,3 +32,6 @@ __all__ = [
     "tables",
     "tyres",
 ]
+
+# What draws needs matplotlib, which is an extra.
+__getattr__ = submodules(__name__, ("figures",))

@@ -13,7 +13,7 @@ from jaxveh import estimators, manoeuvres, sensors, vehicles
 from jaxveh._core.errors import check_at_least
 from jaxveh._core.parameter import pick, resolve
 from jaxveh._core.progress import Progress, part, silent
-from jaxveh.diagnostics.observability import UNOBSERVABLE, Observability
+from jaxveh.diagnostics import Observability, kit
 from jaxveh.experiments.report import Check, Table, above, at_least, at_most, stated
 from jaxveh.experiments.tyre_apf.criteria import AHEAD, CRITERIA, WHERE
 from jaxveh.experiments.tyre_apf.printed import Printed, closest_share, run_printed_seeds
@@ -124,7 +124,7 @@ def check(result: Reproduction) -> list[Check]:
                     0.35,
                 )
     condition = result.lane_change.condition_number
-    checks.append(above("lane change: condition number of eight parameters, above", condition, UNOBSERVABLE))
+    checks.append(above("lane change: condition number of eight parameters, above", condition, kit.UNOBSERVABLE))
     seen = result.saturated.bounds["D and B"][SWEEP]
     add(f"{SWEEP}: D and B not observable, number", len(seen.names) - len(seen.observable()), 0)
     for name in ("UKF", "MAP"):

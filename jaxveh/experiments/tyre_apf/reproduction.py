@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from jaxveh.diagnostics.observability import Observability
+from jaxveh.diagnostics import Observability
 from jaxveh.experiments.tyre_apf.printed import Printed, PrintedOutcome
 from jaxveh.experiments.tyre_apf.saturated import Saturated
 from jaxveh.experiments.tyre_apf.settings import Study

@@ -20,15 +20,15 @@ from jaxveh import estimators, filters, manoeuvres, sensors, sweeps, vehicles
 from jaxveh._core.parameter import pick, resolve
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.observability import Observability
-from jaxveh.estimators.observability import predict_measurements
+from jaxveh.diagnostics import Observability
+from jaxveh.estimators import predict_measurements
 from jaxveh.experiments.tyre_apf.settings import Study, tyres
 from jaxveh.experiments.tyre_apf.study import guess_once, model_of
+from jaxveh.fitting import kit as fitting_kit
 from jaxveh.fitting import pose_shooting, solve
-from jaxveh.fitting.segments import cut_rows
 from jaxveh.simulation import simulate
 from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.noise import whiten
+from jaxveh.statespace import kit as statespace_kit
 
 SWEEP = "sweep of 15 degrees"
 
@@ -142,7 +142,7 @@ def _estimators(study: Study, where) -> dict:
     def fitted(key, drive):
         # Short pieces tied loosely find the valley, the whole drive its floor.
         model, rows = started(key, drive, study.gaussian)
-        segments = cut_rows(rows, round(study.window * study.rate))
+        segments = fitting_kit.cut_rows(rows, round(study.window * study.rate))
         fit = solve(pose_shooting(model, segments), max_steps=100, standard_errors=False)
         found, converged = single_shooting(model, rows, fit.unconstrained)
         return {
@@ -166,7 +166,7 @@ def single_shooting(model: StateSpace, rows: Row, start) -> tuple[jax.Array, jax
         wrong = {
             name: jnp.where(present[name], getattr(rows.y, name), 0.0) - predicted[name] for name in model.channels
         }
-        white = whiten(model.measurement_noise, wrong, present)
+        white = statespace_kit.whiten(model.measurement_noise, wrong, present)
         return jnp.concatenate([*(white[name] for name in model.channels), (z - mean[n:]) / spread])
 
     solver = optx.LevenbergMarquardt(rtol=1e-8, atol=1e-8)

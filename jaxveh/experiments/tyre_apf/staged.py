@@ -17,7 +17,7 @@ from jaxveh import estimators, filters, manoeuvres, vehicles
 from jaxveh._core.parameter import pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.observability import Observability
+from jaxveh.diagnostics import Observability
 from jaxveh.experiments.tyre_apf.settings import STEP_STEER, Study, tyres
 from jaxveh.experiments.tyre_apf.study import (
     ESTIMATORS,

@@ -9,8 +9,7 @@ import numpy as np
 from jaxveh.experiments.tyre_apf.saturated import Saturated
 from jaxveh.experiments.tyre_apf.settings import LEVELS
 from jaxveh.experiments.tyre_apf.sharpness import PAPERS_PARTICLES, SYSTEMATIC, Sharpness
-from jaxveh.plots.figure import Figure
-from jaxveh.plots.style import COLOURS, PAGE_WIDTH, style
+from jaxveh.plots import COLOURS, kit, style
 
 MARKS = {"prior": "s", "UKF": "o", "MAP": "D"}
 
@@ -20,7 +19,7 @@ ASIDE = 0.09
 
 def saturated_figure(found: Saturated) -> Any:
     """Root mean square errors of the parameters beside the Cramer-Rao bound: a column a drive, a row for what is unknown."""
-    figure = Figure(figsize=(PAGE_WIDTH, 1.2 + 2.1 * len(found.found)), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 1.2 + 2.1 * len(found.found)), layout="constrained")
     with style():
         panels = figure.subplots(len(found.found), len(found.cases), squeeze=False, sharey="row")
         for row, (unknown, runs) in zip(panels, found.found.items(), strict=True):
@@ -43,7 +42,7 @@ def saturated_figure(found: Saturated) -> Any:
 
 def sharpness_figure(found: Sharpness) -> Any:
     """Errors of the eight parameters, and how far the log-likelihood spreads, over the sensors' noise: medians and quartiles."""
-    figure = Figure(figsize=(PAGE_WIDTH, 3.4), layout="constrained")
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.4), layout="constrained")
     places = np.arange(len(LEVELS))
     with style():
         left, right = figure.subplots(1, 2)

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh.filters.calibration.monte_carlo import Runs
-from jaxveh.statespace.cramer_rao import PosteriorBound
+from jaxveh.statespace import PosteriorBound
 
 
 class Accuracy(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.progress import Progress
-from jaxveh.statespace.model import StateSpace
+from jaxveh.statespace import StateSpace
 
 
 def check_truth(model: StateSpace, truth: StateSpace) -> None:

@@ -8,11 +8,9 @@ from typing import Any
 import equinox as eqx
 
 from jaxveh._core.recording import Recording
-from jaxveh.statespace.contract import AbstractFilter
-from jaxveh.statespace.driver import Estimate, raise_failure, scan_and_keep
-from jaxveh.statespace.model import StateSpace
+from jaxveh.statespace import AbstractFilter, Estimate, StateSpace, kit
 
-_scan_and_keep = eqx.filter_jit(scan_and_keep)
+_scan_and_keep = eqx.filter_jit(kit.scan_and_keep)
 
 
 def run_and_keep(
@@ -26,5 +24,5 @@ def run_and_keep(
     estimate, kept = _scan_and_keep(filter, model, model.rows(recording), key, keep)
     estimate = eqx.tree_at(lambda e: e.time, estimate, recording.time)
     if throw:
-        raise_failure(estimate, filter, model, recording)
+        kit.raise_failure(estimate, filter, model, recording)
     return estimate, kept

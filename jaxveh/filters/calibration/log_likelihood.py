@@ -14,9 +14,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters.calibration.batches import in_batches
 from jaxveh.filters.calibration.monte_carlo import raise_failed
-from jaxveh.statespace.contract import AbstractFilter
-from jaxveh.statespace.driver import scan
-from jaxveh.statespace.model import StateSpace
+from jaxveh.statespace import AbstractFilter, StateSpace, scan
 
 GOOD_STD = (1.0, 1.7)
 """Where the standard deviation of the log-likelihood should be for particle marginal Metropolis-Hastings (A. Doucet, M. Pitt,

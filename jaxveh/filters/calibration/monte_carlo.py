@@ -13,11 +13,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
 from jaxveh.filters.calibration.batches import check_truth, in_batches
-from jaxveh.statespace.belief import Info
-from jaxveh.statespace.contract import AbstractFilter
-from jaxveh.statespace.draw import draw_rows, schedule_rows
-from jaxveh.statespace.driver import scan_and_keep
-from jaxveh.statespace.model import StateSpace
+from jaxveh.statespace import AbstractFilter, Info, StateSpace, kit
 
 
 class Runs(NamedTuple):
@@ -67,7 +63,7 @@ def monte_carlo(
     check_whole("runs", runs)
     check_truth(model, truth)
     filter.check(model)
-    rows = schedule_rows(truth, schedule)
+    rows = kit.schedule_rows(truth, schedule)
     found = in_batches(
         lambda keys: _runs(filter, model, truth, rows, keys), key, runs, batch, progress, "Monte Carlo runs"
     )
@@ -92,9 +88,9 @@ def raise_failed(filter: AbstractFilter, results: np.ndarray) -> None:
 def _runs(filter: AbstractFilter, model: StateSpace, truth: StateSpace, rows, keys):
     def one(key):
         draw_key, filter_key = jax.random.split(key)
-        states, measured = draw_rows(truth, rows, draw_key)
+        states, measured = kit.draw_rows(truth, rows, draw_key)
         keep = lambda belief: (belief.mean, belief.covariance)
-        estimate, (mean, covariance) = scan_and_keep(filter, model, measured, filter_key, keep)
+        estimate, (mean, covariance) = kit.scan_and_keep(filter, model, measured, filter_key, keep)
         return states, mean, covariance, estimate.info, estimate.log_likelihood, estimate.result
 
     return jax.vmap(one)(keys)

@@ -12,13 +12,10 @@ import numpy as np
 from jaxveh._core.errors import InputError, check, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics.chi_squared import chi_squared_tails
+from jaxveh.diagnostics import chi_squared_tails
 from jaxveh.filters.calibration.batches import check_truth, in_batches
 from jaxveh.filters.calibration.monte_carlo import raise_failed
-from jaxveh.statespace.contract import AbstractFilter
-from jaxveh.statespace.draw import draw_rows, schedule_rows
-from jaxveh.statespace.driver import scan
-from jaxveh.statespace.model import StateSpace
+from jaxveh.statespace import AbstractFilter, StateSpace, kit, scan
 
 
 class Calibration(NamedTuple):
@@ -85,7 +82,7 @@ def simulation_based_calibration(
     check_whole("draws", draws)
     check_truth(model, truth)
     filter.check(model)
-    rows = schedule_rows(truth, schedule)
+    rows = kit.schedule_rows(truth, schedule)
     one_batch = lambda keys: _ranks(filter, model, truth, rows, keys, draws)
     ranks, results = in_batches(one_batch, key, runs, batch, progress, "simulation-based calibration")
     if throw:
@@ -97,7 +94,7 @@ def simulation_based_calibration(
 def _ranks(filter: AbstractFilter, model: StateSpace, truth: StateSpace, rows, keys, draws: int):
     def one(key):
         draw_key, filter_key, belief_key = jax.random.split(key, 3)
-        states, measured = draw_rows(truth, rows, draw_key)
+        states, measured = kit.draw_rows(truth, rows, draw_key)
         estimate = scan(filter, model, measured, filter_key)
         drawn = estimate.belief.sample(belief_key, draws)
         rank = lambda values, path: jnp.sum(values < path[-1])

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh.filters.gaussian.rules import AbstractRule, times
-from jaxveh.statespace.belief import AbstractBelief
+from jaxveh.statespace import AbstractBelief
 
 
 class GaussianBelief(AbstractBelief):

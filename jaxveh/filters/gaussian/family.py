@@ -12,7 +12,7 @@ from jaxveh.filters.gaussian.forms import AbstractForm, Covariance
 from jaxveh.filters.gaussian.linear import check_linear
 from jaxveh.filters.gaussian.rules import Points, Slopes
 from jaxveh.numerics import sigma_points
-from jaxveh.statespace.contract import Smoothing
+from jaxveh.statespace import Smoothing
 
 
 class Kalman(AbstractRuleFilter):

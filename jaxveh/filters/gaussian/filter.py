@@ -16,11 +16,19 @@ from jaxveh.filters.gaussian.belief import GaussianBelief, rows_of
 from jaxveh.filters.gaussian.forms import AbstractForm, Spread
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Image
-from jaxveh.statespace import Row, StateDependent, StateSpace
-from jaxveh.statespace.belief import AbstractBelief, Info
-from jaxveh.statespace.contract import AbstractTwoPartFilter
-from jaxveh.statespace.measurements import by_channel, input_result, presence, wrap_angle
-from jaxveh.statespace.noise import LOG_2PI, AbstractNoise, Gaussian, Independent, MultivariateGaussian
+from jaxveh.statespace import (
+    AbstractBelief,
+    AbstractNoise,
+    AbstractTwoPartFilter,
+    Gaussian,
+    Independent,
+    Info,
+    MultivariateGaussian,
+    Row,
+    StateDependent,
+    StateSpace,
+    kit,
+)
 
 
 class AbstractGaussianFilter(AbstractTwoPartFilter):
@@ -100,7 +108,7 @@ class AbstractRuleFilter(AbstractGaussianFilter):
         return with_spread(belief, image.mean, self.form.add(image, law, model.states), t=t)
 
     def observe(self, model, belief, row):
-        return observation_image(model, belief, row, presence(model, row)[1])
+        return observation_image(model, belief, row, kit.presence(model, row)[1])
 
     def update(self, model, belief, row):
         return corrected(self.form, model, belief, row, self.observe(model, belief, row))
@@ -138,7 +146,7 @@ def corrected(
     form: AbstractForm, model: StateSpace, belief: GaussianBelief, row: Row, image: Image
 ) -> tuple[GaussianBelief, Info]:
     """The belief after a row whose measurement has this image under it."""
-    measured, present = presence(model, row)
+    measured, present = kit.presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])
     given = jnp.stack([measured[name] for name in model.channels])
     innovation = wrapped_innovation(model, given - image.mean, here)
@@ -235,7 +243,7 @@ def unwrapped(model: StateSpace, name: str, values: Any) -> Any:
     """A channel's values (k, ...), angles among them within half a turn of the first; a single one as it is."""
     if name not in model.angles or not values.ndim:
         return values
-    return values[0] + wrap_angle(values - values[0])
+    return values[0] + numerics.wrap_angle(values - values[0])
 
 
 def wrapped_innovation(model: StateSpace, innovation: Any, here: Any) -> Any:
@@ -243,21 +251,21 @@ def wrapped_innovation(model: StateSpace, innovation: Any, here: Any) -> Any:
     if model.angles:
         wraps = jnp.asarray([name in model.angles for name in model.channels])
         wraps = wraps.reshape(-1, *[1] * (innovation.ndim - 1))
-        innovation = jnp.where(wraps, wrap_angle(innovation), innovation)
+        innovation = jnp.where(wraps, numerics.wrap_angle(innovation), innovation)
     return jnp.where(here, innovation, 0)
 
 
 def innovation_info(model: StateSpace, row: Row, innovation: Any, white: Any, factor: Any, result: Any) -> Info:
     """The info of innovations (m,) with a covariance of this lower factor (m, m), by which `white` is whitened."""
-    _, present = presence(model, row)
+    _, present = kit.presence(model, row)
     dtype = innovation.dtype
     count = jnp.sum(jnp.stack([present[name] for name in model.channels]).astype(dtype))
     nis, variances = jnp.sum(white**2), jnp.sum(jnp.square(factor), axis=-1)
     named = lambda values: record("Measurements", dict(zip(model.channels, values, strict=True)))
     return Info(
-        log_likelihood=-0.5 * (nis + numerics.log_det(factor) + count * LOG_2PI),
-        innovation=by_channel(model, innovation, present),
-        innovation_std=by_channel(model, jnp.sqrt(variances), present),
+        log_likelihood=-0.5 * (nis + numerics.log_det(factor) + count * kit.LOG_2PI),
+        innovation=kit.by_channel(model, innovation, present),
+        innovation_std=kit.by_channel(model, jnp.sqrt(variances), present),
         nis=nis,
         ess=jnp.full((), jnp.nan, dtype),
         whitened=named(white),
@@ -270,7 +278,7 @@ def _result(model, row, beliefs, image: Image, factor):
     """The first thing that went wrong, in the order of the computation: what follows from it is not finite either."""
     before, after = beliefs
     diverged, indefinite = Result.non_finite_state, Result.not_positive_definite
-    result = input_result(model, row)
+    result = kit.input_result(model, row)
     matrix = before.vector if before.matrix is None else before.matrix
     for values, reason in (
         (before.vector, diverged),

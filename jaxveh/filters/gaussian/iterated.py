@@ -15,7 +15,7 @@ from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, corre
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import Image, product, times
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
-from jaxveh.statespace.contract import Smoothing
+from jaxveh.statespace import Smoothing
 
 
 class Iterated(AbstractGaussianWrapper):

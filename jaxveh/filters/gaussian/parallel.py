@@ -15,8 +15,7 @@ from jaxveh.filters.gaussian.forms import masked_factor
 from jaxveh.filters.gaussian.iterated import line_through
 from jaxveh.filters.gaussian.noises import covariance_in, law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, product
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.measurements import input_result, presence
+from jaxveh.statespace import Row, StateSpace, kit
 
 
 class Lines(NamedTuple):
@@ -100,7 +99,7 @@ def _lines(rule, model, rows: Row, means, covariances) -> tuple[Lines, Lines]:
 
     def see(row, mean, covariance):
         now = belief(row, mean, covariance)
-        return _line(observation_image(model, now, row, presence(model, row)[1]), now)
+        return _line(observation_image(model, now, row, kit.presence(model, row)[1]), now)
 
     before = jax.tree.map(lambda leaf: leaf[:-1], (rows, means, covariances))
     moves = jax.vmap(move)(before[0], rows.t[1:], jax.tree.map(lambda u: u[1:], rows.u), *before[1:])
@@ -118,7 +117,7 @@ def _measured(model, rows: Row, means):
     kind = type(model.prior.mean)
 
     def of(row, mean):
-        values, present = presence(model, row)
+        values, present = kit.presence(model, row)
         here = jnp.stack([present[name] for name in model.channels])
         law = law_at(model, row, lambda: kind(*mean))
         noise = masked_factor(law, model.channels, here, row.t.dtype)
@@ -183,12 +182,12 @@ def infos_of(model: StateSpace, rows: Row, passed: Passed) -> Any:
     y, R = _measured(model, rows, passed.about)
 
     def of(row, y, R, mean, covariance, line):
-        _, present = presence(model, row)
+        _, present = kit.presence(model, row)
         here = jnp.stack([present[name] for name in model.channels])
         innovation = wrapped_innovation(model, y - line.slope @ mean - line.offset, here)
         factor = numerics.cholesky(line.slope @ covariance @ line.slope.T + line.error + R)
         white = numerics.solve_lower(factor, innovation)
-        result = input_result(model, row)
+        result = kit.input_result(model, row)
         lost = ~jnp.all(jnp.isfinite(factor))
         result = jnp.where((result == 0) & lost, code(Result.not_positive_definite), result)
         return innovation_info(model, row, innovation, white, factor, result)

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh.numerics.sigma_points import SigmaPoints
+from jaxveh.numerics import sigma_points
 
 
 class Image(NamedTuple):
@@ -69,7 +69,7 @@ class Points(AbstractRule):
     Two of equal numbers are equal, so that jit sees one structure.
     """
 
-    points: SigmaPoints = eqx.field(static=True)
+    points: sigma_points.SigmaPoints = eqx.field(static=True)
 
     @property
     def positive(self):

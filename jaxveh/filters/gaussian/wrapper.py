@@ -3,7 +3,7 @@
 import equinox as eqx
 
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind
-from jaxveh.statespace.contract import AbstractWrapper
+from jaxveh.statespace import AbstractWrapper
 
 
 class AbstractGaussianWrapper(AbstractGaussianFilter, AbstractWrapper):

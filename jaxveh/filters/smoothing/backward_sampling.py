@@ -11,8 +11,7 @@ from jaxveh.filters.choosing import log_of
 from jaxveh.filters.particle import AbstractParticleFilter
 from jaxveh.filters.smoothing.genealogy import path_moments
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.driver import scan_and_keep
+from jaxveh.statespace import Row, StateSpace, kit
 
 
 def check_density(model: StateSpace) -> None:
@@ -34,7 +33,7 @@ def sample_backwards(filter: AbstractParticleFilter, model: StateSpace, rows: Ro
     noise = model.process_noise
     assert noise is not None  # `check_density` has seen to it
     forward_key, last_key, back_key = jax.random.split(key, 3)
-    filtered, kept = scan_and_keep(filter, model, rows, forward_key, lambda b: (b.particles, b.weights))
+    filtered, kept = kit.scan_and_keep(filter, model, rows, forward_key, lambda b: (b.particles, b.weights))
     particles, weights = kept
     chosen = jax.random.categorical(last_key, log_of(weights[-1]), shape=(count,))
     last = jax.tree.map(lambda field: field[-1][chosen], particles)

@@ -15,9 +15,7 @@ from jaxveh.filters.smoothing.fixed_lag import check_lag, smooth_with_lag
 from jaxveh.filters.smoothing.genealogy import trace_genealogy
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractFilter, Smoothing, check_smooths, key_for
-from jaxveh.statespace.driver import raise_failure
+from jaxveh.statespace import AbstractFilter, Smoothing, StateSpace, kit
 
 
 class BackwardSampling(eqx.Module):
@@ -55,7 +53,7 @@ def smooth(
     not declare that it can be smoothed (`AbstractFilter.smooths`).
     """
     filter.check(model)
-    kind = check_smooths("smooth", filter)
+    kind = kit.check_smooths("smooth", filter)
     rows = model.rows(recording)
     if lag is not None:
         check_lag(filter, lag)
@@ -63,7 +61,7 @@ def smooth(
             raise InputError("smooth: a lag has a method of its own; give one of both.")
         found = smooth_with_lag(filter, model, rows, key, lag)
     elif kind is Smoothing.particles:
-        found = _particles(filter, model, rows, key_for(filter, key), method)
+        found = _particles(filter, model, rows, kit.key_for(filter, key), method)
     elif method is not None:
         raise InputError(
             f"method = {type(method).__name__}: is for particle filters; {type(filter).__name__} has its own."
@@ -72,7 +70,7 @@ def smooth(
         found = rauch_tung_striebel(filter, model, rows)
     found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
     if throw:
-        raise_failure(found.filtered, filter, model, recording)
+        kit.raise_failure(found.filtered, filter, model, recording)
     return found
 
 

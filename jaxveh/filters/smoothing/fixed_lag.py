@@ -14,10 +14,7 @@ from jaxveh.filters.particle import ParticleBelief
 from jaxveh.filters.smoothing.rauch_tung_striebel import given_later
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.filters.wrappers.base import gaussian_of
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.belief import AbstractBelief
-from jaxveh.statespace.contract import AbstractFilter, AbstractWrapper, Smoothing, check_smooths, smoothing_of
-from jaxveh.statespace.driver import scan_and_keep
+from jaxveh.statespace import AbstractBelief, AbstractFilter, AbstractWrapper, Row, Smoothing, StateSpace, kit
 
 
 class LaggedBelief(AbstractBelief):
@@ -84,7 +81,7 @@ class FixedLag(AbstractWrapper):
 def check_lag(filter: Any, lag: int) -> None:
     """Raise `InputError` for a lag that is no whole number of at least 1, or a filter without a smoother."""
     check_whole("lag", lag)
-    kind = check_smooths("FixedLag", filter)
+    kind = kit.check_smooths("FixedLag", filter)
     if kind is Smoothing.particles and isinstance(filter.resampling, Transport):
         raise InputError("FixedLag: particles of Transport have no ancestors.")
 
@@ -94,7 +91,7 @@ def first_of(filter: Any, model: StateSpace, past: Any, real: Any) -> tuple[Any,
 
     A belief that is not `real` (L,) is passed over: it is a copy of the one after it.
     """
-    if smoothing_of(filter) is Smoothing.particles:
+    if kit.smoothing_of(filter) is Smoothing.particles:
         return _traced(model, past, real)
     last = jax.tree.map(lambda leaf: leaf[-1], past)
     before = jax.tree.map(lambda leaf: leaf[:-1], past)
@@ -127,7 +124,7 @@ def _traced(model: StateSpace, past: ParticleBelief, real: Any) -> tuple[Any, An
 @eqx.filter_jit
 def smooth_with_lag(filter: Any, model: StateSpace, rows: Row, key, lag: int) -> SmoothedEstimate:
     """Each row given those up to `lag` rows behind it, over rows with (T,) leaves."""
-    filtered, beliefs = scan_and_keep(filter, model, rows, key, lambda belief: belief)
+    filtered, beliefs = kit.scan_and_keep(filter, model, rows, key, lambda belief: belief)
     count = rows.t.shape[0]
 
     def window(k):

@@ -8,8 +8,7 @@ import jax.numpy as jnp
 
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.driver import scan_and_keep
+from jaxveh.statespace import Row, StateSpace, kit
 
 
 @eqx.filter_jit
@@ -19,7 +18,7 @@ def trace_genealogy(filter: AbstractParticleFilter, model: StateSpace, rows: Row
     Every path has the weight of its end. Going back they fall together: some hundred rows before the end few distinct
     ancestors are left, and the spreads say too little.
     """
-    filtered, (particles, ancestors) = scan_and_keep(filter, model, rows, key, lambda b: (b.particles, b.ancestors))
+    filtered, (particles, ancestors) = kit.scan_and_keep(filter, model, rows, key, lambda b: (b.particles, b.ancestors))
     weights = filtered.belief.weights
     last = jnp.arange(filter.particles, dtype=ancestors.dtype)
 

@@ -16,9 +16,7 @@ from jaxveh.filters.gaussian.family import Kalman
 from jaxveh.filters.gaussian.forms import Covariance
 from jaxveh.filters.gaussian.parallel import infos_of, pass_over
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
-from jaxveh.statespace import Row, StateSpace, parameter_view
-from jaxveh.statespace.contract import Smoothing, innermost, smoothing_of
-from jaxveh.statespace.driver import Estimate, raise_failure
+from jaxveh.statespace import Estimate, Row, Smoothing, StateSpace, kit, parameter_view
 
 
 def smooth_parallel(
@@ -38,8 +36,12 @@ def smooth_parallel(
 
     **Raises** as `run`, and `InputError` for other filters and forms.
     """
-    declared = smoothing_of(filter) is Smoothing.gaussian
-    if not declared or not isinstance(filter, (Kalman, Iterated)) or not isinstance(innermost(filter).form, Covariance):
+    declared = kit.smoothing_of(filter) is Smoothing.gaussian
+    if (
+        not declared
+        or not isinstance(filter, (Kalman, Iterated))
+        or not isinstance(kit.innermost(filter).form, Covariance)
+    ):
         raise InputError(
             f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...) itself, of the form Covariance()."
         )
@@ -52,13 +54,13 @@ def smooth_parallel(
     found = _smooth(filter, model, model.rows(recording))
     found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
     if throw:
-        raise_failure(found.filtered, filter, model, recording)
+        kit.raise_failure(found.filtered, filter, model, recording)
     return found
 
 
 @eqx.filter_jit
 def _smooth(filter, model, rows: Row) -> SmoothedEstimate:
-    rule = innermost(filter).rule(len(model.states))
+    rule = kit.innermost(filter).rule(len(model.states))
     wide = lambda leaf: jnp.broadcast_to(leaf, (*rows.t.shape, *leaf.shape))
     path = wide(jnp.stack(model.prior.mean)), wide(model.prior.covariance())
 

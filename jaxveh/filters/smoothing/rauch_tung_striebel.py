@@ -13,15 +13,13 @@ from jaxveh.filters.gaussian.filter import transition_image, with_spread
 from jaxveh.filters.gaussian.forms import Later, Spread
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
 from jaxveh.filters.wrappers.base import gaussian_of
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.contract import innermost
-from jaxveh.statespace.driver import scan_and_keep
+from jaxveh.statespace import Row, StateSpace, kit
 
 
 @eqx.filter_jit
 def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows: Row) -> SmoothedEstimate:
     """The smoother of a Gaussian filter's kind over rows with (T,) leaves (Sarkka 2013, eqs 8.6, 9.17 and 10.1)."""
-    filtered, beliefs = scan_and_keep(filter, model, rows, None, lambda belief: belief)
+    filtered, beliefs = kit.scan_and_keep(filter, model, rows, None, lambda belief: belief)
     last = jax.tree.map(lambda leaf: leaf[-1], beliefs)
     before = jax.tree.map(lambda leaf: leaf[:-1], beliefs)
     after = jax.tree.map(lambda leaf: leaf[1:], (rows.t, rows.u))
@@ -48,5 +46,5 @@ def given_later(
     law = None if own.process_noise is None else own.process_noise.over(t - gaussian.t)
     known = Later(later.vector - image.mean, Spread(later.factor, later.matrix))
     before = Spread(gaussian.factor, gaussian.matrix)
-    found = innermost(filter).form.smooth(image, law, model.states, before, known)
+    found = kit.innermost(filter).form.smooth(image, law, model.states, before, known)
     return with_spread(gaussian, gaussian.vector + found.shift, found.spread)

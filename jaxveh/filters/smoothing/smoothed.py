@@ -8,8 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh.statespace import StateSpace, parameter_view
-from jaxveh.statespace.driver import Estimate
+from jaxveh.statespace import Estimate, StateSpace, parameter_view
 
 
 class SmoothedEstimate(eqx.Module):

@@ -9,9 +9,7 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
-from jaxveh.statespace import Gaussian, Row, StateSpace
-from jaxveh.statespace.belief import AbstractBelief, Info
-from jaxveh.statespace.dependent_noise import check_fixed
+from jaxveh.statespace import AbstractBelief, Gaussian, Info, Row, StateSpace, kit
 
 
 class AbstractStateless(AbstractGaussianWrapper):
@@ -124,7 +122,7 @@ def with_gaussian(belief: Any, gaussian: GaussianBelief) -> Any:
 
 def check_independent(who: str, model: StateSpace) -> None:
     """Raise `InputError` unless the measurement noise is one standard deviation a channel."""
-    check_fixed(who, model.measurement_noise, "Take the filter inside by itself, or a particle filter.")
+    kit.check_fixed(who, model.measurement_noise, "Take the filter inside by itself, or a particle filter.")
     if not isinstance(model.measurement_noise, Gaussian):
         kind = type(model.measurement_noise).__name__
         raise InputError(f"{who}: the measurement noise is {kind}: must be Gaussian, a standard deviation a channel.")

@@ -13,8 +13,7 @@ from jaxveh._core.names import as_groups, as_names, check_names
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.wrappers.base import AbstractStateless
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import Smoothing
+from jaxveh.statespace import Smoothing, StateSpace
 
 
 class Consider(AbstractStateless):

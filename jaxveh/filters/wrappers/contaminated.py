@@ -15,8 +15,7 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.wrappers.base import AbstractStateless, check_independent, variances_of, with_variances
 from jaxveh.filters.wrappers.interacting import mixed_covariance
-from jaxveh.statespace.belief import Info
-from jaxveh.statespace.contract import Smoothing
+from jaxveh.statespace import Info, Smoothing
 
 MOST_CHANNELS = 6
 """Of which 64 cases are made."""

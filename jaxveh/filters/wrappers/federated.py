@@ -17,10 +17,7 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import SingularValues, Spread
 from jaxveh.filters.gaussian.rules import times
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.belief import AbstractBelief
-from jaxveh.statespace.contract import AbstractWrapper
-from jaxveh.statespace.process import AbstractProcessNoise
+from jaxveh.statespace import AbstractBelief, AbstractProcessNoise, AbstractWrapper, Row, StateSpace
 
 
 class FederatedBelief(AbstractBelief):

@@ -12,7 +12,7 @@ from jaxveh._core.names import record
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.wrappers.base import AbstractStateless
 from jaxveh.filters.wrappers.innovation import innovation
-from jaxveh.statespace.contract import Smoothing
+from jaxveh.statespace import Smoothing
 
 
 class Gated(AbstractStateless):

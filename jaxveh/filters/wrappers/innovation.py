@@ -9,8 +9,7 @@ import jax.numpy as jnp
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
 from jaxveh.filters.gaussian.noises import covariance_in, law_at
 from jaxveh.filters.gaussian.rules import Image
-from jaxveh.statespace import Row, StateSpace
-from jaxveh.statespace.measurements import presence
+from jaxveh.statespace import Row, StateSpace, kit
 
 
 class Innovation(NamedTuple):
@@ -26,7 +25,7 @@ class Innovation(NamedTuple):
 def innovation(filter: AbstractGaussianFilter, model: StateSpace, belief: Any, row: Row) -> Innovation:
     """What `row` says against the belief before it."""
     image = filter.observe(model, belief, row)
-    measured, present = presence(model, row)
+    measured, present = kit.presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])
     error = jnp.stack([measured[name] for name in model.channels]) - image.mean
     own = filter.adapted(model, belief)

@@ -16,10 +16,7 @@ from jaxveh._core.result import first_failure
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.belief import AbstractBelief, Info
-from jaxveh.statespace.contract import AbstractWrapper
-from jaxveh.statespace.measurements import by_channel, presence
+from jaxveh.statespace import AbstractBelief, AbstractWrapper, Info, StateSpace, kit
 
 
 class MixtureBelief(AbstractBelief):
@@ -173,13 +170,13 @@ def _mixed(weights, moments):
 
 
 def _mixture_info(model, row, weights, infos, log_likelihood) -> Info:
-    _, present = presence(model, row)
+    _, present = kit.presence(model, row)
     mean, std = _mixed(weights, [(info.innovation, info.innovation_std) for info in infos])
     nothing = jnp.full_like(log_likelihood, jnp.nan)
     return Info(
         log_likelihood=log_likelihood,
-        innovation=by_channel(model, mean, present),
-        innovation_std=by_channel(model, std, present),
+        innovation=kit.by_channel(model, mean, present),
+        innovation_std=kit.by_channel(model, std, present),
         nis=nothing,
         ess=nothing,
         result=first_failure(jnp.where(weights > 0, jnp.stack([info.result for info in infos]), 0))[0],

@@ -19,7 +19,7 @@ from jaxveh.filters.wrappers.base import (
 )
 from jaxveh.filters.wrappers.innovation import innovation
 from jaxveh.filters.wrappers.robust import expected_squares
-from jaxveh.statespace.contract import Smoothing
+from jaxveh.statespace import Smoothing
 
 
 class SageHusa(AbstractRemembering):

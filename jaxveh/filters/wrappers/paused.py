@@ -14,8 +14,7 @@ from jaxveh._core.names import check_names
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.wrappers.base import gaussian_of, with_gaussian
-from jaxveh.statespace import StateSpace
-from jaxveh.statespace.contract import AbstractWrapper, innermost
+from jaxveh.statespace import AbstractWrapper, StateSpace, kit
 
 
 class Paused(AbstractWrapper):
@@ -70,7 +69,7 @@ class Paused(AbstractWrapper):
     def _widened(self, model: StateSpace, belief: Any) -> Any:
         extra, gaussian = dict(self.widen), gaussian_of(belief)
         added = jnp.diag(jnp.asarray([extra.get(name, 0.0) ** 2 for name in model.states], gaussian.vector.dtype))
-        spread = innermost(self.inner).form.start(gaussian.covariance + added)
+        spread = kit.innermost(self.inner).form.start(gaussian.covariance + added)
         return with_gaussian(belief, with_spread(gaussian, gaussian.vector, spread))
 
 

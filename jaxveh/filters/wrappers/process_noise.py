@@ -14,9 +14,7 @@ from jaxveh._core.names import check_names
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.wrappers.base import AbstractRemembering, Remembering
-from jaxveh.statespace import AbstractNoise, Gaussian, MultivariateGaussian, StateSpace
-from jaxveh.statespace.contract import Smoothing
-from jaxveh.statespace.process import AbstractProcessNoise
+from jaxveh.statespace import AbstractNoise, AbstractProcessNoise, Gaussian, MultivariateGaussian, Smoothing, StateSpace
 
 
 class ShrinkingProcess(AbstractRemembering):

@@ -17,8 +17,7 @@ from jaxveh.filters.wrappers.base import (
     with_variances,
 )
 from jaxveh.filters.wrappers.innovation import innovation, spread_of
-from jaxveh.statespace.contract import Smoothing, check_noise_by_row
-from jaxveh.statespace.measurements import presence
+from jaxveh.statespace import Smoothing, kit
 
 
 class Huber(AbstractStateless):
@@ -40,7 +39,7 @@ class Huber(AbstractStateless):
 
     def check(self, model):
         check_independent("Huber", model)
-        check_noise_by_row("Huber", self.inner)
+        kit.check_noise_by_row("Huber", self.inner)
         self.inner.check(model)
 
     def update(self, model, belief, row):
@@ -75,7 +74,7 @@ class RobustStudentT(AbstractStateless):
 
     def check(self, model):
         check_independent("RobustStudentT", model)
-        check_noise_by_row("RobustStudentT", self.inner)
+        kit.check_noise_by_row("RobustStudentT", self.inner)
         self.inner.check(model)
 
     def update(self, model, belief, row):
@@ -93,7 +92,7 @@ class RobustStudentT(AbstractStateless):
 def expected_squares(filter: AbstractGaussianFilter, model: Any, belief: Any, row: Any) -> Any:
     """E[(y - h)^2] (m,) under a belief after the row: the residual's square, and what the belief spreads."""
     image = filter.observe(model, belief, row)
-    measured, present = presence(model, row)
+    measured, present = kit.presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])
     residual = jnp.stack([measured[name] for name in model.channels]) - image.mean
     return jnp.square(wrapped_innovation(model, residual, here)) + spread_of(image)

@@ -10,10 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.names import check_names
-from jaxveh.statespace import Continuous, Gaussian, StateSpace
-from jaxveh.statespace.contract import AbstractFilter, AbstractWrapper, check_noise_by_row
-from jaxveh.statespace.dependent_noise import check_fixed
-from jaxveh.statespace.process import Discrete
+from jaxveh.statespace import AbstractFilter, AbstractWrapper, Continuous, Discrete, Gaussian, StateSpace, kit
 
 
 class VaryingNoise(AbstractWrapper):
@@ -64,13 +61,15 @@ class VaryingNoise(AbstractWrapper):
                 raise InputError(f"VaryingNoise: the process noise is {kind}: must be Continuous or Discrete.")
             laws.append(("process noise", model.process_noise.law))
         if self.measurement:
-            check_fixed("VaryingNoise.measurement", model.measurement_noise, "Its function may take the input itself.")
+            kit.check_fixed(
+                "VaryingNoise.measurement", model.measurement_noise, "Its function may take the input itself."
+            )
         for what, law in laws:
             if not isinstance(law, Gaussian):
                 kind = type(law).__name__
                 raise InputError(f"VaryingNoise: the {what} is {kind}: must be Gaussian, a standard deviation a field.")
         if self.measurement:
-            check_noise_by_row("VaryingNoise", self.inner)
+            kit.check_noise_by_row("VaryingNoise", self.inner)
         self.inner.check(model)
 
     def _init(self, model, row, key):

@@ -17,9 +17,7 @@ from jaxveh.filters.wrappers.base import (
     variances_of,
     with_variances,
 )
-from jaxveh.statespace import CauchyGaussianMixture, Gaussian
-from jaxveh.statespace.contract import AbstractWrapper, Smoothing
-from jaxveh.statespace.dependent_noise import check_fixed
+from jaxveh.statespace import AbstractWrapper, CauchyGaussianMixture, Gaussian, Smoothing, kit
 
 # The median of the absolute value of a standard normal number.
 NORMAL_MEDIAN = 0.6744897501960817
@@ -111,7 +109,7 @@ class HaarParticles(AbstractWrapper):
 
     def check(self, model):
         law = model.measurement_noise
-        check_fixed("HaarParticles", law, "Take the particle filter by itself.")
+        kit.check_fixed("HaarParticles", law, "Take the particle filter by itself.")
         if not isinstance(law, Gaussian | CauchyGaussianMixture):
             raise InputError(
                 f"HaarParticles: the measurement noise is {type(law).__name__}: must be Gaussian, a standard deviation a "

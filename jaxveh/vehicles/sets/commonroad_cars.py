@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from jaxveh.io.commonroad import CommonRoadSpecification
+from jaxveh.io import CommonRoadSpecification
 from jaxveh.vehicles.sets.from_commonroad import from_commonroad
 from jaxveh.vehicles.sets.numbers import CarNumbers
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from jaxveh.io.naming import check_known
+from jaxveh.io import kit
 from jaxveh.vehicles.base import AbstractVehicle
 from jaxveh.vehicles.fourteen_dof import FourteenDOF
 from jaxveh.vehicles.kinematic import Kinematic
@@ -59,6 +59,6 @@ def named_car(name: str, fidelity: str = "single-track", **options: Any) -> Abst
 
     **Raises** `InputError` for a name that is not there (with the near ones), and where the car's numbers do not reach.
     """
-    check_known("vehicles", "car", name, CARS)
-    check_known("vehicles", "fidelity", fidelity, FIDELITIES)
+    kit.check_known("vehicles", "car", name, CARS)
+    kit.check_known("vehicles", "fidelity", fidelity, FIDELITIES)
     return build(CARS[name](), FIDELITIES[fidelity], **options)

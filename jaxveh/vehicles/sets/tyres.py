@@ -7,8 +7,7 @@ import dataclasses
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxveh.tyres import AbstractTyre, MagicFormula, MFTyre, from_property_file, mf_tyre, typical_mf_tyre
-from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
+from jaxveh.tyres import AbstractTyre, MagicFormula, MFTyre, from_property_file, kit, mf_tyre, typical_mf_tyre
 from jaxveh.vehicles.parameter_sets import GENERIC_TYRE
 from jaxveh.vehicles.sets.numbers import TyreNumbers
 
@@ -33,13 +32,13 @@ def wheel_tyre(numbers: TyreNumbers, load: float, radius: float | None = None) -
     tyre = typical_mf_tyre(load, radius=radius)
     along = numbers.cornering_stiffness if numbers.slip_stiffness is None else numbers.slip_stiffness
     scales = {
-        "LKY": numbers.cornering_stiffness / (-TYPICAL_COEFFICIENTS["PKY1"] * load),
+        "LKY": numbers.cornering_stiffness / (-kit.TYPICAL_COEFFICIENTS["PKY1"] * load),
         # Camber's stiffness goes with the slip's, as that of one carcass: with the typical tyre's own, a softened front axle
         # would have twice the rear's camber thrust, and a leaning car 8 % less yaw gain.
-        "LKYC": numbers.cornering_stiffness / (-TYPICAL_COEFFICIENTS["PKY1"] * load),
-        "LKX": along / (TYPICAL_COEFFICIENTS["PKX1"] * load),
-        "LMUX": numbers.friction / TYPICAL_COEFFICIENTS["PDX1"],
-        "LMUY": numbers.friction / TYPICAL_COEFFICIENTS["PDY1"],
+        "LKYC": numbers.cornering_stiffness / (-kit.TYPICAL_COEFFICIENTS["PKY1"] * load),
+        "LKX": along / (kit.TYPICAL_COEFFICIENTS["PKX1"] * load),
+        "LMUX": numbers.friction / kit.TYPICAL_COEFFICIENTS["PDX1"],
+        "LMUY": numbers.friction / kit.TYPICAL_COEFFICIENTS["PDY1"],
         # The car's own number says how hard it rolls.
         "LMY": 0.0,
     }

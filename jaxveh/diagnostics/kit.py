@@ -1,0 +1,16 @@
+"""Numbers that figures share with what they show."""
+
+from jaxveh.diagnostics.observability import UNOBSERVABLE
+from jaxveh.diagnostics.sine_with_dwell import DISPLACED_AFTER, DISPLACED_FROM, DISPLACEMENT, YAW_RATE_LIMITS
+from jaxveh.diagnostics.steady_state import LINEAR_A_Y
+from jaxveh.diagnostics.step_response import RESPONSE_SHARE
+
+__all__ = [
+    "DISPLACED_AFTER",
+    "DISPLACED_FROM",
+    "DISPLACEMENT",
+    "LINEAR_A_Y",
+    "RESPONSE_SHARE",
+    "UNOBSERVABLE",
+    "YAW_RATE_LIMITS",
+]

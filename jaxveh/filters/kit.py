@@ -1,0 +1,113 @@
+"""What those who add a filter or a wrapper build with: the contract, the families' bases, and their tools."""
+
+from jaxveh.filters.choosing import log_of
+from jaxveh.filters.gaussian.belief import GaussianBelief
+from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, AbstractRuleFilter, check_covariances, with_spread
+from jaxveh.filters.gaussian.forms import AbstractForm, Spread
+from jaxveh.filters.gaussian.rules import AbstractRule, Image, Points, Slopes
+from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
+from jaxveh.filters.particle import (
+    AbstractParticleFilter,
+    Drawn,
+    Expected,
+    ParticleBelief,
+    add_noise,
+    check_particle_settings,
+    choose_ancestors,
+    gather,
+    log_prob,
+    make_info,
+)
+from jaxveh.filters.wrappers.base import (
+    AbstractRemembering,
+    AbstractStateless,
+    Remembering,
+    gaussian_of,
+    variances_of,
+    with_gaussian,
+    with_variances,
+)
+from jaxveh.filters.wrappers.innovation import Innovation, innovation
+from jaxveh.filters.wrappers.wavelet import NORMAL_MEDIAN, Window, first_window, row_values, window_after
+from jaxveh.statespace import (
+    AbstractBelief,
+    AbstractFilter,
+    AbstractTwoPartFilter,
+    AbstractTwoPartWrapper,
+    AbstractWrapper,
+    Info,
+    Row,
+    Smoothing,
+    StateSpace,
+)
+from jaxveh.statespace import kit as contract
+
+by_channel = contract.by_channel
+check_noise_by_row = contract.check_noise_by_row
+check_rows_between = contract.check_rows_between
+innermost = contract.innermost
+input_result = contract.input_result
+key_for = contract.key_for
+layers = contract.layers
+presence = contract.presence
+smoothing_of = contract.smoothing_of
+who_lacks = contract.who_lacks
+
+__all__ = [
+    "NORMAL_MEDIAN",
+    "AbstractBelief",
+    "AbstractFilter",
+    "AbstractForm",
+    "AbstractGaussianFilter",
+    "AbstractGaussianWrapper",
+    "AbstractParticleFilter",
+    "AbstractRemembering",
+    "AbstractRule",
+    "AbstractRuleFilter",
+    "AbstractStateless",
+    "AbstractTwoPartFilter",
+    "AbstractTwoPartWrapper",
+    "AbstractWrapper",
+    "Drawn",
+    "Expected",
+    "GaussianBelief",
+    "Image",
+    "Info",
+    "Innovation",
+    "ParticleBelief",
+    "Points",
+    "Remembering",
+    "Row",
+    "Slopes",
+    "Smoothing",
+    "Spread",
+    "StateSpace",
+    "Window",
+    "add_noise",
+    "by_channel",
+    "check_covariances",
+    "check_noise_by_row",
+    "check_particle_settings",
+    "check_rows_between",
+    "choose_ancestors",
+    "first_window",
+    "gather",
+    "gaussian_of",
+    "innermost",
+    "innovation",
+    "input_result",
+    "key_for",
+    "layers",
+    "log_of",
+    "log_prob",
+    "make_info",
+    "presence",
+    "row_values",
+    "smoothing_of",
+    "variances_of",
+    "who_lacks",
+    "window_after",
+    "with_gaussian",
+    "with_spread",
+    "with_variances",
+]

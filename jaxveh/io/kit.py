@@ -1,0 +1,25 @@
+"""What those who read and write further files build with."""
+
+from jaxveh.io.car import CAR_SCHEMA
+from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
+from jaxveh.io.naming import check_known
+from jaxveh.io.optional import require
+from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
+from jaxveh.io.rig_table import RIG_CHANNELS
+from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
+
+__all__ = [
+    "CAR_SCHEMA",
+    "CHANNEL_MAP_SCHEMA",
+    "PROPERTY_UNITS",
+    "RIG_CHANNELS",
+    "Entry",
+    "check_keys",
+    "check_known",
+    "parse_property_file",
+    "read_toml",
+    "require",
+    "toml_number",
+    "toml_string",
+    "toml_text",
+]

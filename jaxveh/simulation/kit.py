@@ -1,0 +1,7 @@
+"""What programs over `simulate` ask for."""
+
+from jaxveh.simulation.simulate import SOLVERS
+
+__all__ = [
+    "SOLVERS",
+]

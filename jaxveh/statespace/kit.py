@@ -1,0 +1,42 @@
+"""What those who add a filter, an observer or a driver build with."""
+
+from jaxveh.statespace.contract import (
+    KEPT,
+    check_noise_by_row,
+    check_rows_between,
+    check_smooths,
+    innermost,
+    key_for,
+    layers,
+    smoothing_of,
+    who_lacks,
+)
+from jaxveh.statespace.dependent_noise import check_fixed
+from jaxveh.statespace.disturbances import DISTURBANCE_PREFIX
+from jaxveh.statespace.draw import draw_rows, schedule_rows
+from jaxveh.statespace.driver import raise_failure, scan_and_keep
+from jaxveh.statespace.measurements import by_channel, input_result, presence
+from jaxveh.statespace.noise import LOG_2PI, whiten
+
+__all__ = [
+    "DISTURBANCE_PREFIX",
+    "KEPT",
+    "LOG_2PI",
+    "by_channel",
+    "check_fixed",
+    "check_noise_by_row",
+    "check_rows_between",
+    "check_smooths",
+    "draw_rows",
+    "innermost",
+    "input_result",
+    "key_for",
+    "layers",
+    "presence",
+    "raise_failure",
+    "scan_and_keep",
+    "schedule_rows",
+    "smoothing_of",
+    "whiten",
+    "who_lacks",
+]
