@@ -14,9 +14,13 @@ from jaxveh.filters.particle import (
     add_noise,
     check_particle_settings,
     choose_ancestors,
+    fate,
+    found_again,
     gather,
+    log_chosen,
     log_prob,
     make_info,
+    without,
 )
 from jaxveh.filters.wrappers.base import (
     AbstractRemembering,
@@ -54,7 +58,6 @@ smoothing_of = contract.smoothing_of
 who_lacks = contract.who_lacks
 
 __all__ = [
-    "NORMAL_MEDIAN",
     "AbstractBelief",
     "AbstractFilter",
     "AbstractForm",
@@ -74,6 +77,7 @@ __all__ = [
     "Image",
     "Info",
     "Innovation",
+    "NORMAL_MEDIAN",
     "ParticleBelief",
     "Points",
     "Remembering",
@@ -90,7 +94,9 @@ __all__ = [
     "check_particle_settings",
     "check_rows_between",
     "choose_ancestors",
+    "fate",
     "first_window",
+    "found_again",
     "gather",
     "gaussian_of",
     "innermost",
@@ -98,6 +104,7 @@ __all__ = [
     "input_result",
     "key_for",
     "layers",
+    "log_chosen",
     "log_of",
     "log_prob",
     "make_info",
@@ -110,4 +117,5 @@ __all__ = [
     "with_gaussian",
     "with_spread",
     "with_variances",
+    "without",
 ]
