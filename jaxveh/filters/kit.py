@@ -58,6 +58,7 @@ smoothing_of = contract.smoothing_of
 who_lacks = contract.who_lacks
 
 __all__ = [
+    "NORMAL_MEDIAN",
     "AbstractBelief",
     "AbstractFilter",
     "AbstractForm",
@@ -77,7 +78,6 @@ __all__ = [
     "Image",
     "Info",
     "Innovation",
-    "NORMAL_MEDIAN",
     "ParticleBelief",
     "Points",
     "Remembering",

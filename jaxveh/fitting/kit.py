@@ -4,7 +4,7 @@ from jaxveh.fitting.rig_data import LEAST_NOISE
 from jaxveh.fitting.rig_ranges import measured_ranges, widened_ranges
 from jaxveh.fitting.rig_robust import FAR_RESIDUAL
 from jaxveh.fitting.rig_stages import HELD_COEFFICIENTS, varying_inputs
-from jaxveh.fitting.rig_start import RIG_STARTS
+from jaxveh.fitting.rig_start import RIG_STARTS, RigFacts
 from jaxveh.fitting.segments import cut_rows
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "HELD_COEFFICIENTS",
     "LEAST_NOISE",
     "RIG_STARTS",
+    "RigFacts",
     "cut_rows",
     "measured_ranges",
     "varying_inputs",

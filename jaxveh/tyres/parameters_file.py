@@ -18,6 +18,7 @@ from jaxveh.tyres.exponential import Exponential
 from jaxveh.tyres.fiala import Fiala
 from jaxveh.tyres.fiala_adams import FialaADAMS
 from jaxveh.tyres.hsri import HSRI
+from jaxveh.tyres.isotropic import IsotropicMagicFormula
 from jaxveh.tyres.linear import Linear
 from jaxveh.tyres.linear_with_load import LinearWithLoad
 from jaxveh.tyres.magic_formula import MagicFormula
@@ -27,7 +28,8 @@ from jaxveh.tyres.unitire import UniTire
 MODELS: dict[str, type[AbstractTyre]] = {
     law.__name__: law
     for law in (
-        Arctangent, Brush, Dugoff, Exponential, Fiala, FialaADAMS, HSRI, Linear, LinearWithLoad, MagicFormula, Parabolic, UniTire,
+        Arctangent, Brush, Dugoff, Exponential, Fiala, FialaADAMS, HSRI, IsotropicMagicFormula, Linear,
+        LinearWithLoad, MagicFormula, Parabolic, UniTire,
     )
 }  # fmt: skip
 """The laws whose parameters are one number each, or a word."""

@@ -18,12 +18,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from families import left_out
 from filter_systems import kalman, linear_model, linear_recording
 
 from jaxveh import InputError, Recording, filters
 from jaxveh import statespace as ss
 from jaxveh._core.names import record_type
 from jaxveh.filters import Covariance, SingularValues, SquareRoot
+from jaxveh.numerics import sigma_points
 
 N = 200
 
@@ -65,6 +67,7 @@ FILTERS = {
     "Cubature, square root": Line(lambda: filters.Cubature(form=SquareRoot()), seldom=True),
     "Cubature, singular values": Line(lambda: filters.Cubature(form=SingularValues()), differentiable=False),
     "Cubature of degree 5": Line(lambda: filters.Cubature(degree=5), seldom=True),
+    "own points": Line(lambda: filters.SigmaPointFilter(sigma_points.unscented), seldom=True),
     "Gauss-Hermite": Line(lambda: filters.GaussHermite(), seldom=True),
     "Iterated Extended": Line(lambda: filters.Iterated(filters.Extended()), seldom=True),
     "Iterated Cubature": Line(lambda: filters.Iterated(filters.Cubature(form=SquareRoot()), 2)),
@@ -82,6 +85,7 @@ FILTERS = {
     "federated by trace": Line(
         lambda: filters.Federated(filters.Cubature(form=SquareRoot()), GROUPS, by_trace=True), seldom=True
     ),
+    "paused": Line(lambda: filters.Paused(filters.Cubature(), "force", {"x0": 1.0}), exact=False),
     "interacting, equal": Line(
         lambda: filters.InteractingModels(filters.Cubature(), (same, same), CHANGES), seldom=True
     ),
@@ -139,6 +143,20 @@ FILTERS = {
         seldom=True,
     ),
 }
+
+
+EXEMPT = {
+    "VaryingNoise": "its input must be a spread, which the force of these recordings is not: test_data_reality, and around each "
+    "filter here test_every_capability",
+}
+
+
+def test_every_filter_form_and_look_ahead_of_the_package_is_here():
+    made = [line.make() for line in FILTERS.values()]
+    assert not left_out("filters", filters.AbstractFilter, made, EXEMPT)
+    assert not left_out("filters", filters.AbstractForm, made, {})
+    default = {"PredictiveLikelihood": "what the auxiliary filter looks ahead with unless it is told"}
+    assert not left_out("filters", filters.AbstractLookahead, made, default)
 
 
 def linear(seed=3):

@@ -13,13 +13,10 @@ from test_every_filter import FILTERS, linear
 
 from jaxveh import InputError, filters
 from jaxveh.filters.wrappers.base import AbstractStateless, gaussian_of
-from jaxveh.numerics import sigma_points
 from jaxveh.statespace.contract import Smoothing, smoothing_of
 
 ROWS = 8
 TABLE = {name: line.make for name, line in FILTERS.items()} | {
-    "own points": lambda: filters.SigmaPointFilter(sigma_points.unscented),
-    "paused": lambda: filters.Paused(filters.Cubature(), "force", {"x0": 1.0}),
     "varying noise": lambda: filters.VaryingNoise(filters.Cubature(), {"y0": "force"}),
 }
 SMOOTHED = [name for name, make in TABLE.items() if smoothing_of(make()) is Smoothing.gaussian]

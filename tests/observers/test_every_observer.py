@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from families import left_out
 from observer_systems import Swing, Theta, drive, mass, pendulum, regression, see_curve, without
 
 from jaxveh import observers
@@ -86,6 +87,15 @@ STARTS = {
     "line": lambda: (regression(), Theta(2.0, -1.0)),
     "curve": lambda: (regression(see_curve, spread=1.0), Theta(0.7, -1.0)),
 }
+
+
+def test_every_observer_of_the_package_is_here():
+    start = lambda name, line: STARTS[line.models[0]]()[0]
+    prepared = lambda name, line: line.prepare(start(name, line)) if line.prepare else start(name, line)
+    made = [line.make(prepared(name, line)) for name, line in OBSERVERS.items()]
+    assert not left_out("observers", observers.AbstractObserver, made, {})
+
+
 FULL = (("adaptive", "pendulum"), ("least squares", "curve"), ("least squares, several", "line"))
 """What another line says as well."""
 

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from families import left_out
 
 from jaxveh import roads, statespace
 
@@ -47,6 +48,10 @@ ROADS = {
     "SplitMu": Line(lambda: roads.SplitMu(1.0, 0.3, 0.4), across=True, smooth=2),
     **{f"named {name}": Line(entry.make, along=None, across=None) for name, entry in roads.ROADS.items()},
 }  # fmt: skip
+
+
+def test_every_road_of_the_package_is_here():
+    assert not left_out("roads", roads.AbstractRoad, [line.make() for line in ROADS.values()], {})
 
 
 @pytest.fixture(params=ROADS)

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from families import left_out
 from sensor_truth import truth
 
 from jaxveh import InputError, sensors, statespace
@@ -81,6 +82,11 @@ DEVICES = {
         lambda **c: sensors.Renamed(light(**c), {"a_x": "second"}), lambda d: d.device.signals["a_x"].bias
     ),
 }
+
+
+def test_every_device_of_the_package_is_here():
+    made = [one.make(rate=50.0, delay=0.013, phase=0.004) for one in DEVICES.values()]
+    assert not left_out("sensors", sensors.AbstractDevice, made, {})
 
 
 @pytest.fixture(params=DEVICES)

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from families import left_out
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shared_data import shared
@@ -35,6 +36,12 @@ TYRES = {
     "LuGre": lambda: tyres.LuGre(200.0, 150.0, 1.1, 0.8, 6.0),
     "LuGre, damped": lambda: tyres.LuGre(200.0, 150.0, 1.1, 0.8, 6.0, 0.15, 0.2, 0.3, 1e-3, 0.5),
 }
+
+
+def test_every_tyre_with_states_of_the_package_is_here():
+    assert not left_out("tyres", tyres.AbstractDynamicTyre, [make() for make in TYRES.values()], {})
+
+
 RELAXED = [name for name in TYRES if name.startswith("Relaxed")]
 LUGRE = [name for name in TYRES if name.startswith("LuGre")]
 

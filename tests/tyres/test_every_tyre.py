@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from families import left_out, members
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shared_data import shared
@@ -36,16 +37,26 @@ def tmeasy(twice=True):
     return tyres.TMeasy(*one, 3000.0, *(two if twice else ()), trail=tyres.TMeasyTrail(0.035, 0.20, 0.45))
 
 
+def across():
+    return tyres.MagicFormula(10.0, 1.4, 0.9 * LOAD, -0.8, nominal_load=LOAD)
+
+
+def along():
+    return tyres.Longitudinal(tyres.MagicFormula(12.0, 1.6, 1.1 * LOAD, 0.3, nominal_load=LOAD))
+
+
 class Law(NamedTuple):
     """A tyre and what it can do.
 
-    `bound` is the most force over load (None: no bound), `combined` whether it has longitudinal forces, `symmetric` whether a
-    mirror turns it, `load` whether it needs a load, `friction` whether the road's friction counts.
+    `bound` is the most force over load (None: no bound), `combined` whether it has longitudinal forces, `lateral` whether it has
+    lateral ones, `symmetric` whether a mirror turns it, `load` whether it needs a load, `friction` whether the road's friction
+    counts.
     """
 
     make: Callable[[], tyres.AbstractTyre]
     bound: float | None = 0.9
     combined: bool = True
+    lateral: bool = True
     symmetric: bool = True
     load: bool = True
     friction: bool = True
@@ -63,19 +74,28 @@ LAWS = {
     "FialaADAMS": Law(lambda: tyres.FialaADAMS(80000.0, 60000.0, 0.9, 0.7), bound=0.9 * np.sqrt(2)),
     "FialaPolynomial": Law(lambda: tyres.FialaPolynomial(80000.0, 60000.0, 0.9), bound=0.9 * np.hypot(1, 1.00631)),
     "HSRI": Law(lambda: tyres.HSRI(80000.0, 60000.0, 0.9)),
+    "FrictionEllipse": Law(lambda: tyres.FrictionEllipse(along(), across()), bound=np.hypot(1.1, 0.9)),
     "IsotropicMagicFormula": Law(lambda: tyres.IsotropicMagicFormula(10.0, 1.4, 0.9, 0.2)),
     "Linear": Law(lambda: tyres.Linear(60000.0, 80000.0), bound=None, load=False, friction=False),
     "LinearWithLoad": Law(lambda: tyres.LinearWithLoad(60000.0, 5000.0, 20.0), bound=None, friction=False),
+    "Longitudinal": Law(along, bound=1.1, lateral=False),
     "MF-Tyre": Law(mf_tyre, bound=None, symmetric=False),
     "MagicFormula": Law(lambda: tyres.MagicFormula(10.0, 1.4, 3600.0, -0.8, nominal_load=LOAD), combined=False),
     "Mirrored": Law(lambda: tyres.Mirrored(tyres.Brush(80000.0, 60000.0, 0.9))),
+    "OnRoad": Law(lambda: tyres.OnRoad(tyres.Brush(80000.0, 60000.0, 0.9), 0.5), bound=0.45),
     "Parabolic": Law(lambda: tyres.Parabolic(60000.0, 0.9, 80000.0)),
     "Parabolic, lateral": Law(lambda: tyres.Parabolic(60000.0, 0.9), combined=False),
+    "Similarity": Law(lambda: tyres.Similarity(across(), LOAD, slip_stiffness_ratio=1.3)),
     # Its friction is greatest without load.
     "TMeasy": Law(tmeasy, bound=(2 * 3300 - 6000 / 2) / 3000),
     "TMeasy, one load": Law(lambda: tmeasy(twice=False), bound=3300 / 3000),
     "UniTire": Law(lambda: tyres.UniTire(80000.0, 60000.0, 0.9, 0.4)),
 }
+
+
+def test_every_law_of_the_package_is_here():
+    dynamic = dict.fromkeys(members("tyres", tyres.AbstractDynamicTyre), "has states: test_every_dynamic_tyre")
+    assert not left_out("tyres", tyres.AbstractTyre, [law.make() for law in LAWS.values()], dynamic)
 
 
 def those(**able):
@@ -161,7 +181,8 @@ def test_a_load_that_is_needed_and_not_given_raises(name):
 
 
 def test_signs_are_those_of_the_package(law, tyre):
-    assert tyre.forces(contact(0.03)).F_y > 0 > tyre.forces(contact(-0.03)).F_y
+    if law.lateral:
+        assert tyre.forces(contact(0.03)).F_y > 0 > tyre.forces(contact(-0.03)).F_y
     # The trail turns the wheel towards its course.
     assert float(tyre.forces(contact(0.03)).M_z) <= 0
     if law.combined:
@@ -229,12 +250,22 @@ def test_gradients_equal_differences(name, angle, ratio, load):
     assert np.max(error) < 2e-5
 
 
-@pytest.mark.parametrize("name", [name for name in LAWS if name not in ("MF-Tyre", "Mirrored")])
+def positive_parameters(name):
+    """The fields of its own that must be positive: none of MF-Tyre, nor of what is made of other laws."""
+    fields = dataclasses.fields(LAWS[name].make())
+    return [field for field in fields if isinstance(field.metadata.get("domain"), Positive)]
+
+
+def test_every_law_but_those_made_of_others_has_a_positive_parameter():
+    assert {name for name in LAWS if not positive_parameters(name)} == {
+        "FrictionEllipse", "Longitudinal", "MF-Tyre", "Mirrored"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [name for name in LAWS if positive_parameters(name)])
 def test_bad_parameters_are_named(name):
     tyre = LAWS[name].make()
-    positive = [field for field in dataclasses.fields(tyre) if isinstance(field.metadata.get("domain"), Positive)]
-    assert positive
-    for field in positive:
+    for field in positive_parameters(name):
         for bad in (-1.0, 0.0, np.inf):
             if getattr(tyre, field.name) is None:
                 continue

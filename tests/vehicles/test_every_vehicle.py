@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from families import left_out
 from four_wheel_cars import drive as driven
 
 from jaxveh import InputError, manoeuvres, statespace, tyres, vehicles
@@ -102,6 +103,10 @@ CARS = {
         lambda: eqx.tree_at(lambda c: (c.front, c.rear), fourteen(), (tyres.Relaxed(shifted_mf()), shifted_mf())), heavy=True
     ),
     "Kinematic": Car(lambda: vehicles.Kinematic(2.6, 1.4), told_speed=True, friction=False, slope=False),
+    "KinematicCrawl": Car(
+        lambda: vehicles.KinematicCrawl(vehicles.linear_single_track(vehicles.passenger_car())),
+        told_speed=True, friction=False, slope=False,
+    ),
     "KinematicTrailer": Car(lambda: vehicles.KinematicTrailer(3.6, 8.1), told_speed=True, friction=False, slope=False),
     "LinearSingleTrack": Car(
         lambda: vehicles.linear_single_track(vehicles.passenger_car()), told_speed=True, friction=False, slope=False
@@ -130,6 +135,11 @@ CARS = {
     "TwoTrack3DOF": Car(lambda: planar(vehicles.TwoTrack3DOF)),
     "TwoTrack3DOF, four motors": Car(lambda: planar(vehicles.TwoTrack3DOF, drive=vehicles.FourMotors())),
 }  # fmt: skip
+
+
+def test_every_vehicle_of_the_package_is_here():
+    assert not left_out("vehicles", vehicles.AbstractVehicle, [car.make() for car in CARS.values()], {})
+
 
 LIGHT = [name for name, car in CARS.items() if not car.heavy]
 LATERAL = [name for name, car in CARS.items() if car.lateral]

@@ -1,0 +1,97 @@
+"""What programs know by name: each registry has every member of its family, or there is a reason why not."""
+
+import inspect
+import pathlib
+
+import jax
+import pytest
+from families import kinds_in, members
+
+import jaxveh
+from jaxveh import experiments, fitting, manoeuvres, roads, tyres, vehicles
+from jaxveh.cli.reproduce import PAPERS
+from jaxveh.tyres.parameters_file import MODELS
+
+OF_OTHERS = "is made of other laws, whose files are theirs"
+ONE_LAW = ("FrictionEllipse", "Longitudinal", "Mirrored", "OnRoad", "Relaxed", "Similarity")
+
+
+def test_a_parameter_file_holds_every_law_of_plain_numbers():
+    exempt = dict.fromkeys(ONE_LAW, OF_OTHERS) | {
+        "FialaPolynomial": "has a switch for the paper's misprint, which is no law to hand on",
+        "LuGre": "has a choice that is neither a number nor a word",
+        "MFTyre": "has a property file of its own",
+        "TMeasy": "has a curve for each direction and load, and no flat table of numbers",
+    }
+    assert members("tyres", tyres.AbstractTyre) == set(MODELS) | set(exempt)
+    assert not set(MODELS) & set(exempt)
+
+
+def test_a_rig_fit_starts_from_every_law_that_a_rig_can_tell():
+    facts = fitting.kit.RigFacts(4000.0, 220e3, 16.7, 80e3, 60e3, 1.0)
+    started = {type(make(facts)).__name__ for make in fitting.kit.RIG_STARTS.values()}
+    exempt = dict.fromkeys(ONE_LAW, OF_OTHERS) | {
+        "Arctangent": "has no peak, which a rig shows",
+        "Exponential": "its sideways part alone saturates; fit it from a tyre of one's own (--start)",
+        "FialaADAMS": "its second friction is seen far beyond the peak alone: --start",
+        "FialaPolynomial": "the brush model without its trail: brush",
+        "IsotropicMagicFormula": "one curve for both directions, which a rig contradicts: mf",
+        "Linear": "has no load, over which a rig varies: linear-with-load",
+        "LuGre": "a rig of steady slips shows nothing of its states",
+        "Parabolic": "the brush model by another name: brush",
+        "TMeasy": "its curves are read off by hand, not fitted",
+    }
+    assert members("tyres", tyres.AbstractTyre) == started | set(exempt)
+    assert not started & set(exempt)
+
+
+def test_every_manoeuvre_has_a_name():
+    made = [name.replace("-", "_") for name in manoeuvres.MANOEUVRES]
+    kinds = (manoeuvres.AbstractManoeuvre, manoeuvres.AbstractDriver)
+    public = [
+        name
+        for name in manoeuvres.__all__
+        if inspect.isfunction(getattr(manoeuvres, name))
+        and str(inspect.signature(getattr(manoeuvres, name)).return_annotation).split(".")[-1]
+        in {one for kind in kinds for one in members("manoeuvres", kind) | {kind.__name__}}
+    ]
+    exempt = {
+        "as_driver": "makes a driver of any manoeuvre",
+        "named_manoeuvre": "finds them by name",
+        "replay": "needs a recording (--replay)",
+    }
+    assert set(public) - set(exempt) == set(made)
+
+
+def test_every_road_has_a_name():
+    named = set().union(
+        *(kinds_in(road.make(key=jax.random.key(0)) if road.random else road.make(), roads.AbstractRoad)
+          for road in roads.ROADS.values())
+    )  # fmt: skip
+    exempt = {"Combined": "joins others", "Hill": "a road file has its heights", "Profile": "is what a road file makes"}
+    assert members("roads", roads.AbstractRoad) == named | set(exempt)
+
+
+def test_every_paper_has_a_name():
+    folders = {path.parent.name for path in pathlib.Path(experiments.__file__).parent.glob("*/__init__.py")}
+    assert folders == {name.replace("-", "_") for name in PAPERS}
+    assert folders <= set(experiments.__all__)
+
+
+def test_every_vehicle_can_be_made_by_name():
+    kinds = {kind.__name__ for kind in vehicles.kit.FIDELITIES.values() if inspect.isclass(kind)}
+    exempt = {
+        "Commanded": "goes around another: asked for by its inputs",
+        "KinematicCrawl": "goes around the linear single track at a crawl",
+        "KinematicTrailer": "is a car of another file (CommonRoad's trailer)",
+        "LinearSingleTrack": "linear: made of the single track",
+        "Steered": "goes around another: --steering",
+        "Travelling": "goes around another, which it gives a place",
+    }
+    assert members("vehicles", vehicles.AbstractVehicle) == kinds | set(exempt)
+
+
+@pytest.mark.parametrize("room", ["filters", "observers", "tyres", "vehicles", "sensors", "roads", "manoeuvres"])
+def test_every_family_has_its_file(room):
+    assert list((pathlib.Path(__file__).parents[1] / room).glob("test_every_*.py"))
+    assert hasattr(jaxveh, room)
