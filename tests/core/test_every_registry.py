@@ -19,7 +19,7 @@ ONE_LAW = ("FrictionEllipse", "Longitudinal", "Mirrored", "OnRoad", "Relaxed", "
 def test_a_parameter_file_holds_every_law_of_plain_numbers():
     exempt = dict.fromkeys(ONE_LAW, OF_OTHERS) | {
         "FialaPolynomial": "has a switch for the paper's misprint, which is no law to hand on",
-        "LuGre": "has a choice that is neither a number nor a word",
+        "LuGre": "has an exponent that is fixed when compiling",
         "MFTyre": "has a property file of its own",
         "TMeasy": "has a curve for each direction and load, and no flat table of numbers",
     }
