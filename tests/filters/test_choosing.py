@@ -8,7 +8,7 @@ import pytest
 from filter_systems import linear_model
 from test_every_filter import batch, kalman_of, pendulum, recordings
 
-from jaxveh import InputError, filters
+from jaxveh import InputError, filters, numerics
 from jaxveh import statespace as ss
 from jaxveh._core.names import record_type
 from jaxveh.filters.choosing import distances, log_of, score, transport_plan
@@ -91,6 +91,32 @@ class TestTransport:
         value = jax.jit(lambda scale: filters.scan(filter_, with_(scale), rows, jax.random.key(2)).log_likelihood)
         difference = (value(1.0 + 1e-6) - value(1.0 - 1e-6)) / 2e-6
         np.testing.assert_allclose(jax.jit(jax.grad(value))(1.0), difference, rtol=1e-5)
+
+    def test_a_plan_that_misplaces_weight_is_told_however_far_the_particles_are_spread(self):
+        rng = np.random.default_rng(3)
+        particles = record_type("P", ("x",))(jnp.asarray(rng.normal(size=30)))
+        weights = jnp.asarray(rng.dirichlet(np.full(30, 0.2)))
+        few, many = filters.Transport(1e-3, 1), filters.Transport(0.3, 500)
+        assert not few.moved(particles, weights)[1] and many.moved(particles, weights)[1]
+        # All weight on one particle: nothing is misplaced by a plan that is of other weights.
+        one = jnp.zeros(30).at[4].set(1.0)
+        assert not filters.Transport(0.3, 500, 10.0).moved(particles, one)[1]
+
+    def test_without_a_plan_it_is_the_bootstrap_filter_value_and_gradient(self):
+        model, rows, _ = one()
+        never = filters.Transport(0.3, 1, 1e-12)
+        with_ = lambda scale: eqx.tree_at(lambda m: m.system["A"], model, scale * model.system["A"])
+        of = lambda scheme: jax.jit(
+            jax.value_and_grad(
+                lambda scale: (
+                    filters.scan(
+                        filters.ParticleFilter(40, scheme), with_(scale), rows, jax.random.key(2)
+                    ).log_likelihood
+                )
+            )
+        )(1.0)
+        found, plain = of(never), of(numerics.systematic)
+        np.testing.assert_allclose(found, plain, rtol=1e-9)
 
     def test_it_is_for_the_bootstrap_filter_alone(self):
         for make in (

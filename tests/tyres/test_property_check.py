@@ -1,10 +1,14 @@
 """What is worth a look in a property file: each finding once, and no alarm for good files."""
 
+import re
+
+import numpy as np
 import pytest
 from shared_data import shared, shared_names
 
 from jaxveh import tyres
 from jaxveh.io.property_file import parse_property_file
+from jaxveh.tyres import Contact, property_check
 
 GOOD = """\
 [UNITS]
@@ -166,6 +170,37 @@ def test_a_good_file_gives_no_alarm(text):
 def test_each_finding(old, new, expected):
     assert old in GOOD
     assert any(line.startswith(expected) for line in found(GOOD.replace(old, new, 1))), found(GOOD.replace(old, new, 1))
+
+
+@pytest.mark.parametrize("name", ["F_x", "F_y"])
+def test_what_is_left_of_a_force_is_the_share_of_it_alone(name):
+    """The number of a finding, computed anew: the least over the other slip, at the load and the slip that it names."""
+    about, text = ("RCX1 = 0.9", "slip angle of") if name == "F_x" else ("RCY1 = 1\n", "slip ratio of")
+    text = GOOD.replace(about, f"{about.split()[0]} = 1.6\n")
+    [line] = [line for line in found(text) if f"turn {name} round" in line]
+    share, load, slip = map(
+        float, re.search(r"round: (\S+) of it is left at (\S+) N and a slip \w+ of ([-\d.]+)", line).groups()
+    )
+    tyre = tyres.from_property_file(parse_property_file(text))
+    steps = np.linspace(0.05, 1.0, 400)
+    angle, ratio = (np.radians(slip), -0.5 * steps) if name == "F_x" else (0.5 * steps, slip)
+    forces = lambda a, k: tyre.forces(Contact(*np.broadcast_arrays(a, k), load * np.ones(400), speed=16.7))
+    if name == "F_x":
+        left = forces(angle, ratio).F_x / forces(0.0, ratio).F_x
+    else:
+        between = lambda k: forces(angle, k).F_y - forces(-angle, k).F_y
+        left = between(ratio) / between(0.0)
+    np.testing.assert_allclose(np.min(left), share, rtol=0.02)
+
+
+def test_loads_are_looked_at_from_a_tenth_to_three_times_the_nominal_one():
+    wide = tyres.from_property_file(parse_property_file(GOOD.replace("FZMAX = 10000", "FZMAX = 1e5")))
+    loads = property_check._loads(wide)
+    np.testing.assert_allclose([loads[0], loads[-1]], [400.0, 12000.0])
+    narrow = property_check._loads(
+        tyres.from_property_file(parse_property_file(GOOD.replace("FZMIN = 100\n", "FZMIN = 900\n")))
+    )
+    np.testing.assert_allclose([narrow[0], narrow[-1]], [900.0, 10000.0])
 
 
 def test_neutral_coefficients_that_are_not_read_are_no_alarm():
