@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxveh._core.parameter import resolve
 from jaxveh.fitting import RigProblem, rig_problem, rig_stages
-from jaxveh.fitting.problem import Found
+from jaxveh.fitting.problem import SearchEnd
 from jaxveh.fitting.rig_data import leaf_of
 from jaxveh.tyres import mf_tyre
 
@@ -65,7 +65,7 @@ def make_rig(count: int, seed: int = 0) -> Rig:
     return Rig(given, forces + NOISE * rng.standard_normal(forces.shape), start)
 
 
-def ours_compiled(rig: Rig) -> tuple[RigProblem, Callable[[], Found]]:
+def ours_compiled(rig: Rig) -> tuple[RigProblem, Callable[[], SearchEnd]]:
     """The problem as the joint stage of `fit_rig` states it, and its fit."""
     law = _started(rig.start)
     parameters = resolve(law, lambda law: [leaf_of(law, name) for name in _names()])

@@ -57,11 +57,11 @@ def tyre(dtype: np.typing.DTypeLike, coefficients: Mapping[str, float] = COEFFIC
     """The tyre of these coefficients, as a property file of them would give it."""
     sections = (
         mf_tyre.Structure,
-        mf_tyre.Longitudinal,
-        mf_tyre.Lateral,
-        mf_tyre.Aligning,
-        mf_tyre.Overturning,
-        mf_tyre.Rolling,
+        mf_tyre.LongitudinalCoefficients,
+        mf_tyre.LateralCoefficients,
+        mf_tyre.AligningCoefficients,
+        mf_tyre.OverturningCoefficients,
+        mf_tyre.RollingCoefficients,
         mf_tyre.Scaling,
         mf_tyre.Ranges,
     )

@@ -43,7 +43,7 @@ def filled(recording: Recording, max_gap: float | None) -> Recording:
     return recording
 
 
-class Parts(NamedTuple):
+class LogParts(NamedTuple):
     """A log in parts: the `calibration` span (or None), the rows to `estimate`, and all channels of those as `truth`."""
 
     calibration: Recording | None
@@ -53,7 +53,7 @@ class Parts(NamedTuple):
 
 def split(
     recording: Recording, span: tuple[float, float] | None, calibrate_on: Sequence[str] = (), truth: str | None = None
-) -> Parts:
+) -> LogParts:
     """Cut a log: the span with the blind channels and `calibrate_on`; the rows after it with the blind channels alone.
 
     A channel named as `truth` is NaN wherever an estimator could see it, but for `calibrate_on` inside the span.
@@ -66,7 +66,7 @@ def split(
     if calibrate_on and span is None:
         raise InputError(f"--calibrate-on {calibrate_on[0]}: needs a span; add --calibrate START:END.")
     if span is None:
-        return Parts(None, _seen(recording, (), truth), recording)
+        return LogParts(None, _seen(recording, (), truth), recording)
     time = np.asarray(recording.time)
     if not span[1] <= time[-1]:
         raise InputError(
@@ -75,7 +75,7 @@ def split(
         )
     rest = recording.between(span[1], np.inf)
     inside = _seen(recording.between(*span), tuple(calibrate_on), None if truth in calibrate_on else truth)
-    return Parts(inside, _seen(rest, (), truth), rest)
+    return LogParts(inside, _seen(rest, (), truth), rest)
 
 
 def calibration_part(recording: Recording, span: tuple[float, float] | None, calibrate_on: Sequence[str]) -> Recording:

@@ -10,7 +10,7 @@ from jaxveh._core.errors import check_one_of
 from jaxveh.vehicles import kit
 
 
-class Noise(NamedTuple):
+class NoiseOption(NamedTuple):
     """Standard deviations of the stability control's sensors: rad/s and m/s^2."""
 
     yaw_rate: float
@@ -20,7 +20,7 @@ class Noise(NamedTuple):
 class Fitted(NamedTuple):
     """How to make what is in the car, and what to say about it."""
 
-    make: Callable[[Any, Noise], Any]
+    make: Callable[[Any, NoiseOption], Any]
     help: str
 
 
@@ -42,7 +42,7 @@ DEVICES: dict[str, Fitted] = {
 """What can be in the car, by name."""
 
 
-def devices_of(name: str, car: Any, noise: Noise) -> Any:
+def devices_of(name: str, car: Any, noise: NoiseOption) -> Any:
     """The sensors or devices of a name in `DEVICES`; raises `InputError` for another."""
     check_one_of("--devices", name, DEVICES)
     return DEVICES[name].make(car, noise)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh import InputError, Recording, diagnostics
 from jaxveh.cli.console import number, results
 from jaxveh.cli.failure import say
-from jaxveh.cli.manoeuvre import Asked, course_of, understeer_of, width_of
+from jaxveh.cli.manoeuvre import AskedManoeuvre, course_of, understeer_of, width_of
 from jaxveh.cli.output import make_folder
 from jaxveh.diagnostics import drive_channels
 from jaxveh.manoeuvres import clearance
@@ -39,12 +39,12 @@ def steer_at_03g(car: Any) -> float | None:
     return steer if steer > 0 else None
 
 
-def _commanded(asked: Asked, car: Any) -> float | None:
+def _commanded(asked: AskedManoeuvre, car: Any) -> float | None:
     """The steer at 0.3 g where the manoeuvre's steer is counted in it."""
     return steer_at_03g(car) if asked.name == "sine-with-dwell" else None
 
 
-def numbers_of(recording: Recording, asked: Asked, car: Any) -> dict[str, dict[str, Any]]:
+def numbers_of(recording: Recording, asked: AskedManoeuvre, car: Any) -> dict[str, dict[str, Any]]:
     """Numbers by title and name, SI; where the drive does not carry its standard's, the peaks alone and a warning why."""
     try:
         found = diagnostics.drive_numbers(recording, asked.name, wheelbase_of(car), steer_at_03g=_commanded(asked, car))
@@ -80,7 +80,7 @@ def _missing(value: Any) -> bool:
     return value is not None and not isinstance(value, bool | np.bool_) and np.isnan(value)
 
 
-def draw(recording: Recording, asked: Asked, car: Any, out: Path) -> list[Path]:
+def draw(recording: Recording, asked: AskedManoeuvre, car: Any, out: Path) -> list[Path]:
     """Write the figures into a folder and return their paths."""
     from jaxveh import plots
 

@@ -36,7 +36,7 @@ NOT_SET = {"speed": "--speed", "to_speed": "--speed", "steer": "--steer-deg", "d
 """What has an option of its own."""
 
 
-class Asked(NamedTuple):
+class AskedManoeuvre(NamedTuple):
     """A manoeuvre as the command line asks for it."""
 
     name: str
@@ -47,7 +47,7 @@ class Asked(NamedTuple):
 
 def asked(
     name: str, speed: float | None, steer_deg: float | None, duration: float | None, settings: Sequence[str], car: Any
-) -> Asked:
+) -> AskedManoeuvre:
     """The manoeuvre of a name with usual values for what is None, its `name=value` settings, and what it wants of the car.
 
     Raises `InputError` for an unknown manoeuvre or setting, and for a setting that is no number.
@@ -57,17 +57,17 @@ def asked(
     options = {**_of_car(name, car), **_settings(name, settings)}
     if duration is not None:
         options["duration"] = duration
-    return Asked(
+    return AskedManoeuvre(
         name, usual_speed if speed is None else speed, usual_steer if steer_deg is None else steer_deg, options
     )
 
 
-def make(one: Asked, key: jax.Array) -> Any:
+def make(one: AskedManoeuvre, key: jax.Array) -> Any:
     """The manoeuvre or driver; `key` for random ones."""
     return manoeuvres.named_manoeuvre(one.name, one.speed, math.radians(one.steer_deg), key, **one.options)
 
 
-def course_of(one: Asked) -> Course | None:
+def course_of(one: AskedManoeuvre) -> Course | None:
     """The cones that the manoeuvre goes through, None where there are none."""
     options = {**manoeuvre_options(one.name), **one.options}
     if one.name == "slalom-course":
@@ -78,7 +78,7 @@ def course_of(one: Asked) -> Course | None:
     return makers[one.name](width_of(one), options["start"])
 
 
-def width_of(one: Asked) -> float:
+def width_of(one: AskedManoeuvre) -> float:
     """The width of the car that the course is made for, m; where it has none of its own, that of the ISO lane change."""
     return {**manoeuvre_options("iso-lane-change"), **manoeuvre_options(one.name), **one.options}["width"]
 

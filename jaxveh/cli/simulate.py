@@ -13,7 +13,7 @@ from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh.cli import manoeuvre as driving
 from jaxveh.cli import options
 from jaxveh.cli.console import progress, results, table
-from jaxveh.cli.devices import DEVICES, Noise, devices_of
+from jaxveh.cli.devices import DEVICES, NoiseOption, devices_of
 from jaxveh.cli.drive_report import draw, numbers_of, print_numbers
 from jaxveh.cli.output import check_product, check_report, write_numbers
 from jaxveh.cli.vehicle import BUILT_IN, first_line, vehicle_of
@@ -90,7 +90,7 @@ def simulate(
     drive_key, road_key, sensor_key = jax.random.split(jax.random.key(seed), 3)
     driver = driving.make(asked, drive_key)
     ground = None if road == "level" else roads.named_road(road, road_key)
-    fitted = devices_of(devices, car, Noise(yaw_rate_std, a_y_std))
+    fitted = devices_of(devices, car, NoiseOption(yaw_rate_std, a_y_std))
     with progress("simulate") as report:
         report(0, 1, f"{manoeuvre} (compiling)")
         recording = simulation.simulate(

@@ -201,7 +201,7 @@ def _law(origin: Origin, rig: io.RigTable) -> tyres.AbstractTyre:
 
 def _write(
     fit: fitting.RigFit, rig: io.RigTable, origin: Origin, side: Side | None, note: str, product: Path, force: bool
-) -> list[tyres.Finding]:
+) -> list[tyres.PropertyFinding]:
     """Write the tyre; what is worth a look in a property file."""
     tyre = fit.tyre
     if not isinstance(tyre, tyres.MFTyre):

@@ -20,7 +20,9 @@ UNITS = {"F_x": "N", "F_y": "N", "M_x": "N m", "M_y": "N m", "M_z": "N m"}
 UNSEEN, WEAK, SET = "not identified", "uncertain", "held"
 
 
-def show(fit: RigFit, start: tyres.AbstractTyre, findings: list[tyres.Finding], robust: bool = False) -> dict[str, Any]:
+def show(
+    fit: RigFit, start: tyres.AbstractTyre, findings: list[tyres.PropertyFinding], robust: bool = False
+) -> dict[str, Any]:
     """Print tables and warnings; returns every number for the JSON file. `start`: the tyre before the fit; `robust`: as in
     `fit_rig`."""
     parameters, size = _parameters(fit), _sizes(fit)

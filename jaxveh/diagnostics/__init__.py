@@ -8,7 +8,7 @@ from jaxveh.diagnostics.consistency import Consistency, nees, nis, nis_by_channe
 from jaxveh.diagnostics.drive_numbers import Peaks, drive_numbers, peaks
 from jaxveh.diagnostics.frequency_response import FrequencyResponse, frequency_response
 from jaxveh.diagnostics.log_check import check_log
-from jaxveh.diagnostics.log_findings import SEVERITIES, Finding
+from jaxveh.diagnostics.log_findings import SEVERITIES, LogFinding
 from jaxveh.diagnostics.log_plausibility import check_car
 from jaxveh.diagnostics.observability import Observability, from_sensitivities, observability_at
 from jaxveh.diagnostics.particles import Ancestry, ParticleHealth, ancestry, particle_health
@@ -22,8 +22,8 @@ __all__ = [
     "Ancestry",
     "BrakingTest",
     "Consistency",
-    "Finding",
     "FrequencyResponse",
+    "LogFinding",
     "Observability",
     "ParticleHealth",
     "Peaks",

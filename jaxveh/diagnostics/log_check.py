@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.log_delays import check_delays
-from jaxveh.diagnostics.log_findings import Finding, LogView
+from jaxveh.diagnostics.log_findings import LogFinding, LogView
 from jaxveh.diagnostics.log_plausibility import check_plausibility
 from jaxveh.diagnostics.log_samples import check_samples
 from jaxveh.diagnostics.log_sampling import check_sampling
@@ -15,7 +15,7 @@ from jaxveh.io import CarSpecification
 CHECKS = (check_sampling, check_samples, check_units, check_signs, check_delays, check_steering, check_plausibility)
 
 
-def check_log(recording: Recording, car: CarSpecification | None = None) -> list[Finding]:
+def check_log(recording: Recording, car: CarSpecification | None = None) -> list[LogFinding]:
     """Look at a log before trusting it: every check's findings, good and bad, in the order of `CHECKS`.
 
     **Arguments**: `recording` with channels of the usual names (`v_x`, `v_y`, `yaw_rate`, `a_x`, `a_y`, `steer`) in SI; what

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import Finding, LogView
+from jaxveh.diagnostics.log_findings import LogFinding, LogView
 from jaxveh.diagnostics.log_single_track import a_y_from_yaw_rate, yaw_rate_from_steer
 
 REACH = 0.5
@@ -69,7 +69,7 @@ def delay(reference: np.ndarray, signal: np.ndarray, step: float, reach: float =
     return Delay(float(seconds), float(error), float(found[peak]))
 
 
-def check_delays(log: LogView) -> list[Finding]:
+def check_delays(log: LogView) -> list[LogFinding]:
     """Delays of a_y and a_x after the speeds and the gyroscope, and of yaw rate after steer."""
     findings = []
     if log.has("v_x", "yaw_rate", "a_y"):
@@ -84,7 +84,7 @@ def check_delays(log: LogView) -> list[Finding]:
     return findings
 
 
-def _lateral(log: LogView) -> Finding:
+def _lateral(log: LogView) -> LogFinding:
     speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
     if log.has("v_y"):
         reference = speed * yaw_rate + log.slope(log.even("v_y"))
@@ -98,7 +98,7 @@ def _lateral(log: LogView) -> Finding:
     return _judge(log, "a_y", "v_x yaw_rate", speed * yaw_rate, caveat, np.inf)
 
 
-def _steering(log: LogView) -> Finding:
+def _steering(log: LogView) -> LogFinding:
     steer = log.even("steer")
     if log.car is None:
         caveat = " Without a car, its own response of some 0.1 s is part of it."
@@ -107,22 +107,22 @@ def _steering(log: LogView) -> Finding:
     return _judge(log, "yaw_rate", "what the car's linear model makes of steer", expected, "", MODELLED)
 
 
-def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: str, tolerance: float) -> Finding:
+def _judge(log: LogView, name: str, other: str, reference: np.ndarray, caveat: str, tolerance: float) -> LogFinding:
     # The same symmetric average on both sides takes out noise and delays neither.
     found = delay(log.smooth(reference, SMOOTH), log.smooth(log.even(name), SMOOTH), log.step)
     values = {name: value for name, value in found._asdict().items() if np.isfinite(value)}
     if not (found.correlation > ALIKE and np.isfinite(found.seconds)):
         message = f"cannot be timed against {other}: they are too different (correlation {found.correlation:.2f})."
-        return Finding("note", name, message, values)
+        return LogFinding("note", name, message, values)
     size, sure = abs(found.seconds), 2 * found.error
     words = (
         f"comes {size * 1e3:.0f} ms (+-{sure * 1e3:.0f}) {'after' if found.seconds >= 0 else 'before'} {other}.{caveat}"
     )
     if size <= max(tolerance if np.isfinite(tolerance) else 0.0, 0.75 * log.step, 3 * found.error):
-        return Finding("ok", name, words, values)
+        return LogFinding("ok", name, words, values)
     if np.isinf(tolerance):
-        return Finding("note", name, words, values)
-    return Finding("warning", name, f"{words} Shift the channel by as much before estimating.", values)
+        return LogFinding("note", name, words, values)
+    return LogFinding("warning", name, f"{words} Shift the channel by as much before estimating.", values)
 
 
 def _correlations(reference: np.ndarray, signal: np.ndarray, most: int) -> np.ndarray:

@@ -22,7 +22,7 @@ MOVING = 5.0
 """m/s above which directions are compared."""
 
 
-class Finding(NamedTuple):
+class LogFinding(NamedTuple):
     """One finding: `severity` (of `SEVERITIES`), the `channel` it is about, `message` in words, `values` by name."""
 
     severity: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import GRAVITY, Finding, LogView
+from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView
 from jaxveh.io import CarSpecification
 
 FRICTION = 1.3
@@ -14,7 +14,7 @@ _STIFFNESS = (4.0, 60.0)  # cornering stiffness of an axle over its load, 1/rad
 _INERTIA = (0.4, 2.0)  # yaw inertia over mass a b
 
 
-def check_plausibility(log: LogView) -> list[Finding]:
+def check_plausibility(log: LogView) -> list[LogFinding]:
     """Whether accelerations are within what tyres carry, and stiffnesses and inertia within what cars have."""
     findings = []
     for name in ("a_y", "a_x"):
@@ -23,7 +23,7 @@ def check_plausibility(log: LogView) -> list[Finding]:
     return findings + (check_car(log.car) if log.car is not None else [])
 
 
-def check_car(car: CarSpecification) -> list[Finding]:
+def check_car(car: CarSpecification) -> list[LogFinding]:
     """Whether stiffnesses over axle loads and the inertia over mass a b are those of a car."""
     findings = []
     for axle, stiffness, arm in (
@@ -40,20 +40,20 @@ def check_car(car: CarSpecification) -> list[Finding]:
     return findings
 
 
-def _grip(log: LogView, name: str) -> Finding:
+def _grip(log: LogView, name: str) -> LogFinding:
     smooth = log.smooth(log.even(name), 0.3)
     known = np.abs(smooth[np.isfinite(smooth)])
     peak = float(np.quantile(known, 0.999)) / GRAVITY if known.size else 0.0
     words = f"reaches {peak:.2f} g for a third of a second"
     if peak > FRICTION:
         message = f"{words}: more than tyres carry without downforce. A wrong unit or scale?"
-        return Finding("warning", name, message, {"peak": peak})
-    return Finding("ok", name, f"{words}.", {"peak": peak})
+        return LogFinding("warning", name, message, {"peak": peak})
+    return LogFinding("ok", name, f"{words}.", {"peak": peak})
 
 
-def _ratio(name: str, ratio: float, allowed: tuple[float, float], other: str, hint: str) -> Finding:
+def _ratio(name: str, ratio: float, allowed: tuple[float, float], other: str, hint: str) -> LogFinding:
     low, high = allowed
     if low <= ratio <= high:
-        return Finding("ok", name, f"is {ratio:.3g} times {other}.", {"ratio": ratio})
+        return LogFinding("ok", name, f"is {ratio:.3g} times {other}.", {"ratio": ratio})
     message = f"is {ratio:.3g} times {other}; cars have {low:g} to {high:g}.{hint}"
-    return Finding("warning", name, message, {"ratio": ratio})
+    return LogFinding("warning", name, message, {"ratio": ratio})

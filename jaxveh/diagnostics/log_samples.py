@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import Finding, LogView
+from jaxveh.diagnostics.log_findings import LogFinding, LogView
 
 HELD = 0.1
 """Share of samples equal to the one before above which a channel is said to repeat."""
@@ -19,7 +19,7 @@ SPIKE_RANGE = 0.1
 _HALF_WINDOW = 3
 
 
-def check_samples(log: LogView) -> list[Finding]:
+def check_samples(log: LogView) -> list[LogFinding]:
     """Repeated values (the true update rate), frozen stretches, coarse steps and spikes of every channel."""
     findings = []
     for name, values in log.channels.items():
@@ -29,7 +29,7 @@ def check_samples(log: LogView) -> list[Finding]:
         time, samples = log.time[present], values[present]
         if np.all(samples == samples[0]):
             message = f"is {samples[0]:g} throughout: a sensor that does not speak, or a manoeuvre without it."
-            findings.append(Finding("note", name, message, {"value": float(samples[0])}))
+            findings.append(LogFinding("note", name, message, {"value": float(samples[0])}))
             continue
         coarse = _resolution(samples)
         findings += _repeats(name, time, samples, coarse) + _spikes(name, time, samples)
@@ -46,7 +46,7 @@ def _resolution(samples: np.ndarray) -> float:
     return float(step) if coarse and np.median(count) < 4 else 0.0
 
 
-def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float) -> list[Finding]:
+def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float) -> list[LogFinding]:
     starts = np.flatnonzero(np.r_[True, np.diff(samples) != 0])
     lengths = np.diff(np.r_[starts, samples.size])
     share = 1 - starts.size / samples.size
@@ -55,7 +55,7 @@ def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float) ->
         if share <= HELD:
             return []
         message = f"comes in steps of {coarse:.3g}: finer detail is lost, and so are {share:.0%} of its changes."
-        return [Finding("note", name, message, {"resolution": coarse, "repeated": share})]
+        return [LogFinding("note", name, message, {"resolution": coarse, "repeated": share})]
     findings = []
     ends = np.minimum(starts + lengths - 1, samples.size - 1)
     durations = time[ends] - time[starts]
@@ -67,18 +67,18 @@ def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float) ->
             f"at {time[starts[worst]]:.6g} s: a dropout that repeats the last value? Blank those rows."
         )
         values = {"count": float(frozen.sum()), "longest": float(durations[worst]), "time": float(time[starts[worst]])}
-        findings.append(Finding("warning", name, message, values))
+        findings.append(LogFinding("warning", name, message, values))
     moving = ~frozen
     repeated = 1 - moving.sum() / lengths[moving].sum()
     if repeated > HELD:
         message = f"repeats {repeated:.0%} of its samples: new values come at about {rate * (1 - repeated):.3g} Hz."
         findings.append(
-            Finding("note", name, message, {"repeated": float(repeated), "rate": float(rate * (1 - repeated))})
+            LogFinding("note", name, message, {"repeated": float(repeated), "rate": float(rate * (1 - repeated))})
         )
     return findings
 
 
-def _spikes(name: str, time: np.ndarray, samples: np.ndarray) -> list[Finding]:
+def _spikes(name: str, time: np.ndarray, samples: np.ndarray) -> list[LogFinding]:
     """Hampel's identifier with the deviation of the whole channel: up to three samples far off their neighbours."""
     width = 2 * _HALF_WINDOW + 1
     if samples.size <= width:
@@ -90,11 +90,11 @@ def _spikes(name: str, time: np.ndarray, samples: np.ndarray) -> list[Finding]:
     usual = 1.4826 * np.median(off[off > 0]) if np.any(off > 0) else 0.0
     found = off > max(SPIKE * usual, SPIKE_RANGE * (high - low))
     if not found.any():
-        return [Finding("ok", name, "has no spikes.", {"count": 0.0})]
+        return [LogFinding("ok", name, "has no spikes.", {"count": 0.0})]
     worst = int(np.argmax(off))
     message = (
         f"{int(found.sum())} spike(s), the largest {samples[worst]:.4g} at {time[worst]:.6g} s where its neighbours "
         f"say {median[worst]:.4g}. Blank them, or use a heavy-tailed noise law."
     )
     values = {"count": float(found.sum()), "time": float(time[worst]), "value": float(samples[worst])}
-    return [Finding("warning", name, message, values)]
+    return [LogFinding("warning", name, message, values)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import Finding, LogView
+from jaxveh.diagnostics.log_findings import LogFinding, LogView
 
 GAP = 2.5
 """A step longer than this many usual steps is a gap."""
@@ -13,7 +13,7 @@ JITTER = 0.05
 """Spread of the steps, as a share of the usual one, above which sampling is called irregular."""
 
 
-def check_sampling(log: LogView) -> list[Finding]:
+def check_sampling(log: LogView) -> list[LogFinding]:
     """Rate, jitter and gaps of each raster (channels that speak in the same rows), and samples that are no numbers."""
     findings, rasters = [], {}
     for name, values in log.channels.items():
@@ -21,10 +21,10 @@ def check_sampling(log: LogView) -> list[Finding]:
         if infinite:
             where = float(log.time[np.argmax(np.isinf(values))])
             message = f"{infinite} infinite sample(s), the first at {where:g} s: replace them by NaN."
-            findings.append(Finding("error", name, message, {"count": infinite, "time": where}))
+            findings.append(LogFinding("error", name, message, {"count": infinite, "time": where}))
         present = np.isfinite(values)
         if not present.any():
-            findings.append(Finding("error", name, "has no finite sample at all: leave the channel out.", {}))
+            findings.append(LogFinding("error", name, "has no finite sample at all: leave the channel out.", {}))
         else:
             rasters.setdefault(present.tobytes(), (present, []))[1].append(name)
     for present, names in rasters.values():
@@ -33,21 +33,21 @@ def check_sampling(log: LogView) -> list[Finding]:
     return findings
 
 
-def _raster(label: str, time: np.ndarray, missing: float) -> list[Finding]:
+def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
     if time.size < 3:
-        return [Finding("error", label, f"holds only {time.size} sample(s).", {"count": time.size})]
+        return [LogFinding("error", label, f"holds only {time.size} sample(s).", {"count": time.size})]
     steps = np.diff(time)
     usual = float(np.median(steps))
     gaps = steps > GAP * usual
     jitter = float(np.std(steps[~gaps]) / usual)
     values = {"rate": 1 / usual, "jitter": jitter, "missing": missing, "samples": float(time.size)}
     quiet = f" (silent in {missing:.0%} of the log's rows)" if missing else ""
-    regular = Finding("ok", label, f"speaks every {usual * 1e3:.4g} ms, {1 / usual:.4g} Hz{quiet}.", values)
+    regular = LogFinding("ok", label, f"speaks every {usual * 1e3:.4g} ms, {1 / usual:.4g} Hz{quiet}.", values)
     if jitter > JITTER:
         words = (
             f"speaks at {1 / usual:.4g} Hz on average{quiet}, unevenly: steps spread by {jitter:.0%} of the usual one."
         )
-        regular = Finding("note", label, words, values)
+        regular = LogFinding("note", label, words, values)
     if not gaps.any():
         return [regular]
     longest = int(np.argmax(steps))
@@ -57,7 +57,7 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[Finding]:
     )
     return [
         regular,
-        Finding(
+        LogFinding(
             "warning",
             label,
             message,

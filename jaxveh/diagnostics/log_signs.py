@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import GRAVITY, Finding, LogView, fit
+from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView, fit
 
 AGREE = 0.5
 """Correlation above which two channels are said to tell the same story."""
@@ -28,7 +28,7 @@ _LIMITS = {
 }
 
 
-def check_units(log: LogView) -> list[Finding]:
+def check_units(log: LogView) -> list[LogFinding]:
     """Magnitudes that no car reaches in SI units (99.5 % quantile, so that spikes do not count)."""
     findings = []
     for name, (limit, unit, likely) in _LIMITS.items():
@@ -38,13 +38,13 @@ def check_units(log: LogView) -> list[Finding]:
         size = float(np.quantile(np.abs(values[np.isfinite(values)]), 0.995))
         if size > limit:
             message = f"reaches {size:.4g}: too much for {unit}; it looks like {likely}. Say so in the channel map."
-            findings.append(Finding("error", name, message, {"size": size, "limit": limit}))
+            findings.append(LogFinding("error", name, message, {"size": size, "limit": limit}))
         else:
-            findings.append(Finding("ok", name, f"reaches {size:.4g} {unit}.", {"size": size, "limit": limit}))
+            findings.append(LogFinding("ok", name, f"reaches {size:.4g} {unit}.", {"size": size, "limit": limit}))
     return findings
 
 
-def check_signs(log: LogView) -> list[Finding]:
+def check_signs(log: LogView) -> list[LogFinding]:
     """Whether steer, yaw rate and lateral acceleration turn the same way, and the accelerations follow the speeds."""
     findings = []
     steering = _correlation(log) if log.has("steer", "yaw_rate", "v_x") else None
@@ -75,7 +75,7 @@ def _lateral(log: LogView) -> tuple[float, float, float]:
     return float(coefficients[1]), float(coefficients[0]), correlation
 
 
-def _sideways(log: LogView) -> list[Finding]:
+def _sideways(log: LogView) -> list[LogFinding]:
     """Whether dv_y/dt is what v_x yaw_rate leaves of a_y; silent where the two have little in common."""
     rest = log.smooth(log.even("a_y") - log.even("v_x") * log.even("yaw_rate"), 0.3)
     change = log.moving(log.smooth(log.slope(log.even("v_y")), 0.3))
@@ -86,8 +86,8 @@ def _sideways(log: LogView) -> list[Finding]:
         return []
     if slope < 0:
         message = "moves against a_y - v_x yaw_rate: v_y has the wrong sign. Left is positive; set sign = -1."
-        return [Finding("error", "v_y", message, values)]
-    return [Finding("ok", "v_y", f"moves as a_y - v_x yaw_rate says (correlation {correlation:.2f}).", values)]
+        return [LogFinding("error", "v_y", message, values)]
+    return [LogFinding("ok", "v_y", f"moves as a_y - v_x yaw_rate says (correlation {correlation:.2f}).", values)]
 
 
 def _longitudinal(log: LogView) -> tuple[float, float, float]:
@@ -100,15 +100,17 @@ def _longitudinal(log: LogView) -> tuple[float, float, float]:
     return float(coefficients[1]), float(coefficients[0]), correlation
 
 
-def _steering(correlation: float, lateral: tuple[float, float, float] | None) -> Finding:
+def _steering(correlation: float, lateral: tuple[float, float, float] | None) -> LogFinding:
     values = {"correlation": correlation}
     if correlation > AGREE:
-        return Finding("ok", "steer", f"turns the car the way yaw_rate says (correlation {correlation:.2f}).", values)
+        return LogFinding(
+            "ok", "steer", f"turns the car the way yaw_rate says (correlation {correlation:.2f}).", values
+        )
     if correlation > -AGREE:
         message = (
             f"has little to do with yaw_rate (correlation {correlation:.2f}): too little steering, or wrong columns?"
         )
-        return Finding("note", "steer", message, values)
+        return LogFinding("note", "steer", message, values)
     agrees = lateral is not None and lateral[2] > AGREE and lateral[0] > 0
     opposed = lateral is not None and lateral[2] > AGREE and lateral[0] < 0
     wrong = "steer" if agrees else "yaw_rate" if opposed else "steer or yaw_rate"
@@ -116,10 +118,10 @@ def _steering(correlation: float, lateral: tuple[float, float, float] | None) ->
         f"steer and yaw_rate are opposite (correlation {correlation:.2f}): {wrong} has the wrong sign. Left is "
         "positive; set sign = -1 in the channel map."
     )
-    return Finding("error", "steer" if wrong == "steer or yaw_rate" else wrong, message, values)
+    return LogFinding("error", "steer" if wrong == "steer or yaw_rate" else wrong, message, values)
 
 
-def _slope(name: str, other: str, line: tuple[float, float, float], table: dict, blamed: str) -> Finding:
+def _slope(name: str, other: str, line: tuple[float, float, float], table: dict, blamed: str) -> LogFinding:
     slope, intercept, correlation = line
     values = {"slope": slope, "intercept": intercept, "correlation": correlation}
     story = f"is {slope:.3g} times {other} {'+' if intercept >= 0 else '-'} {abs(intercept):.2g} m/s^2"
@@ -127,18 +129,18 @@ def _slope(name: str, other: str, line: tuple[float, float, float], table: dict,
         message = (
             f"{story}, but hardly follows it (correlation {correlation:.2f}): too little motion to compare, or noise."
         )
-        return Finding("note", name, message, values)
+        return LogFinding("note", name, message, values)
     if slope < 0:
-        return Finding(
+        return LogFinding(
             "error", name, f"{story}: {blamed} has the wrong sign. Set sign = -1 in the channel map.", values
         )
     if abs(np.log(slope)) < np.log(1.35):
         if abs(intercept) > 0.5:
-            return Finding("warning", name, f"{story}: a bias of {intercept:.2g} m/s^2, or a banked road.", values)
-        return Finding("ok", name, f"{story} (correlation {correlation:.2f}).", values)
+            return LogFinding("warning", name, f"{story}: a bias of {intercept:.2g} m/s^2, or a banked road.", values)
+        return LogFinding("ok", name, f"{story} (correlation {correlation:.2f}).", values)
     factors = {factor: guess for factor, guess in table.items() if abs(np.log(slope / factor)) < np.log(1.25)}
     if factors:
         nearest = min(factors, key=lambda factor: abs(np.log(slope / factor)))
         channel, unit = factors[nearest]
-        return Finding("error", channel, f"{story}: {channel} looks like {unit}. Say so in the channel map.", values)
-    return Finding("warning", name, f"{story}, which should be 1: a wrong unit or scale in one of them?", values)
+        return LogFinding("error", channel, f"{story}: {channel} looks like {unit}. Say so in the channel map.", values)
+    return LogFinding("warning", name, f"{story}, which should be 1: a wrong unit or scale in one of them?", values)

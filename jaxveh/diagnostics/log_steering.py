@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.diagnostics.log_findings import GRAVITY, Finding, LogView, fit
+from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView, fit
 from jaxveh.diagnostics.log_single_track import understeer_gradient
 
 GENTLE = 3.0
@@ -22,7 +22,7 @@ STANDSTILL = 0.1
 _YAW_RATE_BIAS = 0.003
 
 
-def check_steering(log: LogView) -> list[Finding]:
+def check_steering(log: LogView) -> list[LogFinding]:
     """Scale of steer against the geometry, its offset when the car runs straight, and the understeer gradient."""
     findings = _standstill(log) if log.has("v_x", "yaw_rate") else []
     if not log.has("steer", "yaw_rate", "v_x"):
@@ -34,7 +34,7 @@ def check_steering(log: LogView) -> list[Finding]:
         bend = np.where(np.abs(push) < GENTLE, bend, np.nan)
     if np.isfinite(bend * steer).sum() * log.step < 3.0:
         message = f"less than 3 s of driving below {GENTLE:g} m/s^2 laterally: offset and scale cannot be judged."
-        return [*findings, Finding("note", "steer", message, {})]
+        return [*findings, LogFinding("note", "steer", message, {})]
     scale = _scale(log, steer, bend, push)
     findings.append(scale)
     if scale.severity in ("ok", "note"):
@@ -42,7 +42,7 @@ def check_steering(log: LogView) -> list[Finding]:
     return findings
 
 
-def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> Finding:
+def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> LogFinding:
     car = log.car
     wheelbase, understeer = (USUAL_WHEELBASE, 0.0) if car is None else (car.wheelbase, understeer_gradient(car))
     coefficients, _, correlation = fit(steer, wheelbase * bend + understeer * push)
@@ -53,9 +53,9 @@ def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) 
     against = f"a wheelbase of {USUAL_WHEELBASE:g} m, taken for granted," if car is None else "the car"
     if correlation < 0.5 or scale <= 0:
         message = f"does not follow what yaw_rate and speed need (correlation {correlation:.2f})."
-        return Finding("note", "steer", message, values)
+        return LogFinding("note", "steer", message, values)
     if low <= scale <= high:
-        return Finding("ok", "steer", f"is {scale:.2f} times what {against} needs in gentle turns.", values)
+        return LogFinding("ok", "steer", f"is {scale:.2f} times what {against} needs in gentle turns.", values)
     guess = "another scale"
     if 8 <= scale < 30:
         guess = f"the steering wheel's angle, with a ratio of about {scale:.0f}"
@@ -67,10 +67,10 @@ def _scale(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) 
         f"is {scale:.3g} times what {against} needs in gentle turns: it looks like {guess}. Set unit or scale in the "
         "channel map so that steer is the angle at the road wheels in rad."
     )
-    return Finding("error", "steer", message, values)
+    return LogFinding("error", "steer", message, values)
 
 
-def _offset(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> list[Finding]:
+def _offset(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray) -> list[LogFinding]:
     """Steer is offset + L yaw_rate / v_x + K v_x yaw_rate; L is the car's, or fitted where the car is not known."""
     if log.car is None:
         coefficients, errors, _ = fit(steer, bend, push)
@@ -83,10 +83,10 @@ def _offset(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray)
     words = f"shows {np.rad2deg(offset):+.2f} degrees (+-{np.rad2deg(2 * error):.2f}) when the car runs straight"
     if told:
         words += f", the car's file says {np.rad2deg(told):+.2f}"
-    findings = [Finding("ok", "steer", f"{words}.", values)]
+    findings = [LogFinding("ok", "steer", f"{words}.", values)]
     if abs(rest) > max(OFFSET, 3 * error):
         advice = "subtract it in the channel map, set steer_offset in the car's file, or let calibration estimate it"
-        findings = [Finding("warning", "steer", f"{words}: {advice} (a yaw-rate bias looks alike).", values)]
+        findings = [LogFinding("warning", "steer", f"{words}: {advice} (a yaw-rate bias looks alike).", values)]
     if log.car is None:
         return findings
     measured, expected, spread = float(coefficients[1]), understeer_gradient(log.car), float(errors[1])
@@ -98,14 +98,14 @@ def _offset(log: LogView, steer: np.ndarray, bend: np.ndarray, push: np.ndarray)
     off = abs(measured - expected)
     far = _degrees_a_g(off) > 1.5 and off > 3 * spread
     advice = " Are stiffnesses, masses and axle distances right?"
-    return [*findings, Finding("warning" if far else "ok", "steer", words + (advice if far else ""), values)]
+    return [*findings, LogFinding("warning" if far else "ok", "steer", words + (advice if far else ""), values)]
 
 
 def _degrees_a_g(gradient: float) -> float:
     return float(np.rad2deg(gradient) * GRAVITY)
 
 
-def _standstill(log: LogView) -> list[Finding]:
+def _standstill(log: LogView) -> list[LogFinding]:
     speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
     with np.errstate(invalid="ignore"):
         rows = (np.abs(speed) < STANDSTILL) & np.isfinite(yaw_rate)
@@ -114,5 +114,5 @@ def _standstill(log: LogView) -> list[Finding]:
     bias = float(np.median(yaw_rate[rows]))
     words = f"shows {bias:+.2g} rad/s at standstill"
     if abs(bias) > _YAW_RATE_BIAS:
-        return [Finding("warning", "yaw_rate", f"{words}: subtract this bias in the channel map.", {"bias": bias})]
-    return [Finding("ok", "yaw_rate", f"{words}.", {"bias": bias})]
+        return [LogFinding("warning", "yaw_rate", f"{words}: subtract this bias in the channel map.", {"bias": bias})]
+    return [LogFinding("ok", "yaw_rate", f"{words}.", {"bias": bias})]

@@ -1,23 +1,17 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
-from jaxveh.estimators import kit, sideslip
+from jaxveh.estimators import kit, mass_and_grade, sideslip
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.handling import Handling, handling_model
 from jaxveh.estimators.linear_baseline import open_loop
-from jaxveh.estimators.mass_and_grade import mass_and_grade
 from jaxveh.estimators.observability import observe, predict_measurements
-from jaxveh.estimators.sideslip import Calibration, calibrate, estimate, handling_car, score
 from jaxveh.estimators.state_space import PROCESS_NOISE, START_SPREAD, held_rows, state_space
 
 __all__ = [
     "PROCESS_NOISE",
     "START_SPREAD",
-    "Calibration",
     "Handling",
-    "calibrate",
     "clean",
-    "estimate",
-    "handling_car",
     "handling_model",
     "held_rows",
     "kit",
@@ -25,7 +19,6 @@ __all__ = [
     "observe",
     "open_loop",
     "predict_measurements",
-    "score",
     "sideslip",
     "state_space",
 ]

@@ -16,7 +16,7 @@ from jaxveh.vehicles import Longitudinal
 ACCELEROMETER = "a_x"
 
 
-def mass_and_grade(
+def model(
     car: Longitudinal,
     *,
     v_x: float = 0.02,

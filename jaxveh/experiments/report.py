@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh.sweeps import Interval
+from jaxveh.sweeps import ConfidenceInterval
 
 HELD, FAILED, OPEN = "held", "failed", "open"
 """What becomes of a criterion: it is met, it is not, or what was found cannot decide."""
@@ -119,7 +119,7 @@ def number_asked(criteria: Criteria) -> int:
     return sum(not terms.original for terms in criteria.values())
 
 
-def interval(found: Interval, digits: int = 3) -> str:
+def interval(found: ConfidenceInterval, digits: int = 3) -> str:
     """`value [low, high]` of a number with its bootstrap interval."""
     value, low, high = (float(number) for number in found)
     return f"{value:.{digits}g} [{low:.{digits}g}, {high:.{digits}g}]"

@@ -5,7 +5,7 @@ from jaxveh.filters.adaptive_number import AdaptiveNumber
 from jaxveh.filters.auxiliary import AuxiliaryParticleFilter
 from jaxveh.filters.calibration import (
     Accuracy,
-    Calibration,
+    CalibrationRanks,
     LogLikelihoodSpread,
     Runs,
     log_likelihood_spread,
@@ -75,7 +75,7 @@ __all__ = [
     "AdaptiveNumber",
     "AuxiliaryParticleFilter",
     "BackwardSampling",
-    "Calibration",
+    "CalibrationRanks",
     "Consider",
     "Contaminated",
     "Covariance",

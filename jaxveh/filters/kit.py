@@ -8,7 +8,7 @@ from jaxveh.filters.gaussian.rules import AbstractRule, Image, Points, Slopes
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
 from jaxveh.filters.particle import (
     AbstractParticleFilter,
-    Drawn,
+    DrawnParticles,
     Expected,
     ParticleBelief,
     add_noise,
@@ -72,7 +72,7 @@ __all__ = [
     "AbstractTwoPartFilter",
     "AbstractTwoPartWrapper",
     "AbstractWrapper",
-    "Drawn",
+    "DrawnParticles",
     "Expected",
     "GaussianBelief",
     "Image",

@@ -156,7 +156,7 @@ class Marginalised(AbstractParticleFilter):
         weights = jnp.full((n,), 1 / n, dtype)
         start = _named(self, model, drawn.z.T, drawn.x.T), drawn.P
         ancestors = jnp.arange(n, dtype=jnp.int32)
-        return Cloud(*start, Prior(ancestors, weights, log_of(weights)), key, jnp.int32(0))
+        return Cloud(*start, CloudWeights(ancestors, weights, log_of(weights)), key, jnp.int32(0))
 
     def _predict(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
@@ -188,7 +188,7 @@ class Marginalised(AbstractParticleFilter):
         particles, lost = found_again(_named(self, model, moved.z.T, moved.x.T), points)
         lost = lost | ~jnp.all(jnp.isfinite(moved.P), axis=(1, 2))
         P = jnp.where(lost[:, None, None], covariances, moved.P)
-        return Cloud(particles, P, Prior(ancestors, weights, without(lost, chosen)), belief.key, belief.count)
+        return Cloud(particles, P, CloudWeights(ancestors, weights, without(lost, chosen)), belief.key, belief.count)
 
     def _update(self, model, ahead, row):
         cloud: Cloud = ahead
@@ -238,7 +238,7 @@ class Cloud(NamedTuple):
     count: Any
 
 
-class Prior(NamedTuple):
+class CloudWeights(NamedTuple):
     """Ancestors, weights, and the weights' logarithms with the derivative of the choice, before a measurement."""
 
     ancestors: Any
@@ -246,7 +246,7 @@ class Prior(NamedTuple):
     log_weights: Any
 
 
-class Drawn(NamedTuple):
+class GivenDraw(NamedTuple):
     """Drawn states z (q,), and the Gaussian (x, P) of the linear ones given them."""
 
     z: Any
@@ -254,15 +254,15 @@ class Drawn(NamedTuple):
     P: Any
 
 
-def _given_first(mean, covariance, white) -> Drawn:
+def _given_first(mean, covariance, white) -> GivenDraw:
     """The first q = len(white) of jointly Gaussian numbers drawn by `white` (q,), and the others given them."""
     q = white.shape[0]
     if q == 0:
-        return Drawn(white, mean, covariance)
+        return GivenDraw(white, mean, covariance)
     factor = numerics.cholesky(covariance[:q, :q])
     gain = numerics.solve_lower(factor, covariance[:q, q:])
     P = covariance[q:, q:] - times(gain.T, gain)
-    return Drawn(mean[:q] + times(factor, white), mean[q:] + times(gain.T, white), P)
+    return GivenDraw(mean[:q] + times(factor, white), mean[q:] + times(gain.T, white), P)
 
 
 def _slopes(linear: tuple[str, ...], point, function) -> tuple[Any, Any]:

@@ -263,7 +263,7 @@ def mean_variances(model, weights, variances):
     return dict(zip(model.channels, weights @ jnp.where(jnp.isfinite(variances), variances, 0), strict=True))
 
 
-class Drawn(NamedTuple):
+class DrawnParticles(NamedTuple):
     """Particles before their measurement: where they came from, their weights and the logarithms of these, with derivatives;
     `remark`: the code of how they were chosen."""
 
@@ -278,7 +278,7 @@ class Expected(NamedTuple):
     `count` of rows before."""
 
     particles: Any
-    drawn: Drawn
+    drawn: DrawnParticles
     lost: Any
     key: Any
     count: Any
@@ -300,7 +300,7 @@ class ParticleFilter(AbstractParticleFilter):
         particles, key = start_particles(self, model, row, key)
         uniform = jnp.full((self.particles,), 1 / self.particles, particles[0].dtype)
         ancestors = jnp.arange(self.particles, dtype=jnp.int32)
-        drawn = Drawn(ancestors, uniform, log_of(uniform), code(Result.successful))
+        drawn = DrawnParticles(ancestors, uniform, log_of(uniform), code(Result.successful))
         none = jnp.zeros(self.particles, bool)
         return Expected(particles, drawn, none, key, jnp.int32(0))
 
@@ -332,7 +332,7 @@ class ParticleFilter(AbstractParticleFilter):
             weights = jnp.where(resampled, weights, belief.weights)
             chosen = jnp.where(resampled, chosen, logs)
             remark = jnp.where(resampled, remark, code(Result.successful))
-        return particles, Drawn(ancestors, weights, chosen, remark)
+        return particles, DrawnParticles(ancestors, weights, chosen, remark)
 
     def _update(self, model, ahead, row):
         particles, drawn, lost, key, count = ahead

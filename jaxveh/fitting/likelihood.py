@@ -15,7 +15,7 @@ from jax import lax
 from jaxveh._core.parameter import Parameter, Where, pick, put
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
-from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units, on_line, picked
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, Shape, in_units, on_line, picked
 from jaxveh.fitting.recorded import listed, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.solve import solve
@@ -62,7 +62,7 @@ class LikelihoodProblem(AbstractProblem):
     def search(self, z, max_steps, tolerance):
         solver = optx.BFGS(rtol=tolerance, atol=tolerance)
         found = optx.minimise(_cost, solver, z, self, max_steps=max_steps, throw=False)
-        return Found(found.value, found.stats["num_steps"], found.result == optx.RESULTS.successful)
+        return SearchEnd(found.value, found.stats["num_steps"], found.result == optx.RESULTS.successful)
 
     def covariance(self, z):
         return jnp.linalg.inv(hessian(self.cost, z)), jnp.ones(z.shape, bool)

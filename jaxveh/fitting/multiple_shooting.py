@@ -16,7 +16,7 @@ from jaxveh._core.errors import InputError, check_positive, is_concrete
 from jaxveh._core.names import record
 from jaxveh._core.parameter import Parameter, Where, pick, put
 from jaxveh._core.recording import Recording
-from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units, on_line, picked
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, Shape, in_units, on_line, picked
 from jaxveh.fitting.recorded import spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.segments import Segments, cut
@@ -76,7 +76,7 @@ class ShootingProblem(AbstractProblem):
     def search(self, z, max_steps, tolerance):
         solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance)
         found = optx.least_squares(residuals, solver, z, self, max_steps=max_steps, throw=False)
-        return Found(found.value, found.stats["num_steps"], found.result == optx.RESULTS.successful)
+        return SearchEnd(found.value, found.stats["num_steps"], found.result == optx.RESULTS.successful)
 
     def covariance(self, z):
         jacobian, p = jax.jacfwd(residuals)(z, self), len(self.parameters)

@@ -18,7 +18,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
 from jaxveh.fitting.levenberg_marquardt import Quadratic
-from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units, on_line, picked
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, Shape, in_units, on_line, picked
 from jaxveh.fitting.recorded import listed, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.scoring import FisherScoring
@@ -87,7 +87,7 @@ class PredictionErrorProblem(AbstractProblem):
 
     def search(self, z, max_steps, tolerance):
         found, state = score(self, z, None, tolerance, jnp.asarray(max_steps))
-        return Found(found, state.steps, state.done)
+        return SearchEnd(found, state.steps, state.done)
 
     def covariance(self, z):
         return uncertainty(quadratic(z, self))
@@ -261,7 +261,7 @@ def _stepwise(problem: PredictionErrorProblem, max_steps: int, tolerance: float,
         z, state = _block(problem, z, state, tolerance, jnp.asarray(limit))
         best = -float(state.at.cost)
         progress(int(state.steps), max_steps, f"fit: step {int(state.steps)}, log-posterior {best:.1f}")
-    return _concluded(problem, Found(z, state.steps, state.done), state.at)
+    return _concluded(problem, SearchEnd(z, state.steps, state.done), state.at)
 
 
 @eqx.filter_jit
@@ -270,7 +270,7 @@ def _block(problem: PredictionErrorProblem, z, state, tolerance: float, limit):
 
 
 @eqx.filter_jit
-def _concluded(problem: PredictionErrorProblem, found: Found, at: Quadratic) -> Fit:
+def _concluded(problem: PredictionErrorProblem, found: SearchEnd, at: Quadratic) -> Fit:
     return fit_at(problem, found, at.cost, uncertainty(at))
 
 

@@ -13,7 +13,7 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import Parameter, Where, pick, resolve
 
 
-class Found(NamedTuple):
+class SearchEnd(NamedTuple):
     """Where a search ended: the coordinates `z` (n,), the `steps` it took, and whether it `converged`."""
 
     z: Any
@@ -48,7 +48,7 @@ class AbstractProblem(eqx.Module):
         """The negative log-posterior at the coordinates z (n,), up to a constant: a scalar."""
 
     @abc.abstractmethod
-    def search(self, z, max_steps: int, tolerance) -> Found:
+    def search(self, z, max_steps: int, tolerance) -> SearchEnd:
         """The least cost from the coordinates z (n,), by a solver of optimistix."""
 
     @abc.abstractmethod

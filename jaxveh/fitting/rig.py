@@ -15,7 +15,7 @@ from jaxveh._core.errors import FilterError, InputError, check_at_least, check_o
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, silent
-from jaxveh.fitting.problem import Found, on_line, picked, shaped
+from jaxveh.fitting.problem import SearchEnd, on_line, picked, shaped
 from jaxveh.fitting.result import AbstractFit
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
 from jaxveh.fitting.rig_identify import settle, without
@@ -299,5 +299,5 @@ def _as_uncertain(problem: RigProblem, held: np.ndarray, names: Sequence[str]) -
 @eqx.filter_jit
 def _summed_up(problem: RigProblem, steps, converged):
     """The fit that ended where the problem starts, and how many directions of the coefficients the data identify."""
-    found = Found(problem.start(), steps, converged)
+    found = SearchEnd(problem.start(), steps, converged)
     return fit_at(problem, found, problem.cost(found.z), problem.covariance(found.z)), spread_of(found.z, problem)[1]

@@ -78,10 +78,10 @@ def _fixed(data: RigData, joint: Stage) -> list[str]:
 
 
 def _sections():
-    from jaxveh.tyres import Longitudinal, kit
+    from jaxveh.tyres import LongitudinalLaw, kit
 
     for name, kind in (
-        ("longitudinal", Longitudinal), ("lateral", kit.Lateral), ("aligning", kit.Aligning), ("overturning", kit.Overturning),
+        ("longitudinal", LongitudinalLaw), ("lateral", kit.Lateral), ("aligning", kit.Aligning), ("overturning", kit.Overturning),
     ):  # fmt: skip
         yield name, kind.__dataclass_fields__
 

@@ -16,7 +16,7 @@ from jax import lax
 from jaxveh._core.bijectors import Real
 from jaxveh._core.parameter import Parameter, pick, put
 from jaxveh.fitting.levenberg_marquardt import LevenbergMarquardt, Quadratic
-from jaxveh.fitting.problem import AbstractProblem, Found, Shape, in_units
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, Shape, in_units
 from jaxveh.numerics import on_cpu
 from jaxveh.tyres import AbstractTyre, Contact
 
@@ -111,7 +111,7 @@ class RigProblem(AbstractProblem):
 class Descent(NamedTuple):
     """Where a search ended, and by how much it `lowered` the loss."""
 
-    found: Found
+    found: SearchEnd
     lowered: Any
 
 
@@ -121,7 +121,7 @@ def descend(problem: RigProblem, z, max_steps: int | None, tolerance: float, lim
     options = {} if limit is None else {"limit": limit}
     found = optx.minimise(loss, solver, z, problem, options=options, max_steps=max_steps, throw=False)
     lowered = loss(z, problem) - found.state.at.cost
-    return Descent(Found(found.value, found.stats["num_steps"], found.state.done), lowered)
+    return Descent(SearchEnd(found.value, found.stats["num_steps"], found.state.done), lowered)
 
 
 def loss(z, problem: RigProblem):

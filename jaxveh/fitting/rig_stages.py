@@ -60,7 +60,7 @@ class Stage(NamedTuple):
     aside: tuple[str, ...] = ()
 
 
-class Group(NamedTuple):
+class CoefficientGroup(NamedTuple):
     """Coefficients that show in one force or moment: always, and where load, camber or pressure vary (names split at blanks).
 
     Those of `asked` show where the load varies, and are fitted where somebody asks for them alone (`HELD`).
@@ -88,33 +88,35 @@ class Group(NamedTuple):
         return tuple(name for name in names if "load" in varies and name not in free)
 
 
-ALONG = Group(
+ALONG = CoefficientGroup(
     "longitudinal", "F_x", "PCX1 PDX1 PEX1 PEX4 PKX1 PHX1 PVX1", "PDX2 PEX2 PEX3 PKX2 PKX3 PHX2 PVX2", "PDX3",
     "PPX1 PPX2 PPX3 PPX4",
 )  # fmt: skip
 ALONG_52 = ALONG._replace(pressure="")
-ALONG_COMBINED = Group("longitudinal", "F_x", "RBX1 RBX2 RCX1 REX1 RHX1", "REX2", "RBX3")
-ACROSS = Group(
+ALONG_COMBINED = CoefficientGroup("longitudinal", "F_x", "RBX1 RBX2 RCX1 REX1 RHX1", "REX2", "RBX3")
+ACROSS = CoefficientGroup(
     "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PHY2 PVY2",
     "PDY3 PEY4 PEY5 PKY3 PKY5 PKY6 PKY7 PVY3 PVY4", "PPY1 PPY2 PPY3 PPY4 PPY5", asked="PKY4",
 )  # fmt: skip
 
-ACROSS_52 = Group(
+ACROSS_52 = CoefficientGroup(
     "lateral", "F_y", "PCY1 PDY1 PEY1 PEY3 PKY1 PHY1 PVY1", "PDY2 PEY2 PKY2 PHY2 PVY2", "PDY3 PEY4 PKY3 PHY3 PVY3 PVY4"
 )  # fmt: skip
-ACROSS_COMBINED = Group(
+ACROSS_COMBINED = CoefficientGroup(
     "lateral", "F_y", "RBY1 RBY2 RBY3 RCY1 REY1 RHY1 RVY1 RVY4 RVY5 RVY6", "REY2 RHY2 RVY2", "RBY4 RVY3"
 )
-ALIGNING = Group(
+ALIGNING = CoefficientGroup(
     "aligning", "M_z", "QBZ1 QBZ9 QCZ1 QDZ1 QDZ6 QEZ1 QEZ4 QHZ1", "QBZ2 QBZ3 QDZ2 QDZ7 QEZ2 QEZ3 QHZ2",
     "QBZ4 QBZ5 QDZ3 QDZ4 QDZ8 QDZ9 QDZ10 QDZ11 QEZ5 QHZ3 QHZ4", "PPZ1 PPZ2",
 )  # fmt: skip
 ALIGNING_52 = ALIGNING._replace(camber="QBZ4 QBZ5 QDZ3 QDZ4 QDZ8 QDZ9 QEZ5 QHZ3 QHZ4", pressure="")
-ALIGNING_COMBINED = Group("aligning", "M_z", "SSZ1 SSZ2", "", "SSZ3 SSZ4")
-OVERTURNING = Group("overturning", "M_x", "QSX1 QSX3 QSX4 QSX8 QSX9", "QSX5 QSX6", "QSX2 QSX7 QSX10 QSX11", "PPMX1")
-OVERTURNING_52 = Group("overturning", "M_x", "QSX1 QSX3", "", "QSX2")
-ROLLING = Group("rolling", "M_y", "QSY1", "QSY7", "QSY5 QSY6", "QSY8", "QSY3 QSY4")
-ROLLING_52 = Group("rolling", "M_y", "QSY1", "", "", "", "QSY3 QSY4")
+ALIGNING_COMBINED = CoefficientGroup("aligning", "M_z", "SSZ1 SSZ2", "", "SSZ3 SSZ4")
+OVERTURNING = CoefficientGroup(
+    "overturning", "M_x", "QSX1 QSX3 QSX4 QSX8 QSX9", "QSX5 QSX6", "QSX2 QSX7 QSX10 QSX11", "PPMX1"
+)
+OVERTURNING_52 = CoefficientGroup("overturning", "M_x", "QSX1 QSX3", "", "QSX2")
+ROLLING = CoefficientGroup("rolling", "M_y", "QSY1", "QSY7", "QSY5 QSY6", "QSY8", "QSY3 QSY4")
+ROLLING_52 = CoefficientGroup("rolling", "M_y", "QSY1", "", "", "", "QSY3 QSY4")
 
 
 def varying_inputs(rig: RigTable) -> set[str]:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from jaxveh._core.result import Result, code
-from jaxveh.fitting.problem import AbstractProblem, Found, in_units, shaped
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, shaped
 from jaxveh.fitting.result import Fit
 
 MOST_STEPS = 200
@@ -38,7 +38,7 @@ def solve(
 
 
 @eqx.filter_custom_jvp
-def optimum(problem: AbstractProblem, start, *, max_steps: int, tolerance: float) -> Found:
+def optimum(problem: AbstractProblem, start, *, max_steps: int, tolerance: float) -> SearchEnd:
     """Where a search from the coordinates `start` (n,) ends."""
     return problem.search(start, max_steps, tolerance)
 
@@ -54,7 +54,7 @@ def _of_optimum(primals, tangents, **settings):
     matrix, cross = curvature(lambda z, free: eqx.combine(free, held).cost(z), found.z, free)
     parts = jax.tree.map(lambda row, tangent: jnp.tensordot(row, tangent, tangent.ndim), cross, moved)
     change = sum(jax.tree.leaves(parts), start=jnp.zeros_like(found.z))
-    return found, Found(-jnp.linalg.solve(matrix, change), None, None)
+    return found, SearchEnd(-jnp.linalg.solve(matrix, change), None, None)
 
 
 def curvature(cost, z, free):
@@ -71,7 +71,7 @@ def curvature(cost, z, free):
     return lax.map(row, jnp.eye(z.size, dtype=z.dtype))
 
 
-def fit_at(problem: AbstractProblem, found: Found, cost, uncertainty: tuple[jax.Array, jax.Array] | None) -> Fit:
+def fit_at(problem: AbstractProblem, found: SearchEnd, cost, uncertainty: tuple[jax.Array, jax.Array] | None) -> Fit:
     """The fit that ended at these coordinates, with this cost and what the problem's `covariance` says, or nothing of it."""
     parameters, line = problem.parameters, problem.line(found.z)
     values = in_units(parameters, line)

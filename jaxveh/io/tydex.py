@@ -24,7 +24,7 @@ _NAME, _UNIT, _VALUES, _WIDTH = slice(0, 10), slice(40, 50), 50, 10
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class TydexChannel:
     """One quantity of a TYDEX file: physical `values` (n,), or a float for a constant, in `unit`; its `line` from 1.
 
     A constant that is no number (the name of a road) is a text.
@@ -43,10 +43,10 @@ class TydexFile:
     source: str
     header: dict[str, str]
     comments: tuple[str, ...]
-    constants: dict[str, Channel]
-    channels: dict[str, Channel]
+    constants: dict[str, TydexChannel]
+    channels: dict[str, TydexChannel]
 
-    def find(self, name: str) -> Channel | None:
+    def find(self, name: str) -> TydexChannel | None:
         """The channel of that name, else the constant; None where there is neither."""
         return self.channels.get(name, self.constants.get(name))
 
@@ -86,7 +86,7 @@ def parse_tydex(text: str, source: str = "TYDEX file") -> TydexFile:
     rows = [_row(line, number, len(conversions), source) for number, line in sections["MEASURDATA"]]
     raw = np.array(rows)
     channels = {
-        c.name: Channel(c.name, c.unit, c.factor * (raw[:, k] + c.before) + c.after, c.line)
+        c.name: TydexChannel(c.name, c.unit, c.factor * (raw[:, k] + c.before) + c.after, c.line)
         for k, c in enumerate(conversions)
     }
     constants = {c.name: c for c in (_constant(line, number) for number, line in sections.get("CONSTANTS", []))}
@@ -161,10 +161,10 @@ def _number(cell: str, line: int, source: str) -> float:
         ) from None
 
 
-def _constant(line: str, number: int) -> Channel:
+def _constant(line: str, number: int) -> TydexChannel:
     text = line[_VALUES:].strip()
     try:
         value: float | str = decimal(text)
     except ValueError:
         value = text
-    return Channel(line[_NAME].strip(), line[_UNIT].strip(), value, number)
+    return TydexChannel(line[_NAME].strip(), line[_UNIT].strip(), value, number)

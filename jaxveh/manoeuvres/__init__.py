@@ -20,7 +20,7 @@ from jaxveh.manoeuvres.driver import AbstractDriver, Motion, OpenLoop, as_driver
 from jaxveh.manoeuvres.named import MANOEUVRES, NamedManoeuvre, named_manoeuvre
 from jaxveh.manoeuvres.options import manoeuvre_options
 from jaxveh.manoeuvres.path_driver import PathDriver
-from jaxveh.manoeuvres.paths import AbstractGraph, AbstractPath, Beside, Circle, LaneChanges, Sine, Straight, Target
+from jaxveh.manoeuvres.paths import AbstractGraph, AbstractPath, Beside, Circle, LaneChanges, PathTarget, Sine, Straight
 from jaxveh.manoeuvres.random_steering import RandomSteering, random_steering
 from jaxveh.manoeuvres.replayed import Replay, replay
 from jaxveh.manoeuvres.speed_control import SpeedControl
@@ -64,6 +64,7 @@ __all__ = [
     "NamedManoeuvre",
     "OpenLoop",
     "PathDriver",
+    "PathTarget",
     "PedalInputs",
     "RampSteer",
     "RandomSteering",
@@ -76,7 +77,6 @@ __all__ = [
     "StepSteer",
     "Straight",
     "SweptSine",
-    "Target",
     "WaveringSpeed",
     "as_driver",
     "braking_in_a_turn",

@@ -19,7 +19,7 @@ from jaxveh.manoeuvres.standard_steering import ramp_steer, sine_with_dwell, sla
 from jaxveh.manoeuvres.steering import double_lane_change, step_steer, swept_sine
 
 
-class Drive(NamedTuple):
+class DriveSettings(NamedTuple):
     """What a named manoeuvre is made of: `speed` (m/s), `steer` (rad at the road wheels), `options` by name, `key`."""
 
     speed: float
@@ -31,7 +31,7 @@ class Drive(NamedTuple):
 class NamedManoeuvre(NamedTuple):
     """How to make a manoeuvre, whether the driver sees the car and whether he works the pedals, and what to say."""
 
-    make: Callable[[Drive], AbstractManoeuvre | AbstractDriver]
+    make: Callable[[DriveSettings], AbstractManoeuvre | AbstractDriver]
     help: str
     closed_loop: bool = False
     pedals: bool = False
@@ -92,4 +92,4 @@ def named_manoeuvre(
     """
     check_one_of("manoeuvre", name, MANOEUVRES)
     check_options(name, options)
-    return MANOEUVRES[name].make(Drive(speed, steer, options, jax.random.key(0) if key is None else key))
+    return MANOEUVRES[name].make(DriveSettings(speed, steer, options, jax.random.key(0) if key is None else key))

@@ -16,7 +16,7 @@ from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.numerics import smooth_step
 
 
-class Target(NamedTuple):
+class PathTarget(NamedTuple):
     """A point of the path seen from a car: `ahead` and `left` of it, m."""
 
     ahead: Any
@@ -38,7 +38,7 @@ class AbstractPath(eqx.Module):
         """Where the place (x, y) (m) is, seen from the path."""
 
     @abc.abstractmethod
-    def preview(self, x: Any, y: Any, direction: Any, distance: Any) -> Target:
+    def preview(self, x: Any, y: Any, direction: Any, distance: Any) -> PathTarget:
         """The path's point `distance` (m) further on, seen from the place (x, y) (m) in a `direction` (rad)."""
 
 
@@ -54,7 +54,7 @@ class AbstractGraph(AbstractPath):
         here, slope = self._slope(x)
         return Beside((y - here) * _cosine(slope), numerics.arctan(slope))
 
-    def preview(self, x: Any, y: Any, direction: Any, distance: Any) -> Target:
+    def preview(self, x: Any, y: Any, direction: Any, distance: Any) -> PathTarget:
         """The distance is counted along the path's tangent beside the place."""
         _, slope = self._slope(x)
         along = distance * _cosine(slope)
@@ -70,9 +70,9 @@ def _cosine(slope):
     return 1.0 / jnp.sqrt(1.0 + slope * slope)
 
 
-def _turned(along, across, direction) -> Target:
+def _turned(along, across, direction) -> PathTarget:
     cosine, sine = numerics.cos(direction), numerics.sin(direction)
-    return Target(along * cosine + across * sine, across * cosine - along * sine)
+    return PathTarget(along * cosine + across * sine, across * cosine - along * sine)
 
 
 class Straight(AbstractGraph):
@@ -153,7 +153,7 @@ class Circle(AbstractPath):
         sine, cosine, away = self._angle(x, y)
         return Beside(self.radius - jnp.sign(self.radius) * away, numerics.arctan2(sine, cosine))
 
-    def preview(self, x: Any, y: Any, direction: Any, distance: Any) -> Target:
+    def preview(self, x: Any, y: Any, direction: Any, distance: Any) -> PathTarget:
         """The distance is counted along the circle from the point nearest to the place."""
         sine, cosine, _ = self._angle(x, y)
         further = distance / self.radius

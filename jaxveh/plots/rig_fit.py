@@ -27,7 +27,7 @@ TAIL = 5.0
 COLOUR_MAP = "viridis"
 
 
-class Quantity(NamedTuple):
+class FittedQuantity(NamedTuple):
     """A channel in words, its unit, the unit in which its values are shown, how many of the first are one of the second,
     and the slip over which it is drawn where that varies."""
 
@@ -39,11 +39,11 @@ class Quantity(NamedTuple):
 
 
 QUANTITIES = {
-    "F_x": Quantity("longitudinal force", "N", "kN", 1e3, "slip_ratio"),
-    "F_y": Quantity("lateral force", "N", "kN", 1e3, "slip_angle"),
-    "M_x": Quantity("overturning moment", "N m", "N m", 1.0, "slip_angle"),
-    "M_y": Quantity("rolling moment", "N m", "N m", 1.0, "slip_ratio"),
-    "M_z": Quantity("aligning moment", "N m", "N m", 1.0, "slip_angle"),
+    "F_x": FittedQuantity("longitudinal force", "N", "kN", 1e3, "slip_ratio"),
+    "F_y": FittedQuantity("lateral force", "N", "kN", 1e3, "slip_angle"),
+    "M_x": FittedQuantity("overturning moment", "N m", "N m", 1.0, "slip_angle"),
+    "M_y": FittedQuantity("rolling moment", "N m", "N m", 1.0, "slip_ratio"),
+    "M_z": FittedQuantity("aligning moment", "N m", "N m", 1.0, "slip_angle"),
 }
 
 SLIPS = {"slip_angle": ("slip angle [°]", np.degrees(1.0)), "slip_ratio": ("slip ratio [%]", 100.0)}

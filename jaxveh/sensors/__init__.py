@@ -14,15 +14,15 @@ from jaxveh.sensors.suite import Measured, Suite
 from jaxveh.sensors.torque import BrakeTorque, MotorTorque
 from jaxveh.sensors.typical import production_car, proving_ground_car
 from jaxveh.sensors.wheel_speeds import WheelSpeeds
-from jaxveh.sensors.wrapper import AbstractWrapper, Renamed
+from jaxveh.sensors.wrapper import AbstractDeviceWrapper, Renamed
 
 __all__ = [
     "GNSS",
     "IMU",
     "AbstractDevice",
+    "AbstractDeviceWrapper",
     "AbstractFault",
     "AbstractInstrument",
-    "AbstractWrapper",
     "Alignment",
     "BiasStep",
     "BrakeTorque",

@@ -17,7 +17,7 @@ from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.sensors.device import AbstractDevice, name_of
 from jaxveh.sensors.randomness import subkey
 from jaxveh.sensors.spans import as_spans, check_spans, inside, since
-from jaxveh.sensors.wrapper import AbstractWrapper, check_device
+from jaxveh.sensors.wrapper import AbstractDeviceWrapper, check_device
 
 Channels = dict[str, jax.Array]
 
@@ -30,7 +30,7 @@ def _names_or_none(channel) -> tuple[str, ...] | None:
     return None if channel is None else _names(channel)
 
 
-class AbstractFault(AbstractWrapper):
+class AbstractFault(AbstractDeviceWrapper):
     """A fault in some of a device's channels (None: in all); times are those at which the device speaks, s."""
 
     channel: eqx.AbstractVar[tuple[str, ...] | None]

@@ -17,7 +17,7 @@ _OWN_TAG = 1000
 """Beyond every tag of a device: a wrapper draws beside the inner device, whose numbers stay what they were."""
 
 
-class AbstractWrapper(AbstractDevice):
+class AbstractDeviceWrapper(AbstractDevice):
     """A device around another: it looks at what that one looks at, and speaks when that one speaks."""
 
     device: eqx.AbstractVar[AbstractDevice]
@@ -52,7 +52,7 @@ class AbstractWrapper(AbstractDevice):
         return subkey(key, _OWN_TAG + _depth(self))
 
 
-class Renamed(AbstractWrapper):
+class Renamed(AbstractDeviceWrapper):
     """A device whose channels have other names: `names` maps old to new, what it leaves out stays.
 
     Two devices of a kind in one suite need it: `Renamed(optical, {"v_x": "optical_v_x"})`.
@@ -87,7 +87,7 @@ class Renamed(AbstractWrapper):
         return {dict(self.names).get(name, name): value for name, value in said.items()}
 
 
-def check_device(wrapper: AbstractWrapper) -> None:
+def check_device(wrapper: AbstractDeviceWrapper) -> None:
     """Raise unless there is a device inside; to be called before anything is asked of it."""
     if not isinstance(wrapper.device, AbstractDevice):
         raise InputError(f"{name_of(wrapper)}.device = {wrapper.device!r}: must be a device, such as IMU(rate=100.0).")
@@ -95,8 +95,8 @@ def check_device(wrapper: AbstractWrapper) -> None:
 
 def innermost(device: AbstractDevice) -> AbstractDevice:
     """The device within all wrappers."""
-    return innermost(device.device) if isinstance(device, AbstractWrapper) else device
+    return innermost(device.device) if isinstance(device, AbstractDeviceWrapper) else device
 
 
 def _depth(device: AbstractDevice) -> int:
-    return 1 + _depth(device.device) if isinstance(device, AbstractWrapper) else 0
+    return 1 + _depth(device.device) if isinstance(device, AbstractDeviceWrapper) else 0

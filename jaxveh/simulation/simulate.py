@@ -22,7 +22,7 @@ from jaxveh.simulation.driven import Driven, check_inputs, driver_name, vehicle_
 from jaxveh.simulation.events import Event
 from jaxveh.simulation.meter import told
 from jaxveh.simulation.solve import Grid, Solution, even_grid, grid_through, solve
-from jaxveh.simulation.stiffness import Choice
+from jaxveh.simulation.stiffness import SolverChoice
 from jaxveh.statespace import RK4, RolledRK4
 from jaxveh.vehicles import AbstractVehicle, Travelling
 
@@ -171,10 +171,10 @@ def _check_not_placed(car: AbstractVehicle) -> None:
             )
 
 
-def _choice(solver, controller, max_step) -> Choice | None:
+def _choice(solver, controller, max_step) -> SolverChoice | None:
     """What the caller insists on; None for "auto"."""
     if not isinstance(solver, str):
-        return Choice(solver, controller, max_step)
+        return SolverChoice(solver, controller, max_step)
     check_one_of("solver", solver, SOLVERS)
     if controller is not None:
         raise InputError(
@@ -185,7 +185,7 @@ def _choice(solver, controller, max_step) -> Choice | None:
     return stiffness.explicit(max_step) if solver == "explicit" else stiffness.implicit(max_step)
 
 
-def _run(driven: Driven, values: dict, run, asked: Choice | None, times: np.ndarray, max_step: float) -> Solution:
+def _run(driven: Driven, values: dict, run, asked: SolverChoice | None, times: np.ndarray, max_step: float) -> Solution:
     """Run as asked; on "auto" look at the fastest motion before and after, and run again where steps were too long."""
     looks = is_concrete(driven, values) and stiffness.may_be_stiff(driven, max_step)
     if asked is not None or not looks:
@@ -207,7 +207,7 @@ def _run(driven: Driven, values: dict, run, asked: Choice | None, times: np.ndar
     return run(stiffness.implicit(max_step))
 
 
-def _warn_of_long_steps(driven: Driven, found: Solution, choice: Choice, times: np.ndarray) -> None:
+def _warn_of_long_steps(driven: Driven, found: Solution, choice: SolverChoice, times: np.ndarray) -> None:
     if not isinstance(choice.solver, (RK4, RolledRK4)):
         return
     pole, time = stiffness.worst(driven, times, found.x, found.u)

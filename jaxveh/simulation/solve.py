@@ -17,7 +17,7 @@ from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.result import Result, code
 from jaxveh.simulation.driven import Driven, dtype_of
 from jaxveh.simulation.events import Event
-from jaxveh.simulation.stiffness import Choice
+from jaxveh.simulation.stiffness import SolverChoice
 from jaxveh.statespace import RK4, Heun, RolledRK4
 
 ADAPTIVE_STEPS_A_ROW = 64
@@ -80,7 +80,7 @@ def solve(
     driven: Driven,
     start: dict,
     grid: Grid,
-    choice: Choice,
+    choice: SolverChoice,
     until: Event | None = None,
     adjoint: diffrax.AbstractAdjoint | None = None,
     meter: diffrax.AbstractProgressMeter | None = None,

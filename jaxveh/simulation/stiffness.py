@@ -42,7 +42,7 @@ SLOW_POLE = 1000.0
 """1/s: some hundred at walking speed, and room."""
 
 
-class Choice(NamedTuple):
+class SolverChoice(NamedTuple):
     """A solver with equal steps of at most `max_step` (s), or with a controller that chooses its own."""
 
     solver: diffrax.AbstractSolver
@@ -137,17 +137,17 @@ def worst(driven: Driven, times: np.ndarray, x: Any, u: Any) -> tuple[float, flo
     return float(found[row]), float(times[some][row])
 
 
-def explicit(max_step: float) -> Choice:
+def explicit(max_step: float) -> SolverChoice:
     """RK4 with equal steps."""
-    return Choice(RolledRK4(), None, max_step)
+    return SolverChoice(RolledRK4(), None, max_step)
 
 
-def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> Choice:
+def implicit(max_step: float, rtol: float = 1e-6, atol: float = 1e-7) -> SolverChoice:
     """Kvaerno's stiff method of fifth order (2004) with steps of its own."""
-    return Choice(diffrax.Kvaerno5(), diffrax.PIDController(rtol=rtol, atol=atol, dtmax=0.05), max_step)
+    return SolverChoice(diffrax.Kvaerno5(), diffrax.PIDController(rtol=rtol, atol=atol, dtmax=0.05), max_step)
 
 
-def choose(pole: float, max_step: float) -> Choice:
+def choose(pole: float, max_step: float) -> SolverChoice:
     """RK4 with steps that hold the fastest pole, or where they would be shorter than `LEAST_STEP` the implicit method."""
     step = min(max_step, STABLE / pole) if np.isfinite(pole) and pole > 0 else max_step
     return explicit(step) if step >= LEAST_STEP else implicit(max_step)

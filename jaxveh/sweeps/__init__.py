@@ -1,8 +1,8 @@
 """Monte Carlo: one function over a design of settings and many seeds, in chunks that fit memory, on every core."""
 
 from jaxveh.sweeps.design import Axis, Design
-from jaxveh.sweeps.paired import Comparison, Interval, compare
+from jaxveh.sweeps.paired import Comparison, ConfidenceInterval, compare
 from jaxveh.sweeps.running import sweep
 from jaxveh.sweeps.swept import Swept
 
-__all__ = ["Axis", "Comparison", "Design", "Interval", "Swept", "compare", "sweep"]
+__all__ = ["Axis", "Comparison", "ConfidenceInterval", "Design", "Swept", "compare", "sweep"]

@@ -12,7 +12,7 @@ RESAMPLED = 2000
 """Bootstrap draws of the seeds."""
 
 
-class Interval(NamedTuple):
+class ConfidenceInterval(NamedTuple):
     """A `value` and the bootstrap interval from `low` to `high`."""
 
     value: np.ndarray
@@ -27,8 +27,8 @@ class Comparison(NamedTuple):
     `wins`: the share of seeds in which a is smaller; a tie is half a win. A run that is not finite has lost.
     """
 
-    ratio: Interval
-    of_medians: Interval
+    ratio: ConfidenceInterval
+    of_medians: ConfidenceInterval
     wins: np.ndarray
 
 
@@ -76,6 +76,6 @@ def _median(values):
     return np.where(low == high, low, 0.5 * (low + high))
 
 
-def _interval(value, draws, level) -> Interval:
+def _interval(value, draws, level) -> ConfidenceInterval:
     low, high = (np.quantile(draws, q, axis=-1, method="nearest") for q in (0.5 * (1 - level), 0.5 * (1 + level)))
-    return Interval(value, low, high)
+    return ConfidenceInterval(value, low, high)

@@ -14,7 +14,7 @@ from jaxveh.tyres.hsri import HSRI
 from jaxveh.tyres.isotropic import IsotropicMagicFormula
 from jaxveh.tyres.linear import Linear
 from jaxveh.tyres.linear_with_load import LinearWithLoad
-from jaxveh.tyres.longitudinal import Longitudinal
+from jaxveh.tyres.longitudinal import LongitudinalLaw
 from jaxveh.tyres.lugre import LuGre
 from jaxveh.tyres.magic_formula import MagicFormula
 from jaxveh.tyres.mf_tyre import MFOutputs, MFTyre
@@ -22,7 +22,7 @@ from jaxveh.tyres.mirrored import Mirrored
 from jaxveh.tyres.on_road import OnRoad
 from jaxveh.tyres.parabolic import Parabolic
 from jaxveh.tyres.parameters_file import read_parameters, write_parameters
-from jaxveh.tyres.property_check import Finding, check_property_file
+from jaxveh.tyres.property_check import PropertyFinding, check_property_file
 from jaxveh.tyres.property_file import from_property_file
 from jaxveh.tyres.property_writer import to_property_file
 from jaxveh.tyres.relaxed import Relaxed
@@ -43,13 +43,12 @@ __all__ = [
     "Fiala",
     "FialaADAMS",
     "FialaPolynomial",
-    "Finding",
     "Forces",
     "FrictionEllipse",
     "IsotropicMagicFormula",
     "Linear",
     "LinearWithLoad",
-    "Longitudinal",
+    "LongitudinalLaw",
     "LuGre",
     "MFOutputs",
     "MFTyre",
@@ -57,6 +56,7 @@ __all__ = [
     "Mirrored",
     "OnRoad",
     "Parabolic",
+    "PropertyFinding",
     "Relaxed",
     "Similarity",
     "TMeasy",

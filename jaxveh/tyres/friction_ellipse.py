@@ -22,7 +22,7 @@ class FrictionEllipse(AbstractTyre):
     With one slip zero the other law is left as it is. Where a slip is negative the law's negative side is taken; a force at
     zero slip (shifts, camber) is kept whatever the slip, and may leave the ellipse by as much.
 
-    A law that has F_y alone stands along the wheel as `Longitudinal(law)`. The contact's load, camber, friction, speed and
+    A law that has F_y alone stands along the wheel as `LongitudinalLaw(law)`. The contact's load, camber, friction, speed and
     pressure reach both laws; moments are left out.
 
     **Raises** `InputError` for a law that is no tyre, or has states.

@@ -7,10 +7,10 @@ from typing import Any
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_static
 
 
-class Longitudinal(AbstractTyre):
+class LongitudinalLaw(AbstractTyre):
     """`F_x` (N) is the `F_y` of a lateral `law` at `slip_angle = slip_ratio`: its coefficients "per rad" are per unit slip.
 
-    `Longitudinal(MagicFormula(...))` is the Magic Formula of longitudinal slip. Slip angle and camber do not count; load,
+    `LongitudinalLaw(MagicFormula(...))` is the Magic Formula of longitudinal slip. Slip angle and camber do not count; load,
     friction, speed and pressure reach the law.
 
     **Raises** `InputError` for a law that is no tyre, or has states.
@@ -19,7 +19,7 @@ class Longitudinal(AbstractTyre):
     law: AbstractTyre
 
     def __check_init__(self):
-        need_static("Longitudinal.law", self.law)
+        need_static("LongitudinalLaw.law", self.law)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """Longitudinal force alone, N."""

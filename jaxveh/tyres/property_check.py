@@ -22,7 +22,7 @@ from jaxveh.io import PropertyFile, kit, read_property_file
 from jaxveh.tyres.base import Contact
 from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.property_file import SIDES, from_property_file, tells
-from jaxveh.tyres.property_lines import Finding, first_of, odd_lines
+from jaxveh.tyres.property_lines import PropertyFinding, first_of, odd_lines
 
 USUAL = {
     "mu_x": ("friction along", 0.2, 3.0, ""),
@@ -43,7 +43,7 @@ GRID = 11
 """Points over a range of the file."""
 
 
-def check_property_file(source: str | Path | PropertyFile) -> list[Finding]:
+def check_property_file(source: str | Path | PropertyFile) -> list[PropertyFinding]:
     """What is worth a look in a .tir file; an empty list where nothing is.
 
     It tells of what is missing, of ranges and units that are odd, of scaling factors other than 1, of entries that are not
@@ -70,111 +70,117 @@ def check_property_file(source: str | Path | PropertyFile) -> list[Finding]:
     ]
 
 
-def _model(file: PropertyFile, version: int) -> Iterator[Finding]:
+def _model(file: PropertyFile, version: int) -> Iterator[PropertyFinding]:
     side, kind, mode = (first_of(file, key) for key in ("TYRESIDE", "PROPERTY_FILE_FORMAT", "USE_MODE"))
     if side is None:
-        yield Finding("TYRESIDE", "is missing: the side for which the coefficients hold is not known")
+        yield PropertyFinding("TYRESIDE", "is missing: the side for which the coefficients hold is not known")
     elif str(side.value).strip().lower() not in SIDES:
-        yield Finding("TYRESIDE", f"is {side.shown}, neither LEFT nor RIGHT: the tyre cannot be mirrored")
+        yield PropertyFinding("TYRESIDE", f"is {side.shown}, neither LEFT nor RIGHT: the tyre cannot be mirrored")
     if file.find("FITTYP") is None and kind is not None and str(kind.value).upper().startswith("MF"):
-        yield Finding("FITTYP", f"is missing: {version / 10:g} is taken because of PROPERTY_FILE_FORMAT = {kind.shown}")
+        yield PropertyFinding(
+            "FITTYP", f"is missing: {version / 10:g} is taken because of PROPERTY_FILE_FORMAT = {kind.shown}"
+        )
     elif file.text("FITTYP") == "60":
-        yield Finding("FITTYP", "is 60: the equations of 6.1 are taken")
+        yield PropertyFinding("FITTYP", "is 60: the equations of 6.1 are taken")
     if mode is not None and not isinstance(mode.value, str):
         if mode.value < 0:
-            yield Finding(
+            yield PropertyFinding(
                 "USE_MODE", f"is {mode.value:g}: asks for a mirrored tyre; the tyre comes as it is (see `side`)"
             )
         elif abs(mode.value) % 10 < 4:
-            yield Finding(
+            yield PropertyFinding(
                 "USE_MODE", f"is {mode.value:g}: fitted without combined slip, which is computed all the same"
             )
     if "UNITS" not in file.sections:
-        yield Finding("[UNITS]", "is missing: SI units and radians are taken")
+        yield PropertyFinding("[UNITS]", "is missing: SI units and radians are taken")
     angle = str(file.sections.get("UNITS", {}).get("ANGLE", "radian")).strip().lower()
     if angle not in kit.PROPERTY_UNITS["ANGLE"]:
-        yield Finding("ANGLE", f"is {angle!r}: ranges and coefficients are taken in radians all the same")
+        yield PropertyFinding("ANGLE", f"is {angle!r}: ranges and coefficients are taken in radians all the same")
 
 
-def _missing(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
+def _missing(file: PropertyFile, tyre: MFTyre) -> Iterator[PropertyFinding]:
     """Values of which a default is taken that no one should rely on."""
     wanted = ["LONGVL", "VERTICAL_STIFFNESS"]
     if tyre.version != 52:
         wanted += ["NOMPRES", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS"]
     for key in wanted:
         if not tells(file, key):
-            yield Finding(key, f"is missing: {float(getattr(tyre.structure, key)):g} is taken")
+            yield PropertyFinding(key, f"is missing: {float(getattr(tyre.structure, key)):g} is taken")
     speed = float(tyre.structure.LONGVL)
     if not 5 <= speed <= 50:
-        yield Finding("LONGVL", f"is {speed:g} m/s: tyres are measured at 5 to 50 m/s, mostly 16.7; is it in km/h?")
+        yield PropertyFinding(
+            "LONGVL", f"is {speed:g} m/s: tyres are measured at 5 to 50 m/s, mostly 16.7; is it in km/h?"
+        )
 
 
-def _ranges(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
+def _ranges(file: PropertyFile, tyre: MFTyre) -> Iterator[PropertyFinding]:
     r, load = tyre.ranges, float(tyre.scaling.LFZO * tyre.structure.FNOMIN)
     for low, high in (
         ("KPUMIN", "KPUMAX"), ("ALPMIN", "ALPMAX"), ("CAMMIN", "CAMMAX"), ("FZMIN", "FZMAX"), ("PRESMIN", "PRESMAX"),
     ):  # fmt: skip
         least, most = float(getattr(r, low)), float(getattr(r, high))
         if least >= most:
-            yield Finding(f"{low}, {high}", f"are {least:g} and {most:g}: the range is empty")
+            yield PropertyFinding(f"{low}, {high}", f"are {least:g} and {most:g}: the range is empty")
         elif low in ("KPUMIN", "ALPMIN", "CAMMIN") and not least < 0 < most:
-            yield Finding(
+            yield PropertyFinding(
                 f"{low}, {high}", f"are {least:g} and {most:g}: one side only was measured, the other is held at 0"
             )
     for key, largest in (("ALPMIN", 3.2), ("ALPMAX", 3.2), ("CAMMIN", 3.2), ("CAMMAX", 3.2)):
         if abs(float(getattr(r, key))) > largest:
-            yield Finding(key, f"is {float(getattr(r, key)):g}: must be in radians; is it in degrees?")
+            yield PropertyFinding(key, f"is {float(getattr(r, key)):g}: must be in radians; is it in degrees?")
     for key in ("KPUMIN", "KPUMAX"):
         if file.find(key) is not None and abs(float(getattr(r, key))) > 5:
-            yield Finding(key, f"is {float(getattr(r, key)):g}: a slip ratio of 1 is 100 %; is it in per cent?")
+            yield PropertyFinding(key, f"is {float(getattr(r, key)):g}: a slip ratio of 1 is 100 %; is it in per cent?")
     if not float(r.FZMIN) <= load <= float(r.FZMAX):
-        yield Finding(
+        yield PropertyFinding(
             "FNOMIN", f"times LFZO is {load:g} N, outside FZMIN to FZMAX, {float(r.FZMIN):g} to {float(r.FZMAX):g} N"
         )
 
 
-def _pressure(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
+def _pressure(file: PropertyFile, tyre: MFTyre) -> Iterator[PropertyFinding]:
     r = tyre.ranges
     for key in ("NOMPRES", "INFLPRES"):
         if not tells(file, key):
             continue
         value = float(getattr(tyre.structure, key))
         if not 2e4 <= value <= 2e6:
-            yield Finding(key, f"is {value:g} Pa: tyres have 20 to 2000 kPa; are [UNITS] those of the pressure?")
+            yield PropertyFinding(
+                key, f"is {value:g} Pa: tyres have 20 to 2000 kPa; are [UNITS] those of the pressure?"
+            )
         elif not float(r.PRESMIN) <= value <= float(r.PRESMAX):
-            yield Finding(
+            yield PropertyFinding(
                 key, f"is {value:g} Pa, outside PRESMIN to PRESMAX, {float(r.PRESMIN):g} to {float(r.PRESMAX):g} Pa"
             )
 
 
-def _scaling(tyre: MFTyre) -> Iterator[Finding]:
+def _scaling(tyre: MFTyre) -> Iterator[PropertyFinding]:
     factors = {name: float(value) for name, value in vars(tyre.scaling).items()}
     changed = [f"{name} = {value:g}" for name, value in factors.items() if value != 1]
     if changed:
-        yield Finding("scaling", f"{', '.join(changed)}: not 1, so the tyre differs from what was measured")
+        yield PropertyFinding("scaling", f"{', '.join(changed)}: not 1, so the tyre differs from what was measured")
 
 
-def _body(tyre: MFTyre) -> Iterator[Finding]:
+def _body(tyre: MFTyre) -> Iterator[PropertyFinding]:
     s = tyre.structure
     radius, rim, load = float(s.UNLOADED_RADIUS), float(s.RIM_RADIUS), float(s.FNOMIN)
     if not 0.05 <= radius <= 1.5:
-        yield Finding("UNLOADED_RADIUS", f"is {radius:g} m: wheels have 0.05 to 1.5 m; does [UNITS] hold?")
+        yield PropertyFinding("UNLOADED_RADIUS", f"is {radius:g} m: wheels have 0.05 to 1.5 m; does [UNITS] hold?")
     if rim >= radius:
-        yield Finding("RIM_RADIUS", f"is {rim:g} m, not less than UNLOADED_RADIUS, {radius:g} m")
+        yield PropertyFinding("RIM_RADIUS", f"is {rim:g} m, not less than UNLOADED_RADIUS, {radius:g} m")
     if not 100 <= load <= 1e5:
-        yield Finding("FNOMIN", f"is {load:g} N: wheels carry 100 to 100000 N; does [UNITS] hold?")
+        yield PropertyFinding("FNOMIN", f"is {load:g} N: wheels carry 100 to 100000 N; does [UNITS] hold?")
 
 
-def _shapes(tyre: MFTyre) -> Iterator[Finding]:
+def _shapes(tyre: MFTyre) -> Iterator[PropertyFinding]:
     for key, shape in (
         ("PCX1", tyre.longitudinal.PCX1 * tyre.scaling.LCX),
         ("PCY1", tyre.lateral.PCY1 * tyre.scaling.LCY),
     ):
         if float(shape) <= 0:
-            yield Finding(key, f"gives a shape factor C of {float(shape):g}: must be positive")
+            yield PropertyFinding(key, f"gives a shape factor C of {float(shape):g}: must be positive")
         elif not 1 <= float(shape) <= 2:
             what = "the force never peaks" if float(shape) < 1 else "the force turns round at large slip"
-            yield Finding(key, f"gives a shape factor C of {float(shape):g}: usual are 1 to 2; {what}")
+            yield PropertyFinding(key, f"gives a shape factor C of {float(shape):g}: usual are 1 to 2; {what}")
 
 
 class _Freely(NamedTuple):
@@ -201,7 +207,7 @@ def _freely(tyre: MFTyre) -> _Freely:
     return _Freely(load, camber, pressure, _outputs(dataclasses.replace(tyre, limits=False), at))
 
 
-def _usual(tyre: MFTyre, freely: _Freely) -> Iterator[Finding]:
+def _usual(tyre: MFTyre, freely: _Freely) -> Iterator[PropertyFinding]:
     """The tyre that rolls freely at its nominal load, against what tyres do."""
     s = tyre.structure
     for field, (what, least, most, unit) in USUAL.items():
@@ -212,10 +218,12 @@ def _usual(tyre: MFTyre, freely: _Freely) -> Iterator[Finding]:
             value /= float(s.UNLOADED_RADIUS)
         if not least <= value <= most:
             advice = "; is PKY1 meant for other axes than ISO-W?" if field == "K_ya" and value < 0 else ""
-            yield Finding(what, f"is {value:.3g}{unit} at nominal load; usual are {least:g} to {most:g}{advice}")
+            yield PropertyFinding(
+                what, f"is {value:.3g}{unit} at nominal load; usual are {least:g} to {most:g}{advice}"
+            )
 
 
-def _friction_over_range(freely: _Freely) -> Iterator[Finding]:
+def _friction_over_range(freely: _Freely) -> Iterator[PropertyFinding]:
     """D > 0 at every load, camber and pressure of the ranges, where it is so at nominal load."""
     load, camber, pressure = freely.load, freely.camber, freely.pressure
     for field, what in (("mu_x", "friction along"), ("mu_y", "friction across")):
@@ -225,10 +233,10 @@ def _friction_over_range(freely: _Freely) -> Iterator[Finding]:
             place = (
                 f"{load[worst]:g} N, camber {math.degrees(camber[worst]):.3g} degrees, {pressure[worst] / 1e5:.3g} bar"
             )
-            yield Finding(what, f"is {mu.min():.3g} at {place}, within the file's ranges: must be positive")
+            yield PropertyFinding(what, f"is {mu.min():.3g} at {place}, within the file's ranges: must be positive")
 
 
-def _curvature(tyre: MFTyre) -> Iterator[Finding]:
+def _curvature(tyre: MFTyre) -> Iterator[PropertyFinding]:
     """E <= 1 at every load, without camber (with it E is far off in most files); the equations hold it at 1."""
     x, y, z, s, df_z = tyre.longitudinal, tyre.lateral, tyre.aligning, tyre.scaling, _df_z(tyre)
     along = (x.PEX1 + x.PEX2 * df_z + x.PEX3 * df_z**2) * s.LEX
@@ -245,22 +253,24 @@ def _curvature(tyre: MFTyre) -> Iterator[Finding]:
         worst = int(jnp.argmax(curvature))
         if curvature[worst] > 1:
             says = f"give a curvature factor E of {float(curvature[worst]):.3g} at {_loads(tyre)[worst]:.0f} N: it is held at 1"
-            yield Finding(about, says)
+            yield PropertyFinding(about, says)
 
 
-def _aligning(tyre: MFTyre) -> Iterator[Finding]:
+def _aligning(tyre: MFTyre) -> Iterator[PropertyFinding]:
     z, df_z = tyre.aligning, _df_z(tyre)
     if float(z.QDZ1) == 0 and float(z.QDZ2) == 0:
         return  # no trail was fitted
     if float(z.QCZ1) <= 0:
-        yield Finding("QCZ1", f"is {float(z.QCZ1):g}: the shape factor of the trail must be positive")
+        yield PropertyFinding("QCZ1", f"is {float(z.QCZ1):g}: the shape factor of the trail must be positive")
     slope = np.asarray(z.QBZ1 + z.QBZ2 * df_z + z.QBZ3 * df_z**2)
     if slope.min() <= 0:
         load = _loads(tyre)[slope.argmin()]
-        yield Finding("QBZ1 to QBZ3", f"give a slope of the trail of {slope.min():.3g} at {load:g} N: must be positive")
+        yield PropertyFinding(
+            "QBZ1 to QBZ3", f"give a slope of the trail of {slope.min():.3g} at {load:g} N: must be positive"
+        )
 
 
-def _combined(tyre: MFTyre) -> Iterator[Finding]:
+def _combined(tyre: MFTyre) -> Iterator[PropertyFinding]:
     """The weights of combined slip are positive: a force fades with the other slip, and never turns round."""
     r = tyre.ranges
     slip_ratio, slip_angle = min(-float(r.KPUMIN), 0.5), min(float(r.ALPMAX), 0.5)
@@ -283,20 +293,20 @@ def _combined(tyre: MFTyre) -> Iterator[Finding]:
             worst, unit = np.unravel_index(weight.argmin(), weight.shape), " degrees" if name == "F_x" else ""
             what = "slip angle" if name == "F_x" else "slip ratio"
             says = f"turn {name} round: {weight.min():.3g} of it is left at {load[worst]:.0f} N and a {what} of"
-            yield Finding(about, f"{says} {slip[worst]:.3g}{unit}; must be positive")
+            yield PropertyFinding(about, f"{says} {slip[worst]:.3g}{unit}; must be positive")
 
 
-def _moments(tyre: MFTyre) -> Iterator[Finding]:
+def _moments(tyre: MFTyre) -> Iterator[PropertyFinding]:
     c = vars(tyre.overturning)
     told = lambda numbers: [f"QSX{k}" for k in numbers if float(c[f"QSX{k}"]) != 0]
     first, second = told(range(1, 12)), told(range(12, 15))
     if tyre.version == 61 and first and second:
-        yield Finding(
+        yield PropertyFinding(
             ", ".join(second), "are not 0, nor are QSX1 to QSX11: two forms of M_x that MF-Tyre does not take together"
         )
     rolling = float(tyre.rolling.QSY1)
     if not 0 <= rolling <= 0.05:
-        yield Finding("QSY1", f"is {rolling:g}: rolling resistance over load is usually 0 to 0.05")
+        yield PropertyFinding("QSY1", f"is {rolling:g}: rolling resistance over load is usually 0 to 0.05")
 
 
 @eqx.filter_jit

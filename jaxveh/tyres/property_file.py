@@ -12,13 +12,13 @@ import numpy as np
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh.io import PropertyFile, read_property_file
 from jaxveh.tyres.mf_tyre import (
-    Aligning,
-    Lateral,
-    Longitudinal,
+    AligningCoefficients,
+    LateralCoefficients,
+    LongitudinalCoefficients,
     MFTyre,
-    Overturning,
+    OverturningCoefficients,
     Ranges,
-    Rolling,
+    RollingCoefficients,
     Scaling,
     Structure,
     TurnSlip,
@@ -125,11 +125,11 @@ def _as_it_is(file: PropertyFile, limits: bool, angles: bool, spins: bool) -> MF
 
     return MFTyre(
         section(Structure),
-        section(Longitudinal),
-        section(Lateral),
-        section(Aligning),
-        section(Overturning),
-        section(Rolling),
+        section(LongitudinalCoefficients),
+        section(LateralCoefficients),
+        section(AligningCoefficients),
+        section(OverturningCoefficients),
+        section(RollingCoefficients),
         section(Scaling),
         section(Ranges),
         section(TurnSlip),

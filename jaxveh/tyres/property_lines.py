@@ -27,7 +27,7 @@ LISTED = 6
 """So many keys are listed by name; of more, the first ones."""
 
 
-class Finding(NamedTuple):
+class PropertyFinding(NamedTuple):
     """One thing worth a look: the key or quantity that it is `about`, and what there is to say."""
 
     about: str
@@ -39,7 +39,7 @@ def first_of(file: PropertyFile, key: str) -> kit.Entry | None:
     return next((entry for entry in file.entries if entry.key == key and entry.value != ""), None)
 
 
-def odd_lines(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
+def odd_lines(file: PropertyFile, tyre: MFTyre) -> Iterator[PropertyFinding]:
     """Findings about single lines of a file, and about the coefficients in them that this tyre, made of it, does not use."""
     known = {name for part in vars(tyre).values() if isinstance(part, eqx.Module) for name in vars(part)}
     yield from _without_value(file, known)
@@ -49,58 +49,64 @@ def odd_lines(file: PropertyFile, tyre: MFTyre) -> Iterator[Finding]:
     yield from _unread(file, known)
 
 
-def _without_value(file: PropertyFile, known: set[str]) -> Iterator[Finding]:
+def _without_value(file: PropertyFile, known: set[str]) -> Iterator[PropertyFinding]:
     """Empty entries: those that the tyre reads, of which it takes a default, and in one line those that it does not."""
     told = {entry.key for entry in file.entries if entry.value != ""}
     empty = [entry for entry in file.entries if entry.value == "" and entry.key not in told]
     read = [entry for entry in empty if entry.key in known or entry.key in WORDS or entry.section == "UNITS"]
     if read:
-        yield Finding(_listed(read), "without a value: as if the lines were not there")
+        yield PropertyFinding(_listed(read), "without a value: as if the lines were not there")
     if others := [entry for entry in empty if entry not in read and not entry.quoted]:
-        yield Finding(_listed(others), "without a value, and not read")
+        yield PropertyFinding(_listed(others), "without a value, and not read")
 
 
-def _zeros(file: PropertyFile) -> Iterator[Finding]:
+def _zeros(file: PropertyFile) -> Iterator[PropertyFinding]:
     if zeros := [entry for entry in file.entries if entry.value == 0 and entry.key in NOT_MEASURED]:
-        yield Finding(_listed(zeros), "0, where only a positive number means anything: as if the lines were not there")
+        yield PropertyFinding(
+            _listed(zeros), "0, where only a positive number means anything: as if the lines were not there"
+        )
 
 
-def _texts(file: PropertyFile) -> Iterator[Finding]:
+def _texts(file: PropertyFile) -> Iterator[PropertyFinding]:
     """What stands without quotes and is no number: whatever it is, the tyre has no need of it."""
     for entry in file.entries:
         if entry.quoted or not isinstance(entry.value, str) or entry.value == "":
             continue
         if entry.key not in WORDS and entry.section != "UNITS":
             place = f"in [{entry.section}], line {entry.line}"
-            yield Finding(entry.key, f"{place}, is {entry.shown}: neither a number nor in quotes; kept, and not read")
+            yield PropertyFinding(
+                entry.key, f"{place}, is {entry.shown}: neither a number nor in quotes; kept, and not read"
+            )
 
 
-def _twice(file: PropertyFile) -> Iterator[Finding]:
+def _twice(file: PropertyFile) -> Iterator[PropertyFinding]:
     """Entries that contradict each other, of which the tyre has no need (else there were no tyre)."""
     first: dict[tuple[str, str], kit.Entry] = {}
     for entry in file.entries:
         section = "" if entry.key in (*WORDS, "USE_MODE") else entry.section
         before = first.setdefault((section, entry.key), entry)
         if before.value != entry.value and "" not in (before.value, entry.value):
-            yield Finding(entry.key, f"stands in lines {before.line} and {entry.line} with different values")
+            yield PropertyFinding(entry.key, f"stands in lines {before.line} and {entry.line} with different values")
 
 
-def _unread(file: PropertyFile, known: set[str]) -> Iterator[Finding]:
+def _unread(file: PropertyFile, known: set[str]) -> Iterator[PropertyFinding]:
     """Coefficients of forces and moments that do something, and that are not read; names in small letters; tables."""
     unread: dict[str, list[kit.Entry]] = {}
     for entry in file.entries:
         if entry.key in known or entry.key in DYNAMIC or isinstance(entry.value, str):
             continue
         if entry.key.upper() in known:
-            yield Finding(entry.key, f"in [{entry.section}], line {entry.line}, is not read: write {entry.key.upper()}")
+            yield PropertyFinding(
+                entry.key, f"in [{entry.section}], line {entry.line}, is not read: write {entry.key.upper()}"
+            )
         elif entry.section.endswith("COEFFICIENTS") or entry.section.startswith("TURNSLIP"):
             neutral = NEUTRAL.get(entry.key, 1.0 if entry.section.startswith("SCALING") else 0.0)
             if entry.value != neutral:
                 unread.setdefault(entry.section, []).append(entry)
     for section, entries in unread.items():
-        yield Finding(f"[{section}]", f"{_listed(entries)}: not read, and not neutral")
+        yield PropertyFinding(f"[{section}]", f"{_listed(entries)}: not read, and not neutral")
     if DEFLECTIONS in (line.strip().upper() for line in file.lines):
-        yield Finding(DEFLECTIONS, "is not read: the deflection follows VERTICAL_STIFFNESS")
+        yield PropertyFinding(DEFLECTIONS, "is not read: the deflection follows VERTICAL_STIFFNESS")
 
 
 def _listed(entries: Iterable[kit.Entry]) -> str:

@@ -6,13 +6,13 @@ import dataclasses
 
 from jaxveh._core.errors import check_positive
 from jaxveh.tyres.mf_tyre import (
-    Aligning,
-    Lateral,
-    Longitudinal,
+    AligningCoefficients,
+    LateralCoefficients,
+    LongitudinalCoefficients,
     MFTyre,
-    Overturning,
+    OverturningCoefficients,
     Ranges,
-    Rolling,
+    RollingCoefficients,
     Scaling,
     Structure,
     TurnSlip,
@@ -44,5 +44,15 @@ def typical_mf_tyre(
     def section(kind):
         return kind(**{field.name: known[field.name] for field in dataclasses.fields(kind) if field.name in known})
 
-    parts = (Structure, Longitudinal, Lateral, Aligning, Overturning, Rolling, Scaling, Ranges, TurnSlip)
+    parts = (
+        Structure,
+        LongitudinalCoefficients,
+        LateralCoefficients,
+        AligningCoefficients,
+        OverturningCoefficients,
+        RollingCoefficients,
+        Scaling,
+        Ranges,
+        TurnSlip,
+    )
     return MFTyre(*map(section, parts), version=version, limits=limits)

@@ -79,7 +79,7 @@ def gravity(ground: Ground) -> tuple[Any, Any, Any]:
     return -GRAVITY * (along / run), -GRAVITY * across / (run * rise), -GRAVITY / rise
 
 
-class Rolling(NamedTuple):
+class WheelMotion(NamedTuple):
     """How a wheel moves over the road: speeds of the contact point in the wheel's axes (m/s), the steer's cosine and sine."""
 
     along: Any
@@ -88,17 +88,17 @@ class Rolling(NamedTuple):
     sine: Any
 
 
-def rolling(position: tuple[Any, Any], v_x: Any, v_y: Any, yaw_rate: Any, cosine: Any, sine: Any) -> Rolling:
+def rolling(position: tuple[Any, Any], v_x: Any, v_y: Any, yaw_rate: Any, cosine: Any, sine: Any) -> WheelMotion:
     """The contact point's motion of a wheel at `position` (m) that is turned by an angle of this cosine and sine."""
     x, y = position
     u, v = v_x - yaw_rate * y, v_y + yaw_rate * x
     if isinstance(sine, float) and sine == 0.0:
-        return Rolling(u, v, 1.0, 0.0)
-    return Rolling(u * cosine + v * sine, v * cosine - u * sine, cosine, sine)
+        return WheelMotion(u, v, 1.0, 0.0)
+    return WheelMotion(u * cosine + v * sine, v * cosine - u * sine, cosine, sine)
 
 
 def contact(
-    moves: Rolling, load: Any, friction: Any, crawl: float, wheel_speed: Any = None, camber: Any = 0.0
+    moves: WheelMotion, load: Any, friction: Any, crawl: float, wheel_speed: Any = None, camber: Any = 0.0
 ) -> Contact:
     """How a wheel touches the road; `wheel_speed` is `omega r_e` (m/s), None for a wheel that rolls freely.
 

@@ -9,7 +9,7 @@ import pytest
 from programs import error_line, run, write_car
 
 from jaxveh import InputError, Recording, io, roads, simulation, vehicles
-from jaxveh.cli.devices import DEVICES, Noise, devices_of
+from jaxveh.cli.devices import DEVICES, NoiseOption, devices_of
 from jaxveh.cli.drive_report import numbers_of, print_numbers, steer_at_03g
 from jaxveh.cli.manoeuvre import USUAL, asked, course_of, make
 from jaxveh.cli.vehicle import AS_PRINTED, BUILT_IN, FIDELITIES, vehicle_of
@@ -163,7 +163,9 @@ def test_a_drive_too_short_for_its_standard_says_so_and_is_written(tmp_path):
 
 @pytest.mark.parametrize("name", ["production", "proving-ground"])
 def test_wheel_speeds_are_measured_where_wheels_spin(name):
-    measured = {f: devices_of(name, vehicle_of("sedan", f), Noise(0.01, 0.1)) for f in FIDELITIES if "trailer" not in f}
+    measured = {
+        f: devices_of(name, vehicle_of("sedan", f), NoiseOption(0.01, 0.1)) for f in FIDELITIES if "trailer" not in f
+    }
     for fidelity, suite in measured.items():
         assert ("wheel_speed_fl" in suite.channels) == (fidelity in ("seven-dof", "fourteen-dof")), fidelity
 

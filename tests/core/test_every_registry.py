@@ -13,7 +13,7 @@ from jaxveh.cli.reproduce import PAPERS
 from jaxveh.tyres.parameters_file import MODELS
 
 OF_OTHERS = "is made of other laws, whose files are theirs"
-ONE_LAW = ("FrictionEllipse", "Longitudinal", "Mirrored", "OnRoad", "Relaxed", "Similarity")
+ONE_LAW = ("FrictionEllipse", "LongitudinalLaw", "Mirrored", "OnRoad", "Relaxed", "Similarity")
 
 
 def test_a_parameter_file_holds_every_law_of_plain_numbers():

@@ -34,7 +34,7 @@ def drive(seed=0, duration=80.0):
 
 
 def estimate(recording, grade_rate_walk=3e-3, **options):
-    model = estimators.mass_and_grade(car(1100.0), start_speed=20.0, grade_rate_walk=grade_rate_walk, **options)
+    model = estimators.mass_and_grade.model(car(1100.0), start_speed=20.0, grade_rate_walk=grade_rate_walk, **options)
     return filters.run(filters.Unscented(), model, recording)
 
 
@@ -56,7 +56,7 @@ def test_an_accelerometer_s_offset_is_a_state():
 
 
 def test_a_mass_may_be_additive_and_a_grade_may_walk():
-    model = estimators.mass_and_grade(car(1100.0), mass_domain=Real(), grade_walk=2e-3, grade_rate_walk=None)
+    model = estimators.mass_and_grade.model(car(1100.0), mass_domain=Real(), grade_walk=2e-3, grade_rate_walk=None)
     assert model.states == ("v_x", "grade", "mass")
     np.testing.assert_allclose(model.prior.mean.mass, 1100.0)
     np.testing.assert_allclose(jnp.sqrt(jnp.diagonal(model.prior.covariance()))[2], 0.4 * 1100.0)
@@ -66,7 +66,7 @@ def test_a_mass_may_be_additive_and_a_grade_may_walk():
 def test_the_model_is_the_vehicle_s_own():
     """The truck of the sets, on a grade, at one instant, by hand."""
     truck = vehicles.build(sets.truck(), Longitudinal)
-    model = estimators.mass_and_grade(truck, a_x=0.05, a_x_bias=0.1)
+    model = estimators.mass_and_grade.model(truck, a_x=0.05, a_x_bias=0.1)
     x = type(model.prior.mean)(v_x=15.0, grade=0.03, grade_rate=0.001, bias=0.2, mass=np.log(truck.mass))
     u = model.row(0.0, {"drive_torque": 2000.0, "brake_torque": 0.0}, {}).u
     after = model.transition(0.0, 1e-4, x, u)
@@ -92,4 +92,4 @@ def test_the_model_is_the_vehicle_s_own():
 )
 def test_mistakes_are_named(options, message):
     with pytest.raises(InputError, match=message):
-        estimators.mass_and_grade(car(), **options)
+        estimators.mass_and_grade.model(car(), **options)

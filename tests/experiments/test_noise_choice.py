@@ -10,7 +10,7 @@ import scipy.stats
 
 from jaxveh import Recording
 from jaxveh.experiments.tyre_apf import Study, noise, predictive
-from jaxveh.experiments.tyre_apf.settings import Level
+from jaxveh.experiments.tyre_apf.settings import NoiseLevel
 
 SMALL = dataclasses.replace(Study(), rate=25.0, particles=40)
 
@@ -48,7 +48,7 @@ CANDIDATES = np.array([(0.02, 0.005, 0.05), (0.02, 0.005, 0.1), (5.0, 0.005, 0.0
 
 def choose_level(rounds, seed=2000, keep=2):
     return noise.choose_level(
-        dataclasses.replace(SMALL, duration=6.0, rate=20.0), Level(0.02, 0.4, None), candidates=CANDIDATES, particles=40,
+        dataclasses.replace(SMALL, duration=6.0, rate=20.0), NoiseLevel(0.02, 0.4, None), candidates=CANDIDATES, particles=40,
         rounds=rounds, keep=keep, seed=seed,
     )  # fmt: skip
 
@@ -113,7 +113,7 @@ def test_its_drives_are_not_those_of_the_report(choice):
 def test_the_predictive_look_ahead_is_raced_at_noise_of_its_own_choice():
     study = dataclasses.replace(SMALL, duration=6.0, rate=20.0)
     levels, raced = predictive.race(
-        study, 2, jax.random.key(0), levels=[Level(0.02, 0.4, None)], candidates=CANDIDATES[:2], rounds=[noise.Round(2, 2)],
+        study, 2, jax.random.key(0), levels=[NoiseLevel(0.02, 0.4, None)], candidates=CANDIDATES[:2], rounds=[noise.Round(2, 2)],
         particles=40, again=2,
     )  # fmt: skip
     assert levels[0].noise in [noise.Noise(*candidate) for candidate in CANDIDATES[:2]]

@@ -24,7 +24,7 @@ from jaxveh.experiments.sideslip_review import drives as own_drives
 from jaxveh.experiments.sideslip_review.drives import Drive
 from jaxveh.experiments.sideslip_review.settings import DEGREE, MARKS, SCENARIOS
 from jaxveh.experiments.sideslip_review.study import fast_part, metrics
-from jaxveh.sweeps import Interval
+from jaxveh.sweeps import ConfidenceInterval
 from jaxveh.tyres import Contact, IsotropicMagicFormula, Relaxed
 
 SMALL = experiment.Study(duration=8.0, span=6.0, warm_up=1.0, dt=0.02, max_step=0.005)
@@ -169,7 +169,10 @@ def test_printed_errata_do_what_the_report_says():
     ],
 )
 def test_a_verdict_is_the_intervals(low, value, high, mark, verdict):
-    assert verdicts.judged(Interval(np.float64(value), np.float64(low), np.float64(high)), 0.0, 0.3, mark) == verdict
+    assert (
+        verdicts.judged(ConfidenceInterval(np.float64(value), np.float64(low), np.float64(high)), 0.0, 0.3, mark)
+        == verdict
+    )
 
 
 def test_checks_count_failures_and_cells(raced):

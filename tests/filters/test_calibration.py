@@ -209,7 +209,7 @@ def test_mistakes_are_named():
         filters.simulation_based_calibration(filters.Kalman(), model, schedule(), key, draws=0)
     with pytest.raises(InputError, match=r"unknown name\(s\) force"):
         filters.simulation_based_calibration(filters.Kalman(), model, SHORT, key)
-    found = filters.Calibration(ss.model.record("X", {"x": np.arange(100)}), 99)
+    found = filters.CalibrationRanks(ss.model.record("X", {"x": np.arange(100)}), 99)
     with pytest.raises(
         InputError, match=r"bins = 7: must be a whole number of at least 2 that divides draws \+ 1 = 100"
     ):

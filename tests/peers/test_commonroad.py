@@ -52,11 +52,11 @@ def _ours(p, load, camber):
     across = {name: value for name, value in named.items() if name[2] == "Y"}
     return tyres.MFTyre(
         structure=mf_tyre.Structure(UNLOADED_RADIUS=0.3, FNOMIN=load),
-        longitudinal=mf_tyre.Longitudinal(**along),
-        lateral=mf_tyre.Lateral(**across),
-        aligning=mf_tyre.Aligning(),
-        overturning=mf_tyre.Overturning(),
-        rolling=mf_tyre.Rolling(),
+        longitudinal=mf_tyre.LongitudinalCoefficients(**along),
+        lateral=mf_tyre.LateralCoefficients(**across),
+        aligning=mf_tyre.AligningCoefficients(),
+        overturning=mf_tyre.OverturningCoefficients(),
+        rolling=mf_tyre.RollingCoefficients(),
         scaling=mf_tyre.Scaling(),
         ranges=mf_tyre.Ranges(),
         version=52,

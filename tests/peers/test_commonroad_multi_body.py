@@ -90,11 +90,11 @@ def our_tyre(p):
     pick = lambda axis: {name: value for name, value in named.items() if name[2] == axis}
     law = tyres.MFTyre(
         structure=mf_tyre.Structure(UNLOADED_RADIUS=0.344, FNOMIN=NOMINAL),
-        longitudinal=mf_tyre.Longitudinal(**pick("X")),
-        lateral=mf_tyre.Lateral(**pick("Y")),
-        aligning=mf_tyre.Aligning(),
-        overturning=mf_tyre.Overturning(),
-        rolling=mf_tyre.Rolling(),
+        longitudinal=mf_tyre.LongitudinalCoefficients(**pick("X")),
+        lateral=mf_tyre.LateralCoefficients(**pick("Y")),
+        aligning=mf_tyre.AligningCoefficients(),
+        overturning=mf_tyre.OverturningCoefficients(),
+        rolling=mf_tyre.RollingCoefficients(),
         scaling=mf_tyre.Scaling(),
         ranges=mf_tyre.Ranges(),
         version=52,

@@ -42,7 +42,7 @@ def across():
 
 
 def along():
-    return tyres.Longitudinal(tyres.MagicFormula(12.0, 1.6, 1.1 * LOAD, 0.3, nominal_load=LOAD))
+    return tyres.LongitudinalLaw(tyres.MagicFormula(12.0, 1.6, 1.1 * LOAD, 0.3, nominal_load=LOAD))
 
 
 class Law(NamedTuple):
@@ -78,7 +78,7 @@ LAWS = {
     "IsotropicMagicFormula": Law(lambda: tyres.IsotropicMagicFormula(10.0, 1.4, 0.9, 0.2)),
     "Linear": Law(lambda: tyres.Linear(60000.0, 80000.0), bound=None, load=False, friction=False),
     "LinearWithLoad": Law(lambda: tyres.LinearWithLoad(60000.0, 5000.0, 20.0), bound=None, friction=False),
-    "Longitudinal": Law(along, bound=1.1, lateral=False),
+    "LongitudinalLaw": Law(along, bound=1.1, lateral=False),
     "MF-Tyre": Law(mf_tyre, bound=None, symmetric=False),
     "MagicFormula": Law(lambda: tyres.MagicFormula(10.0, 1.4, 3600.0, -0.8, nominal_load=LOAD), combined=False),
     "Mirrored": Law(lambda: tyres.Mirrored(tyres.Brush(80000.0, 60000.0, 0.9))),
@@ -258,7 +258,7 @@ def positive_parameters(name):
 
 def test_every_law_but_those_made_of_others_has_a_positive_parameter():
     assert {name for name in LAWS if not positive_parameters(name)} == {
-        "FrictionEllipse", "Longitudinal", "MF-Tyre", "Mirrored"
+        "FrictionEllipse", "LongitudinalLaw", "MF-Tyre", "Mirrored"
     }  # fmt: skip
 
 

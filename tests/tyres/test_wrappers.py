@@ -23,7 +23,7 @@ def lateral(S_h=0.0, S_v=0.0):
 
 
 def longitudinal():
-    return tyres.Longitudinal(tyres.MagicFormula(12.0, 1.6, PEAK_X * LOAD, 0.3, nominal_load=LOAD))
+    return tyres.LongitudinalLaw(tyres.MagicFormula(12.0, 1.6, PEAK_X * LOAD, 0.3, nominal_load=LOAD))
 
 
 def brush():
@@ -186,7 +186,7 @@ def test_similarity_of_a_brush_is_the_brush():
 
 
 def test_longitudinal_turns_a_law():
-    law, tyre = lateral(), tyres.Longitudinal(lateral())
+    law, tyre = lateral(), tyres.LongitudinalLaw(lateral())
     turned = vector(tyre, contact(0.3, 0.05))
     np.testing.assert_allclose(turned, [vector(law, contact(0.05))[1], 0, 0, 0, 0], rtol=1e-14)
 
@@ -212,7 +212,7 @@ def test_the_roads_friction_can_be_estimated():
     [
         (lambda: tyres.FrictionEllipse(lateral(), 3.0), "FrictionEllipse.across = float: must be a tyre"),
         (lambda: tyres.FrictionEllipse(None, lateral()), "FrictionEllipse.along = NoneType: must be a tyre"),
-        (lambda: tyres.Longitudinal(80e3), "Longitudinal.law = float: must be a tyre"),
+        (lambda: tyres.LongitudinalLaw(80e3), "LongitudinalLaw.law = float: must be a tyre"),
         (lambda: tyres.OnRoad(lateral(), -0.5), "OnRoad.friction = -0.5: must be positive"),
         (
             lambda: tyres.OnRoad(tyres.Relaxed(lateral(), 0.1), 0.5),

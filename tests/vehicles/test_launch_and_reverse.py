@@ -19,7 +19,7 @@ STATIC = {
     "Brush": brush,
     "MF-Tyre": lambda: tyres.typical_mf_tyre(LOAD),
     "MF-Tyre, shifted": asymmetric,
-    "ellipse": lambda: tyres.FrictionEllipse(tyres.Longitudinal(formula()), formula()),
+    "ellipse": lambda: tyres.FrictionEllipse(tyres.LongitudinalLaw(formula()), formula()),
 }
 DYNAMIC = {
     "Relaxed Brush": lambda: tyres.Relaxed(brush(), 0.2, 0.4),

@@ -99,7 +99,7 @@ def _filtered(filter_, model: StateSpace, study: Study, drive: Drive, waits: boo
 def _model(study: Study, guess, drive: Drive, **options) -> StateSpace:
     car = eqx.tree_at(lambda c: c.mass, model_car(study), guess)
     noises = {"grade_rate_walk": study.grade_rate_walk, "speed_noise": study.speed_noise}
-    return mass_and_grade(car, v_x=study.v_x, start_speed=drive.v_x[0], more_inputs=TOLD, **{**noises, **options})
+    return mass_and_grade.model(car, v_x=study.v_x, start_speed=drive.v_x[0], more_inputs=TOLD, **{**noises, **options})
 
 
 def _guess(study: Study, guess, drive: Drive) -> Found:

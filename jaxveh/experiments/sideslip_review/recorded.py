@@ -14,7 +14,7 @@ import numpy as np
 from jaxveh import estimators, filters, io
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators import handling_car, kit
+from jaxveh.estimators import kit
 from jaxveh.experiments.sideslip_review.contestants import WHAT, groups, pseudo_integrated, switched, weighted
 from jaxveh.experiments.sideslip_review.contestants import Found as Estimated
 from jaxveh.experiments.sideslip_review.drives import Drive
@@ -26,8 +26,8 @@ from jaxveh.vehicles import LinearSingleTrack
 
 BEST = 0.2312
 """Degrees: the least RMSE of the library's ready-made estimators of sideslip on the Ferrari log, rows 13750 on, v_y never seen:
-`estimators.calibrate` on the rows before without v_y, then `estimators.estimate` (0.296 with the car's file at its
-word, 0.2316 with v_y offered to the calibration, which declines it;
+`estimators.sideslip.calibrate` on the rows before without v_y, then `estimators.sideslip.estimate` (0.296 with the car's file
+at its word, 0.2316 with v_y offered to the calibration, which declines it;
 `tests/estimators/test_sideslip.py` holds them near these). Its model was made while the score of these rows was looked at."""
 
 READY = ("ready-made, as told", "ready-made, calibrated blind")
@@ -94,7 +94,7 @@ def on_log(study: Study, log: Any, car: Any, progress: Progress = silent) -> Log
     half = len(recording) // 2
     blind = recording.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])
     first, rest = blind.rows(slice(0, half)), blind.rows(slice(half, None))
-    fit = estimators.calibrate(first, told, progress=part(progress, 0.0, 0.6, "calibration"))
+    fit = estimators.sideslip.calibrate(first, told, progress=part(progress, 0.0, 0.6, "calibration"))
     progress(0.6, 1.0, "noises")
     cars, speed = log_cars(told, fit.model), float(np.mean(np.asarray(first["v_x"])))
     noise = fitted_noise(cars, study.noise, estimators.clean(first), speed)
@@ -108,9 +108,10 @@ def on_log(study: Study, log: Any, car: Any, progress: Progress = silent) -> Log
 
 def log_cars(told: io.CarSpecification, model: StateSpace) -> Cars:
     """The file's linear car, and the calibrated handling model with its single track."""
+    car = estimators.sideslip.handling_car(told).car
     linear = LinearSingleTrack(
         told.mass, told.yaw_inertia, told.front_axle_to_cg, told.rear_axle_to_cg,
-        *(tyre.cornering_stiffness for tyre in (handling_car(told).car.front, handling_car(told).car.rear)),
+        car.front.cornering_stiffness, car.rear.cornering_stiffness,
     )  # fmt: skip
     return Cars(linear, model.system.car, model.system)
 
@@ -165,7 +166,7 @@ def _found(study: Study, cars: Cars, models: Models, drive: Drive) -> dict[str, 
 
 
 def _ready(rest: Recording, told, fit) -> dict[str, Estimated]:
-    made = [estimators.estimate(rest, source) for source in (told, fit)]
+    made = [estimators.sideslip.estimate(rest, source) for source in (told, fit)]
     return {name: Estimated(e.mean.v_y, e.std.v_y, e.result) for name, e in zip(READY, made, strict=True)}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxveh.experiments.sideslip_review.settings import MARKED, MARKS, Study
 from jaxveh.experiments.sideslip_review.study import Raced
-from jaxveh.sweeps import Interval, compare
+from jaxveh.sweeps import ConfidenceInterval, compare
 
 SUPPORTS, CONTRADICTS, OPEN = "supports", "contradicts", "cannot tell"
 
@@ -67,7 +67,7 @@ class Verdict(NamedTuple):
     statistic: Statistic
     method: str
     mark: bool
-    found: Interval
+    found: ConfidenceInterval
     limit: float
     verdict: str
 
@@ -117,7 +117,7 @@ CLAIMS = (
 """What the text says of methods, ours for those that it names."""
 
 
-def number(raced: Raced, statistic: Statistic, method: str) -> Interval:
+def number(raced: Raced, statistic: Statistic, method: str) -> ConfidenceInterval:
     """The statistic of a method with its 95 % bootstrap interval."""
     metric, scenario = statistic.reference
     return compare(raced.at(statistic.metric, method, statistic.scenario), raced.at(metric, method, scenario)).ratio
@@ -128,7 +128,7 @@ def limit_of(study: Study, statistic: Statistic) -> float:
     return study.share_limit if statistic.is_share else study.growth_limit
 
 
-def judged(found: Interval, low: float, high: float, expected: bool = True) -> str:
+def judged(found: ConfidenceInterval, low: float, high: float, expected: bool = True) -> str:
     """Whether the number is within the bounds as expected; nobody can tell where its interval has one of them inside."""
     if not np.isfinite([found.value, found.low]).all():
         inside = None if np.isnan(found.value) else False
@@ -157,7 +157,7 @@ class Judged(NamedTuple):
     """A claim with its number, its verdict, and the verdict by any lead at all."""
 
     claim: Claim
-    ratio: Interval
+    ratio: ConfidenceInterval
     verdict: str
     by_any_lead: str
 

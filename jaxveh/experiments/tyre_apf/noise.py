@@ -22,7 +22,7 @@ from jaxveh import filters, numerics, sweeps
 from jaxveh._core.errors import InputError, check_at_least
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
-from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study
+from jaxveh.experiments.tyre_apf.settings import LEVELS, NoiseLevel, Study, StudyNoise
 from jaxveh.experiments.tyre_apf.sharpness import KINDS, PAPERS_PARTICLES, Kinds, drive_at, several_passes
 from jaxveh.experiments.tyre_apf.study import drive_once, filter_of, guess_once, model_of
 
@@ -58,7 +58,7 @@ KEEP = 12
 class Choice(NamedTuple):
     """`noise`: the best of `candidates` (m, 3: v_y, yaw_rate, walk) by the mean over drives of `log_likelihood` (m, drives)."""
 
-    noise: Noise
+    noise: StudyNoise
     candidates: np.ndarray
     log_likelihood: np.ndarray
 
@@ -83,7 +83,7 @@ def choose(study: Study, name: str, *, drives: int = 8, seed: int = 1000, progre
 
 def choose_level(
     study: Study,
-    level: Level,
+    level: NoiseLevel,
     *,
     candidates: np.ndarray = LEVEL_CANDIDATES,
     particles: int = PAPERS_PARTICLES,
@@ -125,15 +125,17 @@ def _best(candidates: np.ndarray, log_likelihood: np.ndarray) -> Choice:
     mean = np.where(np.isfinite(mean), mean, -np.inf)
     if not np.isfinite(mean).any():
         raise InputError(f"all {len(candidates)} candidates fail on a drive: give others, or filters more particles.")
-    return Choice(Noise(*map(float, candidates[mean.argmax()])), candidates, log_likelihood)
+    return Choice(StudyNoise(*map(float, candidates[mean.argmax()])), candidates, log_likelihood)
 
 
-def _of_level(study: Study, level: Level, both, candidates, again: int, drives: tuple[int, int], progress: Progress):
+def _of_level(
+    study: Study, level: NoiseLevel, both, candidates, again: int, drives: tuple[int, int], progress: Progress
+):
     """Log-likelihoods (candidates, drives): both filters' means over passes, summed. `drives`: how many, from which seed."""
     values = jnp.asarray(candidates)
 
     def run(point, key):
-        own = level._replace(noise=Noise(*values[point.candidate.astype(int)]))
+        own = level._replace(noise=StudyNoise(*values[point.candidate.astype(int)]))
         found = [several_passes(study, filter_, own, again, key) for filter_ in both]
         least = unexplained(drive_at(study, own, key))
         each = [jnp.where(result == 0, jnp.maximum(passes, least), -jnp.inf) for _, passes, result in found]
@@ -157,7 +159,7 @@ def _drives(study: Study, name: str, keys):
     @eqx.filter_jit
     def likelihood(seen: Any, levels):
         def one(drive, guess, key):
-            noise = Noise(levels[0], levels[1], 0.0 if name == "UKF" else levels[2])
+            noise = StudyNoise(levels[0], levels[1], 0.0 if name == "UKF" else levels[2])
             model = model_of(study, guess, noise)
             found = filters.scan(kind, model, model.rows(drive), key)
             return jnp.where(found.result == 0, found.log_likelihood, -jnp.inf)

@@ -16,7 +16,7 @@ import numpy as np
 
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.experiments.tyre_apf.noise import KEEP, LEVEL_CANDIDATES, ROUNDS, Round, choose_level
-from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Study
+from jaxveh.experiments.tyre_apf.settings import LEVELS, NoiseLevel, Study
 from jaxveh.experiments.tyre_apf.sharpness import (
     AGAIN,
     PAPERS_PARTICLES,
@@ -32,14 +32,14 @@ def race(
     seeds: int,
     key,
     *,
-    levels: Sequence[Level] = LEVELS,
+    levels: Sequence[NoiseLevel] = LEVELS,
     candidates: np.ndarray = LEVEL_CANDIDATES,
     rounds: Sequence[Round] = ROUNDS,
     keep: int = KEEP,
     particles: int = PAPERS_PARTICLES,
     again: int = AGAIN,
     progress: Progress = silent,
-) -> tuple[list[Level], Sharpness]:
+) -> tuple[list[NoiseLevel], Sharpness]:
     """The levels with the noise that is chosen, and both filters at them over `seeds` drives."""
     chosen, share = [], 0.8 / len(levels)
     for i, level in enumerate(levels):

@@ -46,7 +46,7 @@ def tyres(car):
 
 
 @dataclasses.dataclass(frozen=True)
-class Noise:
+class StudyNoise:
     """What a filter's model adds to a drive that has none: `v_y` m/s, `yaw_rate` rad/s, `walk` of the parameters (relative).
 
     All per root second. They pay for what the filter does approximately: its sigma points, or its finite cloud.
@@ -57,26 +57,26 @@ class Noise:
     walk: float
 
 
-class Level(NamedTuple):
+class NoiseLevel(NamedTuple):
     """The sensors' noise, `yaw_rate` (rad/s) and `a_y` (m/s^2), and the process noise that both particle filters assume there:
     the one with the largest mean of their log-likelihoods on drives of other seeds (`noise.choose_level`)."""
 
     yaw_rate: float
     a_y: float
-    noise: Noise
+    noise: StudyNoise
 
 
 LEVELS = (
-    Level(0.001, 0.02, Noise(v_y=0.05, yaw_rate=0.001, walk=0.1)),
-    Level(0.005, 0.1, Noise(v_y=0.01, yaw_rate=0.005, walk=0.1)),
-    Level(0.02, 0.4, Noise(v_y=0.01, yaw_rate=0.002, walk=0.1)),
+    NoiseLevel(0.001, 0.02, StudyNoise(v_y=0.05, yaw_rate=0.001, walk=0.1)),
+    NoiseLevel(0.005, 0.1, StudyNoise(v_y=0.01, yaw_rate=0.005, walk=0.1)),
+    NoiseLevel(0.02, 0.4, StudyNoise(v_y=0.01, yaw_rate=0.002, walk=0.1)),
 )
 """From sharp sensors to coarse ones; the middle is the study's."""
 
 LOOKING_AHEAD = (
-    Level(0.001, 0.02, Noise(v_y=0.05, yaw_rate=0.001, walk=0.1)),
-    Level(0.005, 0.1, Noise(v_y=0.02, yaw_rate=0.002, walk=0.1)),
-    Level(0.02, 0.4, Noise(v_y=0.01, yaw_rate=0.002, walk=0.1)),
+    NoiseLevel(0.001, 0.02, StudyNoise(v_y=0.05, yaw_rate=0.001, walk=0.1)),
+    NoiseLevel(0.005, 0.1, StudyNoise(v_y=0.02, yaw_rate=0.002, walk=0.1)),
+    NoiseLevel(0.02, 0.4, StudyNoise(v_y=0.01, yaw_rate=0.002, walk=0.1)),
 )
 """The same, chosen with an auxiliary filter that looks ahead with the process noise (`predictive`)."""
 
@@ -100,7 +100,7 @@ class Study:
     a_y_std: float = 0.1
     prior: float = 0.1
     particles: int = 1000
-    gaussian: Noise = Noise(v_y=0.02, yaw_rate=0.01, walk=0.0)
-    particle: Noise = Noise(v_y=0.02, yaw_rate=0.005, walk=0.05)
-    saturated: Noise = Noise(v_y=0.0005, yaw_rate=0.0002, walk=0.0)
+    gaussian: StudyNoise = StudyNoise(v_y=0.02, yaw_rate=0.01, walk=0.0)
+    particle: StudyNoise = StudyNoise(v_y=0.02, yaw_rate=0.005, walk=0.05)
+    saturated: StudyNoise = StudyNoise(v_y=0.0005, yaw_rate=0.0002, walk=0.0)
     window: float = 0.5

@@ -18,7 +18,7 @@ from jaxveh import filters, numerics, sweeps, vehicles
 from jaxveh._core.parameter import pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
-from jaxveh.experiments.tyre_apf.settings import LEVELS, Level, Noise, Study, tyres
+from jaxveh.experiments.tyre_apf.settings import LEVELS, NoiseLevel, Study, StudyNoise, tyres
 from jaxveh.experiments.tyre_apf.study import auxiliary, drive_once, guess_once, model_of
 
 PAPERS_PARTICLES = 300
@@ -57,7 +57,7 @@ def run_sharpness(
     counts: Sequence[int] = COUNTS,
     again: int = AGAIN,
     kinds: Kinds | None = None,
-    levels: Sequence[Level] = LEVELS,
+    levels: Sequence[NoiseLevel] = LEVELS,
     progress: Progress = silent,
 ) -> Sharpness:
     """Both filters (`kinds`, by default `KINDS`) with every number of particles at each of the `levels` of noise.
@@ -109,11 +109,13 @@ def _prior(study: Study):
     return run
 
 
-def _passes(study: Study, filter_, again: int, levels: Sequence[Level]):
+def _passes(study: Study, filter_, again: int, levels: Sequence[NoiseLevel]):
     def run(level, key):
         at = lambda which: jnp.asarray([which(one) for one in levels])[level.astype(int)]
-        noise = Noise(*(at(lambda one, name=name: getattr(one.noise, name)) for name in ("v_y", "yaw_rate", "walk")))
-        chosen = Level(at(lambda one: one.yaw_rate), at(lambda one: one.a_y), noise)
+        noise = StudyNoise(
+            *(at(lambda one, name=name: getattr(one.noise, name)) for name in ("v_y", "yaw_rate", "walk"))
+        )
+        chosen = NoiseLevel(at(lambda one: one.yaw_rate), at(lambda one: one.a_y), noise)
         last, likelihood, result = several_passes(study, filter_, chosen, again, key)
         low, high = jnp.quantile(likelihood, jnp.asarray([0.25, 0.75]))
         return {
@@ -125,7 +127,7 @@ def _passes(study: Study, filter_, again: int, levels: Sequence[Level]):
     return run
 
 
-def several_passes(study: Study, filter_, level: Level, again: int, key) -> tuple[jax.Array, jax.Array, jax.Array]:
+def several_passes(study: Study, filter_, level: NoiseLevel, again: int, key) -> tuple[jax.Array, jax.Array, jax.Array]:
     """`again` passes over one lane change at a level: the last parameters (again, 8), log-likelihoods and results (again,)."""
     guess = guess_once(study, jax.random.fold_in(key, 2))
     model = model_of(_at(study, level), guess, level.noise)
@@ -140,12 +142,12 @@ def several_passes(study: Study, filter_, level: Level, again: int, key) -> tupl
     return jax.vmap(once)(jax.random.split(jax.random.fold_in(key, 3), again))
 
 
-def drive_at(study: Study, level: Level, key) -> Recording:
+def drive_at(study: Study, level: NoiseLevel, key) -> Recording:
     """The lane change of `several_passes`, as the level's sensors see it."""
     return drive_once(_at(study, level), jax.random.fold_in(key, 1))
 
 
-def _at(study: Study, level: Level) -> Study:
+def _at(study: Study, level: NoiseLevel) -> Study:
     return dataclasses.replace(study, yaw_rate_std=level.yaw_rate, a_y_std=level.a_y)
 
 

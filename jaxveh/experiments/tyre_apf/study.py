@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import estimators, filters, manoeuvres, numerics, sensors, vehicles
 from jaxveh._core.parameter import pick, prior_spread, put, resolve
 from jaxveh._core.recording import Recording
-from jaxveh.experiments.tyre_apf.settings import Noise, Study, tyres
+from jaxveh.experiments.tyre_apf.settings import Study, StudyNoise, tyres
 from jaxveh.simulation import simulate
 
 ESTIMATORS = ("prior", "PF", "APF", "UKF", "MAP")
@@ -57,7 +57,7 @@ def guess_once(study: Study, key, where=tyres):
     return put(car, parameters, moved)
 
 
-def model_of(study: Study, car, noise: Noise, where=tyres, input_path: str = "held"):
+def model_of(study: Study, car, noise: StudyNoise, where=tyres, input_path: str = "held"):
     """The state space that an estimator of the study sees, with its noise; it estimates `where`."""
     return estimators.state_space(
         car,

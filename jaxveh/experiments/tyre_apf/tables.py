@@ -11,7 +11,7 @@ from jaxveh.experiments.tyre_apf.saturated import over_bound
 from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER, TABLE_2, TABLE_3
 from jaxveh.experiments.tyre_apf.sharpness import Sharpness, likelihood_ratio, pairs
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS
-from jaxveh.sweeps import Interval, Swept
+from jaxveh.sweeps import ConfidenceInterval, Swept
 
 
 def tables(result: Reproduction) -> list[Table]:
@@ -104,7 +104,7 @@ def _error_table(found: Sharpness, title: str = ERROR_TITLE) -> Table:
         rows += [(count, name, *[spread(v) for v in runs.at("error", filter=name)]) for name in _names(runs)]
         for auxiliary, plain in pairs(runs):
             compared = runs.compare("error", "filter", auxiliary, plain)
-            ratios = [Interval(*numbers) for numbers in zip(*compared.ratio, strict=True)]
+            ratios = [ConfidenceInterval(*numbers) for numbers in zip(*compared.ratio, strict=True)]
             cells = [f"{interval(ratio)}, {wins:.0%}" for ratio, wins in zip(ratios, compared.wins, strict=True)]
             rows.append((count, f"{auxiliary} over plain (95 %), wins", *cells))
     return Table(title, ("particles", "filter", *HEADS), rows)

@@ -4,11 +4,11 @@ from jaxveh.filters.calibration.accuracy import Accuracy, rmse_beside_bound
 from jaxveh.filters.calibration.kept import run_and_keep
 from jaxveh.filters.calibration.log_likelihood import LogLikelihoodSpread, log_likelihood_spread
 from jaxveh.filters.calibration.monte_carlo import Runs, monte_carlo
-from jaxveh.filters.calibration.simulation_based import Calibration, simulation_based_calibration
+from jaxveh.filters.calibration.simulation_based import CalibrationRanks, simulation_based_calibration
 
 __all__ = [
     "Accuracy",
-    "Calibration",
+    "CalibrationRanks",
     "LogLikelihoodSpread",
     "Runs",
     "log_likelihood_spread",

@@ -18,7 +18,7 @@ from jaxveh.filters.calibration.monte_carlo import raise_failed
 from jaxveh.statespace import AbstractFilter, StateSpace, kit, scan
 
 
-class Calibration(NamedTuple):
+class CalibrationRanks(NamedTuple):
     """Ranks of the truth: the state's NamedTuple with (R,) whole numbers from 0 to `draws` in each field."""
 
     ranks: Any
@@ -68,7 +68,7 @@ def simulation_based_calibration(
     batch: int | None = None,
     progress: Progress = silent,
     throw: bool = True,
-) -> Calibration:
+) -> CalibrationRanks:
     """Rank the true last state among `draws` of the belief after the last row, over `runs` draws of the model.
 
     Over draws from prior and model, truth and belief are exchangeable, so that all ranks are equally likely, whatever the model,
@@ -87,7 +87,7 @@ def simulation_based_calibration(
     ranks, results = in_batches(one_batch, key, runs, batch, progress, "simulation-based calibration")
     if throw:
         raise_failed(filter, results)
-    return Calibration(ranks, draws)
+    return CalibrationRanks(ranks, draws)
 
 
 @eqx.filter_jit

@@ -36,7 +36,7 @@ class Filtering(NamedTuple):
     J: Any
 
 
-class Smoothing(NamedTuple):
+class SmoothingElement(NamedTuple):
     """p(x_k | x_j, y_0..j) = N(E x_j + g, L) of an earlier row k and a later row j, with (T, ...) leaves."""
 
     E: Any
@@ -75,7 +75,7 @@ def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, cova
     means, covariances = (leaf[:-1] for leaf in filtered)
     predicted = jax.vmap(_moved)(moves, means, covariances)
     back = jax.vmap(_smoothing_element)(moves, means, covariances, *predicted)
-    last = Smoothing(jnp.zeros_like(filtered[1][-1]), filtered[0][-1], filtered[1][-1])
+    last = SmoothingElement(jnp.zeros_like(filtered[1][-1]), filtered[0][-1], filtered[1][-1])
     back = jax.tree.map(lambda a, b: jnp.concatenate([a, b[None]]), back, last)
     joined = jax.lax.associative_scan(jax.vmap(_join_smoothing), back, reverse=True)
     predicted = jax.tree.map(lambda first, rest: jnp.concatenate([first[None], rest]), prior, predicted)
@@ -167,14 +167,14 @@ def _moved(move: Lines, m, P):
     return move.slope @ m + move.offset, numerics.symmetric(move.slope @ P @ move.slope.T + move.error)
 
 
-def _smoothing_element(move: Lines, m, P, m_next, P_next) -> Smoothing:
+def _smoothing_element(move: Lines, m, P, m_next, P_next) -> SmoothingElement:
     E = jnp.linalg.solve(P_next, move.slope @ P).T
-    return Smoothing(E, m - E @ m_next, P - E @ P_next @ E.T)
+    return SmoothingElement(E, m - E @ m_next, P - E @ P_next @ E.T)
 
 
-def _join_smoothing(j: Smoothing, i: Smoothing) -> Smoothing:
+def _join_smoothing(j: SmoothingElement, i: SmoothingElement) -> SmoothingElement:
     """Of a later element j and an earlier element i, in the order of a reversed scan."""
-    return Smoothing(i.E @ j.E, i.E @ j.g + i.g, i.E @ j.L @ i.E.T + i.L)
+    return SmoothingElement(i.E @ j.E, i.E @ j.g + i.g, i.E @ j.L @ i.E.T + i.L)
 
 
 def infos_of(model: StateSpace, rows: Row, passed: Passed) -> Any:

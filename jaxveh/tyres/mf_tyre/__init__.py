@@ -7,26 +7,26 @@ Coefficients keep the names of property files. Inside this folder axes and signs
 gives a negative force; `MFTyre` is the boundary.
 """
 
-from jaxveh.tyres.mf_tyre.aligning import Aligning
-from jaxveh.tyres.mf_tyre.lateral import Lateral
-from jaxveh.tyres.mf_tyre.longitudinal import Longitudinal
-from jaxveh.tyres.mf_tyre.overturning import Overturning
+from jaxveh.tyres.mf_tyre.aligning import AligningCoefficients
+from jaxveh.tyres.mf_tyre.lateral import LateralCoefficients
+from jaxveh.tyres.mf_tyre.longitudinal import LongitudinalCoefficients
+from jaxveh.tyres.mf_tyre.overturning import OverturningCoefficients
 from jaxveh.tyres.mf_tyre.ranges import Ranges
-from jaxveh.tyres.mf_tyre.rolling import Rolling
+from jaxveh.tyres.mf_tyre.rolling import RollingCoefficients
 from jaxveh.tyres.mf_tyre.scaling import Scaling
 from jaxveh.tyres.mf_tyre.structure import Structure
 from jaxveh.tyres.mf_tyre.turn_slip import TurnSlip
 from jaxveh.tyres.mf_tyre.tyre import MFOutputs, MFTyre
 
 __all__ = [
-    "Aligning",
-    "Lateral",
-    "Longitudinal",
+    "AligningCoefficients",
+    "LateralCoefficients",
+    "LongitudinalCoefficients",
     "MFOutputs",
     "MFTyre",
-    "Overturning",
+    "OverturningCoefficients",
     "Ranges",
-    "Rolling",
+    "RollingCoefficients",
     "Scaling",
     "Structure",
     "TurnSlip",

@@ -22,7 +22,7 @@ class AligningParts(NamedTuple):
     residual: Any
 
 
-class Aligning(eqx.Module):
+class AligningCoefficients(eqx.Module):
     """The section [ALIGNING_COEFFICIENTS].
 
     Trail: slope `QBZ1` to `QBZ5`, shape `QCZ1`, peak `QDZ1` to `QDZ4`, curvature `QEZ1` to `QEZ5`, shift `QHZ1` to `QHZ4`.

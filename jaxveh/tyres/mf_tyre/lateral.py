@@ -34,7 +34,7 @@ class PureLateral(NamedTuple):
     S_V: Any
 
 
-class Lateral(eqx.Module):
+class LateralCoefficients(eqx.Module):
     """The section [LATERAL_COEFFICIENTS].
 
     Pure slip: shape `PCY1`; friction `PDY1`, with load (`2`) and camber squared (`3`); curvature `PEY1`, with load (`2`), side

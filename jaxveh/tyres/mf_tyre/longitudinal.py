@@ -20,7 +20,7 @@ class PureLongitudinal(NamedTuple):
     mu: Any
 
 
-class Longitudinal(eqx.Module):
+class LongitudinalCoefficients(eqx.Module):
     """The section [LONGITUDINAL_COEFFICIENTS].
 
     Pure slip: shape `PCX1`; friction `PDX1` at nominal load, with load (`2`) and camber squared (`3`); curvature `PEX1`, with

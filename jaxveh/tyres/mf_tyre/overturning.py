@@ -11,7 +11,7 @@ from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient
 
 
-class Overturning(eqx.Module):
+class OverturningCoefficients(eqx.Module):
     """The section [OVERTURNING_COEFFICIENTS]: `QSX1` to `QSX14`, pressure `PPMX1`."""
 
     QSX1: jax.Array = coefficient(scale=0.01)

@@ -13,7 +13,7 @@ from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient
 
 
-class Rolling(eqx.Module):
+class RollingCoefficients(eqx.Module):
     """The section [ROLLING_COEFFICIENTS]: `QSY1` constant, with F_x (`2`), speed (`3`, `4`), camber (`5`, `6`), exponents of load
     (`7`) and pressure (`8`)."""
 

@@ -10,13 +10,13 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
-from jaxveh.tyres.mf_tyre.aligning import Aligning
-from jaxveh.tyres.mf_tyre.lateral import Lateral
-from jaxveh.tyres.mf_tyre.longitudinal import Longitudinal
+from jaxveh.tyres.mf_tyre.aligning import AligningCoefficients
+from jaxveh.tyres.mf_tyre.lateral import LateralCoefficients
+from jaxveh.tyres.mf_tyre.longitudinal import LongitudinalCoefficients
 from jaxveh.tyres.mf_tyre.operating import Operating
-from jaxveh.tyres.mf_tyre.overturning import Overturning
+from jaxveh.tyres.mf_tyre.overturning import OverturningCoefficients
 from jaxveh.tyres.mf_tyre.ranges import Ranges
-from jaxveh.tyres.mf_tyre.rolling import Rolling
+from jaxveh.tyres.mf_tyre.rolling import RollingCoefficients
 from jaxveh.tyres.mf_tyre.scaling import Scaling
 from jaxveh.tyres.mf_tyre.structure import Structure
 from jaxveh.tyres.mf_tyre.turn_slip import NO_SPIN, Spin, TurnSlip
@@ -74,11 +74,11 @@ class MFTyre(AbstractTyre):
     """
 
     structure: Structure
-    longitudinal: Longitudinal
-    lateral: Lateral
-    aligning: Aligning
-    overturning: Overturning
-    rolling: Rolling
+    longitudinal: LongitudinalCoefficients
+    lateral: LateralCoefficients
+    aligning: AligningCoefficients
+    overturning: OverturningCoefficients
+    rolling: RollingCoefficients
     scaling: Scaling
     ranges: Ranges
     turn_slip: TurnSlip | None = None

@@ -11,7 +11,7 @@ from jaxveh.tyres import Contact, Forces
 from jaxveh.vehicles.fourteen_dof.kinematics import Body, to_body, to_road
 from jaxveh.vehicles.fourteen_dof.suspension import LEFT, Wheel
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
-from jaxveh.vehicles.wheels import Rolling, Wheels, contact, each_wheel, front_rear, travel_direction
+from jaxveh.vehicles.wheels import WheelMotion, Wheels, contact, each_wheel, front_rear, travel_direction
 
 ROLLING_SHARE = 1.0 / 3.0
 """Of a tyre's compression the part by which its effective rolling radius shrinks: a belt that hardly stretches."""
@@ -51,7 +51,7 @@ class Touch(NamedTuple):
     radius: Any
     axis: Vector
     turns: Vector
-    moves: Rolling
+    moves: WheelMotion
     sinks: Any
     damped: Any
 
@@ -77,7 +77,7 @@ def touch(car: Any, body: Body, wheel: Wheel, axis: Vector, omega: Any, friction
     load = jnp.where(compression > 0, spring - car.tyre_damping * at.z / (flat * flat), 0.0)
     load = jnp.maximum(load, 0.0)
     radius = car.wheel_radius - ROLLING_SHARE * compression
-    moves = Rolling(at.x * cosine + at.y * sine, at.y * cosine - at.x * sine, cosine, sine)
+    moves = WheelMotion(at.x * cosine + at.y * sine, at.y * cosine - at.x * sine, cosine, sine)
     camber = numerics.arctan2(axis.z, flat)
     found = contact(moves, load, friction, car.crawl_speed, omega * radius, camber)
     return found, Touch(arm, radius, axis, turns, moves, -at.z, load - spring)

@@ -65,7 +65,7 @@ def _pac2002(coefficients, load: float, radius: float) -> MFTyre:
         return kind(**{entry.name: known[entry.name] for entry in dataclasses.fields(kind) if entry.name in known})
 
     parts = (
-        mf_tyre.Structure, mf_tyre.Longitudinal, mf_tyre.Lateral, mf_tyre.Aligning,
-        mf_tyre.Overturning, mf_tyre.Rolling, mf_tyre.Scaling, mf_tyre.Ranges,
+        mf_tyre.Structure, mf_tyre.LongitudinalCoefficients, mf_tyre.LateralCoefficients, mf_tyre.AligningCoefficients,
+        mf_tyre.OverturningCoefficients, mf_tyre.RollingCoefficients, mf_tyre.Scaling, mf_tyre.Ranges,
     )  # fmt: skip
     return MFTyre(*map(section, parts), version=52)
