@@ -78,10 +78,11 @@ def _fixed(data: RigData, joint: Stage) -> list[str]:
 
 
 def _sections():
-    from jaxveh.tyres import LongitudinalLaw, kit
+    from jaxveh.tyres import mf_tyre
 
     for name, kind in (
-        ("longitudinal", LongitudinalLaw), ("lateral", kit.Lateral), ("aligning", kit.Aligning), ("overturning", kit.Overturning),
+        ("longitudinal", mf_tyre.LongitudinalCoefficients), ("lateral", mf_tyre.LateralCoefficients),
+        ("aligning", mf_tyre.AligningCoefficients), ("overturning", mf_tyre.OverturningCoefficients),
     ):  # fmt: skip
         yield name, kind.__dataclass_fields__
 

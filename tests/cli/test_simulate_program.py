@@ -12,8 +12,9 @@ from jaxveh import InputError, Recording, io, roads, simulation, vehicles
 from jaxveh.cli.devices import DEVICES, NoiseOption, devices_of
 from jaxveh.cli.drive_report import numbers_of, print_numbers, steer_at_03g
 from jaxveh.cli.manoeuvre import USUAL, asked, course_of, make
-from jaxveh.cli.vehicle import AS_PRINTED, BUILT_IN, FIDELITIES, vehicle_of
+from jaxveh.cli.vehicle import AS_PRINTED, BUILT_IN, vehicle_of
 from jaxveh.manoeuvres import MANOEUVRES
+from jaxveh.vehicles import kit
 
 QUICK = ("--duration", "1", "--rate", "50", "--manoeuvre", "step-steer", "--set", "start=0.1")
 
@@ -29,7 +30,7 @@ def read_json(path):
 def test_list_shows_all_that_there_is():
     result = simulate("--list")
     assert result.exit_code == 0, result.output
-    for names in (BUILT_IN, FIDELITIES, MANOEUVRES, roads.ROADS, DEVICES):
+    for names in (BUILT_IN, kit.FIDELITIES, MANOEUVRES, roads.ROADS, DEVICES):
         for name in names:
             assert name in result.stdout
     assert "ramp=0.2 start=1" in result.stdout
@@ -97,9 +98,9 @@ def test_the_sine_with_dwell_is_judged_by_the_cars_own_steer_at_03g(capsys):
     assert capsys.readouterr().out.strip().endswith("sine with dwell: amplitude 3.5, stable yes, responsive not judged")
 
 
-@pytest.mark.parametrize("fidelity", [name for name in FIDELITIES if name != "kinematic-trailer"])
+@pytest.mark.parametrize("fidelity", [name for name in kit.FIDELITIES if name != "kinematic-trailer"])
 def test_every_fidelity_is_made_of_a_named_car(fidelity):
-    assert type(vehicle_of("passenger_car", fidelity)) is FIDELITIES[fidelity]
+    assert type(vehicle_of("passenger_car", fidelity)) is kit.FIDELITIES[fidelity]
 
 
 def test_a_car_file_is_made_into_what_its_numbers_reach_for(tmp_path):
@@ -164,7 +165,9 @@ def test_a_drive_too_short_for_its_standard_says_so_and_is_written(tmp_path):
 @pytest.mark.parametrize("name", ["production", "proving-ground"])
 def test_wheel_speeds_are_measured_where_wheels_spin(name):
     measured = {
-        f: devices_of(name, vehicle_of("sedan", f), NoiseOption(0.01, 0.1)) for f in FIDELITIES if "trailer" not in f
+        f: devices_of(name, vehicle_of("sedan", f), NoiseOption(0.01, 0.1))
+        for f in kit.FIDELITIES
+        if "trailer" not in f
     }
     for fidelity, suite in measured.items():
         assert ("wheel_speed_fl" in suite.channels) == (fidelity in ("seven-dof", "fourteen-dof")), fidelity

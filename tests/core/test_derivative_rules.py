@@ -75,7 +75,7 @@ PLACES = {
     "numerics/triangular.py": {"custom_jvp": EVERY},
     "simulation/meter.py": {"callback": "tells how far a run is; no number comes back"},
     "simulation/solve.py": {"diffeqsolve": "tests/simulation, by the adjoint that is asked for"},
-    "statespace/contract.py": {
+    "numerics/apart.py": {
         "custom_jvp": HESSIAN,
         "bitcast_convert_type": "the condition of a branch that is always taken",
     },

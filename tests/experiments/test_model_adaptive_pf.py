@@ -310,10 +310,10 @@ class Scripted(AbstractFilter):
     def check(self, model):
         del model
 
-    def init(self, model, row, key=None):
+    def _init(self, model, row, key):
         return Told(models.BodyState(*row.y), jnp.int32(0)), model.system.keeps
 
-    def step(self, model, belief, row):
+    def _step(self, model, belief, row):
         return Told(models.BodyState(*row.y), belief.count + 1), model.system.keeps
 
 
@@ -368,7 +368,7 @@ def test_the_printed_variance_grows_to_a_standard_deviation():
         measurement_noise=models.mixture(study),
         prior=ss.Prior(models.BodyState(0.0, 0.0, 0.0), dict.fromkeys(("v_x", "v_y", "yaw_rate"), 1.0)),
     )  # fmt: skip
-    window = printed.first_window(filter_.inner, own)
+    window = filters.kit.first_window(filter_.inner, own)
     seen = jax.jit(filter_._seen)
     Measured = models.record_type("Measurements", study.stds)
     for k in range(400):

@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.linalg
-from test_every_filter import FILTERS, linear, recordings
+from test_every_filter import FILTERS as EVERY
+from test_every_filter import Line, linear, recordings
 
 from jaxveh import InputError, filters, observers
 from jaxveh import statespace as ss
@@ -30,17 +31,19 @@ CLASSES = [
     for cls in (getattr(room, name) for name in room.__all__)
     if isinstance(cls, type) and issubclass(cls, AbstractFilter) and not inspect.isabstract(cls)
 ]
+FILTERS = EVERY | {
+    "paused": Line(lambda: filters.Paused(filters.Cubature(), "force", {"x0": 1.0}), exact=False),
+}
 FLAGS = ("whitens", "noise_by_row", "rows_between")
 HUGE, ROW = 1e6, 12
 
-# Capabilities are those of classes: of lines of the same classes the first.
-KINDS = {tuple(type(layer) for layer in layers(line.make())): name for name, line in reversed(FILTERS.items())}
+# Capabilities are those of classes: of lines of the same classes the last.
+KINDS = {tuple(type(layer) for layer in layers(line.make())): name for name, line in FILTERS.items()}
 ONCE = [name for name in FILTERS if name in KINDS.values()]
 # Of an earlier row is what one shows that is late.
 NOW = [name for name in ONCE if not FILTERS[name].late]
 DRAWN, NOT_DRAWN = [n for n in ONCE if FILTERS[n].drawn], [n for n in NOW if not FILTERS[n].drawn]
-# Its second mode sets a noise itself.
-SETS_NOISE = "interacting"
+NOT_TOLD = {"interacting": "its second mode sets a noise itself", "paused": "the row is one of a pause"}
 
 
 def filter_named(name):
@@ -73,7 +76,7 @@ def told_rows(model, values, y0=None):
     return model.rows(recording.replace(**channels, told=values))
 
 
-@pytest.mark.parametrize("name", [n for n in NOW if able(n, "noise_by_row") and n != SETS_NOISE])
+@pytest.mark.parametrize("name", [n for n in NOW if able(n, "noise_by_row") and n not in NOT_TOLD])
 def test_noise_of_a_row_is_taken_as_it_is_told(name):
     """A channel of a huge spread in one row is as good as missing there, and has the model's own spread in all others."""
     model, own = told_model(), 0.4

@@ -30,6 +30,7 @@ MORE = {
     "strong tracking, softly": lambda: filters.StrongTracking(filters.Extended(), 0.5, 1.5, 3.0),
     "matched process, quickly": lambda: filters.MatchedProcess(filters.Extended(), {"x0": 0.1, "x1": 0.2}, 0.6),
     "varying noise": lambda: filters.VaryingNoise(filters.Extended(), {"y0": "force"}, {"x0": "force"}),
+    "paused": lambda: filters.Paused(filters.Extended(), "force", {"x0": 0.5}),
     "fixed lag, particles": lambda: filters.FixedLag(FEW, 2),
     "regularised by a bandwidth": lambda: filters.Regularised(FEW, 0.2),
     "Liu-West, all states": lambda: filters.LiuWest(FEW, 0.9, ("x0", "x1", "x2")),

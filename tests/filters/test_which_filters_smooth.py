@@ -17,6 +17,7 @@ from jaxveh.statespace.contract import Smoothing, smoothing_of
 
 ROWS = 8
 TABLE = {name: line.make for name, line in FILTERS.items()} | {
+    "paused": lambda: filters.Paused(filters.Cubature(), "force", {"x0": 1.0}),
     "varying noise": lambda: filters.VaryingNoise(filters.Cubature(), {"y0": "force"}),
 }
 SMOOTHED = [name for name, make in TABLE.items() if smoothing_of(make()) is Smoothing.gaussian]

@@ -255,7 +255,10 @@ def test_laws_that_are_not_gaussian_are_refused_where_they_must_be():
         ),
         (lambda: filters.Iterated(filters.Gated(filters.Kalman())), "Iterated: Gated inside"),
         (lambda: filters.Federated(filters.Ensemble(5), (("y0",), ("y1",))), "Federated: Ensemble inside"),
-        (lambda: filters.LiuWest(filters.Kalman()), "LiuWest: Kalman inside: must be ParticleFilter"),
+        (
+            lambda: filters.LiuWest(filters.Kalman()),
+            "LiuWest: Kalman inside: must be a filter of which particles are all",
+        ),
         (lambda: filters.Regularised(filters.Marginalised(5, ("x0",))), "Regularised: Marginalised inside"),
         (
             lambda: filters.AdaptiveNumber(filters.Marginalised(50, ("x0",)), {"x1": 1.0}),

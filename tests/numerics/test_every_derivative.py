@@ -19,6 +19,10 @@ from jaxveh import numerics
 from jaxveh.numerics import elementary, triangular
 
 NONE = {
+    "always": "a condition",
+    "derivative_alone": "a derivative without a value, which differences do not see: test_every_hessian, of particle filters",
+    "polynomials": "a module: of the elementary functions, which are here",
+    "sigma_points": "a module: of constant points and weights",
     "barriers_hold": "a fact of the platform",
     "on_cpu": "a fact of the platform",
     "cauchy": "numbers of a key, which has no derivative",
@@ -78,6 +82,7 @@ def table(interpolate):
 
 
 CASES: dict[str, Callable] = {
+    "apart": lambda x: numerics.apart(lambda y: y * jnp.sin(2 * y) + y**3, numerics.always(x), x),
     "arctan": lambda x: numerics.arctan(2 * x),
     "arctan2": lambda x: numerics.arctan2(x, x + 0.7) + numerics.arctan2(1 + x, x - 0.2),
     "band_harmonics": lambda x: mixed(jnp.stack(numerics.band_harmonics(KEY, 1 + x * x, 3 + x, 4, x.dtype))) / 9,
@@ -119,6 +124,7 @@ CASES: dict[str, Callable] = {
     "sum_of_harmonics": lambda x: mixed(numerics.sum_of_harmonics(sides(x), count(x, 0.3, 0.5), sides(x)[:2])),
     "symmetric": lambda x: mixed(numerics.symmetric(factor(x))),
     "tan": lambda x: numerics.tan(x),
+    "wrap_angle": lambda x: numerics.wrap_angle(3 * x + 7.0) * x,
     "total": lambda x: numerics.total(jnp.sin(x * jnp.arange(90, dtype=x.dtype) / 50)) / 20,
 }
 

@@ -28,7 +28,9 @@ class Paused(AbstractWrapper):
     innovation.
     """
 
+    whitens: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
+    rows_between: ClassVar[bool] = True
     inner: AbstractGaussianFilter
     channel: str = eqx.field(static=True)
     widen: tuple[tuple[str, float], ...] = eqx.field(static=True)
