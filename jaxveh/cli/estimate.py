@@ -91,12 +91,8 @@ def estimate(
         "truth": truth, "filter": filter.value, "particles": particles,
     }  # fmt: skip
     shown = {
-        "file": product,
-        "rows": len(found.time),
-        "start_s": found.time[0],
-        "end_s": found.time[-1],
-        "figures": figures,
-    }
+        "file": product, "rows": len(found.time), "start_s": found.time[0], "end_s": found.time[-1], "figures": figures
+    }  # fmt: skip
     write_numbers(numbers, {**(score or {}), **sideslip.fitted(calibration), **shown}, configuration, seed)
 
 

@@ -71,8 +71,7 @@ def simulate(
     The numbers that the manoeuvre's standard asks for are printed. --out draws the manoeuvre's own figure, the drive from
     above, the wheel loads and the channels. --list shows what there is.
 
-    A step of the steering, with its figures: [bold]jaxveh simulate --manoeuvre step-steer --steer-deg 3 -o drive.parquet --out
-    figures[/]
+    A step of the steering, with its figures: [bold]jaxveh simulate --manoeuvre step-steer --steer-deg 3 -o drive.csv --out figs[/]
 
     The lane change of ISO 3888-1 on four wheels: [bold]jaxveh simulate --manoeuvre iso-lane-change --fidelity two-track-3dof
     --set preview_time=0.7 --out figures[/]
@@ -81,8 +80,7 @@ def simulate(
     --fidelity seven-dof --road ice --until standstill --devices production --duration 40 -o brake.mf4[/]
     """
     if listed:
-        _list()
-        return
+        return _list()
     _check(product, vehicle, road, force, out, numbers, solver, until, rate)
     car = vehicle_of(vehicle, fidelity)
     asked = driving.asked(manoeuvre, speed, steer_deg, duration, settings or (), car)
@@ -95,16 +93,11 @@ def simulate(
         report(0, 1, f"{manoeuvre} (compiling)")
         recording = simulation.simulate(
             car, driver, fitted, sensor_key, road=ground, dt=1 / rate, solver=solver, progress=report,
-            until=None if until is None else EVENTS[until](),
+            until=until and EVENTS[until](),
         )  # fmt: skip
     found = numbers_of(recording, asked, car)
     print_numbers(found)
-    if product is not None:
-        io.write_recording(recording, product, overwrite=force)
-        results().print(f"{product}: {len(recording)} rows, {', '.join(recording.names)}")
-    if out is not None:
-        for path in draw(recording, asked, car, out):
-            results().print(f"figure: {path}")
+    _keep(recording, product, asked, car, out, force)
     configuration = {
         "vehicle": vehicle, "fidelity": fidelity, "manoeuvre": manoeuvre, "speed": asked.speed, "steer_deg": asked.steer_deg,
         "duration": driver.duration, "options": asked.options, "road": road, "devices": devices, "rate": rate,
@@ -132,6 +125,15 @@ def _check(product, vehicle, road, force, out, numbers, solver, until, rate) -> 
     if until is not None:
         check_one_of("--until", until, EVENTS)
     check_positive("--rate", rate, "Hz")
+
+
+def _keep(recording: Recording, product: Path | None, asked: Any, car: Any, out: Path | None, force: bool) -> None:
+    """Write the recording and draw the figures where that is asked for, and say so."""
+    if product is not None:
+        io.write_recording(recording, product, overwrite=force)
+        results().print(f"{product}: {len(recording)} rows, {', '.join(recording.names)}")
+    for path in [] if out is None else draw(recording, asked, car, out):
+        results().print(f"figure: {path}")
 
 
 def _list() -> None:

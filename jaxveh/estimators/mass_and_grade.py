@@ -60,27 +60,21 @@ def model(
         raise InputError("mass_and_grade: a_x_bias: there is no accelerometer; give its noise, a_x.")
     check("mass_and_grade: grade_walk", grade_walk, lambda v: v >= 0, "at least 0 rad per root second")
     check_positive("mass_and_grade: speed_noise", speed_noise, "m/s per root second")
-    states = {"v_x": (start_speed, 20.0), "grade": (0.0, grade_spread)}
-    noise = {"v_x": speed_noise}
+    states, noise = {"v_x": (start_speed, 20.0), "grade": (0.0, grade_spread)}, {"v_x": speed_noise}
     if not (isinstance(grade_walk, float | int) and grade_walk == 0):
         noise["grade"] = grade_walk
     if grade_rate_walk is not None:
         check_positive("mass_and_grade: grade_rate_walk", grade_rate_walk, "rad/s per root second")
         # What the walk makes of the rate in half a minute.
         states["grade_rate"], noise["grade_rate"] = (0.0, grade_rate_walk * 30.0**0.5), grade_rate_walk
-    if a_x_bias is not None:
-        states["bias"] = (0.0, a_x_bias)
+    states |= {} if a_x_bias is None else {"bias": (0.0, a_x_bias)}
     kind = record_type("MassAndGradeState", states)
     model = StateSpace(
-        system=car,
-        transition=Propagate(_rates, Heun()),
-        observation=_seen,
-        process_noise=Continuous(Gaussian(noise)),
+        system=car, transition=Propagate(_rates, Heun()), observation=_seen, process_noise=Continuous(Gaussian(noise)),
         measurement_noise=Gaussian({"v_x": v_x} | ({} if a_x is None else {ACCELEROMETER: a_x})),
         prior=Prior(kind(*(mean for mean, _ in states.values())), {name: std for name, (_, std) in states.items()}),
-        inputs=(*car.inputs, *more_inputs),
-        input_path=input_path,
-    )
+        inputs=(*car.inputs, *more_inputs), input_path=input_path,
+    )  # fmt: skip
     return with_parameters(model, lambda car: (car.mass,), mass_spread, mass_walk, domain=mass_domain)
 
 

@@ -69,14 +69,9 @@ def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace,
     state = jax.eval_shape(init, *like)[0]
     then = jax.export.export(jax.jit(step))(state, *like)
     described = {
-        "inputs": model.inputs,
-        "channels": model.channels,
-        "report": names[0],
-        "numbers": NUMBERS,
-        "dtype": np.dtype(dtype).name,
-        "jax": jax.__version__,
-        "platforms": first.platforms,
-    }
+        "inputs": model.inputs, "channels": model.channels, "report": names[0], "numbers": NUMBERS,
+        "dtype": np.dtype(dtype).name, "jax": jax.__version__, "platforms": first.platforms,
+    }  # fmt: skip
     with making_folder(folder) as part:
         (part / "init.jaxexport").write_bytes(first.serialize())
         (part / "step.jaxexport").write_bytes(then.serialize())

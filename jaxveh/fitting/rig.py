@@ -110,7 +110,7 @@ def fit_rig(
     """
     check_at_least("max_steps", max_steps, 1)
     data, plan, aside = _prepared(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
-    parts = fold_of(rig, folds) if folds else np.zeros(rig.load.shape)
+    parts = fold_of(rig, folds) if folds else np.full(rig.load.shape, -1)
     joint = _joint(data)
     plan = [*(plan if staged else ()), without(joint, _held(data, aside), data.names)]
     total = len(plan) + folds
@@ -122,17 +122,13 @@ def fit_rig(
     settled = settle(data, law, tyre, joint, aside, reports[-1])
     tyre, reports[-1] = settled.tyre, settled.report
     plan = [without(stage, settled.held, data.names) for stage in plan]
-    missed = np.full(data.measured.shape, np.nan)
-    for k in range(folds):
-        progress(len(plan) + k, total, "cross-validation")
-        missed[:, parts == k] = _unseen(data, law, plan, parts == k)[:, parts == k]
+    missed = _missed(data, law, plan, parts, lambda k: progress(len(plan) + k, total, "cross-validation"))
     progress(total, total, JOINT)
-    validation = rms(data.channels, missed) if folds else dict.fromkeys(data.channels, float("nan"))
-    fit = _result(data, tyre, joint, settled.held, tuple(reports), data.rmse(law), validation)
+    validation = rms(data.channels, missed) if folds else dict.fromkeys(data.channels, np.nan)
     if throw and not reports[-1].converged:
         steps = reports[-1].steps
         raise FilterError(f"fit to {rig.source} stopped after {steps} steps; throw=False returns it as it is.")
-    return fit
+    return _result(data, tyre, joint, settled.held, tuple(reports), data.rmse(law), validation)
 
 
 def _check_free(free: Sequence[str], plan: list[Stage]) -> None:
@@ -202,6 +198,15 @@ def _prepared(
 
 def _joint(data: RigData) -> Stage:
     return Stage(JOINT, data.channels, data.names, np.ones(data.rig.load.shape, bool))
+
+
+def _missed(data, law, plan, parts, told):
+    """Residuals at rows that a fold's fit did not see, by the fold of each row, `parts` (-1: of none); nan without one."""
+    missed = np.full(data.measured.shape, np.nan)
+    for k in range(int(parts.max()) + 1):
+        told(k)
+        missed[:, parts == k] = _unseen(data, law, plan, parts == k)[:, parts == k]
+    return missed
 
 
 def _unseen(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarray) -> np.ndarray:

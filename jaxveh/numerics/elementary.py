@@ -20,6 +20,7 @@ from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jaxveh.numerics import polynomials
+from jaxveh.numerics.float_bits import float_layout, sign_of
 from jaxveh.numerics.platform import Tree, barrier, on_cpu
 
 _TANGENT_OF_PI_8 = math.sqrt(2) - 1
@@ -89,51 +90,9 @@ def log(x: ArrayLike) -> Array:
     return _log(_floating(x))
 
 
-def sin_cos_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Array]:
-    """Sine and cosine of an angle uniform over the circle, of random words: uint32, or uint64 for float64.
-
-    Two bits choose the signs, one whether the functions swap, the others an angle in (-pi / 4, pi / 4), so that no
-    reduction and no long polynomial is needed.
-    """
-    bits = 8 * word.dtype.itemsize
-    signed = jnp.int32 if bits == 32 else jnp.int64
-    # The low three bits select, and are set to 7 in the angle: less 3, it is symmetric about 0 and never 0.
-    integer = lax.bitcast_convert_type(word | _bits(word, 7), signed)
-    unit = 2.0 ** (1 - bits)
-    # The sum between the scales also keeps XLA from joining them: the powers of so small a constant underflow.
-    r = (integer.astype(dtype) * unit - 3 * unit) * (math.pi / 4)
-    t = r * r
-    sine = r + r * t * polynomials.evaluate(
-        polynomials.of_dtype(r, polynomials.OCTANT_SINE_32, polynomials.OCTANT_SINE_64), t
-    )
-    cosine = 1.0 + t * polynomials.evaluate(
-        polynomials.of_dtype(r, polynomials.OCTANT_COSINE_32, polynomials.OCTANT_COSINE_64), t
-    )
-    swap = (word & _bits(word, 1)) != _bits(word, 0)
-    first, second = jnp.where(swap, cosine, sine), jnp.where(swap, sine, cosine)
-    return _flip(first, word >> _bits(word, 1)), _flip(second, word >> _bits(word, 2))
-
-
-def half_turn_of_word(word: Array, dtype: jax.typing.DTypeLike) -> tuple[Array, Array]:
-    """Sine and cosine of an angle uniform over the circle, of random words uint32.
-
-    The lowest bit chooses the half turn, the others an angle in (-pi / 2, pi / 2): each function is one polynomial, so that
-    computing them apart costs nothing twice. Absolute errors as of `sin`; where the relative error of a cosine near 0
-    counts, use `sin_cos_of_word`.
-    """
-    # With the lowest bit set, which is what the sum does, the integers are symmetric about 0. The sum between the scales also
-    # keeps XLA from joining them: the powers of so small a constant underflow.
-    integer = lax.bitcast_convert_type(word & _bits(word, 2**32 - 2), jnp.int32)
-    r = (integer.astype(dtype) * 2.0**-32 + 2.0**-32) * math.pi
-    t = r * r
-    sine = r + r * t * polynomials.evaluate(polynomials.of_dtype(r, polynomials.SINE_32, polynomials.SINE_64), t)
-    cosine = 1.0 + t * polynomials.evaluate(polynomials.of_dtype(r, polynomials.COSINE_32, polynomials.COSINE_64), t)
-    return sine, _flip(cosine, word)
-
-
 def log_of_normal(x: Array) -> Array:
     """Natural logarithm of positive, finite, normal float32 or float64 numbers; anything else gives a wrong number."""
-    unsigned, mantissa_bits = _layout(x)
+    unsigned, mantissa_bits = float_layout(x)
     signed = jnp.int32 if unsigned == jnp.uint32 else jnp.int64
     origin, one = (jnp.asarray(int(np.asarray(value, x.dtype).view(signed)), signed) for value in (math.sqrt(2.0), 1.0))
     held = lax.stop_gradient(x)
@@ -179,29 +138,6 @@ def _ours(*arguments: Array) -> bool:
 def _stored(values: Tree) -> Tree:
     """Arguments as arrays in memory, where they are many: else XLA computes what they are made of once for each use."""
     return barrier(values) if jax.tree.leaves(values)[0].size >= _MANY else values
-
-
-def _layout(x: Array) -> tuple[type, int]:
-    return (jnp.uint32, 23) if x.dtype == jnp.float32 else (jnp.uint64, 52)
-
-
-def _bits(word: Array, value: int) -> Array:
-    return jnp.asarray(value, word.dtype)
-
-
-def _flip(x: Array, word: Array) -> Array:
-    """`x` with its sign flipped where the lowest bit of `word` is set."""
-    unsigned, _ = _layout(x)
-    sign = word.astype(unsigned) << jnp.asarray(8 * x.dtype.itemsize - 1, unsigned)
-    return lax.bitcast_convert_type(lax.bitcast_convert_type(x, unsigned) ^ sign, x.dtype)
-
-
-def _sign(x: Array) -> Array:
-    """1 with the sign bit of `x`; as bits, because a comparison loses the sign of zero. A constant to derivatives."""
-    unsigned, _ = _layout(x)
-    mask = jnp.asarray(1 << (8 * x.dtype.itemsize - 1), unsigned)
-    one = lax.bitcast_convert_type(jnp.ones_like(x), unsigned)
-    return lax.bitcast_convert_type(one | (lax.bitcast_convert_type(x, unsigned) & mask), x.dtype)
 
 
 # Sine and cosine
@@ -297,7 +233,7 @@ def _arctan(x: Array) -> Array:
         return jnp.arctan(x)
     x = _stored(x)
     # |x| as a product, because the derivative of |x| is 0 at 0.
-    sign = _sign(x)
+    sign = sign_of(x)
     turned, top, bottom = _three_ranges(sign * x, jnp.ones_like(x))
     return sign * _arctan_polynomial(turned, top / bottom)
 
@@ -308,7 +244,7 @@ def _arctan2(y: Array, x: Array) -> Array:
         return _library_arctan2(y, x)
     x, y = _stored(jnp.broadcast_arrays(x, y))
     largest = float(jnp.finfo(x.dtype).max) / 4  # so that infinities and sums of the two stay finite
-    sign = _sign(y)
+    sign = sign_of(y)
     left = x < 0.0
     width, height = (jnp.where(z > largest, largest, z) for z in (jnp.where(left, -x, x), sign * y))
     turned, top, bottom = _three_ranges(height, width)

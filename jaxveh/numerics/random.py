@@ -15,8 +15,9 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike, DTypeLike
 
-from jaxveh.numerics.elementary import half_turn_of_word, log_of_normal, sin_cos_of_word, sqrt
+from jaxveh.numerics.elementary import log_of_normal, sqrt
 from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu
+from jaxveh.numerics.words import half_turn_of_word, sin_cos_of_word
 
 Shape = int | Sequence[int]
 

@@ -21,7 +21,7 @@ from jaxveh.simulation import stiffness
 from jaxveh.simulation.driven import Driven, check_inputs, driver_name, vehicle_name, with_pedals
 from jaxveh.simulation.events import Event
 from jaxveh.simulation.meter import told
-from jaxveh.simulation.solve import Grid, Solution, even_grid, grid_through, solve
+from jaxveh.simulation.solve import Solution, even_grid, grid_through, solve
 from jaxveh.simulation.stiffness import SolverChoice
 from jaxveh.statespace import RK4, RolledRK4
 from jaxveh.vehicles import AbstractVehicle, Travelling
@@ -70,33 +70,26 @@ def simulate(
     **Channels** with a `SensorSet` (or none): each measured channel by its name, with the sensors' noise, and the car's inputs
     (`steer`, `v_x`, ...) exact unless the sensors measure them. With a `Suite` of devices (or one device): what they say, when
     they say it (its rows instead of `dt`'s, NaN where a device was silent). In both the truth, every output of the car, as
-    `true.<name>`.
-    `key` draws all randomness; without a key the measurements carry none.
+    `true.<name>`. `key` draws all randomness; without a key the measurements carry none.
 
     **Solvers**: "auto" takes RK4 with equal steps of at most `max_step` (s) that meet every row, shortened to what the fastest
     motion asks for (the spins of wheels at low speed, a sensor's low-pass, the driver), or Kvaerno's implicit method where
     they would become too short; "explicit" and "implicit" insist, and a warning says where equal steps were too long for what
     happened. A diffrax solver takes equal steps, or its own with a `stepsize_controller`. Under jit, vmap or grad nothing can
-    be looked at: "auto" is then "explicit". `adjoint`: diffrax's way to differentiate; the default serves
-    reverse mode, and forward mode too where steps are equal and no event ends them (else `diffrax.ForwardMode()`).
-    `progress` hears how far it is (single runs).
-
-    It may be jitted, vmapped over keys, cars and manoeuvres, and differentiated with respect to any of their leaves.
+    be looked at: "auto" is then "explicit". `adjoint`: diffrax's way to differentiate; the default serves reverse mode, and
+    forward mode too where steps are equal and no event ends them (else `diffrax.ForwardMode()`). `progress` hears how far it
+    is (single runs). All may be jitted, vmapped over keys, cars and manoeuvres, and differentiated by any of their leaves.
 
     **Raises** `InputError` for arguments out of range, sensors or an event that are none, a manoeuvre that lacks an input of
-    the car, rows that are one instant in the car's dtype; `FilterError`, naming
-    time, state and a remedy, where the motion does not stay finite. The latter needs `throw=True` and acts on the host; under
-    jit look at the channels.
+    the car, rows that are one instant in the car's dtype; `FilterError`, naming time, state and a remedy, where the motion does
+    not stay finite. The latter needs `throw=True` and acts on the host; under jit look at the channels.
     """
     sensors = _fitted(sensors)
     _check_event(until)
     driven = driven_car(car, manoeuvre, sensors if isinstance(sensors, SensorSet) else None, road)
     duration, values = driven.driver.duration, {} if start is None else as_mapping(start, "start")
     rows = None if not isinstance(sensors, Suite) else device_rows(sensors, duration)
-
-    def grid(step: float) -> Grid:
-        return even_grid(duration, dt, step) if rows is None else grid_through(rows, step)
-
+    grid = lambda step: even_grid(duration, dt, step) if rows is None else grid_through(rows, step)
     times = grid(max_step).rows
     with told(progress) as meter:
         run = lambda choice: solve(driven, values, grid(choice.max_step), choice, until, adjoint, meter)
@@ -104,11 +97,9 @@ def simulate(
     if throw:
         _check_finished(found, times)
     source = f"simulation: {vehicle_name(car)}, {driver_name(driven.driver)}"
-    if isinstance(sensors, Suite):
-        recording, row = _devices(driven, found, times, sensors, duration, key, source)
-    else:
-        recording, row = _recording(driven, found, times, key, source), np.arange(len(times))
-    return _cut(recording, row, found, until)
+    if not isinstance(sensors, Suite):
+        return _cut(_recording(driven, found, times, key, source), np.arange(len(times)), found, until)
+    return _cut(*_devices(driven, found, times, sensors, duration, key, source), found, until)
 
 
 def _fitted(sensors: Any) -> SensorSet | Suite | None:

@@ -58,11 +58,11 @@ PLACES = {
     },
     "filters/choosing.py": {"stop_gradient": "the largest logarithm, which cancels in the sum of exponentials"},
     "filters/looking_ahead.py": {"stop_gradient": "a remark, which is a code"},
-    "filters/particle.py": {
-        "stop_gradient": "the draw of ancestors, whole numbers; the base of moments, which cancels"
-    },
+    "filters/particle.py": {"stop_gradient": "the draw of ancestors, whole numbers"},
+    "filters/particle_belief.py": {"stop_gradient": "the base of moments, which cancels"},
     "numerics/blocks.py": {"filter_custom_jvp": EVERY},
     "numerics/elementary.py": {"custom_jvp": EVERY, "stop_gradient": EVERY, "bitcast_convert_type": EVERY},
+    "numerics/float_bits.py": {"bitcast_convert_type": EVERY},
     "numerics/held.py": {
         "Primitive": EVERY,
         "optimization_barrier": EVERY,
@@ -73,6 +73,7 @@ PLACES = {
     "numerics/roots.py": {"stop_gradient": EVERY, "while_loop": EVERY},
     "numerics/tangents.py": {"Primitive": SCORES},
     "numerics/triangular.py": {"custom_jvp": EVERY},
+    "numerics/words.py": {"bitcast_convert_type": "whole numbers of random words"},
     "simulation/meter.py": {"callback": "tells how far a run is; no number comes back"},
     "simulation/solve.py": {"diffeqsolve": "tests/simulation, by the adjoint that is asked for"},
     "numerics/apart.py": {

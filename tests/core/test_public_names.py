@@ -4,6 +4,7 @@ import ast
 import importlib
 import pathlib
 
+import numpy as np
 import pytest
 
 import jaxveh
@@ -63,3 +64,20 @@ def test_every_room_is_reached_from_the_package():
         assert getattr(jaxveh, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'garage'"):
         _ = jaxveh.garage
+
+
+LONGEST_FUNCTION, LONGEST_MODULE, MEDIAN_MODULE = 60, 350, 100
+
+
+def test_functions_and_modules_stay_short():
+    """With their docstrings."""
+    lengths, long = {}, []
+    for path in ROOT.rglob("*.py"):
+        text = path.read_text()
+        lengths[str(path.relative_to(ROOT))] = len(text.splitlines())
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno >= LONGEST_FUNCTION:
+                long.append(f"{path.relative_to(ROOT)}:{node.name}: {node.end_lineno - node.lineno + 1} lines")
+    assert not long
+    assert not {name: count for name, count in lengths.items() if count > LONGEST_MODULE}
+    assert np.median(list(lengths.values())) <= MEDIAN_MODULE
