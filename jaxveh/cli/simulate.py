@@ -71,7 +71,7 @@ def simulate(
     The numbers that the manoeuvre's standard asks for are printed. --out draws the manoeuvre's own figure, the drive from
     above, the wheel loads and the channels. --list shows what there is.
 
-    A step of the steering, with its figures: [bold]jaxveh simulate --manoeuvre step-steer --steer-deg 3 -o drive.csv --out figs[/]
+    A step of the steering, with its figures: [bold]jaxveh simulate --manoeuvre step-steer --steer-deg 3 -o step.csv --out figs[/]
 
     The lane change of ISO 3888-1 on four wheels: [bold]jaxveh simulate --manoeuvre iso-lane-change --fidelity two-track-3dof
     --set preview_time=0.7 --out figures[/]

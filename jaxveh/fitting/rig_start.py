@@ -20,6 +20,7 @@ from jaxveh.tyres import (
     LinearWithLoad,
     MagicFormula,
     UniTire,
+    kit,
     typical_mf_tyre,
 )
 
@@ -32,8 +33,8 @@ LEAST_LOAD = 0.2
 NEAR_LOAD = 1.4
 """Loads within this factor of the median give the slope there; other loads where none is so near."""
 
-GENERIC = {"C": 1.3, "E": -0.5, "stiffness": 15.0, "friction": 1.0, "speed": 16.7, "pressure": 220000.0}
-"""An ordinary tyre's, where the data are silent; `stiffness` over load, 1/rad or per slip ratio."""
+GENERIC_RIG = {"speed": 16.7, "pressure": 220000.0}
+"""m/s and Pa, where the data are silent."""
 
 
 class RigFacts(NamedTuple):
@@ -54,14 +55,14 @@ def rig_facts(rig: RigTable) -> RigFacts:
     A direction without measurements takes the other one's stiffness.
     """
     load = float(np.median(rig.load))
-    median = lambda name: float(np.median(getattr(rig, name)) if getattr(rig, name) is not None else GENERIC[name])
+    median = lambda name: float(np.median(getattr(rig, name)) if getattr(rig, name) is not None else GENERIC_RIG[name])
     across, along = _slope(rig, "F_y", load), _slope(rig, "F_x", load)
-    generic = GENERIC["stiffness"] * load
+    generic = kit.GENERIC_TYRE.stiffness * load
     # `speed` of a table may be zero where the rig did not tell it.
     return RigFacts(
         load=load,
         pressure=median("pressure"),
-        speed=median("speed") or GENERIC["speed"],
+        speed=median("speed") or GENERIC_RIG["speed"],
         cornering_stiffness=across or along or generic,
         slip_stiffness=along or across or generic,
         friction=_friction(rig, load),
@@ -94,10 +95,10 @@ def _friction(rig: RigTable, load: float) -> float:
     parts = [np.nan_to_num(force) for force in (rig.F_x, rig.F_y) if force is not None]
     rows = rig.load > LEAST_LOAD * load
     if not parts or not np.any(rows):
-        return GENERIC["friction"]
+        return kit.GENERIC_TYRE.friction
     share = np.hypot(parts[0], parts[-1] if len(parts) > 1 else 0.0)[rows] / rig.load[rows]
     # The very largest is an outlier's.
-    return float(np.percentile(share, 99.5)) or GENERIC["friction"]
+    return float(np.percentile(share, 99.5)) or kit.GENERIC_TYRE.friction
 
 
 def _mf(version: int) -> Callable[[RigFacts], AbstractTyre]:
@@ -108,8 +109,7 @@ def _mf(version: int) -> Callable[[RigFacts], AbstractTyre]:
 
 
 def _magic_formula(facts: RigFacts) -> MagicFormula:
-    C, D = GENERIC["C"], facts.friction * facts.load
-    return MagicFormula(B=facts.cornering_stiffness / (C * D), C=C, D=D, E=GENERIC["E"], nominal_load=facts.load)
+    return kit.GENERIC_TYRE.magic_formula(facts.cornering_stiffness, facts.load, facts.friction)
 
 
 def _linear_with_load(facts: RigFacts) -> LinearWithLoad:

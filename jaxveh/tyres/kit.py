@@ -1,12 +1,15 @@
 """What those who add a tyre law, or read one, build with."""
 
 from jaxveh.tyres.evaluation import EVALUATION_INPUTS, evaluate
+from jaxveh.tyres.generic import GENERIC_TYRE, GenericTyre
 from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
 from jaxveh.tyres.mirrored import mirrored_contact
 
 __all__ = [
     "EVALUATION_INPUTS",
+    "GENERIC_TYRE",
     "TYPICAL_COEFFICIENTS",
+    "GenericTyre",
     "evaluate",
     "mirrored_contact",
 ]

@@ -1,7 +1,6 @@
 """What those who add a vehicle build with."""
 
 from jaxveh.vehicles.load_transfer import planar_loads
-from jaxveh.vehicles.parameter_sets import GENERIC_TYRE
 from jaxveh.vehicles.sets import CARS, FIDELITIES
 from jaxveh.vehicles.two_track import air_drag, positions_of, rolling_wheels
 from jaxveh.vehicles.wheels import Wheels, body_forces, each_wheel, travel_direction, wheel_names, wheels_of
@@ -9,7 +8,6 @@ from jaxveh.vehicles.wheels import Wheels, body_forces, each_wheel, travel_direc
 __all__ = [
     "CARS",
     "FIDELITIES",
-    "GENERIC_TYRE",
     "Wheels",
     "air_drag",
     "body_forces",

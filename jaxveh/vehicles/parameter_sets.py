@@ -7,12 +7,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
-from jaxveh.tyres import AbstractTyre, Contact, Linear, MagicFormula, cornering_stiffness
+from jaxveh.tyres import AbstractTyre, Contact, Linear, MagicFormula, cornering_stiffness, kit
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.single_track import SingleTrack
-
-GENERIC_TYRE = {"mu": 1.0, "C": 1.3, "E": -0.5}
-"""Friction coefficient and shape of an ordinary tyre, for a specification that gives cornering stiffness alone."""
 
 
 def passenger_car() -> SingleTrack:
@@ -53,10 +50,7 @@ def axle_from_stiffness(stiffness, load) -> MagicFormula:
     Peak force D is the load (friction coefficient 1), C 1.3 and E -0.5 are those of an ordinary tyre, and
     `B = stiffness / (C D)`. The force scales with load (`nominal_load` is the static load).
     """
-    D = GENERIC_TYRE["mu"] * load
-    return MagicFormula(
-        B=stiffness / (GENERIC_TYRE["C"] * D), C=GENERIC_TYRE["C"], D=D, E=GENERIC_TYRE["E"], nominal_load=load
-    )
+    return kit.GENERIC_TYRE.magic_formula(stiffness, load)
 
 
 def linear(car: SingleTrack) -> SingleTrack:

@@ -9,7 +9,7 @@ import pytest
 from jaxveh import InputError, tyres
 from jaxveh.fitting import fit_rig, starting_tyre
 from jaxveh.fitting.rig_problem import offered
-from jaxveh.fitting.rig_start import GENERIC, RIG_STARTS, rig_facts
+from jaxveh.fitting.rig_start import GENERIC_RIG, RIG_STARTS, rig_facts
 from jaxveh.io import RigTable
 
 TRUTH = tyres.Brush(slip_stiffness=80e3, cornering_stiffness=60e3, friction=0.9)
@@ -33,7 +33,7 @@ def rig_of(tyre=TRUTH, noise=20.0, rows=300, sign=1.0, **extra):
 
 def test_facts_are_near_the_truth():
     facts = rig_facts(rig_of(pressure=np.full(300, 2.4e5)))
-    assert facts.load == 4000.0 and facts.pressure == 2.4e5 and facts.speed == GENERIC["speed"]
+    assert facts.load == 4000.0 and facts.pressure == 2.4e5 and facts.speed == GENERIC_RIG["speed"]
     assert facts.friction == pytest.approx(0.9, rel=0.05)
     assert 0.75 * 80e3 < facts.slip_stiffness < 1.25 * 80e3
     assert 0.75 * 60e3 < facts.cornering_stiffness < 1.25 * 60e3
@@ -43,7 +43,7 @@ def test_silent_directions_take_the_other_one_s():
     one = rig_facts(rig_of(F_x=None))
     assert one.slip_stiffness == one.cornering_stiffness
     quiet = rig_facts(rig_of(F_x=None, F_y=None, M_z=np.ones(300)))
-    assert quiet.slip_stiffness == GENERIC["stiffness"] * 4000.0 and quiet.friction == GENERIC["friction"]
+    assert quiet.slip_stiffness == tyres.kit.GENERIC_TYRE.stiffness * 4000.0 and quiet.friction == tyres.kit.GENERIC_TYRE.friction
 
 
 @pytest.mark.parametrize("name", RIG_STARTS)

@@ -9,14 +9,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import manoeuvres, numerics, roads, vehicles
+from jaxveh import manoeuvres, numerics, roads, tyres, vehicles
 from jaxveh._core.parameter import parameter
 from jaxveh.experiments.federated_ckf.settings import Study
 from jaxveh.manoeuvres import AbstractManoeuvre, AbstractSpeed, DriverInputs
 from jaxveh.manoeuvres import kit as manoeuvres_kit
 from jaxveh.simulation import simulate
 from jaxveh.statespace import Gaussian, RolledRK4
-from jaxveh.tyres import Dugoff, MagicFormula, Similarity
+from jaxveh.tyres import Dugoff, Similarity
 from jaxveh.vehicles import SevenDOF, sets
 from jaxveh.vehicles import kit as vehicles_kit
 
@@ -76,8 +76,7 @@ def peaked() -> Similarity:
     numbers = sets.ev()
     assert numbers.front is not None and numbers.front.slip_stiffness is not None
     load, stiffness = 0.5 * sum(numbers.wheel_loads()), numbers.front.cornering_stiffness
-    C, E = vehicles_kit.GENERIC_TYRE["C"], vehicles_kit.GENERIC_TYRE["E"]
-    curve = MagicFormula(B=stiffness / (C * load), C=C, D=load, E=E)
+    curve = tyres.kit.GENERIC_TYRE.magic_formula(stiffness, load)
     return Similarity(curve, load, slip_stiffness_ratio=numbers.front.slip_stiffness / stiffness)
 
 

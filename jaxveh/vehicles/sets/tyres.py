@@ -8,7 +8,6 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh.tyres import AbstractTyre, MagicFormula, MFTyre, from_property_file, kit, mf_tyre, typical_mf_tyre
-from jaxveh.vehicles.parameter_sets import GENERIC_TYRE
 from jaxveh.vehicles.sets.numbers import TyreNumbers
 
 STRAIGHT = 1e4
@@ -49,12 +48,10 @@ def wheel_tyre(numbers: TyreNumbers, load: float, radius: float | None = None) -
 
 def axle_tyre(numbers: TyreNumbers, load: float) -> MagicFormula:
     """Both tyres of an axle as one Magic Formula: its own where it is known; else of this stiffness and friction at the axle's
-    static `load` (N) and of ordinary shape (`GENERIC`), with force proportional to load."""
+    static `load` (N) and of ordinary shape (`tyres.kit.GENERIC_TYRE`), with force proportional to load."""
     if numbers.axle_formula is not None:
         return MagicFormula(*numbers.axle_formula)
-    D, C = numbers.friction * load, GENERIC_TYRE["C"]
-    B = 2.0 * numbers.cornering_stiffness / (C * D)
-    return MagicFormula(B=B, C=C, D=D, E=GENERIC_TYRE["E"], nominal_load=load)
+    return kit.GENERIC_TYRE.magic_formula(2.0 * numbers.cornering_stiffness, load, numbers.friction)
 
 
 def _pac2002(coefficients, load: float, radius: float) -> MFTyre:
