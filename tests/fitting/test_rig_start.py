@@ -43,7 +43,10 @@ def test_silent_directions_take_the_other_one_s():
     one = rig_facts(rig_of(F_x=None))
     assert one.slip_stiffness == one.cornering_stiffness
     quiet = rig_facts(rig_of(F_x=None, F_y=None, M_z=np.ones(300)))
-    assert quiet.slip_stiffness == tyres.kit.GENERIC_TYRE.stiffness * 4000.0 and quiet.friction == tyres.kit.GENERIC_TYRE.friction
+    assert (
+        quiet.slip_stiffness == tyres.kit.GENERIC_TYRE.stiffness * 4000.0
+        and quiet.friction == tyres.kit.GENERIC_TYRE.friction
+    )
 
 
 @pytest.mark.parametrize("name", RIG_STARTS)
