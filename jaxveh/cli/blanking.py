@@ -19,7 +19,7 @@ INPUTS = ("steer", "v_x", "a_x")
 def filled(recording: Recording, max_gap: float | None) -> Recording:
     """The inputs without gaps: filled along lines over at most `max_gap` seconds where that is given.
 
-    **Raises** `InputError` where a channel of `BLIND` is missing, or an input is NaN still, with the option that fills it.
+    **Raises** `InputError` where a channel of `BLIND_CHANNELS` is missing, or an input is still NaN, and the option for it.
     """
     if max_gap is not None:
         check_positive("--fill", max_gap, "s")

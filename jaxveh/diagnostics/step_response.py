@@ -18,7 +18,7 @@ class StepResponse(NamedTuple):
     """How one quantity answers a step of the steering (ISO 7401, step input). Times in s from the `reference`.
 
     `reference`: the instant (s, the recording's time) when half of the steer is turned. `steer`: the step's height (rad).
-    `steady`: the steady value, `gain` = steady / steer. `response_time`: to `RISEN` of the steady value. `peak`,
+    `steady`: the steady value, `gain` = steady / steer. `response_time`: to `RESPONSE_SHARE` of the steady value. `peak`,
     `peak_response_time`, `overshoot` = peak / steady - 1; where the response creeps up without a peak, NaN, NaN and 0.
     """
 

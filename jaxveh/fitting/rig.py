@@ -292,8 +292,8 @@ def _result(data: RigData, law, joint: Stage, held: np.ndarray, reports, start_r
 def _as_uncertain(problem: RigProblem, held: np.ndarray, names: Sequence[str]) -> RigProblem:
     """The problem in which what is held is not known for certain.
 
-    What is held at its start for lack of data may be off by its own size, what is held unless asked by what `HELD` says, and what
-    is confounded with it by as much.
+    What is held at its start for lack of data may be off by its own size, what is held unless asked by what `HELD_COEFFICIENTS`
+    says, and what is confounded with it by as much.
     """
     spreads = jnp.asarray([HELD_COEFFICIENTS.get(name, np.nan) for name in names])
     size = jnp.where(jnp.isnan(spreads), 1.0, spreads / problem.scale)

@@ -24,8 +24,8 @@ TO_DEVIATION = 1.4826
 
 
 class Tails(NamedTuple):
-    """Residuals with heavy tails: the `share` of rows that lie beyond `FAR` robust standard deviations, that `deviation` (in the
-    channel's unit), and the `ratio` of their RMS to it (1 for normal noise)."""
+    """Residuals with heavy tails: the `share` of rows that lie beyond `FAR_RESIDUAL` robust standard deviations, that `deviation`
+    (in the channel's unit), and the `ratio` of their RMS to it (1 for normal noise)."""
 
     share: float
     deviation: float

@@ -49,7 +49,7 @@ class Stage(NamedTuple):
     """One fit: its `name`, the `channels` that it compares, the names of its coefficients, and which rows count (n,).
 
     `starts`: coefficients and other values from which the stage starts, in every combination; the best end counts. `aside`: those
-    of `HELD` that belong here and nobody asked for.
+    of `HELD_COEFFICIENTS` that belong here and nobody asked for.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Stage(NamedTuple):
 class CoefficientGroup(NamedTuple):
     """Coefficients that show in one force or moment: always, and where load, camber or pressure vary (names split at blanks).
 
-    Those of `asked` show where the load varies, and are fitted where somebody asks for them alone (`HELD`).
+    Those of `asked` show where the load varies, and are fitted where somebody asks for them alone (`HELD_COEFFICIENTS`).
     """
 
     section: str

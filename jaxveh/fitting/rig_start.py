@@ -137,7 +137,7 @@ RIG_STARTS: dict[str, Callable[[RigFacts], AbstractTyre]] = {
 
 
 def starting_tyre(model: str, rig: RigTable) -> AbstractTyre:
-    """A law to start a fit from, by its name (`STARTS`).
+    """A law to start a fit from, by its name (`RIG_STARTS`).
 
     MF-Tyre (`mf61`, `mf52`, `mf62`) is `tyres.typical_mf_tyre` with the median load, pressure and speed of the data as nominal
     ones. Others take their stiffnesses from the slope of forces at small slip, and their friction from the largest force

@@ -37,8 +37,8 @@ AXES = ("iso-w", "ours")
 def evaluate(tyre: MFTyre, columns: Mapping[str, np.ndarray], *, axes: str = "iso-w") -> dict[str, np.ndarray]:
     """Forces, moments and internals of each row, by the names of the reference evaluator.
 
-    `columns`: arrays of equal length by the names of `INPUTS`; `useMode`, where present, chooses row by row: hundreds digit 1
-    limits, 2 none; tens 1 angles, 2 their tangent and sine; units 1 without, 2 with turn slip. `axes`: `iso-w`, where a
+    `columns`: arrays of equal length by the names of `EVALUATION_INPUTS`; `useMode`, where present, chooses row by row: hundreds
+    digit 1 limits, 2 none; tens 1 angles, 2 their tangent and sine; units 1 without, 2 with turn slip. `axes`: `iso-w`, where a
     positive slip angle gives a negative force, or `ours`, where it gives a positive one (then K_ya is positive, too).
 
     **Raises** `InputError` for a table without a load, an unknown mode or negative speeds.

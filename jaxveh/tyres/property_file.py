@@ -36,7 +36,7 @@ OLD_FORMATS = ("PAC2002", "MF_05", "MF-TYRE", "MF_TYRE")
 """PROPERTY_FILE_FORMAT of files that need no FITTYP: their equations are those of version 5.2."""
 
 NEEDED = ("FNOMIN", "UNLOADED_RADIUS", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
-"""What no tyre can do without; for all else see `TYPICAL`."""
+"""What no tyre can do without; for all else see `TYPICAL_COEFFICIENTS`."""
 
 NOT_MEASURED = (
     "WIDTH", "VERTICAL_STIFFNESS", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS", "NOMPRES", "INFLPRES", "LONGVL", "Q_RE0",
@@ -86,8 +86,9 @@ def from_property_file(
 
     `side`, `left` or `right`: the side of the car on which the tyre is mounted; it comes mirrored where TYRESIDE, for which
     the file's coefficients hold, is the other one. None takes it as it is. The version comes from FITTYP or
-    PROPERTY_FILE_FORMAT; `limits`, `angles` and `spins` as in `MFTyre`. Where the file is silent coefficients are `TYPICAL`,
-    or zero; an entry without a value is silent, and so is a zero for what is `NOT_MEASURED`. `check_property_file` tells of both.
+    PROPERTY_FILE_FORMAT; `limits`, `angles` and `spins` as in `MFTyre`. Where the file is silent coefficients are
+    `TYPICAL_COEFFICIENTS`, or zero; an entry without a value is silent, and so is a zero for what is `NOT_MEASURED`.
+    `check_property_file` tells of both.
 
     **Raises** `InputError` for a version that is not in, a coefficient of the tyre that is no finite number (entries that it
     does not read may say what they like), a needed one that is missing, and a `side` where the file does not tell its own.

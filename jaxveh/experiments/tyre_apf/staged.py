@@ -48,8 +48,8 @@ class Seconds(NamedTuple):
 class Staged(NamedTuple):
     """The study's result and how it came about. Leaves have the seeds in front.
 
-    `outcome`, `steps`: as `run_seeds` returns them. `estimates`: the filters' `Estimate` by name; `fit`: the MAP's
-    `fitting.Fit`. `open_loop`: mapping from `prior` and `MAP` to the states that those tyres give without any
+    `outcome`: each seed's; `steps`: errors of step steers by estimator and angle. `estimates`: the filters' `Estimate` by name;
+    `fit`: the MAP's `fitting.Fit`. `open_loop`: mapping from `prior` and `MAP` to the states that those tyres give without any
     measurement. `observability`: what the drive can tell of the eight parameters at all, at the truth. `seconds`: by stage.
     """
 
@@ -63,7 +63,7 @@ class Staged(NamedTuple):
 
 
 def run_staged(study: Study, keys, progress: Progress = silent) -> Staged:
-    """The study over `keys` (seeds,), compiled and run in stages; the same numbers as `run_seeds` but for rounding."""
+    """The study over `keys` (seeds,), compiled and run in stages, all seeds together."""
     clock = _Clock(keys.shape[0], progress)
     parts = jax.vmap(lambda key: jax.random.split(key, 4))(keys)
     drive, guess = clock.one(
