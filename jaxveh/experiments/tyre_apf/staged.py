@@ -48,7 +48,7 @@ class Seconds(NamedTuple):
 class Staged(NamedTuple):
     """The study's result and how it came about. Leaves have the seeds in front.
 
-    `outcome`: each seed's; `steps`: errors of step steers by angle, of each estimator. `estimates`: the filters' `Estimate` by name;
+    `outcome`: each seed's; `steps`: errors of step steers by angle. `estimates`: the filters' `Estimate` by name;
     `fit`: the MAP's `fitting.Fit`. `open_loop`: mapping from `prior` and `MAP` to the states that those tyres give without any
     measurement. `observability`: what the drive can tell of the eight parameters at all, at the truth. `seconds`: by stage.
     """
