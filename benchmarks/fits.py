@@ -74,7 +74,7 @@ def ours_compiled(rig: Rig) -> tuple[RigProblem, Callable[[], SearchEnd]]:
     once, none = jnp.ones(len(FORCES)), jnp.full_like(origin, jnp.inf)
     problem = RigProblem(
         law=law, contact=contact(rig.contacts), measured=jnp.asarray(rig.measured), weight=weight, emphasis=once, origin=origin,
-        scale=scale, centre=origin, spread=none, pull=jnp.asarray(rig_problem.PULL), parameters=parameters, channels=FORCES,
+        scale=scale, centre=origin, spread=none, pull=jnp.asarray(rig_problem.PULL), chosen=parameters, channels=FORCES,
         robust=False,
     )  # fmt: skip
     search = eqx.filter_jit(lambda problem: problem.search(problem.start(), STEPS, TOLERANCE))
@@ -85,7 +85,7 @@ def by_scipy(rig: Rig, problem: RigProblem, method: str) -> Callable[[], Any]:
     """The same sum of squares by `scipy.optimize.least_squares`: same coordinates, start and tolerance, forward differences."""
     from scipy.optimize import least_squares
 
-    names = [_short(p.name) for p in problem.parameters]
+    names = [_short(p.name) for p in problem.chosen]
     origin, scale = np.asarray(problem.origin), np.asarray(problem.scale)
     c = numpy_mf_tyre.of_type(np.dtype(float), {**COEFFICIENTS, **rig.start})
     at = numpy_mf_tyre.operating(c, rig.contacts)

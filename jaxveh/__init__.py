@@ -18,6 +18,7 @@ from jaxveh import (
 )
 from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
 from jaxveh._core.lazy import submodules
+from jaxveh._core.parameters import Parameters
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
 from jaxveh.simulation import simulate
@@ -30,6 +31,7 @@ __all__ = [
     "FilterError",
     "InputError",
     "JaxvehWarning",
+    "Parameters",
     "Recording",
     "Result",
     "__version__",

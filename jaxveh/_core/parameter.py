@@ -17,6 +17,15 @@ from jaxveh._core.errors import InputError, check_finite, check_positive, float_
 from jaxveh._core.names import check_names
 
 Where = Callable[..., object]
+"""Picks array leaves, as in `equinox.tree_at`: `lambda car: (car.front.B, car.rear.B)`.
+
+Everywhere it sees what is handed in beside it, as it is: `state_space(car, ..., estimate=where)` the car, `fit_rig(law, rig,
+where)` the tyre, `with_parameters(model, where)` and the fits to recordings the StateSpace, whose car is `m.system.vehicle`. In
+answers a parameter has its name in the car, whatever the car stands in: `front.B`, of each of them.
+"""
+
+UNNAMED = {"named": False}
+"""Metadata of a field that only holds what has the parameters, such as a model's system: names leave it out."""
 
 
 def parameter(unit: str = "-", domain: AbstractBijector | None = None, scale: float | None = None, **kwargs):
@@ -79,10 +88,8 @@ class _Mark:
         self.index = index
 
 
-def resolve(model, where: Where | None, inside: str = "") -> tuple[Parameter, ...]:
+def resolve(model, where: Where | None) -> tuple[Parameter, ...]:
     """The parameters that `where` picks from `model`, in the order of `where`; names come from the tree's paths.
-
-    `inside` is the path at which `model` sits in the tree that the parameters will be put into.
 
     Raises `InputError` where `where` picks something that is no array leaf, or the same leaf twice.
     """
@@ -106,10 +113,21 @@ def resolve(model, where: Where | None, inside: str = "") -> tuple[Parameter, ..
         indices.append(leaf.index)
     if not indices:
         raise InputError(f"where picked nothing from {type(model).__name__}: it must pick at least one leaf.")
+    found = [_describe(model, paths[i][0]) for i in indices]
     if len(set(indices)) < len(indices):
-        twice = [_path_name(paths[i][0]) for i in indices if indices.count(i) > 1]
+        twice = [p.name for p, i in zip(found, indices, strict=True) if indices.count(i) > 1]
         raise InputError(f"where picked {twice[0]} twice: each leaf can be chosen once.")
-    return tuple(_describe(model, paths[i][0], inside) for i in indices)
+    return tuple(_told_apart(found))
+
+
+def _told_apart(found: list[Parameter]) -> list[Parameter]:
+    """The parameters, those that would share a name by their whole paths."""
+    names = [p.name for p in found]
+    return [p if names.count(p.name) == 1 else _named(p, p.path) for p in found]
+
+
+def _named(p: Parameter, name: str) -> Parameter:
+    return p._replace(name=name, field=name.replace(".", "_"))
 
 
 def _path_name(path) -> str:
@@ -123,17 +141,25 @@ def _metadata(owner: Any, name: str, otherwise: Any) -> Any:
     return {f.name: f.metadata for f in dataclasses.fields(owner)}.get(name, {})
 
 
-def _describe(model, path, inside: str) -> Parameter:
+def _only_holds(owner: Any, metadata: Any) -> bool:
+    """Whether the field says so itself: what stands in a NamedTuple there has no declaration of its own."""
+    return dataclasses.is_dataclass(owner) and not metadata.get("named", True)
+
+
+def _describe(model, path) -> Parameter:
     """Walk down to the module that owns the leaf and read its field's metadata."""
     owner: Any = model
     metadata: Any = {}
+    in_name = []
     for key in path:
         by_name = isinstance(key, jtu.GetAttrKey)
         metadata = _metadata(owner, key.name, metadata) if by_name else metadata
+        if not _only_holds(owner, metadata):
+            in_name.append(key)
         owner = getattr(owner, key.name) if by_name else owner[getattr(key, "key", getattr(key, "idx", None))]
-    name = _path_name(path)
+    name = _path_name(in_name or path)
     return Parameter(
-        path=f"{inside}.{name}" if inside else name,
+        path=_path_name(path),
         name=name,
         field=name.replace(".", "_"),
         unit=metadata.get("unit", "-"),
@@ -153,12 +179,6 @@ def put(model, parameters: tuple[Parameter, ...], values):
     return eqx.tree_at(
         lambda m: [_get(m, path) for path in paths], model, replace=list(values), is_leaf=lambda leaf: leaf is None
     )
-
-
-def view(model, parameters: tuple[Parameter, ...], values):
-    """A tree shaped like `model` that holds only these parameters: `view(...).front.B`; every other leaf is None."""
-    empty = jax.tree.map(lambda _: None, model)
-    return put(empty, tuple(p._replace(path=p.name) for p in parameters), values)
 
 
 def _get(model, path: str):

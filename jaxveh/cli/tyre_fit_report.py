@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh import tyres
-from jaxveh._core.parameter import Parameter, resolve
+from jaxveh._core.parameter import Parameter
 from jaxveh.cli.console import number, table
 from jaxveh.cli.failure import say
 from jaxveh.fitting import RigFit, heavy_tails, kit
@@ -25,12 +25,11 @@ def show(
 ) -> dict[str, Any]:
     """Print tables and warnings; returns every number for the JSON file. `start`: the tyre before the fit; `robust`: as in
     `fit_rig`."""
-    parameters, size = _parameters(fit), _sizes(fit)
-    share = fit.std / size
+    share = fit.parameters_std.array() / _sizes(fit)
     marks = [_mark(name, one) for name, one in zip(fit.names, share, strict=True)]
     _stages(fit)
     _channels(fit)
-    _coefficients(fit, start, parameters, share, marks)
+    _coefficients(fit, start, share, marks)
     if findings:
         table("Worth a look in the fitted file", ("about", "what"), findings, left=2)
     warnings = warnings_of(fit, robust)
@@ -47,7 +46,7 @@ def show(
         },
         "coefficients": {
             p.name: {"value": value, "std": std, "std_over_size": one, "unit": p.unit, "mark": mark}
-            for p, value, std, one, mark in zip(parameters, fit.values, fit.std, share, marks, strict=True)
+            for (p, value, std), one, mark in zip(_fitted(fit), share, marks, strict=True)
         },
         "identified_directions": fit.identified,
         "heavy_tails": {
@@ -82,11 +81,11 @@ def _channels(fit: RigFit) -> None:
     table("Channels", heads + (["cross-validated"] if validated else []), rows, left=2)
 
 
-def _coefficients(fit: RigFit, start, parameters, share: np.ndarray, marks: list[str]) -> None:
+def _coefficients(fit: RigFit, start, share: np.ndarray, marks: list[str]) -> None:
     before = [_leaf(start, name) for name in fit.names]
     rows = [
         (p.name, "" if p.unit == "-" else p.unit, was, value, std, 100 * one, mark)
-        for p, was, value, std, one, mark in zip(parameters, before, fit.values, fit.std, share, marks, strict=True)
+        for was, (p, value, std), one, mark in zip(before, _fitted(fit), share, marks, strict=True)
     ]
     heads = ("coefficient", "unit", "start", "fitted", "standard error", "% of its size", "")
     note = (
@@ -106,7 +105,7 @@ def warnings_of(fit: RigFit, robust: bool = False) -> list[str]:
         )
     elif stopped:
         found.append(f"stages that stopped before they converged: {', '.join(stopped)}")
-    still = [name for name, std in zip(fit.names, fit.std, strict=True) if np.isnan(std)]
+    still = [name for name, std in fit.parameters_std.items() if np.isnan(std)]
     unseen = [name for name in still if name not in kit.HELD_COEFFICIENTS]
     if fit.identified < len(fit.names) - (len(still) - len(unseen)):
         found.append(
@@ -154,13 +153,14 @@ def _tails_in_words(name: str, residual: np.ndarray, robust: bool) -> str:
     )
 
 
-def _parameters(fit: RigFit) -> tuple[Parameter, ...]:
-    return resolve(fit.tyre, lambda law: [_leaf(law, name) for name in fit.names])
+def _fitted(fit: RigFit) -> list[tuple[Parameter, Any, Any]]:
+    """Each coefficient with its value and standard error."""
+    return [(p, fit.parameters[p.name], fit.parameters_std[p.name]) for p in fit.chosen]
 
 
 def _sizes(fit: RigFit) -> np.ndarray:
-    scales = [abs(p.scale) if p.scale else 0.0 for p in _parameters(fit)]
-    return np.maximum(np.maximum(np.abs(fit.values), scales), 1e-300)
+    scales = [abs(p.scale) if p.scale else 0.0 for p in fit.chosen]
+    return np.maximum(np.maximum(np.abs(fit.parameters.array()), scales), 1e-300)
 
 
 def _leaf(law: Any, name: str) -> Any:

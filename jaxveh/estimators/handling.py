@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.names import record_type
-from jaxveh._core.parameter import parameter, positive
+from jaxveh._core.parameter import UNNAMED, parameter, positive
 from jaxveh.statespace import Continuous, Gaussian, Heun, Prior, Propagate, StateSpace
 from jaxveh.vehicles import SingleTrack
 
@@ -64,7 +64,7 @@ class Handling(eqx.Module):
     Inputs: `steer` (rad), `v_x` (m/s), `a_x` (m/s^2). Axes of ISO 8855.
     """
 
-    car: SingleTrack
+    car: SingleTrack = eqx.field(metadata=UNNAMED)
     steer_gain: jax.Array = positive("-", default=1.0)
     yaw_rate_offset: jax.Array = parameter("rad/s", scale=0.002, default=0.0)
     a_y_gain: jax.Array = positive("-", default=1.0)

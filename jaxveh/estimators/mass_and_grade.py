@@ -75,7 +75,7 @@ def model(
         prior=Prior(kind(*(mean for mean, _ in states.values())), {name: std for name, (_, std) in states.items()}),
         inputs=(*car.inputs, *more_inputs), input_path=input_path,
     )  # fmt: skip
-    return with_parameters(model, lambda car: (car.mass,), mass_spread, mass_walk, domain=mass_domain)
+    return with_parameters(model, lambda model: (model.system.mass,), mass_spread, mass_walk, domain=mass_domain)
 
 
 def _ground(x: Any) -> Ground:

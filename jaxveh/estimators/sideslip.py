@@ -85,13 +85,13 @@ class Calibration(eqx.Module):
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Fitted values by name: `{"value", "std", "unit"}`."""
-        rows = zip(self.fit.parameters, self.fit.values, self.fit.std, strict=True)
-        short = lambda name: name.removeprefix("system.").replace("process_noise.law.std", "process noise")
+        fit = self.fit
+        in_words = lambda name: name.replace("process_noise.law.std", "process noise")
         return {
-            short(p.name).replace("measurement_noise.std", "measurement noise"): {
-                "value": float(value), "std": float(std), "unit": p.unit
+            in_words(p.name).replace("measurement_noise.std", "measurement noise"): {
+                "value": float(fit.parameters[p.name]), "std": float(fit.parameters_std[p.name]), "unit": p.unit
             }
-            for p, value, std in rows
+            for p in fit.chosen
         }  # fmt: skip
 
     def specification(self, car: CarSpecification) -> CarSpecification:

@@ -96,7 +96,7 @@ def state_space(
     )
     if estimate is None:
         return model
-    return with_parameters(model, estimate, prior, walk, inside="vehicle", domain=domain)
+    return with_parameters(model, lambda model: estimate(model.system.vehicle), prior, walk, domain=domain)
 
 
 def _derivatives(system: Instrumented, t, x, u):

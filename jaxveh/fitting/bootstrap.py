@@ -11,7 +11,8 @@ import numpy as np
 from jax import lax
 
 from jaxveh._core.errors import InputError, check_whole
-from jaxveh.fitting.problem import AbstractProblem, in_units, shaped
+from jaxveh._core.parameters import Parameters
+from jaxveh.fitting.problem import AbstractProblem, by_name, in_units
 from jaxveh.fitting.solve import MOST_STEPS, optimum
 
 LEAST_UNITS = 5
@@ -19,11 +20,11 @@ LEAST_UNITS = 5
 
 
 class Bootstrap(NamedTuple):
-    """Fits to `count` data sets drawn anew: `values` in the shape of the fit's, with an axis (count,) in front; `std`, their
+    """Fits to `count` data sets drawn anew: `parameters` as those of the fit, (count,) each; `parameters_std`, their
     spread, which is their standard error; `converged` (count,): those that did not are left out of it."""
 
-    values: Any
-    std: Any
+    parameters: Parameters
+    parameters_std: Parameters
     converged: Any
 
 
@@ -67,13 +68,11 @@ def _drawn(problem, key, group, groups: int, count: int, max_steps: int, toleran
         drawn = jax.random.randint(key, (groups,), 0, groups)
         times = jnp.zeros(groups, whole.dtype).at[drawn].add(1)
         found = fit(problem.counted(times[group]), whole)
-        return jnp.stack(in_units(problem.parameters, problem.line(found.z))), found.converged
+        return jnp.stack(in_units(problem.chosen, problem.line(found.z))), found.converged
 
     values, converged = jax.vmap(once)(jax.random.split(key, count))
     counted = converged.astype(values.dtype)
     kept, many = jnp.where(converged[:, None], values, 0), jnp.sum(counted)
     mean = counted @ kept / many
     std = jnp.sqrt(counted @ (kept - mean) ** 2 / (many - 1))
-    return Bootstrap(
-        shaped(problem.shape, values.T) if problem.shape else values, shaped(problem.shape, std), converged
-    )
+    return Bootstrap(by_name(problem.chosen, values.T), by_name(problem.chosen, std), converged)

@@ -15,7 +15,7 @@ from jax import lax
 from jaxveh._core.parameter import Parameter, Where, pick, put
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, Shape, in_units, on_line, picked
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, picked
 from jaxveh.fitting.recorded import listed, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.solve import solve
@@ -39,17 +39,16 @@ class LikelihoodProblem(AbstractProblem):
     centre: jax.Array
     spread: jax.Array
     key: Any
-    parameters: tuple[Parameter, ...] = eqx.field(static=True)
-    shape: Shape | None = eqx.field(static=True)
+    chosen: tuple[Parameter, ...] = eqx.field(static=True)
 
     def start(self):
-        return on_line(self.parameters, pick(self.model, self.parameters))
+        return on_line(self.chosen, pick(self.model, self.chosen))
 
     def line(self, z):
         return z
 
     def filled(self, z):
-        return put(self.model, self.parameters, in_units(self.parameters, z))
+        return put(self.model, self.chosen, in_units(self.chosen, z))
 
     def cost(self, z):
         model = self.filled(z)
@@ -107,13 +106,13 @@ def pose_likelihood(
     """What `maximum_likelihood` solves, for `solve`; arguments and errors as there."""
     filter.check(model)
     rows = tuple(model.rows(recording) for recording in listed(recordings))
-    parameters, shape = picked(model, where)
-    values = pick(model, parameters)
-    centre = on_line(parameters, values)
-    spread = spread_on_line(parameters, values, prior)
+    chosen = picked(model, where)
+    values = pick(model, chosen)
+    centre = on_line(chosen, values)
+    spread = spread_on_line(chosen, values, prior)
     return LikelihoodProblem(
         filter=filter, model=model, rows=rows, counts=jnp.ones(len(rows), centre.dtype), centre=centre, spread=spread, key=key,
-        parameters=parameters, shape=shape,
+        chosen=chosen,
     )  # fmt: skip
 
 

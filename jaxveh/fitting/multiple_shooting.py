@@ -13,15 +13,14 @@ import optimistix as optx
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive, is_concrete
-from jaxveh._core.names import record
 from jaxveh._core.parameter import Parameter, Where, pick, put
 from jaxveh._core.recording import Recording
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, Shape, in_units, on_line, picked
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, picked
 from jaxveh.fitting.recorded import spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.segments import Segments, cut
 from jaxveh.fitting.solve import solve
-from jaxveh.statespace import StateSpace, kit, parameter_view, start_from
+from jaxveh.statespace import StateSpace, kit, start_from
 
 LARGEST_RESIDUAL = 1e6
 """What a residual of a diverged segment is taken as: finite, so that the solver can step back."""
@@ -44,8 +43,7 @@ class ShootingProblem(AbstractProblem):
     counts: jax.Array
     centre: jax.Array
     prior: jax.Array | None
-    parameters: tuple[Parameter, ...] = eqx.field(static=True)
-    shape: Shape | None = eqx.field(static=True)
+    chosen: tuple[Parameter, ...] = eqx.field(static=True)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -58,17 +56,17 @@ class ShootingProblem(AbstractProblem):
         return jnp.concatenate([self.centre, *(jnp.broadcast_to(m, (count,)) for m in mean)])
 
     def line(self, z):
-        return z[: len(self.parameters)]
+        return z[: len(self.chosen)]
 
     def starts(self, z):
         """The states at the start of each segment: an array (K,) each."""
-        return list(z[len(self.parameters) :].reshape(len(self.states), -1))
+        return list(z[len(self.chosen) :].reshape(len(self.states), -1))
 
     def filled(self, z):
-        values = in_units(self.parameters, self.line(z))
+        values = in_units(self.chosen, self.line(z))
         if self.model.chosen is None:
-            return put(self.model, self.parameters, values)
-        return start_from(self.model, **{p.field: v for p, v in zip(self.parameters, values, strict=True)})
+            return put(self.model, self.chosen, values)
+        return start_from(self.model, **{p.field: v for p, v in zip(self.chosen, values, strict=True)})
 
     def cost(self, z):
         return 0.5 * jnp.sum(residuals(z, self) ** 2)
@@ -79,7 +77,7 @@ class ShootingProblem(AbstractProblem):
         return SearchEnd(found.value, found.stats["num_steps"], found.result == optx.RESULTS.successful)
 
     def covariance(self, z):
-        jacobian, p = jax.jacfwd(residuals)(z, self), len(self.parameters)
+        jacobian, p = jax.jacfwd(residuals)(z, self), len(self.chosen)
         # R of the QR factorisation with the parameters last: its lower right block is the square root of their information.
         reordered = jnp.concatenate([jacobian[:, p:], jacobian[:, :p]], axis=1)
         root = jnp.linalg.qr(reordered, mode="r")[-p:, -p:]
@@ -113,18 +111,18 @@ def pose_shooting(
         raise InputError("multiple_shooting: the model's parameters are states already; leave `where` out.")
     known = None
     if model.chosen is None:
-        parameters, shape = picked(model, where)
-        _check_inside(parameters)
-        values = pick(model, parameters)
-        centre = on_line(parameters, values)
+        chosen = picked(model, where)
+        _check_inside(chosen)
+        values = pick(model, chosen)
+        centre = on_line(chosen, values)
     else:
-        parameters, shape = model.chosen.parameters, _shape_of_view(model)
+        chosen = model.chosen.parameters
         n = len(model.chosen.states)
         # States and parameters are independent in the prior that `with_parameters` makes, each among themselves may not be.
         centre, known = jnp.stack(model.prior.mean[n:]), model.prior.covariance()[n:, n:]
-        values = in_units(parameters, centre)
+        values = in_units(chosen, centre)
     if prior is not None:
-        known = jnp.diag(spread_on_line(parameters, values, prior) ** 2)
+        known = jnp.diag(spread_on_line(chosen, values, prior) ** 2)
     # A batch of segments does not tell how many recordings it is made of: then they are one.
     count = int(np.sum(segments.first)) if is_concrete(segments.first) else 1
     counts, tie = jnp.ones(count, centre.dtype), jnp.asarray(tie, centre.dtype)
@@ -135,26 +133,18 @@ def pose_shooting(
         counts=counts,
         centre=centre,
         prior=known,
-        parameters=parameters,
-        shape=shape,
+        chosen=chosen,
     )
 
 
-def _check_inside(parameters: tuple[Parameter, ...]) -> None:
+def _check_inside(chosen: tuple[Parameter, ...]) -> None:
     """Raise for what squares of residuals cannot tell, or what is unknown anyway."""
-    for p in parameters:
-        if not p.path.startswith("system"):
+    for p in chosen:
+        if p.path.partition(".")[0] != "system":
             raise InputError(
                 f"multiple_shooting: where picked {p.name}; it fits what moves the system (`m.system...`): noise levels are for "
                 "maximum_likelihood, and first states are always found."
             )
-
-
-def _shape_of_view(model: StateSpace) -> Shape:
-    """The tree in which an Estimate reports the parameters of a model whose parameters are states."""
-    places = record("Parameters", {p.field: i for i, p in enumerate(model.chosen.parameters)})
-    tree = parameter_view(model.system, model.chosen, places)
-    return Shape(jax.tree.structure(tree), tuple(jax.tree.leaves(tree)))
 
 
 def multiple_shooting(

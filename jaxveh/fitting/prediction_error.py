@@ -18,7 +18,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
 from jaxveh.fitting.levenberg_marquardt import Quadratic
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, Shape, in_units, on_line, picked
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, picked
 from jaxveh.fitting.recorded import listed, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.scoring import FisherScoring
@@ -66,17 +66,16 @@ class PredictionErrorProblem(AbstractProblem):
     spread: jax.Array
     target: Any
     warm_up: int = eqx.field(static=True)
-    parameters: tuple[Parameter, ...] = eqx.field(static=True)
-    shape: Shape | None = eqx.field(static=True)
+    chosen: tuple[Parameter, ...] = eqx.field(static=True)
 
     def start(self):
-        return on_line(self.parameters, pick(self.model, self.parameters))
+        return on_line(self.chosen, pick(self.model, self.chosen))
 
     def line(self, z):
         return z
 
     def filled(self, z):
-        return put(self.model, self.parameters, in_units(self.parameters, z))
+        return put(self.model, self.chosen, in_units(self.chosen, z))
 
     def cost(self, z):
         return _cost(self, self.parts(z)) + 0.5 * jnp.sum(((z - self.centre) / self.spread) ** 2)
@@ -197,14 +196,14 @@ def pose_prediction_error(
     if (mixture := kit.who_lacks(filter, "whitens")) is not None:
         raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
     filter.check(model)
-    parameters, shape = picked(model, where)
+    chosen = picked(model, where)
     rows = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[model.rows(recording) for recording in recordings])
-    means = pick(model if centre is None else centre, parameters)
-    line = on_line(parameters, means)
+    means = pick(model if centre is None else centre, chosen)
+    line = on_line(chosen, means)
     return PredictionErrorProblem(
         filter=filter, model=model, rows=rows, counts=jnp.ones(len(recordings), line.dtype), centre=line,
-        spread=spread_on_line(parameters, means, prior), target=_target(target, recordings), warm_up=warm_up,
-        parameters=parameters, shape=shape,
+        spread=spread_on_line(chosen, means, prior), target=_target(target, recordings), warm_up=warm_up,
+        chosen=chosen,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import Parameter, Where, pick, resolve
+from jaxveh._core.parameters import Parameters
 
 
 class SearchEnd(NamedTuple):
@@ -21,23 +22,15 @@ class SearchEnd(NamedTuple):
     converged: Any
 
 
-class Shape(NamedTuple):
-    """In which tree the values of parameters are reported: its structure, and which parameter stands at each of its leaves."""
-
-    structure: Any
-    order: tuple[int, ...]
-
-
 class AbstractProblem(eqx.Module):
-    """A cost to be minimised, the negative log-posterior of `parameters` given data.
+    """A cost to be minimised, the negative log-posterior of parameters, `chosen`, given data.
 
     Everything that the optimum depends on is an array leaf (data, noise levels, prior spreads), so that `solve` has a derivative
     with respect to each. Coordinates z (n,) are the solver's: the parameters, scaled as it likes, and what else is unknown. On
     the line of their bijectors parameters are arrays (p,).
     """
 
-    parameters: eqx.AbstractVar[tuple[Parameter, ...]]
-    shape: eqx.AbstractVar[Shape | None]
+    chosen: eqx.AbstractVar[tuple[Parameter, ...]]
 
     @abc.abstractmethod
     def start(self) -> jax.Array:
@@ -76,30 +69,28 @@ class AbstractProblem(eqx.Module):
         """The problem in which each part of the data counts so many times, (units,)."""
 
 
-def shaped(shape: Shape | None, values):
-    """Values (p,) in a tree; without one as they are."""
-    if shape is None:
-        return values
-    return jax.tree.unflatten(shape.structure, [values[i] for i in shape.order])
+def by_name(chosen: tuple[Parameter, ...], values) -> Parameters:
+    """Values (p, ...) by their parameters' names."""
+    return Parameters({p.name: value for p, value in zip(chosen, values, strict=True)})
 
 
-def picked(model: Any, where: Where) -> tuple[tuple[Parameter, ...], Shape]:
-    """The scalar parameters that `where` picks from a model, and the shape in which it does.
+def picked(model: Any, where: Where) -> tuple[Parameter, ...]:
+    """The scalar parameters that `where` picks from a model.
 
     **Raises** `InputError` as `resolve`, and for arrays.
     """
-    parameters = resolve(model, where)
-    for p, value in zip(parameters, pick(model, parameters), strict=True):
+    chosen = resolve(model, where)
+    for p, value in zip(chosen, pick(model, chosen), strict=True):
         if jnp.ndim(value) > 0:
             raise InputError(f"where picked {p.name}, an array of shape {jnp.shape(value)}: a fit takes scalars.")
-    return parameters, Shape(jax.tree.structure(where(model)), tuple(range(len(parameters))))
+    return chosen
 
 
-def on_line(parameters: tuple[Parameter, ...], physical) -> jax.Array:
+def on_line(chosen: tuple[Parameter, ...], physical) -> jax.Array:
     """Physical values on the line of their bijectors, (p,)."""
-    return jnp.stack([p.domain.inverse(value) for p, value in zip(parameters, physical, strict=True)])
+    return jnp.stack([p.domain.inverse(value) for p, value in zip(chosen, physical, strict=True)])
 
 
-def in_units(parameters: tuple[Parameter, ...], line) -> list:
+def in_units(chosen: tuple[Parameter, ...], line) -> list:
     """Values on the line of their bijectors in physical units."""
-    return [p.domain.forward(line[i]) for i, p in enumerate(parameters)]
+    return [p.domain.forward(line[i]) for i, p in enumerate(chosen)]

@@ -9,33 +9,34 @@ import jax
 
 from jaxveh._core.errors import FilterError, is_concrete
 from jaxveh._core.parameter import Parameter
+from jaxveh._core.parameters import Parameters
 from jaxveh._core.result import Result
 
 
 class AbstractFit(eqx.Module):
     """What all fits return.
 
-    `values`, `std`: the fitted parameters in physical units and their standard errors, in the shape of what `where` picked
-    (without a `where`: an array (p,) in the order of `names`; of a model whose parameters are states, a tree as
-    `Estimate.parameters`); NaN for a standard error that the data do not give. `unconstrained` (p,), `covariance` (p, p): the
-    same on the line of each parameter's bijector. `cost`: the minimised negative log-posterior, up to a constant. `steps`: taken
-    by the solver. `result`: a code, see `jaxveh.Result`. `model`: what was fitted, with the values in place.
+    `parameters`, `parameters_std`: the fitted parameters in physical units and their standard errors, `Parameters` as those of an
+    `Estimate` (`.front.B`, `["front.B"]`); NaN for a standard error that the data do not give. `unconstrained` (p,), `covariance`
+    (p, p): the same on the line of each parameter's bijector. `cost`: the minimised negative log-posterior, up to a constant.
+    `steps`: taken by the solver. `result`: a code, see `jaxveh.Result`. `model`: what was fitted, with the values in place.
+    `chosen`: what the parameters are (unit, domain), in their order.
     """
 
-    values: eqx.AbstractVar[Any]
-    std: eqx.AbstractVar[Any]
+    parameters: eqx.AbstractVar[Parameters]
+    parameters_std: eqx.AbstractVar[Parameters]
     unconstrained: eqx.AbstractVar[Any]
     covariance: eqx.AbstractVar[Any]
     cost: eqx.AbstractVar[Any]
     steps: eqx.AbstractVar[Any]
     result: eqx.AbstractVar[Any]
     model: eqx.AbstractVar[Any]
-    parameters: eqx.AbstractVar[tuple[Parameter, ...]]
+    chosen: eqx.AbstractVar[tuple[Parameter, ...]]
 
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters' names, (p,)."""
-        return tuple(p.name for p in self.parameters)
+        return tuple(p.name for p in self.chosen)
 
     @property
     def converged(self):
@@ -51,15 +52,15 @@ class AbstractFit(eqx.Module):
 class Fit(AbstractFit):
     """A fit by `multiple_shooting`, `maximum_likelihood`, `prediction_error`, or by `solve` of any problem; see `AbstractFit`."""
 
-    values: Any
-    std: Any
+    parameters: Parameters
+    parameters_std: Parameters
     unconstrained: jax.Array
     covariance: jax.Array
     cost: jax.Array
     steps: jax.Array
     result: jax.Array
     model: Any
-    parameters: tuple[Parameter, ...] = eqx.field(static=True)
+    chosen: tuple[Parameter, ...] = eqx.field(static=True)
 
 
 def raise_unfinished(fit: AbstractFit) -> None:

@@ -14,8 +14,9 @@ import numpy as np
 from jaxveh._core.errors import FilterError, InputError, check_at_least, check_one_of, check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, resolve
+from jaxveh._core.parameters import Parameters
 from jaxveh._core.progress import Progress, silent
-from jaxveh.fitting.problem import SearchEnd, on_line, picked, shaped
+from jaxveh.fitting.problem import SearchEnd, by_name, on_line, picked
 from jaxveh.fitting.result import AbstractFit
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
 from jaxveh.fitting.rig_identify import settle, without
@@ -45,15 +46,15 @@ class RigFit(AbstractFit):
     the fit, for `solve` and `bootstrap`, in which what is held stays.
     """
 
-    values: Any
-    std: Any
+    parameters: Parameters
+    parameters_std: Parameters
     unconstrained: np.ndarray
     covariance: np.ndarray
     cost: Any
     steps: Any
     result: Any
     model: AbstractTyre
-    parameters: tuple[Parameter, ...] = eqx.field(static=True)
+    chosen: tuple[Parameter, ...] = eqx.field(static=True)
     identified: int = eqx.field(static=True)
     rmse: dict[str, float]
     start_rmse: dict[str, float]
@@ -73,8 +74,8 @@ class RigFit(AbstractFit):
 def fit_rig(
     law: AbstractTyre,
     rig: RigTable,
-    *,
     where: Where | None = None,
+    *,
     free: Sequence[str] = (),
     prior: float | Mapping[str, float] | None = None,
     measured: Sequence[str] | None = None,
@@ -91,11 +92,12 @@ def fit_rig(
     """Fit a tyre to rig data, from the coefficients that it has.
 
     MF-Tyre goes in stages (pure slip, combined slip, moments) over the coefficients that the data show (those of load where the
-    load varies, and so on), then all of them together; other laws at once. `where` picks coefficients instead. `free`: names
-    of those that are held unless asked (`lateral.PKY4`, the form of the cornering stiffness over load, which stays at what the
-    law has, 2 in a typical one). What the data do not identify stays at its start. `prior`: relative spreads around the law's
-    own coefficients, one number or by name, as in all fits. `measured`: the forces and moments to be compared; by default
-    those that both data and law have. `weights`: by channel, on top of one over the noise squared, which is estimated.
+    load varies, and so on), then all of them together; other laws at once. `where` picks coefficients of the law instead.
+
+    `free`: names of those that are held unless asked (`lateral.PKY4`, the form of the cornering stiffness over load, which stays
+    at what the law has, 2 in a typical one). What the data do not identify stays at its start. `prior`: relative spreads around
+    the law's own coefficients, one number or by name, as in all fits. `measured`: the forces and moments to be compared; by
+    default those that both data and law have. `weights`: by channel, on top of one over the noise squared, which is estimated.
     `bounds`: by name, an interval that a coefficient stays in. `robust`: residuals are taken for Student's t with 4 degrees of
     freedom, on the scale of their median size, so that outliers count little. `folds`: parts for cross-validation, whole runs
     where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law
@@ -143,9 +145,9 @@ def _held(data: RigData, aside: Sequence[str]) -> np.ndarray:
 def pose_rig(
     law: AbstractTyre,
     rig: RigTable,
+    where: Where | None = None,
     *,
     noise: Mapping[str, float] | None = None,
-    where: Where | None = None,
     free: Sequence[str] = (),
     prior: float | Mapping[str, float] | None = None,
     measured: Sequence[str] | None = None,
@@ -180,12 +182,11 @@ def _prepared(
     check_names("weights", extra, channels)
     for name, weight in extra.items():
         check_positive(f"weights[{name!r}]", weight)
-    parameters, shape = ((), None) if where is None else picked(law, where)
-    chosen = None if where is None else tuple(p.name for p in parameters)
+    chosen = None if where is None else tuple(p.name for p in picked(law, where))
     plan = stages_of(law, rig, channels, chosen, free)
     _check_free(free, plan)
     aside = tuple(name for stage in plan for name in stage.aside)
-    settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance, shape=shape)
+    settings = Settings(extra, dict(bounds or {}), robust, max_steps, tolerance)
     data = RigData(rig, contact, channels, (*_names(law, plan, chosen), *aside), settings)
     data.check(law)
     if prior is not None:
@@ -264,19 +265,19 @@ def _result(data: RigData, law, joint: Stage, held: np.ndarray, reports, start_r
     if data.chosen.robust:
         factor *= inflation(data.residuals(law) / np.array([[noise[name]] for name in data.channels]))
     covariance = np.asarray(fit.covariance) * factor
-    values = pick(law, fit.parameters)
-    slopes = np.array([float(p.domain.slope(value)) for p, value in zip(fit.parameters, values, strict=True)])
+    values = pick(law, fit.chosen)
+    slopes = np.array([float(p.domain.slope(value)) for p, value in zip(fit.chosen, values, strict=True)])
     std = np.where(held, np.nan, np.abs(slopes) * np.sqrt(np.diag(covariance)))
     return RigFit(
-        values=jax.tree.map(np.asarray, fit.values),
-        std=shaped(problem.shape, std),
+        parameters=jax.tree.map(np.asarray, fit.parameters),
+        parameters_std=by_name(fit.chosen, std),
         unconstrained=np.asarray(fit.unconstrained),
         covariance=covariance,
         cost=fit.cost,
         steps=fit.steps,
         result=fit.result,
         model=law,
-        parameters=fit.parameters,
+        chosen=fit.chosen,
         identified=int(known),
         rmse=data.rmse(law),
         start_rmse=start_rmse,

@@ -15,7 +15,6 @@ from jaxveh._core.bijectors import Interval
 from jaxveh._core.errors import InputError, check_at_least, check_positive
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, resolve
-from jaxveh.fitting.problem import Shape
 from jaxveh.fitting.rig_problem import PULL, Descent, RigProblem, descend, start_of
 from jaxveh.fitting.rig_robust import TO_DEVIATION
 from jaxveh.fitting.rig_stages import Stage
@@ -50,7 +49,7 @@ class StageReport(NamedTuple):
 
 class Settings(NamedTuple):
     """What a user chose: `weights` and `bounds` by name, `robust`, the most steps a stage, the solver's tolerance; the centre
-    and the spread (p,) of a `prior` on the coefficients' line; the `shape` in which their values are reported."""
+    and the spread (p,) of a `prior` on the coefficients' line."""
 
     weights: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]
@@ -58,7 +57,6 @@ class Settings(NamedTuple):
     max_steps: int
     tolerance: float
     prior: tuple[Any, Any] | None = None
-    shape: Shape | None = None
 
 
 class RigData:
@@ -142,10 +140,9 @@ class RigData:
             centre=centre,
             spread=spread,
             pull=jnp.asarray(PULL, origin.dtype),
-            parameters=parameters,
+            chosen=parameters,
             channels=self.channels,
             robust=self.chosen.robust,
-            shape=self.chosen.shape,
         )
 
     def residuals(self, law: AbstractTyre) -> np.ndarray:

@@ -16,7 +16,7 @@ from jax import lax
 from jaxveh._core.bijectors import Real
 from jaxveh._core.parameter import Parameter, pick, put
 from jaxveh.fitting.levenberg_marquardt import LevenbergMarquardt, Quadratic
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, Shape, in_units
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units
 from jaxveh.numerics import on_cpu
 from jaxveh.tyres import AbstractTyre, Contact
 
@@ -52,10 +52,9 @@ class RigProblem(AbstractProblem):
     centre: jax.Array
     spread: jax.Array
     pull: jax.Array
-    parameters: tuple[Parameter, ...] = eqx.field(static=True)
+    chosen: tuple[Parameter, ...] = eqx.field(static=True)
     channels: tuple[str, ...] = eqx.field(static=True)
     robust: bool = eqx.field(static=True)
-    shape: Shape | None = eqx.field(static=True, default=None)
 
     def start(self):
         return jnp.zeros_like(self.origin)
@@ -85,11 +84,11 @@ class RigProblem(AbstractProblem):
 
     def values(self, z):
         """Coefficients (p,) at the coordinates z (p,)."""
-        return in_units(self.parameters, self.line(z))
+        return in_units(self.chosen, self.line(z))
 
     def filled(self, z) -> AbstractTyre:
         """The law with the coefficients at z."""
-        return put(self.law, self.parameters, self.values(z))
+        return put(self.law, self.chosen, self.values(z))
 
     def forces(self, law: AbstractTyre):
         """The channels (m, n) of a law."""
@@ -160,8 +159,8 @@ def _of_data(z, problem: RigProblem) -> Quadratic:
     rows = problem.measured.shape[1]
 
     def channels(*lines):
-        values = [p.domain.forward(one) for p, one in zip(problem.parameters, lines, strict=True)]
-        return problem.forces(put(problem.law, problem.parameters, values))
+        values = [p.domain.forward(one) for p, one in zip(problem.chosen, lines, strict=True)]
+        return problem.forces(put(problem.law, problem.chosen, values))
 
     found, pull = jax.vjp(channels, *(jnp.broadcast_to(line[i], (rows,)) for i in range(line.size)))
     value, slope = problem.bent(problem.weight * (found - problem.measured))

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from jaxveh._core.result import Result, code
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, shaped
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, by_name, in_units
 from jaxveh.fitting.result import Fit
 
 MOST_STEPS = 200
@@ -73,25 +73,25 @@ def curvature(cost, z, free):
 
 def fit_at(problem: AbstractProblem, found: SearchEnd, cost, uncertainty: tuple[jax.Array, jax.Array] | None) -> Fit:
     """The fit that ended at these coordinates, with this cost and what the problem's `covariance` says, or nothing of it."""
-    parameters, line = problem.parameters, problem.line(found.z)
-    values = in_units(parameters, line)
+    chosen, line = problem.chosen, problem.line(found.z)
+    values = in_units(chosen, line)
     unknown = jnp.full((line.size, line.size), jnp.nan, line.dtype), jnp.zeros(line.shape, bool)
     covariance, known = unknown if uncertainty is None else uncertainty
     variance = jnp.diagonal(covariance)
     known = known & (variance > 0)
-    slopes = jnp.stack([p.domain.slope(value) for p, value in zip(parameters, values, strict=True)])
+    slopes = jnp.stack([p.domain.slope(value) for p, value in zip(chosen, values, strict=True)])
     std = jnp.where(known, jnp.abs(slopes) * jnp.sqrt(jnp.where(known, variance, 1.0)), jnp.nan)
     well = found.converged & ~problem.failed(cost)
     finite = jnp.all(jnp.isfinite(found.z)) & jnp.isfinite(cost)
     result = jnp.where(well, code(Result.successful), code(Result.not_converged))
     return Fit(
-        values=shaped(problem.shape, jnp.stack(values)),
-        std=shaped(problem.shape, std),
+        parameters=by_name(chosen, values),
+        parameters_std=by_name(chosen, std),
         unconstrained=line,
         covariance=covariance,
         cost=cost,
         steps=found.steps,
         result=jnp.where(finite, result, code(Result.non_finite_state)),
         model=problem.filled(found.z),
-        parameters=parameters,
+        chosen=chosen,
     )

@@ -7,6 +7,7 @@ from typing import Any
 import equinox as eqx
 
 from jaxveh._core.names import check_names, record_type
+from jaxveh._core.parameter import UNNAMED
 from jaxveh.sensors.sensor_set import SensorSet
 from jaxveh.vehicles import AbstractVehicle
 
@@ -18,7 +19,7 @@ class Instrumented(eqx.Module):
     the vehicle alone, and measures nothing.
     """
 
-    vehicle: AbstractVehicle
+    vehicle: AbstractVehicle = eqx.field(metadata=UNNAMED)
     sensors: SensorSet | None = None
 
     @property

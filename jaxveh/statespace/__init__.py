@@ -23,7 +23,7 @@ from jaxveh.statespace.noise import (
     MultivariateGaussian,
     StudentT,
 )
-from jaxveh.statespace.parameters import parameter_view, put_parameters, start_from, with_parameters
+from jaxveh.statespace.parameters import parameters_of, put_parameters, start_from, with_parameters
 from jaxveh.statespace.process import AbstractProcessNoise, Continuous, Discrete
 from jaxveh.statespace.solvers import RK4, Heun, Propagate, RolledRK4
 from jaxveh.statespace.uncertain_inputs import uncertain_inputs
@@ -62,7 +62,7 @@ __all__ = [
     "cast",
     "draw",
     "kit",
-    "parameter_view",
+    "parameters_of",
     "posterior_cramer_rao",
     "put_parameters",
     "run",

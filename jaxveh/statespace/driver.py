@@ -16,7 +16,7 @@ from jaxveh._core.result import Result, first_failure
 from jaxveh.statespace.belief import Info
 from jaxveh.statespace.contract import KEPT, AbstractFilter
 from jaxveh.statespace.model import Row, StateSpace
-from jaxveh.statespace.parameters import parameter_view
+from jaxveh.statespace.parameters import parameters_of
 
 
 class Estimate(eqx.Module):
@@ -25,7 +25,8 @@ class Estimate(eqx.Module):
     `time` (T,); `mean`, `std`: NamedTuples of the model's report with (T,) in each field, in physical units;
     `log_likelihood`: scalar, of all measurements; `info`: `filters.Info` with (T,) leaves; `result`: the first failing
     code (`jaxveh.Result`) and `failed_at` its row, 0 and -1 where all went well; `belief`: after the last row, ready
-    for `filter.step`. `parameters` and `parameters_std`: trees shaped like what `where` saw, with (T,) leaves.
+    for `filter.step`. `parameters` and `parameters_std`: `Parameters` with (T,) each, as in the car
+    (`.front.B`); None without.
     """
 
     time: Any
@@ -86,8 +87,7 @@ def scan_and_keep(filter: AbstractFilter, model: StateSpace, rows: Row, key, kee
     belief, rest = jax.lax.scan(body, belief, rest)
     mean, std, info, kept = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
     result, failed_at = first_failure(info.result)
-    chosen = model.chosen
-    show = lambda report: None if chosen is None else parameter_view(model.system, chosen, report)
+    show = lambda report: parameters_of(model, report)
     total = jnp.sum(info.log_likelihood)
     return Estimate(rows.t, mean, std, total, info, result, failed_at, belief, show(mean), show(std)), kept
 

@@ -1,5 +1,6 @@
 """What those who add a filter, an observer or a driver build with."""
 
+from jaxveh._core.parameter import UNNAMED
 from jaxveh.statespace.contract import (
     KEPT,
     check_noise_by_row,
@@ -22,6 +23,7 @@ __all__ = [
     "DISTURBANCE_PREFIX",
     "KEPT",
     "LOG_2PI",
+    "UNNAMED",
     "by_channel",
     "check_fixed",
     "check_noise_by_row",

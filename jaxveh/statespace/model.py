@@ -12,6 +12,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, float_array, is_concrete
 from jaxveh._core.names import check_names, record
+from jaxveh._core.parameter import UNNAMED
 from jaxveh._core.recording import Recording
 from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
@@ -87,7 +88,7 @@ class StateSpace(eqx.Module):
     The functions are static (plain functions, or modules without arrays), so a new lambda each time compiles each time.
     """
 
-    system: Any
+    system: Any = eqx.field(metadata=UNNAMED)
     process_noise: AbstractProcessNoise | None
     measurement_noise: MeasurementNoise
     prior: Prior

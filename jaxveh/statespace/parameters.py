@@ -11,7 +11,8 @@ import jax.numpy as jnp
 from jaxveh._core.bijectors import AbstractBijector
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import record_type
-from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_spread, put, resolve, share_of, view
+from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_spread, put, resolve, share_of
+from jaxveh._core.parameters import Parameters
 from jaxveh.statespace.dependent_noise import around
 from jaxveh.statespace.model import Prior, StateSpace
 from jaxveh.statespace.noise import Gaussian, Independent
@@ -19,12 +20,12 @@ from jaxveh.statespace.process import Continuous, join
 
 
 class Chosen(eqx.Module):
-    """Which fields of a joint state are the model's own, and which are parameters (on the real line)."""
+    """Which fields of a joint state are the model's own, and which are parameters (on the real line; their paths begin at the
+    system)."""
 
     states: tuple[str, ...] = eqx.field(static=True)
     parameters: tuple[Parameter, ...] = eqx.field(static=True)
     state_type: Any = eqx.field(static=True)
-    inside: str = eqx.field(static=True, default="")
 
     @property
     def joint_type(self):
@@ -48,9 +49,9 @@ class Chosen(eqx.Module):
         """The system with its missing leaves put back."""
         return put(system, self.parameters, self.physical(unconstrained))
 
-    def reported_parameters(self, report) -> list:
-        """The parameters' entries of a report, in the order of `parameters`."""
-        return [getattr(report, p.field) for p in self.parameters]
+    def of_report(self, report) -> Parameters:
+        """The parameters' entries of a report, by name."""
+        return Parameters({p.name: getattr(report, p.field) for p in self.parameters})
 
 
 class JointTransition(eqx.Module):
@@ -95,32 +96,31 @@ def with_parameters(
     where: Where,
     prior: float | Mapping[str, float],
     walk: float | Mapping[str, float] = 0.0,
-    inside: str = "",
     domain: AbstractBijector | None = None,
 ) -> StateSpace:
-    """The model with the leaves that `where` picks from its system made states.
+    """The model with the leaves of its system that `where` picks made states.
 
     The leaves are removed from `model.system` and become the prior's mean, so that a gradient never silently is zero: it
     reaches the start values as `model.prior.mean`. Each parameter walks on the real line of its own bijector.
 
-    **Arguments**: `where(system)`, or `where` of the part of the system at the path `inside`. `prior`: the relative
+    **Arguments**: `where` sees the StateSpace, `lambda m: m.system.vehicle.front.B`. `prior`: the relative
     spread, one number or by name (`{"B": 0.1, "rear.D": 0.05}`); a positive parameter's is on its logarithm, an
     unbounded one's times its declared scale. `walk`: the random walk's spread relative likewise, per root second
     (zero: the parameters are constant and carry no process noise). `domain` overrides every parameter's own bijector
     (`Real()`: an additive walk in physical units, as papers print it; spreads are then relative to the value or scale).
 
-    **Raises** `InputError` where a spread is zero or negative, or where `where` picks no leaf.
+    **Raises** `InputError` where a spread is zero or negative, or where `where` picks no leaf of the system.
     """
     if model.chosen is not None:
         raise InputError("with_parameters: this model estimates parameters already; choose them all in one `where`.")
-    parameters = resolve(_part(model.system, inside), where, inside)
+    parameters = tuple(_of_system(p) for p in resolve(model, where))
     if domain is not None:
         parameters = tuple(p._replace(domain=domain) for p in parameters)
     values = pick(model.system, parameters)
     shaped = [p.name for p, value in zip(parameters, values, strict=True) if jnp.ndim(value) > 0]
     if shaped:
         raise InputError(f"where picked {shaped[0]}, an array: parameters that are states are scalars.")
-    chosen = Chosen(model.states, parameters, type(model.prior.mean), inside)
+    chosen = Chosen(model.states, parameters, type(model.prior.mean))
     starts = [p.domain.inverse(value) for p, value in zip(parameters, values, strict=True)]
     spreads = dict(zip([p.field for p in parameters], prior_spread(parameters, values, prior), strict=True))
     own = model.prior.law
@@ -144,10 +144,15 @@ def with_parameters(
     )
 
 
-def _part(system, inside: str):
-    for name in filter(None, inside.split(".")):
-        system = getattr(system, name)
-    return system
+def _of_system(p: Parameter) -> Parameter:
+    """The parameter with its path from the system on."""
+    whole, _, path = p.path.partition(".")
+    if whole != "system" or not path:
+        raise InputError(
+            f"with_parameters: where picked {p.path}: it must pick leaves of `m.system...`. Noise levels are for "
+            "`fitting.maximum_likelihood`."
+        )
+    return p._replace(path=path)
 
 
 def _walk(parameters, values, relative):
@@ -177,13 +182,13 @@ def start_from(model: StateSpace, **physical) -> StateSpace:
     return eqx.tree_at(lambda m: m.prior.mean, model, model.prior.mean._replace(**new))
 
 
-def parameter_view(system, chosen: Chosen, report):
-    """A tree shaped like the part that `where` saw, with only the parameters of a report: `.front.B`; else None."""
-    return view(_part(system, chosen.inside), chosen.parameters, chosen.reported_parameters(report))
+def parameters_of(model: StateSpace, report) -> Parameters | None:
+    """The parameters of a report (a state's, a mean's or a std's), by name: `.front.B`; None of a model without."""
+    return None if model.chosen is None else model.chosen.of_report(report)
 
 
 def put_parameters(model: StateSpace, report) -> Any:
     """The system with the parameters of one report (physical scalars) put back: an ordinary car again."""
     if model.chosen is None:
         return model.system
-    return put(model.system, model.chosen.parameters, model.chosen.reported_parameters(report))
+    return put(model.system, model.chosen.parameters, model.chosen.of_report(report).values())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from programs import error_line, run
 
-from jaxveh import io, tyres
+from jaxveh import Parameters, io, tyres
 from jaxveh._core.parameter import resolve
 from jaxveh.cli.tyre_fit_report import warnings_of
 from jaxveh.fitting import RigFit, StageReport
@@ -135,8 +135,9 @@ def fit_of(*converged, rmse=10.0, validated=11.0, std=0.1, identified=1):
         for name, value in dict(rmse=rmse, start_rmse=50.0, cross_validation=validated, peak=1e3, noise=rmse).items()
     }
     return RigFit(
-        values=one, std=std * one, unconstrained=one, covariance=matrix, cost=0.0, steps=7, result=0, model=TRUTH,
-        parameters=resolve(TRUTH, lambda law: law.friction), identified=identified, **of_channel, residuals={}, stages=stages,
+        parameters=Parameters({"friction": 1.0}), parameters_std=Parameters({"friction": std}), unconstrained=one,
+        covariance=matrix, cost=0.0, steps=7, result=0, model=TRUTH,
+        chosen=resolve(TRUTH, lambda law: law.friction), identified=identified, **of_channel, residuals={}, stages=stages,
         problem=None,
     )  # fmt: skip
 

@@ -1,5 +1,7 @@
 """`where`: names, metadata, errors; bijectors; prior spreads; strong float arrays; result codes."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -10,7 +12,7 @@ from jaxveh import InputError, Result
 from jaxveh._core.bijectors import Interval, Positive, Real
 from jaxveh._core.errors import check, check_at_least, check_finite, check_one_of, check_positive, float_array
 from jaxveh._core.names import as_mapping, record, record_type
-from jaxveh._core.parameter import parameter, pick, positive, prior_spread, put, resolve, view
+from jaxveh._core.parameter import UNNAMED, parameter, pick, positive, prior_spread, put, resolve
 from jaxveh._core.result import first_failure
 from jaxveh.statespace import Gaussian
 
@@ -44,22 +46,46 @@ def test_names_units_domains_come_from_the_tree():
     assert pick(car(), chosen)[:2] == [8.0, 0.0]
 
 
-def test_inside_is_where_the_part_sits():
-    (p,) = resolve(car().front, lambda tyre: tyre.B, inside="front")
-    assert (p.path, p.name, p.field) == ("front.B", "B", "B")
-    assert put(car(), (p,), [jnp.asarray(1.0)]).front.B == 1.0
+class Loaded(eqx.Module):
+    car: Car = eqx.field(metadata=UNNAMED)
+    front: jax.Array = parameter("kg")
 
 
-def test_put_view_and_a_whole_part():
+class Trip(NamedTuple):
+    loaded: Loaded
+
+
+class Driven(eqx.Module):
+    trip: Trip = eqx.field(metadata=UNNAMED)
+
+
+def test_names_leave_out_what_only_holds_the_car():
+    """But not what stands in a NamedTuple there, which has no declarations of its own."""
+    whole = Driven(Trip(Loaded(car(), 1.0)))
+    chosen = resolve(whole, lambda w: (w.trip.loaded.car.front.B, w.trip.loaded.front))
+    assert [p.name for p in chosen] == ["loaded.front.B", "loaded.front"]
+    assert [p.path for p in chosen] == ["trip.loaded.car.front.B", "trip.loaded.front"]
+    assert [p.unit for p in chosen] == ["-", "kg"]
+    assert put(whole, chosen[:1], [jnp.asarray(1.0)]).trip.loaded.car.front.B == 1.0
+
+
+class Twice(eqx.Module):
+    first: Tyre = eqx.field(metadata=UNNAMED)
+    second: Tyre = eqx.field(metadata=UNNAMED)
+
+
+def test_parameters_that_would_share_a_name_have_their_whole_paths():
+    two = Twice(car().front, car().rear)
+    assert [p.name for p in resolve(two, lambda t: (t.first.B, t.second.B, t.second.E))] == ["first.B", "second.B", "E"]
+
+
+def test_put_and_a_whole_part():
     chosen = resolve(car(), lambda c: c.rear)
     assert [p.name for p in chosen] == ["rear.B", "rear.E", "rear.share"]
     without = put(car(), chosen, [None] * 3)
     assert len(jax.tree.leaves(without)) == len(jax.tree.leaves(car())) - 3
     again = put(without, chosen, pick(car(), chosen))
     assert eqx.tree_equal(again, car())
-    shown = view(car(), chosen, [jnp.arange(2.0)] * 3)
-    assert shown.front.B is None
-    np.testing.assert_array_equal(shown.rear.E, [0.0, 1.0])
 
 
 @pytest.mark.parametrize(

@@ -98,7 +98,7 @@ def _line(law=None):
         measurement_noise=law or ss.Gaussian({"y": 0.1}),
         prior=ss.Prior(Line(1.0), {"x": 0.05}),
     )
-    return ss.with_parameters(plain, lambda s: s["slope"], prior=0.25)
+    return ss.with_parameters(plain, lambda m: m.system["slope"], prior=0.25)
 
 
 MEASURED = np.where(np.arange(21) % 3 == 0, np.nan, 1.0)

@@ -133,7 +133,13 @@ def test_real_log_calibrated_blind():
     calibration = estimators.sideslip.calibrate(first.select(blind), car)
     numbers = estimators.sideslip.score(estimators.sideslip.estimate(rest.select(blind), calibration), rest, car)
     assert numbers["sideslip_rmse_deg"] <= 0.24  # 0.2312 measured
-    assert set(calibration.summary()) >= {"car.front.B", "car.rear.D", "process noise.v_y", "measurement noise.a_y"}
+    assert set(calibration.summary()) >= {
+        "front.B",
+        "rear.D",
+        "steer_gain",
+        "process noise.v_y",
+        "measurement noise.a_y",
+    }
     fitted = calibration.specification(car)
     assert fitted.front.nominal_load == pytest.approx(982 * 9.80665 * 1.07 / 2.40, rel=1e-6)
 

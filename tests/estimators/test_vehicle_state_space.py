@@ -41,7 +41,7 @@ def test_names_of_states_channels_and_report(model, drive):
         "rear_D",
     )
     assert found.parameters.front.B.shape == (len(drive),)
-    assert found.parameters.mass is None
+    assert "mass" not in found.parameters
     error = np.asarray(found.mean.sideslip - drive["true.sideslip"])
     assert np.sqrt(np.mean(error**2)) < 0.004
     force = np.asarray(found.mean.F_yf - drive["true.F_yf"])

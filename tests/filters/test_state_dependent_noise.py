@@ -272,7 +272,7 @@ def test_kalman_takes_a_law_of_the_inputs_and_refuses_one_of_the_state():
 
 
 def chosen_beta():
-    return ss.with_parameters(stochastic_volatility(**POUND_DOLLAR), lambda system: system["beta"], 0.1)
+    return ss.with_parameters(stochastic_volatility(**POUND_DOLLAR), lambda m: m.system["beta"], 0.1)
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,7 @@ def test_gradient_of_a_nonlinear_model_with_parameters_as_states_equals_differen
         measurement_noise=ss.StudentT(5.0, {"angle": 0.1, "rate": 0.2}),
         prior=ss.Prior(ss.model.record("X", {"angle": 0.3, "rate": 0.0}), {"angle": 0.2, "rate": 0.3}),
     )
-    model = ss.with_parameters(model, lambda s: s["stiffness"], prior=0.3, walk=0.1)
+    model = ss.with_parameters(model, lambda m: m.system["stiffness"], prior=0.3, walk=0.1)
     time = np.linspace(0, 1, 15)
     angle = np.where(np.arange(15) % 4 == 1, np.nan, 0.3 * np.cos(2 * time))
     recording = Recording(time, {"angle": angle, "rate": np.where(np.arange(15) == 5, np.nan, -0.6 * np.sin(2 * time))})

@@ -48,7 +48,7 @@ def plain(k=3.0, d=0.7, noise=None, process=None, law=None, see=see):
 
 def model(k=3.0, d=0.7, prior=0.5, **parts):
     """The pendulum with its parameters among the states."""
-    return ss.with_parameters(plain(k, d, **parts), lambda s: (s.k, s.d), prior=prior)
+    return ss.with_parameters(plain(k, d, **parts), lambda m: (m.system.k, m.system.d), prior=prior)
 
 
 def rk4(f, x, dt):

@@ -25,10 +25,12 @@ def fit(rig):
 
 def test_two_hundred_rigs_spread_as_the_information_says(fit):
     found = jax.jit(lambda key: fitting.bootstrap(fit.problem, key))(jax.random.key(0))
-    assert found.values.shape == (200, 4) and bool(found.converged.all())
-    np.testing.assert_allclose(found.std, fit.std, rtol=0.3)
-    np.testing.assert_allclose(found.std, np.std(found.values, axis=0, ddof=1), rtol=1e-9)
-    np.testing.assert_allclose(np.mean(found.values, axis=0), fit.values, rtol=0.01)
+    assert found.parameters.array().shape == (4, 200) and bool(found.converged.all())
+    np.testing.assert_allclose(found.parameters_std.array(), fit.parameters_std.array(), rtol=0.3)
+    np.testing.assert_allclose(
+        found.parameters_std.array(), np.std(found.parameters.array(), axis=1, ddof=1), rtol=1e-9
+    )
+    np.testing.assert_allclose(np.mean(found.parameters.array(), axis=1), fit.parameters.array(), rtol=0.01)
 
 
 def test_runs_are_drawn_whole(fit):
@@ -40,7 +42,7 @@ def test_runs_are_drawn_whole(fit):
     key = jax.random.key(1)
     by_row = fitting.bootstrap(thrice, key, count=60)
     by_group = fitting.bootstrap(thrice, key, count=60, groups=np.repeat(np.arange(RUN.size), 3))
-    np.testing.assert_allclose(by_group.std, fit.std, rtol=0.4)
+    np.testing.assert_allclose(by_group.parameters_std.array(), fit.parameters_std.array(), rtol=0.4)
     assert np.all(np.asarray(by_row.std) < 0.8 * np.asarray(by_group.std))
 
 
@@ -58,4 +60,6 @@ def test_fits_that_did_not_converge_are_left_out(fit):
     found = fitting.bootstrap(fit.problem, jax.random.key(2), count=60, max_steps=4)
     ended = np.asarray(found.converged)  # half of them, in four steps
     assert 5 < ended.sum() < 55
-    np.testing.assert_allclose(found.std, np.std(np.asarray(found.values)[ended], axis=0, ddof=1), rtol=1e-9)
+    np.testing.assert_allclose(
+        found.parameters_std.array(), np.std(found.parameters.array()[:, ended], axis=1, ddof=1), rtol=1e-9
+    )

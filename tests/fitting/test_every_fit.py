@@ -17,7 +17,7 @@ from rig_sweeps import brush, measured_of, small_plan, table
 from test_maximum_likelihood import LEVELS
 from test_maximum_likelihood import model as diffuse
 
-from jaxveh import InputError, Recording, filters, fitting, tyres
+from jaxveh import InputError, Parameters, Recording, filters, fitting, tyres
 from jaxveh.fitting.solve import curvature, optimum
 
 FILTER = filters.Unscented()
@@ -132,15 +132,16 @@ def test_every_fit_and_every_problem_has_a_case():
 def test_results_have_one_shape(case, problem, by):
     fit = case.fit() if by == "program" else fitting.solve(problem)
     p = len(fit.names)
-    assert isinstance(fit, fitting.AbstractFit) and p == 2 == len(fit.parameters)
-    assert jax.tree.structure(fit.values) == jax.tree.structure(fit.std) == problem.shape.structure
-    values, std = (np.asarray(jax.tree.leaves(tree)) for tree in (fit.values, fit.std))
+    assert isinstance(fit, fitting.AbstractFit) and p == 2 == len(fit.chosen)
+    for found in (fit.parameters, fit.parameters_std):
+        assert isinstance(found, Parameters) and tuple(found) == fit.names == tuple(q.name for q in problem.chosen)
+    values, std = fit.parameters.array(), fit.parameters_std.array()
     assert values.shape == std.shape == fit.unconstrained.shape == (p,) and (std > 0).all()
     assert fit.covariance.shape == (p, p)
     np.testing.assert_allclose(fit.covariance, fit.covariance.T, rtol=1e-6)
-    lines = [q.domain.forward(z) for q, z in zip(fit.parameters, fit.unconstrained, strict=True)]
+    lines = [q.domain.forward(z) for q, z in zip(fit.chosen, fit.unconstrained, strict=True)]
     np.testing.assert_allclose(values, lines, rtol=1e-12)
-    slopes = [q.domain.slope(value) for q, value in zip(fit.parameters, values, strict=True)]
+    slopes = [q.domain.slope(value) for q, value in zip(fit.chosen, values, strict=True)]
     np.testing.assert_allclose(std, np.abs(slopes) * np.sqrt(np.diagonal(fit.covariance)), rtol=1e-9)
     assert bool(fit.converged) and int(fit.steps) > 0 and fit.reason == "successful" and np.isfinite(fit.cost)
 
@@ -148,7 +149,7 @@ def test_results_have_one_shape(case, problem, by):
 def test_a_search_that_stops_short_says_so(case, problem):
     fit = fitting.solve(problem, max_steps=1, tolerance=1e-14, standard_errors=False)
     assert not bool(fit.converged) and "stopped before its tolerance" in fit.reason
-    assert all(np.isnan(leaf) for leaf in jax.tree.leaves(fit.std))
+    assert all(np.isnan(leaf) for leaf in jax.tree.leaves(fit.parameters_std))
 
 
 def test_derivatives_equal_differences(case, changed, core):
@@ -197,15 +198,15 @@ def test_program_and_core_end_alike(case, problem):
         # Where the fit ended, with its noise: its last round pulled to where it began.
         problem = fit.problem
     core = fitting.solve(problem, tolerance=case.tolerance)
-    off = np.subtract(jax.tree.leaves(core.values), jax.tree.leaves(fit.values))
-    assert (np.abs(off) < 0.05 * np.asarray(jax.tree.leaves(fit.std))).all()
+    off = np.subtract(jax.tree.leaves(core.parameters), jax.tree.leaves(fit.parameters))
+    assert (np.abs(off) < 0.05 * np.asarray(jax.tree.leaves(fit.parameters_std))).all()
 
 
 @pytest.mark.parametrize(("prior", "message"), [(-1.0, "prior spread of"), ({"nothing": 1.0}, "prior: unknown")])
 def test_a_prior_is_a_number_or_numbers_by_name(case, problem, prior, message):
     with pytest.raises(InputError, match=message):
         case.pose(prior)
-    by_name = case.pose(dict.fromkeys([p.name for p in problem.parameters], 0.4))
+    by_name = case.pose(dict.fromkeys([p.name for p in problem.chosen], 0.4))
     for one, other in zip(
         *(jax.tree.leaves(eqx.filter(p, eqx.is_array)) for p in (by_name, case.pose(0.4))), strict=True
     ):

@@ -60,7 +60,7 @@ def drive(rows=25):
 def test_standard_errors_of_the_likelihood_are_those_of_differences():
     recording, where = drive(), lambda m: (m.system.k, m.system.b)
     fit = maximum_likelihood(filters.Unscented(), model(), recording, where, tolerance=1e-8)
-    values = np.array([float(value) for value in fit.values])
+    values = np.array([float(value) for value in fit.parameters.values()])
 
     @jax.jit
     def gradient(logs):
@@ -74,16 +74,16 @@ def test_standard_errors_of_the_likelihood_are_those_of_differences():
     moved = [[gradient(jnp.log(values) + sign * step * side) for sign in (1, -1)] for side in np.eye(2)]
     information = np.array([(plus - minus) / (2 * step) for plus, minus in moved])
     expected = np.sqrt(np.diagonal(np.linalg.inv(information)))
-    np.testing.assert_allclose(np.array([float(s) for s in fit.std]) / values, expected, rtol=1e-4)
+    np.testing.assert_allclose(np.array([float(s) for s in fit.parameters_std.values()]) / values, expected, rtol=1e-4)
 
 
 def test_the_slope_of_a_shot_optimum_is_a_difference():
     recording = drive()
 
     def stiffness(noise):
-        chosen = ss.with_parameters(model(), lambda system: (system.k, system.b), prior=0.3)
+        chosen = ss.with_parameters(model(), lambda m: (m.system.k, m.system.b), prior=0.3)
         chosen = eqx.tree_at(lambda m: m.measurement_noise.std.force, chosen, noise)
-        return solve(pose_shooting(chosen, cut(chosen, recording, 0.8)), tolerance=1e-12).values.k
+        return solve(pose_shooting(chosen, cut(chosen, recording, 0.8)), tolerance=1e-12).parameters.k
 
     at, step = jnp.asarray(0.05, jnp.float64), 1e-4
     value = jax.jit(stiffness)

@@ -47,11 +47,11 @@ def fit():
 
 
 def test_noise_levels_of_the_nile(fit):
-    walk, noise = fit.values
+    walk, noise = fit.parameters.array()
     np.testing.assert_allclose([walk**2, noise**2], [1469.1, 15099.0], rtol=0.01)
     assert fit.names == ("process_noise.law.std.level", "measurement_noise.std.flow")
     assert Result(int(fit.result)) is Result.successful
-    np.testing.assert_allclose(LEVELS(fit.model), fit.values, rtol=1e-12)
+    np.testing.assert_allclose(LEVELS(fit.model), fit.parameters.array(), rtol=1e-12)
     # The value printed for these variances is the largest, so that it is met from below within rounding of the print.
     assert abs(float(fit.cost) - 641.5855784594) < 1e-4
     np.testing.assert_allclose(filters.run(filters.Unscented(), fit.model, RECORDING).log_likelihood, -fit.cost)
@@ -81,12 +81,14 @@ def test_standard_errors_are_those_of_the_curvature(fit):
             hessian[i, j] = (corners[0] - corners[1] - corners[2] + corners[3]) / (4 * h * h)
     expected = np.linalg.inv(hessian)
     np.testing.assert_allclose(fit.covariance, expected, rtol=1e-3)
-    np.testing.assert_allclose(fit.std, np.sqrt(np.diagonal(expected)) * np.stack(fit.values), rtol=1e-3)
+    np.testing.assert_allclose(
+        fit.parameters_std.array(), np.sqrt(np.diagonal(expected)) * fit.parameters.array(), rtol=1e-3
+    )
 
 
 def test_two_recordings_count_twice(fit):
     both = maximum_likelihood(filters.Unscented(), model(), [RECORDING, RECORDING], LEVELS, standard_errors=False)
-    np.testing.assert_allclose(both.values, fit.values, rtol=2e-3)
+    np.testing.assert_allclose(both.parameters.array(), fit.parameters.array(), rtol=2e-3)
     np.testing.assert_allclose(both.cost, 2 * fit.cost, rtol=1e-6)
 
 
@@ -94,10 +96,10 @@ def test_a_prior_holds_what_it_knows():
     held = maximum_likelihood(
         filters.Unscented(), model(), RECORDING, LEVELS, prior={"level": 0.01, "flow": 0.5}, standard_errors=False
     )
-    assert abs(float(held.values[0]) - 60.0) < 2.0
-    assert np.isnan(held.std).all()
+    assert abs(float(held.parameters.array()[0]) - 60.0) < 2.0
+    assert np.isnan(held.parameters_std.array()).all()
     around = [
-        eqx.tree_at(LEVELS, held.model, (held.values[0], held.values[1] * (1 + change)))
+        eqx.tree_at(LEVELS, held.model, (held.parameters.array()[0], held.parameters.array()[1] * (1 + change)))
         for change in (-0.02, 0.0, 0.02)
     ]
     low, best, high = (float(filters.run(filters.Unscented(), m, RECORDING).log_likelihood) for m in around)
@@ -119,8 +121,8 @@ def test_a_start_value_is_a_parameter_too():
         picked,
     )
     # A level that stays: the mean, known to a tenth of the noise.
-    assert float(found.values) == pytest.approx(NILE.mean(), abs=0.01)
-    assert float(found.std) == pytest.approx(10.0, rel=1e-3)
+    assert float(found.parameters.prior.mean.level) == pytest.approx(NILE.mean(), abs=0.01)
+    assert float(found.parameters_std.prior.mean.level) == pytest.approx(10.0, rel=1e-3)
 
 
 def test_particle_likelihood_with_a_held_key():
@@ -135,7 +137,8 @@ def test_particle_likelihood_with_a_held_key():
         filters.ParticleFilter(500), near, short, noise, key=key, tolerance=1e-2, standard_errors=False, throw=False
     )
     exact = maximum_likelihood(filters.Unscented(), near, short, noise, standard_errors=False)
-    assert float(found.values) == pytest.approx(float(exact.values), rel=0.1)
+    there = [float(one.parameters.measurement_noise.std.flow) for one in (found, exact)]
+    assert there[0] == pytest.approx(there[1], rel=0.1)
     with pytest.raises(InputError, match="ParticleFilter draws random numbers: give it a key"):
         maximum_likelihood(filters.ParticleFilter(500), near, short, noise)
 
@@ -169,5 +172,7 @@ def test_a_fit_that_does_not_finish_raises_unless_told():
 def test_float32_without_x64(float32):
     settings = dict(tolerance=1e-4, standard_errors=False, throw=False)
     found = maximum_likelihood(filters.Unscented(), model(), RECORDING, LEVELS, **settings)
-    assert found.values[0].dtype == jnp.float32
-    np.testing.assert_allclose([found.values[0] ** 2, found.values[1] ** 2], [1469.1, 15099.0], rtol=0.1)
+    assert found.parameters.array()[0].dtype == jnp.float32
+    np.testing.assert_allclose(
+        [found.parameters.array()[0] ** 2, found.parameters.array()[1] ** 2], [1469.1, 15099.0], rtol=0.1
+    )

@@ -37,22 +37,26 @@ def test_equals_scipy_on_the_same_residuals(recordings, both):
         residuals, start, args=(recordings, 10, 0.1, centre, spread), xtol=1e-15, ftol=1e-15, gtol=1e-13
     )
     np.testing.assert_allclose(fit.unconstrained, exact.x[:2], rtol=1e-6)
-    np.testing.assert_allclose(numbers(fit.values), np.exp(exact.x[:2]), rtol=1e-6)
+    np.testing.assert_allclose(numbers(fit.parameters), np.exp(exact.x[:2]), rtol=1e-6)
     np.testing.assert_allclose(fit.cost, exact.cost, rtol=1e-9)
     covariance = np.linalg.inv(exact.jac.T @ exact.jac)[:2, :2]
     np.testing.assert_allclose(fit.covariance, covariance, rtol=1e-5, atol=1e-9)
-    np.testing.assert_allclose(numbers(fit.std), np.sqrt(np.diagonal(covariance)) * np.exp(exact.x[:2]), rtol=1e-5)
+    np.testing.assert_allclose(
+        numbers(fit.parameters_std), np.sqrt(np.diagonal(covariance)) * np.exp(exact.x[:2]), rtol=1e-5
+    )
     assert Result(int(fit.result)) is Result.successful
-    assert fit.names == ("k", "d") and fit.values.k == numbers(fit.values)[0]
+    assert fit.names == ("k", "d") and fit.parameters.k == numbers(fit.parameters)[0]
     # The model carries the fit: the prior's mean, physically.
-    np.testing.assert_allclose(fit.model.report(0.0, fit.model.prior.mean, None)[2:], numbers(fit.values), rtol=1e-12)
+    np.testing.assert_allclose(
+        fit.model.report(0.0, fit.model.prior.mean, None)[2:], numbers(fit.parameters), rtol=1e-12
+    )
     assert int(fit.steps) > 1
 
 
 def test_least_squares_alone_finds_the_truth_without_noise():
     clean = drive(60, noise=False)
     fit = multiple_shooting(plain(), clean, lambda m: (m.system.k, m.system.d), window=1.0, tolerance=1e-12)
-    np.testing.assert_allclose(fit.values, TRUE, rtol=1e-5)
+    np.testing.assert_allclose(fit.parameters.array(), TRUE, rtol=1e-5)
     assert float(fit.cost) < 1e-8
 
 
@@ -83,10 +87,10 @@ def test_standard_errors_cover_the_truth():
 
 def test_several_recordings_tell_more_than_one(recordings, both):
     one = multiple_shooting(model(), recordings[0], window=1.0, tie=0.1, tolerance=1e-12)
-    for few, more, truth in zip(numbers(one.std), numbers(both.std), TRUE, strict=True):
+    for few, more, truth in zip(numbers(one.parameters_std), numbers(both.parameters_std), TRUE, strict=True):
         assert float(more) < float(few)
         assert float(more) < 0.3 * truth
-    assert (np.abs(numbers(both.values) - TRUE) < 4 * numbers(both.std)).all()
+    assert (np.abs(numbers(both.parameters) - TRUE) < 4 * numbers(both.parameters_std)).all()
 
 
 One = namedtuple("One", "x")
@@ -112,14 +116,14 @@ def _unstable(rows=200, dt=0.05):
     )
     measured = np.array(xs) + 0.01 * rng.normal(size=rows)
     recording = Recording(dt * np.arange(rows), {"u": us, "x": measured})
-    return ss.with_parameters(system, lambda s: s["a"], prior=1.0), recording
+    return ss.with_parameters(system, lambda m: m.system["a"], prior=1.0), recording
 
 
 def test_short_windows_keep_an_unstable_system_from_exploding():
     system, recording = _unstable()
     fit = multiple_shooting(system, recording, window=0.25)
-    assert abs(float(fit.values["a"]) - 8.0) < 5 * float(fit.std["a"])
-    assert float(fit.std["a"]) < 0.1
+    assert abs(float(fit.parameters["a"]) - 8.0) < 5 * float(fit.parameters_std["a"])
+    assert float(fit.parameters_std["a"]) < 0.1
 
 
 def test_a_fit_that_diverges_everywhere_is_a_code_not_a_crash():
@@ -194,7 +198,7 @@ def test_a_fit_that_does_not_finish_raises_unless_told(recordings):
     fit = multiple_shooting(model(), recordings[1], window=1.0, max_steps=2, throw=False)
     assert Result(int(fit.result)) is Result.not_converged
     assert not bool(fit.converged) and fit.reason.startswith("the solver stopped before its tolerance")
-    assert np.isfinite(numbers(fit.values)).all()
+    assert np.isfinite(numbers(fit.parameters)).all()
 
 
 def test_one_compilation_serves_other_drives(recordings):
@@ -214,5 +218,5 @@ def test_one_compilation_serves_other_drives(recordings):
 
 def test_float32_without_x64(float32):
     fit = multiple_shooting(model(), drive(40, seed=5), window=1.0)
-    assert fit.values.k.dtype == fit.covariance.dtype == jnp.float32
-    assert (np.abs(numbers(fit.values) - TRUE) < 4 * numbers(fit.std)).all()
+    assert fit.parameters.k.dtype == fit.covariance.dtype == jnp.float32
+    assert (np.abs(numbers(fit.parameters) - TRUE) < 4 * numbers(fit.parameters_std)).all()

@@ -51,7 +51,7 @@ def fit():
 
 def test_finds_the_noise_levels_of_the_nile(fit):
     # Durbin & Koopman (2012), sec. 2.10: 15099 and 1469.1, with a diffuse start.
-    found = np.asarray(fit.values) ** 2
+    found = np.asarray(fit.parameters.array()) ** 2
     np.testing.assert_allclose(found, [15099.0, 1469.1], rtol=0.01)
     assert int(fit.result) == 0
 
@@ -77,19 +77,21 @@ def test_standard_errors_are_those_of_the_curvature():
     rows = model().rows(long)
     negative = lambda z: -filters.scan(filters.Unscented(), model(*jnp.exp(z)), rows).log_likelihood
     observed = np.asarray(jax.jit(jax.hessian(negative))(fit.unconstrained))
-    spread = np.sqrt(np.diag(np.linalg.inv(observed))) * np.asarray(fit.values)
-    np.testing.assert_allclose(np.asarray(fit.std), spread, rtol=0.1)
-    assert np.all(np.abs(np.asarray(fit.values) - [120.0, 40.0]) < 3 * np.asarray(fit.std))
+    spread = np.sqrt(np.diag(np.linalg.inv(observed))) * np.asarray(fit.parameters.array())
+    np.testing.assert_allclose(np.asarray(fit.parameters_std.array()), spread, rtol=0.1)
+    assert np.all(
+        np.abs(np.asarray(fit.parameters.array()) - [120.0, 40.0]) < 3 * np.asarray(fit.parameters_std.array())
+    )
 
 
 def test_a_tight_prior_holds_and_centre_moves_it():
     tight = {"flow": 0.01, "level": 0.01}
     held = fitting.prediction_error(filters.Unscented(), model(100.0, 50.0), RECORDING, levels, prior=tight)
-    np.testing.assert_allclose(np.asarray(held.values), [100.0, 50.0], rtol=0.01)
+    np.testing.assert_allclose(np.asarray(held.parameters.array()), [100.0, 50.0], rtol=0.01)
     elsewhere = fitting.prediction_error(
         filters.Unscented(), model(100.0, 50.0), RECORDING, levels, prior=tight, centre=model(120.0, 40.0)
     )
-    np.testing.assert_allclose(np.asarray(elsewhere.values), [120.0, 40.0], rtol=0.01)
+    np.testing.assert_allclose(np.asarray(elsewhere.parameters.array()), [120.0, 40.0], rtol=0.01)
 
 
 def test_rows_of_the_warm_up_do_not_count():
@@ -98,8 +100,8 @@ def test_rows_of_the_warm_up_do_not_count():
     recording = Recording(np.arange(1871.0, 1971.0), {"flow": wild})
     with_them = fitting.prediction_error(filters.Unscented(), model(), recording, levels)
     without = fitting.prediction_error(filters.Unscented(), model(), recording, levels, warm_up=30)
-    assert float(with_them.values[0]) > 200.0
-    assert 90.0 < float(without.values[0]) < 160.0
+    assert float(with_them.parameters.array()[0]) > 200.0
+    assert 90.0 < float(without.parameters.array()[0]) < 160.0
 
 
 def test_a_reference_pulls_the_fit():
@@ -107,7 +109,7 @@ def test_a_reference_pulls_the_fit():
     target = fitting.Target("level", (NILE,), weight=5.0, bend=1e6)
     pulled = fitting.prediction_error(filters.Unscented(), model(), RECORDING, levels, target=target)
     blind = fitting.prediction_error(filters.Unscented(), model(), RECORDING, levels)
-    gain = lambda fit: float(fit.values[1] / fit.values[0])
+    gain = lambda fit: float(fit.parameters.array()[1] / fit.parameters.array()[0])
     assert gain(pulled) > 1.5 * gain(blind)
 
 

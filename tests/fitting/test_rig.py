@@ -35,8 +35,8 @@ TRUE = np.array([9e4, 7e4, 0.95, 0.06])
 def test_without_noise_the_truth_comes_back(clean):
     fit = fitting.fit_rig(start(), rig(clean, noise=0.0))
     assert fit.names == ("slip_stiffness", "cornering_stiffness", "friction", "half_length")
-    np.testing.assert_allclose(fit.values, TRUE, rtol=1e-5)
-    assert fit.tyre.friction == fit.values[2]
+    np.testing.assert_allclose(fit.parameters.array(), TRUE, rtol=1e-5)
+    assert fit.tyre.friction == fit.parameters.array()[2]
     assert all(fit.rmse[name] < 1e-4 * fit.peak[name] < 0.05 * fit.start_rmse[name] for name in CHANNELS)
     assert fit.identified == 4 and fit.stages[-1].converged
 
@@ -44,12 +44,12 @@ def test_without_noise_the_truth_comes_back(clean):
 def test_standard_errors_cover(clean):
     """200 repetitions: of nominally 95 % intervals, 90 to 98 % hold the truth."""
     fits = [fitting.fit_rig(start(), rig(clean, seed=seed)) for seed in range(200)]
-    held = np.array([np.abs(fit.values - TRUE) < 1.96 * fit.std for fit in fits])
+    held = np.array([np.abs(fit.parameters.array() - TRUE) < 1.96 * fit.parameters_std.array() for fit in fits])
     assert np.all((held.mean(axis=0) > 0.90) & (held.mean(axis=0) < 0.99))
     assert 0.92 < held.mean() < 0.98
     # And they are no larger than they have to be.
-    spread = np.std([fit.values for fit in fits], axis=0)
-    np.testing.assert_allclose(np.mean([fit.std for fit in fits], axis=0), spread, rtol=0.2)
+    spread = np.std([fit.parameters.array() for fit in fits], axis=0)
+    np.testing.assert_allclose(np.mean([fit.parameters_std.array() for fit in fits], axis=0), spread, rtol=0.2)
 
 
 def test_residuals_and_noise_are_those_of_the_data(clean):
@@ -67,14 +67,14 @@ def test_missing_measurements_are_left_out(clean):
     fit = lambda force: fitting.fit_rig(start(), rig(clean, F_y=force), measured=("F_y",))
     with_gaps, whole = fit(np.where(gone, np.nan, clean["F_y"])), fit(clean["F_y"])
     assert np.array_equal(np.isnan(with_gaps.residuals["F_y"]), gone)
-    assert 1.15 < with_gaps.std[1] / whole.std[1] < 1.45
-    np.testing.assert_allclose(with_gaps.values[1:3], TRUE[1:3], rtol=0.03)
+    assert 1.15 < with_gaps.parameters_std.array()[1] / whole.parameters_std.array()[1] < 1.45
+    np.testing.assert_allclose(with_gaps.parameters.array()[1:3], TRUE[1:3], rtol=0.03)
 
 
 def test_outliers_count_little_where_a_fit_is_robust(clean):
     wrong = np.random.default_rng(4).random(RUN.size) < 0.1
     data = rig(clean, F_y=np.where(wrong, 0.1, 1.0) * clean["F_y"])
-    error = lambda fit: np.abs(fit.values[1:3] / TRUE[1:3] - 1).max()
+    error = lambda fit: np.abs(fit.parameters.array()[1:3] / TRUE[1:3] - 1).max()
     plain, robust = (fitting.fit_rig(start(), data, measured=("F_y",), robust=robust) for robust in (False, True))
     assert 3 * error(robust) < error(plain) and error(robust) < 0.02
 
@@ -94,13 +94,13 @@ def test_weights_do_not_make_data_better(clean):
     fits = [fitting.fit_rig(start(), rig(clean, seed=seed), weights=weights) for seed in range(40)]
     assert np.all(fits[0].std > 0.9 * plain.std)
     assert fits[0].identified == plain.identified
-    spread = np.std([fit.values for fit in fits], axis=0)
-    np.testing.assert_allclose(np.mean([fit.std for fit in fits], axis=0), spread, rtol=0.3)
+    spread = np.std([fit.parameters.array() for fit in fits], axis=0)
+    np.testing.assert_allclose(np.mean([fit.parameters_std.array() for fit in fits], axis=0), spread, rtol=0.3)
 
 
 def test_weights_leave_unknown_what_the_data_do_not_show(clean):
     fit = fitting.fit_rig(start(), rig(clean), measured=("F_y",), weights={"F_y": 4.0}, throw=False)
-    assert np.isnan(fit.std[3]) and fit.identified == 3
+    assert np.isnan(fit.parameters_std.array()[3]) and fit.identified == 3
 
 
 def test_a_speed_of_zero_throughout_was_not_told(clean):
@@ -123,11 +123,11 @@ class Nowhere(tyres.Brush):
 
 def test_bounds_hold(clean):
     fit = fitting.fit_rig(start(), rig(clean), bounds={"friction": (0.5, 0.9)}, throw=False)
-    assert 0.88 < fit.values[2] < 0.9
+    assert 0.88 < fit.parameters.array()[2] < 0.9
     inside = fitting.fit_rig(start(), rig(clean), bounds={"friction": (0.5, 1.5)})
     free = fitting.fit_rig(start(), rig(clean))
-    np.testing.assert_allclose(inside.values, free.values, rtol=1e-4)
-    np.testing.assert_allclose(inside.std, free.std, rtol=1e-2)
+    np.testing.assert_allclose(inside.parameters.array(), free.parameters.array(), rtol=1e-4)
+    np.testing.assert_allclose(inside.parameters_std.array(), free.parameters_std.array(), rtol=1e-2)
 
 
 def test_where_picks_what_is_fitted(clean):
@@ -140,7 +140,7 @@ def test_measured_says_which_channels_count(clean):
     fit = fitting.fit_rig(start(), rig(clean), measured=("F_y",), throw=False)
     assert set(fit.rmse) == {"F_y"}
     # The lateral force shows neither the trail nor much of the slip stiffness.
-    assert np.isnan(fit.std[3]) and fit.identified == 3
+    assert np.isnan(fit.parameters_std.array()[3]) and fit.identified == 3
     np.testing.assert_allclose(fit.tyre.half_length, 0.04, rtol=1e-9)
 
 

@@ -51,11 +51,11 @@ def test_intervals_of_pure_slip_cover():
     pure = np.abs(io.read_rig_table(shared("mfeval_mf61.csv")).slip_ratio) < 1e-6
     fits = [fitting.fit_rig(ordinary(), noisy_table(("F_y",), seed, pure), throw=False) for seed in range(3)]
     by_name, pooled = covered(fits)
-    assert "lateral.PKY4" not in by_name and all(fit.values[fit.names.index("lateral.PKY4")] == 2.0 for fit in fits)
+    assert "lateral.PKY4" not in by_name and all(fit.parameters["lateral.PKY4"] == 2.0 for fit in fits)
     assert pooled > 0.85
     start = ordinary()
     for fit in fits:
-        for name in np.array(fit.names)[np.isnan(fit.std)]:
+        for name in np.array(fit.names)[np.isnan(fit.parameters_std.array())]:
             assert float(leaf(fit.tyre, name)) == float(leaf(start, name))
 
 
@@ -122,9 +122,9 @@ def test_coefficients_and_directions_cover_from_the_fit_s_end():
     for seed in range(1, 101):
         fit = fitting.fit_rig(first.tyre, noisy(seed), staged=False, **again)
         assert fit.names == first.names
-        error = (fit.values - true) / size
-        known = np.isfinite(fit.std)
-        coefficients.append(np.abs(error * size / fit.std)[known] < 1.96)
+        error = (fit.parameters.array() - true) / size
+        known = np.isfinite(fit.parameters_std.array())
+        coefficients.append(np.abs(error * size / fit.parameters_std.array())[known] < 1.96)
         spread = np.diag(axes.eigenvectors.T @ (fit.covariance / np.outer(size, size)) @ axes.eigenvectors)
         directions.append((np.abs(axes.eigenvectors.T @ error) < 1.96 * np.sqrt(spread))[seen])
     print("coefficients", np.mean(np.concatenate(coefficients)), "directions", np.mean(directions), seen.sum())

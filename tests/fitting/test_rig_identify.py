@@ -42,14 +42,14 @@ def rig(truth, seed=0, camber=0.08, rows=300):
 
 def test_the_least_known_stays_at_its_start_and_the_other_is_fitted():
     fit = fitting.fit_rig(law(), rig(law(14.0, 1.2)))
-    held = np.isnan(fit.std)
+    held = np.isnan(fit.parameters_std.array())
     assert held.tolist() in ([True, False, True], [False, True, True])
     start = np.array([8.0, 0.5, 0.0])
-    np.testing.assert_array_equal(fit.values[held], start[held])
+    np.testing.assert_array_equal(fit.parameters.array()[held], start[held])
     # The sum is what the data know; the held one may be off by its own size, and the fitted one by as much.
-    assert fit.values[0] + fit.values[1] == pytest.approx(15.2, abs=0.1)
+    assert fit.parameters.array()[0] + fit.parameters.array()[1] == pytest.approx(15.2, abs=0.1)
     size = 1.0 if held[1] else 10.0
-    assert 0.95 * size < fit.std[~held][0] < 1.1 * size
+    assert 0.95 * size < fit.parameters_std.array()[~held][0] < 1.1 * size
     assert fit.stages[-1].coefficients == 1 and fit.stages[-1].converged
 
 
@@ -57,8 +57,8 @@ def test_intervals_hold_the_truth_that_the_start_is_not():
     truths = [(14.0, 1.2), (6.0, -0.4), (11.0, 1.5)]
     for seed, (a, b) in enumerate(truths):
         fit = fitting.fit_rig(law(), rig(law(a, b), seed))
-        known = np.isfinite(fit.std)
-        assert (np.abs(fit.values - [a, b, 0.0]) < 1.96 * fit.std)[known].all()
+        known = np.isfinite(fit.parameters_std.array())
+        assert (np.abs(fit.parameters.array() - [a, b, 0.0]) < 1.96 * fit.parameters_std.array())[known].all()
 
 
 def test_what_the_data_reject_is_not_put_back():
@@ -66,16 +66,16 @@ def test_what_the_data_reject_is_not_put_back():
     where = lambda law: law.c
     data = rig(law(14.0, 1.2, 0.1), seed=1)
     fit = fitting.fit_rig(law(14.0, 1.2, 20.0), data, where=where)
-    assert np.isfinite(fit.std) and fit.std > 1.0
-    assert abs(fit.values - 0.1) < 3 * fit.std
+    assert np.isfinite(fit.parameters_std.c) and fit.parameters_std.c > 1.0
+    assert abs(fit.parameters.c - 0.1) < 3 * fit.parameters_std.c
     near = fitting.fit_rig(law(14.0, 1.2, 1.0), data, where=where)
-    assert np.isnan(near.std) and near.values == 1.0
+    assert np.isnan(near.parameters_std.c) and near.parameters.c == 1.0
 
 
 def test_a_bounded_coefficient_may_be_held_too():
     fit = fitting.fit_rig(law(), rig(law(14.0, 1.2)), bounds={"b": (0.0, 3.0)})
-    held = np.isnan(fit.std)
-    assert held.sum() == 2 and fit.values[held] == pytest.approx(np.array([8.0, 0.5, 0.0])[held])
+    held = np.isnan(fit.parameters_std.array())
+    assert held.sum() == 2 and fit.parameters.array()[held] == pytest.approx(np.array([8.0, 0.5, 0.0])[held])
 
 
 def lateral():

@@ -30,7 +30,7 @@ def test_a_generic_start_comes_to_the_truth_through_noise():
         np.testing.assert_allclose(fit.noise[name] / peak(clean[name]), NOISE, rtol=0.05)
     # Camber and pressure never vary together here, and PKY4 was not asked for.
     for name, value in (("lateral.PPY5", 0.0), ("lateral.PKY4", 2.0)):
-        assert np.isnan(fit.std[fit.names.index(name)]) and fit.values[fit.names.index(name)] == value
+        assert np.isnan(fit.parameters_std[name]) and fit.parameters[name] == value
     assert 55 <= fit.identified < len(fit.names)
 
 

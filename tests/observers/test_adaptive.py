@@ -33,7 +33,7 @@ def model(**start):
 
 
 def joint(**start):
-    return ss.with_parameters(model(**start), lambda system: (system["pull"], system["gain"]), prior=0.5)
+    return ss.with_parameters(model(**start), lambda m: (m.system["pull"], m.system["gain"]), prior=0.5)
 
 
 def observer(rate=3e-3, **options):
@@ -157,7 +157,7 @@ def test_a_dead_zone_lets_small_errors_pass():
 def test_a_pendulum_s_pull_is_found_and_with_it_the_rate():
     force = {"force": 3.0 * np.sin(2.0 * TIME)}
     states, recording = drive(pendulum(9.0), (1.0, 0.0), TIME, force, noise=0.2)
-    wrong = ss.with_parameters(pendulum(13.0), lambda system: system["pull"], prior=0.3)
+    wrong = ss.with_parameters(pendulum(13.0), lambda m: m.system["pull"], prior=0.3)
     gain = observers.place_poles(pendulum(13.0), [-4.0, -5.0], dt=DT)
     found = run(observers.Adaptive(gain, {"pull": 5.0}, bounds={"pull": (3.0, 20.0)}), wrong, recording)
     assert np.abs(np.asarray(found.mean.pull)[-200:] - 9.0).max() < 0.15

@@ -43,8 +43,8 @@ def switching(model):
     return observers.SlidingMode(gain(model), size, np.full(len(model.channels), 0.05))
 
 
-def first(system):
-    return system["stiffness"] if "stiffness" in system else system["pull"]
+def first(model):
+    return model.system["stiffness" if "stiffness" in model.system else "pull"]
 
 
 def without_parameter(model):

@@ -50,7 +50,7 @@ def test_its_law_is_that_of_state_and_input():
 
 
 def test_chosen_parameters_reach_it():
-    joint = ss.with_parameters(model(), lambda system: system["r"], 0.1)
+    joint = ss.with_parameters(model(), lambda m: m.system["r"], 0.1)
     x = joint.prior.mean._replace(x=jnp.asarray(3.0), r=1.4 * joint.prior.mean.r)
     physical = float(joint.chosen.physical([x.r])[0])
     assert float(joint.measurement_law(T, x, U).std.y) == pytest.approx(physical * 10.0 + 0.4)

@@ -55,7 +55,7 @@ def test_a_push_moves_the_mass_as_a_force_does():
 
 
 def test_it_stands_beside_chosen_parameters_in_either_order():
-    choose = lambda model: ss.with_parameters(model, lambda system: system["mass"], prior=0.2)
+    choose = lambda model: ss.with_parameters(model, lambda m: m.system["mass"], prior=0.2)
     push = lambda model: ss.with_disturbances(model, {"speed": 3.0})
     for joint in (choose(push(model())), push(choose(model()))):
         x = type(joint.prior.mean)(**{"place": 1.0, "speed": 2.0, "disturbance_speed": 0.7, "mass": 4.0})

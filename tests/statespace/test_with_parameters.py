@@ -48,8 +48,8 @@ def base(law=None, process=True):
 
 TIME = np.linspace(0, 2, 21)
 RECORDING = Recording(TIME, {"force": np.sin(3 * TIME), "v": 1 + 0.7 * (1 - np.cos(3 * TIME))})
-ALL = lambda s: (s["car"].engine.gain, s["car"].engine.offset, s["car"].share)
-INSIDE = lambda car: (car.engine.gain, car.engine.offset, car.share)
+OF_CAR = lambda car: (car.engine.gain, car.engine.offset, car.share)
+ALL = lambda m: OF_CAR(m.system["car"])
 
 
 def test_chosen_leaves_leave_the_system_and_become_the_prior():
@@ -71,7 +71,7 @@ def test_the_joint_model_is_the_plain_one_with_these_parameters():
     plain, model = base(), with_parameters(base(), ALL, prior=0.1)
     u, x = Push(jnp.asarray(0.7)), type(model.prior.mean)(*[jnp.asarray(v) for v in (1.3, np.log(3.0), 0.4, 1.1)])
     moved = model.transition(0.0, 0.1, x, u)
-    changed = eqx.tree_at(ALL, plain.system, [jnp.asarray(3.0), jnp.asarray(0.4), jnp.asarray(1 / (1 + np.exp(-1.1)))])
+    changed = eqx.tree_at(ALL, plain, [jnp.asarray(3.0), jnp.asarray(0.4), jnp.asarray(1 / (1 + np.exp(-1.1)))]).system
     np.testing.assert_allclose(moved.v, move(changed, 0.0, 0.1, Speed(1.3), u).v, rtol=1e-14)
     assert moved[1:] == x[1:]
     shown = model.report(0.0, x, u)
@@ -89,18 +89,18 @@ def estimated():
     return model, filters.run(filters.Unscented(), model, RECORDING)
 
 
-def test_an_estimate_s_parameters_look_like_what_where_saw(estimated):
+def test_an_estimate_s_parameters_are_found_as_in_the_car(estimated):
     model, estimate = estimated
     assert model.process_noise.law.names == ("v", "car_engine_gain")
     tree, spread = estimate.parameters, estimate.parameters_std
-    assert tree["spare"] is None
-    assert tree["car"].engine.gain.shape == (21,)
-    np.testing.assert_array_equal(tree["car"].engine.gain, estimate.mean.car_engine_gain)
-    np.testing.assert_array_equal(spread["car"].share, estimate.std.car_share)
-    assert 0 < float(tree["car"].share[-1]) < 1
-    assert float(spread["car"].engine.gain[-1]) < 0.2 * float(spread["car"].engine.gain[0])
+    assert list(tree) == list(spread) == ["car.engine.gain", "car.engine.offset", "car.share"]
+    assert tree.car.engine.gain.shape == (21,)
+    np.testing.assert_array_equal(tree["car.engine.gain"], estimate.mean.car_engine_gain)
+    np.testing.assert_array_equal(spread.car.share, estimate.std.car_share)
+    assert 0 < float(tree.car.share[-1]) < 1
+    assert float(spread.car.engine.gain[-1]) < 0.2 * float(spread.car.engine.gain[0])
     # The drive was made with a gain of about 2.1: dv/dt is 2.1 sin(3 t).
-    assert float(tree["car"].engine.gain[-1]) == pytest.approx(2.1, abs=0.3)
+    assert float(tree.car.engine.gain[-1]) == pytest.approx(2.1, abs=0.3)
     np.testing.assert_array_equal(estimate["v"], estimate.mean.v)
 
 
@@ -133,7 +133,7 @@ def test_start_from_takes_physical_values():
 
 
 def test_a_domain_for_all_of_them():
-    model = with_parameters(base(), lambda s: s["car"].engine.gain, prior=0.1, walk=0.02, domain=Real())
+    model = with_parameters(base(), lambda m: m.system["car"].engine.gain, prior=0.1, walk=0.02, domain=Real())
     np.testing.assert_allclose(model.prior.mean.car_engine_gain, 2.0)
     np.testing.assert_allclose(model.prior.law.std.car_engine_gain, 0.2)
     np.testing.assert_allclose(model.process_noise.law.std.car_engine_gain, 0.04)
@@ -150,7 +150,7 @@ def test_a_correlated_prior_stays_so():
 
 @pytest.mark.parametrize("walk", [0.0, 0, {}, {"gain": 0.0}, np.float64(0), jnp.asarray(0.0)])
 def test_a_walk_of_zero_is_a_constant(walk):
-    model = with_parameters(base(process=False), lambda s: s["car"].engine.gain, prior=0.1, walk=walk)
+    model = with_parameters(base(process=False), lambda m: m.system["car"].engine.gain, prior=0.1, walk=walk)
     assert model.process_noise is None
 
 
@@ -171,8 +171,12 @@ def test_a_walk_s_spread_is_relative_and_per_root_second():
         ),
         (dict(prior=0.1, walk=-0.1), r"walk spread of car\.engine\.gain = -0\.1: must be positive"),
         (dict(prior=0.1, walk={"gian": 0.1}), r"walk: unknown name\(s\) gian; there are: car\.engine\.gain, gain"),
-        (dict(prior=0.1, where=lambda s: (s["car"].share, s["car"].share)), r"where picked car\.share twice"),
-        (dict(prior=0.1, where=lambda s: s["car"].mass), "where: .*mass"),
+        (
+            dict(prior=0.1, where=lambda m: (m.system["car"].share, m.system["car"].share)),
+            r"where picked car\.share twice",
+        ),
+        (dict(prior=0.1, where=lambda m: m.system["car"].mass), "where: .*mass"),
+        (dict(prior=0.1, where=lambda m: m.measurement_noise.std), r"where picked measurement_noise\.std\..*m\.system"),
     ],
 )
 def test_errors(settings, message):
@@ -183,15 +187,15 @@ def test_errors(settings, message):
 def test_parameters_are_chosen_once_and_are_scalars():
     model = with_parameters(base(), ALL, prior=0.1)
     with pytest.raises(InputError, match="estimates parameters already"):
-        with_parameters(model, lambda s: s["spare"], prior=0.1)
+        with_parameters(model, lambda m: m.system["spare"], prior=0.1)
     wide = eqx.tree_at(lambda m: m.system["spare"], base(), jnp.ones(3))
     with pytest.raises(InputError, match="where picked spare, an array"):
-        with_parameters(wide, lambda s: s["spare"], prior=0.1)
+        with_parameters(wide, lambda m: m.system["spare"], prior=0.1)
 
 
-def test_a_part_of_an_object_gives_short_names():
+def test_what_holds_the_car_is_in_no_name():
     class Whole(eqx.Module):
-        car: Vehicle
+        car: Vehicle = eqx.field(metadata=ss.kit.UNNAMED)
         spare: jax.Array = parameter()
 
     plain = base()
@@ -204,7 +208,7 @@ def test_a_part_of_an_object_gives_short_names():
         prior=plain.prior,
         inputs=plain.inputs,
     )
-    short = with_parameters(model, INSIDE, prior=0.1, inside="car")
+    short = with_parameters(model, lambda m: OF_CAR(m.system.car), prior=0.1)
     assert short.states == ("v", "engine_gain", "engine_offset", "share")
     assert short.system.car.engine.gain is None
     estimate = filters.run(filters.Unscented(), short, RECORDING)

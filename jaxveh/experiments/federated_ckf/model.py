@@ -200,7 +200,7 @@ def states_model(study: Study, car: Planar, drive: Drive) -> StateSpace:
 def joint_model(study: Study, start: Any, drive: Drive) -> StateSpace:
     """Seven states: the car's, and the logarithms of four parameters."""
     spreads = (study.friction_spread, study.mass_spread, study.inertia_spread, study.cg_spread)
-    where = lambda car: tuple(getattr(car, name) for name in PARAMETERS)
+    where = lambda model: tuple(getattr(model.system, name) for name in PARAMETERS)
     return with_parameters(
         states_model(study, planar(study, start), drive), where, dict(zip(PARAMETERS, spreads, strict=True)), study.walk
     )

@@ -71,7 +71,7 @@ def looked_at_the_truth(staged: Staged, printed: Printed) -> dict[str, np.ndarra
     truth = jnp.stack(pick(vehicles.passenger_car(), resolve(vehicles.passenger_car(), tyres)))
     found = {}
     for name in ("PF", "APF"):
-        series = jnp.stack([getattr(staged.estimates[name].mean, field) for field in FIELDS], axis=1)
+        series = jnp.stack(list(staged.estimates[name].parameters.values()), axis=1)
         found[name] = np.asarray(jax.vmap(lambda one: closest_share(one, truth, printed.share))(series))
     return found
 

@@ -176,9 +176,11 @@ def _parameters(study: Study, guess, estimates: dict, fit) -> tuple[dict, dict]:
     values, spread = {}, {}
     values["prior"], spread["prior"] = jax.vmap(prior)(guess)
     for name, estimate in estimates.items():
-        values[name] = jnp.stack([getattr(estimate.mean, field)[:, -1] for field in FIELDS], axis=1)
-        spread[name] = jnp.stack([getattr(estimate.std, field)[:, -1] for field in FIELDS], axis=1)
-    values["MAP"], spread["MAP"] = (jnp.stack(pick(tree, chosen), axis=1) for tree in (fit.values, fit.std))
+        values[name] = jnp.stack([one[:, -1] for one in estimate.parameters.values()], axis=1)
+        spread[name] = jnp.stack([one[:, -1] for one in estimate.parameters_std.values()], axis=1)
+    values["MAP"], spread["MAP"] = (
+        jnp.stack(list(found.values()), axis=1) for found in (fit.parameters, fit.parameters_std)
+    )
     return values, spread
 
 

@@ -16,7 +16,7 @@ from jaxveh.filters.gaussian.family import Kalman
 from jaxveh.filters.gaussian.forms import Covariance
 from jaxveh.filters.gaussian.parallel import infos_of, pass_over
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
-from jaxveh.statespace import Estimate, Row, Smoothing, StateSpace, kit, parameter_view
+from jaxveh.statespace import Estimate, Row, Smoothing, StateSpace, kit, parameters_of
 
 
 def smooth_parallel(
@@ -76,7 +76,7 @@ def _smooth(filter, model, rows: Row) -> SmoothedEstimate:
     moments = jax.vmap(lambda belief: belief.moments(model))
     mean, std = moments(filtered)
     result, failed_at = first_failure(infos.result)
-    show = lambda report: None if model.chosen is None else parameter_view(model.system, model.chosen, report)
+    show = lambda report: parameters_of(model, report)
     last = jax.tree.map(lambda leaf: leaf[-1], filtered)
     total = jnp.sum(infos.log_likelihood)
     estimate = Estimate(rows.t, mean, std, total, infos, result, failed_at, last, show(mean), show(std))

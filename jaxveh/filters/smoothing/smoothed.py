@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh.statespace import Estimate, StateSpace, parameter_view
+from jaxveh.statespace import Estimate, StateSpace, parameters_of
 
 
 class SmoothedEstimate(eqx.Module):
@@ -38,7 +38,7 @@ def smoothed_estimate(
 ) -> SmoothedEstimate:
     """The estimate of `moments`: mean and std of the report, (T,) leaves."""
     mean, std = moments
-    show = lambda report: None if model.chosen is None else parameter_view(model.system, model.chosen, report)
+    show = lambda report: parameters_of(model, report)
     return SmoothedEstimate(filtered.time, mean, std, show(mean), show(std), filtered, trajectories, weights)
 
 
