@@ -40,7 +40,7 @@ def check(
     check_report(out, numbers)
     recording = io.read_recording(log, channels)
     car = None if vehicle is None else io.read_car(vehicle)
-    findings = diagnostics.check_log(recording, car)
+    findings = diagnostics.check_log(recording, car=car)
     _print(log, recording, findings)
     if out is not None:
         from jaxveh import plots

@@ -43,7 +43,7 @@ def demo(
     study = tyre_apf.Study(particles=particles)
     start = time.perf_counter()
     with progress("demo") as report:
-        found = tyre_apf.run_staged(study, jax.random.split(jax.random.key(seed), seeds), report)
+        found = tyre_apf.run_staged(study, seeds, jax.random.key(seed), progress=report)
         report(1, 1, "drawing")
         paths = _draw(found, study, out)
     _print(found, study, seeds)
@@ -161,7 +161,7 @@ def _numbers(found: tyre_apf.Staged) -> dict[str, Any]:
         },
         "observability": {
             "condition_number": seen.condition_number,
-            "bounds": dict(zip(seen.names, seen.bounds, strict=True)),
+            "bounds": dict(seen.bounds),
             "report": seen.report().splitlines(),
         },
         "seconds": found.seconds,

@@ -78,11 +78,11 @@ def estimate(
     uses = tuple(calibrate_on or ())
     parts = split(recording, span, uses, truth)
     with progress("estimate") as report:
-        calibration = None if span is None else sideslip.calibrate(parts.calibration, car, uses, report)
+        calibration = None if span is None else sideslip.calibrate(car, parts.calibration, uses, report)
         report(0, 1, "estimating (compiling first)")
-        found = sideslip.estimate(parts.estimate, calibration or car, filter.value, particles, seed)
+        found = sideslip.estimate(calibration or car, parts.estimate, filter.value, particles, seed)
         report(1, 1, "scoring")
-        score = None if truth is None else sideslip.score(found, parts.truth, truth, car)
+        score = None if truth is None else sideslip.score(car, found, parts.truth, truth)
     io.write_frame(io.to_frame(found), product, overwrite=force)
     _print(product, found, calibration, score)
     figures = [] if out is None else _draw(found, recording, parts.truth, truth, car, span, out)
@@ -121,7 +121,7 @@ def _draw(found: Any, recording: Any, seen: Any, truth: str | None, car: Any, sp
     make_folder(out)
     names = ("sideslip", "v_y", "yaw_rate") if truth is None else ("sideslip", "v_y")
     true = None if truth is None else sideslip.truth_of(seen, truth)
-    others = {} if truth is None else {"open-loop linear model": sideslip.open_loop(seen, car)}
+    others = {} if truth is None else {"open-loop linear model": sideslip.open_loop(car, seen)}
     spans = [] if span is None else [(max(span[0], float(recording.time[0])), span[1], "calibration")]
     paths = [
         plots.save(plots.recording(recording, spans=spans), out / "channels.png"),

@@ -43,7 +43,7 @@ def fit(
     uses = tuple(calibrate_on or ())
     part = calibration_part(recording, span, uses)
     with progress("fit") as report:
-        calibration = sideslip.calibrate(part, car, uses, report)
+        calibration = sideslip.calibrate(car, part, uses, report)
     where = f"{part.time[0]:g} to {part.time[-1]:g} s of {log.name}"
     io.write_car(sideslip.fitted_car(calibration, car), product, note=f"Fitted to {where}.", overwrite=force)
     print_fitted(calibration)

@@ -25,21 +25,21 @@ def filter_of(name: str, particles: int) -> filters.AbstractFilter:
 
 
 def calibrate(
-    part: Recording, car: CarSpecification, uses: tuple[str, ...], progress: Progress
+    car: CarSpecification, part: Recording, uses: tuple[str, ...], progress: Progress
 ) -> sideslip.Calibration:
     """Tyres, noises and steering offset fitted on a span."""
-    return sideslip.calibrate(part, car, uses=uses, progress=progress)
+    return sideslip.calibrate(car, part, uses=uses, progress=progress)
 
 
 def estimate(
-    part: Recording,
     source: sideslip.Calibration | CarSpecification,
+    part: Recording,
     kind: str = "ukf",
     particles: int = 1000,
     seed: int = 0,
 ) -> filters.Estimate:
     """The states along the rows of `part`, of a calibration or of a car's file taken at its word."""
-    return sideslip.estimate(part, source, filter=filter_of(kind, particles), key=jax.random.key(seed))
+    return sideslip.estimate(source, part, filter=filter_of(kind, particles), key=jax.random.key(seed))
 
 
 def truth_of(seen: Recording, name: str) -> dict[str, np.ndarray]:
@@ -50,14 +50,14 @@ def truth_of(seen: Recording, name: str) -> dict[str, np.ndarray]:
     return {"sideslip": values, "v_y": v_x * np.tan(values)}
 
 
-def score(found: filters.Estimate, seen: Recording, name: str, car: CarSpecification) -> dict[str, float]:
+def score(car: CarSpecification, found: filters.Estimate, seen: Recording, name: str) -> dict[str, float]:
     """RMSEs and the coverage of the 95 % band, next to the open-loop linear model's, by the names of the JSON file."""
-    return sideslip.score(found, seen.replace(v_y=truth_of(seen, name)["v_y"]), car)
+    return sideslip.score(car, found, seen.replace(v_y=truth_of(seen, name)["v_y"]))
 
 
-def open_loop(seen: Recording, car: CarSpecification) -> dict[str, np.ndarray]:
+def open_loop(car: CarSpecification, seen: Recording) -> dict[str, np.ndarray]:
     """What a linear single track makes of steer and speed alone, by name (T,)."""
-    return drive_open_loop(seen, vehicles.from_specification(car))
+    return drive_open_loop(vehicles.from_specification(car), seen)
 
 
 def fitted(calibration: sideslip.Calibration | None) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from jaxveh.io import CarSpecification
 CHECKS = (check_sampling, check_samples, check_units, check_signs, check_delays, check_steering, check_plausibility)
 
 
-def check_log(recording: Recording, car: CarSpecification | None = None) -> list[LogFinding]:
+def check_log(recording: Recording, *, car: CarSpecification | None = None) -> list[LogFinding]:
     """Look at a log before trusting it: every check's findings, good and bad, in the order of `CHECKS`.
 
     **Arguments**: `recording` with channels of the usual names (`v_x`, `v_y`, `yaw_rate`, `a_x`, `a_y`, `steer`) in SI; what

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from jaxveh._core.errors import FilterError, InputError, check_positive
+from jaxveh._core.parameters import Parameters
 
 UNOBSERVABLE = 1e9
 """Prior-scaled condition number of the information above which the report speaks of unobservable parameters."""
@@ -17,32 +18,34 @@ UNOBSERVABLE = 1e9
 class Observability(NamedTuple):
     """Fisher information of named parameters, whitened by noise and scaled by the prior's spread.
 
-    `names` (p,); `spread` (p,) the prior's standard deviations; `information` (p, p) in units of the prior (1 on the
-    diagonal: as much as the prior knows); `singular_values` (p,) of the scaled sensitivities, descending;
-    `condition_number`: of the information, the square of the ratio of the extreme singular values;
-    `bounds` (p,): Cramer-Rao bounds of the standard deviations, all parameters unknown, in the parameters' own units on
-    the real line (0.05: five per cent for a positive parameter); `bounds_alone` (p,): each with the others known;
-    `bounds_with_prior` (p,): with the prior's information added; `directions` (p, p): rows are the right singular vectors
-    in units of the prior, the last the least observable.
+    By name, `Parameters` as those of an estimate (`.front.B`): `spread`, the prior's standard deviations; `bounds`,
+    Cramer-Rao bounds of the standard deviations, all parameters unknown, in the parameters' own units on the real line
+    (0.05: five per cent for a positive parameter); `bounds_alone`, each with the others known; `bounds_with_prior`, with
+    the prior's information added.
+
+    In the order of `names` (p,): `information` (p, p) in units of the prior (1 on the diagonal: as much as the prior
+    knows); `singular_values` (p,) of the scaled sensitivities, descending; `condition_number`: of the information, the
+    square of the ratio of the extreme singular values; `directions` (p, p): rows are the right singular vectors in units
+    of the prior, the last the least observable.
     """
 
     names: tuple[str, ...]
-    spread: np.ndarray
+    spread: Parameters
     information: np.ndarray
     singular_values: np.ndarray
     condition_number: float
-    bounds: np.ndarray
-    bounds_alone: np.ndarray
-    bounds_with_prior: np.ndarray
+    bounds: Parameters
+    bounds_alone: Parameters
+    bounds_with_prior: Parameters
     directions: np.ndarray
 
     def observable(self, share: float = 0.1) -> tuple[str, ...]:
         """The parameters whose Cramer-Rao bound, all others unknown, is at most `share` of the prior's spread."""
-        return tuple(n for n, b, s in zip(self.names, self.bounds, self.spread, strict=True) if b <= share * s)
+        return tuple(name for name in self.names if self.bounds[name] <= share * self.spread[name])
 
     def unobservable(self, share: float = 1.0) -> tuple[str, ...]:
         """The parameters whose bound is no better than `share` of the prior's spread: the recording tells nothing new."""
-        return tuple(n for n, b, s in zip(self.names, self.bounds, self.spread, strict=True) if not b <= share * s)
+        return tuple(name for name in self.names if not self.bounds[name] <= share * self.spread[name])
 
     def trade(self) -> str:
         """The least observable direction in words."""
@@ -63,7 +66,8 @@ class Observability(NamedTuple):
     def report(self) -> str:
         """The findings in words, a line each."""
         lines = [f"condition number of the information, scaled by the prior: {self.condition_number:.1e}"]
-        for name, bound, alone, spread in zip(self.names, self.bounds, self.bounds_alone, self.spread, strict=True):
+        for name in self.names:
+            bound, alone, spread = self.bounds[name], self.bounds_alone[name], self.spread[name]
             verdict = (
                 "observable" if bound <= 0.1 * spread else "weakly observable" if bound <= spread else "unobservable"
             )
@@ -124,14 +128,15 @@ def from_sensitivities(jacobian: np.ndarray, names: tuple[str, ...], spread: np.
     alone = np.linalg.norm(jacobian, axis=0)
     with np.errstate(over="ignore"):  # a direction without any trace has an infinite bound
         ratio, reach = (safe[0] / safe[-1]) ** 2, np.sum((directions / safe[:, None]) ** 2, axis=0)
+    by_name = lambda values: Parameters(dict(zip(names, values, strict=True)))
     return Observability(
         names=tuple(names),
-        spread=spread,
+        spread=by_name(spread),
         information=jacobian.T @ jacobian,
         singular_values=values,
         condition_number=float(min(ratio, np.finfo(np.float64).max)),
-        bounds=spread * np.sqrt(reach),
-        bounds_alone=spread / np.maximum(alone, floor),
-        bounds_with_prior=spread * np.sqrt(np.sum(directions**2 / (1 + values[:, None] ** 2), axis=0)),
+        bounds=by_name(spread * np.sqrt(reach)),
+        bounds_alone=by_name(spread / np.maximum(alone, floor)),
+        bounds_with_prior=by_name(spread * np.sqrt(np.sum(directions**2 / (1 + values[:, None] ** 2), axis=0))),
         directions=directions,
     )

@@ -20,7 +20,7 @@ def _derivatives(car: SingleTrack, t, x, u):
 PROPAGATE = Propagate(_derivatives)
 
 
-def open_loop(recording: Recording, car: SingleTrack) -> dict[str, np.ndarray]:
+def open_loop(car: SingleTrack, recording: Recording) -> dict[str, np.ndarray]:
     """What a linear single track makes of `steer` (rad) and `v_x` (m/s) alone, from straight running at the first row.
 
     The car's own cornering stiffnesses at its static loads, without load transfer. **Returns** by name, (T,) each: `v_y`

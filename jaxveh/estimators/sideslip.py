@@ -133,8 +133,8 @@ def _generic(tyre: MagicFormula, load, told: bool) -> MagicFormula:
 
 
 def calibrate(
-    recording: Recording,
     car: CarSpecification,
+    recording: Recording,
     *,
     uses: tuple[str, ...] = (),
     filter: AbstractFilter | None = None,
@@ -200,14 +200,14 @@ def _fit(filter, model, log, weight, progress, centre=None) -> Fit:
     )
 
 
-def cut_pieces(log: Recording, length: float, overlap: float) -> tuple[list[Recording], int]:
-    """The log in pieces of one number of rows, about `length` seconds beside an overlap, and the overlap's rows."""
-    time = np.asarray(log.time)
+def cut_pieces(recording: Recording, length: float, overlap: float) -> tuple[list[Recording], int]:
+    """The recording in pieces of one number of rows, about `length` seconds beside an overlap, and the overlap's rows."""
+    time = np.asarray(recording.time)
     step = float(np.median(np.diff(time)))
     warm_up = round(overlap / step)
     count = max(1, round((time[-1] - time[0] - overlap) / length))
-    new = (len(log) - warm_up) // count
-    return [log.rows(slice(i * new, i * new + new + warm_up)) for i in range(count)], warm_up
+    new = (len(recording) - warm_up) // count
+    return [recording.rows(slice(i * new, i * new + new + warm_up)) for i in range(count)], warm_up
 
 
 def reference_sideslip(recording: Recording) -> jax.Array:
@@ -223,7 +223,7 @@ def _validate(filter, model, log, start: int) -> float:
 
 
 def estimate(
-    recording: Recording, source: Calibration | CarSpecification, *, filter: AbstractFilter | None = None, key=None
+    source: Calibration | CarSpecification, recording: Recording, *, filter: AbstractFilter | None = None, key=None
 ) -> Estimate:
     """States of the car along a log from steer, v_x, a_x, a_y and yaw_rate: see `handling.HandlingReport` for the names.
 
@@ -233,13 +233,13 @@ def estimate(
     return run(filter or Unscented(), model, clean(recording), key=key)
 
 
-def score(found: Estimate, seen: Recording, car: CarSpecification) -> dict[str, float]:
-    """Errors against a reference recording with `v_y`, over its finite rows, next to the open-loop linear model's.
+def score(car: CarSpecification, found: Estimate, recording: Recording) -> dict[str, float]:
+    """Errors of an estimate against a reference recording with `v_y`, over its finite rows, next to the open-loop linear model's.
 
     Keys: `sideslip_rmse_deg`, `sideslip_coverage_95` (share of rows inside the 95 % band), the same for `v_y`, and
     `open_loop_sideslip_rmse_deg` for the car's file with linear tyres, steered from rest: the do-nothing baseline.
     """
-    v_y, v_x = np.asarray(seen["v_y"]), np.asarray(seen["v_x"])
+    v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
     truth = {"v_y": v_y, "sideslip": np.arctan2(v_y, v_x)}
     known = np.isfinite(v_y)
     if not known.any():
@@ -249,7 +249,7 @@ def score(found: Estimate, seen: Recording, car: CarSpecification) -> dict[str, 
         name: np.abs(np.asarray(getattr(found.mean, name)) - truth[name]) <= 1.96 * np.asarray(getattr(found.std, name))
         for name in truth
     }
-    baseline = open_loop(seen, from_specification(car))
+    baseline = open_loop(from_specification(car), recording)
     return {
         "sideslip_rmse_deg": np.degrees(rms(np.asarray(found.mean.sideslip) - truth["sideslip"])),
         "open_loop_sideslip_rmse_deg": np.degrees(rms(baseline["sideslip"] - truth["sideslip"])),

@@ -30,8 +30,8 @@ PATIENCE = 900.0
 def sweep(
     run: Callable[..., Any],
     design: Design,
-    seeds: int,
-    key,
+    seeds: int | None = None,
+    key: Any = None,
     *,
     data: Any = None,
     batch: int | None = None,
@@ -40,25 +40,28 @@ def sweep(
     patience: float | None = PATIENCE,
     progress: Progress = silent,
 ) -> Swept:
-    """`run(point, key)` at every point of the design, each with the same `seeds` keys, so that points can be compared in pairs.
+    """`run` at every point of the design, each with the same seeds, so that points can be compared in pairs.
 
-    **Arguments**: `run`, a pure function of one point (a NamedTuple with the design's names) and one key, whose result is a
-    mapping or NamedTuple of arrays (trees of them get dotted names); `seeds`, how many keys are split from `key`; `data`, a tree
-    of arrays that begin with the axes of numbers and the seeds: then it is `run(point, key, data)` with each run's own part
-    (drives that several filters see); `batch`, runs at a time (default: all points of a choice, or as many as `memory`, bytes,
-    holds: half of the machine's); `devices`, over which a batch is split by `shard_map` (default: all of `jax.devices()`: on a
-    CPU one, unless `jax_num_cpu_devices` is set before jax starts; a run that fits with optimistix takes one,
-    `jax.devices()[:1]`: linear solves of lineax refuse `shard_map`); `patience`, s: each time that a chunk, or compiling, has
-    taken so long, a `JaxvehWarning` names it and says what can be done (None: never); `progress(done, total, stage)` is called
-    between chunks.
+        sweep(lambda point, key: ..., design, seeds, key)             each seed is a key, split from `key`
+        sweep(lambda point, drive: ..., design, data=drives)          each seed is a part of `data`: nothing is drawn
+        sweep(lambda point, key, drive: ..., design, seeds, key, data=drives)
+
+    **Arguments**: `run`, a pure function of one point (a NamedTuple with the design's names) and of a key, of data or of both,
+    as they are given, whose result is a mapping or NamedTuple of arrays (trees of them get dotted names,
+    `parameters.front.B`); `seeds`, how many (with `data` as many as it has); `data`, a tree of arrays that begin with the axes
+    of numbers and the seeds: each run gets its own part (drives that several filters see); `batch`, runs at a time (default:
+    all points of a choice, or as many as `memory`, bytes, holds: half of the machine's); `devices`, over which a batch is
+    split by `shard_map` (default: all of `jax.devices()`: on a CPU one, unless `jax_num_cpu_devices` is set before jax starts;
+    a run that fits with optimistix takes one, `jax.devices()[:1]`: linear solves of lineax refuse `shard_map`); `patience`, s:
+    each time that a chunk, or compiling, has taken so long, a `JaxvehWarning` names it and says what can be done (None:
+    never); `progress(done, total, stage)` is called between chunks.
 
     Every choice is compiled once, whatever the number of chunks; and again for fewer devices where as many as were asked for
     could wait for each other for ever (large batches of LAPACK routines with jax before 0.12; see `sweeps/workers.py`).
 
-    **Raises** `InputError` for bad counts, data of another shape, and for a `run` that returns nothing named.
+    **Raises** `InputError` for bad counts, neither a key nor data, data of another shape, and a `run` that returns nothing named.
     **Warns** where a program may never end even on one device, and what keeps it from that.
     """
-    check_whole("seeds", seeds)
     check_positive("patience", patience, "s")
     devices = jax.devices() if devices is None else list(devices)
     given = Given(design, seeds, key, data)
@@ -70,17 +73,27 @@ def sweep(
         late = lambda what, said=said: told_when_late(f"{what} ({said})" if said else what, patience)
         found.append(_all(one, given, batch, memory, devices, report, late))
         done += given.runs
-    return Swept(design, seeds, _arranged(design, seeds, found))
+    return Swept(design, given.seeds, _arranged(design, given.seeds, found))
 
 
 class Given:
     """What the runs of one choice are given; they are ordered by point, then by seed."""
 
-    def __init__(self, design: Design, seeds: int, key, data: Any):
-        self.shape = (*(len(axis.values) for axis in design.numbers), seeds)
+    def __init__(self, design: Design, seeds: int | None, key: Any, data: Any):
+        points = tuple(len(axis.values) for axis in design.numbers)
+        parts = named_leaves(data)
+        if key is None and not parts:
+            raise InputError(
+                "sweep: give seeds and a key, from which each run draws, or data, of which each has its part."
+            )
+        if seeds is None:
+            seeds = next((np.shape(leaf)[len(points)] for leaf in parts.values() if np.ndim(leaf) > len(points)), None)
+        check_whole("seeds", seeds)
+        self.seeds, self.shape = int(seeds), (*points, int(seeds))
         self.runs = int(np.prod(self.shape))
-        self.grid, self.keys, self.data = design.grid(), jax.random.split(key, seeds), data
-        for name, leaf in named_leaves(data).items():
+        self.grid, self.data = design.grid(), data
+        self.keys = None if key is None else jax.random.split(key, self.seeds)
+        for name, leaf in parts.items():
             if np.shape(leaf)[: len(self.shape)] != self.shape:
                 names = ", ".join([axis.name for axis in design.numbers] + ["seeds"])
                 raise InputError(f"data {name} has shape {np.shape(leaf)}: must begin with {self.shape} ({names}).")
@@ -91,8 +104,9 @@ class Given:
         place = np.unravel_index(which, self.shape)
         point = which // self.shape[-1]
         numbers = {name: jnp.asarray(values[point]) for name, values in self.grid.items()}
+        keys = () if self.keys is None else (self.keys[jnp.asarray(place[-1])],)
         own = () if self.data is None else (jax.tree.map(lambda leaf: jnp.asarray(leaf[place]), self.data),)
-        return numbers, self.keys[jnp.asarray(place[-1])], *own
+        return numbers, *keys, *own
 
 
 def _all(one, given: Given, batch, memory, devices, report, late) -> dict[str, np.ndarray]:

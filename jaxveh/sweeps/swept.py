@@ -11,24 +11,30 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import check_names
+from jaxveh._core.parameters import Parameters
 from jaxveh.sweeps.design import Design
 from jaxveh.sweeps.paired import Comparison, compare
 
 
 @dataclasses.dataclass(frozen=True)
 class Swept:
-    """`values` by name, each with the design's axes, then the `seeds`, then what a run's own value has."""
+    """`values` by name, each with the design's axes, then the `seeds`, then what a run's own value has.
+
+    Where runs return trees, such as an estimate's `parameters`, `found["parameters"]` is all of them, `Parameters` again, and
+    `found["parameters.front.B"]` one; so it is in `at`, `quantile` and what follows from it.
+    """
 
     design: Design
     seeds: int
     values: Mapping[str, np.ndarray]
 
-    def __getitem__(self, name: str) -> np.ndarray:
-        """All values of this name: (axes..., seeds, ...)."""
-        check_names("value", (name,), self.values)
-        return self.values[name]
+    def __getitem__(self, name: str) -> Any:
+        """All values of this name, (axes..., seeds, ...), or `Parameters` of those that begin with it and a dot."""
+        if not any(one == name or one.startswith(f"{name}.") for one in self.values):
+            check_names("value", (name,), self.values)
+        return Parameters(self.values)[name]
 
-    def at(self, name: str, **where: Any) -> np.ndarray:
+    def at(self, name: str, **where: Any) -> Any:
         """The values where axes have these labels: `found.at("rmse", filter="PF", noise=0.02)`; other axes are kept."""
         values, index = self[name], []
         for axis_name in where:
@@ -41,20 +47,17 @@ class Swept:
                 there = ", ".join(map(str, axis.labels))
                 raise InputError(f"{axis.name} = {where[axis.name]!r}: the design has {there}.")
             index.append(axis.labels.index(where[axis.name]))
-        return values[tuple(index)]
+        return jax.tree.map(lambda one: one[tuple(index)], values)
 
-    def quantile(self, name: str, share: float) -> np.ndarray:
+    def quantile(self, name: str, share: float) -> Any:
         """The quantile over seeds: (axes..., ...). Runs that are not finite count as the largest."""
-        values = np.where(np.isnan(self[name]), np.inf, self[name])
-        return np.quantile(
-            values, share, axis=len(self.design.axes), method="linear" if np.isfinite(values).all() else "nearest"
-        )
+        return jax.tree.map(lambda values: _quantile(values, share, len(self.design.axes)), self[name])
 
-    def median(self, name: str) -> np.ndarray:
+    def median(self, name: str) -> Any:
         """The median over seeds."""
         return self.quantile(name, 0.5)
 
-    def quartiles(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+    def quartiles(self, name: str) -> tuple[Any, Any]:
         """The lower and the upper quartile over seeds."""
         return self.quantile(name, 0.25), self.quantile(name, 0.75)
 
@@ -63,6 +66,11 @@ class Swept:
         return compare(
             self.at(name, **{axis: a}), self.at(name, **{axis: b}), axis=len(self.design.axes) - 1, level=level
         )
+
+
+def _quantile(values: np.ndarray, share: float, axis: int) -> np.ndarray:
+    values = np.where(np.isnan(values), np.inf, values)
+    return np.quantile(values, share, axis=axis, method="linear" if np.isfinite(values).all() else "nearest")
 
 
 def named_leaves(tree: Any) -> dict[str, Any]:

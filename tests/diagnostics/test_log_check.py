@@ -52,7 +52,7 @@ def sound():
 
 
 def findings(time, channels, car=CAR):
-    return check_log(Recording(time, channels), car)
+    return check_log(Recording(time, channels), car=car)
 
 
 def matching(found, severity, channel, pattern):
@@ -328,7 +328,7 @@ def test_truth_is_not_looked_at(sound):
 
 def test_the_shared_log():
     recording = io.read_recording(shared("ferrari_250lm_100hz.csv"))
-    found = check_log(recording, io.read_car(shared("ferrari_250lm.toml")))
+    found = check_log(recording, car=io.read_car(shared("ferrari_250lm.toml")))
     assert not [finding for finding in found if finding.severity == "error"]
     assert matching(found, "warning", "steer", r"1 spike\(s\), the largest 0.1356 at 207.27 s")
     assert matching(found, "note", "yaw_rate", "repeats 12% of its samples")

@@ -21,7 +21,7 @@ def log(rows=3000, seed=0):
     recording = Recording(time, {"steer": steer, "v_x": v_x})
     from jaxveh import vehicles
 
-    truth = estimators.open_loop(recording, vehicles.from_specification(CAR))
+    truth = estimators.open_loop(vehicles.from_specification(CAR), recording)
     yaw_rate, v_y = truth["yaw_rate"], truth["v_y"]
     a_y = np.gradient(v_y, time) + v_x * yaw_rate
     return recording.replace(
@@ -64,28 +64,28 @@ def test_missing_channels_and_gaps_are_named():
 
 def test_a_short_span_and_an_unknown_reference_are_refused():
     with pytest.raises(InputError, match="at least 20 s"):
-        estimators.sideslip.calibrate(log(1000), CAR)
+        estimators.sideslip.calibrate(CAR, log(1000))
     with pytest.raises(InputError, match="uses"):
-        estimators.sideslip.calibrate(log(3000), CAR, uses=("course",))
+        estimators.sideslip.calibrate(CAR, log(3000), uses=("course",))
 
 
 def test_estimates_the_sideslip_of_a_car_as_told_and_scores_it():
     recording = log(3000)
-    found = estimators.sideslip.estimate(recording.without("v_y"), CAR)
-    numbers = estimators.sideslip.score(found, recording, CAR)
+    found = estimators.sideslip.estimate(CAR, recording.without("v_y"))
+    numbers = estimators.sideslip.score(CAR, found, recording)
     assert numbers["rows"] == 3000
     assert numbers["open_loop_sideslip_rmse_deg"] < 1e-6
     assert numbers["sideslip_rmse_deg"] < 0.15
     assert 0.5 < numbers["sideslip_coverage_95"] <= 1.0
     # The score counts what it is told: shifting the reference by one degree is one degree of error.
     off = recording.replace(v_y=np.asarray(recording["v_y"]) - np.radians(1.0) * 20.0)
-    assert estimators.sideslip.score(found, off, CAR)["sideslip_rmse_deg"] == pytest.approx(1.0, abs=0.15)
+    assert estimators.sideslip.score(CAR, found, off)["sideslip_rmse_deg"] == pytest.approx(1.0, abs=0.15)
 
 
 def test_the_reference_cannot_reach_a_blind_estimate():
     recording = log(1500)
-    found = estimators.sideslip.estimate(recording, CAR)
-    blind = estimators.sideslip.estimate(recording.without("v_y"), CAR)
+    found = estimators.sideslip.estimate(CAR, recording)
+    blind = estimators.sideslip.estimate(CAR, recording.without("v_y"))
     np.testing.assert_array_equal(np.asarray(found.mean.sideslip), np.asarray(blind.mean.sideslip))
 
 
@@ -110,8 +110,8 @@ def test_real_logs_as_near_as_they_were_measured(log, begin, measured, open_loop
     """
     recording, car = io.read_recording(shared(f"{log}_100hz.csv")), io.read_car(shared(f"{log}.toml"))
     span = recording.rows(slice(begin, begin + 3000))
-    found = estimators.sideslip.estimate(span.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]), car)
-    numbers = estimators.sideslip.score(found, span, car)
+    found = estimators.sideslip.estimate(car, span.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]))
+    numbers = estimators.sideslip.score(car, found, span)
     assert numbers["open_loop_sideslip_rmse_deg"] == pytest.approx(open_loop, rel=0.03)
     assert numbers["sideslip_rmse_deg"] <= 1.03 * measured
 
@@ -120,7 +120,7 @@ def test_real_logs_as_near_as_they_were_measured(log, begin, measured, open_loop
 def test_real_log_taken_at_its_word():
     _, rest, car = real_log()
     numbers = estimators.sideslip.score(
-        estimators.sideslip.estimate(rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]), car), rest, car
+        car, estimators.sideslip.estimate(car, rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])), rest
     )
     assert numbers["open_loop_sideslip_rmse_deg"] == pytest.approx(0.605, abs=0.005)
     assert numbers["sideslip_rmse_deg"] <= 0.305  # 0.296 measured
@@ -130,8 +130,8 @@ def test_real_log_taken_at_its_word():
 def test_real_log_calibrated_blind():
     first, rest, car = real_log()
     blind = ["steer", "v_x", "a_x", "a_y", "yaw_rate"]
-    calibration = estimators.sideslip.calibrate(first.select(blind), car)
-    numbers = estimators.sideslip.score(estimators.sideslip.estimate(rest.select(blind), calibration), rest, car)
+    calibration = estimators.sideslip.calibrate(car, first.select(blind))
+    numbers = estimators.sideslip.score(car, estimators.sideslip.estimate(calibration, rest.select(blind)), rest)
     assert numbers["sideslip_rmse_deg"] <= 0.24  # 0.2312 measured
     assert set(calibration.summary()) >= {
         "front.B",
@@ -147,8 +147,8 @@ def test_real_log_calibrated_blind():
 @pytest.mark.full
 def test_real_log_calibrated_with_the_reference():
     first, rest, car = real_log()
-    calibration = estimators.sideslip.calibrate(first, car, uses=("v_y",))
+    calibration = estimators.sideslip.calibrate(car, first, uses=("v_y",))
     blind = rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])
-    numbers = estimators.sideslip.score(estimators.sideslip.estimate(blind, calibration), rest, car)
+    numbers = estimators.sideslip.score(car, estimators.sideslip.estimate(calibration, blind), rest)
     assert numbers["sideslip_rmse_deg"] <= 0.26
     assert [weight for weight, _ in calibration.validation] == [None, 0.05, 0.02]

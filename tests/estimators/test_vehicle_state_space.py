@@ -88,10 +88,10 @@ def test_bad_settings_are_named(settings, message):
 def test_observability_tells_what_the_drive_can_teach(model, drive):
     report = estimators.observe(model, drive)
     assert report.names == ("front.B", "front.D", "rear.B", "rear.D")
-    assert np.all(report.bounds >= report.bounds_alone)
+    assert np.all(report.bounds.array() >= report.bounds_alone.array())
     assert "front.D" in report.observable(share=0.5)
     loose = estimators.observe(model, drive, known_start=False)
-    assert np.all(loose.bounds >= report.bounds * (1 - 1e-9))
+    assert np.all(loose.bounds.array() >= report.bounds.array() * (1 - 1e-9))
 
 
 @pytest.mark.full

@@ -88,9 +88,9 @@ def test_the_bound_calls_observable_what_three_states_cannot_find(drives):
     assert bounds.names == ("mass", "grade") and "mass" not in bounds.unobservable()
     assert known.verdict == "unobservable"
     # The same bound, but for the first grade, of which nothing is known here, and for wider knots.
-    fine = bound_of_mass(SMALL, still, KNOT).bounds[0]
+    fine = bound_of_mass(SMALL, still, KNOT).bounds.mass
     np.testing.assert_allclose(fine, known.bound, rtol=0.05)
-    assert bounds.bounds[0] < fine
+    assert bounds.bounds.mass < fine
 
 
 def made_up(study, **errors):

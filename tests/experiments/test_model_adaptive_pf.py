@@ -119,7 +119,7 @@ def test_what_knows_outliers_beats_what_does_not(drives):
         ADAPTIVE: Contestant(moved(filters.HaarParticles(particles), models.mixture, lags=False), ""),
     }
     entrants |= {REDESIGNED: Contestant(redesigned(SMALL), ""), TOLD: Contestant(told(filters.Cubature()), "")}
-    raced = experiment.race(SMALL, cases, drives, entrants=entrants, tyre=quick_tyre)
+    raced = experiment.race(SMALL, cases, drives, jax.random.key(0), entrants=entrants, tyre=quick_tyre)
     error = lambda name, case, what="yaw_rate": np.median(raced.of(what, name, case))
     assert error(ADAPTIVE, "both") < 0.8 * error(PLAIN, "both")
     assert error(ADAPTIVE, "quiet") < 1.1 * error(PLAIN, "quiet") < error(PLAIN, "both")

@@ -48,7 +48,7 @@ def drives():
 
 @pytest.fixture(scope="module")
 def raced(drives):
-    return experiment.race(SMALL, drives, scenarios=NAMES, only=RACED)
+    return experiment.race(SMALL, drives, jax.random.key(0), scenarios=NAMES, only=RACED)
 
 
 def known(sideslip=0.02, rows=401, dt=0.02, **changes):
@@ -264,5 +264,5 @@ def test_on_a_log_the_baseline_is_the_open_loop():
     made = models.models_of(cars, study.noise, 30.0)
     groups = {group.names[0]: group for group in contestants.groups(study, cars, made)}
     found = groups["open loop"].run(drive, jax.random.key(0))["open loop"]
-    reference = estimators.open_loop(recording, vehicles.from_specification(car))
+    reference = estimators.open_loop(vehicles.from_specification(car), recording)
     np.testing.assert_allclose(np.arctan2(found.v_y, drive.v_x)[50:], reference["sideslip"][50:], atol=0.15 * DEGREE)

@@ -35,10 +35,10 @@ def test_the_figure_shows_errors_beside_the_bound(peaks):
     (axes, _), seen = figure.axes, peaks.bounds["D and B"][peaks.cases[0]]
     assert [text.get_text() for text in axes.get_xticklabels()] == ["f.B", "f.D", "r.B", "r.D"]
     (bounds,) = axes.collections
-    np.testing.assert_allclose([line[0, 1] for line in bounds.get_segments()], 100 * seen.bounds)
+    np.testing.assert_allclose([line[0, 1] for line in bounds.get_segments()], 100 * seen.bounds.array())
     drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
     ratio = saturated.over_bound(peaks, "D and B", "UKF", peaks.cases[0])
-    np.testing.assert_allclose(drawn["UKF"], 100 * ratio * seen.bounds)
+    np.testing.assert_allclose(drawn["UKF"], 100 * ratio * seen.bounds.array())
     assert set(drawn) == {"prior", "UKF"} and "%" in axes.get_ylabel()
 
 

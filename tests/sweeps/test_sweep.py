@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, sweeps
+from jaxveh import InputError, Parameters, sweeps
 
 KEY = jax.random.key(3)
 
@@ -104,6 +104,34 @@ def test_each_run_gets_its_own_part_of_the_data():
         sweeps.sweep(use, design, 4, KEY, data={"b": drives["b"]})
 
 
+def test_runs_on_data_alone_need_no_key():
+    """As many seeds as the data have; a number each where both keys and data are given."""
+    drives, design = np.arange(6.0).reshape(2, 3), sweeps.Design(scale=[1.0, 10.0])
+    alone = sweeps.sweep(lambda point, drive: {"x": point.scale * drive}, design, data=drives)
+    assert alone.seeds == 3
+    np.testing.assert_array_equal(alone["x"], np.array([[1.0], [10.0]]) * drives)
+    with_keys = sweeps.sweep(
+        lambda point, key, drive: {"x": drive, "drawn": jax.random.normal(key)}, design, key=KEY, data=drives
+    )
+    np.testing.assert_array_equal(with_keys["x"], drives)
+    np.testing.assert_array_equal(with_keys["drawn"][0], jax.vmap(jax.random.normal)(jax.random.split(KEY, 3)))
+
+
+def test_parameters_of_every_run_are_found_as_in_the_car():
+    def fit(point, key):
+        drawn = jax.random.normal(key)
+        return {"parameters": Parameters({"front.B": drawn, "front.D": point.scale, "mass": 2 * drawn}), "result": 0}
+
+    found = sweeps.sweep(fit, sweeps.Design(scale=[1.0, 10.0]), 4, KEY)
+    assert list(found["parameters"]) == ["front.B", "front.D", "mass"]
+    np.testing.assert_array_equal(found["parameters"].front.B, found["parameters.front.B"])
+    np.testing.assert_array_equal(found["parameters"].front.D, [[1.0] * 4, [10.0] * 4])
+    np.testing.assert_array_equal(found.at("parameters", scale=10.0).mass, found["parameters.mass"][1])
+    np.testing.assert_array_equal(found.median("parameters").mass, found.median("parameters.mass"))
+    with pytest.raises(InputError, match=r"value: unknown name\(s\) spread; there are: .*parameters\.front\.B"):
+        found["spread"]
+
+
 def test_a_design_without_axes_is_one_point():
     found = sweeps.sweep(lambda point, key: {"x": jax.random.normal(key)}, sweeps.Design(), 3, KEY)
     np.testing.assert_array_equal(found["x"], jax.vmap(jax.random.normal)(jax.random.split(KEY, 3)))
@@ -136,6 +164,8 @@ def test_two_devices_make_what_one_makes():
         (lambda: sweeps.Design(a=[]), "axis a is empty"),
         (lambda: sweeps.Design(a=[1.0, np.nan]), r"axis a = .*must be finite"),
         (lambda: sweeps.Design(a=["PF", "UKF"]), "axis a = .*must be a sequence of numbers, or a mapping from labels"),
+        (lambda: sweeps.sweep(run, DESIGN, 3), "sweep: give seeds and a key, .* or data"),
+        (lambda: sweeps.sweep(run, DESIGN, key=KEY), "seeds = None: must be a whole number"),
         (lambda: sweeps.sweep(run, DESIGN, 0, KEY), "seeds = 0: must be a whole number of at least 1"),
         (lambda: sweeps.sweep(run, DESIGN, 1, KEY, batch=0), "batch = 0: must be a whole number"),
         (

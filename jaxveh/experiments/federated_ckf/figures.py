@@ -128,14 +128,14 @@ def fault_figure(raced: Raced) -> Any:
 def line_figure(result: Reproduction) -> Any:
     """Bounds of friction and mass over the steer amplitude, by how much the speed varies, and what the joint filter finds."""
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.8), layout="constrained")
-    bounds = {name: np.array([[one.bounds for one in row] for row in rows]) for name, rows in result.seen.items()}
+    bound = lambda who, name, j: 100.0 * np.array([row[j].bounds[name] for row in result.seen[who]])
     with style():
         left, right = figure.subplots(1, 2)
         for j, speed in enumerate(result.spreads):
             colour, label = kit.CYCLE[j], f"speed varied by {speed:g} m/s"
-            left.plot(result.steers, 100.0 * bounds["known"][:, j, 0], color=colour, label=label)
-            right.plot(result.steers, 100.0 * bounds["known"][:, j, 1], color=colour, linestyle=":")
-            right.plot(result.steers, 100.0 * bounds["unknown"][:, j, 1], color=colour)
+            left.plot(result.steers, bound("known", "friction", j), color=colour, label=label)
+            right.plot(result.steers, bound("known", "mass", j), color=colour, linestyle=":")
+            right.plot(result.steers, bound("unknown", "mass", j), color=colour)
             for axes, name in ((left, "friction"), (right, "mass")):
                 found = 100.0 * np.median(result.over[f"{name}_error"][:, j], axis=-1)
                 axes.plot(result.steers, found, color=colour, linestyle="none", marker="o", markersize=4)

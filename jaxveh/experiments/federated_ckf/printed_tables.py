@@ -36,8 +36,8 @@ def as_printed(
     told = part(progress, 0.0, 0.1, "drives")
     drives = drives_of(study, (study.steer,), (0.0,), seeds, key, progress=told)
     drives = jax.tree.map(lambda leaf: leaf[0, 0], drives)
-    found = _raced(study, drives, seeds, part(progress, 0.1, 0.8, "estimators"))
-    twice = _twice(study, drives, seeds, part(progress, 0.8, 1.0, "shared sensors"))
+    found = _raced(study, drives, part(progress, 0.1, 0.8, "estimators"))
+    twice = _twice(study, drives, part(progress, 0.8, 1.0, "shared sensors"))
     progress(1.0, 1.0, "done")
     return [_table(found, seeds), _traces(twice, seeds)]
 
@@ -51,7 +51,7 @@ def _runs(study: Study) -> dict[str, tuple[Any, str]]:
     return {**first, "as printed": (printed_filters, what), **own, "federated, disjoint sensors": shares[:2]}
 
 
-def _raced(study: Study, drives: Drive, seeds: int, progress: Progress) -> sweeps.Swept:
+def _raced(study: Study, drives: Drive, progress: Progress) -> sweeps.Swept:
     start, right = Start(*map(jnp.asarray, dataclasses.astuple(PRINTED_START))), truth(study)
     names = (*[f"{name}_error" for name in PARAMETERS], "sideslip_rmse", "v_x_rmse", "parameters")
 
@@ -63,8 +63,8 @@ def _raced(study: Study, drives: Drive, seeds: int, progress: Progress) -> sweep
         return run
 
     design = sweeps.Design(estimator={name: of(estimate) for name, (estimate, _) in _runs(study).items()})
-    run = lambda point, key, drive: point.estimator(drive)
-    return sweeps.sweep(run, design, seeds, jax.random.key(0), data=drives, progress=progress)
+    run = lambda point, drive: point.estimator(drive)
+    return sweeps.sweep(run, design, data=drives, progress=progress)
 
 
 def _table(found: sweeps.Swept, seeds: int) -> Table:
@@ -96,7 +96,7 @@ Z_1, Z_2 = ("a_x", "a_y", "yaw_rate"), ("a_y", "yaw_rate")
 """What the paper's two locals measure."""
 
 
-def _twice(study: Study, drives: Drive, seeds: int, progress: Progress) -> sweeps.Swept:
+def _twice(study: Study, drives: Drive, progress: Progress) -> sweeps.Swept:
     """Final traces of the states' covariance over the prior's variances, the paper's sensors alone, all parameters known."""
     cubature, right = filters.Cubature(), truth(study)
     chosen = {
@@ -119,8 +119,8 @@ def _twice(study: Study, drives: Drive, seeds: int, progress: Progress) -> sweep
         return run
 
     design = sweeps.Design(filter={name: of(filter_) for name, filter_ in chosen.items()})
-    run = lambda point, key, drive: point.filter(drive)
-    return sweeps.sweep(run, design, seeds, jax.random.key(0), data=drives, progress=progress)
+    run = lambda point, drive: point.filter(drive)
+    return sweeps.sweep(run, design, data=drives, progress=progress)
 
 
 def _traces(found: sweeps.Swept, seeds: int) -> Table:

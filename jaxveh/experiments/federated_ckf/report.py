@@ -102,7 +102,7 @@ def check(result: Reproduction) -> list[Check]:
     gated = [median("sideslip_rmse", "joint, gated", case) for case in ("fault", "nearer start")]
     found.append(at_most(GATE, gated[0] / gated[1], 1.2))
     # Of mu, over the prior's spread: without end where nothing slides.
-    smallest = min(float(one.bounds[0] / one.spread[0]) for one in result.seen["known"][0])
+    smallest = min(float(one.bounds.friction / one.spread.friction) for one in result.seen["known"][0])
     found.append(above(SMALL_STEER, smallest, 1.0))
     return stated(found, CRITERIA)
 
@@ -183,10 +183,10 @@ def _line_table(result: Reproduction) -> Table:
         for j, speed in enumerate(result.spreads):
             known, unknown = (result.seen[name][i][j] for name in ("known", "unknown"))
             mu, m = (result.over[f"{name}_error"][i, j] for name in ("friction", "mass"))
-            mu_bound = "unobservable" if "friction" in known.unobservable() else 100.0 * known.bounds[0]
+            mu_bound = "unobservable" if "friction" in known.unobservable() else 100.0 * known.bounds.friction
             rows.append(
-                (f"{steer:g}", speed, mu_bound, spread(mu, scale=100.0), 100.0 * known.bounds[1],
-                 100.0 * unknown.bounds[1], spread(m, scale=100.0))
+                (f"{steer:g}", speed, mu_bound, spread(mu, scale=100.0), 100.0 * known.bounds.mass,
+                 100.0 * unknown.bounds.mass, spread(m, scale=100.0))
             )  # fmt: skip
     return Table(
         "What steer and speed can tell: Cramer-Rao bounds in % (at the truth), and the joint filter's final errors in %",

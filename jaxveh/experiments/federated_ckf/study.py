@@ -119,8 +119,8 @@ def race(
     design = sweeps.Design(
         estimator={name: runs(contestant) for name, contestant in chosen.items()}, case=range(len(names))
     )
-    run = lambda point, key, drive: point.estimator(point, drive)
-    found = sweeps.sweep(run, design, np.shape(drives.a_x)[1], jax.random.key(0), data=drives, progress=progress)
+    run = lambda point, drive: point.estimator(point, drive)
+    found = sweeps.sweep(run, design, data=drives, progress=progress)
     return Raced(study, tuple(names), drives, found)
 
 
@@ -128,11 +128,11 @@ def race_over(study: Study, drives: Drive, steers, spreads, estimator: str = "jo
     """One estimator from the nearer start on drives (steers, spreads, seeds, T, ...): a sweep with the axes steer, speed_std."""
     contestant, right = contestants(study)[estimator], truth(study)
 
-    def run(point, key, drive):
-        del point, key
+    def run(point, drive):
+        del point
         start = Start(*map(jnp.asarray, dataclasses.astuple(OTHER_START)))
         found = metrics(study, contestant.run(study, start, drive), drive, jnp.asarray(right))
         return {name: found[name] for name in (*[f"{name}_error" for name in PARAMETERS], "spread", "sideslip_rmse")}
 
     design = sweeps.Design(steer=steers, speed_std=spreads)
-    return sweeps.sweep(run, design, np.shape(drives.a_x)[2], jax.random.key(0), data=drives, progress=progress)
+    return sweeps.sweep(run, design, data=drives, progress=progress)

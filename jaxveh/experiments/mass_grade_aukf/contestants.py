@@ -222,11 +222,10 @@ def metrics(study: Study, found: Found, drive: Drive) -> dict[str, Any]:
     }
 
 
-def of_a_point(study: Study, contestant: Contestant) -> Callable[[Any, Any, Drive], dict[str, Any]]:
-    """The contestant's run of a design's point: `run(point, key, drive)`, as `sweeps.sweep` calls it."""
+def of_a_point(study: Study, contestant: Contestant) -> Callable[[Any, Drive], dict[str, Any]]:
+    """The contestant's run of a design's point: `run(point, drive)`, as `sweeps.sweep` calls it."""
 
-    def run(point, key, drive):
-        del key
+    def run(point, drive):
         return metrics(study, contestant.run(study, point.guess, drive), drive)
 
     return run

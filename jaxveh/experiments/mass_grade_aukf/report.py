@@ -165,7 +165,7 @@ def check(result: Reproduction) -> list[Check]:
         found.append(at_most(named.settled("truck", estimator), worst(truck, "settled", estimator), time))
     for drive in STILL:
         bounds, (three, _) = result.bounds[drive], result.observed[drive]
-        found.append(above(named.bounded(drive), bounds.bounds[0] / bounds.spread[0], 1.0))
+        found.append(above(named.bounded(drive), bounds.bounds.mass / bounds.spread.mass, 1.0))
         found.append(above(named.erring(drive), three.share, 1.0))
     return stated(found, CRITERIA)
 

@@ -48,11 +48,10 @@ def race(
     chosen = {name: every[name] for name in (every if only is None else only)}
     runs = {name: of_a_point(study, contestant) for name, contestant in chosen.items()}
     design = sweeps.Design(estimator=runs, pedals=pedals, guess=study.guesses)
-    seeds = np.shape(drives.v_x)[1]
     # The drive is the same for every guess.
     shared = jax.tree.map(
         lambda leaf: np.broadcast_to(leaf[:, None], (len(pedals), len(study.guesses), *leaf.shape[1:])), drives
     )
-    run = lambda point, key, drive: point.estimator(point, key, drive)
-    found = sweeps.sweep(run, design, seeds, jax.random.key(0), data=shared, progress=progress)
+    run = lambda point, drive: point.estimator(point, drive)
+    found = sweeps.sweep(run, design, data=shared, progress=progress)
     return Raced(study, tuple(pedals), drives, found)

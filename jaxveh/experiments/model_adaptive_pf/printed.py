@@ -84,11 +84,11 @@ def as_printed(*, seeds: int = 20, seed: int = 0, progress: Progress = silent) -
     drive_key, filter_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 1))
     drives = drives_of(study, SHOWN, seeds, drive_key, progress=part(progress, 0.0, 0.2, "drives"))
     raced = race(
-        study, SHOWN, drives, entrants=entrants(study), key=filter_key, progress=part(progress, 0.2, 0.7, "filters")
+        study, SHOWN, drives, filter_key, entrants=entrants(study), progress=part(progress, 0.2, 0.7, "filters")
     )
     few = {name: one for name, one in entrants(study).items() if name in (PLAIN, ADAPTIVE)}
     own = race(
-        study, SHOWN, drives, entrants=few, tyre=printed_tyre, key=filter_key,
+        study, SHOWN, drives, filter_key, entrants=few, tyre=printed_tyre,
         progress=part(progress, 0.7, 1.0, "printed tyre"),
     )  # fmt: skip
     progress(1.0, 1.0, "done")

@@ -52,17 +52,17 @@ def run(study: Study | None = None, *, seeds: int = 20, seed: int = 0, progress:
     drive_key, filter_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 1))
     cases = {**CASES, **LIMIT}
     drives = drives_of(study, cases, seeds, drive_key, progress=part(progress, 0.0, 0.15, "drives"))
-    raced = race(study, cases, drives, key=filter_key, progress=part(progress, 0.15, 0.7, "filters"))
+    raced = race(study, cases, drives, filter_key, progress=part(progress, 0.15, 0.7, "filters"))
     on = lambda *names: _drives_on(drives, cases, names)
     told = part(progress, 0.7, 0.8, "process noise")
-    pressed = race(study, PROCESS, on(*["both"] * len(PROCESS)), only=PRESSED, key=filter_key, progress=told)
+    pressed = race(study, PROCESS, on(*["both"] * len(PROCESS)), filter_key, only=PRESSED, progress=told)
     same = {name: CASES[name] for name in ("constant", "both")}
     unaware = race(
-        study, same, on(*same), only=JUDGED, entrants=contestants(study, lags=False), key=filter_key,
+        study, same, on(*same), filter_key, only=JUDGED, entrants=contestants(study, lags=False),
         progress=part(progress, 0.8, 0.9, "no relaxation known"),
     )  # fmt: skip
     misled = race(
-        study, WRONG_LENGTHS, on(*[name.split(",")[0] for name in WRONG_LENGTHS]), only=JUDGED, key=filter_key,
+        study, WRONG_LENGTHS, on(*[name.split(",")[0] for name in WRONG_LENGTHS]), filter_key, only=JUDGED,
         progress=part(progress, 0.9, 1.0, "wrong relaxation lengths"),
     )  # fmt: skip
     progress(1.0, 1.0, "done")

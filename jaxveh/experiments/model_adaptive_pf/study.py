@@ -48,11 +48,11 @@ def race(
     study: Study,
     cases: Mapping[str, Case],
     drives: Drive,
+    key,
     *,
     only: tuple[str, ...] | None = None,
     entrants: Mapping[str, Contestant] | None = None,
     tyre: Callable[..., Any] = fiala,
-    key: Any = None,
     progress: Progress = silent,
 ) -> Raced:
     """Every estimator (or `only` these, or others: `entrants`) on the same drives, (cases, seeds, T); filters draw from `key`."""
@@ -63,7 +63,6 @@ def race(
     runs = {name: of_a_point(study, contestant, tyre) for name, contestant in chosen.items()}
     design = sweeps.Design(estimator=runs, **{axis.name: axis.values for axis in _design(cases).axes})
     run = lambda point, key, data: point.estimator(point, key, data)
-    key = jax.random.key(0) if key is None else key
     found = sweeps.sweep(run, design, seeds, key, data=(own, drives), progress=progress)
     return Raced(study, dict(cases), drives, found)
 

@@ -94,7 +94,7 @@ def on_log(study: Study, log: Any, car: Any, progress: Progress = silent) -> Log
     half = len(recording) // 2
     blind = recording.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])
     first, rest = blind.rows(slice(0, half)), blind.rows(slice(half, None))
-    fit = estimators.sideslip.calibrate(first, told, progress=part(progress, 0.0, 0.6, "calibration"))
+    fit = estimators.sideslip.calibrate(told, first, progress=part(progress, 0.0, 0.6, "calibration"))
     progress(0.6, 1.0, "noises")
     cars, speed = log_cars(told, fit.model), float(np.mean(np.asarray(first["v_x"])))
     noise = fitted_noise(cars, study.noise, estimators.clean(first), speed)
@@ -166,7 +166,7 @@ def _found(study: Study, cars: Cars, models: Models, drive: Drive) -> dict[str, 
 
 
 def _ready(rest: Recording, told, fit) -> dict[str, Estimated]:
-    made = [estimators.sideslip.estimate(rest, source) for source in (told, fit)]
+    made = [estimators.sideslip.estimate(source, rest) for source in (told, fit)]
     return {name: Estimated(e.mean.v_y, e.std.v_y, e.result) for name, e in zip(READY, made, strict=True)}
 
 

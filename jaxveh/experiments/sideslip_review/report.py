@@ -69,7 +69,7 @@ def run(
     # Other drives than those on which the noises were chosen.
     key = jax.random.fold_in(jax.random.key(seed), 1)
     drives = drives_of(study, seeds, key, progress=part(progress, 0.0, 0.25 * share, "drives"))
-    raced = race(study, drives, progress=part(progress, 0.25 * share, share, "methods"))
+    raced = race(study, drives, jax.random.key(seed), progress=part(progress, 0.25 * share, share, "methods"))
     logged = None if log is None else on_log(study, log, car, progress=part(progress, share, 1.0, "log"))
     progress(1.0, 1.0, "done")
     return Reproduction(seeds, raced, logged)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -56,12 +55,13 @@ def _design(scenarios: tuple[str, ...]) -> sweeps.Design:
 def race(
     study: Study,
     drives: Drive,
+    key,
     *,
     scenarios: tuple[str, ...] = tuple(SCENARIOS),
     only: tuple[str, ...] | None = None,
     progress: Progress = silent,
 ) -> Raced:
-    """Every method (or `only` these) on the same drives, (scenarios, seeds, T)."""
+    """Every method (or `only` these) on the same drives, (scenarios, seeds, T); filters draw from `key`."""
     wanted = tuple(WHAT) if only is None else only
     check_names("only", wanted, WHAT)
     cars = sheet_cars()
@@ -71,9 +71,9 @@ def race(
     for i, group in enumerate(chosen):
         told = part(progress, i / len(chosen), (i + 1) / len(chosen), ", ".join(group.names))
         run = _scored(study, group)
-        swept = sweeps.sweep(run, _design(scenarios), seeds, jax.random.key(0), data=drives, progress=told)
-        for key, values in swept.values.items():
-            name, metric = key.rsplit(".", 1)
+        swept = sweeps.sweep(run, _design(scenarios), seeds, key, data=drives, progress=told)
+        for path, values in swept.values.items():
+            name, metric = path.rsplit(".", 1)
             found.setdefault(name, {})[metric] = values
     return Raced(study, scenarios, drives, {name: found[name] for name in WHAT if name in wanted})
 

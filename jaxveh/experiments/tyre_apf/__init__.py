@@ -3,7 +3,7 @@
 from jaxveh._core.lazy import submodules
 from jaxveh.experiments.report import Check, Table
 from jaxveh.experiments.tyre_apf.criteria import CRITERIA
-from jaxveh.experiments.tyre_apf.printed import Printed, run_printed_seeds
+from jaxveh.experiments.tyre_apf.printed import Printed, run_printed
 from jaxveh.experiments.tyre_apf.report import as_printed, check, run, settings
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.settings import CITATION, Study, tyres
@@ -26,7 +26,7 @@ __all__ = [
     "check",
     "figures",
     "run",
-    "run_printed_seeds",
+    "run_printed",
     "run_staged",
     "settings",
     "tables",

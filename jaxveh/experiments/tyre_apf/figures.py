@@ -60,13 +60,13 @@ def prior_draws(study: Study, guess, key, count: int = 400) -> Any:
     return put(eqx.tree_at(lambda car: (car.front, car.rear), guess, wide), chosen, moved)
 
 
-def curves_figure(outcome: Outcome, study: Study, seed: int = 0, key=None, figure: Any = None) -> Any:
+def curves_figure(outcome: Outcome, study: Study, seed: int = 0, figure: Any = None) -> Any:
     """Force curves of seed number `seed`: truth, prior with its band, and every estimator, over the visited slips."""
     guess = jax.tree.map(lambda leaf: leaf[seed], outcome.guess)
     cars = {"truth": vehicles.passenger_car()}
     cars |= {name: with_tyres(outcome.parameters[name][seed]) for name in ESTIMATORS}
     slips = {axle: outcome.drive[f"true.slip_angle_{axle}"][seed] for axle in ("front", "rear")}
-    draws = prior_draws(study, guess, jax.random.key(0) if key is None else key)
+    draws = prior_draws(study, guess, jax.random.key(0))
     return plots.force_curves(cars, slips, draws=draws, figure=figure)
 
 

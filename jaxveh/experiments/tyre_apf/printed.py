@@ -60,7 +60,17 @@ def closest_share(series, truth, share: float):
     return jnp.mean(jnp.take_along_axis(series, order, axis=-1), axis=-1)
 
 
-def run_printed(printed: Printed, key) -> PrintedOutcome:
+def run_printed(printed: Printed, seeds: int, key) -> PrintedOutcome:
+    """The printed experiment over `seeds` seeds, in one batch."""
+    return _every_seed(printed, jax.random.split(key, seeds))
+
+
+@eqx.filter_jit
+def _every_seed(printed: Printed, keys) -> PrintedOutcome:
+    return jax.vmap(lambda key: printed_once(printed, key))(keys)
+
+
+def printed_once(printed: Printed, key) -> PrintedOutcome:
     """One seed of the printed experiment. Pure: `vmap` it over keys."""
     car = vehicles.passenger_car_as_printed() if printed.as_printed_geometry else vehicles.passenger_car()
     chosen = resolve(car, tyres)
@@ -86,14 +96,13 @@ def run_printed(printed: Printed, key) -> PrintedOutcome:
         minimum_speed=0.0,
     )
     rows = model.rows(drive)
-    fields = [p.field for p in chosen]
     series, ess = {}, {}
     for name, kind, k in (
         ("PF", filters.ParticleFilter(printed.particles, numerics.multinomial), pf_key),
         ("APF", auxiliary(printed.particles, numerics.multinomial), apf_key),
     ):
         estimate = filters.scan(kind, model, rows, k)
-        series[name] = jnp.stack([getattr(estimate.mean, field) for field in fields])
+        series[name] = jnp.stack([estimate.parameters[p.name] for p in chosen])
         ess[name] = jnp.median(estimate.info.ess)
     steps = numerics.normal(walk_key, (8, rows.t.shape[0]), truth.dtype)
     series["walk"] = truth[:, None] * (1 + 0.005 / math.sqrt(rows.t.shape[0]) * jnp.cumsum(steps, axis=-1))
@@ -104,9 +113,3 @@ def run_printed(printed: Printed, key) -> PrintedOutcome:
         by_rule={name: closest_share(value, truth, printed.share) for name, value in series.items()},
         ess=ess,
     )
-
-
-@eqx.filter_jit
-def run_printed_seeds(printed: Printed, keys) -> PrintedOutcome:
-    """All seeds in one batch."""
-    return jax.vmap(lambda key: run_printed(printed, key))(keys)

@@ -16,7 +16,7 @@ from jaxveh._core.progress import Progress, part, silent
 from jaxveh.diagnostics import Observability, kit
 from jaxveh.experiments.report import Check, Table, above, at_least, at_most, stated
 from jaxveh.experiments.tyre_apf.criteria import AHEAD, CRITERIA, WHERE
-from jaxveh.experiments.tyre_apf.printed import Printed, closest_share, run_printed_seeds
+from jaxveh.experiments.tyre_apf.printed import Printed, closest_share, run_printed
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.saturated import SWEEP, over_bound, run_saturated
 from jaxveh.experiments.tyre_apf.settings import LOOKING_AHEAD, STEP_STEER, Study, tyres
@@ -45,20 +45,19 @@ def run(
     check_at_least("seeds", seeds, 2)
     study, printed = study or Study(), printed or Printed()
     honest_key, printed_key = jax.random.split(jax.random.key(seed))
-    keys = jax.random.split(honest_key, seeds)
-    staged = run_staged(study, keys, part(progress, 0.0, 0.4, "lane change"))
+    staged = run_staged(study, seeds, honest_key, progress=part(progress, 0.0, 0.4, "lane change"))
     progress(0.4, 1.0, "observability in the lane change")
     lane_change = lane_change_observability(study)
     # Drives of their own, beside the study's.
     saturated_key, sharp_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 2))
-    saturated = run_saturated(study, seeds, saturated_key, part(progress, 0.42, 0.65, "saturated"))
+    saturated = run_saturated(study, seeds, saturated_key, progress=part(progress, 0.42, 0.65, "saturated"))
     sharpness = run_sharpness(study, seeds, sharp_key, progress=part(progress, 0.65, 0.84, "sharpness"))
     ahead = run_sharpness(
         study, seeds, sharp_key, counts=(PAPERS_PARTICLES,), kinds=PREDICTIVE, levels=LOOKING_AHEAD,
         progress=part(progress, 0.84, 0.92, "looking ahead with the noise"),
     )  # fmt: skip
     progress(0.92, 1.0, "printed settings")
-    found = jax.block_until_ready(run_printed_seeds(printed, jax.random.split(printed_key, seeds)))
+    found = jax.block_until_ready(run_printed(printed, seeds, printed_key))
     progress(1.0, 1.0, "done")
     return Reproduction(
         study, seeds, staged.outcome, staged.steps, lane_change, saturated, sharpness, ahead, found, printed,
@@ -81,7 +80,7 @@ def as_printed(*, seeds: int = 20, seed: int = 0, progress: Progress = silent) -
     progress(0.0, 1.0, "printed settings")
     printed = Printed()
     _, key = jax.random.split(jax.random.key(seed))
-    found = jax.block_until_ready(run_printed_seeds(printed, jax.random.split(key, seeds)))
+    found = jax.block_until_ready(run_printed(printed, seeds, key))
     progress(1.0, 1.0, "done")
     return tables_as_printed(found, printed)
 

@@ -69,10 +69,10 @@ def run_saturated(
     study: Study,
     seeds: int,
     key,
-    progress: Progress = silent,
     *,
     unknown: tuple[str, ...] = tuple(UNKNOWN),
     only: tuple[str, ...] | None = None,
+    progress: Progress = silent,
 ) -> Saturated:
     """UKF and MAP (or `only` these) on both drives, with D and B `unknown`; with all eight the UKF alone, since a
     fit takes long to say that they cannot be told apart."""
@@ -136,7 +136,7 @@ def _estimators(study: Study, where) -> dict:
     def unscented(key, drive):
         model, rows = started(key, drive, study.saturated)
         estimate = filters.scan(filters.Unscented(), model, rows)
-        values = [getattr(estimate.mean, p.field)[-1] for p in chosen]
+        values = [one[-1] for one in estimate.parameters.values()]
         return {"error": error(values), "result": estimate.result.astype(jnp.int32)}
 
     def fitted(key, drive):
@@ -177,4 +177,4 @@ def single_shooting(model: StateSpace, rows: Row, start) -> tuple[jax.Array, jax
 def over_bound(result: Saturated, unknown: str, estimator: str, case: str) -> np.ndarray:
     """(p,) root mean square over seeds of each parameter's error, over its Cramer-Rao bound."""
     error = result.found[unknown].at("error", estimator=estimator)[result.cases.index(case)]
-    return np.sqrt(np.mean(error**2, axis=0)) / result.bounds[unknown][case].bounds
+    return np.sqrt(np.mean(error**2, axis=0)) / result.bounds[unknown][case].bounds.array()

@@ -132,11 +132,10 @@ def several_passes(study: Study, filter_, level: NoiseLevel, again: int, key) ->
     guess = guess_once(study, jax.random.fold_in(key, 2))
     model = model_of(_at(study, level), guess, level.noise)
     rows = model.rows(drive_at(study, level, key))
-    fields = [p.field for p in resolve(guess, tyres)]
 
     def once(key):
         estimate = filters.scan(filter_, model, rows, key)
-        last = jnp.stack([getattr(estimate.mean, field)[-1] for field in fields])
+        last = jnp.stack([one[-1] for one in estimate.parameters.values()])
         return last, estimate.log_likelihood, estimate.result
 
     return jax.vmap(once)(jax.random.split(jax.random.fold_in(key, 3), again))

@@ -62,15 +62,15 @@ class Staged(NamedTuple):
     seconds: dict[str, Seconds]
 
 
-def run_staged(study: Study, keys, progress: Progress = silent) -> Staged:
-    """The study over `keys` (seeds,), compiled and run in stages, all seeds together."""
-    clock = _Clock(keys.shape[0], progress)
-    parts = jax.vmap(lambda key: jax.random.split(key, 4))(keys)
+def run_staged(study: Study, seeds: int, key, *, progress: Progress = silent) -> Staged:
+    """The study over `seeds` seeds, compiled and run in stages, all seeds together."""
+    clock = _Clock(seeds, progress)
+    parts = jax.vmap(lambda key: jax.random.split(key, 4))(jax.random.split(key, seeds))
     drive, guess = clock.one(
         "simulation", lambda a, b: (drive_once(study, a), guess_once(study, b)), parts[:, 0], parts[:, 1]
     )
     segments = _segments(study, drive, guess)
-    values_like = jnp.zeros((keys.shape[0], len(ESTIMATORS), len(FIELDS)), drive.time.dtype)
+    values_like = jnp.zeros((seeds, len(ESTIMATORS), len(FIELDS)), drive.time.dtype)
     tasks = {
         "MAP": (_fit(study), guess, segments),
         "errors and step steers": (_judge(study), values_like, drive),
@@ -87,7 +87,7 @@ def run_staged(study: Study, keys, progress: Progress = silent) -> Staged:
     curves, states, loops, steps = clock.run("errors and step steers", stacked, drive)
     by_name = lambda array: {name: array[:, i] for i, name in enumerate(ESTIMATORS)}
     filtered = {name: jax.vmap(state_errors)(estimate.mean, drive) for name, estimate in estimates.items()}
-    nothing = jnp.full((keys.shape[0],), jnp.nan)
+    nothing = jnp.full((seeds,), jnp.nan)
     outcome = Outcome(
         drive=drive,
         guess=guess,

@@ -26,7 +26,9 @@ def saturated_figure(found: Saturated) -> Any:
             for i, (axes, case) in enumerate(zip(row, found.cases, strict=True)):
                 seen = found.bounds[unknown][case]
                 place = np.arange(len(seen.names))
-                axes.hlines(100 * seen.bounds, place - 0.35, place + 0.35, color="#000000", label="Cramér-Rao bound")
+                axes.hlines(
+                    100 * seen.bounds.array(), place - 0.35, place + 0.35, color="#000000", label="Cramér-Rao bound"
+                )
                 names = runs.design.axis("estimator").labels
                 for j, name in enumerate(names):
                     rms = 100 * np.sqrt(np.mean(runs.at("error", estimator=name)[i] ** 2, axis=0))

@@ -79,7 +79,7 @@ def _saturated_table(result: Reproduction) -> Table:
             seen = result.saturated.bounds[unknown][case]
             for name in found.design.axis("estimator").labels:
                 error = 100 * np.sqrt(np.mean(found.at("error", estimator=name)[i] ** 2, axis=0))
-                by_name = dict(zip(seen.names, zip(error, 100 * seen.bounds, strict=True), strict=True))
+                by_name = dict(zip(seen.names, zip(error, 100 * seen.bounds.array(), strict=True), strict=True))
                 ratio = over_bound(result.saturated, unknown, name, case).max()
                 lost = int((found.at("result", estimator=name)[i] != 0).sum())
                 cells = [f"{by_name[one][0]:.2g} ({by_name[one][1]:.2g})" for one in shown]
