@@ -1,7 +1,7 @@
 """Estimated parameters have one shape, whoever estimated them: every filter of the package, and every smoother.
 
-Traced alone, not run: names and shapes are all that is looked at. The fits' are in `tests/fitting/test_every_fit.py`, the observers'
-in `tests/observers/test_every_observer.py`, those of a sweep's runs in `tests/sweeps/test_sweep.py`.
+Filters are traced alone, not run: names and shapes are all that is looked at. Fits are in `tests/fitting/test_every_fit.py`,
+observers in `tests/observers/test_every_observer.py`, a sweep's runs in `tests/sweeps/test_sweep.py`.
 """
 
 import equinox as eqx
@@ -73,6 +73,6 @@ def test_a_smoother_s_parameters_are_found_as_in_the_car(lag):
 
 
 def test_a_parallel_smoother_s_parameters_are_found_as_in_the_car():
-    found = filters.smooth_parallel(filters.Cubature(), MODEL, RECORDING)
+    found = filters.smooth_parallel(filters.Iterated(filters.Cubature()), MODEL, RECORDING)
     check(found)
     check(found.filtered)

@@ -92,7 +92,7 @@ def test_weights_do_not_make_data_better(clean):
     weights = {"F_y": 25.0}
     plain = fitting.fit_rig(start(), rig(clean))
     fits = [fitting.fit_rig(start(), rig(clean, seed=seed), weights=weights) for seed in range(40)]
-    assert np.all(fits[0].std > 0.9 * plain.std)
+    assert np.all(fits[0].parameters_std.array() > 0.9 * plain.parameters_std.array())
     assert fits[0].identified == plain.identified
     spread = np.std([fit.parameters.array() for fit in fits], axis=0)
     np.testing.assert_allclose(np.mean([fit.parameters_std.array() for fit in fits], axis=0), spread, rtol=0.3)

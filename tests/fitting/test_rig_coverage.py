@@ -40,7 +40,7 @@ def covered(fits, tyre=None):
     name and pooled."""
     form = fitting.canonical(truth() if tyre is None else tyre)
     true = np.array([float(leaf(form, name)) for name in fits[0].names])
-    values, std = (np.array([getattr(fit, name) for fit in fits]) for name in ("values", "std"))
+    values, std = (np.array([getattr(fit, name).array() for fit in fits]) for name in ("parameters", "parameters_std"))
     known, held = np.isfinite(std), np.abs(values - true) < 1.96 * std
     by_name = {name: held[known[:, i], i].mean() for i, name in enumerate(fits[0].names) if known[:, i].any()}
     return by_name, held[known].mean()

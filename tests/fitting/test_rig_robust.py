@@ -47,7 +47,7 @@ def test_outliers_move_a_robust_fit_little(clean):
 
 def test_standard_errors_of_robust_fits_cover(clean):
     fits = [fitting.fit_rig(start(), spoilt(clean, seed), robust=True) for seed in range(50)]
-    values, std = (np.array([getattr(fit, name) for fit in fits]) for name in ("values", "std"))
+    values, std = (np.array([getattr(fit, name).array() for fit in fits]) for name in ("parameters", "parameters_std"))
     np.testing.assert_allclose(std.mean(axis=0), values.std(axis=0), rtol=0.3)
     assert 0.88 < np.mean(np.abs(values - TRUE) < 1.96 * std) < 0.99
 

@@ -16,7 +16,7 @@ import pytest
 from families import left_out
 from observer_systems import Swing, Theta, drive, mass, pendulum, regression, see_curve, without
 
-from jaxveh import observers
+from jaxveh import Parameters, filters, observers
 from jaxveh import statespace as ss
 
 pytestmark = pytest.mark.product
@@ -94,6 +94,15 @@ def test_every_observer_of_the_package_is_here():
     prepared = lambda name, line: line.prepare(start(name, line)) if line.prepare else start(name, line)
     made = [line.make(prepared(name, line)) for name, line in OBSERVERS.items()]
     assert not left_out("observers", observers.AbstractObserver, made, {})
+
+
+@pytest.mark.parametrize("name", [name for name, line in OBSERVERS.items() if line.prepare is with_first])
+def test_parameters_are_found_as_in_the_car(name):
+    observer, model, rows, _ = batch(name, OBSERVERS[name].models[0])
+    found = eqx.filter_eval_shape(filters.scan, observer, model, jax.tree.map(lambda leaf: leaf[0], rows))
+    (parameter,) = model.chosen.parameters
+    for one in (found.parameters, found.parameters_std):
+        assert isinstance(one, Parameters) and one[parameter.name].shape == (ROWS,) and len(one) == 1
 
 
 FULL = (("adaptive", "pendulum"), ("least squares", "curve"), ("least squares, several", "line"))
