@@ -2,42 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.names import check_names
 from jaxveh.plots.estimates import BAND
 from jaxveh.plots.style import COLOURS, colour, legend, new_figure, style
 
 
 def parameters(
-    names: Sequence[str],
-    truth: Any,
-    mean: Mapping[str, Any],
-    std: Mapping[str, Any],
+    truth: Mapping[str, Any],
+    mean: Mapping[str, Mapping[str, Any]],
+    std: Mapping[str, Mapping[str, Any]],
     *,
-    scale: Any,
+    scale: Mapping[str, Any],
     figure: Any = None,
 ) -> Any:
     """A row a parameter, a dot an estimator: its deviation from the truth in prior standard deviations, with 95 % bars.
 
-    **Arguments**: `names` (p,), such as `front.B`; `truth` (p,); `mean`, `std`: label to (p,) values and standard
-    deviations; `scale` (p,): the prior's standard deviations, positive. `figure`: where to draw.
+    **Arguments**, each a number by a parameter's name (`front.B`), such as the `Parameters` of a fit or the last row of an
+    estimate's: `truth`; `mean`, `std`: of each estimator by its label; `scale`: the prior's standard deviations, positive.
+    `figure`: where to draw.
 
-    **Returns** the figure. **Raises** `InputError` for lengths that do not agree.
+    **Returns** the figure. **Raises** `InputError` for names that do not agree.
     """
-    truth, scale = np.asarray(truth, dtype=np.float64), np.asarray(scale, dtype=np.float64)
+    names = tuple(truth)
+    truths, scales = _numbers("truth", truth, names), _numbers("scale", scale, names)
+    check_positive("scale", scales)
+    means = {label: _numbers(f"mean of {label}", values, names) for label, values in mean.items()}
+    spreads = {label: _numbers(f"std of {label}", std[label], names) for label in mean}
     count, labels = len(names), list(mean)
-    for what, values in {
-        "truth": truth,
-        "scale": scale,
-        **{f"mean of {k}": np.asarray(v) for k, v in mean.items()},
-    }.items():
-        if values.shape != (count,):
-            raise InputError(f"plots.parameters: {what} has shape {values.shape}; must be ({count},) for the names.")
-    check_positive("scale", scale)
     offsets = np.linspace(-0.3, 0.3, len(labels)) if len(labels) > 1 else np.zeros(1)
     rows = np.arange(count)
     with style():
@@ -45,13 +42,13 @@ def parameters(
         ax = figure.subplots()
         ax.axvline(0, color=COLOURS["truth"], lw=1.2, zorder=1.5)
         for index, (label, offset) in enumerate(zip(labels, offsets, strict=True)):
-            deviation = (np.asarray(mean[label], dtype=np.float64) - truth) / scale
-            reach = BAND * np.asarray(std[label], dtype=np.float64) / scale
+            deviation = (means[label] - truths) / scales
+            reach = BAND * spreads[label] / scales
             ax.errorbar(deviation, rows + offset, xerr=np.nan_to_num(reach), fmt="o", ms=3.4, lw=1.0, capsize=0,
                         color=colour(label, index), label=label)  # fmt: skip
         for row in rows[:-1]:
             ax.axhline(row + 0.5, color="#e6e6e6", lw=0.6)
-        ax.set_yticks(rows, [f"{name}  ({value:.5g})" for name, value in zip(names, truth, strict=True)])
+        ax.set_yticks(rows, [f"{name}  ({value:.5g})" for name, value in zip(names, truths, strict=True)])
         ax.tick_params(axis="y", length=0)
         ax.grid(axis="y", visible=False)
         ax.set_ylim(count - 0.5, -0.5)
@@ -59,3 +56,18 @@ def parameters(
         ax.set_ylabel("parameter (truth)")
         legend(figure, ax)
     return figure
+
+
+def _numbers(what: str, values: Mapping[str, Any], names: tuple[str, ...]) -> np.ndarray:
+    """The numbers (p,) of these names, and of no others."""
+    check_names(f"plots.parameters: {what}", values, names)
+    missing = [name for name in names if name not in values]
+    if missing:
+        raise InputError(f"plots.parameters: {what} has no {', '.join(missing)}; truth has: {', '.join(names)}.")
+    numbers = {name: np.asarray(values[name], dtype=np.float64) for name in names}
+    for name, number in numbers.items():
+        if number.ndim:
+            raise InputError(
+                f"plots.parameters: {what}: {name} has shape {number.shape}: must be one number, such as a last row."
+            )
+    return np.array(list(numbers.values()))

@@ -5,7 +5,18 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, Recording, estimators, filters, manoeuvres, sensors, simulate, vehicles
+from jaxveh import (
+    InputError,
+    Recording,
+    estimators,
+    filters,
+    fitting,
+    manoeuvres,
+    sensors,
+    simulate,
+    statespace,
+    vehicles,
+)
 
 
 def tyres(car):
@@ -23,6 +34,24 @@ def model():
     return estimators.state_space(
         vehicles.passenger_car(), sensors.esc(), estimate=tyres, report=("sideslip", "F_yf"), steps=2
     )
+
+
+def test_a_parameter_has_one_name_on_every_road(model, drive):
+    """`where` sees the car, or the model that holds it: names are those in the car."""
+    plain, of_model = estimators.state_space(vehicles.passenger_car(), sensors.esc()), lambda m: tyres(m.system.vehicle)
+    ukf = filters.Unscented()
+    roads = {
+        "state_space": model.chosen.parameters,
+        "with_parameters": statespace.with_parameters(plain, of_model, prior=0.1).chosen.parameters,
+        "maximum_likelihood": fitting.pose_likelihood(ukf, plain, drive, of_model).chosen,
+        "prediction_error": fitting.pose_prediction_error(ukf, plain, drive, of_model).chosen,
+        "multiple_shooting": fitting.pose_shooting(plain, fitting.cut(plain, drive, 0.5), of_model).chosen,
+        "of states": fitting.pose_shooting(model, fitting.cut(model, drive, 0.5)).chosen,
+    }
+    for road, chosen in roads.items():
+        assert [p.name for p in chosen] == ["front.B", "front.D", "rear.B", "rear.D"], road
+    levels = fitting.pose_likelihood(ukf, plain, drive, lambda m: (m.measurement_noise.std.a_y, m.system.vehicle.mass))
+    assert [p.name for p in levels.chosen] == ["measurement_noise.std.a_y", "mass"]
 
 
 def test_names_of_states_channels_and_report(model, drive):

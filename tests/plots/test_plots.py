@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, Recording, plots, vehicles
+from jaxveh import InputError, Parameters, Recording, plots, vehicles
 from jaxveh.tyres import Contact
 
 TIME = np.linspace(0.0, 2.0, 21)
@@ -164,8 +164,9 @@ def test_force_curves_refuse_missing_slips():
 
 
 def test_parameters_are_deviations_in_prior_spreads():
+    named = lambda B, E: Parameters({"front.B": B, "front.E": E})
     figure = plots.parameters(
-        ["front.B", "front.E"], [7.0, -0.1], {"UKF": [7.7, -0.1]}, {"UKF": [0.35, 0.1]}, scale=[0.7, 0.2]
+        named(7.0, -0.1), {"UKF": named(7.7, -0.1)}, {"UKF": named(0.35, 0.1)}, scale=named(0.7, 0.2)
     )
     (ax,) = figure.axes
     assert "prior standard deviations" in ax.get_xlabel()
@@ -176,11 +177,16 @@ def test_parameters_are_deviations_in_prior_spreads():
     np.testing.assert_allclose((high - low) / 2, 1.959964 * 0.5, rtol=1e-6)
 
 
-def test_parameters_refuse_lengths_that_do_not_agree():
-    with pytest.raises(InputError, match=r"mean of UKF has shape \(1,\)"):
-        plots.parameters(["a", "b"], [1, 2], {"UKF": [1]}, {"UKF": [1]}, scale=[1, 1])
+def test_parameters_refuse_names_that_do_not_agree():
+    one, two = {"a": 1}, {"a": 1, "b": 1}
+    with pytest.raises(InputError, match=r"mean of UKF has no b; truth has: a, b"):
+        plots.parameters(two, {"UKF": one}, {"UKF": one}, scale=two)
+    with pytest.raises(InputError, match=r"std of UKF: unknown name\(s\) b; there are: a"):
+        plots.parameters(one, {"UKF": one}, {"UKF": two}, scale=one)
+    with pytest.raises(InputError, match=r"mean of UKF: a has shape \(3,\): must be one number"):
+        plots.parameters(one, {"UKF": {"a": np.ones(3)}}, {"UKF": one}, scale=one)
     with pytest.raises(InputError, match="scale"):
-        plots.parameters(["a"], [1], {"UKF": [1]}, {"UKF": [1]}, scale=[0])
+        plots.parameters(one, {"UKF": one}, {"UKF": one}, scale={"a": 0})
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])

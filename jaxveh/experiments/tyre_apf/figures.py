@@ -72,9 +72,10 @@ def curves_figure(outcome: Outcome, study: Study, seed: int = 0, figure: Any = N
 
 def parameters_figure(outcome: Outcome, study: Study, seed: int = 0, figure: Any = None) -> Any:
     """Parameters of seed number `seed` against the truth, in units of the prior's spread."""
-    mean = {name: outcome.parameters[name][seed] for name in ESTIMATORS}
-    std = {name: outcome.spread[name][seed] for name in ESTIMATORS}
-    return plots.parameters(NAMES, truth(), mean, std, scale=true_spread(study), figure=figure)
+    named = lambda values: dict(zip(NAMES, values, strict=True))
+    mean = {name: named(outcome.parameters[name][seed]) for name in ESTIMATORS}
+    std = {name: named(outcome.spread[name][seed]) for name in ESTIMATORS}
+    return plots.parameters(named(truth()), mean, std, scale=named(true_spread(study)), figure=figure)
 
 
 def states_figure(found: Staged, seed: int = 0, labels: tuple[str, ...] = ("UKF", "APF"), figure: Any = None) -> Any:
