@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import InputError, plots
+from jaxveh import InputError, Parameters, plots
 from jaxveh.fitting import RigFit
 from jaxveh.io import RigTable
 from jaxveh.plots.rig_fit import DOTS, GROUPS, grouped, slip_of
@@ -29,10 +29,10 @@ def fit_of(rig, **residuals):
     """A fit with these residuals, so that no fit has to be made."""
     rmse = {name: float(np.sqrt(np.nanmean(value**2))) for name, value in residuals.items()}
     peak = {name: 10.0 * value for name, value in rmse.items()}
-    none = np.zeros(0)
+    none, empty = np.zeros(0), Parameters({})
     return RigFit(
-        values=none, std=none, unconstrained=none, covariance=none, cost=0.0, steps=0, result=0, model=Brush(9e4, 6e4),
-        parameters=(), identified=0, rmse=rmse, start_rmse=rmse, cross_validation=rmse, peak=peak, noise=rmse,
+        parameters=empty, parameters_std=empty, unconstrained=none, covariance=none, cost=0.0, steps=0, result=0, model=Brush(9e4, 6e4),
+        chosen=(), identified=0, rmse=rmse, start_rmse=rmse, cross_validation=rmse, peak=peak, noise=rmse,
         residuals=residuals, stages=(), problem=None,
     )  # fmt: skip
 
