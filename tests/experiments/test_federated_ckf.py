@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import filters, sweeps
+from jaxveh import Parameters, filters, sweeps
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record_type
 from jaxveh.diagnostics.observability import observability_at
@@ -170,7 +170,9 @@ def test_what_another_tyre_does_stands_beside_the_truths_own():
     values["friction_error"][:, cases.index(criteria.OTHER)] = 0.22
     design = sweeps.Design(estimator=dict.fromkeys(names), case=range(len(cases)))
     raced = study.Raced(SMALL, cases, None, sweeps.Swept(design, 2, values))
-    known = dataclasses.make_dataclass("Known", ("bounds", "spread"))([np.inf], [0.8])
+    known = dataclasses.make_dataclass("Known", ("bounds", "spread"))(
+        Parameters({"friction": np.inf}), Parameters({"friction": 0.8})
+    )
     checks = report.check(report.Reproduction(2, raced, (3.0,), (0.0,), None, {"known": [[known]]}))
     found = {check.name: check for check in checks}
     own, other = (found[criteria.final(case, "friction")] for case in ("nearer start", criteria.OTHER))

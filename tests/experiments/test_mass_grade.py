@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxveh import sweeps
+from jaxveh import Parameters, sweeps
 from jaxveh.experiments import mass_grade_aukf as experiment
 from jaxveh.experiments.mass_grade_aukf import criteria
 from jaxveh.experiments.mass_grade_aukf import drives as own_drives
@@ -107,7 +107,8 @@ def test_criteria_are_judged_as_they_were_asked_and_what_took_their_place_stands
     touched = dataclasses.replace(experiment.car(), guesses=(1300.0,))
     car = made_up(touched, **{pausing(criteria.RATE): 0.012, criteria.RATE: 0.0076})
     pulled = (Known(0.06, 0.7, 0.1), Known(0.06, 0.1, 0.1))
-    bounds = dataclasses.make_dataclass("Bounds", ("bounds", "spread"))([0.06, 1.0], [0.4, 0.03])
+    bound, spread = Parameters({"mass": 0.06, "grade": 1.0}), Parameters({"mass": 0.4, "grade": 0.03})
+    bounds = dataclasses.make_dataclass("Bounds", ("bounds", "spread"))(bound, spread)
     result = experiment.Reproduction(
         2, made_up(SMALL), car, made_up(SMALL), {}, dict.fromkeys(criteria.STILL, pulled),
         dict.fromkeys(criteria.STILL, bounds),

@@ -31,8 +31,9 @@ def fit_of(rig, **residuals):
     peak = {name: 10.0 * value for name, value in rmse.items()}
     none, empty = np.zeros(0), Parameters({})
     return RigFit(
-        parameters=empty, parameters_std=empty, unconstrained=none, covariance=none, cost=0.0, steps=0, result=0, model=Brush(9e4, 6e4),
-        chosen=(), identified=0, rmse=rmse, start_rmse=rmse, cross_validation=rmse, peak=peak, noise=rmse,
+        parameters=empty, parameters_std=empty, unconstrained=none, covariance=none, cost=0.0, steps=0,
+        result=0, model=Brush(9e4, 6e4), chosen=(), identified=0,
+        rmse=rmse, start_rmse=rmse, cross_validation=rmse, peak=peak, noise=rmse,
         residuals=residuals, stages=(), problem=None,
     )  # fmt: skip
 
