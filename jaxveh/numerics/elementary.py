@@ -34,6 +34,7 @@ _PI_PARTS_32 = (3.140625, 0.0009670257568359375, 6.278329573009626e-07)
 _PI_PARTS_64 = (3.1415926218032837, 3.1786509424591713e-08, 1.2246467991473532e-16)
 
 
+@jax.jit
 def sin(x: ArrayLike) -> Array:
     """Sine of an angle in rad, any shape.
 
@@ -44,21 +45,25 @@ def sin(x: ArrayLike) -> Array:
     return _sin(_floating(x))
 
 
+@jax.jit
 def cos(x: ArrayLike) -> Array:
     """Cosine of an angle in rad, any shape; ranges and errors as for `sin`."""
     return _cos(_floating(x))
 
 
+@jax.jit
 def tan(x: ArrayLike) -> Array:
     """Tangent of an angle in rad, any shape: relative error below 4e-7 / 1e-15 for |x| <= pi, then slowly growing."""
     return _tan(_floating(x))
 
 
+@jax.jit
 def arctan(x: ArrayLike) -> Array:
     """Arctangent in rad, any shape; every finite or infinite x. Absolute error below 2e-7 / 4e-16."""
     return _arctan(_floating(x))
 
 
+@jax.jit
 def arctan2(y: ArrayLike, x: ArrayLike) -> Array:
     """Angle of the point (x, y) in rad, in [-pi, pi]. Absolute error below 3e-7 / 1e-15 in all quadrants.
 
@@ -74,6 +79,7 @@ def sqrt(x: ArrayLike) -> Array:
     return _sqrt(_floating(x))
 
 
+@jax.jit
 def hypot(x: ArrayLike, y: ArrayLike) -> Array:
     """Length of (x, y), as sqrt(x^2 + y^2): accurate where the squares neither underflow nor overflow.
 
@@ -82,6 +88,7 @@ def hypot(x: ArrayLike, y: ArrayLike) -> Array:
     return _hypot(*_same_type(x, y))
 
 
+@jax.jit
 def log(x: ArrayLike) -> Array:
     """Natural logarithm, any shape: error below 2e-7 / 4e-16 relative to max(1, |log x|).
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.result import Result, code
+from jaxveh._core.traced import traced_once
 from jaxveh.simulation.driven import Driven, dtype_of
 from jaxveh.simulation.events import Event
 from jaxveh.simulation.stiffness import SolverChoice
@@ -115,7 +116,7 @@ def _check_distinct(what: str, instants: np.ndarray, dtype) -> None:
 
 
 def _rates(t, x, driven: Driven):
-    return driven.derivatives(t, x)
+    return traced_once(Driven.derivatives, driven, t, x)
 
 
 SCANNED = (RK4, RolledRK4, Heun)

@@ -14,6 +14,7 @@ from jaxveh._core.errors import InputError, float_array, is_concrete
 from jaxveh._core.names import check_names, record
 from jaxveh._core.parameter import UNNAMED
 from jaxveh._core.recording import Recording
+from jaxveh._core.traced import traced_once
 from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
 from jaxveh.statespace.process import AbstractProcessNoise
@@ -178,14 +179,14 @@ class StateSpace(eqx.Module):
 
     def transition(self, t0, t1, x, u):
         """The state at `t1` without noise, from the state `x` at `t0`."""
-        moved = self.transition_function(self.system, t0, t1, x, u)
+        moved = traced_once(self.transition_function, self.system, t0, t1, x, u)
         if getattr(moved, "_fields", None) != x._fields:
             raise InputError(f"transition returned {_shown(moved)}: must be the state, with {', '.join(x._fields)}.")
         return moved
 
     def observation(self, t, x, u):
         """What the sensors would say without noise."""
-        seen = self.observation_function(self.system, t, x, u)
+        seen = traced_once(self.observation_function, self.system, t, x, u)
         lacks = [name for name in self.channels if name not in getattr(seen, "_fields", ())]
         if lacks:
             raise InputError(

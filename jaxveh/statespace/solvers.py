@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.traced import traced_once
 from jaxveh.statespace.model import LinearInput
 
 
@@ -131,7 +132,7 @@ class Propagate(eqx.Module):
     steps: int = eqx.field(static=True, default=1)
 
     def __call__(self, system, t0, t1, x, u):
-        term = diffrax.ODETerm(lambda t, y, args: self.derivatives(system, t, y, _at(args, t)))
+        term = diffrax.ODETerm(lambda t, y, args: traced_once(_rates, self.derivatives, system, t, y, args))
         dt = (t1 - t0) / self.steps
         state = None
         for i in range(self.steps):
@@ -141,5 +142,5 @@ class Propagate(eqx.Module):
         return x
 
 
-def _at(u, t):
-    return u.at(t) if isinstance(u, LinearInput) else u
+def _rates(derivatives, system, t, x, u):
+    return derivatives(system, t, x, u.at(t) if isinstance(u, LinearInput) else u)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from jaxveh import Recording
-from jaxveh.experiments.tyre_apf import Study, noise, predictive
+from jaxveh import Recording, filters, numerics
+from jaxveh.experiments.tyre_apf import Study, noise, predictive, sharpness
 from jaxveh.experiments.tyre_apf.settings import NoiseLevel
 
 SMALL = dataclasses.replace(Study(), rate=25.0, particles=40)
@@ -44,16 +44,33 @@ def test_a_candidate_that_fails_on_one_drive_is_out(monkeypatch, failed):
 
 
 CANDIDATES = np.array([(0.02, 0.005, 0.05), (0.02, 0.005, 0.1), (5.0, 0.005, 0.05), (5.0, 0.005, 0.1)])
+LEVEL = NoiseLevel(0.02, 0.4, None)
 
 
 def choose_level(rounds, seed=2000, keep=2):
     return noise.choose_level(
-        dataclasses.replace(SMALL, duration=6.0, rate=20.0), NoiseLevel(0.02, 0.4, None), candidates=CANDIDATES, particles=40,
-        rounds=rounds, keep=keep, seed=seed,
-    )  # fmt: skip
+        SMALL, LEVEL, candidates=CANDIDATES, particles=40, rounds=rounds, keep=keep, seed=seed
+    )
 
 
-def test_both_particle_filters_share_the_noise_of_a_level(monkeypatch):
+@pytest.fixture
+def passes(monkeypatch):
+    """The filters' passes, made up: each draws its log-likelihood around a value of its own for every candidate and drive."""
+
+    def made_up(study, filter_, level, again, key):
+        assert study is SMALL and filter_.particles == 40 and filter_.resampling is numerics.multinomial
+        assert (level.yaw_rate, level.a_y) == (LEVEL.yaw_rate, LEVEL.a_y)
+        behind = 10.0 * isinstance(filter_, filters.AuxiliaryParticleFilter) - 3.0 * level.noise.v_y
+        mean = behind + 20.0 * level.noise.walk + level.noise.yaw_rate + jax.random.normal(key)
+        each = mean + jax.random.normal(jax.random.fold_in(key, 1), (again,))
+        return None, each, jnp.zeros(again, jnp.int32)
+
+    monkeypatch.setattr(noise, "several_passes", made_up)
+    monkeypatch.setattr(noise, "drive_at", lambda *a: None)
+    monkeypatch.setattr(noise, "unexplained", lambda drive: -1e9)
+
+
+def test_both_particle_filters_share_the_noise_of_a_level(monkeypatch, passes):
     found = choose_level([noise.Round(2, 3)])
     np.testing.assert_array_equal(found.candidates, CANDIDATES)
     assert found.log_likelihood.shape == (4, 2) and np.isfinite(found.log_likelihood).all()
@@ -65,17 +82,30 @@ def test_both_particle_filters_share_the_noise_of_a_level(monkeypatch):
         monkeypatch.setattr(noise, "KINDS", {name: kind})
         each.append(choose_level([noise.Round(2, 3)]).log_likelihood)
     np.testing.assert_allclose(sum(each), found.log_likelihood, rtol=1e-9)
+    assert (np.abs(each[1] - each[0] - 10.0) < 1e-9).all()
 
 
-def test_a_lost_pass_counts_as_what_mean_and_spread_explain(monkeypatch):
-    passes = jnp.array([5.0, 3.0, -1e9])
+def test_a_lost_pass_counts_as_what_mean_and_spread_explain(monkeypatch, passes):
+    found = jnp.array([5.0, 3.0, -1e9])
     monkeypatch.setattr(noise, "unexplained", lambda drive: -2.0)
-    monkeypatch.setattr(noise, "several_passes", lambda *a: (None, passes, jnp.zeros(3)))
+    monkeypatch.setattr(noise, "several_passes", lambda *a: (None, found, jnp.zeros(3)))
     np.testing.assert_allclose(choose_level([noise.Round(2, 3)]).log_likelihood, 4.0)
     # A pass that fails rules the candidate out.
-    monkeypatch.setattr(noise, "several_passes", lambda *a: (None, passes, jnp.array([0, 0, 1])))
+    monkeypatch.setattr(noise, "several_passes", lambda *a: (None, found, jnp.array([0, 0, 1])))
     with pytest.raises(ValueError, match="all 4 candidates fail on a drive"):
         choose_level([noise.Round(2, 3)])
+
+
+def test_drives_of_a_level_are_of_its_sensors(monkeypatch):
+    """What the passes go over, and what the mean and the spread are taken of."""
+    at = jax.jit(lambda key, *std: sharpness.drive_at(SMALL, NoiseLevel(*std, None), key))
+    key, other = jax.random.split(jax.random.key(0))
+    drive, clean = at(key, LEVEL.yaw_rate, LEVEL.a_y), at(key, 1e-9, 1e-9)
+    for channel in ("yaw_rate", "a_y"):
+        np.testing.assert_allclose(np.std(drive[channel] - clean[channel]), getattr(LEVEL, channel), rtol=0.15)
+    # It is one lane change: the sensors' noise is all that differs.
+    np.testing.assert_allclose(at(other, 1e-9, 1e-9)["a_y"], clean["a_y"], atol=1e-6)
+    assert np.abs(at(other, LEVEL.yaw_rate, LEVEL.a_y)["a_y"] - drive["a_y"]).max() > LEVEL.a_y
 
 
 def test_what_a_mean_and_a_spread_explain():
@@ -86,7 +116,7 @@ def test_what_a_mean_and_a_spread_explain():
     np.testing.assert_allclose(found, normal(values["yaw_rate"]) + normal(values["a_y"]), rtol=1e-12)
 
 
-def test_the_best_of_a_round_go_to_other_drives():
+def test_the_best_of_a_round_go_to_other_drives(passes):
     found = choose_level([noise.Round(2, 1), noise.Round(3, 1)])
     first = choose_level([noise.Round(2, 1)])
     best = np.sort(np.argsort(-first.log_likelihood.mean(axis=1))[:2])
