@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import abc
-from typing import Any, ClassVar
+from dataclasses import KW_ONLY
+from typing import Any, ClassVar, Protocol
 
 import equinox as eqx
 import jax
@@ -11,11 +12,13 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.vehicles.shared import AbstractPlaneBody
 from jaxveh.vehicles.wheels import Wheels
 
 
 class AbstractLoadTransfer(eqx.Module):
-    """Which accelerations shift the loads. `felt` are those at an instant; states, where there are any, are the car's.
+    """Which accelerations shift the loads. `felt` are those at an instant; states, where there are any, are the car's, and zero
+    where it runs straight.
 
     Longitudinally it is what the tyres push, over the mass: the air's drag acts at the centre of gravity's height, so that in
     moments about it only forces of the road count.
@@ -31,10 +34,6 @@ class AbstractLoadTransfer(eqx.Module):
     @abc.abstractmethod
     def rates(self, x: Any, a_x: Any, a_y: Any) -> tuple:
         """The time derivatives of the states where the tyres push with a_x, a_y (m/s^2: force over mass)."""
-
-    def start(self, guess: tuple[Any, Any]) -> tuple:
-        """The settled states."""
-        return tuple(guess) if self.state_names else ()
 
 
 class StaticLoads(AbstractLoadTransfer):
@@ -105,7 +104,42 @@ class MeasuredLoads(AbstractLoadTransfer):
         return ()
 
 
-def planar_loads(car: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
+class AbstractShiftingLoads(AbstractPlaneBody):
+    """A car whose wheel loads follow from accelerations.
+
+    **Parameters** of the loads: `load_transfer`, by which they follow accelerations (`QuasiStatic`, `LaggedLoads`, ...).
+    """
+
+    _: KW_ONLY
+    load_transfer: AbstractLoadTransfer = eqx.field(default_factory=LaggedLoads)
+
+
+class AxleWeights(Protocol):
+    """What the loads of axles depend on: mass (kg), places of the axles and height of the centre of gravity (m)."""
+
+    @property
+    def mass(self) -> Any: ...
+    @property
+    def front_axle_to_cg(self) -> Any: ...
+    @property
+    def rear_axle_to_cg(self) -> Any: ...
+    @property
+    def cg_height(self) -> Any: ...
+
+
+class WheelWeights(AxleWeights, Protocol):
+    """What the loads of an upright car's wheels depend on: besides, tracks (m) and the front axle's share of the lateral transfer
+    (-; None: by the static loads)."""
+
+    @property
+    def track_front(self) -> Any: ...
+    @property
+    def track_rear(self) -> Any: ...
+    @property
+    def front_roll_share(self) -> Any: ...
+
+
+def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     """Wheel loads, N, of a rigid car whose body neither rolls nor pitches visibly.
 
     In the road's plane, with a_x, a_y what accelerometers at the centre of gravity say (slopes are in them), h its height
@@ -138,7 +172,7 @@ def held(moved: Any, half: Any) -> Any:
     return jnp.clip(moved, -half, half)
 
 
-def axle_loads(car: Any, a_x: Any, g_z: Any) -> tuple[Any, Any]:
+def axle_loads(car: AxleWeights, a_x: Any, g_z: Any) -> tuple[Any, Any]:
     """Loads of the front and the rear axle, N: `m (g_z b - a_x h) / (a + b)` and the rest of the weight, none below zero."""
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     weight = -car.mass * g_z

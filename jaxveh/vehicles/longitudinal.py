@@ -59,7 +59,7 @@ class Longitudinal(AbstractVehicle):
     a slope creeps where they hold the slope's pull.
 
     **Parameters**: `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2, of one wheel), `drag` (N s^2/m^2, half the air's
-    density times c_W times the area), `rolling_resistance` f_r (-).
+    density times c_d times the area), `rolling_resistance` f_r (-).
 
     **Inputs**: `drive_torque` and `brake_torque` (N m), sums over the wheels; the second at least zero.
 
