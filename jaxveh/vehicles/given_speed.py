@@ -10,7 +10,6 @@ import equinox as eqx
 from jaxveh.roads import Ground
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic
 from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack
-from jaxveh.vehicles.wheels import gravity
 
 
 def longitudinal_acceleration(x: Any, u: Any, g_x: Any = 0.0) -> Any:
@@ -35,5 +34,6 @@ class AbstractToldSpeed(AbstractLoadedTwoTrack):
     def inputs(self):
         return ("steer", "v_x", *self.load_transfer.inputs)
 
-    def steady_a_x(self, x, u, ground: Ground):
-        return longitudinal_acceleration(self.motion(x, u), u, gravity(ground)[0])
+    def steady_a_x(self, x, u, ground: Ground, g: tuple[Any, Any, Any]):
+        del ground
+        return longitudinal_acceleration(self.motion(x, u), u, g[0])

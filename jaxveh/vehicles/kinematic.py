@@ -11,7 +11,7 @@ from jaxveh import numerics
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.base import AbstractVehicle, Motion, filled
 from jaxveh.vehicles.wheels import gravity
 
 
@@ -110,7 +110,7 @@ class Kinematic(AbstractVehicle):
             sideslip=numerics.arctan(self.rear_axle_to_reference * curvature),
             curvature=curvature,
         )
-        return KinematicState(moves.yaw_rate), outputs
+        return KinematicState(moves.yaw_rate), filled(outputs)
 
     def _curvature(self, u):
         return numerics.tan(u.steer) / self.wheelbase

@@ -14,7 +14,7 @@ from jaxveh._core.errors import check
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.base import AbstractVehicle, Motion, filled
 from jaxveh.vehicles.wheels import gravity
 
 
@@ -124,12 +124,12 @@ class KinematicTrailer(AbstractVehicle):
             v_y=moves.v_y,
             yaw=x.yaw,
             yaw_rate=yaw_rate,
-            a_x=jnp.zeros_like(yaw_rate) - g_x,
+            a_x=-g_x,
             a_y=u.v_x * yaw_rate - g_y,
-            sideslip=jnp.zeros_like(yaw_rate),
+            sideslip=0.0,
             hitch_angle=x.hitch_angle,
             hitch_rate=hitch_rate,
             trailer_yaw=x.yaw + x.hitch_angle,
             trailer_v_x=u.v_x * cosine - swing * sine,
         )
-        return KinematicTrailerState(yaw_rate, hitch_rate), outputs
+        return KinematicTrailerState(yaw_rate, hitch_rate), filled(outputs)

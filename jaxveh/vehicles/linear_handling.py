@@ -44,7 +44,8 @@ class LinearSingleTrack(AbstractOneTrack):
     A road's bank pushes by `m g_y`; its friction does not count, as always in a linear law.
 
     **Parameters**: `front_stiffness`, `rear_stiffness` (N/rad, of the axle at rest on a level road), `cg_height` (m; None:
-    stiffnesses stay). With a height the stiffnesses are proportional to the axles' loads, which move by `m a_x h / (a + b)` to the rear, as in CommonRoad's ST model.
+    stiffnesses stay). With a height the stiffnesses are proportional to the axles' loads, which move by `m a_x h / (a + b)` to
+    the rear, as in CommonRoad's ST model.
 
     **Inputs**: `steer` (rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, `v_x_rate = dv_x/dt` (m/s^2).
 

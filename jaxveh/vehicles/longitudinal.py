@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxveh._core.names import check_names
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.base import AbstractVehicle, Motion, filled
 from jaxveh.vehicles.two_track import air_drag
 from jaxveh.vehicles.wheels import gravity, travel_direction
 
@@ -110,13 +110,13 @@ class Longitudinal(AbstractVehicle):
         brake_force = -against * u.brake_torque / self.wheel_radius
         rolling_force = against * self.rolling_resistance * self.mass * g_z
         air_force = -air_drag(self.drag, x.v_x)
-        grade_force = self.mass * (g_x + jnp.zeros_like(x.v_x))
+        grade_force = self.mass * g_x
         rate = (drive_force + brake_force + rolling_force + air_force + grade_force) / self.moving_mass
         outputs = LongitudinalOutputs(
             v_x=x.v_x,
             v_x_rate=rate,
             a_x=rate - g_x,
-            grade=ground.grade + jnp.zeros_like(x.v_x),
+            grade=ground.grade,
             drive_force=drive_force,
             brake_force=brake_force,
             rolling_force=rolling_force,
@@ -124,4 +124,4 @@ class Longitudinal(AbstractVehicle):
             grade_force=grade_force,
             drive_power=drive_force * x.v_x,
         )
-        return LongitudinalState(rate), outputs
+        return LongitudinalState(rate), filled(outputs)

@@ -22,9 +22,9 @@ NOT_NEGATIVE = ("roll_damping_front", "roll_damping_rear", "roll_centre_front", 
 class AbstractRollingTwoTrack(AbstractLoadedTwoTrack):
     """A two-track car whose body leans: its states are the speeds of a point on the roll axis, about which the wheels stay.
 
-    **Parameters** of the rolling body: `sprung_mass` (kg, of what rolls), `roll_inertia` (kg m^2, of the sprung mass about its own
-    centre of gravity), `roll_yaw_product` (kg m^2: the integral of x z dm over what rolls, about the point of the roll axis below
-    the car's centre of gravity), `unsprung_height` (m: the centre of gravity of what does not roll), `roll_centre_front`,
+    **Parameters** of the rolling body: `sprung_mass` (kg, of what rolls), `roll_inertia` (kg m^2, of the sprung mass about its
+    own centre of gravity), `roll_yaw_product` (kg m^2: the integral of x z dm over what rolls, about the point of the roll axis
+    below the car's centre of gravity), `unsprung_height` (m: the centre of gravity of what does not roll), `roll_centre_front`,
     `roll_centre_rear` (m over the road), `roll_stiffness_front`, `roll_stiffness_rear` (N m/rad, springs and bars),
     `roll_damping_front`, `roll_damping_rear` (N m s/rad). `load_transfer` is for what passes from body to wheels at once, and
     for the axles' loads.

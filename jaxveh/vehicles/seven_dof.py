@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax
 
@@ -38,9 +38,9 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
         J_w domega_i/dt     = T_i - r_e (F_x,i + f_r F_z,i) - brakes
 
     Both front wheels turn by the steer. Loads follow `load_transfer`. Slips are those of `wheels.contact`; brakes and
-    rolling resistance turn round smoothly about 0.5 m/s, so that standstill is an ordinary point. The spins are stiff: their poles
-    are about `-C_x r_e^2 / (J_w |v|)`, 200 1/s at 20 m/s and thousands at walking speed, which `simulate` looks at when it chooses
-    its solver.
+    rolling resistance reverse smoothly about 0.5 m/s, so that standstill is an ordinary point. The spins are stiff: their poles
+    are about `-C_x r_e^2 / (J_w |v|)`, 200 1/s at 20 m/s and thousands at walking speed, which `simulate` looks at when it
+    chooses its solver.
 
     **Parameters**: `wheel_inertia` (kg m^2, of one wheel).
 
@@ -86,9 +86,9 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
     def rim_speeds(self, x) -> Wheels:
         return each_wheel(lambda omega: omega * self.wheel_radius, wheels_of(x, "omega"))
 
-    def steady_a_x(self, x, u, ground: Ground):
+    def steady_a_x(self, x, u, ground: Ground, g: tuple[Any, Any, Any]):
         """That of the torques, m/s^2, whatever the grip; what no load transfer asks for is never computed."""
-        del ground
+        del ground, g
         drive, brake = self.drive.torques(u)
         torque = sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(x.v_x)
         return torque * (1.0 / (self.mass * self.wheel_radius))

@@ -121,8 +121,8 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnTyres, AbstractOneTrack):
 
     def _touching(self, x, u, ground: Ground):
         """Contacts and motions of the axles."""
-        _, g_y, g_z = gravity(ground)
-        steady = self.steady_a_x(x, u, ground), x.v_x * x.yaw_rate - g_y
+        g = _, g_y, g_z = gravity(ground)
+        steady = self.steady_a_x(x, u, ground, g), x.v_x * x.yaw_rate - g_y
         loads = axle_loads(self, self.load_transfer.felt(x, u, steady)[0], g_z)
         friction = 0.5 * (ground.friction_fl + ground.friction_fr), 0.5 * (ground.friction_rl + ground.friction_rr)
         turned = (numerics.cos(u.steer), numerics.sin(u.steer)), (1.0, 0.0)

@@ -15,7 +15,7 @@ from jaxveh.tyres import Contact, Forces
 from jaxveh.vehicles.drive import AbstractDriven
 from jaxveh.vehicles.load_transfer import AbstractShiftingLoads
 from jaxveh.vehicles.two_track import OnRoad
-from jaxveh.vehicles.wheels import Wheels, each_wheel, frictions, gravity, sum_of_wheels, travel_direction
+from jaxveh.vehicles.wheels import Wheels, each_wheel, frictions, sum_of_wheels, travel_direction
 
 LEAST_SHARE = 0.1
 """The share of its lateral force that a wheel keeps however large the torque (as `tyres.Fiala` does): F_x ends at
@@ -62,11 +62,11 @@ class AbstractSpinless(AbstractDriven, AbstractShiftingLoads):
     def inputs(self):
         return ("steer", *self.drive.inputs, *self.load_transfer.inputs)
 
-    def steady_a_x(self, x, u, ground: Ground):
+    def steady_a_x(self, x: Any, u: Any, ground: Ground, g: tuple[Any, Any, Any]) -> Any:
         """a_x, m/s^2, that the torques make, as far as grip allows: what loads can follow without knowing a force."""
         drive, brake = self.drive.torques(u)
         push = (sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(x.v_x)) / self.wheel_radius
-        limit = self.grip * self.mass * (-gravity(ground)[2] * 0.25 * sum_of_wheels(frictions(ground)))
+        limit = self.grip * self.mass * (-g[2] * 0.25 * sum_of_wheels(frictions(ground)))
         return limit * saturated(push / jnp.maximum(limit, _LEAST_LIMIT)) / self.mass
 
 

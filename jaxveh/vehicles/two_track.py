@@ -85,9 +85,9 @@ class OnRoad(NamedTuple):
 
 
 class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
-    """A two-track car whose wheels keep to the road, so that their loads follow from the accelerations that `load_transfer` feels.
+    """A two-track car whose wheels keep to the road: their loads follow from the accelerations that `load_transfer` feels.
 
-    Its kinds say what these accelerations are in a steady turn, and how loads and wheels follow.
+    Its kinds say what these accelerations are in a steady turn, and how the loads follow.
     """
 
     body_states: eqx.AbstractClassVar[tuple[str, ...]]
@@ -106,8 +106,8 @@ class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
         """Forward speed, m/s, of the point from which the wheels' places are told."""
 
     @abc.abstractmethod
-    def steady_a_x(self, x: Any, u: Any, ground: Ground) -> Any:
-        """Longitudinal acceleration, m/s^2, that can be told without knowing a tyre's force."""
+    def steady_a_x(self, x: Any, u: Any, ground: Ground, g: tuple[Any, Any, Any]) -> Any:
+        """Longitudinal acceleration, m/s^2, that can be told without knowing a tyre's force, under gravity g (m/s^2)."""
 
     @abc.abstractmethod
     def loads(self, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
@@ -131,8 +131,8 @@ class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
     def _touching(self, x, u, ground: Ground) -> tuple[Wheels, Wheels]:
         """Contacts and motions of the wheels."""
         moves = rolling_wheels(self.places, self.wheel_speed(x, u), x.v_y, x.yaw_rate, u.steer)
-        _, g_y, g_z = gravity(ground)
-        steady = self.steady_a_x(x, u, ground), self.told_or_own_speed(x, u) * x.yaw_rate - g_y
+        g = _, g_y, g_z = gravity(ground)
+        steady = self.steady_a_x(x, u, ground, g), self.told_or_own_speed(x, u) * x.yaw_rate - g_y
         loads = self.loads(x, *self.load_transfer.felt(x, u, steady), g_z)
         touching = lambda move, load, mu, speed: contact(move, load, mu, self.crawl_speed, speed)
         return each_wheel(touching, moves, loads, frictions(ground), self.rim_speeds(x)), moves

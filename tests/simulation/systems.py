@@ -4,7 +4,6 @@ import jax.numpy as jnp
 
 from jaxveh import tyres, vehicles
 
-
 NUMBERS = dict(
     mass=1500.0, yaw_inertia=2500.0, front_axle_to_cg=1.2, rear_axle_to_cg=1.4, track_front=1.5, track_rear=1.52, cg_height=0.5
 )  # fmt: skip

@@ -110,7 +110,8 @@ def log_cars(told: io.CarSpecification, model: StateSpace) -> Cars:
     """The file's linear car, and the calibrated handling model with its single track."""
     car = estimators.sideslip.handling_car(told).car
     linear = LinearSingleTrack(
-        mass=told.mass, yaw_inertia=told.yaw_inertia, front_axle_to_cg=told.front_axle_to_cg, rear_axle_to_cg=told.rear_axle_to_cg,
+        mass=told.mass, yaw_inertia=told.yaw_inertia,
+        front_axle_to_cg=told.front_axle_to_cg, rear_axle_to_cg=told.rear_axle_to_cg,
         front_stiffness=car.front.cornering_stiffness, rear_stiffness=car.rear.cornering_stiffness,
     )  # fmt: skip
     return Cars(linear, model.system.car, model.system)

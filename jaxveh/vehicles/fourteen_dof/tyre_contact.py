@@ -57,7 +57,9 @@ class Touch(NamedTuple):
     damped: Any
 
 
-def touch(car: AbstractSuspendedTwoTrack, body: Body, wheel: Wheel, axis: Vector, omega: Any, friction: Any) -> tuple[Contact, Touch]:
+def touch(
+    car: AbstractSuspendedTwoTrack, body: Body, wheel: Wheel, axis: Vector, omega: Any, friction: Any
+) -> tuple[Contact, Touch]:
     """The contact of a wheel that spins with `omega` (rad/s) about `axis` (body's axes).
 
     The contact point lies below the centre in the wheel's plane (ISO 8855; H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed.,
@@ -94,7 +96,9 @@ class Reaction(NamedTuple):
     dissipation: Any
 
 
-def reaction(car: AbstractSuspendedTwoTrack, body: Body, at: Contact, how: Touch, forces: Forces, omega: Any) -> Reaction:
+def reaction(
+    car: AbstractSuspendedTwoTrack, body: Body, at: Contact, how: Touch, forces: Forces, omega: Any
+) -> Reaction:
     """The road's forces on body and wheel.
 
     The longitudinal force turns the wheel with the arm of the *rolling* radius. With the loaded radius, which is smaller,
