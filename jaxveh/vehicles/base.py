@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.names import check_names
 from jaxveh.roads import LEVEL, Ground
 
 GRAVITY = 9.80665
@@ -113,3 +114,13 @@ def filled(outputs: Any) -> Any:
     dtype = jnp.result_type(*[leaf for leaf in leaves if hasattr(leaf, "dtype")])
     array = lambda leaf: leaf if hasattr(leaf, "dtype") else jnp.asarray(leaf, dtype)
     return jax.tree.map(lambda leaf: jnp.broadcast_to(array(leaf), shape), outputs)
+
+
+def given_or_zero(state_type: Any, values: dict[str, Any], like: Any, parameter: Any) -> Any:
+    """A state with `values` by name, all else zero in the shape of `like`; of the float type of a `parameter`.
+
+    **Raises** `InputError` for names that the state does not have.
+    """
+    check_names("start", values, state_type._fields)
+    dtype, zero = jnp.result_type(parameter), jnp.zeros(jnp.shape(like))
+    return state_type(*[jnp.asarray(values.get(name, zero), dtype) for name in state_type._fields])

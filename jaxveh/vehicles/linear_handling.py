@@ -10,10 +10,9 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
-from jaxveh._core.names import check_names
 from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import GRAVITY, Motion, filled
+from jaxveh.vehicles.base import GRAVITY, Motion, filled, given_or_zero
 from jaxveh.vehicles.lateral_system import LateralSystem
 from jaxveh.vehicles.shared import AbstractOneTrack
 from jaxveh.vehicles.single_track import UNITS, SingleTrackOutputs
@@ -70,11 +69,7 @@ class LinearSingleTrack(AbstractOneTrack):
         return dict(UNITS)
 
     def start(self, t, u, **values):
-        check_names("start", values, LinearSingleTrackState._fields)
-        dtype, zero = jnp.result_type(self.mass), jnp.zeros(jnp.shape(u.v_x))
-        return LinearSingleTrackState(
-            *[jnp.asarray(values.get(name, zero), dtype) for name in LinearSingleTrackState._fields]
-        )
+        return given_or_zero(LinearSingleTrackState, values, u.v_x, self.mass)
 
     def motion(self, x, u):
         along, across = numerics.cos(x.sideslip), numerics.sin(x.sideslip)

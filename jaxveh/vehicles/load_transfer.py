@@ -36,20 +36,25 @@ class AbstractLoadTransfer(eqx.Module):
         """The time derivatives of the states where the tyres push with a_x, a_y (m/s^2: force over mass)."""
 
 
-class StaticLoads(AbstractLoadTransfer):
-    """Loads as at rest."""
+class AbstractImmediate(AbstractLoadTransfer):
+    """Loads that follow at once, and so need no state."""
 
     state_names: ClassVar[tuple[str, ...]] = ()
-    inputs: ClassVar[tuple[str, ...]] = ()
-
-    def felt(self, x, u, guess):
-        return 0.0, 0.0
 
     def rates(self, x, a_x, a_y):
         return ()
 
 
-class QuasiStatic(AbstractLoadTransfer):
+class StaticLoads(AbstractImmediate):
+    """Loads as at rest."""
+
+    inputs: ClassVar[tuple[str, ...]] = ()
+
+    def felt(self, x, u, guess):
+        return 0.0, 0.0
+
+
+class QuasiStatic(AbstractImmediate):
     """Loads follow at once the accelerations of a steady turn, `a_y = v_x yaw_rate`, and of the torques, `a_x = T / (m r)`.
 
     They need no tyre force, so that there is no loop to solve. A car that yaws without turning (on two frictions, in a spin) has
@@ -57,14 +62,10 @@ class QuasiStatic(AbstractLoadTransfer):
     does not, and its braking torques must be those that the road holds.
     """
 
-    state_names: ClassVar[tuple[str, ...]] = ()
     inputs: ClassVar[tuple[str, ...]] = ()
 
     def felt(self, x, u, guess):
         return guess
-
-    def rates(self, x, a_x, a_y):
-        return ()
 
 
 class LaggedLoads(AbstractLoadTransfer):
@@ -88,20 +89,16 @@ class LaggedLoads(AbstractLoadTransfer):
         return (a_x - x.a_x_felt) / self.time, (a_y - x.a_y_felt) / self.time
 
 
-class MeasuredLoads(AbstractLoadTransfer):
+class MeasuredLoads(AbstractImmediate):
     """Loads of accelerations that are measured: `a_x` and `a_y` (m/s^2) become inputs, as in filters on real logs.
 
     An accelerometer feels the air's drag, too; it is left in (at 45 m/s some 2 % of an axle's load).
     """
 
-    state_names: ClassVar[tuple[str, ...]] = ()
     inputs: ClassVar[tuple[str, ...]] = ("a_x", "a_y")
 
     def felt(self, x, u, guess):
         return u.a_x, u.a_y
-
-    def rates(self, x, a_x, a_y):
-        return ()
 
 
 class AbstractShiftingLoads(AbstractPlaneBody):

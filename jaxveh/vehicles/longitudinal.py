@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.names import check_names
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion, filled
+from jaxveh.vehicles.base import AbstractVehicle, Motion, filled, given_or_zero
 from jaxveh.vehicles.two_track import air_drag
 from jaxveh.vehicles.wheels import gravity, travel_direction
 
@@ -94,9 +93,7 @@ class Longitudinal(AbstractVehicle):
 
     def start(self, t, u, **values):
         """`v_x` is the speed (m/s), 0 unless given."""
-        check_names("start", values, LongitudinalState._fields)
-        dtype = jnp.result_type(self.mass)
-        return LongitudinalState(jnp.asarray(values.get("v_x", jnp.zeros(jnp.shape(u.drive_torque))), dtype))
+        return given_or_zero(LongitudinalState, values, u.drive_torque, self.mass)
 
     def motion(self, x, u):
         zero = jnp.zeros_like(x.v_x)

@@ -18,9 +18,9 @@ class AbstractSuspendedTwoTrack(AbstractDriven, AbstractTwoTrack):
     wheel's); `roll_inertia`, `pitch_inertia`, `yaw_inertia`, `roll_yaw_product` (the integral of x z dm; kg m^2, of the sprung
     mass about its centre of gravity, from which axles and `cg_height` are measured, too: at rest); `spring_`, `damper_`,
     `anti_roll_` `front` and `rear` (N/m, N s/m at the wheel; N per m of difference of the wheels' travels); `roll_centre_` (m
-    over the road), `pitch_slope_` (-); `tyre_stiffness` (N/m), `tyre_damping` (N s/m); `wheel_inertia` (kg m^2, about the axle; about
-    other axes it belongs to the body); `toe_` (rad, inwards), `camber_` (rad, tops outwards), `ackermann` (-: 0 both front wheels
-    turn alike, 1 about one point). `wheel_radius` is that without load.
+    over the road), `pitch_slope_` (-); `tyre_stiffness` (N/m), `tyre_damping` (N s/m); `wheel_inertia` (kg m^2, about the
+    axle; about other axes it belongs to the body); `toe_` (rad, inwards), `camber_` (rad, tops outwards), `ackermann` (-: 0
+    both front wheels turn alike, 1 about one point). `wheel_radius` is that without load.
     """
 
     _: KW_ONLY
