@@ -141,8 +141,10 @@ def vehicle_model(problem: SingleTrack, dtype: np.typing.DTypeLike) -> statespac
     wheel's own axes, a rotation more than the paper's formula, which for given v_x is the same angle.
     """
     p = problem
-    axles = [tyres.MagicFormula(B=B, C=C, D=D, E=E) for D, C, B, E in p.prior_mean[3:].reshape(2, 4)]
-    car = vehicles.SingleTrack(p.mass, p.inertia, p.front, p.rear, *axles)
+    front, rear = (tyres.MagicFormula(B=B, C=C, D=D, E=E) for D, C, B, E in p.prior_mean[3:].reshape(2, 4))
+    car = vehicles.SingleTrack(
+        mass=p.mass, yaw_inertia=p.inertia, front_axle_to_cg=p.front, rear_axle_to_cg=p.rear, front=front, rear=rear
+    )
     model = estimators.state_space(
         car,
         sensors.SensorSet(statespace.Gaussian({"yaw_rate": p.yaw_rate_std, "a_y": p.lateral_acceleration_std})),

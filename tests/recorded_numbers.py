@@ -26,6 +26,10 @@ def classes_of(*modules):
     return {name: one for name, one in sorted(found.items()) if inspect.isclass(one) and dataclasses.is_dataclass(one)}
 
 
+def _declared(test_file):
+    return FOLDER / f"{Path(test_file).stem}_declared.json"
+
+
 def check_declared(test_file, name, one):
     """Compare what a class declares of its fields with what is on record: the unit, the domain, the scale, and the default
     where it is a number or a word.
@@ -40,7 +44,7 @@ def check_declared(test_file, name, one):
         if isinstance(field.default, bool | int | float | str | np.ndarray):
             about["default"] = field.default
         found[field.name] = " ".join(f"{key}={value}" for key, value in about.items())
-    path = FOLDER / f"{Path(test_file).stem}_declared.json"
+    path = _declared(test_file)
     known = json.loads(path.read_text()) if path.exists() else {}
     if os.environ.get("JAXVEH_RECORD"):
         known[name] = found
@@ -48,6 +52,14 @@ def check_declared(test_file, name, one):
         return
     assert name in known, f"{name} is not on record in {path.name}: see {Path(__file__).name}."
     assert found == known[name]
+
+
+def declared_names(test_file, one):
+    """Names of a class's fields as `check_declared` has them on record; of a class that is not there, as they are declared."""
+    names = [field.name for field in dataclasses.fields(one)]
+    known = json.loads(_declared(test_file).read_text())
+    on_record = next((list(known[key]) for key in known if key.endswith(f".{one.__name__}")), names)
+    return on_record if sorted(on_record) == sorted(names) else names
 
 
 def check_recorded(test_file, name, values, rtol=1e-7, given=False):

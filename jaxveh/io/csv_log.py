@@ -13,6 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.channel_map import ChannelMap
+from jaxveh.io.decimals import is_number
 from jaxveh.io.log import TableLog
 from jaxveh.io.optional import require
 from jaxveh.io.units import given, same
@@ -86,7 +87,7 @@ def _header(path: Path, separator: str | None) -> tuple[list[str], str]:
     twice = sorted({heading for heading in headings if headings.count(heading) > 1})
     if twice:
         raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
-    if all(_is_number(heading) for heading in headings):
+    if all(is_number(heading) for heading in headings):
         raise InputError(f"{path}: line 1 holds numbers only; the first line must name the columns.")
     return headings, separator
 
@@ -95,14 +96,6 @@ def _exact(version: str) -> dict[str, str]:
     """What makes pandas read each decimal as its nearest float64: the only way since 3.1, an option before."""
     major, minor = map(int, version.split(".")[:2])
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _read(path: Path, headings: list[str], separator: str, decimal: str, lines: int, errors: str):

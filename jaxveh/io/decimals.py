@@ -17,3 +17,12 @@ def decimal(text: str) -> float:
     if not math.isfinite(number):
         raise ValueError(f"{text!r} is no finite decimal number")
     return number
+
+
+def is_number(text: str) -> bool:
+    """Whether Python takes a text for a number, `nan` and `inf` included: data, and no heading."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -19,6 +19,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh.io.csv_log import read_below
+from jaxveh.io.decimals import is_number
 from jaxveh.io.files import check_readable
 from jaxveh.io.log import numeric, split_unit
 from jaxveh.io.naming import listing
@@ -174,7 +175,7 @@ def _text(path: Path) -> _Cells:
         lines = [line for line, _ in zip(file, range(number + 2), strict=False)]
     below = _split(lines[number + 1], separator) if len(lines) > number + 1 else []
     # A line of data may lack a cell, a line of units may call a ratio's unit 1.
-    rows_begin = sum(map(_is_number, below)) > len(below) / 2
+    rows_begin = sum(map(is_number, below)) > len(below) / 2
     units = {} if rows_begin else dict(zip((heading.upper() for heading in headings), below, strict=False))
     _check_unique(headings, path)
     cells = read_below(path, headings, separator, number + 1 + bool(units))
@@ -221,11 +222,3 @@ def _vector(values: np.ndarray, name: str, path: Path) -> np.ndarray:
     if values.ndim != 1 or values.dtype.kind not in "fiu":
         raise InputError(f"{path}: {name}: must be a vector of numbers, is {values.dtype} of shape {values.shape}.")
     return values.astype(np.float64)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

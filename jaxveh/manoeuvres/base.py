@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import math
+from dataclasses import KW_ONLY
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
@@ -11,6 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check, check_at_least, check_finite, check_positive
+from jaxveh._core.parameter import parameter
 from jaxveh.numerics import smooth_step
 
 
@@ -47,6 +49,22 @@ class AbstractManoeuvre(eqx.Module):
     @abc.abstractmethod
     def inputs(self, t: Any) -> Any:
         """The inputs at time t (s, a scalar or an array): a NamedTuple of arrays in the shape of t."""
+
+
+class AbstractSteering(AbstractManoeuvre):
+    """Steering at a constant speed: `steer` (rad at the road wheels) times a shape over time, at a `speed` (m/s)."""
+
+    _: KW_ONLY
+    duration: float = eqx.field(static=True)
+    speed: jax.Array = parameter("m/s")
+    steer: jax.Array = parameter("rad", scale=0.1)
+
+    @abc.abstractmethod
+    def form(self, t: jax.Array) -> jax.Array:
+        """The steer over `steer` (-) at times t (s)."""
+
+    def inputs(self, t: Any) -> DriverInputs:
+        return constant_speed(self.steer * self.form(as_time(t, self.steer)), self.speed)
 
 
 def window(t: jax.Array, start: float, end: float, edge: float) -> jax.Array:

@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import KW_ONLY
 
 import equinox as eqx
 import jax
 
 from jaxveh._core.errors import check, check_positive
 from jaxveh._core.parameter import parameter
-from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, as_time, check_drive, constant_speed, window
+from jaxveh.manoeuvres.base import AbstractSteering, check_drive, window
 from jaxveh.numerics import band_harmonics, sum_of_harmonics
 
 
-class RandomSteering(AbstractManoeuvre):
+class RandomSteering(AbstractSteering):
     """Steer that is random, white between two frequencies, at a constant speed, with smooth edges at both ends.
 
     `steer` (rad) is its standard deviation; `frequencies` (Hz) and `phases` (rad) are those of its harmonics, (n,).
     """
 
+    _: KW_ONLY
     edge: float = eqx.field(static=True)
-    duration: float = eqx.field(static=True)
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
     frequencies: jax.Array = parameter("Hz", scale=1.0)
     phases: jax.Array = parameter("rad", scale=1.0)
 
-    def inputs(self, t: Any) -> DriverInputs:
-        t = as_time(t, self.steer)
+    def form(self, t: jax.Array) -> jax.Array:
         wave = sum_of_harmonics(t, self.frequencies, self.phases) * window(t, 0.0, self.duration, self.edge)
-        return constant_speed(self.steer * wave, self.speed)
+        return wave
 
 
 def random_steering(

@@ -6,72 +6,62 @@ All are three times continuously differentiable in time: corners of a shape are 
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import KW_ONLY
 
 import equinox as eqx
 import jax
 
 from jaxveh import numerics
 from jaxveh._core.errors import check, check_at_least, check_positive
-from jaxveh._core.parameter import parameter
-from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, as_time, check_drive, constant_speed
+from jaxveh.manoeuvres.base import AbstractSteering, check_drive
 from jaxveh.numerics import smooth_ramp
 
 
-class SineWithDwell(AbstractManoeuvre):
+class SineWithDwell(AbstractSteering):
     """One sine period of steer whose second peak is held for a while (FMVSS 126: 49 CFR 571.126, S7.9).
 
     The sine's phase runs at its frequency, stands still during the dwell, and starts and stops smoothly within `edge`,
     half of it before and half after, so that the quarters keep their times.
     """
 
+    _: KW_ONLY
     frequency: float = eqx.field(static=True)
     dwell: float = eqx.field(static=True)
     edge: float = eqx.field(static=True)
     start: float = eqx.field(static=True)
-    duration: float = eqx.field(static=True)
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
 
-    def inputs(self, t: Any) -> DriverInputs:
-        t = as_time(t, self.steer)
+    def form(self, t: jax.Array) -> jax.Array:
         period, held = 1.0 / self.frequency, self.start + 0.75 / self.frequency
         runs = ((self.start, held), (held + self.dwell, self.start + period + self.dwell))
         running = sum(_since(t, begin, self.edge) - _since(t, end, self.edge) for begin, end in runs)
-        return constant_speed(self.steer * numerics.sin((2 * math.pi * self.frequency) * running), self.speed)
+        return numerics.sin((2 * math.pi * self.frequency) * running)
 
 
-class RampSteer(AbstractManoeuvre):
+class RampSteer(AbstractSteering):
     """Steer that grows linearly from `start` for `rise` and is then held (ISO 4138, constant speed, variable steer)."""
 
+    _: KW_ONLY
     rise: float = eqx.field(static=True)
     edge: float = eqx.field(static=True)
     start: float = eqx.field(static=True)
-    duration: float = eqx.field(static=True)
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
 
-    def inputs(self, t: Any) -> DriverInputs:
-        t = as_time(t, self.steer)
+    def form(self, t: jax.Array) -> jax.Array:
         rising = _since(t, self.start, self.edge) - _since(t, self.start + self.rise, self.edge)
-        return constant_speed(self.steer * (rising / self.rise), self.speed)
+        return rising / self.rise
 
 
-class Slalom(AbstractManoeuvre):
+class Slalom(AbstractSteering):
     """A number of sine periods of steer, as between cones."""
 
+    _: KW_ONLY
     frequency: float = eqx.field(static=True)
     periods: float = eqx.field(static=True)
     edge: float = eqx.field(static=True)
     start: float = eqx.field(static=True)
-    duration: float = eqx.field(static=True)
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
 
-    def inputs(self, t: Any) -> DriverInputs:
-        t = as_time(t, self.steer)
+    def form(self, t: jax.Array) -> jax.Array:
         running = _since(t, self.start, self.edge) - _since(t, self.start + self.periods / self.frequency, self.edge)
-        return constant_speed(self.steer * numerics.sin((2 * math.pi * self.frequency) * running), self.speed)
+        return numerics.sin((2 * math.pi * self.frequency) * running)
 
 
 def _since(t: jax.Array, start: float, edge: float) -> jax.Array:

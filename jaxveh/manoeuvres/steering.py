@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import KW_ONLY
 
 import equinox as eqx
 import jax
@@ -11,28 +11,24 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import check, check_at_least, check_positive
-from jaxveh._core.parameter import parameter
-from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, as_time, check_drive, constant_speed, window
+from jaxveh.manoeuvres.base import AbstractSteering, check_drive, window
 from jaxveh.numerics import smooth_step
 
 
-class DoubleLaneChange(AbstractManoeuvre):
+class DoubleLaneChange(AbstractSteering):
     """One sine period of steer to change lanes, a pause, and the mirrored period to change back.
 
     Each period is faded in and out over an eighth of it, so that its peaks stay at plus and minus `steer`.
     """
 
+    _: KW_ONLY
     start: float = eqx.field(static=True)
     period: float = eqx.field(static=True)
     pause: float = eqx.field(static=True)
-    duration: float = eqx.field(static=True)
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
 
-    def inputs(self, t: Any) -> DriverInputs:
-        t = as_time(t, self.steer)
+    def form(self, t: jax.Array) -> jax.Array:
         back = self.start + self.period + self.pause
-        return constant_speed(self.steer * (self._change(t, self.start) - self._change(t, back)), self.speed)
+        return self._change(t, self.start) - self._change(t, back)
 
     def _change(self, t, start):
         # Outside its window the sine is held: far arguments cost accuracy in float32.
@@ -41,36 +37,30 @@ class DoubleLaneChange(AbstractManoeuvre):
         return numerics.sin(inside * (2 * math.pi / self.period)) * fade
 
 
-class StepSteer(AbstractManoeuvre):
+class StepSteer(AbstractSteering):
     """Straight until `start`, then a smooth ramp of length `ramp` to a constant `steer`."""
 
+    _: KW_ONLY
     ramp: float = eqx.field(static=True)
     start: float = eqx.field(static=True)
-    duration: float = eqx.field(static=True)
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
 
-    def inputs(self, t: Any) -> DriverInputs:
-        t = as_time(t, self.steer)
-        return constant_speed(self.steer * smooth_step((t - self.start) / self.ramp), self.speed)
+    def form(self, t: jax.Array) -> jax.Array:
+        return smooth_step((t - self.start) / self.ramp)
 
 
-class SweptSine(AbstractManoeuvre):
+class SweptSine(AbstractSteering):
     """A sine whose frequency rises linearly over the duration, with smooth edges of length `edge` at both ends."""
 
+    _: KW_ONLY
     from_frequency: float = eqx.field(static=True)
     to_frequency: float = eqx.field(static=True)
     edge: float = eqx.field(static=True)
-    duration: float = eqx.field(static=True)
-    speed: jax.Array = parameter("m/s")
-    steer: jax.Array = parameter("rad", scale=0.1)
 
-    def inputs(self, t: Any) -> DriverInputs:
-        t = as_time(t, self.steer)
+    def form(self, t: jax.Array) -> jax.Array:
         rise = (self.to_frequency - self.from_frequency) / (2 * self.duration)
         turns = t * (self.from_frequency + rise * t)
         wave = numerics.sin((2 * math.pi) * turns) * window(t, 0.0, self.duration, self.edge)
-        return constant_speed(self.steer * wave, self.speed)
+        return wave
 
 
 def double_lane_change(

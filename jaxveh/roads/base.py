@@ -9,6 +9,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.parameter import check_parameters
+
 
 class Surface(NamedTuple):
     """A road at one place.
@@ -28,7 +30,12 @@ class AbstractRoad(eqx.Module):
 
     Slopes are quasi-static: they tilt gravity where the car is. That the car turns with a road whose grade or bank changes,
     and what its curvature does to loads, is left out, by vehicles and by devices.
+
+    **Raises** `InputError` for parameters outside their domain.
     """
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @abc.abstractmethod
     def at(self, s: Any, y: Any = 0.0) -> Surface:

@@ -6,7 +6,7 @@ from typing import Any
 
 import jax
 
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.numerics import smooth_step
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 
@@ -18,9 +18,6 @@ class Level(AbstractRoad):
     """
 
     friction: jax.Array = positive("-", default=1.0)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def at(self, s: Any, y: Any = 0.0) -> Surface:
         return surface(*place(s, y, self.friction), self.friction)
@@ -39,9 +36,6 @@ class SplitMu(AbstractRoad):
     right: jax.Array = positive("-")
     blend: jax.Array = positive("m", default=0.2)
     border: jax.Array = parameter("m", scale=1.0, default=0.0)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def at(self, s: Any, y: Any = 0.0) -> Surface:
         s, y = place(s, y, self.left)
@@ -62,9 +56,6 @@ class MuJump(AbstractRoad):
     after: jax.Array = positive("-")
     at_distance: jax.Array = parameter("m", scale=10.0)
     ramp: jax.Array = positive("m", default=0.5)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def at(self, s: Any, y: Any = 0.0) -> Surface:
         s, y = place(s, y, self.before)

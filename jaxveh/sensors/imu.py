@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -11,16 +11,11 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import check_parameters, parameter
-from jaxveh.sensors.device import AbstractInstrument
 from jaxveh.sensors.low_pass import LowPass, filtered_rows
 from jaxveh.sensors.rigid_body import POSES, into_axes, specific_force, turning
 from jaxveh.sensors.sensor_set import Position
-from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
-
-_UNITS = {
-    **dict.fromkeys(("a_x", "a_y", "a_z"), "m/s^2"),
-    **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"), "rad/s"),
-}
+from jaxveh.sensors.signal import Signal, as_signals
+from jaxveh.sensors.signal_instrument import AbstractSignalInstrument
 
 
 class Alignment(eqx.Module):
@@ -34,7 +29,7 @@ class Alignment(eqx.Module):
         check_parameters(self)
 
 
-class IMU(AbstractInstrument):
+class IMU(AbstractSignalInstrument):
     """An inertial measurement unit that rolls, pitches and turns with the body.
 
     - `signals`: the channels and their errors, a mapping to `Signal`, out of `a_x`, `a_y`, `a_z` (m/s^2, specific
@@ -51,28 +46,21 @@ class IMU(AbstractInstrument):
     **Raises** `InputError` for unknown channels, or anything that is not what it should be.
     """
 
+    known: ClassVar[dict[str, str]] = {
+        **dict.fromkeys(("a_x", "a_y", "a_z"), "m/s^2"),
+        **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"), "rad/s"),
+    }
     signals: dict[str, Signal] = eqx.field(converter=as_signals, default=("a_x", "a_y", "yaw_rate"))
     position: Position = eqx.field(default_factory=Position)
     alignment: Alignment = eqx.field(default_factory=Alignment)
     low_pass: LowPass | None = None
 
     def __check_init__(self):
-        check_signals("IMU.signals", self.signals, _UNITS)
         for name, article, kind in (("position", "a", Position), ("alignment", "an", Alignment)):
             if not isinstance(getattr(self, name), kind):
                 raise InputError(f"IMU.{name} = {getattr(self, name)!r}: must be {article} {kind.__name__}.")
         if not (self.low_pass is None or isinstance(self.low_pass, LowPass)):
             raise InputError(f"IMU.low_pass = {self.low_pass!r}: must be a LowPass(cutoff_hz) or None.")
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The measured channels, accelerations first."""
-        return tuple(name for name in _UNITS if name in self.signals)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """m/s^2 and rad/s."""
-        return {name: _UNITS[name] for name in self.channels}
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -89,9 +77,9 @@ class IMU(AbstractInstrument):
         rates, accelerations = turning(outputs)
         force = specific_force(outputs, self.position, rates, accelerations)
         turn = (self.alignment.roll, self.alignment.pitch, self.alignment.yaw)
-        felt = dict(zip(_UNITS, (*into_axes(force, *turn), *into_axes(rates, *turn)), strict=True))
+        felt = dict(zip(self.known, (*into_axes(force, *turn), *into_axes(rates, *turn)), strict=True))
         if self.low_pass is not None:
             rows = jnp.stack([felt[name] for name in self.channels], axis=-1)
             steps = jnp.full(times.shape[0] - 1, self.period, rows.dtype)
             felt = dict(zip(self.channels, filtered_rows(self.low_pass, rows, steps).T, strict=True))
-        return apply_all(self.signals, _UNITS, felt, self.period, key)
+        return self.sent(felt, key)

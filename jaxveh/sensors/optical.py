@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -11,16 +11,14 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
-from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.sensors.device import AbstractInstrument
+from jaxveh._core.parameter import positive
 from jaxveh.sensors.rigid_body import POSES, velocity
 from jaxveh.sensors.sensor_set import Position
-from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
+from jaxveh.sensors.signal import Signal, as_signals
+from jaxveh.sensors.signal_instrument import AbstractSignalInstrument
 
-_UNITS = {"v_x": "m/s", "v_y": "m/s", "sideslip": "rad"}
 
-
-class OpticalSideslip(AbstractInstrument):
+class OpticalSideslip(AbstractSignalInstrument):
     """A correlation sensor: the velocity of its own place over the road, not of the centre of gravity.
 
     - `signals`: the channels and their errors, a mapping to `Signal`, out of `v_x`, `v_y` (m/s) and `sideslip` (rad,
@@ -31,25 +29,14 @@ class OpticalSideslip(AbstractInstrument):
     **Raises** `InputError` for unknown channels or numbers out of range.
     """
 
+    known: ClassVar[dict[str, str]] = {"v_x": "m/s", "v_y": "m/s", "sideslip": "rad"}
     signals: dict[str, Signal] = eqx.field(converter=as_signals, default=("v_x", "v_y"))
     position: Position = eqx.field(default_factory=Position)
     lowest: jax.Array | None = positive("m/s", default=None)
 
     def __check_init__(self):
-        check_signals("OpticalSideslip.signals", self.signals, _UNITS)
-        check_parameters(self)
         if not isinstance(self.position, Position):
             raise InputError(f"OpticalSideslip.position = {self.position!r}: must be a Position.")
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The measured channels."""
-        return tuple(name for name in _UNITS if name in self.signals)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """m/s and rad."""
-        return {name: _UNITS[name] for name in self.channels}
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -65,7 +52,7 @@ class OpticalSideslip(AbstractInstrument):
         """Velocities and their angle."""
         v_x, v_y = velocity(outputs, self.position)
         true = {"v_x": v_x, "v_y": v_y, "sideslip": numerics.arctan2(v_y, v_x)}
-        said = apply_all(self.signals, _UNITS, true, self.period, key)
+        said = self.sent(true, key)
         if self.lowest is None:
             return said
         slow = numerics.hypot(v_x, v_y) < self.lowest

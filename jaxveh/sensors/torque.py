@@ -4,23 +4,43 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.sensors.device import AbstractInstrument
+from jaxveh._core.parameter import positive
 from jaxveh.sensors.low_pass import LowPass, filtered_rows
-from jaxveh.sensors.signal import Signal, apply_all, as_signals, check_signals
+from jaxveh.sensors.signal import Signal, as_signals
+from jaxveh.sensors.signal_instrument import AbstractSignalInstrument
 
 _WHEELS = ("fl", "fr", "rl", "rr")
 _BRAKE = ("brake_torque", *(f"brake_torque_{wheel}" for wheel in _WHEELS))
 _MOTOR = ("drive_torque", *(f"drive_torque_{wheel}" for wheel in _WHEELS), *(f"torque_{wheel}" for wheel in _WHEELS))
 
 
-class BrakeTorque(AbstractInstrument):
+class AbstractTorque(AbstractSignalInstrument):
+    """A device that knows torques (N m) a little late: `lag` (s) is a time constant of the first order; None: none."""
+
+    lag: jax.Array | None = positive("s", default=None)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The torques that it says."""
+        return self.channels
+
+    @property
+    def may_use(self) -> tuple[str, ...]:
+        """Nothing else."""
+        return ()
+
+    def torques(self, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
+        """The late torques with their errors, N m."""
+        return self.sent({name: lagged(outputs[name], self.lag, self.period) for name in self.channels}, key)
+
+
+class BrakeTorque(AbstractTorque):
     """Braking torque as made of the measured pressure, N m, never negative.
 
     - `signals`: the channels and their errors, a mapping to `Signal`: `brake_torque` (the sum) or `brake_torque_fl` ...
@@ -30,41 +50,15 @@ class BrakeTorque(AbstractInstrument):
     **Raises** `InputError` for unknown channels or numbers out of range.
     """
 
+    known: ClassVar[dict[str, str]] = dict.fromkeys(_BRAKE, "N*m")
     signals: dict[str, Signal] = eqx.field(converter=as_signals, default=("brake_torque",))
-    lag: jax.Array | None = positive("s", default=None)
-
-    def __check_init__(self):
-        check_signals("BrakeTorque.signals", self.signals, _BRAKE)
-        check_parameters(self)
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The measured channels."""
-        return tuple(name for name in _BRAKE if name in self.signals)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """N m."""
-        return dict.fromkeys(self.channels, "N*m")
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The torques that it says."""
-        return self.channels
-
-    @property
-    def may_use(self) -> tuple[str, ...]:
-        """Nothing else."""
-        return ()
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
         """The torques."""
-        true = {name: lagged(outputs[name], self.lag, self.period) for name in self.channels}
-        said = apply_all(self.signals, _BRAKE, true, self.period, key)
-        return {name: jnp.where(value > 0, value, 0.0) for name, value in said.items()}
+        return {name: jnp.where(value > 0, value, 0.0) for name, value in self.torques(outputs, key).items()}
 
 
-class MotorTorque(AbstractInstrument):
+class MotorTorque(AbstractTorque):
     """Driving torque as made of currents or of an engine's map, N m, of either sign.
 
     - `signals`: the channels and their errors, a mapping to `Signal`: `drive_torque` (the sum at the wheels),
@@ -74,37 +68,12 @@ class MotorTorque(AbstractInstrument):
     **Raises** `InputError` for unknown channels or numbers out of range.
     """
 
+    known: ClassVar[dict[str, str]] = dict.fromkeys(_MOTOR, "N*m")
     signals: dict[str, Signal] = eqx.field(converter=as_signals, default=("drive_torque",))
-    lag: jax.Array | None = positive("s", default=None)
-
-    def __check_init__(self):
-        check_signals("MotorTorque.signals", self.signals, _MOTOR)
-        check_parameters(self)
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The measured channels."""
-        return tuple(name for name in _MOTOR if name in self.signals)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """N m."""
-        return dict.fromkeys(self.channels, "N*m")
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The torques that it says."""
-        return self.channels
-
-    @property
-    def may_use(self) -> tuple[str, ...]:
-        """Nothing else."""
-        return ()
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
         """The torques."""
-        true = {name: lagged(outputs[name], self.lag, self.period) for name in self.channels}
-        return apply_all(self.signals, _MOTOR, true, self.period, key)
+        return self.torques(outputs, key)
 
 
 def lagged(values: jax.Array, lag: jax.Array | None, period: float) -> jax.Array:

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
+from jaxveh._core.parameter import check_parameters
 
 
 class Contact(NamedTuple):
@@ -64,7 +65,13 @@ class Forces(NamedTuple):
 
 
 class AbstractTyre(eqx.Module):
-    """A tyre (or an axle's tyres together): an elementwise force law, its array leaves are its parameters."""
+    """A tyre (or an axle's tyres together): an elementwise force law, its array leaves are its parameters.
+
+    **Raises** `InputError` for parameters outside their domain.
+    """
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @abc.abstractmethod
     def forces(self, contact: Contact, state: Any = None) -> Forces:

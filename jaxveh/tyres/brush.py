@@ -11,13 +11,14 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import check_one_of
 from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.slip import theoretical
+from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 SLIDES = ("along deflection", "against velocity")
 
 
-class Brush(AbstractTyre):
+class Brush(AbstractTwoStiffnesses):
     """The brush model with parabolic pressure, combined slip (H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., sec. 3.2).
 
     `slip_stiffness` (N) and `cornering_stiffness` (N/rad) at small slip, `friction` (-), `half_length` (m) of the contact.
@@ -39,9 +40,6 @@ class Brush(AbstractTyre):
     **Raises** `InputError` for parameters that are not positive, an unknown `slides`, or a contact without a load.
     """
 
-    slip_stiffness: jax.Array = positive("N")
-    cornering_stiffness: jax.Array = positive("N/rad")
-    friction: jax.Array = positive("-", default=1.0)
     half_length: jax.Array = positive("m", default=0.06)
     slides: str = eqx.field(static=True, default="along deflection")
 
@@ -51,10 +49,9 @@ class Brush(AbstractTyre):
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x, F_y (N) and M_z (N m)."""
-        limit = self.friction * contact.friction * need_load(contact, "Brush")
+        limit = self.limit(contact)
         sigma_x, sigma_y = theoretical(contact)
-        wish_x, wish_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
-        wish = numerics.hypot(wish_x, wish_y)
+        wish_x, wish_y, wish = self.unbounded(sigma_x, sigma_y)
         held = limit > 0
         g = wish / jnp.where(held, 3 * limit, 1.0)
         sticks = (g < 1) & held

@@ -9,12 +9,13 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_at_least
-from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh._core.parameter import check_parameters, parameter
+from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.slip import theoretical
+from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 
-class Dugoff(AbstractTyre):
+class Dugoff(AbstractTwoStiffnesses):
     """The model of Dugoff, Fancher & Segel (SAE 700377, 1970), in slip ratios that are positive when driving.
 
     `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `fading` (s/m; default 0) by which friction falls with
@@ -24,9 +25,6 @@ class Dugoff(AbstractTyre):
     **Raises** `InputError` for parameters out of range, or a contact without a load (with `fading`: without a speed).
     """
 
-    slip_stiffness: jax.Array = positive("N")
-    cornering_stiffness: jax.Array = positive("N/rad")
-    friction: jax.Array = positive("-", default=1.0)
     fading: jax.Array | None = parameter("s/m", scale=0.01, default=None)
 
     def __check_init__(self):
@@ -36,12 +34,11 @@ class Dugoff(AbstractTyre):
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x and F_y, N."""
-        limit = self.friction * contact.friction * need_load(contact, "Dugoff")
+        limit = self.limit(contact)
         sigma_x, sigma_y = theoretical(contact)
         if self.fading is not None:
             limit = limit * self._left(contact, sigma_y)
-        wish_x, wish_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
-        wish = numerics.hypot(wish_x, wish_y)
+        wish_x, wish_y, wish = self.unbounded(sigma_x, sigma_y)
         slips = 2 * wish > limit
         part = jnp.where(slips, limit / jnp.where(slips, 2 * wish, 1.0), 1.0)
         share = part * (2 - part)

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 
 
@@ -29,9 +29,6 @@ class Exponential(AbstractTyre):
     stiffness_factor: jax.Array = positive("1/rad")
     friction: jax.Array = positive("-", default=1.0)
     slip_stiffness_factor: jax.Array | None = positive("-", default=None)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_y (N), and F_x (N) where a slip stiffness factor is given."""

@@ -8,14 +8,15 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh._core.parameter import positive
+from jaxveh.tyres.base import Contact, Forces
+from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 LEAST_SHARE = 0.01
 """The square of the share of friction that is left sideways however large the longitudinal force."""
 
 
-class Fiala(AbstractTyre):
+class Fiala(AbstractTwoStiffnesses):
     """Fiala (1954) with longitudinal coupling (Hindiyeh & Gerdes, J. Dyn. Sys. Meas. Control 136, 2014, eqs 3 to 6).
 
     `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `half_length` (m). `F_x = C_x kappa` within
@@ -26,17 +27,11 @@ class Fiala(AbstractTyre):
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """
 
-    slip_stiffness: jax.Array = positive("N")
-    cornering_stiffness: jax.Array = positive("N/rad")
-    friction: jax.Array = positive("-", default=1.0)
     half_length: jax.Array = positive("m", default=0.06)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x, F_y (N) and M_z (N m)."""
-        limit = self.friction * contact.friction * need_load(contact, "Fiala")
+        limit = self.limit(contact)
         F_x = jnp.clip(self.slip_stiffness * contact.slip_ratio, -limit, limit)
         held = limit > 0
         share = F_x / jnp.where(held, limit, 1.0)

@@ -8,11 +8,12 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh._core.parameter import positive
+from jaxveh.tyres.base import Contact, Forces, need_load
+from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 
-class FialaADAMS(AbstractTyre):
+class FialaADAMS(AbstractTwoStiffnesses):
     """The Fiala model of MSC ADAMS (Adams Tire, Using the Fiala Handling Force Model), in this package's signs.
 
     `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-; UMAX) at rest, `sliding_friction` (-; UMIN) at the slip 1,
@@ -29,14 +30,8 @@ class FialaADAMS(AbstractTyre):
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """
 
-    slip_stiffness: jax.Array = positive("N")
-    cornering_stiffness: jax.Array = positive("N/rad")
-    friction: jax.Array = positive("-", default=1.0)
     sliding_friction: jax.Array | None = positive("-", default=None)
     half_width: jax.Array = positive("m", default=0.1)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x, F_y (N) and M_z (N m)."""

@@ -10,8 +10,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh._core.parameter import positive
+from jaxveh.tyres.base import Contact, Forces
+from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 FORCE = (1.0, -0.0668, -0.1032)
 MOMENT = (0.2749, -0.0950, -0.0872, 0.0353)
@@ -22,7 +23,7 @@ TAIL = 2.0
 POLE = 0.32
 
 
-class FialaPolynomial(AbstractTyre):
+class FialaPolynomial(AbstractTwoStiffnesses):
     """The Fiala tyre of Qin et al. (2014, a model-adaptive particle filter for vehicle states), eqs. 9 to 11.
 
     `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-), `trail` e (m) at zero slip, `contact_length` L_r (m;
@@ -43,19 +44,13 @@ class FialaPolynomial(AbstractTyre):
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """
 
-    slip_stiffness: jax.Array = positive("N")
-    cornering_stiffness: jax.Array = positive("N/rad")
-    friction: jax.Array = positive("-", default=1.0)
     trail: jax.Array = positive("m", default=0.0317)
     contact_length: jax.Array | None = positive("m", default=None)
     as_printed: bool = eqx.field(static=True, default=False)
 
-    def __check_init__(self):
-        check_parameters(self)
-
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x, F_y (N) and M_z (N m)."""
-        limit = self.friction * contact.friction * need_load(contact, "FialaPolynomial")
+        limit = self.limit(contact)
         F_x = self.slip_stiffness * contact.slip_ratio
         if not self.as_printed:
             F_x = jnp.clip(F_x, -limit, limit)

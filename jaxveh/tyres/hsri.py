@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 
-from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, positive
-from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.slip import theoretical
+from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 
-class HSRI(AbstractTyre):
+class HSRI(AbstractTwoStiffnesses):
     """The HSRI model (J. T. Tielking & N. K. Mital, UM-HSRI-PF-74-2, 1974), as eq. 4 of the sideslip review writes it.
 
     `slip_stiffness` (N), `cornering_stiffness` (N/rad), `friction` (-). With theoretical slips sigma (in the source
@@ -26,19 +24,11 @@ class HSRI(AbstractTyre):
     **Raises** `InputError` for parameters that are not positive, or a contact without a load.
     """
 
-    slip_stiffness: jax.Array = positive("N")
-    cornering_stiffness: jax.Array = positive("N/rad")
-    friction: jax.Array = positive("-", default=1.0)
-
-    def __check_init__(self):
-        check_parameters(self)
-
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x and F_y, N."""
-        limit = self.friction * contact.friction * need_load(contact, "HSRI")
+        limit = self.limit(contact)
         sigma_x, sigma_y = theoretical(contact)
-        wish_x, wish_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
-        wish = numerics.hypot(wish_x, wish_y)
+        wish_x, wish_y, wish = self.unbounded(sigma_x, sigma_y)
         slips = 2 * wish > limit
         inverse_H = limit / jnp.where(slips, wish, 1.0)
         share = jnp.where(slips, inverse_H - inverse_H**2 / 4, 1.0)

@@ -7,7 +7,7 @@ from typing import Any
 import jax
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 from jaxveh.tyres.slip import length, practical
 
@@ -32,9 +32,6 @@ class IsotropicMagicFormula(AbstractTyre):
     C: jax.Array = positive("-")
     friction: jax.Array = positive("-", default=1.0)
     E: jax.Array = parameter("-", scale=2.0, default=0.0)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x and F_y, N."""

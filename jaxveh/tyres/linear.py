@@ -6,7 +6,7 @@ from typing import Any
 
 import jax
 
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces
 
 
@@ -20,9 +20,6 @@ class Linear(AbstractTyre):
 
     cornering_stiffness: jax.Array = positive("N/rad")
     slip_stiffness: jax.Array | None = positive("N", default=None)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_y, N, in the shape of the slip angle; with a slip stiffness F_x, N, in the shape of the slip ratio."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import jax
 
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 
 
@@ -29,9 +29,6 @@ class LinearWithLoad(AbstractTyre):
     cornering_stiffness: jax.Array = positive("N/rad")
     peak_load: jax.Array = positive("N")
     slip_stiffness_factor: jax.Array | None = positive("-", default=None)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_y (N), and F_x (N) where a slip stiffness is given."""

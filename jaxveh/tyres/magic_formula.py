@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
 
 
@@ -39,9 +39,6 @@ class MagicFormula(AbstractTyre):
     S_h: jax.Array = parameter("rad", scale=0.02, default=0.0)
     S_v: jax.Array = parameter("N", scale=500.0, default=0.0)
     nominal_load: jax.Array | None = positive("N", default=None)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """Lateral force alone, N, in the shape of slip angle, load and friction together."""

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.names import record, record_type
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.tyres.base import (
     AbstractDynamicTyre,
     AbstractTyre,
@@ -82,9 +82,6 @@ class Relaxed(AbstractDynamicTyre):
             )
         self.tyre, self.sigma_x, self.sigma_y, self.of = tyre, sigma_x, sigma_y, of
         self.lags, self.own = given or ("x", "y"), not given
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def state_names(self) -> tuple[str, ...]:

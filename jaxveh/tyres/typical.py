@@ -5,18 +5,8 @@ from __future__ import annotations
 import dataclasses
 
 from jaxveh._core.errors import check_positive
-from jaxveh.tyres.mf_tyre import (
-    AligningCoefficients,
-    LateralCoefficients,
-    LongitudinalCoefficients,
-    MFTyre,
-    OverturningCoefficients,
-    Ranges,
-    RollingCoefficients,
-    Scaling,
-    Structure,
-    TurnSlip,
-)
+from jaxveh.tyres import mf_tyre
+from jaxveh.tyres.mf_tyre import MFTyre
 from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
 
 SLIP_RATIO = 1.5
@@ -45,14 +35,14 @@ def typical_mf_tyre(
         return kind(**{field.name: known[field.name] for field in dataclasses.fields(kind) if field.name in known})
 
     parts = (
-        Structure,
-        LongitudinalCoefficients,
-        LateralCoefficients,
-        AligningCoefficients,
-        OverturningCoefficients,
-        RollingCoefficients,
-        Scaling,
-        Ranges,
-        TurnSlip,
+        mf_tyre.Structure,
+        mf_tyre.LongitudinalCoefficients,
+        mf_tyre.LateralCoefficients,
+        mf_tyre.AligningCoefficients,
+        mf_tyre.OverturningCoefficients,
+        mf_tyre.RollingCoefficients,
+        mf_tyre.Scaling,
+        mf_tyre.Ranges,
+        mf_tyre.TurnSlip,
     )
     return MFTyre(*map(section, parts), version=version, limits=limits)

@@ -7,16 +7,16 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load
+from jaxveh._core.parameter import parameter
+from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.slip import theoretical
+from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
 
 SATURATED = 40.0
 """The normalised slip from which on the exponential is zero in float64, whatever E."""
 
 
-class UniTire(AbstractTyre):
+class UniTire(AbstractTwoStiffnesses):
     """UniTire in combined slip (K. Guo & D. Lu, UniTire: unified tire model, Vehicle System Dynamics 45 S1, 2007, 79-99).
 
     `slip_stiffness` K_x (N), `cornering_stiffness` K_y (N/rad), `friction` (-), `E` (-; default 0) the curvature factor.
@@ -29,20 +29,13 @@ class UniTire(AbstractTyre):
     **Raises** `InputError` for stiffnesses or friction that are not positive, or a contact without a load.
     """
 
-    slip_stiffness: jax.Array = positive("N")
-    cornering_stiffness: jax.Array = positive("N/rad")
-    friction: jax.Array = positive("-", default=1.0)
     E: jax.Array = parameter("-", scale=0.5, default=0.0)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_x and F_y, N."""
-        limit = self.friction * contact.friction * need_load(contact, "UniTire")
+        limit = self.limit(contact)
         sigma_x, sigma_y = theoretical(contact)
-        wish_x, wish_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
-        wish = numerics.hypot(wish_x, wish_y)
+        wish_x, wish_y, wish = self.unbounded(sigma_x, sigma_y)
         held = limit > 0
         phi = wish / jnp.where(held, limit, 1.0)
         rises = (phi < SATURATED) & held

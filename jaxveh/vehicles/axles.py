@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from jaxveh._core.names import record_type
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces
-from jaxveh.vehicles.wheels import stored
+from jaxveh.vehicles.wheels import state_names, state_of, stored
 
 AXLES = ("front", "rear")
 
@@ -20,11 +19,11 @@ class AxleTyres(NamedTuple):
     @property
     def state_names(self) -> tuple[str, ...]:
         """The states of dynamic tyres: `front_<name>`, `rear_<name>`."""
-        return tuple(f"{axle}_{name}" for axle, tyre in zip(AXLES, self, strict=True) for name in _names(tyre))
+        return tuple(f"{axle}_{name}" for axle, tyre in zip(AXLES, self, strict=True) for name in state_names(tyre))
 
     def states(self, x: Any) -> tuple[Any, Any]:
         """Each axle's tyre state out of the car's, None for a tyre without."""
-        return _state("front", self.front, x), _state("rear", self.rear, x)
+        return state_of("front", self.front, x), state_of("rear", self.rear, x)
 
     def start(self, contacts: tuple[Contact, Contact]) -> tuple:
         """The settled states, in the order of `state_names`."""
@@ -42,12 +41,3 @@ class AxleTyres(NamedTuple):
         for tyre, contact, state in zip(self, contacts, states, strict=True):
             found += list(tyre.derivatives(contact, state)) if isinstance(tyre, AbstractDynamicTyre) else []
         return tuple(found)
-
-
-def _names(tyre: AbstractTyre) -> tuple[str, ...]:
-    return tyre.state_names if isinstance(tyre, AbstractDynamicTyre) else ()
-
-
-def _state(axle: str, tyre: AbstractTyre, x: Any) -> Any:
-    names = _names(tyre)
-    return record_type("TyreState", names)(*[getattr(x, f"{axle}_{name}") for name in names]) if names else None

@@ -6,7 +6,10 @@ import abc
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 
+from jaxveh._core.names import check_names
 from jaxveh.roads import LEVEL, Ground
 
 GRAVITY = 9.80665
@@ -29,13 +32,38 @@ class Motion(NamedTuple):
     yaw_rate: Any
 
 
+SHARED = "**Parameters** of "
+"""How a paragraph on parameters begins that is meant for all classes below."""
+
+
+def with_shared_parameters(kind: type) -> str:
+    """The docstring of a class, with its bases' paragraphs on shared parameters before the one on inputs, or at the end."""
+    paragraphs = (kind.__doc__ or "").rstrip().split("\n\n")
+    shared = [
+        part
+        for base in reversed(kind.__mro__[1:])
+        for part in (base.__dict__.get("__doc__") or "").rstrip().split("\n\n")
+        if part.lstrip().startswith(SHARED) and part not in paragraphs
+    ]
+    at = next((i for i, part in enumerate(paragraphs) if part.lstrip().startswith("**Inputs**")), len(paragraphs))
+    return "\n\n".join([*paragraphs[:at], *shared, *paragraphs[at:]]) + "\n    "
+
+
 class AbstractVehicle(eqx.Module):
     """Equations of motion of one vehicle: array leaves are parameters, states and inputs are NamedTuples of scalars.
 
     Written for one instant and elementwise: a batch of vehicles, states or parameters has arrays in the fields. Axes
     of ISO 8855 (x forward, y left, z up; yaw, yaw rate and steer positive to the left), SI units. Speeds and accelerations
     are those of the centre of gravity in the intermediate axes, which lie in the road's plane and turn with the car.
+
+    Parameters that several vehicles share are declared by abstract classes, whose docstrings say of what in a paragraph that
+    begins with `SHARED`; the docstring of a vehicle gets these paragraphs, so that `help` shows all.
     """
+
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        if not cls.__name__.startswith("Abstract"):
+            cls.__doc__ = with_shared_parameters(cls)
 
     @property
     @abc.abstractmethod
@@ -77,3 +105,22 @@ class AbstractVehicle(eqx.Module):
     def outputs(self, t: Any, x: Any, u: Any, ground: Ground = LEVEL) -> Any:
         """Everything that can be said about the vehicle at this instant, a NamedTuple."""
         return self.evaluate(t, x, u, ground)[1]
+
+
+def filled(outputs: Any) -> Any:
+    """The same NamedTuple, each field with the shape of all: a number or a parameter stands for the whole batch."""
+    leaves = jax.tree.leaves(outputs)
+    shape = jnp.broadcast_shapes(*[jnp.shape(leaf) for leaf in leaves])
+    dtype = jnp.result_type(*[leaf for leaf in leaves if hasattr(leaf, "dtype")])
+    array = lambda leaf: leaf if hasattr(leaf, "dtype") else jnp.asarray(leaf, dtype)
+    return jax.tree.map(lambda leaf: jnp.broadcast_to(array(leaf), shape), outputs)
+
+
+def given_or_zero(state_type: Any, values: dict[str, Any], like: Any, parameter: Any) -> Any:
+    """A state with `values` by name, all else zero in the shape of `like`; of the float type of a `parameter`.
+
+    **Raises** `InputError` for names that the state does not have.
+    """
+    check_names("start", values, state_type._fields)
+    dtype, zero = jnp.result_type(parameter), jnp.zeros(jnp.shape(like))
+    return state_type(*[jnp.asarray(values.get(name, zero), dtype) for name in state_type._fields])

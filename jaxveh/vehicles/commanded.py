@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle
+from jaxveh.vehicles.base import AbstractVehicle, filled
 from jaxveh.vehicles.limits import AccelerationLimits, SteerLimits
 from jaxveh.vehicles.wheels import gravity
 
@@ -80,7 +80,7 @@ class Commanded(AbstractVehicle):
         rates, outputs = self.vehicle.evaluate(t, self._inner(x), inner, ground)
         own = {"steer": x.steer, "steer_rate": steer_rate, "v_x_rate": v_x_rate}
         shown = record("CommandedOutputs", own | outputs._asdict())
-        return self.state_type(steer_rate, v_x_rate, *rates), shown
+        return self.state_type(steer_rate, v_x_rate, *rates), filled(shown)
 
     def _inner(self, x):
         return self.vehicle.state_type(*x[len(OWN) :])

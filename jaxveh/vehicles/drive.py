@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import abc
+from dataclasses import KW_ONLY
 from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
 
 from jaxveh._core.errors import check
-from jaxveh._core.parameter import parameter
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.vehicles.base import AbstractVehicle
 from jaxveh.vehicles.wheels import Wheels, front_rear, wheel_names, wheels_of
 
 
@@ -53,3 +55,17 @@ class FourMotors(AbstractDrive):
 
     def torques(self, u):
         return wheels_of(u, "torque"), Wheels(0.0, 0.0, 0.0, 0.0)
+
+
+class AbstractDriven(AbstractVehicle):
+    """A car that torques drive and brake.
+
+    **Parameters** of the drive: `wheel_radius` (m, effective), `drag` (N s^2/m^2, half the air's density times c_d times the
+    area), `rolling_resistance` (-), `drive`, who turns the wheels (`AxleDrive`, `FourMotors`).
+    """
+
+    _: KW_ONLY
+    wheel_radius: jax.Array = positive("m", default=0.32)
+    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.0)
+    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.0)
+    drive: AbstractDrive = eqx.field(default_factory=AxleDrive)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.names import check_names
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.base import AbstractVehicle, Motion, filled, given_or_zero
 from jaxveh.vehicles.wheels import gravity
 
 
@@ -47,7 +45,27 @@ UNITS = {
 }
 
 
-class Kinematic(AbstractVehicle):
+class AbstractKinematic(AbstractVehicle):
+    """A car whose wheels do not slip, steered at a given speed.
+
+    **Raises** `InputError` for parameters outside their domain.
+    """
+
+    wheelbase: jax.Array = positive("m")
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def inputs(self):
+        return ("steer", "v_x")
+
+    def curvature(self, u: Any) -> Any:
+        """That of the rear axle's path, 1/m."""
+        return numerics.tan(u.steer) / self.wheelbase
+
+
+class Kinematic(AbstractKinematic):
     """A single track whose wheels do not slip: true at walking speed, and the usual car of path planning.
 
     With delta the steer, L the wheelbase and d how far the reference point lies ahead of the rear axle (R. Rajamani, Vehicle
@@ -63,15 +81,7 @@ class Kinematic(AbstractVehicle):
     **Raises** `InputError` for parameters outside their domain.
     """
 
-    wheelbase: jax.Array = positive("m")
     rear_axle_to_reference: jax.Array = parameter("m", scale=1.0, default=0.0)
-
-    def __check_init__(self):
-        check_parameters(self)
-
-    @property
-    def inputs(self):
-        return ("steer", "v_x")
 
     @property
     def state_type(self):
@@ -88,18 +98,16 @@ class Kinematic(AbstractVehicle):
         return front, front, rear, rear
 
     def start(self, t, u, **values):
-        check_names("start", values, KinematicState._fields)
-        dtype = jnp.result_type(self.wheelbase)
-        return KinematicState(jnp.asarray(values.get("yaw", jnp.zeros(jnp.shape(u.v_x))), dtype))
+        return given_or_zero(KinematicState, values, u.v_x, self.wheelbase)
 
     def motion(self, x, u):
-        yaw_rate = u.v_x * self._curvature(u)
+        yaw_rate = u.v_x * self.curvature(u)
         return Motion(0.0, 0.0, x.yaw, u.v_x, self.rear_axle_to_reference * yaw_rate, yaw_rate)
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
         g_x, g_y, _ = gravity(ground)
-        moves, curvature = self.motion(x, u), self._curvature(u)
+        moves, curvature = self.motion(x, u), self.curvature(u)
         outputs = KinematicOutputs(
             v_x=u.v_x,
             v_y=moves.v_y,
@@ -110,7 +118,4 @@ class Kinematic(AbstractVehicle):
             sideslip=numerics.arctan(self.rear_axle_to_reference * curvature),
             curvature=curvature,
         )
-        return KinematicState(moves.yaw_rate), outputs
-
-    def _curvature(self, u):
-        return numerics.tan(u.steer) / self.wheelbase
+        return KinematicState(moves.yaw_rate), filled(outputs)

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import check
-from jaxveh._core.names import check_names
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.base import Motion, filled, given_or_zero
+from jaxveh.vehicles.kinematic import AbstractKinematic
 from jaxveh.vehicles.wheels import gravity
 
 
@@ -51,7 +51,7 @@ UNITS = {
 }
 
 
-class KinematicTrailer(AbstractVehicle):
+class KinematicTrailer(AbstractKinematic):
     """A kinematic single track with a trailer of one axle; no wheel slips. Position and speeds are those of the rear axle.
 
     With r the yaw rate, alpha the hitch angle, c the hitch's distance behind the rear axle and l the trailer's length from the
@@ -69,18 +69,12 @@ class KinematicTrailer(AbstractVehicle):
     **Raises** `InputError` for parameters outside their domain.
     """
 
-    wheelbase: jax.Array = positive("m")
     trailer_length: jax.Array = positive("m")
     hitch_behind_axle: jax.Array = parameter("m", scale=1.0, default=0.0)
     hitch_limit: float = eqx.field(static=True, default=math.pi / 2)
 
     def __check_init__(self):
-        check_parameters(self)
         check("KinematicTrailer.hitch_limit", self.hitch_limit, lambda v: (v > 0) & (v <= math.pi), "in (0, pi] rad")
-
-    @property
-    def inputs(self):
-        return ("steer", "v_x")
 
     @property
     def state_type(self):
@@ -97,15 +91,10 @@ class KinematicTrailer(AbstractVehicle):
         return front, front, rear, rear
 
     def start(self, t, u, **values):
-        check_names("start", values, KinematicTrailerState._fields)
-        dtype = jnp.result_type(self.wheelbase)
-        zero = jnp.zeros(jnp.shape(u.v_x))
-        return KinematicTrailerState(
-            *[jnp.asarray(values.get(name, zero), dtype) for name in KinematicTrailerState._fields]
-        )
+        return given_or_zero(KinematicTrailerState, values, u.v_x, self.wheelbase)
 
     def motion(self, x, u):
-        yaw_rate = u.v_x * (numerics.tan(u.steer) / self.wheelbase)
+        yaw_rate = u.v_x * self.curvature(u)
         return Motion(0.0, 0.0, x.yaw, u.v_x, jnp.zeros_like(yaw_rate), yaw_rate)
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
@@ -124,12 +113,12 @@ class KinematicTrailer(AbstractVehicle):
             v_y=moves.v_y,
             yaw=x.yaw,
             yaw_rate=yaw_rate,
-            a_x=jnp.zeros_like(yaw_rate) - g_x,
+            a_x=-g_x,
             a_y=u.v_x * yaw_rate - g_y,
-            sideslip=jnp.zeros_like(yaw_rate),
+            sideslip=0.0,
             hitch_angle=x.hitch_angle,
             hitch_rate=hitch_rate,
             trailer_yaw=x.yaw + x.hitch_angle,
             trailer_v_x=u.v_x * cosine - swing * sine,
         )
-        return KinematicTrailerState(yaw_rate, hitch_rate), outputs
+        return KinematicTrailerState(yaw_rate, hitch_rate), filled(outputs)

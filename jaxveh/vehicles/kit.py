@@ -1,19 +1,39 @@
 """What those who add a vehicle build with."""
 
-from jaxveh.vehicles.load_transfer import planar_loads
+from jaxveh.vehicles.base import filled
+from jaxveh.vehicles.drive import AbstractDriven
+from jaxveh.vehicles.given_speed import AbstractToldSpeed
+from jaxveh.vehicles.load_transfer import AbstractShiftingLoads, planar_loads
+from jaxveh.vehicles.rolling_body import AbstractRollingTwoTrack
 from jaxveh.vehicles.sets import CARS, FIDELITIES
-from jaxveh.vehicles.two_track import air_drag, positions_of, rolling_wheels
-from jaxveh.vehicles.wheels import Wheels, body_forces, each_wheel, travel_direction, wheel_names, wheels_of
+from jaxveh.vehicles.shared import AbstractOneTrack, AbstractOnTyres, AbstractPlaneBody, AbstractTwoAxle
+from jaxveh.vehicles.traction import AbstractSpinless
+from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack, AbstractTwoTrack, air_drag, rolling_wheels
+from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
+from jaxveh.vehicles.wheels import Wheels, body_forces, corners, each_wheel, travel_direction, wheel_names, wheels_of
 
 __all__ = [
     "CARS",
     "FIDELITIES",
+    "AbstractDriven",
+    "AbstractLoadedTwoTrack",
+    "AbstractOnTyres",
+    "AbstractOneTrack",
+    "AbstractPlaneBody",
+    "AbstractRollingTwoTrack",
+    "AbstractShiftingLoads",
+    "AbstractSpinless",
+    "AbstractToldSpeed",
+    "AbstractTwoAxle",
+    "AbstractTwoTrack",
+    "AbstractUprightTwoTrack",
     "Wheels",
     "air_drag",
     "body_forces",
+    "corners",
     "each_wheel",
+    "filled",
     "planar_loads",
-    "positions_of",
     "rolling_wheels",
     "travel_direction",
     "wheel_names",

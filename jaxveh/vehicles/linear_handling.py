@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import KW_ONLY
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
-from jaxveh._core.names import check_names
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
+from jaxveh.vehicles.base import GRAVITY, Motion, filled, given_or_zero
 from jaxveh.vehicles.lateral_system import LateralSystem
+from jaxveh.vehicles.shared import AbstractOneTrack
 from jaxveh.vehicles.single_track import UNITS, SingleTrackOutputs
 from jaxveh.vehicles.slip import regularised_speed
 from jaxveh.vehicles.wheels import gravity
@@ -28,7 +28,7 @@ class LinearSingleTrackState(NamedTuple):
     yaw_rate: Any
 
 
-class LinearSingleTrack(AbstractVehicle):
+class LinearSingleTrack(AbstractOneTrack):
     """The single track for small angles: linear in steer, sideslip and yaw rate at a given speed v.
 
     With C_f, C_r the axles' cornering stiffnesses, a and b their distances from the centre of gravity (P. Riekert & T. E.
@@ -42,27 +42,19 @@ class LinearSingleTrack(AbstractVehicle):
     `crawl_speed` (m/s, 3 by default) |v| in the denominators is `regularised_speed`, so that standstill is an ordinary point.
     A road's bank pushes by `m g_y`; its friction does not count, as always in a linear law.
 
-    **Parameters**: `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `rear_axle_to_cg` (m), `front_stiffness`,
-    `rear_stiffness` (N/rad, of the axle at rest on a level road), `cg_height` (m; None: stiffnesses stay). With a height the
-    stiffnesses are proportional to the axles' loads, which move by `m a_x h / (a + b)` to the rear, as in CommonRoad's ST model.
+    **Parameters**: `front_stiffness`, `rear_stiffness` (N/rad, of the axle at rest on a level road), `cg_height` (m; None:
+    stiffnesses stay). With a height the stiffnesses are proportional to the axles' loads, which move by `m a_x h / (a + b)` to
+    the rear, as in CommonRoad's ST model.
 
     **Inputs**: `steer` (rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, `v_x_rate = dv_x/dt` (m/s^2).
 
     **Raises** `InputError` for parameters that are not positive.
     """
 
-    mass: jax.Array = positive("kg")
-    yaw_inertia: jax.Array = positive("kg m^2")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
+    _: KW_ONLY
     front_stiffness: jax.Array = positive("N/rad")
     rear_stiffness: jax.Array = positive("N/rad")
     cg_height: jax.Array | None = positive("m", default=None)
-    crawl_speed: float = eqx.field(static=True, default=3.0)
-
-    def __check_init__(self):
-        check_parameters(self)
-        check_positive("LinearSingleTrack.crawl_speed", self.crawl_speed, "m/s")
 
     @property
     def inputs(self):
@@ -76,22 +68,8 @@ class LinearSingleTrack(AbstractVehicle):
     def units(self):
         return dict(UNITS)
 
-    @property
-    def wheel_positions(self):
-        front, rear = (self.front_axle_to_cg, 0.0), (-self.rear_axle_to_cg, 0.0)
-        return front, front, rear, rear
-
-    @property
-    def wheelbase(self) -> jax.Array:
-        """Distance between the axles, m."""
-        return self.front_axle_to_cg + self.rear_axle_to_cg
-
     def start(self, t, u, **values):
-        check_names("start", values, LinearSingleTrackState._fields)
-        dtype, zero = jnp.result_type(self.mass), jnp.zeros(jnp.shape(u.v_x))
-        return LinearSingleTrackState(
-            *[jnp.asarray(values.get(name, zero), dtype) for name in LinearSingleTrackState._fields]
-        )
+        return given_or_zero(LinearSingleTrackState, values, u.v_x, self.mass)
 
     def motion(self, x, u):
         along, across = numerics.cos(x.sideslip), numerics.sin(x.sideslip)
@@ -119,17 +97,17 @@ class LinearSingleTrack(AbstractVehicle):
             yaw=x.yaw,
             yaw_rate=x.yaw_rate,
             yaw_acceleration=yaw_acceleration,
-            a_x=(0.0 * u.v_x if self.cg_height is None else u.v_x_rate) - g_x,
+            a_x=(0.0 if self.cg_height is None else u.v_x_rate) - g_x,
             a_y=a_y,
             sideslip=x.sideslip,
             slip_angle_front=slip_front,
             slip_angle_rear=slip_rear,
             F_yf=F_yf,
             F_yr=F_yr,
-            load_front=front * weight * b + 0.0 * u.v_x,
-            load_rear=rear * weight * a + 0.0 * u.v_x,
+            load_front=front * weight * b,
+            load_rear=rear * weight * a,
         )
-        return rates, outputs
+        return rates, filled(outputs)
 
     def load_shares(self, u, ground: Ground = LEVEL) -> tuple[Any, Any]:
         """Loads of front and rear axle over those at rest on a level road (-); they multiply the stiffnesses."""

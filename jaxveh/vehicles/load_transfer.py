@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import abc
-from typing import Any, ClassVar
+from dataclasses import KW_ONLY
+from typing import Any, ClassVar, Protocol
 
 import equinox as eqx
 import jax
@@ -11,11 +12,13 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.vehicles.shared import AbstractPlaneBody
 from jaxveh.vehicles.wheels import Wheels
 
 
 class AbstractLoadTransfer(eqx.Module):
-    """Which accelerations shift the loads. `felt` are those at an instant; states, where there are any, are the car's.
+    """Which accelerations shift the loads. `felt` are those at an instant; states, where there are any, are the car's, and zero
+    where it runs straight.
 
     Longitudinally it is what the tyres push, over the mass: the air's drag acts at the centre of gravity's height, so that in
     moments about it only forces of the road count.
@@ -32,25 +35,26 @@ class AbstractLoadTransfer(eqx.Module):
     def rates(self, x: Any, a_x: Any, a_y: Any) -> tuple:
         """The time derivatives of the states where the tyres push with a_x, a_y (m/s^2: force over mass)."""
 
-    def start(self, guess: tuple[Any, Any]) -> tuple:
-        """The settled states."""
-        return tuple(guess) if self.state_names else ()
 
-
-class StaticLoads(AbstractLoadTransfer):
-    """Loads as at rest."""
+class AbstractImmediate(AbstractLoadTransfer):
+    """Loads that follow at once, and so need no state."""
 
     state_names: ClassVar[tuple[str, ...]] = ()
-    inputs: ClassVar[tuple[str, ...]] = ()
-
-    def felt(self, x, u, guess):
-        return 0.0, 0.0
 
     def rates(self, x, a_x, a_y):
         return ()
 
 
-class QuasiStatic(AbstractLoadTransfer):
+class StaticLoads(AbstractImmediate):
+    """Loads as at rest."""
+
+    inputs: ClassVar[tuple[str, ...]] = ()
+
+    def felt(self, x, u, guess):
+        return 0.0, 0.0
+
+
+class QuasiStatic(AbstractImmediate):
     """Loads follow at once the accelerations of a steady turn, `a_y = v_x yaw_rate`, and of the torques, `a_x = T / (m r)`.
 
     They need no tyre force, so that there is no loop to solve. A car that yaws without turning (on two frictions, in a spin) has
@@ -58,14 +62,10 @@ class QuasiStatic(AbstractLoadTransfer):
     does not, and its braking torques must be those that the road holds.
     """
 
-    state_names: ClassVar[tuple[str, ...]] = ()
     inputs: ClassVar[tuple[str, ...]] = ()
 
     def felt(self, x, u, guess):
         return guess
-
-    def rates(self, x, a_x, a_y):
-        return ()
 
 
 class LaggedLoads(AbstractLoadTransfer):
@@ -89,23 +89,54 @@ class LaggedLoads(AbstractLoadTransfer):
         return (a_x - x.a_x_felt) / self.time, (a_y - x.a_y_felt) / self.time
 
 
-class MeasuredLoads(AbstractLoadTransfer):
+class MeasuredLoads(AbstractImmediate):
     """Loads of accelerations that are measured: `a_x` and `a_y` (m/s^2) become inputs, as in filters on real logs.
 
     An accelerometer feels the air's drag, too; it is left in (at 45 m/s some 2 % of an axle's load).
     """
 
-    state_names: ClassVar[tuple[str, ...]] = ()
     inputs: ClassVar[tuple[str, ...]] = ("a_x", "a_y")
 
     def felt(self, x, u, guess):
         return u.a_x, u.a_y
 
-    def rates(self, x, a_x, a_y):
-        return ()
+
+class AbstractShiftingLoads(AbstractPlaneBody):
+    """A car whose wheel loads follow from accelerations.
+
+    **Parameters** of the loads: `load_transfer`, by which they follow accelerations (`QuasiStatic`, `LaggedLoads`, ...).
+    """
+
+    _: KW_ONLY
+    load_transfer: AbstractLoadTransfer = eqx.field(default_factory=LaggedLoads)
 
 
-def planar_loads(car: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
+class AxleWeights(Protocol):
+    """What the loads of axles depend on: mass (kg), places of the axles and height of the centre of gravity (m)."""
+
+    @property
+    def mass(self) -> Any: ...
+    @property
+    def front_axle_to_cg(self) -> Any: ...
+    @property
+    def rear_axle_to_cg(self) -> Any: ...
+    @property
+    def cg_height(self) -> Any: ...
+
+
+class WheelWeights(AxleWeights, Protocol):
+    """What the loads of an upright car's wheels depend on: besides, tracks (m) and the front axle's share of the lateral transfer
+    (-; None: by the static loads)."""
+
+    @property
+    def track_front(self) -> Any: ...
+    @property
+    def track_rear(self) -> Any: ...
+    @property
+    def front_roll_share(self) -> Any: ...
+
+
+def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     """Wheel loads, N, of a rigid car whose body neither rolls nor pitches visibly.
 
     In the road's plane, with a_x, a_y what accelerometers at the centre of gravity say (slopes are in them), h its height
@@ -138,7 +169,7 @@ def held(moved: Any, half: Any) -> Any:
     return jnp.clip(moved, -half, half)
 
 
-def axle_loads(car: Any, a_x: Any, g_z: Any) -> tuple[Any, Any]:
+def axle_loads(car: AxleWeights, a_x: Any, g_z: Any) -> tuple[Any, Any]:
     """Loads of the front and the rear axle, N: `m (g_z b - a_x h) / (a + b)` and the rest of the weight, none below zero."""
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     weight = -car.mass * g_z

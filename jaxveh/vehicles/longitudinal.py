@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.names import check_names
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh.vehicles.base import AbstractVehicle, Motion, filled, given_or_zero
 from jaxveh.vehicles.two_track import air_drag
 from jaxveh.vehicles.wheels import gravity, travel_direction
 
@@ -59,7 +58,7 @@ class Longitudinal(AbstractVehicle):
     a slope creeps where they hold the slope's pull.
 
     **Parameters**: `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2, of one wheel), `drag` (N s^2/m^2, half the air's
-    density times c_W times the area), `rolling_resistance` f_r (-).
+    density times c_d times the area), `rolling_resistance` f_r (-).
 
     **Inputs**: `drive_torque` and `brake_torque` (N m), sums over the wheels; the second at least zero.
 
@@ -94,9 +93,7 @@ class Longitudinal(AbstractVehicle):
 
     def start(self, t, u, **values):
         """`v_x` is the speed (m/s), 0 unless given."""
-        check_names("start", values, LongitudinalState._fields)
-        dtype = jnp.result_type(self.mass)
-        return LongitudinalState(jnp.asarray(values.get("v_x", jnp.zeros(jnp.shape(u.drive_torque))), dtype))
+        return given_or_zero(LongitudinalState, values, u.drive_torque, self.mass)
 
     def motion(self, x, u):
         zero = jnp.zeros_like(x.v_x)
@@ -110,13 +107,13 @@ class Longitudinal(AbstractVehicle):
         brake_force = -against * u.brake_torque / self.wheel_radius
         rolling_force = against * self.rolling_resistance * self.mass * g_z
         air_force = -air_drag(self.drag, x.v_x)
-        grade_force = self.mass * (g_x + jnp.zeros_like(x.v_x))
+        grade_force = self.mass * g_x
         rate = (drive_force + brake_force + rolling_force + air_force + grade_force) / self.moving_mass
         outputs = LongitudinalOutputs(
             v_x=x.v_x,
             v_x_rate=rate,
             a_x=rate - g_x,
-            grade=ground.grade + jnp.zeros_like(x.v_x),
+            grade=ground.grade,
             drive_force=drive_force,
             brake_force=brake_force,
             rolling_force=rolling_force,
@@ -124,4 +121,4 @@ class Longitudinal(AbstractVehicle):
             grade_force=grade_force,
             drive_power=drive_force * x.v_x,
         )
-        return LongitudinalState(rate), outputs
+        return LongitudinalState(rate), filled(outputs)

@@ -2,40 +2,16 @@
 
 from __future__ import annotations
 
-import equinox as eqx
-import jax
+from typing import ClassVar
 
-from jaxveh._core.names import record
-from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.given_speed import longitudinal_acceleration
-from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic
-from jaxveh.vehicles.rolling_body import (
-    AbstractRollingTwoTrack,
-    check_rolling_car,
-    roll_accelerations,
-    roll_loads,
-    roll_outputs,
-    swing,
-)
-from jaxveh.vehicles.two_track import (
-    body_outputs,
-    filled,
-    positions_of,
-    rolling_wheels,
-    started,
-    state_type,
-    touching,
-    tyres_of,
-    wheel_outputs,
-)
+from jaxveh.vehicles.given_speed import AbstractToldSpeed, longitudinal_acceleration
+from jaxveh.vehicles.rolling_body import AbstractRollingTwoTrack, roll_accelerations, roll_outputs
+from jaxveh.vehicles.two_track import body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import body_forces, gravity
 
-STATES = ("v_y", "yaw", "yaw_rate", "roll", "roll_rate")
 
-
-class Roll3DOF(AbstractRollingTwoTrack):
+class Roll3DOF(AbstractToldSpeed, AbstractRollingTwoTrack):
     """`TwoTrack2DOF` with a body that rolls: lateral, yaw and roll at a given forward speed.
 
     Around the roll axis, which joins the roll centres, the sprung mass leans on springs and dampers; all else stays upright. The
@@ -53,15 +29,6 @@ class Roll3DOF(AbstractRollingTwoTrack):
     are `rolling_body.swing` ahead of those of the axis, `a_x` and `a_y` what an accelerometer there says. Wheels neither steer
     nor tilt with roll. Wheel loads are those of `rolling_body.roll_loads`.
 
-    **Parameters**: `mass`, `sprung_mass` (kg: the whole car's, and that of what rolls), `yaw_inertia` (kg m^2, whole car),
-    `roll_inertia` (kg m^2: of the sprung mass about its own centre of gravity), `roll_yaw_product` (kg m^2: the integral
-    of x z dm over what rolls, about the point of the roll axis below the car's centre of gravity),
-    `front_axle_to_cg`, `rear_axle_to_cg`, `track_front`, `track_rear`, `cg_height` (m, whole car), `unsprung_height` (m: the
-    centre of gravity of what does not roll), `roll_centre_front`, `roll_centre_rear` (m over the road), `roll_stiffness_front`,
-    `roll_stiffness_rear` (N m/rad, springs and bars), `roll_damping_front`, `roll_damping_rear` (N m s/rad), `front` and `rear`:
-    the tyre of a wheel on each axle (`mirrored`: the right wheels' is its mirror image), `load_transfer` (for what
-    passes from body to wheels at once, and the axles' loads); slip angles are regularised below `crawl_speed` (m/s).
-
     **Inputs**: `steer` (rad at the road wheels), `v_x` (m/s), those of `load_transfer`, and if there is one the longitudinal
     acceleration, `a_x` (of an ideal accelerometer) or `v_x_rate`; without, the speed counts as constant.
 
@@ -69,70 +36,20 @@ class Roll3DOF(AbstractRollingTwoTrack):
     is none.
     """
 
-    mass: jax.Array = positive("kg")
-    sprung_mass: jax.Array = positive("kg")
-    yaw_inertia: jax.Array = positive("kg m^2")
-    roll_inertia: jax.Array = positive("kg m^2")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
-    track_front: jax.Array = positive("m")
-    track_rear: jax.Array = positive("m")
-    cg_height: jax.Array = positive("m")
-    roll_stiffness_front: jax.Array = positive("N m/rad")
-    roll_stiffness_rear: jax.Array = positive("N m/rad")
-    front: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
-    rear: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
-    roll_damping_front: jax.Array = parameter("N m s/rad", scale=1000.0, default=2000.0)
-    roll_damping_rear: jax.Array = parameter("N m s/rad", scale=1000.0, default=2000.0)
-    roll_centre_front: jax.Array = parameter("m", scale=0.1, default=0.05)
-    roll_centre_rear: jax.Array = parameter("m", scale=0.1, default=0.1)
-    roll_yaw_product: jax.Array = parameter("kg m^2", scale=50.0, default=0.0)
-    unsprung_height: jax.Array = positive("m", default=0.32)
-    load_transfer: AbstractLoadTransfer = eqx.field(default_factory=QuasiStatic)
-    mirrored: bool = eqx.field(static=True, default=True)
-    crawl_speed: float = eqx.field(static=True, default=3.0)
-
-    def __check_init__(self):
-        check_rolling_car(self)
-
-    @property
-    def inputs(self):
-        return ("steer", "v_x", *self.load_transfer.inputs)
-
-    @property
-    def state_type(self):
-        """`v_y`, `yaw`, `yaw_rate`, `roll`, `roll_rate`, then the states of the load transfer and of dynamic tyres."""
-        return state_type(self, "Roll3DOFState", STATES)
-
-    def start(self, t, u, **values):
-        return started(self, dict.fromkeys(STATES), u.v_x, values, lambda x: self._contacts(x, u, LEVEL)[0])
+    body_states: ClassVar[tuple[str, ...]] = ("v_y", "yaw", "yaw_rate", "roll", "roll_rate")
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        tyres = tyres_of(self)
-        contacts, moves = self._contacts(x, u, ground)
-        centre, states = self.motion(x, u), tyres.states(x)
-        forces = tyres.forces(contacts, states)
-        push = body_forces(positions_of(self), moves, forces)
+        road, centre = self.on_road(x, u, ground), self.motion(x, u)
+        push = body_forces(self.places, road.moves, road.forces)
         g_x, g_y, g_z = gravity(ground)
         a_x, a_y = longitudinal_acceleration(centre, u, g_x), push.F_y / self.mass
         # The force along the car is the one that the given speed takes.
         found = roll_accelerations(self, x, self.mass * a_x, push.F_y, push.M_z, g_z)
         rates = (
-            found.a_y + g_y - self._v_x(x, u) * x.yaw_rate, x.yaw_rate, found.yaw, x.roll_rate, found.roll,
-            *self.load_transfer.rates(x, a_x, a_y), *tyres.rates(contacts, states),
+            found.a_y + g_y - self.wheel_speed(x, u) * x.yaw_rate, x.yaw_rate, found.yaw, x.roll_rate, found.roll,
+            *self.load_transfer.rates(x, a_x, a_y), *road.tyre_rates,
         )  # fmt: skip
         shown = body_outputs(centre, a_x, a_y, found.yaw, u.steer, push)
-        shown |= roll_outputs(x, found.roll) | wheel_outputs(contacts, forces)
-        return self.state_type(*rates), record("Roll3DOFOutputs", filled(shown, push.F_y))
-
-    def _v_x(self, x, u):
-        """Forward speed of the point on the roll axis, m/s."""
-        return u.v_x - swing(self, x)[0]
-
-    def _contacts(self, x, u, ground: Ground):
-        moves = rolling_wheels(self, self._v_x(x, u), x.v_y, x.yaw_rate, u.steer)
-        g_x, g_y, g_z = gravity(ground)
-        steady = longitudinal_acceleration(self.motion(x, u), u, g_x), u.v_x * x.yaw_rate - g_y
-        loads = roll_loads(self, x, *self.load_transfer.felt(x, u, steady), g_z)
-        return touching(self, moves, loads, ground), moves
+        shown |= roll_outputs(x, found.roll) | wheel_outputs(road.contacts, road.forces)
+        return self.rates_and_outputs(rates, shown)

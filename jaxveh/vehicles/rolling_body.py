@@ -2,32 +2,67 @@
 
 from __future__ import annotations
 
+from dataclasses import KW_ONLY
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import check
+from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.vehicles.base import GRAVITY, Motion
 from jaxveh.vehicles.load_transfer import axle_loads, held
-from jaxveh.vehicles.two_track import AbstractTwoTrack, check_car
+from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack
 from jaxveh.vehicles.wheels import Wheels
 
 NOT_NEGATIVE = ("roll_damping_front", "roll_damping_rear", "roll_centre_front", "roll_centre_rear")
 
 
-class AbstractRollingTwoTrack(AbstractTwoTrack):
-    """A two-track car whose body leans: its states are the speeds of a point on the roll axis, about which the wheels stay."""
+class AbstractRollingTwoTrack(AbstractLoadedTwoTrack):
+    """A two-track car whose body leans: its states are the speeds of a point on the roll axis, about which the wheels stay.
+
+    **Parameters** of the rolling body: `sprung_mass` (kg, of what rolls), `roll_inertia` (kg m^2, of the sprung mass about its
+    own centre of gravity), `roll_yaw_product` (kg m^2: the integral of x z dm over what rolls, about the point of the roll axis
+    below the car's centre of gravity), `unsprung_height` (m: the centre of gravity of what does not roll), `roll_centre_front`,
+    `roll_centre_rear` (m over the road), `roll_stiffness_front`, `roll_stiffness_rear` (N m/rad, springs and bars),
+    `roll_damping_front`, `roll_damping_rear` (N m s/rad). `load_transfer` is for what passes from body to wheels at once, and
+    for the axles' loads.
+
+    **Raises** `InputError` for a body that its springs cannot hold upright.
+    """
+
+    _: KW_ONLY
+    sprung_mass: jax.Array = positive("kg")
+    roll_inertia: jax.Array = positive("kg m^2")
+    roll_stiffness_front: jax.Array = positive("N m/rad")
+    roll_stiffness_rear: jax.Array = positive("N m/rad")
+    roll_damping_front: jax.Array = parameter("N m s/rad", scale=1000.0, default=2000.0)
+    roll_damping_rear: jax.Array = parameter("N m s/rad", scale=1000.0, default=2000.0)
+    roll_centre_front: jax.Array = parameter("m", scale=0.1, default=0.05)
+    roll_centre_rear: jax.Array = parameter("m", scale=0.1, default=0.1)
+    roll_yaw_product: jax.Array = parameter("kg m^2", scale=50.0, default=0.0)
+    unsprung_height: jax.Array = positive("m", default=0.32)
+
+    def __check_init__(self):
+        check_parameters(self)
+        check_rolling_body(self)
 
     def motion(self, x, u):
         """That of the centre of gravity of the whole car, which leans out; a given speed is its speed already."""
         ahead, aside = swing(self, x)
         return Motion(0.0, 0.0, x.yaw, x.v_x + ahead if hasattr(x, "v_x") else u.v_x, x.v_y + aside, x.yaw_rate)
 
+    def wheel_speed(self, x, u):
+        """That of the point on the roll axis, m/s."""
+        return x.v_x if hasattr(x, "v_x") else u.v_x - swing(self, x)[0]
 
-def check_rolling_car(car: Any) -> None:
-    """Raise `InputError` unless the car's parameters are in their domains and its body stands upright on its springs."""
-    check_car(car)
+    def loads(self, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
+        return roll_loads(self, x, a_x, a_y, g_z)
+
+
+def check_rolling_body(car: AbstractRollingTwoTrack) -> None:
+    """Raise `InputError` unless the body stands upright on its springs, and its masses and inertias are those of a body."""
     kind = type(car).__name__
     for name in NOT_NEGATIVE:
         check(f"{kind}.{name}", getattr(car, name), lambda v: v >= 0, "at least 0")
@@ -54,7 +89,7 @@ class RollGeometry(NamedTuple):
     unsprung_mass: Any
 
 
-def roll_geometry(car: Any) -> RollGeometry:
+def roll_geometry(car: AbstractRollingTwoTrack) -> RollGeometry:
     """The sprung mass's place: what the whole car's centre of gravity leaves, once the unsprung mass has its own height.
 
     The roll axis joins the roll centres; its height counts below the centre of gravity, and its slope does not.
@@ -66,7 +101,7 @@ def roll_geometry(car: Any) -> RollGeometry:
     return RollGeometry(height, height - axis, unsprung)
 
 
-def swing(car: Any, x: Any) -> tuple[Any, Any]:
+def swing(car: AbstractRollingTwoTrack, x: Any) -> tuple[Any, Any]:
     """Velocity (forward, left; m/s) of the whole car's centre of gravity, as seen from the point on the roll axis below it.
 
     The leaning body takes it along by -h m_s / m sin(phi) to the left, where it stays while the car turns: in the car's axes
@@ -86,7 +121,7 @@ class RollAccelerations(NamedTuple):
     roll: Any
 
 
-def roll_accelerations(car: Any, x: Any, X: Any, Y: Any, N: Any, g_z: Any) -> RollAccelerations:
+def roll_accelerations(car: AbstractRollingTwoTrack, x: Any, X: Any, Y: Any, N: Any, g_z: Any) -> RollAccelerations:
     """Solve the car's equations for the accelerations, under forces X, Y (N) and a moment N (N m) about the vertical.
 
     The kinetic energy, with phi the roll, p its rate, r the yaw rate, h the arm, S = m_s h, s and c the sine and cosine of phi,
@@ -120,7 +155,7 @@ def roll_accelerations(car: Any, x: Any, X: Any, Y: Any, N: Any, g_z: Any) -> Ro
     return RollAccelerations((ahead - S * s * yaw) / car.mass, (side + S * c * roll) / car.mass, yaw, roll)
 
 
-def roll_loads(car: Any, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
+def roll_loads(car: AbstractRollingTwoTrack, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     """Wheel loads, N, of a car whose body leans on springs and dampers.
 
     On each axle, with the share of the masses m_s and m_u that it carries at rest, this moves from the left to the right wheel

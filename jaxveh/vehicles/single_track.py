@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import KW_ONLY
+from typing import Any, ClassVar, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check, check_finite, check_positive
-from jaxveh._core.names import check_names, record_type
-from jaxveh._core.parameter import parameter, positive
+from jaxveh._core.errors import InputError, check
+from jaxveh._core.names import record_type
+from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.tyres import AbstractTyre, Contact
+from jaxveh.tyres import Contact
 from jaxveh.vehicles.axles import AxleTyres
-from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
+from jaxveh.vehicles.base import GRAVITY, Motion, filled
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
+from jaxveh.vehicles.shared import AbstractOneTrack, AbstractOnTyres
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
 from jaxveh.vehicles.wheels import gravity, travel_direction
 
@@ -62,7 +63,7 @@ UNITS = {
 }
 
 
-class SingleTrack(AbstractVehicle):
+class SingleTrack(AbstractOnTyres, AbstractOneTrack):
     """A vehicle on one track: two axles, a given forward speed, no roll.
 
     In the body's axes, with delta the steer at the road wheels, a and b the distances of the axles from the centre of
@@ -72,13 +73,11 @@ class SingleTrack(AbstractVehicle):
         J_z dr/dt           = a F_f cos(delta) - b F_r
         alpha_f = delta - atan2(v_y + a r, v_x),   alpha_r = -atan2(v_y - b r, v_x)
 
-    Longitudinal forces and moments enter where a tyre law gives them. Slip angles are those of `slip_angle`: from
-    `crawl_speed` (m/s, 3 by default) upwards as written, below it regularised, so that standstill is an ordinary
-    point.
+    Longitudinal forces and moments enter where a tyre law gives them. Slip angles are those of `slip_angle`, regularised so that
+    standstill is an ordinary point.
 
-    **Parameters**: `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg` and `rear_axle_to_cg` (m), `front` and
-    `rear`: the axles' tyres, `cg_height` (m; None: axle loads stay static), `steer_offset` (rad: the road wheels
-    stand at `u.steer + steer_offset`).
+    **Parameters**: `cg_height` (m; None: axle loads stay static), `steer_offset` (rad: the road wheels stand at
+    `u.steer + steer_offset`).
 
     **Inputs** u: `steer` (rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, the longitudinal
     acceleration: either `a_x`, what an ideal accelerometer at the centre of gravity says, or `v_x_rate = dv_x/dt`,
@@ -88,36 +87,17 @@ class SingleTrack(AbstractVehicle):
     tyre.
     """
 
-    mass: jax.Array = positive("kg")
-    yaw_inertia: jax.Array = positive("kg m^2")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
-    front: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
-    rear: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
+    _: KW_ONLY
     cg_height: jax.Array | None = positive("m", default=None)
     steer_offset: jax.Array = parameter("rad", scale=0.02, default=0.0)
-    crawl_speed: float = eqx.field(static=True, default=3.0)
+    own_states: ClassVar[tuple[str, ...]] = SingleTrackState._fields
 
     def __check_init__(self):
-        units = {
-            "mass": "kg",
-            "yaw_inertia": "kg m^2",
-            "front_axle_to_cg": "m",
-            "rear_axle_to_cg": "m",
-            "cg_height": "m",
-        }
-        for name, unit in units.items():
-            check_positive(f"SingleTrack.{name}", getattr(self, name), unit)
-        check_positive("SingleTrack.crawl_speed", self.crawl_speed, "m/s")
-        check_finite("SingleTrack.steer_offset", self.steer_offset)
+        check_parameters(self)
         check(
             "SingleTrack.steer_offset", self.steer_offset, lambda v: abs(v) < 1.0, "within 1 rad",
             "It is an angle at the road wheels in rad, not degrees.",
         )  # fmt: skip
-        for name in ("front", "rear"):
-            tyre = getattr(self, name)
-            if not isinstance(tyre, AbstractTyre):
-                raise InputError(f"SingleTrack.{name} = {type(tyre).__name__}: must be a tyre of jaxveh.tyres.")
 
     @property
     def inputs(self):
@@ -126,38 +106,21 @@ class SingleTrack(AbstractVehicle):
     @property
     def state_type(self):
         """`SingleTrackState`, followed by the states of dynamic tyres as `front_<name>`, `rear_<name>`."""
-        extra = self._tyres.state_names
-        if not extra:
-            return SingleTrackState
-        return record_type("SingleTrackState", (*SingleTrackState._fields, *extra))
+        extra = self.tyres.state_names
+        return record_type("SingleTrackState", (*self.own_states, *extra)) if extra else SingleTrackState
+
+    @property
+    def tyres(self) -> AxleTyres:
+        return AxleTyres(self.front, self.rear)
 
     @property
     def units(self):
         return dict(UNITS)
 
-    @property
-    def wheelbase(self) -> jax.Array:
-        """Distance between the axles, m."""
-        return self.front_axle_to_cg + self.rear_axle_to_cg
-
     def static_loads(self) -> tuple[jax.Array, jax.Array]:
         """Loads of front and rear axle at rest on a level road, N."""
         per_length = self.mass * GRAVITY / self.wheelbase
         return per_length * self.rear_axle_to_cg, per_length * self.front_axle_to_cg
-
-    def start(self, t, u, **values):
-        check_names("start", values, self.state_type._fields)
-        dtype = jnp.result_type(self.mass)
-        given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
-        zero = jnp.zeros(jnp.shape(u.v_x), dtype)
-        body = SingleTrackState(*[given.get(name, zero) for name in SingleTrackState._fields])
-        settled = self._tyres.start(self._contacts(body, u, *self._steered(u)))
-        return self.state_type(*body, *settled)._replace(**given)
-
-    @property
-    def wheel_positions(self):
-        front, rear = (self.front_axle_to_cg, 0.0), (-self.rear_axle_to_cg, 0.0)
-        return front, front, rear, rear
 
     def motion(self, x, u):
         return Motion(0.0, 0.0, x.yaw, u.v_x, x.v_y, x.yaw_rate)
@@ -166,7 +129,7 @@ class SingleTrack(AbstractVehicle):
         del t
         cosine, sine = self._steered(u)
         contacts = self._contacts(x, u, cosine, sine, ground)
-        tyres = self._tyres
+        tyres = self.tyres
         states = tyres.states(x)
         front, rear = tyres.forces(contacts, states)
         F_f = front.F_y * cosine + front.F_x * sine
@@ -192,7 +155,7 @@ class SingleTrack(AbstractVehicle):
             load_front=contacts[0].load,
             load_rear=contacts[1].load,
         )
-        return self.state_type(*rates, *tyres.rates(contacts, states)), outputs
+        return self.state_type(*rates, *tyres.rates(contacts, states)), filled(outputs)
 
     def loads(self, x, u, ground: Ground = LEVEL) -> tuple[jax.Array, jax.Array]:
         """Loads of front and rear axle, N; they may become negative where the car would lift an axle."""
@@ -210,15 +173,15 @@ class SingleTrack(AbstractVehicle):
         moved = self.mass * a_x * self.cg_height / self.wheelbase
         return front - moved, rear + moved
 
-    def contacts(self, x, u) -> tuple[Contact, Contact]:
+    def contacts(self, x, u, ground: Ground = LEVEL) -> tuple[Contact, Contact]:
         """How the front and the rear axle touch the road: slip angles, loads, speeds."""
-        return self._contacts(x, u, *self._steered(u))
+        return self._contacts(x, u, *self._steered(u), ground)
 
     def _steered(self, u):
         steer = u.steer + self.steer_offset
         return numerics.cos(steer), numerics.sin(steer)
 
-    def _contacts(self, x, u, cosine, sine, ground: Ground = LEVEL) -> tuple[Contact, Contact]:
+    def _contacts(self, x, u, cosine, sine, ground: Ground) -> tuple[Contact, Contact]:
         front_load, rear_load = self.loads(x, u, ground)
         across = x.v_y + self.front_axle_to_cg * x.yaw_rate
         along_wheel = u.v_x * cosine + across * sine
@@ -240,7 +203,3 @@ class SingleTrack(AbstractVehicle):
             direction=travel_direction(u.v_x),
         )
         return front, rear
-
-    @property
-    def _tyres(self) -> AxleTyres:
-        return AxleTyres(self.front, self.rear)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import KW_ONLY
+
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.names import check_names, record, record_type
-from jaxveh._core.parameter import parameter, positive
+from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.tyres import AbstractTyre
+from jaxveh.tyres import Contact
 from jaxveh.vehicles import two_track
 from jaxveh.vehicles.axles import AxleTyres
-from jaxveh.vehicles.base import AbstractVehicle, Motion
-from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
+from jaxveh.vehicles.base import Motion
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic, axle_loads
-from jaxveh.vehicles.traction import driven, torque_acceleration
+from jaxveh.vehicles.shared import AbstractOneTrack, AbstractOnTyres
+from jaxveh.vehicles.traction import AbstractSpinless, driven
 from jaxveh.vehicles.wheels import contact, gravity, rolling
 
 STATES = ("v_x", "v_y", "yaw", "yaw_rate")
@@ -29,7 +29,7 @@ UNITS = {
 }
 
 
-class SingleTrack3DOF(AbstractVehicle):
+class SingleTrack3DOF(AbstractSpinless, AbstractOnTyres, AbstractOneTrack):
     """A vehicle on one track that speeds up and slows down: v_x, v_y and yaw rate.
 
     With X, Y the axles' forces in the car's axes, a and b the axles' distances from the centre of gravity (R. Rajamani, Vehicle
@@ -43,71 +43,40 @@ class SingleTrack3DOF(AbstractVehicle):
     grip with the lateral forces, and the tyres' own F_x does not count.
     Load moves between the axles with the a_x that `load_transfer` feels (its a_y does not count: `LaggedLoads` carries it along).
 
-    **Parameters**: `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height`, `wheel_radius` (m),
-    `front` and `rear`: the axles' tyres, `grip` (-: the greatest longitudinal force over load, times the road's friction),
-    `drag` (N s^2/m^2), `rolling_resistance` (-), `drive`, whose torques of an axle's wheels are added, and `load_transfer`;
-    `crawl_speed` (m/s) as in `SingleTrack`.
+    **Parameters**: `cg_height` (m). Torques of an axle's wheels are added.
 
     **Inputs**: `steer` (rad at the road wheels) and those of `drive` and `load_transfer`.
 
     **Raises** `InputError` for parameters outside their domain, or a tyre that is none.
     """
 
-    mass: jax.Array = positive("kg")
-    yaw_inertia: jax.Array = positive("kg m^2")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
+    _: KW_ONLY
     cg_height: jax.Array = positive("m")
-    front: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
-    rear: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
-    wheel_radius: jax.Array = positive("m", default=0.32)
-    grip: jax.Array = positive("-", default=1.0)
-    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.0)
-    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.0)
-    drive: AbstractDrive = eqx.field(default_factory=AxleDrive)
     load_transfer: AbstractLoadTransfer = eqx.field(default_factory=QuasiStatic)
-    crawl_speed: float = eqx.field(static=True, default=3.0)
-
-    def __check_init__(self):
-        two_track.check_car(self)
 
     @property
-    def inputs(self):
-        return ("steer", *self.drive.inputs, *self.load_transfer.inputs)
+    def own_states(self):
+        """`v_x`, `v_y`, `yaw`, `yaw_rate`, then the states of the load transfer."""
+        return (*STATES, *self.load_transfer.state_names)
 
     @property
-    def state_type(self):
-        """`v_x`, `v_y`, `yaw`, `yaw_rate`, then the states of the load transfer and of dynamic tyres (`front_<name>` ...)."""
-        extra = (*self.load_transfer.state_names, *self._tyres.state_names)
-        return record_type("SingleTrack3DOFState", (*STATES, *extra))
+    def tyres(self) -> AxleTyres:
+        return AxleTyres(self.front, self.rear)
 
     @property
     def units(self):
         return dict(UNITS)
 
-    @property
-    def wheel_positions(self):
-        front, rear = (self.front_axle_to_cg, 0.0), (-self.rear_axle_to_cg, 0.0)
-        return front, front, rear, rear
-
     def motion(self, x, u):
         return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
 
-    def start(self, t, u, **values):
-        """Straight running; `v_x` is the speed (m/s), 0 unless given."""
-        check_names("start", values, self.state_type._fields)
-        dtype = jnp.result_type(self.mass)
-        given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
-        zero = jnp.zeros(jnp.shape(u.steer), dtype)
-        names = (*STATES, *self.load_transfer.state_names)
-        x = record_type("Body", names)(*[given.get(name, zero) for name in names])
-        contacts, _ = self._contacts(x, u, LEVEL)
-        return self.state_type(*x, *self._tyres.start(contacts))._replace(**given)
+    def contacts(self, x, u, ground: Ground = LEVEL) -> tuple[Contact, Contact]:
+        return self._touching(x, u, ground)[0]
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        tyres, (drive, brake) = self._tyres, self.drive.torques(u)
-        contacts, moves = self._contacts(x, u, ground)
+        tyres, (drive, brake) = self.tyres, self.drive.torques(u)
+        contacts, moves = self._touching(x, u, ground)
         states = tyres.states(x)
         pushing, slowing = (drive.fl + drive.fr, drive.rl + drive.rr), (brake.fl + brake.fr, brake.rl + brake.rr)
         front, rear = (
@@ -148,20 +117,16 @@ class SingleTrack3DOF(AbstractVehicle):
             },
             "drive_power": (pushing[0] * moves[0].along + pushing[1] * moves[1].along) / self.wheel_radius,
         }
-        return self.state_type(*rates), record("SingleTrack3DOFOutputs", two_track.filled(shown, a_y))
+        return self.rates_and_outputs(rates, shown)
 
-    @property
-    def _tyres(self) -> AxleTyres:
-        return AxleTyres(self.front, self.rear)
-
-    def _contacts(self, x, u, ground: Ground):
-        drive, brake = self.drive.torques(u)
-        _, g_y, g_z = gravity(ground)
-        steady = torque_acceleration(self, drive, brake, x.v_x, ground), x.v_x * x.yaw_rate - g_y
+    def _touching(self, x, u, ground: Ground):
+        """Contacts and motions of the axles."""
+        g = _, g_y, g_z = gravity(ground)
+        steady = self.steady_a_x(x, u, ground, g), x.v_x * x.yaw_rate - g_y
         loads = axle_loads(self, self.load_transfer.felt(x, u, steady)[0], g_z)
         friction = 0.5 * (ground.friction_fl + ground.friction_fr), 0.5 * (ground.friction_rl + ground.friction_rr)
         turned = (numerics.cos(u.steer), numerics.sin(u.steer)), (1.0, 0.0)
-        places = (self.front_axle_to_cg, 0.0), (-self.rear_axle_to_cg, 0.0)
+        places = self.wheel_positions[::2]
         moves = [rolling(p, x.v_x, x.v_y, x.yaw_rate, *turn) for p, turn in zip(places, turned, strict=True)]
         front, rear = (
             contact(move, load, mu, self.crawl_speed) for move, load, mu in zip(moves, loads, friction, strict=True)

@@ -11,8 +11,7 @@ from jaxveh._core.errors import InputError, check
 from jaxveh._core.names import as_mapping, check_names, record, record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle
-from jaxveh.vehicles.two_track import filled
+from jaxveh.vehicles.base import AbstractVehicle, filled
 
 
 class Steered(AbstractVehicle):
@@ -117,7 +116,7 @@ class Steered(AbstractVehicle):
             moment = -spring
         if moment is not None:
             shown["steering_torque"] = -moment / (self.ratio * (1.0 + self.assist))
-        return self.state_type(*rates, *own), record("SteeredOutputs", filled(shown, inner_u.steer))
+        return self.state_type(*rates, *own), filled(record("SteeredOutputs", shown))
 
     def _turning(self, x, moment) -> tuple:
         if "steer_rate" not in self.own_states:

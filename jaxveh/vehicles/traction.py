@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import KW_ONLY
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
+from jaxveh._core.parameter import positive
 from jaxveh.roads import Ground
 from jaxveh.tyres import Contact, Forces
-from jaxveh.vehicles.wheels import Wheels, each_wheel, frictions, gravity, sum_of_wheels, travel_direction
+from jaxveh.vehicles.drive import AbstractDriven
+from jaxveh.vehicles.load_transfer import AbstractShiftingLoads
+from jaxveh.vehicles.two_track import OnRoad
+from jaxveh.vehicles.wheels import Wheels, each_wheel, frictions, sum_of_wheels, travel_direction
 
 LEAST_SHARE = 0.1
 """The share of its lateral force that a wheel keeps however large the torque (as `tyres.Fiala` does): F_x ends at
@@ -43,7 +49,28 @@ def within_grip(forces: Forces, wish: Any, limit: Any) -> Forces:
     return forces._replace(F_x=limit * share, F_y=left * forces.F_y, M_z=left * forces.M_z)
 
 
-def driven(car: Any, forces: Forces, at: Contact, along: Any, drive: Any, brake: Any) -> Forces:
+class AbstractSpinless(AbstractDriven, AbstractShiftingLoads):
+    """A car whose wheels have no spin of their own: torques over the radius are forces, as far as grip allows.
+
+    **Parameters** of the grip: `grip` (-), the greatest longitudinal force over load, times the road's friction.
+    """
+
+    _: KW_ONLY
+    grip: jax.Array = positive("-", default=1.0)
+
+    @property
+    def inputs(self):
+        return ("steer", *self.drive.inputs, *self.load_transfer.inputs)
+
+    def steady_a_x(self, x: Any, u: Any, ground: Ground, g: tuple[Any, Any, Any]) -> Any:
+        """a_x, m/s^2, that the torques make, as far as grip allows: what loads can follow without knowing a force."""
+        drive, brake = self.drive.torques(u)
+        push = (sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(x.v_x)) / self.wheel_radius
+        limit = self.grip * self.mass * (-g[2] * 0.25 * sum_of_wheels(frictions(ground)))
+        return limit * saturated(push / jnp.maximum(limit, _LEAST_LIMIT)) / self.mass
+
+
+def driven(car: AbstractSpinless, forces: Forces, at: Contact, along: Any, drive: Any, brake: Any) -> Forces:
     """Forces of a wheel (or axle) of `car` under its torques (N m), where it rolls at `along` (m/s).
 
     The torque less brake and rolling resistance, over the radius, is what the wheel asks of the road; `car.grip` times the
@@ -55,20 +82,12 @@ def driven(car: Any, forces: Forces, at: Contact, along: Any, drive: Any, brake:
     return within_grip(forces, wish, car.grip * at.friction * load)
 
 
-def torque_acceleration(car: Any, drive: Wheels, brake: Wheels, v_x: Any, ground: Ground) -> Any:
-    """a_x, m/s^2, that the torques make, as far as grip allows: what loads can follow without knowing a force."""
-    push = (sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(v_x)) / car.wheel_radius
-    limit = car.grip * car.mass * (-gravity(ground)[2] * 0.25 * sum_of_wheels(frictions(ground)))
-    return limit * saturated(push / jnp.maximum(limit, _LEAST_LIMIT)) / car.mass
-
-
-def driven_wheels(car: Any, forces: Wheels, contacts: Wheels, moves: Wheels, drive: Wheels, brake: Wheels) -> Wheels:
+def driven_wheels(car: AbstractSpinless, road: OnRoad, drive: Wheels, brake: Wheels) -> Wheels:
     """The forces of all wheels under their torques, as `driven`."""
-    return each_wheel(
-        lambda f, at, m, *torques: driven(car, f, at, m.along, *torques), forces, contacts, moves, drive, brake
-    )
+    under = lambda force, at, move, *torques: driven(car, force, at, move.along, *torques)
+    return each_wheel(under, road.forces, road.contacts, road.moves, drive, brake)
 
 
-def drive_power(car: Any, drive: Wheels, moves: Wheels) -> Any:
+def drive_power(car: AbstractSpinless, drive: Wheels, moves: Wheels) -> Any:
     """Power of the driving torques, W, on wheels that roll without slip."""
     return sum_of_wheels(each_wheel(lambda torque, move: torque * move.along, drive, moves)) / car.wheel_radius

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+import abc
+from dataclasses import KW_ONLY
+from typing import Any, NamedTuple
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check
-from jaxveh._core.names import check_names, record_type
-from jaxveh._core.parameter import check_parameters
-from jaxveh.roads import Ground
-from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.base import AbstractVehicle, Motion
+from jaxveh._core.parameter import positive
+from jaxveh.roads import LEVEL, Ground
+from jaxveh.vehicles.base import Motion
+from jaxveh.vehicles.load_transfer import AbstractShiftingLoads
+from jaxveh.vehicles.shared import AbstractOnTyres
 from jaxveh.vehicles.wheels import (
     BodyForces,
     Tyres,
@@ -21,6 +24,7 @@ from jaxveh.vehicles.wheels import (
     corners,
     each_wheel,
     frictions,
+    gravity,
     rolling,
     wheel_names,
 )
@@ -39,8 +43,22 @@ UNITS = {
 """Units of what two-track cars have as states, inputs and outputs."""
 
 
-class AbstractTwoTrack(AbstractVehicle):
-    """A car on four wheels: what its kinds share. Each has the fields of `positions_of`."""
+class AbstractTwoTrack(AbstractOnTyres):
+    """A car on four wheels.
+
+    **Parameters** of the four wheels: `track_front`, `track_rear` (m, between the wheels' middles), `mirrored`: the tyres of the
+    right wheels are the mirror images of the left ones' (so by default), `cg_height` (m, over the road).
+    """
+
+    _: KW_ONLY
+    track_front: jax.Array = positive("m")
+    track_rear: jax.Array = positive("m")
+    cg_height: jax.Array = positive("m")
+    mirrored: bool = eqx.field(static=True, default=True)
+
+    @property
+    def tyres(self) -> Tyres:
+        return Tyres(self.front, self.rear, self.mirrored)
 
     @property
     def units(self):
@@ -48,79 +66,87 @@ class AbstractTwoTrack(AbstractVehicle):
 
     @property
     def wheel_positions(self):
-        return tuple(positions_of(self))
+        return tuple(self.places)
+
+    @property
+    def places(self) -> Wheels:
+        """(x, y), m, of the wheels from the centre of gravity."""
+        return corners(self.front_axle_to_cg, self.rear_axle_to_cg, self.track_front, self.track_rear)
 
 
-class AbstractPlanarTwoTrack(AbstractTwoTrack):
-    """A two-track car that stays upright: its states are the speeds of its centre of gravity."""
+class OnRoad(NamedTuple):
+    """How a car's wheels touch the road and move over it, what the road does to them in their axes, and the rates of dynamic
+    tyres' states."""
 
-    def motion(self, x, u):
-        # The speed is a state, or given.
-        return Motion(0.0, 0.0, x.yaw, x.v_x if hasattr(x, "v_x") else u.v_x, x.v_y, x.yaw_rate)
-
-
-def check_car(car: Any) -> None:
-    """Raise `InputError` unless the car's parameters are in their domains, its tyres are tyres and its shares are shares."""
-    check_parameters(car)
-    kind = type(car).__name__
-    for name in ("front", "rear"):
-        tyre = getattr(car, name)
-        if not isinstance(tyre, AbstractTyre):
-            raise InputError(f"{kind}.{name} = {type(tyre).__name__}: must be a tyre of jaxveh.tyres.")
-    check(f"{kind}.crawl_speed", car.crawl_speed, lambda v: v > 0, "positive (m/s)")
-    share = getattr(car, "front_roll_share", None)
-    check(f"{kind}.front_roll_share", share, lambda v: (v >= 0) & (v <= 1), "between 0 and 1")
+    contacts: Wheels
+    moves: Wheels
+    forces: Wheels
+    tyre_rates: tuple
 
 
-def tyres_of(car: Any) -> Tyres:
-    """The tyres on the car's wheels."""
-    return Tyres(car.front, car.rear, car.mirrored)
+class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
+    """A two-track car whose wheels keep to the road: their loads follow from the accelerations that `load_transfer` feels.
+
+    Its kinds say what these accelerations are in a steady turn, and how the loads follow.
+    """
+
+    body_states: eqx.AbstractClassVar[tuple[str, ...]]
+    """Names of the body's and the wheels' states."""
+
+    @property
+    def own_states(self):
+        return (*self.body_states, *self.load_transfer.state_names)
+
+    def told_or_own_speed(self, x: Any, u: Any) -> Any:
+        """Forward speed, m/s: a state, or given."""
+        return x.v_x if "v_x" in self.body_states else u.v_x
+
+    @abc.abstractmethod
+    def wheel_speed(self, x: Any, u: Any) -> Any:
+        """Forward speed, m/s, of the point from which the wheels' places are told."""
+
+    @abc.abstractmethod
+    def steady_a_x(self, x: Any, u: Any, ground: Ground, g: tuple[Any, Any, Any]) -> Any:
+        """Longitudinal acceleration, m/s^2, that can be told without knowing a tyre's force, under gravity g (m/s^2)."""
+
+    @abc.abstractmethod
+    def loads(self, x: Any, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
+        """Wheel loads, N, under felt accelerations a_x, a_y and gravity g_z across the road (m/s^2)."""
+
+    def rim_speeds(self, x: Any) -> Wheels:
+        """`omega r_e` of each wheel, m/s; None where wheels have no spin of their own."""
+        del x
+        return Wheels(None, None, None, None)
+
+    def contacts(self, x, u, ground: Ground = LEVEL) -> Wheels:
+        return self._touching(x, u, ground)[0]
+
+    def on_road(self, x: Any, u: Any, ground: Ground) -> OnRoad:
+        """What the road does to the wheels."""
+        contacts, moves = self._touching(x, u, ground)
+        tyres = self.tyres
+        states = tyres.states(x)
+        return OnRoad(contacts, moves, tyres.forces(contacts, states), tyres.rates(contacts, states))
+
+    def _touching(self, x, u, ground: Ground) -> tuple[Wheels, Wheels]:
+        """Contacts and motions of the wheels."""
+        moves = rolling_wheels(self.places, self.wheel_speed(x, u), x.v_y, x.yaw_rate, u.steer)
+        g = _, g_y, g_z = gravity(ground)
+        steady = self.steady_a_x(x, u, ground, g), self.told_or_own_speed(x, u) * x.yaw_rate - g_y
+        loads = self.loads(x, *self.load_transfer.felt(x, u, steady), g_z)
+        touching = lambda move, load, mu, speed: contact(move, load, mu, self.crawl_speed, speed)
+        return each_wheel(touching, moves, loads, frictions(ground), self.rim_speeds(x)), moves
 
 
-def positions_of(car: Any) -> Wheels:
-    """(x, y), m, of the wheels from the centre of gravity."""
-    return corners(car.front_axle_to_cg, car.rear_axle_to_cg, car.track_front, car.track_rear)
-
-
-def rolling_wheels(car: Any, v_x: Any, v_y: Any, yaw_rate: Any, steer: Any) -> Wheels:
-    """How the wheels move over the road; both front wheels turn by the steer (rad)."""
+def rolling_wheels(places: Wheels, v_x: Any, v_y: Any, yaw_rate: Any, steer: Any) -> Wheels:
+    """How wheels at `places` ((x, y), m) move over the road; both front wheels turn by the steer (rad)."""
     turn = numerics.barrier((numerics.cos(steer), numerics.sin(steer)))
     turned = Wheels(turn, turn, (1.0, 0.0), (1.0, 0.0))
-    return each_wheel(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), positions_of(car), turned)
-
-
-def touching(car: Any, moves: Wheels, loads: Wheels, ground: Ground, speeds: Wheels | None = None) -> Wheels:
-    """How the wheels touch the road; `speeds` are `omega r_e` (m/s), None where all roll freely."""
-    speeds = Wheels(None, None, None, None) if speeds is None else speeds
-    return each_wheel(
-        lambda m, load, mu, v: contact(m, load, mu, car.crawl_speed, v), moves, loads, frictions(ground), speeds
-    )
-
-
-def state_type(car: Any, name: str, body: tuple[str, ...]) -> Any:
-    """The states of the body, then those of the load transfer and of dynamic tyres (`fl_<name>` ...)."""
-    return record_type(name, (*body, *car.load_transfer.state_names, *tyres_of(car).state_names))
-
-
-def started(car: Any, body: dict, like: Any, values: dict, contacts_of: Any) -> Any:
-    """The state with `values` given by name, all else as `body` says, of the shape of `like`; dynamic tyres have settled.
-
-    `body` has the body's states: a number, or a function of the given values. `contacts_of(x)` are the contacts in a state `x`
-    of the body and the load transfer, whose felt accelerations are zero.
-    """
-    check_names("start", values, car.state_type._fields)
-    dtype = jnp.result_type(car.mass)
-    given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
-    zero = jnp.zeros(jnp.shape(like), dtype)
-    rest = {name: zero if value is None else value(given, zero) for name, value in body.items()}
-    rest |= dict(zip(car.load_transfer.state_names, car.load_transfer.start((zero, zero)), strict=True))
-    rest |= {name: value for name, value in given.items() if name in rest}
-    x = record_type("Body", tuple(rest))(*rest.values())
-    return car.state_type(*x, *tyres_of(car).start(contacts_of(x)))._replace(**given)
+    return each_wheel(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), places, turned)
 
 
 def air_drag(drag: Any, v_x: Any) -> Any:
-    """Drag of the air against the motion, N: `drag` (N s^2/m^2) is half the air's density times c_W times the area."""
+    """Drag of the air against the motion, N: `drag` (N s^2/m^2) is half the air's density times c_d times the area."""
     return drag * v_x * jnp.abs(v_x)
 
 
@@ -149,12 +175,4 @@ def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steer
         "F_x": push.F_x,
         "F_y": push.F_y,
         "M_z": push.M_z,
-    }
-
-
-def filled(values: dict, like: Any) -> dict:
-    """The same values, with Python numbers as arrays of the dtype and shape of `like`."""
-    return {
-        name: value if hasattr(value, "dtype") else jnp.full(jnp.shape(like), value, like.dtype)
-        for name, value in values.items()
     }

@@ -149,11 +149,11 @@ class Tyres(NamedTuple):
     @property
     def state_names(self) -> tuple[str, ...]:
         """The states of dynamic tyres: `fl_<name>` and so on."""
-        return tuple(f"{c}_{name}" for c, tyre in zip(CORNERS, self.wheels, strict=True) for name in _names(tyre))
+        return tuple(f"{c}_{name}" for c, tyre in zip(CORNERS, self.wheels, strict=True) for name in state_names(tyre))
 
     def states(self, x: Any) -> Wheels:
         """Each tyre's state out of the car's, None for a tyre without."""
-        return Wheels(*[_state(c, tyre, x) for c, tyre in zip(CORNERS, self.wheels, strict=True)])
+        return Wheels(*[state_of(c, tyre, x) for c, tyre in zip(CORNERS, self.wheels, strict=True)])
 
     def start(self, contacts: Wheels) -> tuple:
         """The settled states, in the order of `state_names`; of a wheel on the right in the mirror."""
@@ -190,7 +190,7 @@ class Tyres(NamedTuple):
 
     def _gather(self, function: Callable, *wheels: Wheels) -> tuple:
         """The states that `function` makes, of the tyres that have any."""
-        some = lambda tyre, *values: function(tyre, *values) if _names(tyre) else None
+        some = lambda tyre, *values: function(tyre, *values) if state_names(tyre) else None
         return tuple(value for state in self._each(some, *wheels) if state is not None for value in state)
 
 
@@ -203,13 +203,15 @@ def _same_kind(wheels: tuple) -> bool:
     return all(len({jax.tree.structure(value) for value in values}) == 1 for values in wheels)
 
 
-def _names(tyre: AbstractTyre) -> tuple[str, ...]:
+def state_names(tyre: AbstractTyre) -> tuple[str, ...]:
+    """Names of a tyre's states, none of a tyre without."""
     return tyre.state_names if isinstance(tyre, AbstractDynamicTyre) else ()
 
 
-def _state(corner: str, tyre: AbstractTyre, x: Any) -> Any:
-    names = _names(tyre)
-    return record_type("TyreState", names)(*[getattr(x, f"{corner}_{name}") for name in names]) if names else None
+def state_of(place: str, tyre: AbstractTyre, x: Any) -> Any:
+    """A tyre's state out of the car's, whose fields are `<place>_<name>`; None for a tyre without."""
+    names = state_names(tyre)
+    return record_type("TyreState", names)(*[getattr(x, f"{place}_{name}") for name in names]) if names else None
 
 
 class BodyForces(NamedTuple):

@@ -17,7 +17,9 @@ U = {"v_x": SPEED}
 
 def car(friction=0.9):
     tyre = lambda stiffness: Brush(slip_stiffness=1e5, cornering_stiffness=stiffness, friction=friction)
-    return SingleTrack(1420.0, 2124.0, 0.96, 1.59, front=tyre(9.0e4), rear=tyre(1.2e5))
+    return SingleTrack(
+        mass=1420.0, yaw_inertia=2124.0, front_axle_to_cg=0.96, rear_axle_to_cg=1.59, front=tyre(9.0e4), rear=tyre(1.2e5)
+    )  # fmt: skip
 
 
 def model(**settings):

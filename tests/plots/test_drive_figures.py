@@ -334,12 +334,13 @@ def test_bad_input(name):
 
 
 def test_a_sweep_has_the_linear_car_beside_it():
-    car = vehicles.LinearSingleTrack(1500.0, 2500.0, 1.2, 1.4, 80000.0, 90000.0)
+    numbers = dict(mass=1500.0, yaw_inertia=2500.0, front_axle_to_cg=1.2, rear_axle_to_cg=1.4)
+    car = vehicles.LinearSingleTrack(**numbers, front_stiffness=80000.0, rear_stiffness=90000.0)
     sweep = shaken().replace(v_x=np.full(1500, 20.0))
     drawn = line(plots.drive(sweep, "swept-sine", car=car).axes[0], "closed form")
     np.testing.assert_allclose(drawn.get_ydata()[0], car.yaw_rate_gain(20.0), rtol=0.05)
     # A car with tyres of the same slopes is the same linear car.
-    axles = vehicles.SingleTrack(1500.0, 2500.0, 1.2, 1.4, tyres.Linear(80000.0), tyres.Linear(90000.0))
+    axles = vehicles.SingleTrack(**numbers, front=tyres.Linear(80000.0), rear=tyres.Linear(90000.0))
     same = line(plots.drive(sweep, "random-steering", car=axles).axes[0], "closed form")
     np.testing.assert_allclose(same.get_ydata(), drawn.get_ydata(), rtol=1e-9)
     assert not lines(plots.drive(sweep, "swept-sine").axes[0], "closed form")

@@ -141,6 +141,19 @@ def test_every_vehicle_of_the_package_is_here():
     assert not left_out("vehicles", vehicles.AbstractVehicle, [car.make() for car in CARS.values()], {})
 
 
+KINDS = {type(car.make()).__name__: type(car.make()) for car in CARS.values()}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_help_says_what_every_parameter_is(kind):
+    """Those that kinds share included; pairs may be told by the stem (`spring_`) that the front's and the rear's share."""
+    told = KINDS[kind].__doc__ or ""
+    stem = lambda name: name.removesuffix("front").removesuffix("rear")
+    names = [f.name for f in dataclasses.fields(KINDS[kind]) if not (kind == "Steered" and f.name == "own_states")]
+    assert not [name for name in names if not any(f"`{form}" in told for form in {name, stem(name)} - {""})]
+    assert told.count("**Raises**") == 1
+
+
 LIGHT = [name for name, car in CARS.items() if not car.heavy]
 LATERAL = [name for name, car in CARS.items() if car.lateral]
 
@@ -347,6 +360,19 @@ def test_a_batch_and_vmap_equal_single_cars(name):
     for got in (evaluate(*batch), jax.jit(jax.vmap(evaluate))(*batch)):
         for a, b in zip(jax.tree.leaves(got), jax.tree.leaves(singles), strict=True):
             np.testing.assert_allclose(np.broadcast_to(a, (3,)), b, rtol=1e-9, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_outputs_have_the_shape_of_the_batch(name):
+    """All of them, loads that nothing moves and inputs that all share included; the rates of a batch of states likewise."""
+    car, (x, u) = made(name), stirred(name)
+    many = lambda tree: jax.tree.map(lambda value: value + jnp.zeros((2, 3)), tree)
+    for ground in (LEVEL, ROUGH):
+        rates, outputs = car.evaluate(0.0, many(x), many(u), ground)
+        assert not {field: v.shape for field, v in (rates._asdict() | outputs._asdict()).items() if v.shape != (2, 3)}
+        for mixed in ((many(x), u), (x, many(u))):
+            outputs = car.outputs(0.0, *mixed, ground)
+            assert not {field: v.shape for field, v in outputs._asdict().items() if v.shape != (2, 3)}
 
 
 @pytest.mark.parametrize("name", LIGHT)

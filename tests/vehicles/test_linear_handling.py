@@ -213,7 +213,10 @@ def test_a_tyre_with_states_counts_as_settled():
     from jaxveh.tyres import Brush, Relaxed
 
     brush = Brush(60e3, 70e3)
-    car = vehicles.SingleTrack(1500.0, 2600.0, 1.2, 1.5, Relaxed(brush, 0.3, 0.5), brush)
+    car = vehicles.SingleTrack(
+        mass=1500.0, yaw_inertia=2600.0, front_axle_to_cg=1.2, rear_axle_to_cg=1.5,
+        front=Relaxed(brush, 0.3, 0.5), rear=brush,
+    )  # fmt: skip
     found = vehicles.linear_single_track(car)
     np.testing.assert_allclose([found.front_stiffness, found.rear_stiffness], 70e3, rtol=1e-9)
 

@@ -77,15 +77,20 @@ class Planar(eqx.Module):
         """m."""
         return self.wheelbase - self.front_axle_to_cg
 
+    @property
+    def places(self) -> kit.Wheels:
+        """(x, y), m, of the wheels from the centre of gravity."""
+        return kit.corners(self.front_axle_to_cg, self.rear_axle_to_cg, self.track_front, self.track_rear)
+
     def pushed(self, x: State, u: Any) -> Pushed:
         """What the wheels do to the car in the state x with the inputs u (`steer`, `pull_fl` ...)."""
-        moves = kit.rolling_wheels(self, x.v_x, x.v_y, x.yaw_rate, u.steer)
+        moves = kit.rolling_wheels(self.places, x.v_x, x.v_y, x.yaw_rate, u.steer)
         pulls = kit.wheels_of(u, "pull")
         loads = kit.planar_loads(self, u.a_x_felt, u.a_y_felt, -GRAVITY)
         pulls = kit.each_wheel(lambda pull, load: pull - self.rolling_resistance * load, pulls, loads)
         friction = self.friction if isinstance(self.friction, kit.Wheels) else kit.Wheels(*[self.friction] * 4)
         found = self._wheels(moves, loads, pulls, friction, self._slips(moves, u) if self.measured_slip else None)
-        push = kit.body_forces(kit.positions_of(self), moves, kit.each_wheel(lambda wheel: wheel[0], found))
+        push = kit.body_forces(self.places, moves, kit.each_wheel(lambda wheel: wheel[0], found))
         omega = kit.each_wheel(lambda move, wheel: move.along * (1.0 + wheel[1]) / self.wheel_radius, moves, found)
         drag = kit.air_drag(self.drag, x.v_x)
         return Pushed((push.F_x - drag) / self.mass, push.F_y / self.mass, push.M_z, omega)

@@ -110,8 +110,9 @@ def log_cars(told: io.CarSpecification, model: StateSpace) -> Cars:
     """The file's linear car, and the calibrated handling model with its single track."""
     car = estimators.sideslip.handling_car(told).car
     linear = LinearSingleTrack(
-        told.mass, told.yaw_inertia, told.front_axle_to_cg, told.rear_axle_to_cg,
-        car.front.cornering_stiffness, car.rear.cornering_stiffness,
+        mass=told.mass, yaw_inertia=told.yaw_inertia,
+        front_axle_to_cg=told.front_axle_to_cg, rear_axle_to_cg=told.rear_axle_to_cg,
+        front_stiffness=car.front.cornering_stiffness, rear_stiffness=car.rear.cornering_stiffness,
     )  # fmt: skip
     return Cars(linear, model.system.car, model.system)
 

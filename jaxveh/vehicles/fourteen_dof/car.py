@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.names import check_names, record, record_type
-from jaxveh._core.parameter import parameter, positive
+from jaxveh._core.parameter import check_parameters
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.base import Motion
-from jaxveh.vehicles.drive import AbstractDrive, AxleDrive
 from jaxveh.vehicles.fourteen_dof.checks import check_fourteen_dof
 from jaxveh.vehicles.fourteen_dof.dynamics import Accelerations, Inertia, accelerations
 from jaxveh.vehicles.fourteen_dof.kinematics import Body, angle_accelerations, body_of, to_body, to_road
+from jaxveh.vehicles.fourteen_dof.parameters import AbstractSuspendedTwoTrack
 from jaxveh.vehicles.fourteen_dof.shown import UNITS, attitude_outputs, by_wheel, moments
 from jaxveh.vehicles.fourteen_dof.suspension import (
     Wheel,
@@ -29,14 +25,7 @@ from jaxveh.vehicles.fourteen_dof.suspension import (
 )
 from jaxveh.vehicles.fourteen_dof.tyre_contact import ROLLING_SHARE, Touch, axles, reaction, touch
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, scaled
-from jaxveh.vehicles.two_track import (
-    AbstractTwoTrack,
-    air_drag,
-    body_outputs,
-    filled,
-    tyres_of,
-    wheel_outputs,
-)
+from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import (
     Wheels,
     body_forces,
@@ -51,10 +40,9 @@ from jaxveh.vehicles.wheels import (
 
 BODY = ("v_x", "v_y", "v_z", "z", "roll", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate")
 SPINS = wheel_names("omega")
-STATES = (*BODY, *wheel_names("travel"), *wheel_names("travel_rate"), *SPINS)
 
 
-class FourteenDOF(AbstractTwoTrack):
+class FourteenDOF(AbstractSuspendedTwoTrack):
     """A rigid body with all six degrees of freedom, four unsprung masses on springs, four wheels that spin: the truth.
 
     The equations are exact for this mechanism, for angles of any size (pitch below 90 degrees), and keep energy:
@@ -73,22 +61,11 @@ class FourteenDOF(AbstractTwoTrack):
 
     Speeds, place and accelerations are those of the *sprung mass'* centre of gravity, in the intermediate axes (x, y in the
     road's plane); `a_x`, `a_y`, `a_z` are what an ideal accelerometer there says in these axes (a_z = g at rest). Springs
-    are preloaded for rest on a level road, where `start` puts the car. Slips are those of `wheels.contact`, regularised below
-    `crawl_speed` (m/s); brakes and rolling resistance turn round smoothly about 0.5 m/s. Wheel hop (about 10 Hz) and spins
-    (see `SevenDOF`) are stiff.
+    are preloaded for rest on a level road, where `start` puts the car. Slips are those of `wheels.contact`; brakes and
+    rolling resistance turn round smoothly about 0.5 m/s. Wheel hop (about 10 Hz) and spins (see `SevenDOF`) are stiff.
 
     Equations: d'Alembert's principle, see `dynamics.accelerations`. The degrees of freedom are those of T. Shim and C. Ghike,
     Vehicle System Dynamics 45 (2007) 191, with joints inclined for the roll centres and nothing linearised.
-
-    **Parameters**: `sprung_mass`, `unsprung_mass_front`, `unsprung_mass_rear` (kg; the latter each wheel's); `roll_inertia`,
-    `pitch_inertia`, `yaw_inertia`, `roll_yaw_product` (the integral of x z dm; kg m^2, of the sprung mass about its centre of
-    gravity); `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (m, of the sprung mass' centre of gravity at rest);
-    `track_front`, `track_rear` (m); `spring_`, `damper_`, `anti_roll_` `front` and `rear` (N/m, N s/m at the wheel; N per m of
-    difference of the wheels' travels); `roll_centre_` (m over the road), `pitch_slope_` (-); `tyre_stiffness` (N/m),
-    `tyre_damping` (N s/m); `wheel_radius` (m, unloaded), `wheel_inertia` (kg m^2, about the axle; about other axes it belongs
-    to the body); `front` and `rear`: the tyre of a wheel on each axle (`mirrored`: the right wheels' is its mirror image);
-    `drag` (N s^2/m^2), `rolling_resistance` (-), `toe_` (rad, inwards), `camber_` (rad, tops outwards), `ackermann` (-: 0 both
-    front wheels turn alike, 1 about one point), `drive`.
 
     **Inputs**: `steer` (rad at the road wheels) and those of `drive`.
 
@@ -101,46 +78,8 @@ class FourteenDOF(AbstractTwoTrack):
     carry the car, or a tyre that is none.
     """
 
-    sprung_mass: jax.Array = positive("kg")
-    unsprung_mass_front: jax.Array = positive("kg")
-    unsprung_mass_rear: jax.Array = positive("kg")
-    roll_inertia: jax.Array = positive("kg m^2")
-    pitch_inertia: jax.Array = positive("kg m^2")
-    yaw_inertia: jax.Array = positive("kg m^2")
-    front_axle_to_cg: jax.Array = positive("m")
-    rear_axle_to_cg: jax.Array = positive("m")
-    track_front: jax.Array = positive("m")
-    track_rear: jax.Array = positive("m")
-    cg_height: jax.Array = positive("m")
-    spring_front: jax.Array = positive("N/m")
-    spring_rear: jax.Array = positive("N/m")
-    damper_front: jax.Array = parameter("N s/m", scale=1500.0)
-    damper_rear: jax.Array = parameter("N s/m", scale=1500.0)
-    front: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
-    rear: AbstractTyre  # pyright: ignore[reportGeneralTypeIssues]
-    roll_yaw_product: jax.Array = parameter("kg m^2", scale=50.0, default=0.0)
-    anti_roll_front: jax.Array = parameter("N/m", scale=1e4, default=0.0)
-    anti_roll_rear: jax.Array = parameter("N/m", scale=1e4, default=0.0)
-    roll_centre_front: jax.Array = parameter("m", scale=0.1, default=0.0)
-    roll_centre_rear: jax.Array = parameter("m", scale=0.1, default=0.0)
-    pitch_slope_front: jax.Array = parameter("-", scale=0.1, default=0.0)
-    pitch_slope_rear: jax.Array = parameter("-", scale=0.1, default=0.0)
-    tyre_stiffness: jax.Array = positive("N/m", default=2.2e5)
-    tyre_damping: jax.Array = parameter("N s/m", scale=100.0, default=50.0)
-    wheel_radius: jax.Array = positive("m", default=0.32)
-    wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
-    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.0)
-    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.0)
-    toe_front: jax.Array = parameter("rad", scale=0.005, default=0.0)
-    toe_rear: jax.Array = parameter("rad", scale=0.005, default=0.0)
-    camber_front: jax.Array = parameter("rad", scale=0.02, default=0.0)
-    camber_rear: jax.Array = parameter("rad", scale=0.02, default=0.0)
-    ackermann: jax.Array = parameter("-", scale=1.0, default=0.0)
-    drive: AbstractDrive = eqx.field(default_factory=AxleDrive)
-    mirrored: bool = eqx.field(static=True, default=True)
-    crawl_speed: float = eqx.field(static=True, default=3.0)
-
     def __check_init__(self):
+        check_parameters(self)
         check_fourteen_dof(self)
 
     @property
@@ -153,9 +92,9 @@ class FourteenDOF(AbstractTwoTrack):
         return ("steer", *self.drive.inputs)
 
     @property
-    def state_type(self):
-        """The body's states, travels and their rates, spins, then those of dynamic tyres (`fl_<name>` ...)."""
-        return record_type("FourteenDOFState", (*STATES, *tyres_of(self).state_names))
+    def own_states(self):
+        """The body's states, travels and their rates, spins."""
+        return (*BODY, *wheel_names("travel"), *wheel_names("travel_rate"), *SPINS)
 
     @property
     def units(self):
@@ -164,23 +103,17 @@ class FourteenDOF(AbstractTwoTrack):
     def motion(self, x, u):
         return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
 
-    def start(self, t, u, **values):
-        """At rest on its springs on a level road, or rolling there freely with `v_x` (m/s)."""
-        check_names("start", values, self.state_type._fields)
-        dtype = jnp.result_type(self.sprung_mass)
-        given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
-        zero = jnp.zeros(jnp.shape(u.steer), dtype)
-        speed = given.get("v_x", zero)
-        spins = each_wheel(lambda sunk: speed / (self.wheel_radius - ROLLING_SHARE * sunk), sunk_at_rest(self))
-        rest = {"z": self.cg_height + zero, **dict(zip(SPINS, spins, strict=True))}
-        x = record("Body", {name: given.get(name, rest.get(name, zero)) for name in STATES})
-        if not tyres_of(self).state_names:
-            return self.state_type(*x)
-        return self.state_type(*x, *tyres_of(self).start(self._stand(x, u, LEVEL).contacts))._replace(**given)
+    def at_rest(self, v_x):
+        """On its springs on a level road, or rolling there freely with `v_x` (m/s)."""
+        spins = [v_x / (self.wheel_radius - ROLLING_SHARE * sunk) for sunk in sunk_at_rest(self)]
+        return {"z": self.cg_height, **dict(zip(SPINS, spins, strict=True))}
+
+    def contacts(self, x, u, ground: Ground = LEVEL) -> Wheels:
+        return self._stand(x, u, ground).contacts
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        tyres, stand, omegas = tyres_of(self), self._stand(x, u, ground), wheels_of(x, "omega")
+        tyres, stand, omegas = self.tyres, self._stand(x, u, ground), wheels_of(x, "omega")
         body, states, g = stand.body, tyres.states(x), Vector(*gravity(ground))
         forces = tyres.forces(stand.contacts, states)
         roads = each_wheel(
@@ -224,7 +157,7 @@ class FourteenDOF(AbstractTwoTrack):
             "brake_dissipation": sum_of_wheels(each_wheel(lambda shaft: shaft.brake_power, shafts)),
             "drag_dissipation": air_drag(self.drag, x.v_x) * x.v_x,
         }
-        return self.state_type(*rates), record("FourteenDOFOutputs", filled(shown, push.F_y))
+        return self.rates_and_outputs(rates, shown)
 
     def _stand(self, x, u, ground: Ground) -> Stand:
         """How the car stands on the road, before any tyre force."""

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from jaxveh._core.errors import check, check_at_least, is_concrete
+from jaxveh.vehicles.fourteen_dof.parameters import AbstractSuspendedTwoTrack
 from jaxveh.vehicles.fourteen_dof.suspension import static_loads
-from jaxveh.vehicles.two_track import check_car
 
 NOT_NEGATIVE = (
     "damper_front", "damper_rear", "anti_roll_front", "anti_roll_rear", "tyre_damping", "drag", "rolling_resistance",
 )  # fmt: skip
 
 
-def check_fourteen_dof(car: Any) -> None:
-    """Raise `InputError` unless parameters are in their domains, the inertia is positive definite and the tyres carry the car."""
-    check_car(car)
+def check_fourteen_dof(car: AbstractSuspendedTwoTrack) -> None:
+    """Raise `InputError` unless the inertia is positive definite and the tyres carry the car."""
     kind = type(car).__name__
     for name in NOT_NEGATIVE:
         check_at_least(f"{kind}.{name}", getattr(car, name), 0)

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 from jaxveh import numerics
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.fourteen_dof.kinematics import Body
+from jaxveh.vehicles.fourteen_dof.parameters import AbstractSuspendedTwoTrack
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, scaled
-from jaxveh.vehicles.two_track import positions_of
 from jaxveh.vehicles.wheels import Wheels, each_wheel, front_rear
 
 LEFT = Wheels(1.0, -1.0, 1.0, -1.0)
@@ -34,33 +34,33 @@ class Wheel(NamedTuple):
     bias: Vector
 
 
-def spring_loads(car: Any) -> Wheels:
+def spring_loads(car: AbstractSuspendedTwoTrack) -> Wheels:
     """What each spring carries at rest, N."""
     half = 0.5 * GRAVITY * car.sprung_mass / (car.front_axle_to_cg + car.rear_axle_to_cg)
     return front_rear(half * car.rear_axle_to_cg, half * car.front_axle_to_cg)
 
 
-def unsprung(car: Any) -> Wheels:
+def unsprung(car: AbstractSuspendedTwoTrack) -> Wheels:
     """The mass that each wheel carries with it, kg."""
     return front_rear(car.unsprung_mass_front, car.unsprung_mass_rear)
 
 
-def static_loads(car: Any) -> Wheels:
+def static_loads(car: AbstractSuspendedTwoTrack) -> Wheels:
     """Wheel loads at rest on a level road, N."""
     return each_wheel(lambda spring, mass: spring + GRAVITY * mass, spring_loads(car), unsprung(car))
 
 
-def sunk_at_rest(car: Any) -> Wheels:
+def sunk_at_rest(car: AbstractSuspendedTwoTrack) -> Wheels:
     """By how much each tyre is compressed at rest, m, in the plane of its wheel, which camber inclines."""
     return each_wheel(lambda load, lean: load * lean / car.tyre_stiffness, static_loads(car), leans(car))
 
 
-def leans(car: Any) -> Wheels:
+def leans(car: AbstractSuspendedTwoTrack) -> Wheels:
     """The cosine of each wheel's camber at rest."""
     return front_rear(numerics.cos(car.camber_front), numerics.cos(car.camber_rear))
 
 
-def joints(car: Any) -> Wheels:
+def joints(car: AbstractSuspendedTwoTrack) -> Wheels:
     """The joint of each wheel.
 
     Across the car it is inclined so that the contact point turns about the roll centre: the left wheel moves outwards in
@@ -76,7 +76,7 @@ def joints(car: Any) -> Wheels:
         return Joint(Vector(x, y, lean * (car.wheel_radius - sunk) - car.cg_height), slope, dot(slope, slope), mass)
 
     masses, sunk = unsprung(car), sunk_at_rest(car)
-    return each_wheel(one, positions_of(car), LEFT, centres, tracks, pitch_slopes, masses, sunk, leans(car))
+    return each_wheel(one, car.places, LEFT, centres, tracks, pitch_slopes, masses, sunk, leans(car))
 
 
 def wheel_at(joint: Joint, travel: Any, rate: Any, body: Body) -> Wheel:
@@ -88,7 +88,7 @@ def wheel_at(joint: Joint, travel: Any, rate: Any, body: Body) -> Wheel:
     return Wheel(place, add(body.velocity, carried, along), bias)
 
 
-def suspension_forces(car: Any, travels: Wheels, rates: Wheels) -> tuple[Wheels, Wheels]:
+def suspension_forces(car: AbstractSuspendedTwoTrack, travels: Wheels, rates: Wheels) -> tuple[Wheels, Wheels]:
     """Force that pushes each wheel down against its travel (N), and the part of it that the damper makes.
 
     Spring, preloaded for rest, damper, and the anti-roll bar on the difference of an axle's travels.

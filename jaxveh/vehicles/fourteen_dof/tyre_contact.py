@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh.tyres import Contact, Forces
 from jaxveh.vehicles.fourteen_dof.kinematics import Body, to_body, to_road
+from jaxveh.vehicles.fourteen_dof.parameters import AbstractSuspendedTwoTrack
 from jaxveh.vehicles.fourteen_dof.suspension import LEFT, Wheel
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
 from jaxveh.vehicles.wheels import WheelMotion, Wheels, contact, each_wheel, front_rear, travel_direction
@@ -17,7 +18,7 @@ ROLLING_SHARE = 1.0 / 3.0
 """Of a tyre's compression the part by which its effective rolling radius shrinks: a belt that hardly stretches."""
 
 
-def axles(car: Any, steer: Any) -> Wheels:
+def axles(car: AbstractSuspendedTwoTrack, steer: Any) -> Wheels:
     """The axis about which each wheel spins, pointing to the left, in the body's axes.
 
     The front wheels turn about the body's z axis: by the steer, and as far as `ackermann` says by the angle with which
@@ -56,7 +57,9 @@ class Touch(NamedTuple):
     damped: Any
 
 
-def touch(car: Any, body: Body, wheel: Wheel, axis: Vector, omega: Any, friction: Any) -> tuple[Contact, Touch]:
+def touch(
+    car: AbstractSuspendedTwoTrack, body: Body, wheel: Wheel, axis: Vector, omega: Any, friction: Any
+) -> tuple[Contact, Touch]:
     """The contact of a wheel that spins with `omega` (rad/s) about `axis` (body's axes).
 
     The contact point lies below the centre in the wheel's plane (ISO 8855; H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed.,
@@ -93,7 +96,9 @@ class Reaction(NamedTuple):
     dissipation: Any
 
 
-def reaction(car: Any, body: Body, at: Contact, how: Touch, forces: Forces, omega: Any) -> Reaction:
+def reaction(
+    car: AbstractSuspendedTwoTrack, body: Body, at: Contact, how: Touch, forces: Forces, omega: Any
+) -> Reaction:
     """The road's forces on body and wheel.
 
     The longitudinal force turns the wheel with the arm of the *rolling* radius. With the loaded radius, which is smaller,

@@ -7,7 +7,7 @@ from typing import Any
 from jaxveh._core.errors import InputError
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.limits import AccelerationLimits, SteerLimits
-from jaxveh.vehicles.sets.numbers import CarNumbers, SuspensionNumbers, TyreNumbers
+from jaxveh.vehicles.sets.numbers import CarNumbers, SuspensionNumbers, TyreNumbers, named_alike
 
 
 def from_commonroad(specification: Any, name: str = "CommonRoad vehicle", source: str = "CommonRoad") -> CarNumbers:
@@ -28,19 +28,10 @@ def from_commonroad(specification: Any, name: str = "CommonRoad vehicle", source
     return CarNumbers(
         name=name,
         source=source,
-        mass=s.mass,
-        yaw_inertia=s.yaw_inertia,
-        front_axle_to_cg=s.front_axle_to_cg,
-        rear_axle_to_cg=s.rear_axle_to_cg,
+        **named_alike(s),
         front=tyres["front"],
         rear=tyres["rear"],
         cg_height=s.cg_height,
-        track_front=s.track_front,
-        track_rear=s.track_rear,
-        wheel_radius=s.wheel_radius,
-        wheel_inertia=s.wheel_inertia,
-        front_drive=1.0 if s.front_drive is None else s.front_drive,
-        front_brake=0.65 if s.front_brake is None else s.front_brake,
         suspension=_suspension(s),
         trailer_length=s.trailer_wheelbase,
     )

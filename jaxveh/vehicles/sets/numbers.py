@@ -183,3 +183,19 @@ class CarNumbers:
             found[f"roll_stiffness_{axle}"] = spring * tyre / (spring + tyre)
             found[f"roll_damping_{axle}"] = 0.5 * track**2 * getattr(s, f"damper_{axle}")
         return found
+
+
+NAMED_ALIKE = (
+    "mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "track_front", "track_rear", "wheel_radius", "wheel_inertia",
+)  # fmt: skip
+"""What cars' files and CommonRoad's call as `CarNumbers` does."""
+
+SHARES = ("front_drive", "front_brake")
+"""What is generic where they do not say."""
+
+
+def named_alike(specification: Any) -> dict[str, Any]:
+    """Numbers out of a file's specification that have the names of those of `CarNumbers`, without shares that it leaves out."""
+    shares = {name: getattr(specification, name) for name in SHARES}
+    known = {name: share for name, share in shares.items() if share is not None}
+    return {name: getattr(specification, name) for name in NAMED_ALIKE} | known

@@ -6,7 +6,7 @@ from typing import Any
 
 from jaxveh._core.errors import InputError
 from jaxveh.vehicles.base import GRAVITY
-from jaxveh.vehicles.sets.numbers import CarNumbers, TyreNumbers
+from jaxveh.vehicles.sets.numbers import CarNumbers, TyreNumbers, named_alike
 
 
 def numbers_of(specification: Any) -> CarNumbers:
@@ -24,22 +24,13 @@ def numbers_of(specification: Any) -> CarNumbers:
     return CarNumbers(
         name=s.name or "car",
         source="the car's file",
-        mass=s.mass,
-        yaw_inertia=s.yaw_inertia,
-        front_axle_to_cg=s.front_axle_to_cg,
-        rear_axle_to_cg=s.rear_axle_to_cg,
+        **named_alike(s),
         front=_tyre(s, "front", weight * s.rear_axle_to_cg),
         rear=_tyre(s, "rear", weight * s.front_axle_to_cg),
         # A file may hold 0 for a car whose loads stay.
         cg_height=s.cg_height or None,
-        track_front=s.track_front,
-        track_rear=s.track_rear,
-        wheel_radius=s.wheel_radius,
-        wheel_inertia=s.wheel_inertia,
         drag=s.drag,
         rolling_resistance=s.rolling_resistance,
-        front_drive=1.0 if s.front_drive is None else s.front_drive,
-        front_brake=0.65 if s.front_brake is None else s.front_brake,
         steer_offset=0.0 if s.steer_offset is None else -s.steer_offset,
     )
 

@@ -1,0 +1,28 @@
+"""What tyres with a stiffness along, a stiffness across and one friction share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+
+from jaxveh import numerics
+from jaxveh._core.parameter import positive
+from jaxveh.tyres.base import AbstractTyre, Contact, need_load
+
+
+class AbstractTwoStiffnesses(AbstractTyre):
+    """A tyre of `slip_stiffness` (N), `cornering_stiffness` (N/rad) and `friction` (-; default 1), the same in all directions."""
+
+    slip_stiffness: jax.Array = positive("N")
+    cornering_stiffness: jax.Array = positive("N/rad")
+    friction: jax.Array = positive("-", default=1.0)
+
+    def limit(self, contact: Contact) -> Any:
+        """The greatest force, N: friction of tyre and road times the load."""
+        return self.friction * contact.friction * need_load(contact, type(self).__name__)
+
+    def unbounded(self, sigma_x: Any, sigma_y: Any) -> tuple[Any, Any, Any]:
+        """The force that the stiffnesses alone would make of slips, N: along, across, and its size."""
+        F_x, F_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
+        return F_x, F_y, numerics.hypot(F_x, F_y)

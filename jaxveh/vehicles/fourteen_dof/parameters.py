@@ -1,0 +1,51 @@
+"""Parameters of the car of fourteen degrees of freedom."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY
+
+import jax
+
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.vehicles.drive import AbstractDriven
+from jaxveh.vehicles.two_track import AbstractTwoTrack
+
+
+class AbstractSuspendedTwoTrack(AbstractDriven, AbstractTwoTrack):
+    """A two-track car whose wheels have masses of their own on suspensions.
+
+    **Parameters** of body and suspensions: `sprung_mass`, `unsprung_mass_front`, `unsprung_mass_rear` (kg; the latter each
+    wheel's); `roll_inertia`, `pitch_inertia`, `yaw_inertia`, `roll_yaw_product` (the integral of x z dm; kg m^2, of the sprung
+    mass about its centre of gravity, from which axles and `cg_height` are measured, too: at rest); `spring_`, `damper_`,
+    `anti_roll_` `front` and `rear` (N/m, N s/m at the wheel; N per m of difference of the wheels' travels); `roll_centre_` (m
+    over the road), `pitch_slope_` (-); `tyre_stiffness` (N/m), `tyre_damping` (N s/m); `wheel_inertia` (kg m^2, about the
+    axle; about other axes it belongs to the body); `toe_` (rad, inwards), `camber_` (rad, tops outwards), `ackermann` (-: 0
+    both front wheels turn alike, 1 about one point). `wheel_radius` is that without load.
+    """
+
+    _: KW_ONLY
+    sprung_mass: jax.Array = positive("kg")
+    unsprung_mass_front: jax.Array = positive("kg")
+    unsprung_mass_rear: jax.Array = positive("kg")
+    roll_inertia: jax.Array = positive("kg m^2")
+    pitch_inertia: jax.Array = positive("kg m^2")
+    yaw_inertia: jax.Array = positive("kg m^2")
+    spring_front: jax.Array = positive("N/m")
+    spring_rear: jax.Array = positive("N/m")
+    damper_front: jax.Array = parameter("N s/m", scale=1500.0)
+    damper_rear: jax.Array = parameter("N s/m", scale=1500.0)
+    roll_yaw_product: jax.Array = parameter("kg m^2", scale=50.0, default=0.0)
+    anti_roll_front: jax.Array = parameter("N/m", scale=1e4, default=0.0)
+    anti_roll_rear: jax.Array = parameter("N/m", scale=1e4, default=0.0)
+    roll_centre_front: jax.Array = parameter("m", scale=0.1, default=0.0)
+    roll_centre_rear: jax.Array = parameter("m", scale=0.1, default=0.0)
+    pitch_slope_front: jax.Array = parameter("-", scale=0.1, default=0.0)
+    pitch_slope_rear: jax.Array = parameter("-", scale=0.1, default=0.0)
+    tyre_stiffness: jax.Array = positive("N/m", default=2.2e5)
+    tyre_damping: jax.Array = parameter("N s/m", scale=100.0, default=50.0)
+    wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
+    toe_front: jax.Array = parameter("rad", scale=0.005, default=0.0)
+    toe_rear: jax.Array = parameter("rad", scale=0.005, default=0.0)
+    camber_front: jax.Array = parameter("rad", scale=0.02, default=0.0)
+    camber_rear: jax.Array = parameter("rad", scale=0.02, default=0.0)
+    ackermann: jax.Array = parameter("-", scale=1.0, default=0.0)
