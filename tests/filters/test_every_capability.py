@@ -1,5 +1,6 @@
 """What a filter declares is what it does: each of `FILTERS`, each capability, both ways."""
 
+import functools
 import inspect
 from typing import ClassVar
 
@@ -37,6 +38,9 @@ FILTERS = EVERY | {
 FLAGS = ("whitens", "noise_by_row", "rows_between")
 HUGE, ROW = 1e6, 12
 
+BETWEEN = 2
+"""Empty rows put between each two."""
+
 # Capabilities are those of classes: of lines of the same classes the last.
 KINDS = {tuple(type(layer) for layer in layers(line.make())): name for name, line in FILTERS.items()}
 ONCE = [name for name in FILTERS if name in KINDS.values()]
@@ -58,9 +62,9 @@ def scanned(filter_, model, rows):
     return filters.scan(filter_, model, rows, jax.random.key(0))
 
 
-def told_model():
-    """The linear model, with an input that tells the spread of its first channel."""
-    model = linear()
+def told_model(own):
+    """A model, with an input that tells the spread of its first channel."""
+    model = own()
     return ss.StateSpace(
         system=model.system, transition=model.transition_function, observation=model.observation_function,
         process_noise=model.process_noise, measurement_noise=model.measurement_noise, prior=model.prior,
@@ -68,31 +72,50 @@ def told_model():
     )  # fmt: skip
 
 
-def told_rows(model, values, y0=None):
+def told_rows(model, values=None, y0=None):
     recording = recordings("linear")[0]
     channels = {name: np.array(recording[name]) for name in (*model.channels, "force")}
     if y0 is not None:
         channels["y0"][ROW] = y0
-    return model.rows(recording.replace(**channels, told=values))
+    return model.rows(recording.replace(**channels, told=np.full(25, 0.4) if values is None else values))
+
+
+def beyond(rows, count):
+    """`count` empty rows behind the last, so that rows without and with others between are one program."""
+    later = jax.tree.map(lambda leaf: jnp.concatenate([leaf, jnp.full(count, leaf[-1])]), rows)
+    t = later.t.at[-count:].add(0.1 * jnp.arange(1.0, count + 1.0))
+    return later._replace(t=t, y=jax.tree.map(lambda leaf: leaf.at[-count:].set(jnp.nan), later.y))
+
+
+def model_for(name):
+    """Where nothing is drawn the one of all other capabilities, so that they share a program."""
+    return told_model(linear if FILTERS[name].drawn else turning)
+
+
+@functools.cache
+def answer(name, what):
+    """The estimate of a filter's rows: `plain`, `longer` by empty rows between, or with y0 of one row `missing` or `given`."""
+    model = model_for(name)
+    rows = told_rows(model, y0={"missing": np.nan, "given": 5.0}.get(what))
+    rows = with_empty_rows(rows, BETWEEN) if what == "longer" else beyond(rows, BETWEEN * 24)
+    return scanned(filter_named(name), model, rows)
 
 
 @pytest.mark.parametrize("name", [n for n in NOW if able(n, "noise_by_row") and n not in NOT_TOLD])
 def test_noise_of_a_row_is_taken_as_it_is_told(name):
     """A channel of a huge spread in one row is as good as missing there, and has the model's own spread in all others."""
-    model, own = told_model(), 0.4
-    values = np.full(25, own)
+    model, values = model_for(name), np.full(25, 0.4)
     values[ROW] = HUGE
     told = scanned(filters.VaryingNoise(filter_named(name), {"y0": "told"}), model, told_rows(model, values, y0=0.5))
-    missing = scanned(filter_named(name), model, told_rows(model, values, y0=np.nan))
+    missing, given = answer(name, "missing"), answer(name, "given")
     for found, expected in zip(told.mean, missing.mean, strict=True):
         np.testing.assert_allclose(found[: ROW + 1], expected[: ROW + 1], rtol=1e-4, atol=1e-4)
-    given = scanned(filter_named(name), model, told_rows(model, values, y0=5.0))
     assert abs(given.mean.x0[ROW] - missing.mean.x0[ROW]) > 1e-3
 
 
 @pytest.mark.parametrize("name", [n for n in ONCE if not able(n, "noise_by_row")])
 def test_a_filter_with_a_noise_of_its_own_is_refused(name):
-    model, kind = told_model(), who_lacks(filter_named(name), "noise_by_row")
+    model, kind = told_model(linear), who_lacks(filter_named(name), "noise_by_row")
     for outer in (lambda f: filters.VaryingNoise(f, {"y0": "told"}), filters.Huber, filters.RobustStudentT):
         if outer in (filters.Huber, filters.RobustStudentT) and not isinstance(
             filter_named(name), filters.AbstractGaussianFilter
@@ -134,11 +157,8 @@ def with_empty_rows(rows, count):
 
 def beside(name):
     """Estimates of the rows that both have: as they are, and with two empty rows between each two."""
-    model, filter_ = turning(), filter_named(name)
-    rows = model.rows(recordings("linear")[0])
-    plain, longer = scanned(filter_, model, rows), scanned(filter_, model, with_empty_rows(rows, 2))
-    shown = jnp.stack([*plain.mean, *plain.std])
-    return np.asarray(shown), np.asarray(jnp.stack([*longer.mean, *longer.std])[:, ::3])
+    shown = lambda found: np.asarray(jnp.stack([*found.mean, *found.std]))
+    return shown(answer(name, "plain"))[:, :25], shown(answer(name, "longer"))[:, :: BETWEEN + 1]
 
 
 @pytest.mark.parametrize("name", [n for n in NOT_DRAWN if able(n, "rows_between")])
@@ -184,8 +204,7 @@ def test_the_spread_of_particles_without_measurements_depends_on_time_alone(name
 
 @pytest.mark.parametrize("name", NOT_DRAWN)
 def test_whitened_innovations_add_up_where_they_are_declared(name):
-    model = linear()
-    found = scanned(filter_named(name), model, model.rows(recordings("linear")[0]))
+    found = answer(name, "plain")
     if not able(name, "whitens"):
         assert found.info.whitened is None
         return
