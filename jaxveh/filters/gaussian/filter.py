@@ -60,6 +60,12 @@ class AbstractGaussianFilter(AbstractTwoPartFilter):
     def adapted(self, model: StateSpace, belief: Any) -> StateSpace:
         """The model with the noises that this filter takes for true, given what it has seen."""
 
+    @property
+    def linearisations(self) -> int | None:
+        """How many times its update linearises the observation, 0 of a filter of linear models, where a smoother over all rows
+        at once (`smooth_parallel`) does what it does; None: it is a loop over the rows alone."""
+        return None
+
     def predict(self, model: StateSpace, belief: Any, t) -> Any:
         """The belief at time `t`, propagated with the inputs that the belief carries (held)."""
         return self.predict_between(model, belief, t, belief.u)
@@ -124,7 +130,7 @@ MOST_LOST = 1e-3
 def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
     """Raise `InputError` where the form needs positive weights and the rule has others; warn where rounding ruins them."""
     form = type(filter.form)
-    if form.needs_positive and not filter.rule(len(model.states)).positive:
+    if not form.negative_weights and not filter.rule(len(model.states)).positive:
         raise InputError(
             f"{type(filter).__name__}: a weight is negative for {len(model.states)} states, which {form.__name__} cannot take. "
             "Use weights without (alpha = 1, kappa >= 0), or Covariance()."
