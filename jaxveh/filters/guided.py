@@ -14,7 +14,7 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
 from jaxveh.filters.auxiliary import FirstStage
 from jaxveh.filters.choosing import DRAW_INSTEAD, check_ancestors, choose_ancestors, gather, log_chosen, log_of
-from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, is_gaussian, unwrapped, wrapped_innovation
+from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes, product, times
@@ -160,7 +160,7 @@ class Guided(AbstractParticleFilter):
         check_gaussian("Guided", "process noise", model.process_noise.law)
 
     def _start(self, model, row, key):
-        if not is_gaussian(model.prior.law):
+        if not model.prior.law.is_gaussian:
             plain = ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)
             return plain._start(model, row, key)
         draw, key = jax.random.split(key)

@@ -20,10 +20,7 @@ from jaxveh.statespace import (
     AbstractBelief,
     AbstractNoise,
     AbstractTwoPartFilter,
-    Gaussian,
-    Independent,
     Info,
-    MultivariateGaussian,
     Row,
     StateDependent,
     StateSpace,
@@ -195,20 +192,11 @@ def check_kind(who: str, filter: Any, kind: type) -> None:
         raise InputError(f"{who}: {type(filter).__name__} inside: must be {what} (Kalman, Extended, Unscented, ...).")
 
 
-def is_gaussian(law: AbstractNoise) -> bool:
-    """Whether the law, and each part of it, is Gaussian."""
-    return all(isinstance(part, Gaussian | MultivariateGaussian) for part in _parts(law))
-
-
 def check_gaussian(who: str, what: str, law: AbstractNoise, advice: str = "Use ParticleFilter.") -> None:
     """Raise `InputError` unless the law, or each part of it, is Gaussian."""
-    for part in _parts(law):
-        if not is_gaussian(part):
+    for part in law.parts:
+        if not part.is_gaussian:
             raise InputError(f"{who}: the {what} {type(part).__name__} is not Gaussian. {advice}")
-
-
-def _parts(law: AbstractNoise) -> tuple[AbstractNoise, ...]:
-    return law.laws if isinstance(law, Independent) else (law,)
 
 
 def with_spread(belief: GaussianBelief, vector: Any, spread: Spread, t=None, u=None, count=None) -> GaussianBelief:
