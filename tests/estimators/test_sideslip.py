@@ -134,7 +134,7 @@ def test_real_log_calibrated_blind():
     numbers = estimators.sideslip.score(estimators.sideslip.estimate(rest.select(blind), calibration), rest, car)
     assert numbers["sideslip_rmse_deg"] <= 0.24  # 0.2312 measured
     assert set(calibration.summary()) >= {"car.front.B", "car.rear.D", "process noise.v_y", "measurement noise.a_y"}
-    fitted = calibration.specification(car)
+    fitted = estimators.sideslip.fitted_car(calibration, car)
     assert fitted.front.nominal_load == pytest.approx(982 * 9.80665 * 1.07 / 2.40, rel=1e-6)
 
 
