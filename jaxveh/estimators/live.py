@@ -41,7 +41,9 @@ class AbstractCleaning(eqx.Module):
 class AsItIs(AbstractCleaning):
     """Nothing is changed."""
 
-    channels = ()
+    @property
+    def channels(self):
+        return ()
 
     def first(self, t, values):
         return None, values

@@ -139,6 +139,7 @@ def calibrate(
     start = model(car, **options)
     span = span_of(NAME, recording, SHORTEST, "pedals that move")
     check_needs(NAME, needs, recording, start)
+    assert start.process_noise is not None  # `model` has given it
     prior = {"drag": DRAG_SPREAD} | dict.fromkeys((*start.process_noise.law.names, *start.channels), NOISE_SPREAD)
     fit = prediction_error(filter or Unscented(), start, recording, chosen, prior=prior, progress=progress)
     return Calibration(NAME, fit, span)

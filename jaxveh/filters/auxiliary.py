@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
@@ -12,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
-from jaxveh.filters.choosing import DRAW_INSTEAD, check_ancestors, choose_ancestors, gather, log_chosen, log_of
+from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
 from jaxveh.filters.looking_ahead import AbstractLookahead, lookahead_for, remark_of, softened
 from jaxveh.filters.particle import (
     AbstractAhead,
@@ -98,7 +97,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
 
     smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
-    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     lookahead: AbstractLookahead | None = eqx.field(static=True, default=None)
     gradient: str = eqx.field(static=True, default="score")

@@ -124,7 +124,11 @@ class Soft(AbstractDraw):
         return logs - soft, soft
 
 
-def as_resampling(scheme: AbstractResampling | Callable) -> AbstractResampling:
+Scheme = AbstractResampling | Callable
+"""What a particle filter takes as its `resampling`."""
+
+
+def as_resampling(scheme: Scheme) -> AbstractResampling:
     """The scheme; a function `(key, weights, n) -> ancestors` as a `PlainDraw`."""
     return scheme if isinstance(scheme, AbstractResampling) else PlainDraw(scheme)
 
@@ -163,7 +167,7 @@ DRAW_INSTEAD = "Take numerics.systematic or Soft(...), or ParticleFilter, which 
 """What a filter says that needs ancestors."""
 
 
-def check_ancestors(who: str, scheme: AbstractResampling | Callable, instead: str) -> None:
+def check_ancestors(who: str, scheme: Scheme, instead: str) -> None:
     """Raise `InputError` for a scheme whose particles have no ancestors, which `who` needs, and say what to take `instead`."""
     scheme = as_resampling(scheme)
     if not scheme.keeps_ancestors:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
@@ -13,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
 from jaxveh.filters.auxiliary import FirstStage
-from jaxveh.filters.choosing import DRAW_INSTEAD, check_ancestors, choose_ancestors, gather, log_chosen, log_of
+from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.noises import law_at
@@ -143,7 +142,7 @@ class Guided(AbstractParticleFilter):
     particles: int = eqx.field(static=True)
     rule: str = eqx.field(static=True, default="extended")
     auxiliary: bool = eqx.field(static=True, default=False)
-    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     gradient: str = eqx.field(static=True, default="score")
 

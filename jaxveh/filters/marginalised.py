@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -13,7 +12,7 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import as_names, check_names, record
-from jaxveh.filters.choosing import DRAW_INSTEAD, check_ancestors, choose_ancestors, log_chosen, log_of
+from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, log_chosen, log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.noises import covariance_in
@@ -168,7 +167,7 @@ class Marginalised(AbstractParticleFilter):
 
     particles: int = eqx.field(static=True)
     linear: tuple[str, ...] = eqx.field(static=True, converter=as_names)
-    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     gradient: str = eqx.field(static=True, default="score")
 

@@ -1,7 +1,6 @@
 """The bootstrap particle filter, and what every particle filter shares."""
 
 import abc
-from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
@@ -11,7 +10,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.result import Result, code
-from jaxveh.filters.choosing import AbstractResampling, as_resampling, log_of
+from jaxveh.filters.choosing import AbstractResampling, Scheme, as_resampling, log_of
 from jaxveh.filters.particle_belief import ParticleBelief
 from jaxveh.statespace import (
     AbstractBelief,
@@ -43,7 +42,7 @@ class AbstractParticleFilter(AbstractTwoPartFilter):
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     particles: eqx.AbstractVar[int]
-    resampling: eqx.AbstractVar[Callable]
+    resampling: eqx.AbstractVar[Scheme]
     threshold: eqx.AbstractVar[float]
     gradient: eqx.AbstractVar[str]
 
@@ -230,7 +229,7 @@ class ParticleFilter(AbstractParticleFilter):
 
     smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
-    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     gradient: str = eqx.field(static=True, default="score")
 
