@@ -13,7 +13,7 @@ from jax.ad_checkpoint import checkpoint_name
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
-from jaxveh._core.result import Result, code
+from jaxveh._core.result import Result
 from jaxveh.numerics import derivative_alone
 from jaxveh.statespace import kit
 
@@ -42,12 +42,13 @@ def gather(particles, ancestors):
 
 class Resampled(NamedTuple):
     """The next particles, (n,) in each field; which of those before each comes from, `ancestors` (n,) int32; the logarithms of
-    their weights over 1 / n, with the derivative of the choice, `log_weights` (n,); and the code of how they came about."""
+    their weights over 1 / n, with the derivative of the choice, `log_weights` (n,); and the code of how they came about, if there
+    is anything to tell (`Result`)."""
 
     particles: Any
     ancestors: Any
     log_weights: Any
-    remark: Any
+    remark: Any = Result.successful
 
 
 class AbstractResampling(eqx.Module):
@@ -86,7 +87,7 @@ class AbstractDraw(AbstractResampling):
     def resample(self, key, particles, weights, logs, n, gradient):
         ancestors = drawn_ancestors(self, key, weights, n)
         chosen = log_weights_after(self, logs, ancestors, gradient)
-        return Resampled(gather(particles, ancestors), ancestors, chosen, code(Result.successful))
+        return Resampled(gather(particles, ancestors), ancestors, chosen)
 
 
 class PlainDraw(AbstractDraw):

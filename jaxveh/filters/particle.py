@@ -257,12 +257,13 @@ class ParticleFilter(AbstractParticleFilter):
         n, logs = self.particles, log_of(belief.weights)
         uniform = jnp.full((n,), 1 / n, belief.weights.dtype)
         found = self.scheme.resample(key, belief.particles, belief.weights, logs, n, self.gradient)
-        chosen = log_of(uniform) + found.log_weights
+        ancestors, remark = found.ancestors.astype(jnp.int32), jnp.asarray(found.remark, jnp.int32)
+        chosen = log_of(uniform) + found.log_weights.astype(uniform.dtype)
         weights = numerics.normalise(chosen)[0] if self.scheme.reweights else uniform
-        drawn = DrawnParticles(found.ancestors, weights, chosen, found.remark)
+        drawn = DrawnParticles(ancestors, weights, chosen, remark)
         if self.threshold >= 1:
             return found.particles, drawn
         resampled = numerics.ess(belief.weights) < self.threshold * n
-        themselves = jnp.arange(n, dtype=found.ancestors.dtype)
+        themselves = jnp.arange(n, dtype=jnp.int32)
         kept = belief.particles, DrawnParticles(themselves, belief.weights, logs, code(Result.successful))
         return jax.tree.map(lambda new, old: jnp.where(resampled, new, old), (found.particles, drawn), kept)

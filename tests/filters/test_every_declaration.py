@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from families import left_out, members
 from nonlinear_systems import LogChiSquared
+from test_every_filter import linear, recordings
 
 from jaxveh import InputError, filters, numerics
 from jaxveh import statespace as ss
@@ -94,11 +95,15 @@ class Told(kit.AbstractResampling):
     """Of a user, who declares nothing: particles that stay where they are, their weights thrown away."""
 
     def resample(self, key, particles, weights, logs, n, gradient):
-        return kit.Resampled(particles, jnp.arange(n, dtype=jnp.int32), jnp.zeros_like(logs), jnp.int32(0))
+        return kit.Resampled(particles, jnp.arange(n), jnp.zeros_like(logs))
 
 
 def test_a_scheme_of_a_user_that_declares_nothing_is_taken_by_the_bootstrap_filter_alone():
-    filters.ParticleFilter(N, Told())
+    model = linear()
+    found = filters.scan(
+        filters.ParticleFilter(N, Told()), model, model.rows(recordings("linear")[0]), jax.random.key(0)
+    )
+    assert bool(jnp.all(jnp.isfinite(found.log_likelihood)))
     for make in ANCESTORS:
         with pytest.raises(InputError, match="particles of Told have no ancestors"):
             make(Told())
