@@ -189,7 +189,7 @@ def test_live_says_what_it_says_of_a_log(name, with_key):
         for field in getattr(found, what)._fields:
             beside = np.array([getattr(getattr(answer, what), field) for answer in answers])
             there = np.asarray(getattr(getattr(found, what), field))
-            if field in states and field != "mass":
+            if field in states and field != "mass":  # a state as its logarithm
                 np.testing.assert_array_equal(beside, there, err_msg=field)
             np.testing.assert_allclose(beside, there, rtol=1e-9, err_msg=field)
     np.testing.assert_array_equal([answer.info.log_likelihood for answer in answers], found.info.log_likelihood)
