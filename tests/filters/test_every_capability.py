@@ -187,7 +187,10 @@ def test_whitened_innovations_add_up_where_they_are_declared(name):
     model = linear()
     found = scanned(filter_named(name), model, model.rows(recordings("linear")[0]))
     if not able(name, "whitens"):
-        assert found.info.whitened is None
+        kind = who_lacks(filter_named(name), "whitens")
+        assert found.info.whitened is None, (
+            f"{kind} hands on whitened innovations, and does not declare it: whitens = True"
+        )
         return
     white, scale = jnp.stack(found.info.whitened), jnp.stack(found.info.log_scale)
     here = jnp.isfinite(jnp.stack(found.info.innovation))
