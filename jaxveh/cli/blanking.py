@@ -10,23 +10,26 @@ import numpy as np
 from jaxveh import InputError, Recording
 from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
-from jaxveh.estimators import kit
+from jaxveh.estimators import sideslip
 
-INPUTS = ("steer", "v_x", "a_x")
-"""Channels that must be known in every row."""
+SEEN = tuple(need.channel for need in sideslip.needs)
+"""Channels that the estimator sees."""
+
+INPUTS = tuple(need.channel for need in sideslip.needs if need.throughout)
+"""Those that must be known in every row."""
 
 
 def filled(recording: Recording, max_gap: float | None) -> Recording:
     """The inputs without gaps: filled along lines over at most `max_gap` seconds where that is given.
 
-    **Raises** `InputError` where a channel of `BLIND_CHANNELS` is missing, or an input is still NaN, and the option for it.
+    **Raises** `InputError` where a channel of `SEEN` is missing, or an input is still NaN, and the option for it.
     """
     if max_gap is not None:
         check_positive("--fill", max_gap, "s")
-    missing = [name for name in kit.BLIND_CHANNELS if name not in recording]
+    missing = [name for name in SEEN if name not in recording]
     if missing:
         raise InputError(
-            f"log lacks {', '.join(missing)}, and needs {', '.join(kit.BLIND_CHANNELS)}; say which columns they are with "
+            f"log lacks {', '.join(missing)}, and needs {', '.join(SEEN)}; say which columns they are with "
             "--channels (jaxveh schema channels)."
         )
     for name in INPUTS:
@@ -85,7 +88,7 @@ def calibration_part(recording: Recording, span: tuple[float, float] | None, cal
 
 
 def _seen(recording: Recording, more: tuple[str, ...], truth: str | None) -> Recording:
-    kept = recording.select([name for name in recording.names if name in kit.BLIND_CHANNELS or name in more])
+    kept = recording.select([name for name in recording.names if name in SEEN or name in more])
     if truth is not None and truth in kept and truth not in more:
         return kept.replace(**{truth: np.full(len(kept), np.nan)})
     return kept

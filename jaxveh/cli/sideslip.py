@@ -9,8 +9,8 @@ import numpy as np
 
 from jaxveh import Recording, filters, vehicles
 from jaxveh._core.progress import Progress
+from jaxveh.estimators import Calibration, sideslip
 from jaxveh.estimators import open_loop as drive_open_loop
-from jaxveh.estimators import sideslip
 from jaxveh.io import CarSpecification
 
 SCORED = ("v_y", "sideslip")
@@ -24,15 +24,13 @@ def filter_of(name: str, particles: int) -> filters.AbstractFilter:
     return (filters.AuxiliaryParticleFilter if name == "apf" else filters.ParticleFilter)(particles)
 
 
-def calibrate(
-    car: CarSpecification, part: Recording, uses: tuple[str, ...], progress: Progress
-) -> sideslip.Calibration:
+def calibrate(car: CarSpecification, part: Recording, uses: tuple[str, ...], progress: Progress) -> Calibration:
     """Tyres, noises and steering offset fitted on a span."""
     return sideslip.calibrate(car, part, uses=uses, progress=progress)
 
 
 def estimate(
-    source: sideslip.Calibration | CarSpecification,
+    source: Calibration | CarSpecification,
     part: Recording,
     kind: str = "ukf",
     particles: int = 1000,
@@ -60,7 +58,7 @@ def open_loop(car: CarSpecification, seen: Recording) -> dict[str, np.ndarray]:
     return drive_open_loop(vehicles.from_specification(car), seen)
 
 
-def fitted(calibration: sideslip.Calibration | None) -> dict[str, Any]:
+def fitted(calibration: Calibration | None) -> dict[str, Any]:
     """The fitted parameters by name (value, std, unit) and the choice of the reference's weight, for the JSON file."""
     if calibration is None:
         return {}
@@ -73,12 +71,12 @@ def fitted(calibration: sideslip.Calibration | None) -> dict[str, Any]:
     }
 
 
-def fitted_car(calibration: sideslip.Calibration, car: CarSpecification) -> CarSpecification:
+def fitted_car(calibration: Calibration, car: CarSpecification) -> CarSpecification:
     """The specification with the fitted values in place."""
-    return calibration.specification(car)
+    return sideslip.fitted_car(calibration, car)
 
 
-def curves(calibration: sideslip.Calibration, car: CarSpecification, part: Recording) -> tuple[dict, dict]:
+def curves(calibration: Calibration, car: CarSpecification, part: Recording) -> tuple[dict, dict]:
     """Cars before and after, and the slip angles that the span visited, for `plots.force_curves`."""
     cars = {
         "car file": vehicles.from_specification(car),

@@ -1,11 +1,15 @@
-"""What those who add an estimator build with."""
+"""What those who add an estimator build with: see `jaxveh.estimators.contract` for what one is."""
 
-from jaxveh.estimators.cleaning import BLIND_CHANNELS
-from jaxveh.estimators.sideslip import PIECE_LENGTH, WARM_UP, cut_pieces
+from jaxveh.estimators.contract import Need, check_needs, cut_pieces, model_of, span_of
+from jaxveh.estimators.live import AbstractCleaning, AsItIs, cleaned
 
 __all__ = [
-    "BLIND_CHANNELS",
-    "PIECE_LENGTH",
-    "WARM_UP",
+    "AbstractCleaning",
+    "AsItIs",
+    "Need",
+    "check_needs",
+    "cleaned",
     "cut_pieces",
+    "model_of",
+    "span_of",
 ]

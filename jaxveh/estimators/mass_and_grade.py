@@ -9,15 +9,54 @@ import jax.numpy as jnp
 from jaxveh._core.bijectors import AbstractBijector
 from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import record_type
+from jaxveh._core.progress import Progress, silent
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of, span_of
+from jaxveh.estimators.live import AsItIs, Live
+from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
+from jaxveh.fitting import prediction_error
+from jaxveh.io import CarSpecification
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.statespace import Continuous, Gaussian, Heun, Prior, Propagate, StateSpace, with_parameters
 from jaxveh.vehicles import Longitudinal
 
+NAME = "mass_and_grade"
+
 ACCELEROMETER = "a_x"
+
+needs = (
+    Need("drive_torque", "N m", throughout=True),
+    Need("brake_torque", "N m", throughout=True),
+    Need("v_x", "m/s"),
+    Need(ACCELEROMETER, "m/s^2", optional=True),
+)
+"""Torques at the wheels, summed, in every row; speed where it was measured; an accelerometer where the model has one."""
+
+DRAG_SPREAD, NOISE_SPREAD = 0.5, 0.7
+"""Prior spreads of what a calibration fits: of the drag in units of its scale, of each noise level on its logarithm."""
+
+SHORTEST = 30.0
+"""s: in less the pedals have moved too seldom to tell the noises from the grade."""
+
+
+def car_of(car: CarSpecification | Longitudinal) -> Longitudinal:
+    """The car that goes straight of a car's file; what the file leaves out is the vehicle's default.
+
+    **Raises** `InputError` for a file without `wheel_radius`, by which a torque becomes a force.
+    """
+    if isinstance(car, Longitudinal):
+        return car
+    if car.wheel_radius is None:
+        raise InputError(
+            "mass_and_grade: the car's file has no wheel_radius (m), by which a torque becomes a force; give it."
+        )
+    told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance")}
+    known = {name: value for name, value in told.items() if value is not None}
+    return Longitudinal(car.mass, wheel_radius=car.wheel_radius, **known)
 
 
 def model(
-    car: Longitudinal,
+    car: CarSpecification | Longitudinal,
     *,
     v_x: float = 0.02,
     a_x: float | None = None,
@@ -49,11 +88,11 @@ def model(
     half a step, which a lively pedal turns into a wrong mass. `more_inputs`: names of channels that a filter's wrapper reads
     (`Paused`, `VaryingNoise`).
 
-    **Inputs** `drive_torque` and `brake_torque` (N m). **Channels** `v_x` and `a_x`. **Reported**: `v_x`, `grade` (rad), `mass`
-    (kg) and what else is a state.
+    **Inputs** and **channels**: `needs`. **Reported**: `v_x`, `grade` (rad), `mass` (kg) and what else is a state.
 
-    **Raises** `InputError` for spreads out of range.
+    **Raises** `InputError` for spreads out of range, and as `car_of`.
     """
+    car = car_of(car)
     for name, value in (("v_x", v_x), ("a_x", a_x), ("a_x_bias", a_x_bias), ("grade_spread", grade_spread)):
         check_positive(f"mass_and_grade: {name}", value)
     if a_x_bias is not None and a_x is None:
@@ -76,6 +115,62 @@ def model(
         inputs=(*car.inputs, *more_inputs), input_path=input_path,
     )  # fmt: skip
     return with_parameters(model, lambda model: (model.system.mass,), mass_spread, mass_walk, domain=mass_domain)
+
+
+def chosen(model: Any):
+    """The parameters and noise levels that a calibration fits: the air's drag, and how much of everything is noise."""
+    return (model.system.drag, *model.process_noise.law.std, *model.measurement_noise.std)
+
+
+def calibrate(
+    car: CarSpecification | Longitudinal,
+    recording: Recording,
+    *,
+    filter: AbstractFilter | None = None,
+    progress: Progress = silent,
+    **options: Any,
+) -> Calibration:
+    """Fit drag and noise levels to a span of a log, by maximum posterior of a filter whose mass and grade stay states.
+
+    `options`: those of `model`, the start values among them. Rolling resistance is not fitted: a constant grade says the same.
+
+    **Raises** `InputError` for missing channels, or a span shorter than `SHORTEST`; `FilterError` where the fit fails.
+    """
+    start = model(car, **options)
+    span = span_of(NAME, recording, SHORTEST, "pedals that move")
+    check_needs(NAME, needs, recording, start)
+    assert start.process_noise is not None  # `model` has given it
+    prior = {"drag": DRAG_SPREAD} | dict.fromkeys((*start.process_noise.law.names, *start.channels), NOISE_SPREAD)
+    fit = prediction_error(filter or Unscented(), start, recording, chosen, prior=prior, progress=progress)
+    return Calibration(NAME, fit, span)
+
+
+def estimate(
+    source: Calibration | StateSpace | CarSpecification | Longitudinal,
+    recording: Recording,
+    *,
+    filter: AbstractFilter | None = None,
+    key=None,
+) -> Estimate:
+    """Speed, grade (rad), mass (kg) and what else is a state of the model, along a log of speed and torques.
+
+    `source`: a `Calibration`, a model (`model(car, a_x=0.05)`, where there is an accelerometer), or a car taken at its word.
+
+    **Raises** `InputError` for missing channels, and as `run` does.
+    """
+    found = model_of(NAME, source, model)
+    check_needs(NAME, needs, recording, found)
+    return run(filter or Unscented(), found, recording, key=key)
+
+
+def live(
+    source: Calibration | StateSpace | CarSpecification | Longitudinal,
+    *,
+    filter: AbstractFilter | None = None,
+    key=None,
+) -> Live:
+    """The same a row at a time."""
+    return Live(filter or Unscented(), model_of(NAME, source, model), AsItIs(), key)
 
 
 def _ground(x: Any) -> Ground:

@@ -13,15 +13,22 @@ import numpy as np
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.cleaning import clean
+from jaxveh.estimators.cleaning import BLIND, HandlingCleaning, clean
+from jaxveh.estimators.contract import Calibration, Need, check_needs, cut_pieces, model_of, span_of
 from jaxveh.estimators.handling import Handling, handling_model
 from jaxveh.estimators.linear_baseline import open_loop
+from jaxveh.estimators.live import Live
 from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
 from jaxveh.fitting import Fit, Target, prediction_error
 from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.statespace import StateSpace
 from jaxveh.tyres import MagicFormula, kit
 from jaxveh.vehicles import from_specification
+
+NAME = "sideslip"
+
+needs = BLIND
+"""Steer, speed and longitudinal acceleration in every row; lateral acceleration and yaw rate where they were measured."""
 
 START = kit.GenericTyre(friction=1.1, E=0.0)
 """Of axles that a car's file gives a cornering stiffness alone. More friction and a rounder peak than `kit.GENERIC_TYRE`, with
@@ -42,12 +49,6 @@ PRIOR = {
 SHORTEST = 20.0
 """s: a span shorter than this holds too few corners to calibrate a car on."""
 
-PIECE_LENGTH = 8.0
-"""s: calibration runs the filter on pieces of about this length side by side,"""
-
-WARM_UP = 2.0
-"""s: which overlap by this, in which each filter finds its state."""
-
 TARGET_WEIGHTS = (0.05, 0.02)
 """rad: how closely the estimate is asked to follow a sideslip reference; the choice is made inside the span."""
 
@@ -65,49 +66,20 @@ def chosen(model: Any):
     return (*axles, *body, *sensors, *forces, *model.process_noise.law.std, *model.measurement_noise.std)
 
 
-class Calibration(eqx.Module):
-    """A car fitted to a span of a log.
-
-    `fit`: the `fitting.Fit` (its `model` is the fitted StateSpace); `span`: start and end in the log's own time, s;
-    `weight`: of the sideslip reference (rad), None where the fit is blind, by choice or because validation inside
-    the span said so; `validation`: sideslip RMSE in degrees on the span's second half by weight, fitted on its first.
-    """
-
-    fit: Fit
-    span: tuple[float, float] = eqx.field(static=True)
-    weight: float | None = eqx.field(static=True)
-    validation: tuple = eqx.field(static=True)
-
-    @property
-    def model(self) -> StateSpace:
-        """The fitted state space."""
-        return self.fit.model
-
-    def summary(self) -> dict[str, dict[str, Any]]:
-        """Fitted values by name: `{"value", "std", "unit"}`."""
-        fit = self.fit
-        in_words = lambda name: name.replace("process_noise.law.std", "process noise")
-        return {
-            in_words(p.name).replace("measurement_noise.std", "measurement noise"): {
-                "value": float(fit.parameters[p.name]), "std": float(fit.parameters_std[p.name]), "unit": p.unit
-            }
-            for p in fit.chosen
-        }  # fmt: skip
-
-    def specification(self, car: CarSpecification) -> CarSpecification:
-        """The car's file with the fitted values in place, as far as a car file can say them."""
-        fitted = self.model.system.car
-        offset = float(fitted.steer_offset) / float(self.model.system.steer_gain)
-        return dataclasses.replace(
-            car,
-            yaw_inertia=float(fitted.yaw_inertia),
-            cg_height=float(fitted.cg_height),
-            steer_offset=-offset,
-            front=_axle(fitted.front),
-            rear=_axle(fitted.rear),
-            front_cornering_stiffness=float(fitted.front.cornering_stiffness),
-            rear_cornering_stiffness=float(fitted.rear.cornering_stiffness),
-        )
+def fitted_car(calibration: Calibration, car: CarSpecification) -> CarSpecification:
+    """The car's file with the fitted values in place, as far as a car file can say them."""
+    fitted = calibration.model.system.car
+    offset = float(fitted.steer_offset) / float(calibration.model.system.steer_gain)
+    return dataclasses.replace(
+        car,
+        yaw_inertia=float(fitted.yaw_inertia),
+        cg_height=float(fitted.cg_height),
+        steer_offset=-offset,
+        front=_axle(fitted.front),
+        rear=_axle(fitted.rear),
+        front_cornering_stiffness=float(fitted.front.cornering_stiffness),
+        rear_cornering_stiffness=float(fitted.rear.cornering_stiffness),
+    )
 
 
 def _axle(tyre: MagicFormula) -> AxleTyre:
@@ -132,35 +104,37 @@ def _generic(tyre: MagicFormula, load, told: bool) -> MagicFormula:
     return START.magic_formula(tyre.cornering_stiffness, load)
 
 
+def model(car: CarSpecification | Handling) -> StateSpace:
+    """The state space of a car's file taken at its word, or of a `Handling` car: see `handling_model`."""
+    return handling_model(car if isinstance(car, Handling) else handling_car(car))
+
+
 def calibrate(
-    car: CarSpecification,
+    car: CarSpecification | Handling,
     recording: Recording,
     *,
-    uses: tuple[str, ...] = (),
     filter: AbstractFilter | None = None,
     progress: Progress = silent,
+    uses: tuple[str, ...] = (),
 ) -> Calibration:
     """Fit tyres, noise levels and sensor offsets of a car to a span of a log, by maximum posterior of a filter.
 
     Blind (`uses=()`) it reads steer, v_x, a_x, a_y and yaw_rate alone. With `uses=("v_y",)` the span's v_y supervises the
     fit as a reference for sideslip; how strongly is chosen by fitting on the span's first half and looking at the second, where
     "not at all" is among the choices: a reference with slow errors of its own makes a car worse. Start values and priors
-    come from the car's file and `PRIOR`, and nothing outside the recording is looked at.
+    come from the car's file and `PRIOR`, and nothing outside the recording is looked at. `validation` of what is returned is the
+    sideslip RMSE in degrees on the span's second half by the reference's weight (rad), fitted on its first.
 
     **Raises** `InputError` for missing channels, or a span shorter than `SHORTEST`; `FilterError` where the fit fails.
     """
     for name in uses:
         check_one_of("uses", name, ("v_y",))
-    span = (float(recording.time[0]), float(recording.time[-1]))
-    if span[1] - span[0] < SHORTEST:
-        raise InputError(
-            f"calibration span of {span[1] - span[0]:.3g} s ({span[0]:g} to {span[1]:g} s): must be at least {SHORTEST:g} s, "
-            "with corners in it."
-        )
+    span = span_of(NAME, recording, SHORTEST, "corners")
+    check_needs(NAME, (*needs, *(Need(name, "m/s") for name in uses)), recording)
     filter, log = filter or Unscented(), clean(recording)
-    start = handling_model(handling_car(car))
+    start = model(car)
     if not uses:
-        return Calibration(_fit(filter, start, log, None, progress), span, None, ())
+        return Calibration(NAME, _fit(filter, start, log, None, progress), span)
     half = len(log) // 2
     first = _blank(log, slice(half, len(log)))
     parts = [_part(progress, i, 3 + len(TARGET_WEIGHTS)) for i in range(3 + len(TARGET_WEIGHTS))]
@@ -173,7 +147,7 @@ def calibrate(
     fit = _fit(filter, blind.model, log, None, parts[-2], centre=start)
     if weight is not None:
         fit = _fit(filter, fit.model, log, weight, parts[-1], centre=start)
-    return Calibration(fit, span, weight, tuple(validation))
+    return Calibration(NAME, fit, span, weight, tuple(validation))
 
 
 def _part(progress: Progress, index: int, count: int) -> Progress:
@@ -190,7 +164,7 @@ def _blank(log: Recording, rows: slice) -> Recording:
 
 
 def _fit(filter, model, log, weight, progress, centre=None) -> Fit:
-    pieces, warm_up = cut_pieces(log, PIECE_LENGTH, WARM_UP)
+    pieces, warm_up = cut_pieces(log)
     # A blind fit has a reference without values: one compiled function serves all fits.
     silent_one = lambda piece: jnp.full(len(piece), jnp.nan)
     values = tuple(map(silent_one if weight is None else reference_sideslip, pieces))
@@ -198,16 +172,6 @@ def _fit(filter, model, log, weight, progress, centre=None) -> Fit:
     return prediction_error(
         filter, model, pieces, chosen, prior=PRIOR, centre=centre, target=target, warm_up=warm_up, progress=progress
     )
-
-
-def cut_pieces(recording: Recording, length: float, overlap: float) -> tuple[list[Recording], int]:
-    """The recording in pieces of one number of rows, about `length` seconds beside an overlap, and the overlap's rows."""
-    time = np.asarray(recording.time)
-    step = float(np.median(np.diff(time)))
-    warm_up = round(overlap / step)
-    count = max(1, round((time[-1] - time[0] - overlap) / length))
-    new = (len(recording) - warm_up) // count
-    return [recording.rows(slice(i * new, i * new + new + warm_up)) for i in range(count)], warm_up
 
 
 def reference_sideslip(recording: Recording) -> jax.Array:
@@ -223,14 +187,24 @@ def _validate(filter, model, log, start: int) -> float:
 
 
 def estimate(
-    source: Calibration | CarSpecification, recording: Recording, *, filter: AbstractFilter | None = None, key=None
+    source: Calibration | StateSpace | CarSpecification | Handling,
+    recording: Recording,
+    *,
+    filter: AbstractFilter | None = None,
+    key=None,
 ) -> Estimate:
     """States of the car along a log from steer, v_x, a_x, a_y and yaw_rate: see `handling.HandlingReport` for the names.
 
-    `source`: a `Calibration`, or a car's specification taken at its word. **Raises** as `run` and `clean` do.
+    `source`: a `Calibration`, a model, or a car taken at its word. **Raises** as `run` and `clean` do.
     """
-    model = source.model if isinstance(source, Calibration) else handling_model(handling_car(source))
-    return run(filter or Unscented(), model, clean(recording), key=key)
+    return run(filter or Unscented(), model_of(NAME, source, model), clean(recording), key=key)
+
+
+def live(
+    source: Calibration | StateSpace | CarSpecification | Handling, *, filter: AbstractFilter | None = None, key=None
+) -> Live:
+    """The same a row at a time, cleaning included."""
+    return Live(filter or Unscented(), model_of(NAME, source, model), HandlingCleaning(), key)
 
 
 def score(car: CarSpecification, found: Estimate, recording: Recording) -> dict[str, float]:

@@ -15,7 +15,7 @@ from jaxveh.filters.calibration import (
     simulation_based_calibration,
 )
 from jaxveh.filters.checkpoint import load_belief, save_belief
-from jaxveh.filters.choosing import Soft, Transport
+from jaxveh.filters.choosing import AbstractResampling, PlainDraw, Soft
 from jaxveh.filters.delayed import Delayed, DelayedBelief
 from jaxveh.filters.ensemble import Ensemble, EnsembleBelief
 from jaxveh.filters.export import export_filter
@@ -40,8 +40,16 @@ from jaxveh.filters.kernels import LiuWest, Regularised
 from jaxveh.filters.looking_ahead import AbstractLookahead, PointLookahead, PredictiveLikelihood
 from jaxveh.filters.marginalised import Marginalised, MarginalisedBelief
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, ParticleFilter
-from jaxveh.filters.smoothing import BackwardSampling, FixedLag, Genealogy, SmoothedEstimate, smooth
+from jaxveh.filters.smoothing import (
+    AbstractPathSmoother,
+    BackwardSampling,
+    FixedLag,
+    Genealogy,
+    SmoothedEstimate,
+    smooth,
+)
 from jaxveh.filters.smoothing.parallel import smooth_parallel
+from jaxveh.filters.transport import Transport
 from jaxveh.filters.wrappers import (
     Consider,
     Contaminated,
@@ -71,6 +79,8 @@ __all__ = [
     "AbstractGaussianFilter",
     "AbstractLookahead",
     "AbstractParticleFilter",
+    "AbstractPathSmoother",
+    "AbstractResampling",
     "Accuracy",
     "AdaptiveNumber",
     "AuxiliaryParticleFilter",
@@ -110,6 +120,7 @@ __all__ = [
     "ParticleBelief",
     "ParticleFilter",
     "Paused",
+    "PlainDraw",
     "PointLookahead",
     "PredictiveLikelihood",
     "Regularised",

@@ -14,8 +14,8 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import check_names
-from jaxveh.filters.choosing import Transport
-from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, check_all_particles, gather
+from jaxveh.filters.choosing import check_ancestors, gather
+from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief, check_all_particles
 from jaxveh.statespace import AbstractWrapper
 
 BINS = 0x62696E73
@@ -71,8 +71,11 @@ class AdaptiveNumber(AbstractWrapper):
             raise InputError(
                 f"AdaptiveNumber.sizes = {self.sizes}: must rise from at least 2 to the filter's {self.inner.particles}."
             )
-        if self.inner.threshold < 1 or isinstance(self.inner.resampling, Transport):
-            raise InputError("AdaptiveNumber: its filter must resample in every step (threshold = 1) by a draw.")
+        check_ancestors("AdaptiveNumber", self.inner.resampling, "Take numerics.systematic or Soft(...).")
+        if self.inner.threshold < 1:
+            raise InputError(
+                f"AdaptiveNumber: its filter has threshold = {self.inner.threshold}: must resample in every step, threshold = 1."
+            )
 
     def check(self, model):
         self.inner.check(model)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
@@ -12,21 +11,17 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
-from jaxveh.filters.choosing import log_of
+from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
 from jaxveh.filters.looking_ahead import AbstractLookahead, lookahead_for, remark_of, softened
 from jaxveh.filters.particle import (
+    AbstractAhead,
     AbstractParticleFilter,
-    Expected,
     ParticleBelief,
     ParticleFilter,
     add_noise,
     check_particle_settings,
-    check_scheme,
-    choose_ancestors,
     fate,
     found_again,
-    gather,
-    log_chosen,
     log_prob,
     make_info,
     without,
@@ -47,7 +42,7 @@ class FirstStage(NamedTuple):
     alive: Any
 
 
-class LookedAhead(NamedTuple):
+class LookedAhead(AbstractAhead):
     """Particles that wait for their second-stage weights: moved from the belief `before`, some of them `lost` (N,); where each of
     the belief's had been judged, `characteristic`, its `residual` there by channel, and the first `stage`."""
 
@@ -57,6 +52,33 @@ class LookedAhead(NamedTuple):
     characteristic: Any
     residual: Any
     stage: FirstStage
+
+    def update(self, filter_: Any, model, row):
+        before, stage = self.before, self.stage
+        measured, present = kit.presence(model, row)
+        logs, after = log_prob(model, row, self.particles, measured, present)
+        chosen_ahead = gather((stage.ahead,), stage.ancestors)[0]
+        # Of the particles before, of which a number that adapts may have left others than it takes.
+        n = jnp.asarray(before.weights.shape[0], logs.dtype)
+        drawn = logs - chosen_ahead + log_chosen(filter_, log_of(stage.weights), stage.ancestors)
+        log_first = stage.log_mean
+        oftener = chosen_ahead - (log_first + jnp.log(n))
+        if stage.resampled is not None:
+            # Without a draw: an ordinary importance step from the weights that were there.
+            drawn = jnp.where(stage.resampled, drawn, logs + log_of(before.weights) + jnp.log(n))
+            log_first = jnp.where(stage.resampled, log_first, -jnp.log(n))
+            oftener = jnp.where(stage.resampled, oftener, 0.0)
+        weights, log_second, alive = numerics.normalise(without(self.lost, drawn))
+        log_likelihood = log_first + jnp.log(n) + log_second
+        found = ParticleBelief(self.particles, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
+        alive = alive & stage.alive
+        within = _scatter(model, after, gather(self.residual, stage.ancestors))
+        remark = jnp.where(alive, remark_of(weights, oftener), code(Result.successful))
+        both = (before.weights, weights)
+        info = make_info(
+            model, row, log_likelihood, self.residual, both, fate(alive, self.lost), within, self.characteristic, remark
+        )
+        return found, info
 
 
 class AuxiliaryParticleFilter(AbstractParticleFilter):
@@ -75,14 +97,14 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
 
     smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
-    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     lookahead: AbstractLookahead | None = eqx.field(static=True, default=None)
     gradient: str = eqx.field(static=True, default="score")
 
     def __check_init__(self):
         check_particle_settings(self.particles, self.threshold, self.gradient)
-        check_scheme(self)
+        check_ancestors("AuxiliaryParticleFilter", self.resampling, DRAW_INSTEAD)
         if not isinstance(self.lookahead, AbstractLookahead | None):
             raise InputError(
                 f"lookahead = {self.lookahead!r}: must be PredictiveLikelihood(), PointLookahead() or None (what the model "
@@ -94,7 +116,8 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
             self.lookahead.check(model)
 
     def _start(self, model, row, key):
-        return self._bootstrap()._start(model, row, key)
+        # Before the first row there is nothing to choose from.
+        return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)._start(model, row, key)
 
     def _predict(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
@@ -121,36 +144,6 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         moved, lost = numerics.barrier((add_noise(model, noise, moved, row.t - belief.t), lost))
         stage = FirstStage(ahead, first, log_first, ancestors, resampled, alive)
         return LookedAhead(moved, lost, belief, characteristic, residual, stage)
-
-    def _update(self, model, ahead, row):
-        if isinstance(ahead, Expected):  # the first row, before which there is nothing to choose from
-            return self._bootstrap()._update(model, ahead, row)
-        moved, lost, before, characteristic, residual, stage = ahead
-        measured, present = kit.presence(model, row)
-        logs, after = log_prob(model, row, moved, measured, present)
-        chosen_ahead = gather((stage.ahead,), stage.ancestors)[0]
-        # Of the particles before, of which a number that adapts may have left others than it takes.
-        n = jnp.asarray(before.weights.shape[0], logs.dtype)
-        drawn = logs - chosen_ahead + log_chosen(self, log_of(stage.weights), stage.ancestors)
-        log_first = stage.log_mean
-        oftener = chosen_ahead - (log_first + jnp.log(n))
-        if stage.resampled is not None:
-            # Without a draw: an ordinary importance step from the weights that were there.
-            drawn = jnp.where(stage.resampled, drawn, logs + log_of(before.weights) + jnp.log(n))
-            log_first = jnp.where(stage.resampled, log_first, -jnp.log(n))
-            oftener = jnp.where(stage.resampled, oftener, 0.0)
-        weights, log_second, alive = numerics.normalise(without(lost, drawn))
-        log_likelihood = log_first + jnp.log(n) + log_second
-        found = ParticleBelief(moved, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
-        alive = alive & stage.alive
-        within = _scatter(model, after, gather(residual, stage.ancestors))
-        remark = jnp.where(alive, remark_of(weights, oftener), code(Result.successful))
-        both = (before.weights, weights)
-        info = make_info(model, row, log_likelihood, residual, both, fate(alive, lost), within, characteristic, remark)
-        return found, info
-
-    def _bootstrap(self) -> ParticleFilter:
-        return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)
 
 
 def _scatter(model, residual, ahead):

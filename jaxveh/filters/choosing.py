@@ -1,17 +1,21 @@
-"""How the choice of particles lets derivatives through: by a score, by softened weights, or by moving them all."""
+"""How the next particles are chosen, and how that choice lets derivatives through: by a score, or by softened weights."""
 
-from __future__ import annotations
+# No postponed annotations in this file: they would make fields of class variables.
 
+import abc
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.ad_checkpoint import checkpoint_name
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError, check, check_whole
+from jaxveh._core.errors import InputError, check
+from jaxveh._core.result import Result
 from jaxveh.numerics import derivative_alone
+from jaxveh.statespace import kit
 
 
 def score(log_probability):
@@ -30,7 +34,75 @@ def log_of(weights):
     return jnp.where(alive, jnp.log(jnp.where(alive, weights, 1)), -jnp.inf)
 
 
-class Soft(eqx.Module):
+def gather(particles, ancestors):
+    """The ancestors' states; the draw itself is held fixed under differentiation."""
+    take = lambda field: field.at[ancestors].get(mode="promise_in_bounds", indices_are_sorted=True)
+    return jax.tree.map(take, particles)
+
+
+class Resampled(NamedTuple):
+    """The next particles, (n,) in each field; which of those before each comes from, `ancestors` (n,) int32; the logarithms of
+    their weights over 1 / n, with the derivative of the choice, `log_weights` (n,); and the code of how they came about, if there
+    is anything to tell (`Result`)."""
+
+    particles: Any
+    ancestors: Any
+    log_weights: Any
+    remark: Any = Result.successful
+
+
+class AbstractResampling(eqx.Module):
+    """How the next particles are made of weighted ones.
+
+    What a scheme can is declared where it is true, and is *no* otherwise:
+
+    - `keeps_ancestors`: each of the next particles is a copy of one before, its ancestor, drawn by the weights alone (`draw`, as
+      an `AbstractDraw` has it). Filters that choose ancestors before they move (`AuxiliaryParticleFilter`, `Guided`,
+      `Marginalised`), and smoothers that follow them (`Genealogy`, `FixedLag`), ask for it.
+    - `reweights`: the next particles have weights of their own, not all 1 / n.
+    """
+
+    keeps_ancestors: ClassVar[bool] = False
+    reweights: ClassVar[bool] = False
+
+    @abc.abstractmethod
+    def resample(self, key, particles: Any, weights: Any, logs: Any, n: int, gradient: str) -> Resampled:
+        """The next `n` of particles (N,) with normalised `weights` (N,), whose logarithms are `logs`; `gradient` as filters have
+        it."""
+
+
+class AbstractDraw(AbstractResampling):
+    """A scheme that draws ancestors by the weights."""
+
+    keeps_ancestors: ClassVar[bool] = True
+
+    @abc.abstractmethod
+    def draw(self, key, weights: Any, n: int) -> Any:
+        """Ancestors (n,) int32, nondecreasing, of weights (N,)."""
+
+    @abc.abstractmethod
+    def split(self, logs: Any) -> tuple[Any, Any]:
+        """Of normalised log weights (N,): the log weights after the draw, over 1 / n, and the log-probabilities of the draw."""
+
+    def resample(self, key, particles, weights, logs, n, gradient):
+        ancestors = drawn_ancestors(self, key, weights, n)
+        chosen = log_weights_after(self, logs, ancestors, gradient)
+        return Resampled(gather(particles, ancestors), ancestors, chosen)
+
+
+class PlainDraw(AbstractDraw):
+    """A draw by `scheme(key, weights, n) -> ancestors`, such as `numerics.systematic`; equal weights are left."""
+
+    scheme: Callable = eqx.field(static=True, default=numerics.systematic)
+
+    def draw(self, key, weights, n):
+        return self.scheme(key, weights, n)
+
+    def split(self, logs):
+        return jnp.zeros_like(logs), logs
+
+
+class Soft(AbstractDraw):
     """A resampling scheme that draws from softened weights, `share` w + (1 - share) / N (P. Karkus, D. Hsu & W. Lee 2018).
 
     Drawn particles keep the weight w over the softened one, through which derivatives pass; the log-likelihood stays right for
@@ -38,115 +110,69 @@ class Soft(eqx.Module):
     the share (0: no choice at all, weights degenerate). With `gradient="score"` there is none.
     """
 
+    reweights: ClassVar[bool] = True
     share: float = eqx.field(static=True, default=0.5)
     scheme: Callable = eqx.field(static=True, default=numerics.systematic)
 
     def __check_init__(self):
         check("Soft.share", self.share, lambda v: (v >= 0) & (v < 1), "at least 0 and below 1")
 
-    def __call__(self, key, weights, n):
+    def draw(self, key, weights, n):
         return self.scheme(key, self.share * weights + (1.0 - self.share) / weights.shape[0], n)
 
-    def split(self, logs: Any) -> tuple[Any, Any]:
-        """Of normalised log weights (N,): the log weights after the draw, and the log-probabilities of the draw."""
+    def split(self, logs):
         soft = jnp.log(self.share * jnp.exp(logs) + (1.0 - self.share) / logs.shape[0])
         return logs - soft, soft
 
 
-class Transport(eqx.Module):
-    """Instead of a draw, every particle moves: optimal transport from the weighted to equal weights, smoothed by entropy.
+Scheme = AbstractResampling | Callable
+"""What a particle filter takes as its `resampling`."""
 
-        x_i <- N sum_j T_ij x_j,    T = argmin sum T_ij |x_i - x_j|^2 - epsilon entropy(T),    rows 1/N, columns w
 
-    (A. Corenflos, J. Thornton, G. Deligiannidis & A. Doucet, Differentiable particle filtering via entropy-regularized optimal
-    transport, 2021; by Sinkhorn's iterations.) Fields count over their spread. The step is a smooth function of all it is
-    given, so that likelihoods of one key are smooth, too, and their gradient is exactly theirs. The **bias** is in the value:
-    particles are drawn together, the more the larger `epsilon`, and only as N grows and epsilon falls does it vanish. Measured on
-    a linear model of three states and 25 rows, 200 particles: log-likelihood 48, 6.2, 1.9, 1.0 too low with epsilon 1, 0.3,
-    0.1, 0.03, where the bootstrap filter's scatter costs 1.2. A step takes N^2 `iterations` exponentials: for some hundred
-    particles. Where after them more than `tolerance` of the weight is still misplaced, the step resamples systematically
-    instead, and says so: `info.remark = Result.transport_not_converged`, of which `run` tells.
+def as_resampling(scheme: Scheme) -> AbstractResampling:
+    """The scheme; a function `(key, weights, n) -> ancestors` as a `PlainDraw`."""
+    return scheme if isinstance(scheme, AbstractResampling) else PlainDraw(scheme)
+
+
+def drawn_ancestors(scheme: AbstractDraw, key, weights, n: int):
+    """Ancestors (n,) int32, which no derivative passes, kept for the backward pass."""
+    drawn = scheme.draw(key, jax.lax.stop_gradient(weights), n)
+    return checkpoint_name(drawn.astype(jnp.int32), kit.KEPT)
+
+
+def log_weights_after(scheme: AbstractDraw, logs, ancestors, gradient: str):
+    """The log weights (n,), over 1 / n, of particles drawn from those of log weights `logs` (N,): zero unless the scheme
+    `reweights`. They carry the derivative of the choice unless it is `held`.
     """
-
-    epsilon: float = eqx.field(static=True, default=0.1)
-    iterations: int = eqx.field(static=True, default=60)
-    tolerance: float = eqx.field(static=True, default=0.1)
-
-    def __check_init__(self):
-        check("Transport.epsilon", self.epsilon, lambda v: v > 0, "positive")
-        check_whole("Transport.iterations", self.iterations)
-        check("Transport.tolerance", self.tolerance, lambda v: v > 0, "positive")
-
-    def __call__(self, key, weights, n):
-        raise InputError("Transport moves particles and has no ancestors: it is for ParticleFilter alone.")
-
-    def moved(self, particles: Any, weights: Any) -> tuple[Any, Any]:
-        """The particles, (N,) in each field, moved to where equal weights say the same, and whether the plan converged."""
-        fields = jnp.stack(particles)
-        overall = numerics.sqrt(jnp.var(fields, axis=1, keepdims=True))
-        # Where nearly all weight is in one place, distances have no digits left: what is taken instead is not used.
-        spread_out = jnp.all(_spread(fields, weights) >= NARROWEST * overall)
-        safe = jnp.where(spread_out, weights, jnp.full_like(weights, 1.0 / weights.shape[0]))
-        spread = _spread(fields, safe)
-        # A field that does not vary says nothing of distances.
-        scale = jnp.where(spread > 0, spread, 1.0)
-        cost = distances(fields / scale)
-        plan = transport_plan(cost, log_of(safe), self.epsilon, self.iterations)
-        misplaced = 0.5 * jnp.sum(jnp.abs(jnp.mean(plan, axis=0) - weights))
-        moved = type(particles)(*jnp.sum(plan[None] * fields[:, None, :], axis=-1))
-        return moved, spread_out & (misplaced <= self.tolerance)
+    after, chances = scheme.split(logs)
+    after = after[ancestors]
+    return after if gradient == "held" else after + score(chances[ancestors])
 
 
-def _spread(fields: Any, weights: Any) -> Any:
-    """The weighted standard deviations (n, 1) of fields (n, N)."""
-    mean = jnp.sum(weights * fields, axis=1, keepdims=True)
-    return numerics.sqrt(jnp.sum(weights * jnp.square(fields - mean), axis=1, keepdims=True))
+def choose_ancestors(filter_, key, weights):
+    """Ancestors (N,) int32 and whether resampling took place (None: always, known when compiling)."""
+    drawn = drawn_ancestors(filter_.scheme, key, weights, filter_.particles)
+    if filter_.threshold >= 1:
+        return drawn, None
+    resampled = numerics.ess(weights) < filter_.threshold * filter_.particles
+    return jnp.where(resampled, drawn, jnp.arange(filter_.particles, dtype=drawn.dtype)), resampled
 
 
-NARROWEST = 1e-2
-"""The least spread of the weighted particles over that of all that a plan is made for."""
-
-RELAXATION = 1.5
-"""How far an iteration goes beyond Sinkhorn's, once the smoothing has fallen (A. Thibault et al. 2021): a third fewer."""
-
-
-def distances(points: Any) -> Any:
-    """Squared distances (N, N) between points (n, N), per dimension."""
-    return jnp.mean(jnp.square(points[:, :, None] - points[:, None, :]), axis=0)
+def log_chosen(filter_, log_probabilities, ancestors):
+    """The log weights (n,), over 1 / n, of particles that a filter's scheme drew with these log-probabilities (N,), with the
+    derivative of the choice unless the filter's `gradient` is held."""
+    return log_weights_after(filter_.scheme, log_probabilities, ancestors, filter_.gradient)
 
 
-def transport_plan(cost: Any, log_weights: Any, epsilon: float, iterations: int) -> Any:
-    """N T (N, N), its rows sum to one, its columns nearly to N w: Sinkhorn's iterations in logarithms.
-
-    In the first half of them the smoothing falls from the largest cost to `epsilon`.
-    """
-    n = cost.shape[0]
-    uniform = -jnp.log(jnp.asarray(n, cost.dtype))
-    start = jnp.maximum(jnp.max(cost), epsilon)
-    along = jnp.minimum(1.0, 2.0 * jnp.arange(iterations, dtype=cost.dtype) / iterations)
-    falling = jnp.maximum(start * (epsilon / start) ** along, epsilon)
-    further = jnp.where(along < 1.0, 1.0, RELAXATION)
-
-    def iterate(g, now):
-        eps, further = now
-        f = -eps * _log_sum_exp(log_weights[None, :] + (g[None, :] - cost) / eps, axis=1)
-        found = -eps * _log_sum_exp(uniform + (f[:, None] - cost) / eps, axis=0)
-        return g + further * (found - g), None
-
-    g, _ = jax.lax.scan(jax.checkpoint(iterate), jnp.zeros(n, cost.dtype), (falling, further))
-    # Rows that sum to one whatever g is: no particle leaves the others.
-    raw, _ = _below_one(log_weights[None, :] + (g[None, :] - cost) / epsilon, axis=1)
-    return raw / jnp.sum(raw, axis=1, keepdims=True)
+DRAW_INSTEAD = "Take numerics.systematic or Soft(...), or ParticleFilter, which takes any scheme."
+"""What a filter says that needs ancestors."""
 
 
-def _below_one(logs: Any, axis: int) -> tuple[Any, Any]:
-    """exp(logs - largest), and the largest. Where numbers are so large that one more rounding is a whole unit, as where XLA
-    computes them once for the largest and once for the difference, none is above one."""
-    largest = jax.lax.stop_gradient(jnp.max(logs, axis=axis, keepdims=True))
-    less = logs - largest
-    return jnp.exp(jnp.where(less > 0.0, 0.0, less)), largest
-
-
-def _log_sum_exp(logs: Any, axis: int) -> Any:
-    raw, largest = _below_one(logs, axis)
-    return jnp.squeeze(largest, axis) + jnp.log(jnp.sum(raw, axis=axis))
+def check_ancestors(who: str, scheme: Scheme, instead: str) -> None:
+    """Raise `InputError` for a scheme whose particles have no ancestors, which `who` needs, and say what to take `instead`."""
+    scheme = as_resampling(scheme)
+    if not scheme.keeps_ancestors:
+        raise InputError(
+            f"{who}: particles of {type(scheme).__name__} have no ancestors: its class does not declare any (`keeps_ancestors`). "
+            f"{instead}"
+        )

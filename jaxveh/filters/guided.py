@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
@@ -13,25 +12,21 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
 from jaxveh.filters.auxiliary import FirstStage
-from jaxveh.filters.choosing import log_of
-from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, is_gaussian, unwrapped, wrapped_innovation
+from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
+from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrapped, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes, product, times
 from jaxveh.filters.looking_ahead import remark_of
 from jaxveh.filters.particle import (
     SHORTEST,
+    AbstractAhead,
     AbstractParticleFilter,
-    Expected,
     ParticleBelief,
     ParticleFilter,
     check_particle_settings,
-    check_scheme,
-    choose_ancestors,
     fate,
     found_again,
-    gather,
-    log_chosen,
     log_prob,
     make_info,
     mean_variances,
@@ -56,7 +51,7 @@ class Proposal(NamedTuple):
     variances: Any
 
 
-class FirstGuided(NamedTuple):
+class FirstGuided(AbstractAhead):
     """The first particles, some of them `astray` (N,); how much oftener each was drawn than by the prior, `log_drawn` (N,); those
     that the prior alone would have drawn, `unmeasured`; and the filter's `key`."""
 
@@ -66,8 +61,21 @@ class FirstGuided(NamedTuple):
     unmeasured: Any
     key: Any
 
+    def update(self, filter_: Any, model, row):
+        n = filter_.particles
+        measured, present = kit.presence(model, row)
+        logs, _ = log_prob(model, row, self.particles, measured, present)
+        _, residual = log_prob(model, row, self.unmeasured, measured, present)
+        weights, log_likelihood, alive = numerics.normalise(without(self.astray, logs - self.log_drawn))
+        ancestors = jnp.arange(n, dtype=jnp.int32)
+        belief = ParticleBelief(self.particles, weights, ancestors, self.key, row.t, row.u, jnp.int32(1))
+        uniform = jnp.full((n,), 1 / n, logs.dtype)
+        about = (uniform, weights)
+        became = fate(alive, self.astray)
+        return belief, make_info(model, row, log_likelihood, residual, about, became, particles=self.unmeasured)
 
-class Proposed(NamedTuple):
+
+class Proposed(AbstractAhead):
     """Particles that wait for their weights: drawn from their proposals, some of them `astray` (N,), with log p(e) / q(e) in
     `ratio` (N,); the belief `before`, where the transition took its particles (`moved`), which of these it `lost`, the
     `variances` (N, m) of their proposals, and the first `stage`."""
@@ -80,6 +88,32 @@ class Proposed(NamedTuple):
     lost: Any
     variances: Any
     stage: FirstStage
+
+    def update(self, filter_: Any, model, row):
+        before, stage = self.before, self.stage
+        measured, present = kit.presence(model, row)
+        after, _ = log_prob(model, row, self.particles, measured, present)
+        _, residual = log_prob(model, row, self.moved, measured, present)
+        kept = log_chosen(filter_, log_of(stage.weights), stage.ancestors)
+        n = jnp.log(jnp.asarray(before.weights.shape[0], after.dtype))
+        log_first, chosen_ahead = stage.log_mean, stage.ahead[stage.ancestors]
+        drawn = after + self.ratio + kept - (chosen_ahead if filter_.auxiliary else 0.0)
+        oftener = chosen_ahead - (log_first + n) if filter_.auxiliary else jnp.zeros_like(after)
+        if stage.resampled is not None:
+            logs = without(self.lost, log_of(before.weights))
+            drawn = jnp.where(stage.resampled, drawn, after + self.ratio + logs + n)
+            log_first = jnp.where(stage.resampled, log_first, -n)
+            oftener = jnp.where(stage.resampled, oftener, 0.0)
+        weights, log_second, alive = numerics.normalise(without(self.astray, drawn))
+        found = ParticleBelief(self.particles, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
+        alive = alive & stage.alive
+        became = fate(alive, self.lost)
+        remark = jnp.where(alive, remark_of(weights, oftener), code(Result.successful))
+        within = mean_variances(model, before.weights, self.variances)
+        total = log_first + n + log_second
+        about = (before.weights, weights)
+        info = make_info(model, row, total, residual, about, became, within, self.moved, remark)
+        return found, info
 
 
 class Guided(AbstractParticleFilter):
@@ -108,13 +142,13 @@ class Guided(AbstractParticleFilter):
     particles: int = eqx.field(static=True)
     rule: str = eqx.field(static=True, default="extended")
     auxiliary: bool = eqx.field(static=True, default=False)
-    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     gradient: str = eqx.field(static=True, default="score")
 
     def __check_init__(self):
         check_particle_settings(self.particles, self.threshold, self.gradient)
-        check_scheme(self)
+        check_ancestors("Guided", self.resampling, DRAW_INSTEAD)
         if self.rule not in RULES:
             raise InputError(f"rule = {self.rule!r}: must be one of {', '.join(RULES)}.")
 
@@ -125,8 +159,9 @@ class Guided(AbstractParticleFilter):
         check_gaussian("Guided", "process noise", model.process_noise.law)
 
     def _start(self, model, row, key):
-        if not is_gaussian(model.prior.law):
-            return self._bootstrap()._start(model, row, key)
+        if not model.prior.law.is_gaussian:
+            plain = ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)
+            return plain._start(model, row, key)
         draw, key = jax.random.split(key)
         covariance = model.prior.covariance()
         prior = Spread(numerics.cholesky(covariance), covariance)
@@ -171,52 +206,6 @@ class Guided(AbstractParticleFilter):
         ratio = _log_normal(numerics.solve_lower(prior.factor, e), prior.factor) - _log_normal(white, chosen.factor)
         stage = FirstStage(proposals.log_ahead, first, log_first, ancestors, resampled, alive)
         return Proposed(x, astray, ratio, belief, moved, lost, proposals.variances, stage)
-
-    def _update(self, model, ahead, row):
-        if isinstance(ahead, Expected):
-            return self._bootstrap()._update(model, ahead, row)
-        if isinstance(ahead, FirstGuided):
-            return self._first_update(model, ahead, row)
-        x, astray, ratio, before, moved, lost, variances, stage = ahead
-        measured, present = kit.presence(model, row)
-        after, _ = log_prob(model, row, x, measured, present)
-        _, residual = log_prob(model, row, moved, measured, present)
-        kept = log_chosen(self, log_of(stage.weights), stage.ancestors)
-        n = jnp.log(jnp.asarray(before.weights.shape[0], after.dtype))
-        log_first, chosen_ahead = stage.log_mean, stage.ahead[stage.ancestors]
-        drawn = after + ratio + kept - (chosen_ahead if self.auxiliary else 0.0)
-        oftener = chosen_ahead - (log_first + n) if self.auxiliary else jnp.zeros_like(after)
-        if stage.resampled is not None:
-            logs = without(lost, log_of(before.weights))
-            drawn = jnp.where(stage.resampled, drawn, after + ratio + logs + n)
-            log_first = jnp.where(stage.resampled, log_first, -n)
-            oftener = jnp.where(stage.resampled, oftener, 0.0)
-        weights, log_second, alive = numerics.normalise(without(astray, drawn))
-        found = ParticleBelief(x, weights, stage.ancestors, before.key, row.t, row.u, before.count + 1)
-        alive = alive & stage.alive
-        became = fate(alive, lost)
-        remark = jnp.where(alive, remark_of(weights, oftener), code(Result.successful))
-        within = mean_variances(model, before.weights, variances)
-        total = log_first + n + log_second
-        about = (before.weights, weights)
-        info = make_info(model, row, total, residual, about, became, within, moved, remark)
-        return found, info
-
-    def _first_update(self, model, ahead, row):
-        x, astray, log_drawn, unmeasured, key = ahead
-        measured, present = kit.presence(model, row)
-        logs, _ = log_prob(model, row, x, measured, present)
-        _, residual = log_prob(model, row, unmeasured, measured, present)
-        weights, log_likelihood, alive = numerics.normalise(without(astray, logs - log_drawn))
-        ancestors = jnp.arange(self.particles, dtype=jnp.int32)
-        belief = ParticleBelief(x, weights, ancestors, key, row.t, row.u, jnp.int32(1))
-        uniform = jnp.full((self.particles,), 1 / self.particles, logs.dtype)
-        about = (uniform, weights)
-        became = fate(alive, astray)
-        return belief, make_info(model, row, log_likelihood, residual, about, became, particles=unmeasured)
-
-    def _bootstrap(self) -> ParticleFilter:
-        return ParticleFilter(self.particles, self.resampling, self.threshold, self.gradient)
 
 
 def _moved(particles, names, e):

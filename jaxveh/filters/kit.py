@@ -1,23 +1,29 @@
 """What those who add a filter or a wrapper build with: the contract, the families' bases, and their tools."""
 
-from jaxveh.filters.choosing import log_of
+from jaxveh.filters.choosing import (
+    AbstractDraw,
+    AbstractResampling,
+    Resampled,
+    choose_ancestors,
+    gather,
+    log_chosen,
+    log_of,
+)
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, AbstractRuleFilter, check_covariances, with_spread
 from jaxveh.filters.gaussian.forms import AbstractForm, Spread
 from jaxveh.filters.gaussian.rules import AbstractRule, Image, Points, Slopes
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
 from jaxveh.filters.particle import (
+    AbstractAhead,
     AbstractParticleFilter,
     DrawnParticles,
     Expected,
     ParticleBelief,
     add_noise,
     check_particle_settings,
-    choose_ancestors,
     fate,
     found_again,
-    gather,
-    log_chosen,
     log_prob,
     make_info,
     without,
@@ -59,13 +65,16 @@ who_lacks = contract.who_lacks
 
 __all__ = [
     "NORMAL_MEDIAN",
+    "AbstractAhead",
     "AbstractBelief",
+    "AbstractDraw",
     "AbstractFilter",
     "AbstractForm",
     "AbstractGaussianFilter",
     "AbstractGaussianWrapper",
     "AbstractParticleFilter",
     "AbstractRemembering",
+    "AbstractResampling",
     "AbstractRule",
     "AbstractRuleFilter",
     "AbstractStateless",
@@ -81,6 +90,7 @@ __all__ = [
     "ParticleBelief",
     "Points",
     "Remembering",
+    "Resampled",
     "Row",
     "Slopes",
     "Smoothing",

@@ -11,9 +11,9 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check
 from jaxveh._core.result import Result, code
-from jaxveh.filters.gaussian.filter import check_gaussian, is_gaussian, kind_of_law
+from jaxveh.filters.gaussian.filter import check_gaussian, kind_of_law
 from jaxveh.filters.particle import log_prob
-from jaxveh.statespace import AbstractNoise, Gaussian, Independent, StateDependent, StateSpace, kit
+from jaxveh.statespace import AbstractNoise, Gaussian, StateDependent, StateSpace, kit
 
 MISLED = 0.5
 """Below this share of the effective sample size that a choice by the weights alone would have left, looking ahead misled."""
@@ -129,7 +129,7 @@ WITHOUT_SLOPES = PointLookahead(defensive=0.5)
 
 def lookahead_for(model: StateSpace) -> AbstractLookahead:
     """What looks ahead where nothing is asked for: with the process noise where both noises are Gaussian."""
-    if model.process_noise is not None and is_gaussian(model.process_noise.law) and is_gaussian(kind_of_law(model)):
+    if model.process_noise is not None and model.process_noise.law.is_gaussian and kind_of_law(model).is_gaussian:
         return PredictiveLikelihood()
     return WITHOUT_SLOPES
 
@@ -189,9 +189,8 @@ def slopes_of(model: StateSpace, row, particles, names: tuple[str, ...]) -> tupl
 
 def _image(law: AbstractNoise, slopes: list) -> list[list]:
     """H Q H^T, by rows up to the diagonal, each entry (N,)."""
-    parts = law.laws if isinstance(law, Independent) else (law,)
-    if all(isinstance(part, Gaussian) for part in parts):
-        variances = [jnp.square(std) for part in parts for std in part.std]
+    if all(isinstance(part, Gaussian) for part in law.parts):
+        variances = [jnp.square(std) for part in law.parts for std in part.std]
         weighted = [[v * slope for v, slope in zip(variances, of, strict=True)] for of in slopes]
     else:
         weighted = list(jnp.einsum("fg,cgn->cfn", law.covariance(), jnp.stack([jnp.stack(of) for of in slopes])))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -13,20 +12,18 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import as_names, check_names, record
-from jaxveh.filters.choosing import log_of
+from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, log_chosen, log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.gaussian.rules import Image, product, times
 from jaxveh.filters.particle import (
     SHORTEST,
+    AbstractAhead,
     AbstractParticleFilter,
     check_particle_settings,
-    check_scheme,
-    choose_ancestors,
     fate,
     found_again,
-    log_chosen,
     make_info,
     mean_variances,
     without,
@@ -101,6 +98,60 @@ class MarginalisedBelief(AbstractBelief):
         return kinds[0](*mean), kinds[0](*numerics.sqrt(variance))
 
 
+class CloudWeights(NamedTuple):
+    """Ancestors, weights, and the weights' logarithms with the derivative of the choice, before a measurement."""
+
+    ancestors: Any
+    weights: Any
+    log_weights: Any
+
+
+class Cloud(AbstractAhead):
+    """Particles before their measurement: the state's NamedTuple with (N,) fields, covariances (N, l, l), their weights in
+    `prior`, the filter's `key`, and the `count` of rows before."""
+
+    particles: Any
+    covariances: Any
+    prior: Any
+    key: Any
+    count: Any
+
+    def update(self, filter_: Any, model, row):
+        linear, prior = filter_.linear, self.prior
+        measured, present = kit.presence(model, row)
+        here = jnp.stack([present[name] for name in model.channels])
+        given = jnp.stack([measured[name] for name in model.channels])
+
+        def see(point, P):
+            observe = lambda x: [getattr(model.observation(row.t, x, row.u), name) for name in model.channels]
+            mean, H = _slopes(linear, point, observe)
+            root = numerics.cholesky(P)
+            image = Image(mean, jnp.where(here[:, None], times(H, root), 0), root, None)
+            innovation = wrapped_innovation(model, given - mean, here)
+            found = Covariance().condition(
+                image, model.measurement_noise, model.channels, here, innovation, Spread(root, P)
+            )
+            present_ = jnp.sum(here.astype(innovation.dtype))
+            distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
+            variances = jnp.diagonal(product(image.deviations, image.deviations, None))
+            return -0.5 * (distance + present_ * kit.LOG_2PI), innovation, variances, found.shift, found.spread.matrix
+
+        logs, residual, variances, shift, P = jax.vmap(see)(self.particles, self.covariances)
+        given_y = {name: getattr(self.particles, name) + shift[:, i] for i, name in enumerate(linear)}
+        particles, astray = found_again(self.particles._replace(**given_y), self.particles)
+        P = jnp.where(astray[:, None, None], self.covariances, P)
+        weights, log_mean, alive = numerics.normalise(without(astray, logs + prior.log_weights))
+        log_likelihood = log_mean + jnp.log(jnp.asarray(filter_.particles, weights.dtype))
+        belief = MarginalisedBelief(
+            particles, P, weights, prior.ancestors, self.key, row.t, row.u, self.count + 1, linear
+        )
+        by_name = dict(zip(model.channels, residual.T, strict=True))
+        within = mean_variances(model, prior.weights, variances)
+        became = fate(alive, jnp.isneginf(prior.log_weights))
+        info = make_info(model, row, log_likelihood, by_name, (prior.weights, weights), became, within)
+        return belief, info
+
+
 class Marginalised(AbstractParticleFilter):
     """The Rao-Blackwellised, or marginalised, particle filter (T. Schon, F. Gustafsson & P.-J. Nordlund 2005).
 
@@ -116,13 +167,13 @@ class Marginalised(AbstractParticleFilter):
 
     particles: int = eqx.field(static=True)
     linear: tuple[str, ...] = eqx.field(static=True, converter=as_names)
-    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     gradient: str = eqx.field(static=True, default="score")
 
     def __check_init__(self):
         check_particle_settings(self.particles, self.threshold, self.gradient)
-        check_scheme(self)
+        check_ancestors("Marginalised", self.resampling, DRAW_INSTEAD)
         if not self.linear:
             raise InputError("Marginalised.linear is empty: name the states that are linear given the others.")
 
@@ -164,9 +215,9 @@ class Marginalised(AbstractParticleFilter):
         uniform = jnp.full((self.particles,), 1 / self.particles, belief.weights.dtype)
         logs = log_of(belief.weights)
         chosen = log_of(uniform) + log_chosen(self, logs, ancestors)
-        weights = uniform
+        weights = numerics.normalise(chosen)[0] if self.scheme.reweights else uniform
         if resampled is not None:
-            weights = jnp.where(resampled, uniform, belief.weights)
+            weights = jnp.where(resampled, weights, belief.weights)
             chosen = jnp.where(resampled, chosen, logs)
         points, covariances = (
             jax.tree.map(lambda leaf: leaf[ancestors], t) for t in (belief.particles, belief.covariances)
@@ -189,61 +240,6 @@ class Marginalised(AbstractParticleFilter):
         lost = lost | ~jnp.all(jnp.isfinite(moved.P), axis=(1, 2))
         P = jnp.where(lost[:, None, None], covariances, moved.P)
         return Cloud(particles, P, CloudWeights(ancestors, weights, without(lost, chosen)), belief.key, belief.count)
-
-    def _update(self, model, ahead, row):
-        cloud: Cloud = ahead
-        prior = cloud.prior
-        measured, present = kit.presence(model, row)
-        here = jnp.stack([present[name] for name in model.channels])
-        given = jnp.stack([measured[name] for name in model.channels])
-
-        def see(point, P):
-            observe = lambda x: [getattr(model.observation(row.t, x, row.u), name) for name in model.channels]
-            mean, H = _slopes(self.linear, point, observe)
-            root = numerics.cholesky(P)
-            image = Image(mean, jnp.where(here[:, None], times(H, root), 0), root, None)
-            innovation = wrapped_innovation(model, given - mean, here)
-            found = Covariance().condition(
-                image, model.measurement_noise, model.channels, here, innovation, Spread(root, P)
-            )
-            present_ = jnp.sum(here.astype(innovation.dtype))
-            distance = jnp.sum(jnp.square(found.white)) + numerics.log_det(found.innovation_factor)
-            variances = jnp.diagonal(product(image.deviations, image.deviations, None))
-            return -0.5 * (distance + present_ * kit.LOG_2PI), innovation, variances, found.shift, found.spread.matrix
-
-        logs, residual, variances, shift, P = jax.vmap(see)(cloud.particles, cloud.covariances)
-        linear = {name: getattr(cloud.particles, name) + shift[:, i] for i, name in enumerate(self.linear)}
-        particles, astray = found_again(cloud.particles._replace(**linear), cloud.particles)
-        P = jnp.where(astray[:, None, None], cloud.covariances, P)
-        weights, log_mean, alive = numerics.normalise(without(astray, logs + prior.log_weights))
-        log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
-        belief = MarginalisedBelief(
-            particles, P, weights, prior.ancestors, cloud.key, row.t, row.u, cloud.count + 1, self.linear
-        )
-        by_name = dict(zip(model.channels, residual.T, strict=True))
-        within = mean_variances(model, prior.weights, variances)
-        became = fate(alive, jnp.isneginf(prior.log_weights))
-        info = make_info(model, row, log_likelihood, by_name, (prior.weights, weights), became, within)
-        return belief, info
-
-
-class Cloud(NamedTuple):
-    """Particles before their measurement: the state's NamedTuple with (N,) fields, covariances (N, l, l), their weights in
-    `prior`, the filter's `key`, and the `count` of rows before."""
-
-    particles: Any
-    covariances: Any
-    prior: Any
-    key: Any
-    count: Any
-
-
-class CloudWeights(NamedTuple):
-    """Ancestors, weights, and the weights' logarithms with the derivative of the choice, before a measurement."""
-
-    ancestors: Any
-    weights: Any
-    log_weights: Any
 
 
 class GivenDraw(NamedTuple):

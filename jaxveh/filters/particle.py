@@ -1,19 +1,27 @@
 """The bootstrap particle filter, and what every particle filter shares."""
 
-from collections.abc import Callable
+import abc
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax.ad_checkpoint import checkpoint_name
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.result import Result, code
-from jaxveh.filters.choosing import Soft, Transport, log_of, score
+from jaxveh.filters.choosing import AbstractResampling, Scheme, as_resampling, log_of
 from jaxveh.filters.particle_belief import ParticleBelief
-from jaxveh.statespace import AbstractTwoPartFilter, Info, Smoothing, StateDependent, StateSpace, kit
+from jaxveh.statespace import (
+    AbstractBelief,
+    AbstractTwoPartFilter,
+    Info,
+    Row,
+    Smoothing,
+    StateDependent,
+    StateSpace,
+    kit,
+)
 
 SHORTEST = 1e-9
 """Of two rows at one time, seconds for which the noise between them is taken where its covariance must have a factor."""
@@ -22,8 +30,8 @@ SHORTEST = 1e-9
 class AbstractParticleFilter(AbstractTwoPartFilter):
     """Shared by particle filters: `particles` (at least 2), `resampling` scheme, `threshold` of the ESS, `gradient`.
 
-    `resampling(key, weights, n) -> ancestors` (see `numerics.systematic`, `stratified`, `multinomial`, `residual`), `Soft(...)`
-    around one of these, or, for `ParticleFilter`, `Transport(...)`.
+    `resampling(key, weights, n) -> ancestors` (see `numerics.systematic`, `stratified`, `multinomial`, `residual`), or an
+    `AbstractResampling`: `Soft(...)` around one of these, or, for `ParticleFilter`, `Transport(...)`.
     `threshold`: resample where the ESS falls below this share of the particles; 1 (the default) resamples every step.
     `gradient`: `"score"` (the default) adds the derivative of the choice of ancestors, so that the gradient of the
     log-likelihood is right in the limit of many particles; its spread grows with the length of the recording. `"held"` leaves
@@ -34,9 +42,14 @@ class AbstractParticleFilter(AbstractTwoPartFilter):
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     particles: eqx.AbstractVar[int]
-    resampling: eqx.AbstractVar[Callable]
+    resampling: eqx.AbstractVar[Scheme]
     threshold: eqx.AbstractVar[float]
     gradient: eqx.AbstractVar[str]
+
+    @property
+    def scheme(self) -> AbstractResampling:
+        """`resampling`, and what it can; a plain function draws ancestors and leaves equal weights."""
+        return as_resampling(self.resampling)
 
     @property
     def needs_key(self):
@@ -44,6 +57,9 @@ class AbstractParticleFilter(AbstractTwoPartFilter):
 
     def check(self, model):
         del model
+
+    def _update(self, model, ahead, row):
+        return ahead.update(self, model, row)
 
 
 def check_all_particles(who: str, filter: Any) -> None:
@@ -62,14 +78,6 @@ def check_particle_settings(particles: int, threshold: float, gradient: str = "s
     check_whole("particles", particles, 2)
     if not 0 <= threshold <= 1:
         raise InputError(f"threshold = {threshold}: must be from 0 (never resample) to 1 (every step).")
-
-
-def check_scheme(filter_: AbstractParticleFilter) -> None:
-    """Raise `InputError` for a scheme without ancestors, which this filter needs."""
-    if isinstance(filter_.resampling, Transport):
-        raise InputError(
-            f"{type(filter_).__name__}: Transport moves particles and has no ancestors: it is for ParticleFilter alone."
-        )
 
 
 def log_prob(model: StateSpace, row, particles, measured, present):
@@ -113,34 +121,6 @@ def fate(alive, lost):
     """The result code of a step after which some particle is `alive` or none, of particles that the model `lost` (N,)."""
     reason = jnp.where(jnp.all(lost), code(Result.non_finite_state), code(Result.all_particles_dead))
     return jnp.where(alive, code(Result.successful), reason)
-
-
-def log_chosen(filter_, log_probabilities, ancestors):
-    """The log weights (n,) of particles drawn with these log-probabilities (N,), over 1 / n: zero but for `Soft`.
-
-    They carry the derivative of the choice unless it is `held`.
-    """
-    logs, chances = jnp.zeros_like(log_probabilities), log_probabilities
-    if isinstance(filter_.resampling, Soft):
-        logs, chances = filter_.resampling.split(log_probabilities)
-    logs = logs[ancestors]
-    return logs if filter_.gradient == "held" else logs + score(chances[ancestors])
-
-
-def gather(particles, ancestors):
-    """The ancestors' states; the draw itself is held fixed under differentiation."""
-    take = lambda field: field.at[ancestors].get(mode="promise_in_bounds", indices_are_sorted=True)
-    return jax.tree.map(take, particles)
-
-
-def choose_ancestors(filter_, key, weights):
-    """Ancestors (N,) int32 and whether resampling took place (None: always, known when compiling)."""
-    drawn = filter_.resampling(key, jax.lax.stop_gradient(weights), filter_.particles)
-    drawn = checkpoint_name(drawn.astype(jnp.int32), kit.KEPT)
-    if filter_.threshold >= 1:
-        return drawn, None
-    resampled = numerics.ess(weights) < filter_.threshold * filter_.particles
-    return jnp.where(resampled, drawn, jnp.arange(filter_.particles, dtype=drawn.dtype)), resampled
 
 
 def start_particles(filter_, model, row, key):
@@ -213,7 +193,15 @@ class DrawnParticles(NamedTuple):
     remark: Any
 
 
-class Expected(NamedTuple):
+class AbstractAhead(eqx.Module):
+    """What a particle filter knows ahead of a row's measurement, and how that weighs it: what `_start` and `_predict` return."""
+
+    @abc.abstractmethod
+    def update(self, filter_: Any, model: StateSpace, row: Row) -> tuple[AbstractBelief, Info]:
+        """The belief after the row's measurement, and its info."""
+
+
+class Expected(AbstractAhead):
     """Particles that wait for their measurement: as they were `drawn`, which the model `lost` (N,), the filter's `key`, and the
     `count` of rows before."""
 
@@ -223,13 +211,25 @@ class Expected(NamedTuple):
     key: Any
     count: Any
 
+    def update(self, filter_: Any, model, row):
+        measured, present = kit.presence(model, row)
+        logs, residual = log_prob(model, row, self.particles, measured, present)
+        weights, log_mean, alive = numerics.normalise(without(self.lost, logs + self.drawn.log_weights))
+        belief = ParticleBelief(self.particles, weights, self.drawn.ancestors, self.key, row.t, row.u, self.count + 1)
+        # normalise gives the log of the mean over N of what sums to the likelihood.
+        log_likelihood = log_mean + jnp.log(jnp.asarray(filter_.particles, weights.dtype))
+        became = fate(alive, self.lost)
+        both, remark = (self.drawn.weights, weights), self.drawn.remark
+        info = make_info(model, row, log_likelihood, residual, both, became, particles=self.particles, remark=remark)
+        return belief, info
+
 
 class ParticleFilter(AbstractParticleFilter):
     """The bootstrap particle filter (Gordon, Salmond & Smith 1993; Sarkka 2013, algorithm 7.4, the transition as proposal)."""
 
     smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
-    resampling: Callable = eqx.field(static=True, default=numerics.systematic)
+    resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
     gradient: str = eqx.field(static=True, default="score")
 
@@ -254,48 +254,16 @@ class ParticleFilter(AbstractParticleFilter):
 
     def _drawn(self, key, belief):
         """The next particles before they move."""
-        uniform = jnp.full((self.particles,), 1 / self.particles, belief.weights.dtype)
-        logs = log_of(belief.weights)
-        remark = code(Result.successful)
-        if isinstance(self.resampling, Transport):
-            particles, ancestors, chosen, converged = _transported(self, key, belief, logs)
-            chosen = log_of(uniform) + chosen
-            remark = jnp.where(converged, remark, code(Result.transport_not_converged))
-            resampled = None if self.threshold >= 1 else numerics.ess(belief.weights) < self.threshold * self.particles
-        else:
-            ancestors, resampled = choose_ancestors(self, key, belief.weights)
-            particles = gather(belief.particles, ancestors)
-            chosen = log_of(uniform) + log_chosen(self, logs, ancestors)
-        weights = numerics.normalise(chosen)[0] if isinstance(self.resampling, Soft) else uniform
-        if resampled is not None:
-            particles = jax.tree.map(lambda new, old: jnp.where(resampled, new, old), particles, belief.particles)
-            weights = jnp.where(resampled, weights, belief.weights)
-            chosen = jnp.where(resampled, chosen, logs)
-            remark = jnp.where(resampled, remark, code(Result.successful))
-        return particles, DrawnParticles(ancestors, weights, chosen, remark)
-
-    def _update(self, model, ahead, row):
-        particles, drawn, lost, key, count = ahead
-        measured, present = kit.presence(model, row)
-        logs, residual = log_prob(model, row, particles, measured, present)
-        weights, log_mean, alive = numerics.normalise(without(lost, logs + drawn.log_weights))
-        belief = ParticleBelief(particles, weights, drawn.ancestors, key, row.t, row.u, count + 1)
-        # normalise gives the log of the mean over N of what sums to the likelihood.
-        log_likelihood = log_mean + jnp.log(jnp.asarray(self.particles, weights.dtype))
-        became = fate(alive, lost)
-        both = (drawn.weights, weights)
-        info = make_info(model, row, log_likelihood, residual, both, became, particles=particles, remark=drawn.remark)
-        return belief, info
-
-
-def _transported(filter_, key, belief, logs):
-    """Particles moved by the plan, their ancestors, what choosing adds to their log weights, and whether the plan converged:
-    else they are drawn systematically. `logs`: the log weights (N,)."""
-    moved, converged = filter_.resampling.moved(belief.particles, belief.weights)
-    weights = jax.lax.stop_gradient(belief.weights)
-    ancestors = checkpoint_name(numerics.systematic(key, weights, filter_.particles).astype(jnp.int32), kit.KEPT)
-    drawn = gather(belief.particles, ancestors)
-    particles = jax.tree.map(lambda new, old: jnp.where(converged, new, old), moved, drawn)
-    chosen = jnp.where(converged, 0.0, log_chosen(filter_, logs, ancestors))
-    themselves = jnp.arange(filter_.particles, dtype=ancestors.dtype)
-    return particles, jnp.where(converged, themselves, ancestors), chosen, converged
+        n, logs = self.particles, log_of(belief.weights)
+        uniform = jnp.full((n,), 1 / n, belief.weights.dtype)
+        found = self.scheme.resample(key, belief.particles, belief.weights, logs, n, self.gradient)
+        ancestors, remark = found.ancestors.astype(jnp.int32), jnp.asarray(found.remark, jnp.int32)
+        chosen = log_of(uniform) + found.log_weights.astype(uniform.dtype)
+        weights = numerics.normalise(chosen)[0] if self.scheme.reweights else uniform
+        drawn = DrawnParticles(ancestors, weights, chosen, remark)
+        if self.threshold >= 1:
+            return found.particles, drawn
+        resampled = numerics.ess(belief.weights) < self.threshold * n
+        themselves = jnp.arange(n, dtype=jnp.int32)
+        kept = belief.particles, DrawnParticles(themselves, belief.weights, logs, code(Result.successful))
+        return jax.tree.map(lambda new, old: jnp.where(resampled, new, old), (found.particles, drawn), kept)

@@ -16,7 +16,7 @@ from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.decimals import is_number
 from jaxveh.io.log import TableLog
 from jaxveh.io.optional import require
-from jaxveh.io.units import given, same
+from jaxveh.io.units import is_unit, same_unit
 
 _ENCODING = "utf-8-sig"
 
@@ -62,7 +62,7 @@ def write_csv(
     """
     for name in columns:
         wanted = canonical_unit(name)
-        if wanted is not None and given(units.get(name)) and not same(units[name], wanted):
+        if wanted is not None and is_unit(units.get(name)) and not same_unit(units[name], wanted):
             raise InputError(
                 f"{name} is in {units[name]!r}, not in {wanted!r}, and CSV cannot say so. Convert it first, write "
                 "Parquet or MDF4, or put units in the names (io.with_units_in_names)."

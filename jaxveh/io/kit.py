@@ -7,6 +7,7 @@ from jaxveh.io.optional import require
 from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
 from jaxveh.io.rig_table import RIG_CHANNELS
 from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
+from jaxveh.io.units import is_unit, same_unit
 
 __all__ = [
     "CAR_SCHEMA",
@@ -16,9 +17,11 @@ __all__ = [
     "Entry",
     "check_keys",
     "check_known",
+    "is_unit",
     "parse_property_file",
     "read_toml",
     "require",
+    "same_unit",
     "toml_number",
     "toml_string",
     "toml_text",

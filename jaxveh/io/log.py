@@ -15,7 +15,7 @@ from jaxveh.io.channel_map import Channel
 from jaxveh.io.decimals import decimal
 from jaxveh.io.naming import check_known, listing
 from jaxveh.io.toml import shortened
-from jaxveh.io.units import convert, given
+from jaxveh.io.units import convert, is_unit
 
 TIME_NAMES = ("time", "timestamps", "timestamp", "t")
 """Names under which a time column is looked for, in this order, capitals or not."""
@@ -74,7 +74,7 @@ class TableLog(Log):
         stamps, unit = self._values(time_name), (time and time.unit) or self._units[time_name]
         if time is not None:
             stamps = apply(time, stamps)
-        self._time = convert(stamps, unit, "s", f"{path}: {time_name}") if given(unit) else stamps
+        self._time = convert(stamps, unit, "s", f"{path}: {time_name}") if is_unit(unit) else stamps
         if self._time.size == 0:
             raise InputError(f"{path}: the log is empty: it has columns but no row.")
 

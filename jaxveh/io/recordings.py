@@ -19,7 +19,7 @@ from jaxveh.io.log import Column, Log, apply
 from jaxveh.io.mdf_log import open_mdf, write_mdf
 from jaxveh.io.merge import merge, resample
 from jaxveh.io.parquet_log import open_parquet, write_parquet
-from jaxveh.io.units import convert, given
+from jaxveh.io.units import convert, is_unit
 
 _OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
     ".csv": open_csv,
@@ -90,9 +90,9 @@ def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite:
 def with_units_in_names(recording: Recording) -> Recording:
     """A copy whose channels are named `name [unit]`, for CSV files that other programs read; reading strips them."""
     units = {name: recording.unit(name) for name in recording.names}
-    names = {name: f"{name} [{unit}]" if given(unit) else name for name, unit in units.items()}
+    names = {name: f"{name} [{unit}]" if is_unit(unit) else name for name, unit in units.items()}
     channels = {names[name]: values for name, values in recording.channels.items()}
-    known = {names[name]: unit for name, unit in units.items() if given(unit)}
+    known = {names[name]: unit for name, unit in units.items() if is_unit(unit)}
     return Recording(recording.time, channels, known, recording.source)
 
 
@@ -116,8 +116,8 @@ def write_columns(
 def _load(log: Log, name: str, channel: Channel) -> Column:
     column = log.column(channel.column, channel.group)
     values, target = apply(channel, column.values), canonical_unit(name)
-    unit = channel.unit if given(channel.unit) else column.unit
+    unit = channel.unit if is_unit(channel.unit) else column.unit
     what = f"{log.path}: {name}" + (f" (column {channel.column!r})" if channel.column != name else "")
     if target is None:
-        return Column(column.time, values, unit if given(unit) else "")
-    return Column(column.time, convert(values, unit, target, what) if given(unit) else values, target)
+        return Column(column.time, values, unit if is_unit(unit) else "")
+    return Column(column.time, convert(values, unit, target, what) if is_unit(unit) else values, target)

@@ -18,7 +18,7 @@ from jaxveh.io.ttc import SUFFIXES as TTC_SUFFIXES
 from jaxveh.io.ttc import names_line, read_ttc
 from jaxveh.io.tydex import read_tydex
 from jaxveh.io.tydex_axes import contact_patch
-from jaxveh.io.units import convert, given
+from jaxveh.io.units import convert, is_unit
 
 INPUTS = ("slip_angle", "slip_ratio", "load", "camber", "speed", "pressure")
 RIG_CHANNELS = ("F_x", "F_y", "M_x", "M_y", "M_z")
@@ -201,9 +201,9 @@ def _read_csv(path: Path, measured: tuple[str, ...]) -> dict[str, np.ndarray | N
         if name is None or (field in RIG_CHANNELS and field not in measured):
             continue
         values = numeric(columns[name], f"{path}: column {name!r}")
-        if not given(units[name]):
+        if not is_unit(units[name]):
             _refuse_degrees(path, field, name, values)
-        found[field] = convert(values, units[name], unit, f"{path}: {name}") if given(units[name]) else values
+        found[field] = convert(values, units[name], unit, f"{path}: {name}") if is_unit(units[name]) else values
     if "load" not in found:
         raise InputError(f"{path}: no load among the columns {', '.join(columns)}: {COLUMNS['load'][0][0]} is needed.")
     if "slip_angle" not in found and "slip_ratio" not in found:

@@ -23,12 +23,12 @@ _ALIASES_FOR = {
 }
 
 
-def given(unit: str | None) -> TypeGuard[str]:
+def is_unit(unit: str | None) -> TypeGuard[str]:
     """Whether a unit says anything: not empty, `-`, `n/a` and the like."""
     return unit is not None and unit.strip().casefold() not in _NOT_GIVEN
 
 
-def same(unit: str, other: str) -> bool:
+def same_unit(unit: str, other: str) -> bool:
     """Whether two units are one that is written in two ways, such as `N m` and `N*m`."""
     plain = lambda one: _ALIASES.get(one.strip(), one.strip())
     return plain(unit) == plain(other)

@@ -14,12 +14,12 @@ from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.disturbances import with_disturbances
 from jaxveh.statespace.draw import Drawn, draw
 from jaxveh.statespace.driver import Estimate, run, scan
+from jaxveh.statespace.independent import Independent
 from jaxveh.statespace.model import LinearInput, PerPoint, Prior, Row, StateSpace, cast
 from jaxveh.statespace.noise import (
     AbstractNoise,
     CauchyGaussianMixture,
     Gaussian,
-    Independent,
     MultivariateGaussian,
     StudentT,
 )

@@ -11,8 +11,9 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import check_names, record_type
 from jaxveh.statespace.dependent_noise import around
+from jaxveh.statespace.independent import combine
 from jaxveh.statespace.model import Prior, StateSpace
-from jaxveh.statespace.noise import Gaussian, combine
+from jaxveh.statespace.noise import Gaussian
 from jaxveh.statespace.process import Continuous, join
 
 DISTURBANCE_PREFIX = "disturbance_"

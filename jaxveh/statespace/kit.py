@@ -16,8 +16,9 @@ from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.disturbances import DISTURBANCE_PREFIX
 from jaxveh.statespace.draw import draw_rows, schedule_rows
 from jaxveh.statespace.driver import raise_failure, scan_and_keep
+from jaxveh.statespace.independent import whiten
 from jaxveh.statespace.measurements import by_channel, input_result, presence
-from jaxveh.statespace.noise import LOG_2PI, whiten
+from jaxveh.statespace.noise import LOG_2PI
 
 __all__ = [
     "DISTURBANCE_PREFIX",

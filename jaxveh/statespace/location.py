@@ -6,7 +6,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
-from jaxveh.statespace.noise import AbstractNoise, Gaussian, Independent, MultivariateGaussian, StudentT
+from jaxveh.statespace.independent import Independent
+from jaxveh.statespace.noise import AbstractNoise, Gaussian, MultivariateGaussian, StudentT
 
 
 def location_covariance(law: AbstractNoise) -> jax.Array:

@@ -24,7 +24,24 @@ class AbstractNoise(eqx.Module):
     """A zero-mean additive noise law over named scalar fields.
 
     A batch is a mapping from each name to an array of any common shape.
+
+    What a law is beside that is declared where it is true, and is *no* otherwise: `is_gaussian`, `adds_up`.
     """
+
+    @property
+    def is_gaussian(self) -> bool:
+        """Whether it is normal, jointly in all its fields."""
+        return False
+
+    @property
+    def adds_up(self) -> bool:
+        """Whether n independent draws add up to the law `scaled` by sqrt(n), as white noise in continuous time must."""
+        return False
+
+    @property
+    def parts(self) -> tuple[AbstractNoise, ...]:
+        """The independent laws that it is made of."""
+        return (self,)
 
     # Not an `eqx.AbstractVar`: under postponed annotations that would be a field of the dataclass.
     @property
@@ -68,7 +85,7 @@ def _scales(values, what: str):
     return record("Scales", values)
 
 
-def _masked(residual, present, name):
+def masked(residual, present, name):
     """The residual with zero where absent: replaced before the arithmetic, so that gradients stay finite."""
     here = present[name]
     return jnp.where(here, residual[name], jnp.zeros_like(residual[name])), here
@@ -78,6 +95,8 @@ class Gaussian(AbstractNoise):
     """Independent Gaussian noise, `Gaussian({"yaw_rate": 0.005, "a_y": 0.1})`: standard deviations in the fields' units."""
 
     has_covariance: ClassVar[bool] = True
+    is_gaussian: ClassVar[bool] = True
+    adds_up: ClassVar[bool] = True
     std: tuple = _levels()
 
     def __init__(self, std):
@@ -94,7 +113,7 @@ class Gaussian(AbstractNoise):
     def log_prob(self, residual, present):
         terms = []
         for name, std in self.std._asdict().items():
-            value, here = _masked(residual, present, name)
+            value, here = masked(residual, present, name)
             term = -0.5 * (value / std) ** 2 - jnp.log(std) - 0.5 * LOG_2PI
             terms.append(jnp.where(here, term, jnp.zeros_like(term)))
         return sum(terms[1:], terms[0])
@@ -110,6 +129,8 @@ class MultivariateGaussian(AbstractNoise):
     """Correlated Gaussian noise: `fields` in the order of the (k, k) `matrix`, symmetric positive definite."""
 
     has_covariance: ClassVar[bool] = True
+    is_gaussian: ClassVar[bool] = True
+    adds_up: ClassVar[bool] = True
     fields: tuple[str, ...] = eqx.field(static=True)
     matrix: jax.Array = eqx.field(converter=lambda m: float_array(m if eqx.is_array(m) else np.asarray(m, dtype=float)))
 
@@ -144,7 +165,7 @@ class MultivariateGaussian(AbstractNoise):
 
     def _white(self, residual, present):
         """Factor of the marginal covariance (k, k), whitened residuals (k, batch) and presence (k,), itself no batch."""
-        values, here = zip(*[_masked(residual, present, name) for name in self.fields], strict=True)
+        values, here = zip(*[masked(residual, present, name) for name in self.fields], strict=True)
         here, values = jnp.stack(here), jnp.stack(jnp.broadcast_arrays(*values))
         # The marginal of the present fields: absent ones become independent with unit variance and zero residual.
         eye = jnp.eye(len(self.fields), dtype=self.matrix.dtype)
@@ -153,7 +174,7 @@ class MultivariateGaussian(AbstractNoise):
 
     def _log_prob_by_element(self, residual, present):
         """Where what is present differs within the batch, each element has a covariance of its own."""
-        flat, shape = _flatten_batch(self.fields, residual, present)
+        flat, shape = flatten_batch(self.fields, residual, present)
         return jax.vmap(self.log_prob)(*flat).reshape(shape)
 
     def covariance(self):
@@ -163,7 +184,7 @@ class MultivariateGaussian(AbstractNoise):
         return MultivariateGaussian(self.fields, self.matrix * factor**2)
 
 
-def _flatten_batch(names, *mappings):
+def flatten_batch(names, *mappings):
     """The mappings with every array broadcast to the batch and flattened, and the batch's shape."""
     shape = jnp.broadcast_shapes(*[jnp.shape(values[name]) for values in mappings for name in names])
     wide = lambda value: jnp.broadcast_to(value, shape).reshape(-1)
@@ -206,7 +227,7 @@ class StudentT(AbstractNoise):
         constant = jax.lax.lgamma(half) - jax.lax.lgamma(0.5 * dof) - 0.5 * jnp.log(jnp.pi * dof)
         terms = []
         for name, scale in self.scale._asdict().items():
-            value, here = _masked(residual, present, name)
+            value, here = masked(residual, present, name)
             term = constant - jnp.log(scale) - half * jnp.log1p((value / scale) ** 2 / dof)
             terms.append(jnp.where(here, term, jnp.zeros_like(term)))
         return sum(terms[1:], terms[0])
@@ -257,7 +278,7 @@ class CauchyGaussianMixture(AbstractNoise):
     def log_prob(self, residual, present):
         terms = []
         for name, scale, std in zip(self.names, self.scale, self.std, strict=True):
-            value, here = _masked(residual, present, name)
+            value, here = masked(residual, present, name)
             heavy = jnp.log(self.weight) - jnp.log(jnp.pi * scale) - jnp.log1p((value / scale) ** 2)
             light = jnp.log1p(-self.weight) - 0.5 * (value / std) ** 2 - jnp.log(std) - 0.5 * LOG_2PI
             term = jnp.logaddexp(heavy, light)
@@ -272,73 +293,3 @@ class CauchyGaussianMixture(AbstractNoise):
     def scaled(self, factor):
         times = lambda values: jax.tree.map(lambda value: value * factor, values)
         return CauchyGaussianMixture(self.weight, times(self.scale), times(self.std))
-
-
-class Independent(AbstractNoise):
-    """Several independent laws over disjoint fields, as one law."""
-
-    laws: tuple[AbstractNoise, ...]
-
-    def __check_init__(self):
-        names = self.names
-        if len(set(names)) < len(names):
-            raise InputError(f"noise laws share fields: {', '.join(names)}; each field has one law.")
-
-    @property
-    def has_covariance(self):
-        return all(law.has_covariance for law in self.laws)
-
-    @property
-    def names(self):
-        return tuple(name for law in self.laws for name in law.names)
-
-    def sample(self, key, shape=()):
-        keys = jax.random.split(key, len(self.laws))
-        draws = [law.sample(k, shape) for law, k in zip(self.laws, keys, strict=True)]
-        return {name: value for draw in draws for name, value in draw.items()}
-
-    def log_prob(self, residual, present):
-        terms = [law.log_prob(residual, present) for law in self.laws]
-        return sum(terms[1:], terms[0])
-
-    def covariance(self):
-        return jax.scipy.linalg.block_diag(*[law.covariance() for law in self.laws])
-
-    def scaled(self, factor):
-        return Independent(tuple(law.scaled(factor) for law in self.laws))
-
-
-def whiten(law: AbstractNoise, residual: Mapping, present: Mapping) -> dict[str, jax.Array]:
-    """Residuals as independent numbers of unit variance, by the law's covariance; zero where absent (batches broadcast).
-
-    **Raises** `InputError` for what is no law by itself, as `StateDependent` noise.
-    """
-    if not isinstance(law, AbstractNoise):
-        raise InputError(
-            f"residuals are weighed by one law, and {type(law).__name__} has another for each state. "
-            "Take a filter's likelihood (fitting.maximum_likelihood), or one law."
-        )
-    if isinstance(law, Independent):
-        return {name: value for part in law.laws for name, value in whiten(part, residual, present).items()}
-    flat, shape = _flatten_batch(law.names, residual, present)
-    if isinstance(law, MultivariateGaussian):
-        white = jax.vmap(lambda r, p: law._white(r, p)[1][:, 0], out_axes=1)(*flat)
-    else:
-        std = numerics.sqrt(jnp.diagonal(law.covariance()))
-        values, here = flat
-        white = jnp.stack([_masked(values, here, name)[0] / std[i] for i, name in enumerate(law.names)])
-    return {name: white[i].reshape(shape) for i, name in enumerate(law.names)}
-
-
-def combine(*laws: AbstractNoise | None) -> AbstractNoise | None:
-    """One law of several over disjoint fields; independent Gaussians merge into one, so that one draw serves all."""
-    given = [law for law in laws if law is not None]
-    if not given:
-        return None
-    gaussian = [law for law in given if isinstance(law, Gaussian)]
-    merged = {name: std for law in gaussian for name, std in law.std._asdict().items()}
-    others = [law for law in given if not isinstance(law, Gaussian)]
-    if gaussian and len(merged) < sum(len(law.names) for law in gaussian):
-        raise InputError("noise laws share fields: each field has one law.")
-    parts = ([Gaussian(merged)] if gaussian else []) + others
-    return parts[0] if len(parts) == 1 else Independent(tuple(parts))

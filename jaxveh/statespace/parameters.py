@@ -14,8 +14,9 @@ from jaxveh._core.names import record_type
 from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_spread, put, resolve, share_of
 from jaxveh._core.parameters import Parameters
 from jaxveh.statespace.dependent_noise import around
+from jaxveh.statespace.independent import Independent
 from jaxveh.statespace.model import Prior, StateSpace
-from jaxveh.statespace.noise import Gaussian, Independent
+from jaxveh.statespace.noise import Gaussian
 from jaxveh.statespace.process import Continuous, join
 
 

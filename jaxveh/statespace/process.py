@@ -8,7 +8,8 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
-from jaxveh.statespace.noise import AbstractNoise, CauchyGaussianMixture, Independent, StudentT, combine
+from jaxveh.statespace.independent import combine
+from jaxveh.statespace.noise import AbstractNoise
 
 
 class AbstractProcessNoise(eqx.Module):
@@ -30,9 +31,8 @@ class Continuous(AbstractProcessNoise):
     law: AbstractNoise
 
     def __check_init__(self):
-        laws = self.law.laws if isinstance(self.law, Independent) else (self.law,)
-        for law in laws:
-            if isinstance(law, (StudentT, CauchyGaussianMixture)):
+        for law in self.law.parts:
+            if not law.adds_up:
                 raise InputError(f"{type(law).__name__} as process noise is the law of one step: wrap it in Discrete.")
 
     @property

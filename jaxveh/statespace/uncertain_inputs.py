@@ -12,8 +12,9 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import check_names, record_type
 from jaxveh.statespace.dependent_noise import around
+from jaxveh.statespace.independent import combine
 from jaxveh.statespace.model import LinearInput, Prior, StateSpace
-from jaxveh.statespace.noise import Gaussian, combine
+from jaxveh.statespace.noise import Gaussian
 from jaxveh.statespace.process import AbstractProcessNoise, join
 
 

@@ -56,10 +56,10 @@ PLACES = {
     "filters/auxiliary.py": {
         "stop_gradient": "the look-ahead, whose derivative cancels: gained in the choice, lost in the weights"
     },
-    "filters/choosing.py": {"stop_gradient": "the largest logarithm, which cancels in the sum of exponentials"},
+    "filters/choosing.py": {"stop_gradient": "the draw of ancestors, whole numbers"},
     "filters/looking_ahead.py": {"stop_gradient": "a remark, which is a code"},
-    "filters/particle.py": {"stop_gradient": "the draw of ancestors, whole numbers"},
     "filters/particle_belief.py": {"stop_gradient": "the base of moments, which cancels"},
+    "filters/transport.py": {"stop_gradient": "the largest logarithm, which cancels in the sum of exponentials"},
     "numerics/blocks.py": {"filter_custom_jvp": EVERY},
     "numerics/elementary.py": {"custom_jvp": EVERY, "stop_gradient": EVERY, "bitcast_convert_type": EVERY},
     "numerics/float_bits.py": {"bitcast_convert_type": EVERY},

@@ -5,6 +5,7 @@ import inspect
 import re
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -13,9 +14,10 @@ import jaxveh
 ROOT = Path(jaxveh.__file__).parents[1]
 RECIPES = dict(re.findall(r"^\| an? ([\w ]+?) \| (.*) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.M))
 NEW = {
-    "tyre law": ("tyres", jaxveh.tyres.Brush),
-    "filter or wrapper": ("filters", jaxveh.filters.ParticleFilter),
-    "vehicle": ("vehicles", jaxveh.vehicles.SingleTrack),
+    "tyre law": ("tyres", lambda: type("Newcomer", (jaxveh.tyres.Brush,), {})),
+    "filter or wrapper": ("filters", lambda: type("Newcomer", (jaxveh.filters.ParticleFilter,), {})),
+    "vehicle": ("vehicles", lambda: type("Newcomer", (jaxveh.vehicles.SingleTrack,), {})),
+    "estimator": ("estimators", lambda: ModuleType("Newcomer")),
 }
 
 
@@ -32,9 +34,8 @@ def lookers(place, monkeypatch):
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, name, module)
     spec.loader.exec_module(module)
-    found = [
-        one for name, one in vars(module).items() if name.startswith("test_") and not inspect.signature(one).parameters
-    ]
+    tests = [one for name, one in vars(module).items() if name.startswith("test_") and inspect.isfunction(one)]
+    found = [one for one in tests if not inspect.signature(one).parameters]
     return [one for one in found if re.search(r"left_out|members\(|__all__|no_particle", inspect.getsource(one))]
 
 
@@ -50,15 +51,15 @@ def test_there_are_five_and_their_places_exist():
 
 @pytest.mark.parametrize("recipe", NEW)
 def test_a_new_member_is_missed_where_the_recipe_says(recipe, monkeypatch):
-    room, base = NEW[recipe]
-    tables = [place for place in places(recipe) if place.startswith("tests/")]
+    room, newcomer = NEW[recipe]
+    tables = [place for place in places(recipe) if place.startswith("tests/") and "<" not in place]
     looking = {place: lookers(place, monkeypatch) for place in tables}
     assert all(looking.values()), looking
     for tests in looking.values():
         for test in tests:
             test()
     module = getattr(jaxveh, room)
-    monkeypatch.setattr(module, "Newcomer", type("Newcomer", (base,), {}), raising=False)
+    monkeypatch.setattr(module, "Newcomer", newcomer(), raising=False)
     monkeypatch.setattr(module, "__all__", [*module.__all__, "Newcomer"])
     for place, tests in looking.items():
         missed = 0

@@ -140,7 +140,7 @@ def test_real_log_calibrated_blind():
         "process noise.v_y",
         "measurement noise.a_y",
     }
-    fitted = calibration.specification(car)
+    fitted = estimators.sideslip.fitted_car(calibration, car)
     assert fitted.front.nominal_load == pytest.approx(982 * 9.80665 * 1.07 / 2.40, rel=1e-6)
 
 

@@ -48,9 +48,7 @@ LEVEL = NoiseLevel(0.02, 0.4, None)
 
 
 def choose_level(rounds, seed=2000, keep=2):
-    return noise.choose_level(
-        SMALL, LEVEL, candidates=CANDIDATES, particles=40, rounds=rounds, keep=keep, seed=seed
-    )
+    return noise.choose_level(SMALL, LEVEL, candidates=CANDIDATES, particles=40, rounds=rounds, keep=keep, seed=seed)
 
 
 @pytest.fixture

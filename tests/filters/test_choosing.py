@@ -11,7 +11,8 @@ from test_every_filter import batch, kalman_of, pendulum, recordings
 from jaxveh import InputError, filters, numerics
 from jaxveh import statespace as ss
 from jaxveh._core.names import record_type
-from jaxveh.filters.choosing import distances, log_of, score, transport_plan
+from jaxveh.filters.choosing import log_of, score
+from jaxveh.filters.transport import distances, transport_plan
 
 SEEDS = 60
 
@@ -124,7 +125,7 @@ class TestTransport:
             filters.Guided,
             lambda n, resampling: filters.Marginalised(n, ("x",), resampling),
         ):
-            with pytest.raises(InputError, match="it is for ParticleFilter alone"):
+            with pytest.raises(InputError, match="particles of Transport have no ancestors.* or ParticleFilter"):
                 make(10, resampling=filters.Transport())
 
 

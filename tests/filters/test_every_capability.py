@@ -206,7 +206,10 @@ def test_the_spread_of_particles_without_measurements_depends_on_time_alone(name
 def test_whitened_innovations_add_up_where_they_are_declared(name):
     found = answer(name, "plain")
     if not able(name, "whitens"):
-        assert found.info.whitened is None
+        kind = who_lacks(filter_named(name), "whitens")
+        assert found.info.whitened is None, (
+            f"{kind} hands on whitened innovations, and does not declare it: whitens = True"
+        )
         return
     white, scale = jnp.stack(found.info.whitened), jnp.stack(found.info.log_scale)
     here = jnp.isfinite(jnp.stack(found.info.innovation))

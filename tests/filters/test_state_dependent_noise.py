@@ -295,7 +295,7 @@ def chosen_beta():
             "residuals are weighed by one law, and StateDependent has another for each state",
         ),
         (
-            lambda m: ss.noise.whiten(m.measurement_noise, {}, {}),
+            lambda m: ss.kit.whiten(m.measurement_noise, {}, {}),
             "residuals are weighed by one law, and StateDependent has another for each state",
         ),
     ],

@@ -8,7 +8,7 @@ import scipy.stats
 
 from jaxveh import InputError
 from jaxveh import statespace as ss
-from jaxveh.statespace.noise import combine, whiten
+from jaxveh.statespace.independent import combine, whiten
 from jaxveh.statespace.process import Together, join
 
 MATRIX = np.array([[2.0, 0.6, -0.3], [0.6, 1.0, 0.2], [-0.3, 0.2, 0.5]])

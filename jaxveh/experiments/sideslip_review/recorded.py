@@ -132,11 +132,9 @@ def drive_of(blind: Recording, whole: Recording) -> Drive:
 
 def fitted_noise(cars: Cars, start: Noise, log: Recording, speed: float) -> Noise:
     """The noise levels of the greatest posterior on pieces of a cleaned log, about wide priors."""
-    pieces, warm_up = kit.cut_pieces(log, kit.PIECE_LENGTH, kit.WARM_UP)
+    pieces, warm_up = kit.cut_pieces(log)
     # The kinematics takes accelerations for inputs, which must be there.
-    held, _ = kit.cut_pieces(
-        log.fill("a_y", "hold", max_gap=1.0).fill("yaw_rate", "hold", max_gap=1.0), kit.PIECE_LENGTH, kit.WARM_UP
-    )
+    held, _ = kit.cut_pieces(log.fill("a_y", "hold", max_gap=1.0).fill("yaw_rate", "hold", max_gap=1.0))
     models, found = models_of(cars, start, speed), {}
     for name, method in (
         ("linear", filters.Kalman()),

@@ -27,6 +27,10 @@ class Kalman(AbstractRuleFilter):
     def rule(self, n):
         return Slopes()
 
+    @property
+    def linearisations(self):
+        return 0
+
     def check(self, model):
         check_covariances(type(self).__name__, model)
         check_linear(type(self).__name__, model)

@@ -20,10 +20,7 @@ from jaxveh.statespace import (
     AbstractBelief,
     AbstractNoise,
     AbstractTwoPartFilter,
-    Gaussian,
-    Independent,
     Info,
-    MultivariateGaussian,
     Row,
     StateDependent,
     StateSpace,
@@ -59,6 +56,12 @@ class AbstractGaussianFilter(AbstractTwoPartFilter):
     @abc.abstractmethod
     def adapted(self, model: StateSpace, belief: Any) -> StateSpace:
         """The model with the noises that this filter takes for true, given what it has seen."""
+
+    @property
+    def linearisations(self) -> int | None:
+        """How many times its update linearises the observation, 0 of a filter of linear models, where a smoother over all rows
+        at once (`smooth_parallel`) does what it does; None: it is a loop over the rows alone."""
+        return None
 
     def predict(self, model: StateSpace, belief: Any, t) -> Any:
         """The belief at time `t`, propagated with the inputs that the belief carries (held)."""
@@ -124,7 +127,7 @@ MOST_LOST = 1e-3
 def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
     """Raise `InputError` where the form needs positive weights and the rule has others; warn where rounding ruins them."""
     form = type(filter.form)
-    if form.needs_positive and not filter.rule(len(model.states)).positive:
+    if not form.negative_weights and not filter.rule(len(model.states)).positive:
         raise InputError(
             f"{type(filter).__name__}: a weight is negative for {len(model.states)} states, which {form.__name__} cannot take. "
             "Use weights without (alpha = 1, kappa >= 0), or Covariance()."
@@ -189,20 +192,11 @@ def check_kind(who: str, filter: Any, kind: type) -> None:
         raise InputError(f"{who}: {type(filter).__name__} inside: must be {what} (Kalman, Extended, Unscented, ...).")
 
 
-def is_gaussian(law: AbstractNoise) -> bool:
-    """Whether the law, and each part of it, is Gaussian."""
-    return all(isinstance(part, Gaussian | MultivariateGaussian) for part in _parts(law))
-
-
 def check_gaussian(who: str, what: str, law: AbstractNoise, advice: str = "Use ParticleFilter.") -> None:
     """Raise `InputError` unless the law, or each part of it, is Gaussian."""
-    for part in _parts(law):
-        if not is_gaussian(part):
+    for part in law.parts:
+        if not part.is_gaussian:
             raise InputError(f"{who}: the {what} {type(part).__name__} is not Gaussian. {advice}")
-
-
-def _parts(law: AbstractNoise) -> tuple[AbstractNoise, ...]:
-    return law.laws if isinstance(law, Independent) else (law,)
 
 
 def with_spread(belief: GaussianBelief, vector: Any, spread: Spread, t=None, u=None, count=None) -> GaussianBelief:

@@ -45,9 +45,18 @@ class Smoothed(NamedTuple):
 
 
 class AbstractForm(eqx.Module):
-    """The algebra of covariances of a filter. `needs_positive`: no weight of a rule may be negative."""
+    """The algebra of covariances of a filter.
 
-    needs_positive: eqx.AbstractClassVar[bool]
+    What a form can is declared where it is true, and is *no* otherwise:
+
+    - `negative_weights`: it takes rules of which some weights are negative.
+    - `keeps_matrix`: each `Spread` has the covariance itself as its `matrix`.
+    - `triangular`: each factor is lower triangular.
+    """
+
+    negative_weights: ClassVar[bool] = False
+    keeps_matrix: ClassVar[bool] = False
+    triangular: ClassVar[bool] = False
 
     @abc.abstractmethod
     def start(self, covariance: Any) -> Spread:
@@ -83,7 +92,9 @@ class Covariance(AbstractForm):
     S = E W E^T + R,    K = X W E^T S^-1,    P+ = P - K S K^T
     """
 
-    needs_positive: ClassVar[bool] = False
+    negative_weights: ClassVar[bool] = True
+    keeps_matrix: ClassVar[bool] = True
+    triangular: ClassVar[bool] = True
 
     def start(self, covariance):
         return Spread(numerics.cholesky(covariance), covariance)
@@ -123,7 +134,7 @@ class SquareRoot(AbstractForm):
                             [X  0] -> [K S  F+]
     """
 
-    needs_positive: ClassVar[bool] = True
+    triangular: ClassVar[bool] = True
 
     def start(self, covariance):
         return Spread(numerics.cholesky(covariance), None)
@@ -159,8 +170,6 @@ class SingularValues(AbstractForm):
     The decomposition is of deviations, never of the covariance. Where singular values coincide their vectors are not defined,
     and with them the points of nonlinear functions and the derivatives: this form cannot be differentiated.
     """
-
-    needs_positive: ClassVar[bool] = True
 
     def start(self, covariance):
         return Spread(_principal(numerics.cholesky(covariance)), None)

@@ -37,6 +37,10 @@ class Iterated(AbstractGaussianWrapper):
         check_kind("Iterated", self.inner, AbstractRuleFilter)
         check_whole("iterations", self.iterations)
 
+    @property
+    def linearisations(self):
+        return self.iterations
+
     def prior(self, model, row):
         return self.inner.prior(model, row)
 

@@ -6,12 +6,29 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_whole
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.particle import AbstractParticleFilter
 from jaxveh.filters.smoothing.genealogy import path_moments
+from jaxveh.filters.smoothing.path_smoother import AbstractPathSmoother
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate, with_last
 from jaxveh.statespace import Row, StateSpace, kit
+
+
+class BackwardSampling(AbstractPathSmoother):
+    """Paths drawn backwards from the smoothing distribution, `trajectories` of them: for particle filters whose every state
+    carries process noise."""
+
+    trajectories: int = eqx.field(static=True, default=200)
+
+    def __check_init__(self):
+        check_whole("trajectories", self.trajectories, 2)
+
+    def check(self, filter, model):
+        check_density(model)
+
+    def smooth(self, filter, model, rows, key):
+        return sample_backwards(filter, model, rows, key, self.trajectories)
 
 
 def check_density(model: StateSpace) -> None:

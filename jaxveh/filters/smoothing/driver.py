@@ -6,30 +6,16 @@ from typing import Any
 
 import equinox as eqx
 
-from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
-from jaxveh.filters.choosing import Transport
 from jaxveh.filters.particle import AbstractParticleFilter
-from jaxveh.filters.smoothing.backward_sampling import check_density, sample_backwards
+from jaxveh.filters.smoothing.backward_sampling import BackwardSampling
 from jaxveh.filters.smoothing.fixed_lag import check_lag, smooth_with_lag
-from jaxveh.filters.smoothing.genealogy import trace_genealogy
+from jaxveh.filters.smoothing.genealogy import Genealogy
+from jaxveh.filters.smoothing.path_smoother import AbstractPathSmoother
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate
 from jaxveh.statespace import AbstractFilter, Smoothing, StateSpace, kit
-
-
-class BackwardSampling(eqx.Module):
-    """Paths drawn backwards from the smoothing distribution, `trajectories` of them: for particle filters whose every state
-    carries process noise."""
-
-    trajectories: int = eqx.field(static=True, default=200)
-
-    def __check_init__(self):
-        check_whole("trajectories", self.trajectories, 2)
-
-
-class Genealogy(eqx.Module):
-    """The ancestors of the last particles: for any particle filter, good for some ten rows before the end."""
 
 
 def smooth(
@@ -38,7 +24,7 @@ def smooth(
     recording: Recording,
     *,
     key=None,
-    method: BackwardSampling | Genealogy | None = None,
+    method: AbstractPathSmoother | None = None,
     lag: int | None = None,
     throw: bool = True,
 ) -> SmoothedEstimate:
@@ -78,11 +64,7 @@ def _particles(filter: AbstractParticleFilter, model: StateSpace, rows: Any, key
     if method is None:
         noisy = () if model.process_noise is None else model.process_noise.law.names
         method = BackwardSampling() if set(noisy) == set(model.states) else Genealogy()
-    if isinstance(method, Genealogy):
-        if isinstance(filter.resampling, Transport):
-            raise InputError("Genealogy: particles of Transport have no ancestors. Use BackwardSampling().")
-        return trace_genealogy(filter, model, rows, key)
-    if not isinstance(method, BackwardSampling):
+    if not isinstance(method, AbstractPathSmoother):
         raise InputError(f"method = {method!r}: must be BackwardSampling(), Genealogy() or None.")
-    check_density(model)
-    return sample_backwards(filter, model, rows, key, method.trajectories)
+    method.check(filter, model)
+    return method.smooth(filter, model, rows, key)

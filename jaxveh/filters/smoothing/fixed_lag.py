@@ -8,8 +8,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import InputError, check_whole
-from jaxveh.filters.choosing import Transport
+from jaxveh._core.errors import check_whole
+from jaxveh.filters.choosing import check_ancestors
 from jaxveh.filters.particle import ParticleBelief
 from jaxveh.filters.smoothing.rauch_tung_striebel import given_later
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
@@ -82,8 +82,8 @@ def check_lag(filter: Any, lag: int) -> None:
     """Raise `InputError` for a lag that is no whole number of at least 1, or a filter without a smoother."""
     check_whole("lag", lag)
     kind = kit.check_smooths("FixedLag", filter)
-    if kind is Smoothing.particles and isinstance(filter.resampling, Transport):
-        raise InputError("FixedLag: particles of Transport have no ancestors.")
+    if kind is Smoothing.particles:
+        check_ancestors("FixedLag", kit.innermost(filter).resampling, "Take numerics.systematic or Soft(...).")
 
 
 def first_of(filter: Any, model: StateSpace, past: Any, real: Any) -> tuple[Any, Any]:

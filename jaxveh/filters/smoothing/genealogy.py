@@ -6,9 +6,22 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh.filters.choosing import check_ancestors
 from jaxveh.filters.particle import AbstractParticleFilter, ParticleBelief
+from jaxveh.filters.smoothing.path_smoother import AbstractPathSmoother
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.statespace import Row, StateSpace, kit
+
+
+class Genealogy(AbstractPathSmoother):
+    """The ancestors of the last particles: for any particle filter whose scheme keeps them, good for some ten rows before the
+    end."""
+
+    def check(self, filter, model):
+        check_ancestors("Genealogy", kit.innermost(filter).resampling, "Use BackwardSampling().")
+
+    def smooth(self, filter, model, rows, key):
+        return trace_genealogy(filter, model, rows, key)
 
 
 @eqx.filter_jit
@@ -20,7 +33,7 @@ def trace_genealogy(filter: AbstractParticleFilter, model: StateSpace, rows: Row
     """
     filtered, (particles, ancestors) = kit.scan_and_keep(filter, model, rows, key, lambda b: (b.particles, b.ancestors))
     weights = filtered.belief.weights
-    last = jnp.arange(filter.particles, dtype=ancestors.dtype)
+    last = jnp.arange(weights.shape[0], dtype=ancestors.dtype)
 
     def back(index, parents):
         return parents[index], index

@@ -10,17 +10,15 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import first_failure
-from jaxveh.filters.gaussian import Iterated
+from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.family import Kalman
-from jaxveh.filters.gaussian.forms import Covariance
 from jaxveh.filters.gaussian.parallel import infos_of, pass_over
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.statespace import Estimate, Row, Smoothing, StateSpace, kit, parameters_of
 
 
 def smooth_parallel(
-    filter: Kalman | Iterated, model: StateSpace, recording: Recording, *, throw: bool = True
+    filter: AbstractGaussianFilter, model: StateSpace, recording: Recording, *, throw: bool = True
 ) -> SmoothedEstimate:
     """What `smooth` says, by associative scans over the rows: for accelerators, and for long linear problems on many cores.
 
@@ -34,22 +32,19 @@ def smooth_parallel(
 
     On a processor with few cores the loop is faster: about twice the work a row is done, in matrix products.
 
-    **Raises** as `run`, and `InputError` for other filters and forms.
+    **Raises** as `run`, and `InputError` for filters that do not declare it (`linearisations`) and forms without
+    the covariance itself.
     """
     declared = kit.smoothing_of(filter) is Smoothing.gaussian
-    if (
-        not declared
-        or not isinstance(filter, (Kalman, Iterated))
-        or not isinstance(kit.innermost(filter).form, Covariance)
-    ):
+    if not declared or filter.linearisations is None or not kit.innermost(filter).form.keeps_matrix:
         raise InputError(
             f"smooth_parallel: {type(filter).__name__}: must be Kalman() or Iterated(...) itself, of the form Covariance()."
         )
     filter.check(model)
-    if model.angles and isinstance(filter, Kalman):
+    if model.angles and filter.linearisations == 0:
         raise InputError(
-            f"smooth_parallel: Kalman with the angle(s) {', '.join(model.angles)}: innovations are wrapped, which is no linear "
-            "update. Use Iterated(Extended(), 2), or smooth."
+            f"smooth_parallel: {type(filter).__name__} with the angle(s) {', '.join(model.angles)}: innovations are "
+            "wrapped, which is no linear update. Use Iterated(Extended(), 2), or smooth."
         )
     found = _smooth(filter, model, model.rows(recording))
     found = eqx.tree_at(lambda e: (e.time, e.filtered.time), found, (recording.time, recording.time))
@@ -67,8 +62,8 @@ def _smooth(filter, model, rows: Row) -> SmoothedEstimate:
     def again(path, _):
         return pass_over(rule, model, rows, *path).smoothed, None
 
-    passes = filter.iterations - 1 if isinstance(filter, Iterated) else 0
-    path, _ = jax.lax.scan(jax.checkpoint(again), path, length=passes)
+    # The last pass is below.
+    path, _ = jax.lax.scan(jax.checkpoint(again), path, length=max(filter.linearisations - 1, 0))
     passed = pass_over(rule, model, rows, *path)
     infos = infos_of(model, rows, passed)
     beliefs = lambda gaussians: jax.vmap(lambda row, m, P: _belief(model, rule, row, m, P))(rows, *gaussians)

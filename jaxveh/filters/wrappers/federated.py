@@ -15,7 +15,7 @@ from jaxveh._core.names import as_groups, check_names, record
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
-from jaxveh.filters.gaussian.forms import SingularValues, Spread
+from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.statespace import AbstractBelief, AbstractProcessNoise, AbstractWrapper, Row, StateSpace
 
@@ -205,9 +205,8 @@ class Federated(AbstractWrapper):
 
     def _information(self, belief: GaussianBelief) -> tuple[Any, Any]:
         """P^-1 (n, n) and P^-1 x (n,)."""
-        # Singular vectors make no triangular factor.
-        singular = isinstance(self.inner.form, SingularValues)
-        information = numerics.inverse_psd(numerics.lower_factor(belief.factor) if singular else belief.factor)
+        triangular = self.inner.form.triangular
+        information = numerics.inverse_psd(belief.factor if triangular else numerics.lower_factor(belief.factor))
         return information, times(information, belief.vector)
 
 

@@ -1,0 +1,149 @@
+"""What an estimator of a quantity is, and what all of them share.
+
+An estimator is a module of `jaxveh.estimators`, named after what it estimates, with five names and these arguments first:
+
+- `needs`: a tuple of `Need`, the channels that it reads and their units.
+- `model(car, ...) -> StateSpace`: the state space that a filter sees. `car`: an `io.CarSpecification`, or the vehicle that the
+  estimator is about. All other arguments have defaults and are given by name.
+- `calibrate(car, recording, *, filter=None, progress=silent, ...) -> Calibration`: what of the car and of the noises a span of a
+  log tells.
+- `estimate(source, recording, *, filter=None, key=None) -> Estimate`: means and standard deviations of the quantity along a log;
+  `source` is a `Calibration`, a model, or a car taken at its word.
+- `live(source, *, filter=None, key=None) -> Live`: the same a row at a time.
+
+`AbstractCleaning` is what stands between the log and the filter. It looks back only, so that `live` says what `estimate` says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import numpy as np
+
+from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.recording import Recording
+from jaxveh.fitting import Fit
+from jaxveh.io import kit as io
+from jaxveh.statespace import StateSpace
+
+
+class Need(NamedTuple):
+    """A channel that an estimator reads, in its `unit`. `optional`: only where the model measures it; `throughout`: known in
+    every row, as inputs must be, while measurements may be missing (NaN)."""
+
+    channel: str
+    unit: str
+    optional: bool = False
+    throughout: bool = False
+
+
+def check_needs(who: str, needs: tuple[Need, ...], recording: Recording, model: StateSpace | None = None) -> None:
+    """Raise `InputError` for a channel that the recording lacks, or has in another unit, or with gaps where there may be none.
+
+    An optional one is needed where the `model` reads it.
+    """
+    read = () if model is None else (*model.inputs, *model.channels)
+    wanted = [need for need in needs if not need.optional or need.channel in read]
+    missing = [f"{need.channel} ({need.unit})" for need in wanted if need.channel not in recording]
+    if missing:
+        verb = "is" if len(missing) == 1 else "are"
+        raise InputError(
+            f"{who}: {', '.join(missing)} {verb} missing from the log; it has: {', '.join(recording.names) or 'no channel'}. "
+            "Name the columns in a channel map, or in the recording."
+        )
+    for need in wanted:
+        unit = recording.unit(need.channel)
+        if io.is_unit(unit) and not io.same_unit(unit, need.unit):
+            raise InputError(f"{who}: channel {need.channel} is in {unit}: must be in {need.unit}. Convert its values.")
+        if need.throughout:
+            _check_known(who, need.channel, recording)
+
+
+def _check_known(who: str, name: str, recording: Recording) -> None:
+    if not is_concrete(recording[name]):
+        return
+    gaps = np.isnan(np.asarray(recording[name]))
+    if gaps.any():
+        raise InputError(
+            f"{who}: input channel {name} is NaN in {int(gaps.sum())} rows, first at t = "
+            f"{np.asarray(recording.time)[np.argmax(gaps)]:g} s: an input must be known. "
+            f'Fill it on request: recording.fill("{name}", "linear", max_gap=0.1).'
+        )
+
+
+class Calibration(eqx.Module):
+    """What a span of a log told an estimator of a car.
+
+    `estimator`: its name; `fit`: the `fitting.Fit` (its `model` is the fitted StateSpace); `span`: start and end in the log's own
+    time, s. Where a reference was offered, `weight` is the one that it got in the fit, in the reference's unit, None for none, by
+    choice or because validation inside the span said so; `validation`: the error that each weight tried left there.
+    """
+
+    estimator: str = eqx.field(static=True)
+    fit: Fit
+    span: tuple[float, float] = eqx.field(static=True)
+    weight: float | None = eqx.field(static=True, default=None)
+    validation: tuple[tuple[float | None, float], ...] = eqx.field(static=True, default=())
+
+    @property
+    def model(self) -> StateSpace:
+        """The fitted state space."""
+        return self.fit.model
+
+    def summary(self) -> dict[str, dict[str, Any]]:
+        """Fitted values by name: `{"value", "std", "unit"}`."""
+        fit = self.fit
+        in_words = lambda name: name.replace("process_noise.law.std", "process noise")
+        return {
+            in_words(p.name).replace("measurement_noise.std", "measurement noise"): {
+                "value": float(fit.parameters[p.name]), "std": float(fit.parameters_std[p.name]), "unit": p.unit
+            }
+            for p in fit.chosen
+        }  # fmt: skip
+
+
+def model_of(who: str, source: Any, model: Callable[[Any], StateSpace]) -> StateSpace:
+    """The state space of a `source`: that of a calibration or a model as it is, else `model(car)`.
+
+    **Raises** `InputError` for a calibration of another estimator.
+    """
+    if isinstance(source, StateSpace):
+        return source
+    if not isinstance(source, Calibration):
+        return model(source)
+    if source.estimator != who:
+        raise InputError(f"{who}: the calibration is one of {source.estimator}: must be made by {who}.calibrate.")
+    return source.model
+
+
+def span_of(who: str, recording: Recording, shortest: float, what: str) -> tuple[float, float]:
+    """Start and end of a span to calibrate on, s.
+
+    **Raises** `InputError` for one that is shorter than `shortest` (s), and cannot hold `what` is needed.
+    """
+    span = (float(recording.time[0]), float(recording.time[-1]))
+    if span[1] - span[0] < shortest:
+        raise InputError(
+            f"{who}: calibration span of {span[1] - span[0]:.3g} s ({span[0]:g} to {span[1]:g} s): must be at least "
+            f"{shortest:g} s, with {what} in it."
+        )
+    return span
+
+
+PIECE_LENGTH = 8.0
+"""s: calibration runs the filter on pieces of about this length side by side,"""
+
+WARM_UP = 2.0
+"""s: which overlap by this, in which each filter finds its state."""
+
+
+def cut_pieces(log: Recording, length: float = PIECE_LENGTH, overlap: float = WARM_UP) -> tuple[list[Recording], int]:
+    """The log in pieces of one number of rows, about `length` seconds beside an `overlap` (s), and the overlap's rows."""
+    time = np.asarray(log.time)
+    step = float(np.median(np.diff(time)))
+    warm_up = round(overlap / step)
+    count = max(1, round((time[-1] - time[0] - overlap) / length))
+    new = (len(log) - warm_up) // count
+    return [log.rows(slice(i * new, i * new + new + warm_up)) for i in range(count)], warm_up

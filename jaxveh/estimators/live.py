@@ -1,0 +1,149 @@
+"""Estimates a row at a time, and the cleaning that both a log and a live loop go through."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.names import record
+from jaxveh._core.recording import Recording
+from jaxveh.numerics import always, apart
+from jaxveh.statespace import AbstractFilter, Info, Row, StateSpace
+
+
+class AbstractCleaning(eqx.Module):
+    """What a log goes through before a filter reads it, row by row, looking back only.
+
+    A row is a time (s) and a mapping of `channels` to scalars, NaN where missing. What is returned is the memory for the next
+    row, and the channels as the filter gets them.
+    """
+
+    @property
+    @abc.abstractmethod
+    def channels(self) -> tuple[str, ...]:
+        """The channels that it reads."""
+
+    @abc.abstractmethod
+    def first(self, t: Any, values: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+        """The memory after the first row, and what the filter gets of it."""
+
+    @abc.abstractmethod
+    def next(self, memory: Any, t: Any, values: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+        """The same of the next row."""
+
+
+class AsItIs(AbstractCleaning):
+    """Nothing is changed."""
+
+    @property
+    def channels(self):
+        return ()
+
+    def first(self, t, values):
+        return None, values
+
+    def next(self, memory, t, values):
+        return None, values
+
+
+def cleaned(cleaning: AbstractCleaning, recording: Recording) -> Recording:
+    """The recording after its cleaning, with the same rows."""
+    values = {name: recording[name] for name in cleaning.channels}
+    if not values:
+        return recording
+    dtype = next(iter(values.values())).dtype
+    time = recording.time
+    if isinstance(time, np.ndarray) and dtype != np.float64:
+        time = time - time[0]
+    return recording.replace(**_clean_rows(cleaning, jnp.asarray(time, dtype), values))
+
+
+@eqx.filter_jit
+def _clean_rows(cleaning: AbstractCleaning, time: Any, values: dict[str, Any]) -> dict[str, Any]:
+    first, rest = (
+        jax.tree.map(lambda leaf: leaf[0], (time, values)),
+        jax.tree.map(lambda leaf: leaf[1:], (time, values)),
+    )
+    memory, start = apart(cleaning.first, always(first[0]), *first)
+    body = lambda memory, row: apart(cleaning.next, always(row[0]), memory, *row)
+    _, rest = jax.lax.scan(body, memory, rest)
+    return jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), start, rest)
+
+
+class LiveBelief(NamedTuple):
+    """What a live estimator carries from row to row: the filter's belief, and the cleaning's memory."""
+
+    belief: Any
+    memory: Any
+
+
+class LiveAnswer(NamedTuple):
+    """What an estimator says of a row: `mean` and standard deviation `std` by name, as fields of the same NamedTuple that an
+    Estimate has, and the filter's `info`."""
+
+    mean: Any
+    std: Any
+    info: Info
+
+
+class Live(eqx.Module):
+    """An estimator that is given one row at a time, cleaning included, and says what `estimate` says of the same rows.
+
+        live = estimators.sideslip.live(calibration)
+        belief, answer = live.init(t, {"steer": ..., "v_x": ..., "a_x": ..., "a_y": ..., "yaw_rate": ...})
+        belief, answer = live.step(belief, t, {...})
+        answer.mean.sideslip, answer.std.sideslip
+
+    Compiled once each. Inputs must be given; of measurements those that are not given, or NaN, are missing. Channels that the
+    model does not read are not looked at. Where float32 rules, count time from the first row.
+    """
+
+    filter: AbstractFilter
+    model: StateSpace
+    cleaning: AbstractCleaning
+    key: Any = None
+
+    def init(self, t, channels: Mapping[str, Any]) -> tuple[LiveBelief, LiveAnswer]:
+        """The belief after the first row, and what it says.
+
+        **Raises** `InputError` for an input that is not given, and as the filter does.
+        """
+        self.filter.check(self.model)
+        return _live_init(self, self._row(t, channels))
+
+    def step(self, belief: LiveBelief, t, channels: Mapping[str, Any]) -> tuple[LiveBelief, LiveAnswer]:
+        """The belief after the next row, and what it says. **Raises** `InputError` for an input that is not given."""
+        return _live_step(self, belief, self._row(t, channels))
+
+    def _row(self, t, channels: Mapping[str, Any]) -> Row:
+        of = lambda names: {name: channels[name] for name in names if name in channels}
+        return self.model.row(t, of(self.model.inputs), of(self.model.channels))
+
+
+@eqx.filter_jit
+def _live_init(live: Live, row: Row) -> tuple[LiveBelief, LiveAnswer]:
+    memory, values = apart(live.cleaning.first, always(row.t), row.t, _values(row))
+    belief, info = live.filter.init(live.model, _with(row, values), live.key)
+    return LiveBelief(belief, memory), LiveAnswer(*belief.moments(live.model), info)
+
+
+@eqx.filter_jit
+def _live_step(live: Live, before: LiveBelief, row: Row) -> tuple[LiveBelief, LiveAnswer]:
+    memory, values = apart(live.cleaning.next, always(row.t), before.memory, row.t, _values(row))
+    belief, info = live.filter.step(live.model, before.belief, _with(row, values))
+    return LiveBelief(belief, memory), LiveAnswer(*belief.moments(live.model), info)
+
+
+def _values(row: Row) -> dict[str, Any]:
+    return {**row.u._asdict(), **row.y._asdict()}
+
+
+def _with(row: Row, values: dict[str, Any]) -> Row:
+    of = lambda like: {name: values[name] for name in like._fields}
+    return row._replace(u=record("Inputs", of(row.u)), y=record("Measurements", of(row.y)))

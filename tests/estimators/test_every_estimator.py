@@ -1,0 +1,262 @@
+"""Every estimator keeps the contract of `estimators.contract`: five names, early errors, and live what it is on a log."""
+
+import dataclasses
+import functools
+import inspect
+from types import ModuleType, SimpleNamespace
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+import pytest
+import test_mass_and_grade
+import test_sideslip
+
+from jaxveh import InputError, Recording, estimators, filters, vehicles
+from jaxveh.estimators import kit
+
+FULL = pytest.mark.full
+
+
+class Case(NamedTuple):
+    """A log that an estimator can read; its car as a file, and as the vehicle that the estimator is about."""
+
+    log: Recording
+    car: Any
+    vehicle: Any
+
+
+def of_sideslip():
+    file = test_sideslip.CAR
+    return Case(test_sideslip.log(2100), file, estimators.sideslip.handling_car(file))
+
+
+def of_mass_and_grade():
+    known = {"wheel_radius": 0.3, "drag": 0.4, "rolling_resistance": 0.012}
+    file = dataclasses.replace(test_sideslip.CAR, mass=1100.0, **known)
+    return Case(test_mass_and_grade.drive(duration=40.0)[0], file, vehicles.Longitudinal(1100.0, **known))
+
+
+CASES = {"sideslip": of_sideslip, "mass_and_grade": of_mass_and_grade}
+SLOW = ("sideslip",)
+"""To be fitted: by the full run."""
+
+
+@functools.cache
+def case_of(name):
+    return CASES[name]()
+
+
+every = pytest.mark.parametrize("name", CASES)
+
+
+def estimator(name):
+    return getattr(estimators, name)
+
+
+def required(name):
+    return [need for need in estimator(name).needs if not need.optional]
+
+
+def test_every_module_of_the_room_is_an_estimator_with_a_case_here():
+    modules = {name for name in estimators.__all__ if isinstance(getattr(estimators, name), ModuleType)}
+    assert modules - {"kit"} == set(CASES)
+
+
+def parameters(function):
+    """Names of the arguments: those in order, those by name alone; and which have no default."""
+    found = inspect.signature(function).parameters.values()
+    by_place = [p.name for p in found if p.kind is p.POSITIONAL_OR_KEYWORD]
+    by_name = [p.name for p in found if p.kind is p.KEYWORD_ONLY]
+    return by_place, by_name, [p.name for p in found if p.default is p.empty and p.kind is not p.VAR_KEYWORD]
+
+
+@every
+def test_the_five_names_have_the_same_arguments(name):
+    one = estimator(name)
+    assert parameters(one.estimate) == (["source", "recording"], ["filter", "key"], ["source", "recording"])
+    assert parameters(one.live) == (["source"], ["filter", "key"], ["source"])
+    by_place, by_name, needed = parameters(one.calibrate)
+    assert (by_place, needed, by_name[:2]) == (["car", "recording"], ["car", "recording"], ["filter", "progress"])
+    by_place, _, needed = parameters(one.model)
+    assert by_place == needed == ["car"]
+    for function, answer in (
+        ("model", "StateSpace"),
+        ("calibrate", "Calibration"),
+        ("estimate", "Estimate"),
+        ("live", "Live"),
+    ):
+        assert inspect.signature(getattr(one, function)).return_annotation == answer
+        assert getattr(one, function).__doc__
+    assert one.needs and all(isinstance(need, kit.Need) for need in one.needs)
+
+
+@every
+def test_what_it_needs_is_what_its_model_reads(name):
+    model = estimator(name).model(case_of(name).car)
+    needs = {need.channel: need for need in estimator(name).needs}
+    assert {need.channel for need in required(name)} == {*model.inputs, *model.channels}
+    assert {channel for channel, need in needs.items() if need.throughout} == set(model.inputs)
+
+
+@every
+def test_what_is_missing_is_named_with_what_there_is(name):
+    one, case = estimator(name), case_of(name)
+    for need in required(name):
+        less = case.log.without(need.channel)
+        there = ", ".join(less.names)
+        message = (
+            rf"{name}: {need.channel} \({need.unit.replace('^', '.')}\) is missing from the log; it has: {there}\."
+        )
+        for call in (lambda less=less: one.estimate(case.car, less), lambda less=less: one.calibrate(case.car, less)):
+            with pytest.raises(InputError, match=message):
+                call()
+    empty = Recording(case.log.time, {})
+    with pytest.raises(InputError, match=r"are missing from the log; it has: no channel\."):
+        one.estimate(case.car, empty)
+
+
+@every
+def test_another_unit_and_a_gap_in_an_input_are_named(name):
+    one, case = estimator(name), case_of(name)
+    for need in required(name):
+        with pytest.raises(InputError, match=f"{name}: channel {need.channel} is in furlong: must be in"):
+            one.estimate(case.car, case.log.replace(units={need.channel: "furlong"}))
+        values = np.array(case.log[need.channel])
+        values[7] = np.nan
+        if need.throughout:
+            with pytest.raises(InputError, match=rf"input channel {need.channel} is NaN in 1 rows, .*recording\.fill"):
+                one.estimate(case.car, case.log.replace(**{need.channel: values}))
+
+
+@every
+def test_an_optional_channel_is_asked_for_by_a_model_that_reads_it(name):
+    one, case = estimator(name), case_of(name)
+    for need in one.needs:
+        if need.optional:
+            model = one.model(case.car, **{need.channel: 0.05})
+            assert need.channel in model.channels
+            less = case.log.without(need.channel)
+            one.estimate(case.car, less)
+            with pytest.raises(InputError, match=f"{need.channel} .* is missing from the log"):
+                one.estimate(model, less)
+
+
+def same(found, expected):
+    for what in ("mean", "std"):
+        for a, b in zip(getattr(found, what), getattr(expected, what), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@every
+def test_a_file_a_vehicle_a_model_and_a_calibration_are_sources(name):
+    one, case = estimator(name), case_of(name)
+    log, model = case.log.rows(slice(0, 60)), one.model(case.car)
+    expected = one.estimate(case.car, log)
+    told = estimators.Calibration(name, SimpleNamespace(model=model), (0.0, 1.0))
+    for source in (case.vehicle, model, told):
+        same(one.estimate(source, log), expected)
+    other = estimators.Calibration("another", SimpleNamespace(model=model), (0.0, 1.0))
+    for call in (lambda: one.estimate(other, log), lambda: one.live(other)):
+        with pytest.raises(InputError, match=f"{name}: the calibration is one of another: must be made by {name}"):
+            call()
+
+
+def rows_of(log, count):
+    return [(float(log.time[k]), {name: float(log[name][k]) for name in log.names}) for k in range(count)]
+
+
+def live_answers(live, rows):
+    belief, answer = live.init(*rows[0])
+    answers = [answer]
+    for row in rows[1:]:
+        belief, answer = live.step(belief, *row)
+        answers.append(answer)
+    return answers
+
+
+@pytest.mark.parametrize("with_key", [False, pytest.param(True, marks=FULL)], ids=["its own filter", "particles"])
+@every
+def test_live_says_what_it_says_of_a_log(name, with_key):
+    """States bit for bit; what is computed of them for the report to rounding, since a scan fuses it otherwise."""
+    one, case, count = estimator(name), case_of(name), 120
+    options = {"filter": filters.ParticleFilter(64), "key": jax.random.key(3)} if with_key else {}
+    log = spoilt(case.log, required(name))
+    found = one.estimate(case.car, log.rows(slice(0, count)), **options)
+    answers = live_answers(one.live(case.car, **options), rows_of(log, count))
+    states = one.model(case.car).states
+    for what in ("mean", "std"):
+        for field in getattr(found, what)._fields:
+            beside = np.array([getattr(getattr(answer, what), field) for answer in answers])
+            there = np.asarray(getattr(getattr(found, what), field))
+            if field in states and field != "mass":  # a state as its logarithm
+                np.testing.assert_array_equal(beside, there, err_msg=field)
+            np.testing.assert_allclose(beside, there, rtol=1e-9, err_msg=field)
+    np.testing.assert_array_equal([answer.info.log_likelihood for answer in answers], found.info.log_likelihood)
+
+
+def spoilt(log, needs):
+    """A jump of every input for some rows, measurements that are missing, and some that are repeated."""
+    rng, changed = np.random.default_rng(4), {}
+    for need in needs:
+        values = np.array(log[need.channel])
+        if need.throughout:
+            values[50:54] = values[50:54] + 0.3
+            values[60:] += 0.02 * rng.normal(size=values[60:].size)
+        else:
+            values[20:23] = np.nan
+            values[31] = values[30]
+        changed[need.channel] = values
+    return log.replace(**changed)
+
+
+@every
+def test_a_row_without_a_measurement_is_one_of_a_missing_one_and_one_without_an_input_is_refused(name):
+    one, case = estimator(name), case_of(name)
+    rows, live = rows_of(case.log, 3), one.live(case.car)
+    inputs = [need.channel for need in required(name) if need.throughout]
+    measured = [need.channel for need in required(name) if not need.throughout]
+    blank = [rows[0], (rows[1][0], rows[1][1] | dict.fromkeys(measured, np.nan)), rows[2]]
+    without = [rows[0], (rows[1][0], {channel: rows[1][1][channel] for channel in inputs}), rows[2]]
+    for a, b in zip(live_answers(live, blank), live_answers(live, without), strict=True):
+        same(a, b)
+    belief, _ = live.init(*rows[0])
+    for channel in inputs:
+        less = {name: value for name, value in rows[1][1].items() if name != channel}
+        with pytest.raises(InputError, match=rf"no value for the input\(s\) {channel}"):
+            live.step(belief, rows[1][0], less)
+
+
+def test_a_live_step_is_compiled_once():
+    traced = []
+
+    class Counting(kit.AsItIs):
+        def next(self, memory, t, values):
+            traced.append(t)
+            return None, values
+
+    case = case_of("mass_and_grade")
+    live = estimators.Live(filters.Unscented(), estimators.mass_and_grade.model(case.car), Counting())
+    rows = rows_of(case.log, 6)
+    live_answers(live, rows[:2])
+    first = len(traced)
+    live_answers(live, rows)
+    assert len(traced) == first > 0
+
+
+@every
+def test_a_span_that_is_too_short_is_refused(name):
+    with pytest.raises(InputError, match=rf"{name}: calibration span of [\d.]+ s .*: must be at least \d+ s, with"):
+        estimator(name).calibrate(case_of(name).car, case_of(name).log.rows(slice(0, 100)))
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=FULL) if n in SLOW else n for n in CASES])
+def test_a_calibration_explains_its_span_better_and_says_what_it_fitted(name):
+    one, case, told = estimator(name), case_of(name), []
+    found = one.calibrate(case.car, case.log, progress=lambda done, total, stage: told.append(done / total))
+    assert isinstance(found, estimators.Calibration) and found.estimator == name
+    assert found.span == (float(case.log.time[0]), float(case.log.time[-1]))
+    assert told and 0.0 <= min(told) <= max(told) <= 1.0
+    for entry in found.summary().values():
+        assert np.isfinite(entry["value"]) and entry["std"] > 0.0 and entry["unit"]
+    assert one.estimate(found, case.log).log_likelihood > one.estimate(case.car, case.log).log_likelihood + 1.0
