@@ -113,9 +113,9 @@ def own_model(name):
 
 
 @functools.cache
-def answer(name, what, own=turning):
+def answer(name, what, own=None):
     """The estimate of a filter's rows: `plain`, `longer` by empty rows between, or with y0 of one row `missing` or `given`."""
-    model = told_model(own)
+    model = told_model(own or turning)
     rows = told_rows(model, y0={"missing": np.nan, "given": 3.0}.get(what))
     rows = with_empty_rows(rows, BETWEEN) if what == "longer" else beyond(rows, BETWEEN * 24)
     return scanned(filter_named(name), model, rows)
