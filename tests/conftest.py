@@ -6,6 +6,7 @@ of the time: compiling is nearly all that the tests do. `-m full` takes the one 
 
 import gc
 import os
+import shutil
 from importlib.metadata import version
 from pathlib import Path
 
@@ -24,6 +25,11 @@ QUICKLY_COMPILED = " ".join(
     )
 )
 
+QUICK_RUNS = ("not full and not peers and not programs", "peers", "programs")
+
+KEPT_AT_MOST = 2e9
+"""Bytes of compiled programs in pytest's cache folder, beyond which they are all forgotten."""
+
 MOST_MAPPINGS = 30000
 
 COLOURS = 3
@@ -35,8 +41,22 @@ gc.set_threshold(200_000, 20, 50)
 
 def pytest_configure(config):
     """An unknown flag ends the process, so they are set for versions only that are known to have them."""
-    if config.getoption("markexpr") in ("not full and not peers", "peers") and version("jaxlib").startswith("0.10."):
+    if config.getoption("markexpr") in QUICK_RUNS and version("jaxlib").startswith("0.10."):
         os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {QUICKLY_COMPILED}".strip()
+    keep_programs(config)
+
+
+def keep_programs(config):
+    """What one process has compiled is there for the others, for the programs that tests start, and for the next run."""
+    if "JAX_COMPILATION_CACHE_DIR" in os.environ or not hasattr(config, "cache"):
+        return
+    folder = config.cache.mkdir("programs")
+    if sum(file.stat().st_size for file in folder.iterdir()) > KEPT_AT_MOST:
+        shutil.rmtree(folder)
+    os.environ["JAX_COMPILATION_CACHE_DIR"] = str(folder)
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.2"
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
 
 
 @pytest.hookimpl(tryfirst=True)
