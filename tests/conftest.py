@@ -25,12 +25,13 @@ QUICKLY_COMPILED = " ".join(
     )
 )
 
-QUICK_RUNS = ("not full and not peers and not programs", "peers", "programs")
+QUICK_RUNS = ("not full and not peers and not studies", "peers", "studies")
 
 KEPT_AT_MOST = 2e9
 """Bytes of compiled programs in pytest's cache folder, beyond which they are all forgotten."""
 
-MOST_MAPPINGS = 30000
+MOST_MAPPINGS = 45000
+"""Of 65530; forgetting them takes a quarter of a minute each time, so it is done seldom."""
 
 COLOURS = 3
 

@@ -142,7 +142,7 @@ def test_truth_that_says_nothing_of_sideslip(tmp_path, drive):
     assert not product.exists()
 
 
-@pytest.mark.programs
+@pytest.mark.studies
 def test_demo(tmp_path):
     out, numbers = tmp_path / "demo", tmp_path / "demo.json"
     result = run("demo", "--particles", "20", "--out", out, "--json", numbers)

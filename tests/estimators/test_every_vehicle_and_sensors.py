@@ -120,10 +120,10 @@ def test_a_car_of_seven_degrees_of_freedom_is_followed():
     """Speed and spins among the states, torques as inputs: no longer an AttributeError in `run`."""
     car = CARS["seven-dof"]()
     devices = sensors.esc(v_x=0.1)
-    model = estimators.state_space(car, devices, start={"v_x": 20.0}, solver=Heun(), steps=2)
+    model = estimators.state_space(car, devices, start={"v_x": 20.0}, solver=Heun())
     assert float(model.prior.mean.omega_rr) == pytest.approx(20.0 / float(car.wheel_radius))
-    rows = 12
-    time = 0.01 * np.arange(rows)
+    rows, dt = 24, 0.005
+    time = dt * np.arange(rows)
     inputs = {name: np.zeros(rows) for name in model.inputs} | {"steer": 0.02 * np.ones(rows)}
     schedule = Recording(time, {**inputs, **{name: np.zeros(rows) for name in model.channels}})
     rows_ = model.rows(schedule)
@@ -131,7 +131,7 @@ def test_a_car_of_seven_degrees_of_freedom_is_followed():
     def drive(x, k):
         row = jax.tree.map(lambda leaf: leaf[k], rows_)
         seen = model.observation(row.t, x, row.u)
-        return model.transition(row.t, row.t + 0.01, x, row.u), (x, {n: getattr(seen, n) for n in model.channels})
+        return model.transition(row.t, row.t + dt, x, row.u), (x, {n: getattr(seen, n) for n in model.channels})
 
     _, (truth, seen) = jax.lax.scan(drive, model.prior.mean, jnp.arange(rows))
     found = filters.run(filters.Cubature(), model, schedule.replace(**{n: np.array(v) for n, v in seen.items()}))

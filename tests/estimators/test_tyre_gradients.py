@@ -54,7 +54,11 @@ def gradients(filter_, model, rows, coefficients, seeds):
 
 @pytest.mark.parametrize(
     ("name", "gradient"),
-    [*((name, "score") for name in CARS), pytest.param("linear, exact", "held", marks=pytest.mark.full)],
+    [
+        ("linear, exact", "score"),
+        pytest.param("Magic Formula, unscented", "score", marks=pytest.mark.studies),
+        pytest.param("linear, exact", "held", marks=pytest.mark.full),
+    ],
 )
 def test_scores_agree_with_the_kalman_filters_and_held_ancestors_do_not(name, gradient):
     car, noise, coefficients, reference, particles = CARS[name]

@@ -172,6 +172,7 @@ def test_the_robust_filter_shares_the_redesigned_one_s_wavelet(drives):
     np.testing.assert_array_equal(found.mean.sideslip, expected.mean.sideslip)
 
 
+@pytest.mark.studies
 def test_the_choice_is_of_the_likelihood(monkeypatch):
     monkeypatch.setattr(own_drives, "true_car", quick_car)
     monkeypatch.setattr(choice, "fiala", quick_tyre)

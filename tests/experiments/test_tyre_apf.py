@@ -16,6 +16,7 @@ def peaks():
     return saturated.run_saturated(Study(), 4, jax.random.key(3), unknown=("D and B",), only=("prior", "UKF"))
 
 
+@pytest.mark.studies
 def test_beyond_the_peak_the_filter_is_near_the_bound(peaks):
     for case in peaks.cases:
         assert saturated.over_bound(peaks, "D and B", "UKF", case).max() < 3.0
@@ -23,6 +24,7 @@ def test_beyond_the_peak_the_filter_is_near_the_bound(peaks):
     assert (peaks.found["D and B"]["result"] == 0).all()
 
 
+@pytest.mark.studies
 def test_the_drives_tell_d_and_b(peaks):
     for case in peaks.cases:
         seen = peaks.bounds["D and B"][case]
@@ -30,6 +32,7 @@ def test_the_drives_tell_d_and_b(peaks):
         assert seen.observable() == seen.names
 
 
+@pytest.mark.studies
 def test_the_figure_shows_errors_beside_the_bound(peaks):
     figure = saturated_figure(peaks)
     (axes, _), seen = figure.axes, peaks.bounds["D and B"][peaks.cases[0]]
