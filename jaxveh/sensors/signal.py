@@ -54,10 +54,10 @@ class Signal(eqx.Module):
         if self.noise is not None:
             said = said + self.noise * white(subkey(key, _NOISE), value.shape[0], value.dtype)
         if self.quantisation is not None:
-            return self.quantisation * self._limited(jnp.round(said / self.quantisation), self.quantisation)
-        return self._limited(said, None)
+            return self.quantisation * self._limit(jnp.round(said / self.quantisation), self.quantisation)
+        return self._limit(said, None)
 
-    def _limited(self, said, step):
+    def _limit(self, said, step):
         """Within the saturation, where there is one; of numbers of steps, within as many whole ones as are in it."""
         if self.saturation is None:
             return said

@@ -184,7 +184,7 @@ def key_for(filter: AbstractFilter, key: Any) -> Any:
 
 def smoothing_of(filter: Any) -> Smoothing:
     """How a filter can be smoothed: as its own class and those of all filters inside declare, if they agree."""
-    kinds = {_declared(layer) for layer in layers(filter)}
+    kinds = {_declared_smoothing(layer) for layer in layers(filter)}
     return kinds.pop() if len(kinds) == 1 else Smoothing.none
 
 
@@ -193,7 +193,9 @@ def check_smooths(who: str, filter: Any) -> Smoothing:
     kind = smoothing_of(filter)
     if kind is not Smoothing.none:
         return kind
-    name = type(next((layer for layer in layers(filter) if _declared(layer) is Smoothing.none), filter)).__name__
+    name = type(
+        next((layer for layer in layers(filter) if _declared_smoothing(layer) is Smoothing.none), filter)
+    ).__name__
     raise InputError(
         f"{who}: {name} has no smoother: its class does not declare one (`smooths`, which is not inherited). Take a Gaussian "
         "filter or a particle filter that does; a filter of your own declares smooths = Smoothing.gaussian where it predicts as "
@@ -227,5 +229,5 @@ def check_rows_between(who: str, filter: Any) -> None:
         )
 
 
-def _declared(filter: Any) -> Smoothing:
+def _declared_smoothing(filter: Any) -> Smoothing:
     return vars(type(filter)).get("smooths", Smoothing.none)

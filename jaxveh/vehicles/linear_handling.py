@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import GRAVITY, Motion, filled, given_or_zero
+from jaxveh.vehicles.base import GRAVITY, Motion, given_or_zero, with_batch_shape
 from jaxveh.vehicles.lateral_system import LateralSystem
 from jaxveh.vehicles.shared import AbstractOneTrack
 from jaxveh.vehicles.single_track import UNITS, SingleTrackOutputs
@@ -107,7 +107,7 @@ class LinearSingleTrack(AbstractOneTrack):
             load_front=front * weight * b,
             load_rear=rear * weight * a,
         )
-        return rates, filled(outputs)
+        return rates, with_batch_shape(outputs)
 
     def load_shares(self, u, ground: Ground = LEVEL) -> tuple[Any, Any]:
         """Loads of front and rear axle over those at rest on a level road (-); they multiply the stiffnesses."""

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion, filled, given_or_zero
+from jaxveh.vehicles.base import AbstractVehicle, Motion, given_or_zero, with_batch_shape
 from jaxveh.vehicles.two_track import air_drag
 from jaxveh.vehicles.wheels import gravity, travel_direction
 
@@ -121,4 +121,4 @@ class Longitudinal(AbstractVehicle):
             grade_force=grade_force,
             drive_power=drive_force * x.v_x,
         )
-        return LongitudinalState(rate), filled(outputs)
+        return LongitudinalState(rate), with_batch_shape(outputs)

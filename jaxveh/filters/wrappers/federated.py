@@ -138,26 +138,26 @@ class Federated(AbstractWrapper):
         shares = self.shares or (1 / k,) * k
         shares = jnp.asarray(shares, prior.vector.dtype)
         start = FederatedBelief(prior, (prior,) * k, shares, jnp.ones_like(shares))
-        return self._measured(model, start, prior, self._handed_out(prior, shares), row)
+        return self._update_locals(model, start, prior, self._hand_out(prior, shares), row)
 
     def _step(self, model, belief, row):
         if self.common:
             predicted = self.inner.predict_between(model, belief.master, row.t, row.u)
-            return self._measured(model, belief, predicted, self._handed_out(predicted, belief.shares), row)
+            return self._update_locals(model, belief, predicted, self._hand_out(predicted, belief.shares), row)
         # All locals by one program: they differ in numbers alone.
-        before = self._handed_out(belief.master, belief.shares) if self.reset else _together(belief.locals)
+        before = self._hand_out(belief.master, belief.shares) if self.reset else _together(belief.locals)
 
         def ahead(local, share):
             return self.inner.predict_between(_with_process_noise_over(model, share), local, row.t, row.u)
 
         alone = jax.vmap(ahead)(before, belief.shares)
-        return self._measured(model, belief, self._fused(alone, belief.master), alone, row)
+        return self._update_locals(model, belief, self._fuse(alone, belief.master), alone, row)
 
-    def _handed_out(self, master: GaussianBelief, shares) -> GaussianBelief:
+    def _hand_out(self, master: GaussianBelief, shares) -> GaussianBelief:
         """The locals, one behind the other along the first axis of each array."""
-        return jax.vmap(lambda share: master.inflated(1.0 if self.common else 1.0 / share))(shares)
+        return jax.vmap(lambda share: master.inflate(1.0 if self.common else 1.0 / share))(shares)
 
-    def _measured(self, model, belief: FederatedBelief, predicted: GaussianBelief, ahead: GaussianBelief, row):
+    def _update_locals(self, model, belief: FederatedBelief, predicted: GaussianBelief, ahead: GaussianBelief, row):
         rows = _together([_only(model, row, group).y for group in self.groups])
         own = lambda local, y: self.inner.update(model, local, row._replace(y=y))
         found, _ = jax.vmap(own)(ahead, rows)
@@ -172,7 +172,7 @@ class Federated(AbstractWrapper):
         # Where every local is suspect there is nothing to judge by.
         trusted = trusted | ~jnp.any(trusted)
         believed = jax.vmap(_either)(trusted, found, ahead)
-        master = self._fused(believed, belief.master, predicted if self.common else None)
+        master = self._fuse(believed, belief.master, predicted if self.common else None)
         master = with_spread(
             master, master.vector, Spread(master.factor, master.matrix), row.t, row.u, belief.count + 1
         )
@@ -189,7 +189,7 @@ class Federated(AbstractWrapper):
         traces = jnp.stack([jnp.sum(local.variances / scale) for local in locals_])
         return (1.0 / traces) / jnp.sum(1.0 / traces)
 
-    def _fused(
+    def _fuse(
         self, beliefs: GaussianBelief, like: GaussianBelief, common: GaussianBelief | None = None
     ) -> GaussianBelief:
         """The Gaussian of all beliefs' information, with the time and inputs of `like`; what is `common` to all counts once."""
@@ -243,7 +243,7 @@ class _Shared(AbstractProcessNoise):
         return self.whole.law
 
     def over(self, dt):
-        return self.whole.over(dt).scaled(1.0 / jnp.sqrt(self.share))
+        return self.whole.over(dt).times(1.0 / jnp.sqrt(self.share))
 
 
 def _with_process_noise_over(model: StateSpace, share) -> StateSpace:

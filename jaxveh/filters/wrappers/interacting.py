@@ -43,12 +43,12 @@ class MixtureBelief(AbstractBelief):
     @property
     def mean(self):
         """The mixture's mean, the state's NamedTuple."""
-        return _mixed(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[0]
+        return _mixture_moments(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[0]
 
     @property
     def std(self):
         """The mixture's standard deviations, the state's NamedTuple."""
-        return _mixed(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[1]
+        return _mixture_moments(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[1]
 
     @property
     def covariance(self):
@@ -64,7 +64,7 @@ class MixtureBelief(AbstractBelief):
 
     def moments(self, model):
         # A mode's own model reports its state: what differs are parameters, and the report is of states.
-        return _mixed(self.probabilities, [mode.moments(model) for mode in self.modes])
+        return _mixture_moments(self.probabilities, [mode.moments(model) for mode in self.modes])
 
 
 class InteractingModels(AbstractWrapper):
@@ -109,7 +109,7 @@ class InteractingModels(AbstractWrapper):
         r, dtype = len(self.variants), row.t.dtype
         before = jnp.full((r,), 1 / r, dtype) if self.start is None else self.start.astype(dtype)
         found = [self.inner.update(mode, self.inner.prior(mode, row), row) for mode in self._modes(model)]
-        return self._weighed(model, row, before, found)
+        return self._weigh(model, row, before, found)
 
     def _step(self, model, belief, row):
         joint = self.transition.astype(row.t.dtype) * belief.probabilities[:, None]
@@ -121,7 +121,7 @@ class InteractingModels(AbstractWrapper):
         for j, mode in enumerate(self._modes(model)):
             mixed = self._mix(belief, from_each[:, j], j)
             found.append(self.inner.update(mode, self.inner.predict_between(mode, mixed, row.t, row.u), row))
-        return self._weighed(model, row, ahead, found)
+        return self._weigh(model, row, ahead, found)
 
     def _modes(self, model):
         return [variant(model) for variant in self.variants]
@@ -131,7 +131,7 @@ class InteractingModels(AbstractWrapper):
         mean, covariance = _of_modes(weights, belief.modes)
         return with_spread(belief.modes[j], mean, self.inner.form.start(covariance))
 
-    def _weighed(self, model, row, before, found):
+    def _weigh(self, model, row, before, found):
         beliefs, infos = zip(*found, strict=True)
         logs = jnp.stack([info.log_likelihood for info in infos])
         logs = jnp.where(before > 0, logs, -jnp.inf)
@@ -156,7 +156,7 @@ def _of_modes(weights, modes):
     return mixed_covariance(weights, stacked(mode.vector for mode in modes), stacked(mode.covariance for mode in modes))
 
 
-def _mixed(weights, moments):
+def _mixture_moments(weights, moments):
     """Mean and standard deviation, NamedTuples, of a mixture of such pairs."""
     means, stds = zip(*moments, strict=True)
     mean = jax.tree.map(lambda *values: sum(w * v for w, v in zip(weights, values, strict=True)), *means)
@@ -171,7 +171,7 @@ def _mixed(weights, moments):
 
 def _mixture_info(model, row, weights, infos, log_likelihood) -> Info:
     _, present = kit.presence(model, row)
-    mean, std = _mixed(weights, [(info.innovation, info.innovation_std) for info in infos])
+    mean, std = _mixture_moments(weights, [(info.innovation, info.innovation_std) for info in infos])
     nothing = jnp.full_like(log_likelihood, jnp.nan)
     return Info(
         log_likelihood=log_likelihood,

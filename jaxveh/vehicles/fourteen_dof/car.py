@@ -24,7 +24,7 @@ from jaxveh.vehicles.fourteen_dof.suspension import (
     wheel_at,
 )
 from jaxveh.vehicles.fourteen_dof.tyre_contact import ROLLING_SHARE, Touch, axles, reaction, touch
-from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, scaled
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, times
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import (
     Wheels,
@@ -189,11 +189,11 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         """Gravity, drag and the reactions of torques on the body; gravity and the road on the wheels."""
         axes = stand.body.axes
         g = to_body(axes, g)
-        force = add(scaled(self.sprung_mass, g), scaled(-air_drag(self.drag, x.v_x), axes.forward))
+        force = add(times(self.sprung_mass, g), times(-air_drag(self.drag, x.v_x), axes.forward))
         moments = each_wheel(
-            lambda road, shaft, axis: minus(road.moment, scaled(shaft.torque, axis)), roads, shafts, stand.axles
+            lambda road, shaft, axis: minus(road.moment, times(shaft.torque, axis)), roads, shafts, stand.axles
         )
-        momentum = each_wheel(lambda omega, axis: scaled(self.wheel_inertia * omega, axis), omegas, stand.axles)
+        momentum = each_wheel(lambda omega, axis: times(self.wheel_inertia * omega, axis), omegas, stand.axles)
         return accelerations(
             Inertia(self.sprung_mass, self.roll_inertia, self.pitch_inertia, self.yaw_inertia, self.roll_yaw_product),
             joints(self),
@@ -202,7 +202,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
             add(*momentum),
             force,
             add(*moments),
-            each_wheel(lambda road, mass: add(road.force, scaled(mass, g)), roads, unsprung(self)),
+            each_wheel(lambda road, mass: add(road.force, times(mass, g)), roads, unsprung(self)),
             suspension,
         )
 

@@ -144,10 +144,10 @@ class CarNumbers:
             found |= own if sprung else {name: value for name, value in own.items() if name not in found}
             found |= self._rolling(suspension)
             if not sprung:
-                found |= self._leaning(suspension, found)
+                found |= self._leaning_parameters(suspension, found)
         return {name: value for name, value in found.items() if value is not None}
 
-    def _leaning(self, s: SuspensionNumbers, known: dict[str, Any]) -> dict[str, Any]:
+    def _leaning_parameters(self, s: SuspensionNumbers, known: dict[str, Any]) -> dict[str, Any]:
         """What cars that do not ride on their springs need of them: `unsprung_height`, `roll_yaw_product` about the roll axis
         below the whole car's centre of gravity, and the front axle's share of the lateral transfer (`front_roll_share`): of
         springs and bars by stiffness, of roll centres and unsprung masses by what each axle carries."""
