@@ -29,7 +29,7 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
     missing = [name for name in SEEN if name not in recording]
     if missing:
         raise InputError(
-            f"log lacks {', '.join(missing)}, and needs {', '.join(SEEN)}; say which columns they are with "
+            f"the log has no {', '.join(missing)}; it must have {', '.join(SEEN)}. Say which columns they are with "
             "--channels (jaxveh schema channels)."
         )
     for name in INPUTS:

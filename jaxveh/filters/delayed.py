@@ -140,8 +140,8 @@ class Delayed(AbstractWrapper):
         newest = row.t
         times = [row.t - delay for _, delay in self.delays]
         start = belief.base, belief.base_said
-        (inside, said), (infos, real, new) = jax.lax.scan(forward, start, (belief.rows, belief.real))
-        return inside, said, _merge_info(infos, real, new)
+        (inside, said), (every_info, real, new) = jax.lax.scan(forward, start, (belief.rows, belief.real))
+        return inside, said, _merge_info(every_info, real, new)
 
     def _prompt(self, row: Row) -> Row:
         """The row without what is delayed."""
@@ -193,19 +193,19 @@ def _choose(condition: Any, a: Any, b: Any) -> Any:
     return jax.tree.map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 
-def _merge_info(infos: Info, real: Any, new: Any) -> Info:
-    """One info of all rows filtered anew: innovations and NIS of the new ones, the first failure and the first remark of all."""
+def _merge_info(every_info: Info, real: Any, new: Any) -> Info:
+    """The info of all rows filtered anew: innovations and NIS of the new ones, the first failure and the first remark of all."""
     pick = lambda values: jnp.sum(jnp.where(new & jnp.isfinite(values), values, 0), axis=0)
     seen = lambda values: jnp.any(new & jnp.isfinite(values), axis=0)
     by_channel = lambda tree: jax.tree.map(lambda v: jnp.where(seen(v), pick(v), jnp.nan), tree)
     return Info(
-        log_likelihood=jnp.sum(infos.log_likelihood),
-        innovation=by_channel(infos.innovation),
-        innovation_std=by_channel(infos.innovation_std),
-        nis=jnp.where(jnp.any(jnp.isfinite(infos.nis)), pick(infos.nis), jnp.nan),
-        ess=infos.ess[-1],
-        result=_first(infos.result, real),
-        remark=None if infos.remark is None else _first(infos.remark, real),
+        log_likelihood=jnp.sum(every_info.log_likelihood),
+        innovation=by_channel(every_info.innovation),
+        innovation_std=by_channel(every_info.innovation_std),
+        nis=jnp.where(jnp.any(jnp.isfinite(every_info.nis)), pick(every_info.nis), jnp.nan),
+        ess=every_info.ess[-1],
+        result=_first(every_info.result, real),
+        remark=None if every_info.remark is None else _first(every_info.remark, real),
     )
 
 

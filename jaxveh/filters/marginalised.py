@@ -307,9 +307,9 @@ def _check_each_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
         there = jnp.stack([jnp.asarray(getattr(f(moved), n), dtype) for n in names])
         slope = times(slopes, step)
         size = jnp.abs(seen) + jnp.abs(slope) + jnp.abs(there)
-        curved = np.asarray(jnp.abs(there - seen - slope) > 1e3 * jnp.finfo(dtype).eps * size)
-        if curved.any():
+        nonlinear = np.asarray(jnp.abs(there - seen - slope) > 1e3 * jnp.finfo(dtype).eps * size)
+        if nonlinear.any():
             raise InputError(
-                f"Marginalised: {what} {names[int(np.argmax(curved))]} is not linear in {', '.join(linear)}. "
+                f"Marginalised: {what} {names[int(np.argmax(nonlinear))]} is not linear in {', '.join(linear)}. "
                 "Name fewer states in `linear`, or use Guided."
             )

@@ -35,7 +35,7 @@ def contraction_rate(
     check_positive("dt", dt, "s")
     points, gain = list(points), array(gain)
     if not points:
-        raise InputError("contraction_rate: no points.")
+        raise InputError("contraction_rate: there is no point; give at least one.")
     check_gain("gain", gain, model)
     errors = []
     for x, u in points:

@@ -87,7 +87,7 @@ def as_signals(signals) -> dict[str, Signal]:
 def check_signals(name: str, signals: Mapping[str, Signal], allowed: Iterable[str]) -> None:
     """Raise unless there is a channel, all are among `allowed`, and each has a `Signal`."""
     if not signals:
-        raise InputError(f"{name}: no channel; there are: {', '.join(allowed)}.")
+        raise InputError(f"{name} is empty: name at least one channel; there are: {', '.join(allowed)}.")
     check_names(name, signals, allowed)
     for channel, signal in signals.items():
         if not isinstance(signal, Signal):

@@ -1,4 +1,4 @@
-"""What a filter is: `init` applies the first row, `step` propagates and applies the next; both report an info."""
+"""What a filter is: `init` applies the first row, `step` propagates and applies the next; both report `info`."""
 
 # No postponed annotations in this file: they would make fields of class variables.
 
@@ -40,7 +40,7 @@ class AbstractFilter(eqx.Module):
 
     What a filter can is declared where it is true, and is *no* otherwise:
 
-    - `whitens`: its infos carry whitened innovations.
+    - `whitens`: its info carries whitened innovations.
     - `smooths`: how it can be smoothed. Each class declares it for itself: what predicts otherwise than the class it comes from
       would be smoothed wrongly without a word, so that this is not inherited (`smoothing_of`).
     - `noise_by_row`: the model's measurement noise may be another in each row, and is taken as it is there. (Not where a filter

@@ -179,7 +179,7 @@ def _shapes(tyre: MFTyre) -> Iterator[PropertyFinding]:
         if float(shape) <= 0:
             yield PropertyFinding(key, f"gives a shape factor C of {float(shape):g}: must be positive")
         elif not 1 <= float(shape) <= 2:
-            what = "the force never peaks" if float(shape) < 1 else "the force turns round at large slip"
+            what = "the force never peaks" if float(shape) < 1 else "the force reverses its sign at large slip"
             yield PropertyFinding(key, f"gives a shape factor C of {float(shape):g}: usual are 1 to 2; {what}")
 
 
@@ -271,7 +271,7 @@ def _aligning_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
 
 
 def _combined_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
-    """The weights of combined slip are positive: a force fades with the other slip, and never turns round."""
+    """The weights of combined slip are positive: a force fades with the other slip, and never reverses its sign."""
     r = tyre.ranges
     slip_ratio, slip_angle = min(-float(r.KPUMIN), 0.5), min(float(r.ALPMAX), 0.5)
     if slip_ratio <= 0 or slip_angle <= 0:

@@ -38,7 +38,7 @@ class LinearSingleTrack(AbstractOneTrack):
         F_f = C_f (delta - beta - a r / v),  F_r = C_r (-beta + b r / v)
 
     For small angles the speed along the car is that along the path: `v_x` is taken as the latter, so that the velocity has the
-    components `v cos(beta)` and `v sin(beta)`. Backwards (v < 0) the slip angles turn round, as the tyres' forces do. Below
+    components `v cos(beta)` and `v sin(beta)`. Backwards (v < 0) the slip angles reverse sign, as the tyres' forces do. Below
     `crawl_speed` (m/s, 3 by default) |v| in the denominators is `regularised_speed`, so that standstill is an ordinary point.
     A road's bank pushes by `m g_y`; its friction does not count, as always in a linear law.
 

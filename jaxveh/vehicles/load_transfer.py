@@ -17,8 +17,8 @@ from jaxveh.vehicles.wheels import Wheels
 
 
 class AbstractLoadTransfer(eqx.Module):
-    """Which accelerations shift the loads. `felt_accelerations` are those at an instant; states, where there are any, are the car's, and zero
-    where it runs straight.
+    """Which accelerations shift the loads. `felt_accelerations` are those at an instant; states, where there are any, are the
+    car's, and zero where it runs straight.
 
     Longitudinally it is what the tyres push, over the mass: the air's drag acts at the centre of gravity's height, so that in
     moments about it only forces of the road count.

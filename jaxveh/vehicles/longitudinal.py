@@ -54,7 +54,7 @@ class Longitudinal(AbstractVehicle):
 
         (m + 4 J_w / r^2) dv/dt = (T_drive - s T_brake) / r - s f_r m g cos(theta) - drag v |v| - m g sin(theta)
 
-    Brakes and rolling resistance turn round smoothly about 0.5 m/s, so that standstill is an ordinary point; a braked car on
+    Brakes and rolling resistance change sign smoothly about 0.5 m/s, so that standstill is an ordinary point; a braked car on
     a slope creeps where they hold the slope's pull.
 
     **Parameters**: `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2, of one wheel), `drag` (N s^2/m^2, half the air's

@@ -234,7 +234,7 @@ def body_forces(positions: Wheels, moves: Wheels, forces: Wheels) -> BodyForces:
 
 
 STANDSTILL = 15 / 16
-"""m/s: below it brakes and rolling resistance turn round smoothly, so that standstill is an ordinary point."""
+"""m/s: below it brakes and rolling resistance change sign smoothly, so that standstill is an ordinary point."""
 
 
 def travel_direction(speed: Any) -> Any:

@@ -41,7 +41,7 @@ FILTERS = [
 
 
 def _many(filter_, model, rows, runs=RUNS, seed=0):
-    """Log-likelihoods, last means and infos of independent runs."""
+    """Log-likelihoods, last means and info of independent runs."""
 
     @jax.jit
     def one(key):

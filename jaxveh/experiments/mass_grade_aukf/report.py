@@ -39,7 +39,7 @@ DISTURBED = (RATE, AIDED, BIASED)
 
 class Reproduction(NamedTuple):
     """Everything the experiment found: `truck` and `car` with lively pedals; the truck with `gentle` ones; the truck
-    `disturb`, by name; what a drive of the truck can tell three states and four, by what its driver does; and of the drives
+    `disturbed`, by name; what a drive of the truck can tell three states and four, by what its driver does; and of the drives
     without pedal activity the Cramer-Rao `bounds`, by which the report was first to judge."""
 
     seeds: int

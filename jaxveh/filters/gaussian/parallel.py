@@ -177,8 +177,8 @@ def _join_smoothing(j: SmoothingElement, i: SmoothingElement) -> SmoothingElemen
     return SmoothingElement(i.E @ j.E, i.E @ j.g + i.g, i.E @ j.L @ i.E.T + i.L)
 
 
-def infos_of(model: StateSpace, rows: Row, passed: Passed) -> Any:
-    """The infos (T,) of all rows: what the predictions said of the measurements."""
+def info_of(model: StateSpace, rows: Row, passed: Passed) -> Any:
+    """The info (T,) of all rows: what the predictions said of the measurements."""
     y, R = _measurements(model, rows, passed.about)
 
     def of(row, y, R, mean, covariance, line):

@@ -49,7 +49,7 @@ class FixedLag(AbstractWrapper):
 
     A live smoother of constant memory: for what may come late, by `lag` rows, and should be good. Gaussian filters go back by
     their own Rauch-Tung-Striebel steps, particle filters by their ancestors (G. Kitagawa 1996), whose lines are still many over
-    a short lag. Infos are those of the filter. A step costs `lag` steps back.
+    a short lag. The info is that of the filter. A step costs `lag` steps back.
 
     `smooth(filter, model, recording, lag=...)` does the same with each row's estimate in its own place.
     """

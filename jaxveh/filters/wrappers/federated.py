@@ -86,7 +86,7 @@ class Federated(AbstractWrapper):
     variances. `isolate`: what locals measure whose fading mean NIS exceeds this multiple of its expected value is left out of
     the fusion until it falls again (None: never); it is still watched.
 
-    Groups that share a channel count its information twice: `InputError`, unless `overlapping`. Infos are those of the fused
+    Groups that share a channel count its information twice: `InputError`, unless `overlapping`. The info is that of the fused
     prediction with all sensors.
     """
 
@@ -106,7 +106,9 @@ class Federated(AbstractWrapper):
     def __check_init__(self):
         check_kind("Federated", self.inner, AbstractRuleFilter)
         if len(self.groups) < 2:
-            raise InputError(f"Federated.groups: {len(self.groups)}; must be at least two tuples of channels.")
+            raise InputError(
+                f"Federated.groups has {len(self.groups)} member(s): must be at least two tuples of channels."
+            )
         names = [name for group in self.groups for name in group]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice and not self.overlapping:
@@ -116,7 +118,9 @@ class Federated(AbstractWrapper):
             )
         if self.shares is not None:
             if len(self.shares) != len(self.groups):
-                raise InputError(f"Federated.shares: {len(self.shares)} for {len(self.groups)} groups.")
+                raise InputError(
+                    f"Federated.shares has {len(self.shares)} member(s): must be {len(self.groups)}, one for each group."
+                )
             fine = abs(sum(self.shares) - 1) < 1e-9 and min(self.shares) > 0
             check("Federated.shares", self.shares, lambda _: fine, "positive, with the sum 1")
         if self.common and (not self.reset or self.shares is not None or self.by_trace):
@@ -163,8 +167,8 @@ class Federated(AbstractWrapper):
         found, _ = jax.vmap(own)(ahead, rows)
         # A local's own prediction is wide, and seldom surprised: sensors are judged by the fused one.
         every = jax.tree.map(lambda one, some: jnp.concatenate([one[None], some]), row.y, rows)
-        infos = jax.vmap(lambda y: own(predicted, y)[1])(every)
-        info, surprise = jax.tree.map(lambda leaf: leaf[0], infos), infos.nis[1:]
+        every_info = jax.vmap(lambda y: own(predicted, y)[1])(every)
+        info, surprise = jax.tree.map(lambda leaf: leaf[0], every_info), every_info.nis[1:]
         counts = jnp.stack([_count(row, group) for group in self.groups])
         ratio = surprise / jnp.maximum(counts, 1.0)
         alarm = jnp.where(counts > 0, self.forgetting * belief.alarm + (1.0 - self.forgetting) * ratio, belief.alarm)

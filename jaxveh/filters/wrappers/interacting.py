@@ -91,7 +91,7 @@ class InteractingModels(AbstractWrapper):
         check_kind("InteractingModels", self.inner, AbstractRuleFilter)
         r = len(self.variants)
         if r < 2:
-            raise InputError(f"InteractingModels.variants: {r}; must be at least two.")
+            raise InputError(f"InteractingModels.variants has {r} member(s): must be at least two.")
         for name, value, shape in (("transition", self.transition, (r, r)), ("start", self.start, (r,))):
             if value is not None and value.shape != shape:
                 raise InputError(f"InteractingModels.{name} has shape {value.shape}: must be {shape} for {r} variants.")
@@ -132,13 +132,13 @@ class InteractingModels(AbstractWrapper):
         return with_spread(belief.modes[j], mean, self.inner.form.start(covariance))
 
     def _weigh(self, model, row, before, found):
-        beliefs, infos = zip(*found, strict=True)
-        logs = jnp.stack([info.log_likelihood for info in infos])
+        beliefs, every_info = zip(*found, strict=True)
+        logs = jnp.stack([info.log_likelihood for info in every_info])
         logs = jnp.where(before > 0, logs, -jnp.inf)
         top = jnp.max(logs)
         weights = before * jnp.exp(logs - top)
         total = jnp.sum(weights)
-        info = _mixture_info(model, row, before, infos, top + jnp.log(total))
+        info = _mixture_info(model, row, before, every_info, top + jnp.log(total))
         return MixtureBelief(tuple(beliefs), weights / total), info
 
 
@@ -169,9 +169,9 @@ def _mixture_moments(weights, moments):
     return mean, jax.tree.map(spread, mean, *means, *stds)
 
 
-def _mixture_info(model, row, weights, infos, log_likelihood) -> Info:
+def _mixture_info(model, row, weights, every_info, log_likelihood) -> Info:
     _, present = kit.presence(model, row)
-    mean, std = _mixture_moments(weights, [(info.innovation, info.innovation_std) for info in infos])
+    mean, std = _mixture_moments(weights, [(info.innovation, info.innovation_std) for info in every_info])
     nothing = jnp.full_like(log_likelihood, jnp.nan)
     return Info(
         log_likelihood=log_likelihood,
@@ -179,5 +179,5 @@ def _mixture_info(model, row, weights, infos, log_likelihood) -> Info:
         innovation_std=kit.by_channel(model, std, present),
         nis=nothing,
         ess=nothing,
-        result=first_failure(jnp.where(weights > 0, jnp.stack([info.result for info in infos]), 0))[0],
+        result=first_failure(jnp.where(weights > 0, jnp.stack([info.result for info in every_info]), 0))[0],
     )

@@ -24,7 +24,7 @@ class Paused(AbstractWrapper):
     The channel holds from its row to the next, whatever the model's `input_path`: the time before a pause's first row is still
     predicted, that before the first row after it is not. Meanwhile the state, and what a wrapped filter remembers, stay. In the
     first row after a pause the spread grows by `widen`, standard deviations by state: what may have happened (`{"v_x": 20.0}`:
-    whatever it was, the next measurement says it anew). Infos of rows in a pause have a log-likelihood of zero and no
+    whatever it was, the next measurement says it anew). The info of a row in a pause has a log-likelihood of zero and no
     innovation.
     """
 

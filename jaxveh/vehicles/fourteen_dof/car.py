@@ -56,13 +56,13 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
       centre, meets the road.
       It rolls with the unloaded radius less a third of the compression, which is also the arm of its longitudinal force
       about the axle: with the smaller loaded radius tyres would make energy. M_x, M_y, M_z of the tyre count; that of
-      rolling resistance turns round with the direction of travel, and `rolling_resistance` comes on top.
+      rolling resistance reverses its sign with the direction of travel, and `rolling_resistance` comes on top.
     - The road is the plane of x and y; slopes tilt gravity. The air's drag acts on the sprung mass' centre of gravity.
 
     Speeds, place and accelerations are those of the *sprung mass'* centre of gravity, in the intermediate axes (x, y in the
     road's plane); `a_x`, `a_y`, `a_z` are what an ideal accelerometer there says in these axes (a_z = g at rest). Springs
     are preloaded for rest on a level road, where `start` puts the car. Slips are those of `wheels.contact`; brakes and
-    rolling resistance turn round smoothly about 0.5 m/s. Wheel hop (about 10 Hz) and spins (see `SevenDOF`) are stiff.
+    rolling resistance change sign smoothly about 0.5 m/s. Wheel hop (about 10 Hz) and spins (see `SevenDOF`) are stiff.
 
     Equations: d'Alembert's principle, see `dynamics.accelerations`. The degrees of freedom are those of T. Shim and C. Ghike,
     Vehicle System Dynamics 45 (2007) 191, with joints inclined for the roll centres and nothing linearised.

@@ -126,7 +126,7 @@ class CarNumbers:
     def wheel_loads(self) -> tuple[float, float]:
         """Loads of a front and of a rear wheel at rest on a level road, N."""
         if self.mass is None:
-            raise InputError(f"{self.name}: mass is not known, and so no load.")
+            raise InputError(f"{self.name}: the mass is missing, from which the loads follow; give it in kg.")
         half = 0.5 * self.mass * GRAVITY / self.wheelbase
         return half * self.rear_axle_to_cg, half * self.front_axle_to_cg
 
