@@ -61,8 +61,8 @@ class PredictiveLikelihood(AbstractLookahead):
 
     mu is the transition without noise and H the observation's slope there by the fields that carry noise (forward mode, one
     derivative a field). Exact for a linear observation (M. Pitt & N. Shephard 1999, sec. 3.2), and never sharper than what
-    the noise leaves of it; the second stage only corrects what the slope leaves out. Where the observation is so far from
-    linear that the slope leaves out much (a square at its foot), the `defensive` ancestors keep the filter near the bootstrap filter.
+    the noise leaves of it; the second stage only corrects what the slope leaves out. Where the observation is so nonlinear that
+    the slope leaves out much (a square at its foot), the `defensive` ancestors keep the filter near the bootstrap filter.
     Process and measurement noise must be Gaussian; measurement noise that depends on the state counts as it is at mu.
     """
 
