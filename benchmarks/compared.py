@@ -103,7 +103,7 @@ def _ours(compared: Compared, whole: plain.Plain, work: int) -> Contestant:
         channels = {name: y[:, i] for i, name in enumerate(problem.channels)}
         given = {"key": key} if compared.random else {}
         done = drive(compared.filter, model, recording.replace(**channels), **given)
-        # What the peers give, too; XLA leaves out the rest, the infos of every row.
+        # What the peers give, too; XLA leaves out the rest, the info of every row.
         total = done.filtered.log_likelihood if compared.smoother else done.log_likelihood
         return done.mean, done.std, total
 

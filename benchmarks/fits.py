@@ -118,7 +118,7 @@ def _build(count: int, methods: Sequence[str]) -> Sequence[Contestant | Skipped]
 def _names() -> list[str]:
     """The coefficients of F_x and F_y that data show in which load, camber and pressure vary."""
     groups = rig_stages.ALONG, rig_stages.ALONG_COMBINED, rig_stages.ACROSS, rig_stages.ACROSS_COMBINED
-    return [name for group in groups for name in group.shown({"load", "camber", "pressure"})]
+    return [name for group in groups for name in group.identifiable({"load", "camber", "pressure"})]
 
 
 def _started(start: dict[str, float]) -> mf_tyre.MFTyre:

@@ -33,7 +33,7 @@ def _calm(model: statespace.StateSpace) -> statespace.StateSpace:
 
 
 def _restless(model: statespace.StateSpace) -> statespace.StateSpace:
-    return eqx.tree_at(lambda m: m.process_noise.law, model, replace_fn=lambda law: law.scaled(RESTLESS))
+    return eqx.tree_at(lambda m: m.process_noise.law, model, replace_fn=lambda law: law.times(RESTLESS))
 
 
 COMPARED = {

@@ -117,16 +117,16 @@ def resolve(model, where: Where | None) -> tuple[Parameter, ...]:
     if len(set(indices)) < len(indices):
         twice = [p.name for p, i in zip(found, indices, strict=True) if indices.count(i) > 1]
         raise InputError(f"where picked {twice[0]} twice: each leaf can be chosen once.")
-    return tuple(_told_apart(found))
+    return tuple(_tell_apart(found))
 
 
-def _told_apart(found: list[Parameter]) -> list[Parameter]:
+def _tell_apart(found: list[Parameter]) -> list[Parameter]:
     """The parameters, those that would share a name by their whole paths."""
     names = [p.name for p in found]
-    return [p if names.count(p.name) == 1 else _named(p, p.path) for p in found]
+    return [p if names.count(p.name) == 1 else _with_name(p, p.path) for p in found]
 
 
-def _named(p: Parameter, name: str) -> Parameter:
+def _with_name(p: Parameter, name: str) -> Parameter:
     return p._replace(name=name, field=name.replace(".", "_"))
 
 

@@ -10,7 +10,7 @@ import jax
 import numpy as np
 
 
-def traced_once(function: Callable, *operands: Any) -> Any:
+def trace_once(function: Callable, *operands: Any) -> Any:
     """`function(*operands)` inside a larger program: where operands of the same shapes have been given before, its trace is taken
     again, and so are those of its derivatives and batches.
 

@@ -62,7 +62,7 @@ def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None) -> 
     table(
         "Papers",
         ("paper", "criteria that hold", "took, s"),
-        [(n, _held(one), f"{one.took:.0f}") for n, one in done.items()],
+        [(n, _tally(one), f"{one.took:.0f}") for n, one in done.items()],
     )
     if numbers is not None:
         content = {name: one.numbers for name, one in done.items()}
@@ -76,7 +76,7 @@ def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None) -> 
         raise typer.Exit(1)
 
 
-def _held(done: Done) -> str:
+def _tally(done: Done) -> str:
     from jaxveh.experiments import report
 
     if done.code != 0:

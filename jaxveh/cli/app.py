@@ -11,7 +11,7 @@ from jaxveh.cli.check import check
 from jaxveh.cli.console import results
 from jaxveh.cli.demo import demo
 from jaxveh.cli.estimate import estimate
-from jaxveh.cli.failure import flowing, program
+from jaxveh.cli.failure import join_lines, program
 from jaxveh.cli.fit import fit
 from jaxveh.cli.reproduce import reproduce
 from jaxveh.cli.schema import schema
@@ -32,7 +32,7 @@ Start with: jaxveh demo
 
 app = typer.Typer(
     name="jaxveh",
-    help=flowing(HELP),
+    help=join_lines(HELP),
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -57,7 +57,7 @@ def options(
     """Options before the command."""
 
 
-options.__doc__ = flowing(HELP)
+options.__doc__ = join_lines(HELP)
 
 for command in (demo, check, simulate, estimate, fit, reproduce, schema):
     app.command()(program(command))

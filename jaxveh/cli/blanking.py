@@ -19,7 +19,7 @@ INPUTS = tuple(need.channel for need in sideslip.needs if need.throughout)
 """Those that must be known in every row."""
 
 
-def filled(recording: Recording, max_gap: float | None) -> Recording:
+def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
     """The inputs without gaps: filled along lines over at most `max_gap` seconds where that is given.
 
     **Raises** `InputError` where a channel of `SEEN` is missing, or an input is still NaN, and the option for it.
@@ -29,7 +29,7 @@ def filled(recording: Recording, max_gap: float | None) -> Recording:
     missing = [name for name in SEEN if name not in recording]
     if missing:
         raise InputError(
-            f"log lacks {', '.join(missing)}, and needs {', '.join(SEEN)}; say which columns they are with "
+            f"the log has no {', '.join(missing)}; it must have {', '.join(SEEN)}. Say which columns they are with "
             "--channels (jaxveh schema channels)."
         )
     for name in INPUTS:
@@ -69,7 +69,7 @@ def split(
     if calibrate_on and span is None:
         raise InputError(f"--calibrate-on {calibrate_on[0]}: needs a span; add --calibrate START:END.")
     if span is None:
-        return LogParts(None, _seen(recording, (), truth), recording)
+        return LogParts(None, _visible_channels(recording, (), truth), recording)
     time = np.asarray(recording.time)
     if not span[1] <= time[-1]:
         raise InputError(
@@ -77,17 +77,17 @@ def split(
             f"{time[0]:g} to {time[-1]:g} s."
         )
     rest = recording.between(span[1], np.inf)
-    inside = _seen(recording.between(*span), tuple(calibrate_on), None if truth in calibrate_on else truth)
-    return LogParts(inside, _seen(rest, (), truth), rest)
+    inside = _visible_channels(recording.between(*span), tuple(calibrate_on), None if truth in calibrate_on else truth)
+    return LogParts(inside, _visible_channels(rest, (), truth), rest)
 
 
 def calibration_part(recording: Recording, span: tuple[float, float] | None, calibrate_on: Sequence[str]) -> Recording:
     """The span (or the whole log) with the blind channels and `calibrate_on`."""
     check_names("--calibrate-on", calibrate_on, recording.names)
-    return _seen(recording if span is None else recording.between(*span), tuple(calibrate_on), None)
+    return _visible_channels(recording if span is None else recording.between(*span), tuple(calibrate_on), None)
 
 
-def _seen(recording: Recording, more: tuple[str, ...], truth: str | None) -> Recording:
+def _visible_channels(recording: Recording, more: tuple[str, ...], truth: str | None) -> Recording:
     kept = recording.select([name for name in recording.names if name in SEEN or name in more])
     if truth is not None and truth in kept and truth not in more:
         return kept.replace(**{truth: np.full(len(kept), np.nan)})

@@ -39,7 +39,7 @@ def steer_at_03g(car: Any) -> float | None:
     return steer if steer > 0 else None
 
 
-def _commanded(asked: AskedManoeuvre, car: Any) -> float | None:
+def _reference_steer(asked: AskedManoeuvre, car: Any) -> float | None:
     """The steer at 0.3 g where the manoeuvre's steer is counted in it."""
     return steer_at_03g(car) if asked.name == "sine-with-dwell" else None
 
@@ -47,7 +47,9 @@ def _commanded(asked: AskedManoeuvre, car: Any) -> float | None:
 def numbers_of(recording: Recording, asked: AskedManoeuvre, car: Any) -> dict[str, dict[str, Any]]:
     """Numbers by title and name, SI; where the drive does not carry its standard's, the peaks alone and a warning why."""
     try:
-        found = diagnostics.drive_numbers(recording, asked.name, wheelbase_of(car), steer_at_03g=_commanded(asked, car))
+        found = diagnostics.drive_numbers(
+            recording, asked.name, wheelbase_of(car), steer_at_03g=_reference_steer(asked, car)
+        )
     except InputError as error:
         say("warning", "yellow", f"no numbers of {asked.name}: {error}")
         found = diagnostics.drive_numbers(recording)
@@ -65,7 +67,7 @@ def print_numbers(found: dict[str, dict[str, Any]]) -> None:
     """A line a title, without what is not known."""
     results().print("In SI units (s, m, m/s, m/s^2, rad, N):")
     for title, values in found.items():
-        words = [f"{name} {_word(value)}" for name, value in values.items() if not _missing(value)]
+        words = [f"{name} {_word(value)}" for name, value in values.items() if not _is_missing(value)]
         if words:
             results().print(f"{title}: {', '.join(words)}", markup=False, soft_wrap=True)
 
@@ -76,7 +78,7 @@ def _word(value: Any) -> str:
     return ("yes" if value else "no") if isinstance(value, bool | np.bool_) else number(value)
 
 
-def _missing(value: Any) -> bool:
+def _is_missing(value: Any) -> bool:
     return value is not None and not isinstance(value, bool | np.bool_) and np.isnan(value)
 
 
@@ -89,7 +91,7 @@ def draw(recording: Recording, asked: AskedManoeuvre, car: Any, out: Path) -> li
     course = course_of(asked)
     try:
         figures["drive"] = plots.drive(
-            recording, asked.name, course=course, car=car, steer_at_03g=_commanded(asked, car)
+            recording, asked.name, course=course, car=car, steer_at_03g=_reference_steer(asked, car)
         )
     except InputError as error:
         say("warning", "yellow", f"no figure of {asked.name}, what the car does instead: {error}")

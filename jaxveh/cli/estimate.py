@@ -12,7 +12,7 @@ import typer
 from jaxveh import io
 from jaxveh._core.errors import check_at_least, check_one_of
 from jaxveh.cli import options, sideslip
-from jaxveh.cli.blanking import filled, split
+from jaxveh.cli.blanking import fill_gaps, split
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
 
@@ -73,7 +73,7 @@ def estimate(
     check_at_least("--particles", particles, 2)
     if truth is not None:
         check_one_of("--truth", truth, sideslip.SCORED)
-    car, recording = io.read_car(vehicle), filled(io.read_recording(log, channels), fill)
+    car, recording = io.read_car(vehicle), fill_gaps(io.read_recording(log, channels), fill)
     span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
     uses = tuple(calibrate_on or ())
     parts = split(recording, span, uses, truth)
@@ -93,14 +93,14 @@ def estimate(
     shown = {
         "file": product, "rows": len(found.time), "start_s": found.time[0], "end_s": found.time[-1], "figures": figures
     }  # fmt: skip
-    write_numbers(numbers, {**(score or {}), **sideslip.fitted(calibration), **shown}, configuration, seed)
+    write_numbers(numbers, {**(score or {}), **sideslip.fitted_parameters(calibration), **shown}, configuration, seed)
 
 
 def print_fitted(calibration: Any) -> None:
     """Print the fitted parameters as a table."""
     rows = [
         (name, spread(one["value"], one["std"]), one["unit"])
-        for name, one in sideslip.fitted(calibration)["fitted"].items()
+        for name, one in sideslip.fitted_parameters(calibration)["fitted"].items()
     ]
     table("Fitted on the calibration span", ("parameter", "value ± std", "unit"), rows)
 

@@ -37,11 +37,11 @@ def program(function: Callable) -> Callable:
     option = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Debug)
     guarded.__signature__ = inspect.Signature([*own, option])
     guarded.__annotations__ = {**hints, "debug": Debug}
-    guarded.__doc__ = flowing(function.__doc__ or "")
+    guarded.__doc__ = join_lines(function.__doc__ or "")
     return guarded
 
 
-def flowing(text: str) -> str:
+def join_lines(text: str) -> str:
     """A docstring whose paragraphs are one line each, for a terminal to break."""
     return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
 

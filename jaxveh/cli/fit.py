@@ -9,7 +9,7 @@ import typer
 
 from jaxveh import io
 from jaxveh.cli import options, sideslip
-from jaxveh.cli.blanking import calibration_part, filled
+from jaxveh.cli.blanking import calibration_part, fill_gaps
 from jaxveh.cli.console import progress, results
 from jaxveh.cli.estimate import print_fitted
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
@@ -38,7 +38,7 @@ def fit(
     """
     check_product(product, (".toml",), force, (log, vehicle, channels))
     check_report(out, numbers)
-    car, recording = io.read_car(vehicle), filled(io.read_recording(log, channels), fill)
+    car, recording = io.read_car(vehicle), fill_gaps(io.read_recording(log, channels), fill)
     span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
     uses = tuple(calibrate_on or ())
     part = calibration_part(recording, span, uses)
@@ -62,4 +62,4 @@ def fit(
         "calibrate_on": uses,
         "fill": fill,
     }
-    write_numbers(numbers, {**sideslip.fitted(calibration), "file": product}, configuration, None)
+    write_numbers(numbers, {**sideslip.fitted_parameters(calibration), "file": product}, configuration, None)

@@ -45,7 +45,7 @@ class AskedManoeuvre(NamedTuple):
     options: dict[str, Any]
 
 
-def asked(
+def parse_manoeuvre(
     name: str, speed: float | None, steer_deg: float | None, duration: float | None, settings: Sequence[str], car: Any
 ) -> AskedManoeuvre:
     """The manoeuvre of a name with usual values for what is None, its `name=value` settings, and what it wants of the car.

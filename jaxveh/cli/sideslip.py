@@ -58,7 +58,7 @@ def open_loop(car: CarSpecification, seen: Recording) -> dict[str, np.ndarray]:
     return drive_open_loop(vehicles.from_specification(car), seen)
 
 
-def fitted(calibration: Calibration | None) -> dict[str, Any]:
+def fitted_parameters(calibration: Calibration | None) -> dict[str, Any]:
     """The fitted parameters by name (value, std, unit) and the choice of the reference's weight, for the JSON file."""
     if calibration is None:
         return {}

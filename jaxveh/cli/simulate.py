@@ -83,7 +83,7 @@ def simulate(
         return _list()
     _check(product, vehicle, road, force, out, numbers, solver, until, rate)
     car = vehicle_of(vehicle, fidelity)
-    asked = driving.asked(manoeuvre, speed, steer_deg, duration, settings or (), car)
+    asked = driving.parse_manoeuvre(manoeuvre, speed, steer_deg, duration, settings or (), car)
     # The devices fold their numbers into a key: it must not be one of which the driver's or the road's is made.
     drive_key, road_key, sensor_key = jax.random.split(jax.random.key(seed), 3)
     driver = driving.make(asked, drive_key)
@@ -103,10 +103,10 @@ def simulate(
         "duration": driver.duration, "options": asked.options, "road": road, "devices": devices, "rate": rate,
         "yaw_rate_std": yaw_rate_std, "a_y_std": a_y_std, "solver": solver, "until": until,
     }  # fmt: skip
-    write_numbers(numbers, {**_shown(recording, product), "numbers": found}, configuration, seed)
+    write_numbers(numbers, {**_summary(recording, product), "numbers": found}, configuration, seed)
 
 
-def _shown(recording: Recording, product: Path | None) -> dict[str, Any]:
+def _summary(recording: Recording, product: Path | None) -> dict[str, Any]:
     return {
         "rows": len(recording), "channels": list(recording.names), "source": recording.source, "file": product,
         "start": recording.time[0], "end": recording.time[-1],

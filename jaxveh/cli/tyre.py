@@ -121,7 +121,7 @@ def evaluate_table(
     check_product(product, (".csv",), force, (file, inputs))
     tyre = tyres.from_property_file(io.read_property_file(file))
     frame = _read(inputs)
-    found = kit.evaluate(tyre, {name: frame[name].to_numpy() for name in frame if _wanted(name)}, axes=axes.value)
+    found = kit.evaluate(tyre, {name: frame[name].to_numpy() for name in frame if _is_wanted(name)}, axes=axes.value)
     _say_what_is_beyond(tyre, found)
     import pandas as pd
 
@@ -130,7 +130,7 @@ def evaluate_table(
     results().print(f"{product}: {len(frame)} rows, {', '.join(found)}")
 
 
-def _wanted(name: str) -> bool:
+def _is_wanted(name: str) -> bool:
     return name == "useMode" or any(name in names for names in kit.EVALUATION_INPUTS.values())
 
 
@@ -142,7 +142,7 @@ def _read(path: Path) -> Any:
         frame = pd.read_csv(path)
     except (pd.errors.ParserError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: is no table in CSV ({error}).") from None
-    for name in filter(_wanted, frame):
+    for name in filter(_is_wanted, frame):
         if not pd.api.types.is_numeric_dtype(frame[name]):
             bad = pd.to_numeric(frame[name], errors="coerce").isna().to_numpy().argmax()
             raise InputError(f"{path}: {name} = {frame[name].iloc[bad]!r} in row {bad}: must be a number.")

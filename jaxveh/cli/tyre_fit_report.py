@@ -46,7 +46,7 @@ def show(
         },
         "coefficients": {
             p.name: {"value": value, "std": std, "std_over_size": one, "unit": p.unit, "mark": mark}
-            for (p, value, std), one, mark in zip(_fitted(fit), share, marks, strict=True)
+            for (p, value, std), one, mark in zip(_coefficient_rows(fit), share, marks, strict=True)
         },
         "identified_directions": fit.identified,
         "heavy_tails": {
@@ -85,7 +85,7 @@ def _coefficients(fit: RigFit, start, share: np.ndarray, marks: list[str]) -> No
     before = [_leaf(start, name) for name in fit.names]
     rows = [
         (p.name, "" if p.unit == "-" else p.unit, was, value, std, 100 * one, mark)
-        for was, (p, value, std), one, mark in zip(before, _fitted(fit), share, marks, strict=True)
+        for was, (p, value, std), one, mark in zip(before, _coefficient_rows(fit), share, marks, strict=True)
     ]
     heads = ("coefficient", "unit", "start", "fitted", "standard error", "% of its size", "")
     note = (
@@ -153,7 +153,7 @@ def _tails_in_words(name: str, residual: np.ndarray, robust: bool) -> str:
     )
 
 
-def _fitted(fit: RigFit) -> list[tuple[Parameter, Any, Any]]:
+def _coefficient_rows(fit: RigFit) -> list[tuple[Parameter, Any, Any]]:
     """Each coefficient with its value and standard error."""
     return [(p, fit.parameters[p.name], fit.parameters_std[p.name]) for p in fit.chosen]
 

@@ -102,7 +102,7 @@ def _steering(log: LogView) -> LogFinding:
     steer = log.even("steer")
     if log.car is None:
         caveat = " Without a car, its own response of some 0.1 s is part of it."
-        return _judge(log, "yaw_rate", "steer", log.moving(steer), caveat, np.inf)
+        return _judge(log, "yaw_rate", "steer", log.while_moving(steer), caveat, np.inf)
     expected = yaw_rate_from_steer(log.car, steer, log.even("v_x"), log.step)
     return _judge(log, "yaw_rate", "what the car's linear model makes of steer", expected, "", MODELLED)
 

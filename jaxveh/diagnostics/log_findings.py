@@ -79,7 +79,7 @@ class LogView:
         on_grid[(self.grid < time[0] - hair) | (self.grid > time[-1] + hair)] = np.nan
         return on_grid
 
-    def moving(self, values: np.ndarray) -> np.ndarray:
+    def while_moving(self, values: np.ndarray) -> np.ndarray:
         """Values (N,) on `grid`, NaN where the car is slower than `MOVING` or its speed is not known."""
         with np.errstate(invalid="ignore"):
             return np.where(self.even("v_x") > MOVING, values, np.nan)

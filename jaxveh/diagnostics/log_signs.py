@@ -62,14 +62,14 @@ def check_signs(log: LogView) -> list[LogFinding]:
 
 def _correlation(log: LogView) -> float:
     steer, yaw_rate = log.smooth(log.even("steer"), 0.2), log.smooth(log.even("yaw_rate"), 0.2)
-    coefficients, _, correlation = fit(log.moving(yaw_rate), steer)
+    coefficients, _, correlation = fit(log.while_moving(yaw_rate), steer)
     return correlation * float(np.sign(coefficients[1]))
 
 
 def _lateral(log: LogView) -> tuple[float, float, float]:
     """Slope, intercept and correlation of a_y over v_x yaw_rate."""
     speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
-    target = log.moving(log.smooth(log.even("a_y"), 0.2))
+    target = log.while_moving(log.smooth(log.even("a_y"), 0.2))
     turning = log.smooth(speed * yaw_rate, 0.2)
     coefficients, _, correlation = fit(target, turning)
     return float(coefficients[1]), float(coefficients[0]), correlation
@@ -78,7 +78,7 @@ def _lateral(log: LogView) -> tuple[float, float, float]:
 def _sideways(log: LogView) -> list[LogFinding]:
     """Whether dv_y/dt is what v_x yaw_rate leaves of a_y; silent where the two have little in common."""
     rest = log.smooth(log.even("a_y") - log.even("v_x") * log.even("yaw_rate"), 0.3)
-    change = log.moving(log.smooth(log.slope(log.even("v_y")), 0.3))
+    change = log.while_moving(log.smooth(log.slope(log.even("v_y")), 0.3))
     coefficients, _, correlation = fit(change, rest)
     slope = float(coefficients[1])
     values = {"slope": slope, "correlation": correlation}

@@ -28,7 +28,7 @@ def check_steering(log: LogView) -> list[LogFinding]:
     if not log.has("steer", "yaw_rate", "v_x"):
         return findings
     speed, yaw_rate = log.smooth(log.even("v_x"), 0.2), log.smooth(log.even("yaw_rate"), 0.2)
-    steer = log.moving(log.smooth(log.even("steer"), 0.2))
+    steer = log.while_moving(log.smooth(log.even("steer"), 0.2))
     with np.errstate(divide="ignore", invalid="ignore"):
         bend, push = yaw_rate / speed, yaw_rate * speed
         bend = np.where(np.abs(push) < GENTLE, bend, np.nan)

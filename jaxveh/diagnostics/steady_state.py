@@ -62,7 +62,7 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
     """
     check_positive("steady", steady, "m/s^3")
     v_x = channel(recording, "v_x")
-    moves = (v_x >= SLOWEST) & _settled(seconds(recording), channel(recording, "a_y"), steady)
+    moves = (v_x >= SLOWEST) & _is_settled(seconds(recording), channel(recording, "a_y"), steady)
     used = {"v_x", "a_y", "steer", *sideslip_channels(recording)} | ({"yaw_rate"} if wheelbase is not None else set())
     for name in sorted(used):
         moves &= ~within_gaps(recording, name)
@@ -84,7 +84,7 @@ def steady_turns(recording: Recording, wheelbase: float | None = None, *, steady
     )
 
 
-def _settled(time: np.ndarray, a_y: np.ndarray, steady: float) -> np.ndarray:
+def _is_settled(time: np.ndarray, a_y: np.ndarray, steady: float) -> np.ndarray:
     """Whether each row, and those of the last `SETTLED` seconds, are steady."""
     before, after = np.clip(time - 0.5, time[0], time[-1]), np.clip(time + 0.5, time[0], time[-1])
     rate = np.abs(np.interp(after, time, a_y) - np.interp(before, time, a_y)) / np.where(

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
-from jaxveh.estimators.live import AbstractCleaning, cleaned
+from jaxveh.estimators.live import AbstractCleaning, clean_recording
 from jaxveh.sensors import LowPass
 
 STEER_RATE = 3.0
@@ -84,4 +84,4 @@ def clean(recording: Recording) -> Recording:
     **Raises** `InputError` where a channel is missing, or an input is NaN (fill it on request first).
     """
     check_needs("sideslip", BLIND, recording)
-    return cleaned(HandlingCleaning(), recording)
+    return clean_recording(HandlingCleaning(), recording)

@@ -52,7 +52,7 @@ class AsItIs(AbstractCleaning):
         return None, values
 
 
-def cleaned(cleaning: AbstractCleaning, recording: Recording) -> Recording:
+def clean_recording(cleaning: AbstractCleaning, recording: Recording) -> Recording:
     """The recording after its cleaning, with the same rows."""
     values = {name: recording[name] for name in cleaning.channels}
     if not values:

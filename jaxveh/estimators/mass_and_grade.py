@@ -109,7 +109,7 @@ def model(
     states |= {} if a_x_bias is None else {"bias": (0.0, a_x_bias)}
     kind = record_type("MassAndGradeState", states)
     model = StateSpace(
-        system=car, transition=Propagate(_rates, Heun()), observation=_seen, process_noise=Continuous(Gaussian(noise)),
+        system=car, transition=Propagate(_rates, Heun()), observation=_observation, process_noise=Continuous(Gaussian(noise)),
         measurement_noise=Gaussian({"v_x": v_x} | ({} if a_x is None else {ACCELEROMETER: a_x})),
         prior=Prior(kind(*(mean for mean, _ in states.values())), {name: std for name, (_, std) in states.items()}),
         inputs=(*car.inputs, *more_inputs), input_path=input_path,
@@ -117,7 +117,7 @@ def model(
     return with_parameters(model, lambda model: (model.system.mass,), mass_spread, mass_walk, domain=mass_domain)
 
 
-def chosen(model: Any):
+def chosen_parameters(model: Any):
     """The parameters and noise levels that a calibration fits: the air's drag, and how much of everything is noise."""
     return (model.system.drag, *model.process_noise.law.std, *model.measurement_noise.std)
 
@@ -141,7 +141,7 @@ def calibrate(
     check_needs(NAME, needs, recording, start)
     assert start.process_noise is not None  # `model` has given it
     prior = {"drag": DRAG_SPREAD} | dict.fromkeys((*start.process_noise.law.names, *start.channels), NOISE_SPREAD)
-    fit = prediction_error(filter or Unscented(), start, recording, chosen, prior=prior, progress=progress)
+    fit = prediction_error(filter or Unscented(), start, recording, chosen_parameters, prior=prior, progress=progress)
     return Calibration(NAME, fit, span)
 
 
@@ -183,6 +183,6 @@ def _rates(car: Longitudinal, t, x, u):
     return type(x)(**{name: moves.get(name, jnp.zeros_like(x.grade)) for name in x._fields})
 
 
-def _seen(car: Longitudinal, t, x, u):
+def _observation(car: Longitudinal, t, x, u):
     felt = car.outputs(t, car.state_type(x.v_x), u, _ground(x)).a_x
     return record_type("MassAndGradeOutputs", ("v_x", ACCELEROMETER))(x.v_x, felt + getattr(x, "bias", 0.0))

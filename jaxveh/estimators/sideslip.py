@@ -56,7 +56,7 @@ TARGET_BEND = 0.0035
 """rad: errors beyond it count less than by their square (INS alignment, tyres that warm up)."""
 
 
-def chosen(model: Any):
+def chosen_parameters(model: Any):
     """The parameters and noise levels that a calibration fits."""
     s, car = model.system, model.system.car
     axles = [leaf for tyre in (car.front, car.rear) for leaf in (tyre.B, tyre.D, tyre.E)]
@@ -170,7 +170,15 @@ def _fit(filter, model, log, weight, progress, centre=None) -> Fit:
     values = tuple(map(silent_one if weight is None else reference_sideslip, pieces))
     target = Target("reference_sideslip", values, 1.0 if weight is None else weight, TARGET_BEND)
     return prediction_error(
-        filter, model, pieces, chosen, prior=PRIOR, centre=centre, target=target, warm_up=warm_up, progress=progress
+        filter,
+        model,
+        pieces,
+        chosen_parameters,
+        prior=PRIOR,
+        centre=centre,
+        target=target,
+        warm_up=warm_up,
+        progress=progress,
     )
 
 

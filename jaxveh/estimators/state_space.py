@@ -87,7 +87,7 @@ def state_space(
         system=system,
         transition=HeldBelow(transition, minimum_speed) if TOLD_SPEED in system.inputs else transition,
         observation=_observation,
-        report=ReportOutputs(_reported(system, report), states),
+        report=ReportOutputs(_report_names(system, report), states),
         process_noise=_process_noise(process_noise, states),
         measurement_noise=_noise(sensors, measurement_noise),
         prior=_start(system, start or {}, start_spread or {}),
@@ -204,7 +204,7 @@ def _dtype(system: Instrumented):
     return jnp.result_type(*jax.tree.leaves(eqx.filter(system, eqx.is_inexact_array)))
 
 
-def _reported(system: Instrumented, report: tuple[str, ...] | None) -> tuple[str, ...]:
+def _report_names(system: Instrumented, report: tuple[str, ...] | None) -> tuple[str, ...]:
     number = jax.ShapeDtypeStruct((), _dtype(system))
     state = system.state_type(*[number] * len(system.state_type._fields))
     inputs = record_type("Inputs", system.inputs)(*[number] * len(system.inputs))

@@ -72,29 +72,29 @@ class Table(NamedTuple):
 
 def at_most(name: str, value, bound: float) -> Check:
     """A criterion that holds at or below the bound; what is not a number does not hold."""
-    return _checked(name, value, bound, value <= bound)
+    return _make_check(name, value, bound, value <= bound)
 
 
 def above(name: str, value, bound: float) -> Check:
     """A criterion that holds above the bound."""
-    return _checked(name, value, bound, value > bound)
+    return _make_check(name, value, bound, value > bound)
 
 
 def at_least(name: str, value, bound: float) -> Check:
     """A criterion that holds at or above the bound."""
-    return _checked(name, value, bound, value >= bound)
+    return _make_check(name, value, bound, value >= bound)
 
 
-def undecided(check: Check) -> Check:
+def leave_open(check: Check) -> Check:
     """The criterion left open, whatever its number says: `check` for what cannot decide."""
     return check._replace(status=OPEN)
 
 
-def _checked(name: str, value, bound: float, holds) -> Check:
+def _make_check(name: str, value, bound: float, holds) -> Check:
     return Check(name, float(value), float(bound), HELD if holds else FAILED)
 
 
-def stated(checks: Iterable[Check], criteria: Criteria) -> list[Check]:
+def with_terms(checks: Iterable[Check], criteria: Criteria) -> list[Check]:
     """The checks with their terms, in the criteria's order, so that what took the place of another stands behind it.
 
     **Raises** `InputError` where checks and criteria are not the same: none is left out, and none comes without its terms.

@@ -93,12 +93,12 @@ class AdaptiveNumber(AbstractWrapper):
         """How many particles the belief asks for, before they are rounded up to one of the sizes."""
         dtype = belief.weights.dtype
         # Of one filled bin nothing can be told; two ask for few.
-        k = jnp.maximum(self.filled(belief), 2).astype(dtype) - 1.0
+        k = jnp.maximum(self.filled_bins(belief), 2).astype(dtype) - 1.0
         z = jax.scipy.special.ndtri(jnp.asarray(self.confidence, dtype))
         part = 2.0 / (9.0 * k)
         return k / (2.0 * self.error) * (1.0 - part + z * jnp.sqrt(part)) ** 3
 
-    def filled(self, belief: ParticleBelief) -> Any:
+    def filled_bins(self, belief: ParticleBelief) -> Any:
         """How many bins draws from the belief fill."""
         key = jax.random.fold_in(jax.random.fold_in(belief.key, BINS), belief.count)
         ancestors = numerics.systematic(key, jax.lax.stop_gradient(belief.weights), self.inner.particles)

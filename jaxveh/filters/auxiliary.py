@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
-from jaxveh.filters.looking_ahead import AbstractLookahead, lookahead_for, remark_of, softened
+from jaxveh.filters.looking_ahead import AbstractLookahead, lookahead_for, remark_of, soften
 from jaxveh.filters.particle import (
     AbstractAhead,
     AbstractParticleFilter,
@@ -21,9 +21,9 @@ from jaxveh.filters.particle import (
     add_noise,
     check_particle_settings,
     fate,
-    found_again,
     log_prob,
     make_info,
+    replace_lost,
     without,
 )
 from jaxveh.statespace import Smoothing, kit
@@ -126,11 +126,11 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         lookahead = lookahead_for(model) if self.lookahead is None else self.lookahead
         to = (belief.t, row.t)
         characteristic, lost = numerics.barrier(
-            found_again(lookahead.moved(model, *to, belief.particles, u), belief.particles)
+            replace_lost(lookahead.propagate(model, *to, belief.particles, u), belief.particles)
         )
         ahead, residual = lookahead.log_prob(model, row, characteristic, measured, present, row.t - belief.t)
         log_weights = log_of(belief.weights)
-        ahead = softened(ahead, log_weights, ~lost, lookahead.defensive)
+        ahead = soften(ahead, log_weights, ~lost, lookahead.defensive)
         if self.gradient == "score":
             # Its derivative is none of the likelihood's: what is gained in the choice is lost in the weights.
             ahead = jax.lax.stop_gradient(ahead)
@@ -140,7 +140,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
             moved, lost = gather((characteristic, lost), ancestors)
         else:
             chosen = gather(belief.particles, ancestors)
-            moved, lost = found_again(model.transition(*to, chosen, u), chosen)
+            moved, lost = replace_lost(model.transition(*to, chosen, u), chosen)
         moved, lost = numerics.barrier((add_noise(model, noise, moved, row.t - belief.t), lost))
         stage = FirstStage(ahead, first, log_first, ancestors, resampled, alive)
         return LookedAhead(moved, lost, belief, characteristic, residual, stage)

@@ -31,7 +31,7 @@ def save_belief(path: str | Path, belief: AbstractBelief) -> Path:
     path = Path(path)
     if path.suffix != ".npz":
         raise InputError(f"path = {path}: must end in .npz.")
-    arrays = {name: np.asarray(_words(leaf)) for name, leaf in _named(belief).items()}
+    arrays = {name: np.asarray(_words(leaf)) for name, leaf in _leaves_by_name(belief).items()}
     arrays[STATES] = np.asarray(_states(belief))
     with replacing_file(path, overwrite=True) as part:
         np.savez(part, **arrays)
@@ -46,7 +46,7 @@ def load_belief(path: str | Path, like: B) -> B:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"path = {path}: there is no such file.")
-    expected = _named(like)
+    expected = _leaves_by_name(like)
     try:
         with np.load(path) as archive:
             arrays = dict(archive)
@@ -81,7 +81,7 @@ def _states(belief: Any) -> tuple[str, ...]:
         return ()
 
 
-def _named(belief: Any) -> dict[str, Any]:
+def _leaves_by_name(belief: Any) -> dict[str, Any]:
     return {jax.tree_util.keystr(path): leaf for path, leaf in jax.tree_util.tree_leaves_with_path(belief)}
 
 

@@ -114,7 +114,7 @@ class Delayed(AbstractWrapper):
         for piece, real in [*pieces, (prompt, jnp.asarray(True))]:
             late = real & (piece.t < belief.base.t)
             too_late = too_late | (late & (piece.t >= belief.began))
-            belief = self._kept(model, belief, piece, real & ~late)
+            belief = self._with_rows(model, belief, piece, real & ~late)
         inside, said, info = jax.lax.cond(in_order, self._onward, self._anew, model, before, belief, prompt)
         result = jnp.where((info.result == 0) & too_late, code(Result.measurement_too_late), info.result)
         info = info._replace(log_likelihood=said - before.said, result=result)
@@ -140,8 +140,8 @@ class Delayed(AbstractWrapper):
         newest = row.t
         times = [row.t - delay for _, delay in self.delays]
         start = belief.base, belief.base_said
-        (inside, said), (infos, real, new) = jax.lax.scan(forward, start, (belief.rows, belief.real))
-        return inside, said, _merged(infos, real, new)
+        (inside, said), (every_info, real, new) = jax.lax.scan(forward, start, (belief.rows, belief.real))
+        return inside, said, _merge_info(every_info, real, new)
 
     def _prompt(self, row: Row) -> Row:
         """The row without what is delayed."""
@@ -160,7 +160,7 @@ class Delayed(AbstractWrapper):
         )
         return Row(t, u, type(row.y)(**kept)), ~jnp.isnan(getattr(row.y, name))
 
-    def _kept(self, model: StateSpace, belief: DelayedBelief, piece: Row, real) -> DelayedBelief:
+    def _with_rows(self, model: StateSpace, belief: DelayedBelief, piece: Row, real) -> DelayedBelief:
         """The belief with the piece among its rows; the oldest of them goes into the base."""
         longer = lambda rows, one: jnp.concatenate([rows, one[None]])
         rows, reals = jax.tree.map(longer, (belief.rows, belief.real), (piece, real))
@@ -193,19 +193,19 @@ def _choose(condition: Any, a: Any, b: Any) -> Any:
     return jax.tree.map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 
-def _merged(infos: Info, real: Any, new: Any) -> Info:
-    """One info of all rows filtered anew: innovations and NIS of the new ones, the first failure and the first remark of all."""
+def _merge_info(every_info: Info, real: Any, new: Any) -> Info:
+    """The info of all rows filtered anew: innovations and NIS of the new ones, the first failure and the first remark of all."""
     pick = lambda values: jnp.sum(jnp.where(new & jnp.isfinite(values), values, 0), axis=0)
     seen = lambda values: jnp.any(new & jnp.isfinite(values), axis=0)
     by_channel = lambda tree: jax.tree.map(lambda v: jnp.where(seen(v), pick(v), jnp.nan), tree)
     return Info(
-        log_likelihood=jnp.sum(infos.log_likelihood),
-        innovation=by_channel(infos.innovation),
-        innovation_std=by_channel(infos.innovation_std),
-        nis=jnp.where(jnp.any(jnp.isfinite(infos.nis)), pick(infos.nis), jnp.nan),
-        ess=infos.ess[-1],
-        result=_first(infos.result, real),
-        remark=None if infos.remark is None else _first(infos.remark, real),
+        log_likelihood=jnp.sum(every_info.log_likelihood),
+        innovation=by_channel(every_info.innovation),
+        innovation_std=by_channel(every_info.innovation_std),
+        nis=jnp.where(jnp.any(jnp.isfinite(every_info.nis)), pick(every_info.nis), jnp.nan),
+        ess=every_info.ess[-1],
+        result=_first(every_info.result, real),
+        remark=None if every_info.remark is None else _first(every_info.remark, real),
     )
 
 

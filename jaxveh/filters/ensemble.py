@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import check_whole
 from jaxveh._core.result import Result, code
-from jaxveh.filters.gaussian.filter import check_covariances, innovation_info, unwrapped, wrapped_innovation
+from jaxveh.filters.gaussian.filter import check_covariances, innovation_info, unwrap, wrapped_innovation
 from jaxveh.filters.gaussian.forms import masked_factor
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import times
@@ -88,15 +88,15 @@ class Ensemble(AbstractTwoPartFilter):
 
     def predict(self, model: StateSpace, belief: EnsembleBelief, t) -> EnsembleBelief:
         """The belief at time `t`, propagated with the inputs that the belief carries (held)."""
-        return self._moved(model, belief, t, belief.u)
+        return self._propagate(model, belief, t, belief.u)
 
     def _predict(self, model, belief, row):
-        return self._moved(model, belief, row.t, row.u)
+        return self._propagate(model, belief, row.t, row.u)
 
     def _update(self, model, ahead, row):
         return self.update(model, ahead, row)
 
-    def _moved(self, model, belief, t, u_next):
+    def _propagate(self, model, belief, t, u_next):
         u = model.step_inputs(belief.t, t, belief.u, u_next)
         moved = model.transition(belief.t, t, belief.members, u)
         # Another key each time: between two rows there may be several predictions.
@@ -110,7 +110,7 @@ class Ensemble(AbstractTwoPartFilter):
         here = jnp.stack([present[name] for name in model.channels])
         observed = model.observation(row.t, belief.members, row.u)
         rows = [jnp.broadcast_to(getattr(observed, name), belief.members[0].shape) for name in model.channels]
-        rows = [unwrapped(model, name, values) for name, values in zip(model.channels, rows, strict=True)]
+        rows = [unwrap(model, name, values) for name, values in zip(model.channels, rows, strict=True)]
         predicted = jnp.where(here[:, None], jnp.stack(rows), 0)
         states = jnp.stack(belief.members)
         X, E = _deviations(states), _deviations(predicted)

@@ -62,7 +62,7 @@ def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace,
 
     def step(state, t, u, y):
         tree, kinds = structure[0]
-        leaves = [_restored(leaf, kind) for leaf, kind in zip(state, kinds, strict=True)]
+        leaves = [_restore_key(leaf, kind) for leaf, kind in zip(state, kinds, strict=True)]
         return shown(*filter.step(model, jax.tree.unflatten(tree, leaves), _row(model, t, u, y)))
 
     first = jax.export.export(jax.jit(init))(*like)
@@ -93,5 +93,5 @@ def _plain(leaf: Any) -> Any:
     return leaf if _kind(leaf) is None else jax.random.key_data(leaf)
 
 
-def _restored(leaf: Any, kind: Any) -> Any:
+def _restore_key(leaf: Any, kind: Any) -> Any:
     return leaf if kind is None else jax.random.wrap_key_data(leaf, impl=kind)

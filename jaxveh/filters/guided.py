@@ -13,7 +13,7 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.result import Result, code
 from jaxveh.filters.auxiliary import FirstStage
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
-from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrapped, wrapped_innovation
+from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, unwrap, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import AbstractRule, Points, Slopes, product, times
@@ -26,10 +26,10 @@ from jaxveh.filters.particle import (
     ParticleFilter,
     check_particle_settings,
     fate,
-    found_again,
     log_prob,
     make_info,
     mean_variances,
+    replace_lost,
     without,
 )
 from jaxveh.numerics import sigma_points
@@ -131,7 +131,7 @@ class Guided(AbstractParticleFilter):
     `auxiliary`: ancestors are chosen by what each predicts of the measurement, too; with a linear observation this is the fully
     adapted filter (M. Pitt & N. Shephard 1999), whose weights are all equal (measurement noise that depends on the state is
     taken for the proposal where the particle is without its noise). It pays where the measurement is sharper than the
-    process noise; each particle costs a small Kalman update. **Where the observation is curved over the process noise, do not
+    process noise; each particle costs a small Kalman update. **Where the observation is nonlinear over the process noise, do not
     choose it**: with `"extended"` it loses what the slope does not see, and the effective sample size says nothing of it, for it
     rises (one recording of the growth model, 40 rows, 1000 particles: log-likelihood 1.5 too low, scattered by 1.9, the ESS
     700; without `auxiliary` 0.6, 0.8 and 550). Rows of which the particles themselves show it have
@@ -173,8 +173,8 @@ class Guided(AbstractParticleFilter):
         e = proposal.mean[:, None] + times(proposal.factor, white)
         e = jnp.where(jnp.arange(self.particles) < unguided, blind, e)
         wide = jax.tree.map(lambda m: jnp.full(self.particles, m), start)
-        moved = lambda e: _moved(wide, names, e)
-        x, astray = found_again(moved(e), wide)
+        moved = lambda e: _add_to_states(wide, names, e)
+        x, astray = replace_lost(moved(e), wide)
         oftener = _log_normal(numerics.solve_lower(proposal.factor, e - proposal.mean[:, None]), proposal.factor)
         oftener = oftener - _log_normal(numerics.solve_lower(prior.factor, e), prior.factor)
         share = jnp.asarray(unguided / self.particles, covariance.dtype)
@@ -185,7 +185,7 @@ class Guided(AbstractParticleFilter):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved = model.transition(belief.t, row.t, belief.particles, u)
-        moved, lost = found_again(moved, belief.particles)
+        moved, lost = replace_lost(moved, belief.particles)
         assert model.process_noise is not None  # `check` has seen to it
         law = model.process_noise.over(jnp.maximum(row.t - belief.t, SHORTEST))
         covariance = law.covariance()
@@ -200,15 +200,15 @@ class Guided(AbstractParticleFilter):
         chosen, start = taken(proposals), gather(moved, ancestors)
         white = numerics.normal(noise, (len(law.names), self.particles), logs.dtype)
         e = chosen.mean.T + jnp.einsum("iqr,ri->qi", chosen.factor, white)
-        x = _moved(start, law.names, e)
+        x = _add_to_states(start, law.names, e)
         # A proposal, too, may have no value.
-        x, astray = found_again(x, start)
+        x, astray = replace_lost(x, start)
         ratio = _log_normal(numerics.solve_lower(prior.factor, e), prior.factor) - _log_normal(white, chosen.factor)
         stage = FirstStage(proposals.log_ahead, first, log_first, ancestors, resampled, alive)
         return Proposed(x, astray, ratio, belief, moved, lost, proposals.variances, stage)
 
 
-def _moved(particles, names, e):
+def _add_to_states(particles, names, e):
     """The particles with rows e (q, N) added to the states `names`."""
     return particles._replace(**{name: getattr(particles, name) + e[i] for i, name in enumerate(names)})
 
@@ -226,7 +226,7 @@ def _proposal(model: StateSpace, rule: AbstractRule, row, moved, names, prior: S
         x = moved._replace(**{name: getattr(moved, name) + e[i] for i, name in enumerate(names)})
         observed = model.observation(row.t, x, row.u)
         rows = [jnp.broadcast_to(getattr(observed, name), e.shape[1:]) for name in model.channels]
-        rows = [unwrapped(model, name, r) for name, r in zip(model.channels, rows, strict=True)]
+        rows = [unwrap(model, name, r) for name, r in zip(model.channels, rows, strict=True)]
         return jnp.stack([jnp.where(present[name], r, 0) for name, r in zip(model.channels, rows, strict=True)])
 
     image = rule.image(see, jnp.zeros(len(names), prior.matrix.dtype), prior.factor)

@@ -28,7 +28,7 @@ class AbstractKernel(AbstractTwoPartWrapper):
         check_all_particles(type(self).__name__, self.inner)
 
     @abc.abstractmethod
-    def smeared(self, model: StateSpace) -> tuple[str, ...]:
+    def smeared_states(self, model: StateSpace) -> tuple[str, ...]:
         """The states that the kernel acts on."""
 
     @abc.abstractmethod
@@ -36,12 +36,12 @@ class AbstractKernel(AbstractTwoPartWrapper):
         """How far each particle keeps its distance from the mean, and the kernel's spread over the particles'."""
 
     def _predict(self, model, belief, row):
-        names = self.smeared(model)
+        names = self.smeared_states(model)
         if names:
-            belief = eqx.tree_at(lambda b: b.particles, belief, self._drawn(belief, names))
+            belief = eqx.tree_at(lambda b: b.particles, belief, self._draw(belief, names))
         return self.inner._predict(model, belief, row)
 
-    def _drawn(self, belief: ParticleBelief, names: tuple[str, ...]) -> Any:
+    def _draw(self, belief: ParticleBelief, names: tuple[str, ...]) -> Any:
         keeps, spread = self.kernel(len(names))
         values = jnp.stack([getattr(belief.particles, name) for name in names])
         mean = jnp.sum(belief.weights * values, axis=1, keepdims=True)
@@ -74,10 +74,10 @@ class LiuWest(AbstractKernel):
     def check(self, model):
         self.inner.check(model)
         check_names("LiuWest.names", self.names or (), model.states)
-        if not self.smeared(model):
+        if not self.smeared_states(model):
             raise InputError("LiuWest: every state has process noise, so that none is a parameter. Give `names`.")
 
-    def smeared(self, model):
+    def smeared_states(self, model):
         if self.names is not None:
             return self.names
         noisy = () if model.process_noise is None else model.process_noise.law.names
@@ -104,7 +104,7 @@ class Regularised(AbstractKernel):
         check("Regularised.bandwidth", self.bandwidth, lambda v: v > 0, "positive")
         check("Regularised.share", self.share, lambda v: v > 0, "positive")
 
-    def smeared(self, model):
+    def smeared_states(self, model):
         return model.states
 
     def kernel(self, dimension):

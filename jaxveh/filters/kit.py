@@ -23,9 +23,9 @@ from jaxveh.filters.particle import (
     add_noise,
     check_particle_settings,
     fate,
-    found_again,
     log_prob,
     make_info,
+    replace_lost,
     without,
 )
 from jaxveh.filters.wrappers.base import (
@@ -106,7 +106,6 @@ __all__ = [
     "choose_ancestors",
     "fate",
     "first_window",
-    "found_again",
     "gather",
     "gaussian_of",
     "innermost",
@@ -119,6 +118,7 @@ __all__ = [
     "log_prob",
     "make_info",
     "presence",
+    "replace_lost",
     "row_values",
     "smoothing_of",
     "variances_of",

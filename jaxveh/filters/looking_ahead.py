@@ -46,13 +46,13 @@ class AbstractLookahead(eqx.Module):
     def log_prob(self, model: StateSpace, row, ahead, measured, present, dt) -> tuple[Any, dict]:
         """Of particles `ahead` ((N,) in each field), about log p(y | x_{k-1}) (N,), and the residuals there by channel."""
 
-    def moved(self, model: StateSpace, t0, t1, x, u) -> Any:
+    def propagate(self, model: StateSpace, t0, t1, x, u) -> Any:
         """Where each particle of the state `x` (N,) is judged: its transition without noise."""
         return model.transition(t0, t1, x, u)
 
     @property
     def moves_by_transition(self) -> bool:
-        """Whether `moved` is the transition, which then is not computed twice."""
+        """Whether `propagate` is the transition, which then is not computed twice."""
         return True
 
 
@@ -61,7 +61,7 @@ class PredictiveLikelihood(AbstractLookahead):
 
     mu is the transition without noise and H the observation's slope there by the fields that carry noise (forward mode, one
     derivative a field). Exact for a linear observation (M. Pitt & N. Shephard 1999, sec. 3.2), and never sharper than what
-    the noise leaves of it; the second stage only corrects what the slope leaves out. Where the observation is so curved that
+    the noise leaves of it; the second stage only corrects what the slope leaves out. Where the observation is so nonlinear that
     the slope leaves out much (a square at its foot), the `defensive` ancestors keep the filter near the bootstrap filter.
     Process and measurement noise must be Gaussian; measurement noise that depends on the state counts as it is at mu.
     """
@@ -113,7 +113,7 @@ class PointLookahead(AbstractLookahead):
     def log_prob(self, model, row, ahead, measured, present, dt):
         return log_prob(model, row, ahead, measured, present)
 
-    def moved(self, model, t0, t1, x, u):
+    def propagate(self, model, t0, t1, x, u):
         if self.characteristic is None:
             return model.transition(t0, t1, x, u)
         return self.characteristic(model, t0, t1, x, u)
@@ -134,7 +134,7 @@ def lookahead_for(model: StateSpace) -> AbstractLookahead:
     return WITHOUT_SLOPES
 
 
-def softened(ahead: Any, log_weights: Any, alive: Any, share: float) -> Any:
+def soften(ahead: Any, log_weights: Any, alive: Any, share: float) -> Any:
     """Log look-ahead (N,) of which a `share` of ancestors knows nothing: log(share + (1 - share) ahead / mean ahead)."""
     if share == 0:
         return ahead

@@ -23,9 +23,9 @@ from jaxveh.filters.particle import (
     AbstractParticleFilter,
     check_particle_settings,
     fate,
-    found_again,
     make_info,
     mean_variances,
+    replace_lost,
     without,
 )
 from jaxveh.statespace import AbstractBelief, StateSpace, kit
@@ -138,7 +138,7 @@ class Cloud(AbstractAhead):
 
         logs, residual, variances, shift, P = jax.vmap(see)(self.particles, self.covariances)
         given_y = {name: getattr(self.particles, name) + shift[:, i] for i, name in enumerate(linear)}
-        particles, astray = found_again(self.particles._replace(**given_y), self.particles)
+        particles, astray = replace_lost(self.particles._replace(**given_y), self.particles)
         P = jnp.where(astray[:, None, None], self.covariances, P)
         weights, log_mean, alive = numerics.normalise(without(astray, logs + prior.log_weights))
         log_likelihood = log_mean + jnp.log(jnp.asarray(filter_.particles, weights.dtype))
@@ -203,9 +203,9 @@ class Marginalised(AbstractParticleFilter):
         joint = model.prior.covariance()[order][:, order]
         mean = jnp.stack(model.prior.mean)[order]
         white = numerics.normal(draw, (len(others), n), dtype)
-        drawn = jax.vmap(lambda w: _given_first(mean, joint, w), in_axes=1)(white)
+        drawn = jax.vmap(lambda w: _condition_on_first(mean, joint, w), in_axes=1)(white)
         weights = jnp.full((n,), 1 / n, dtype)
-        start = _named(self, model, drawn.z.T, drawn.x.T), drawn.P
+        start = _as_state(self, model, drawn.z.T, drawn.x.T), drawn.P
         ancestors = jnp.arange(n, dtype=jnp.int32)
         return Cloud(*start, CloudWeights(ancestors, weights, log_of(weights)), key, jnp.int32(0))
 
@@ -232,11 +232,11 @@ class Marginalised(AbstractParticleFilter):
         def move(point, P, white):
             f = lambda x: model.transition(belief.t, row.t, x, u)
             mean, J = _slopes(self.linear, point, lambda x: [getattr(f(x), n) for n in (*others, *self.linear)])
-            return _given_first(mean, times(times(J, P), J.T) + Q, white)
+            return _condition_on_first(mean, times(times(J, P), J.T) + Q, white)
 
         moved = jax.vmap(move, in_axes=(0, 0, 1))(points, covariances, white)
         moved = numerics.barrier(moved)
-        particles, lost = found_again(_named(self, model, moved.z.T, moved.x.T), points)
+        particles, lost = replace_lost(_as_state(self, model, moved.z.T, moved.x.T), points)
         lost = lost | ~jnp.all(jnp.isfinite(moved.P), axis=(1, 2))
         P = jnp.where(lost[:, None, None], covariances, moved.P)
         return Cloud(particles, P, CloudWeights(ancestors, weights, without(lost, chosen)), belief.key, belief.count)
@@ -250,7 +250,7 @@ class GivenDraw(NamedTuple):
     P: Any
 
 
-def _given_first(mean, covariance, white) -> GivenDraw:
+def _condition_on_first(mean, covariance, white) -> GivenDraw:
     """The first q = len(white) of jointly Gaussian numbers drawn by `white` (q,), and the others given them."""
     q = white.shape[0]
     if q == 0:
@@ -277,7 +277,7 @@ def _others(filter_: Marginalised, model: StateSpace) -> tuple[str, ...]:
     return tuple(name for name in model.states if name not in filter_.linear)
 
 
-def _named(filter_: Marginalised, model: StateSpace, z, x) -> Any:
+def _as_state(filter_: Marginalised, model: StateSpace, z, x) -> Any:
     """The state's NamedTuple of rows z (q, N) and x (l, N)."""
     values = dict(zip((*_others(filter_, model), *filter_.linear), (*z, *x), strict=True))
     return type(model.prior.mean)(**values)
@@ -307,9 +307,9 @@ def _check_each_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
         there = jnp.stack([jnp.asarray(getattr(f(moved), n), dtype) for n in names])
         slope = times(slopes, step)
         size = jnp.abs(seen) + jnp.abs(slope) + jnp.abs(there)
-        curved = np.asarray(jnp.abs(there - seen - slope) > 1e3 * jnp.finfo(dtype).eps * size)
-        if curved.any():
+        nonlinear = np.asarray(jnp.abs(there - seen - slope) > 1e3 * jnp.finfo(dtype).eps * size)
+        if nonlinear.any():
             raise InputError(
-                f"Marginalised: {what} {names[int(np.argmax(curved))]} is not linear in {', '.join(linear)}. "
+                f"Marginalised: {what} {names[int(np.argmax(nonlinear))]} is not linear in {', '.join(linear)}. "
                 "Name fewer states in `linear`, or use Guided."
             )

@@ -104,7 +104,7 @@ def add_noise(model: StateSpace, key, particles, dt):
     return particles._replace(**{name: getattr(particles, name) + value for name, value in noise.items()})
 
 
-def found_again(moved, before):
+def replace_lost(moved, before):
     """Particles of which those that the model lost, with a field that is not finite, stay as they were `before` the step, and
     which these are, (N,): they must get no weight, and what has no weight must still be finite for a mean."""
     n = moved[0].shape[-1]
@@ -246,13 +246,13 @@ class ParticleFilter(AbstractParticleFilter):
 
     def _predict(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
-        particles, drawn = self._drawn(draw, belief)
+        particles, drawn = self._draw_particles(draw, belief)
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
-        moved, lost = found_again(model.transition(belief.t, row.t, particles, u), particles)
+        moved, lost = replace_lost(model.transition(belief.t, row.t, particles, u), particles)
         moved, lost = numerics.barrier((add_noise(model, noise, moved, row.t - belief.t), lost))
         return Expected(moved, drawn, lost, belief.key, belief.count)
 
-    def _drawn(self, key, belief):
+    def _draw_particles(self, key, belief):
         """The next particles before they move."""
         n, logs = self.particles, log_of(belief.weights)
         uniform = jnp.full((n,), 1 / n, belief.weights.dtype)

@@ -39,7 +39,7 @@ class Transport(AbstractResampling):
         check("Transport.tolerance", self.tolerance, lambda v: v > 0, "positive")
 
     def resample(self, key, particles, weights, logs, n, gradient):
-        moved, converged = self.moved(particles, weights)
+        moved, converged = self.move_particles(particles, weights)
         drawn = PlainDraw(numerics.systematic).resample(key, particles, weights, logs, n, gradient)
         themselves = jnp.arange(n, dtype=drawn.ancestors.dtype)
         return Resampled(
@@ -49,7 +49,7 @@ class Transport(AbstractResampling):
             jnp.where(converged, code(Result.successful), code(Result.transport_not_converged)),
         )
 
-    def moved(self, particles: Any, weights: Any) -> tuple[Any, Any]:
+    def move_particles(self, particles: Any, weights: Any) -> tuple[Any, Any]:
         """The particles, (N,) in each field, moved to where equal weights say the same, and whether the plan converged."""
         fields = jnp.stack(particles)
         overall = numerics.sqrt(jnp.var(fields, axis=1, keepdims=True))

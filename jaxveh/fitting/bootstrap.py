@@ -56,18 +56,18 @@ def bootstrap(
             f"bootstrap: the data have {group.max() + 1} parts to be drawn anew (rows, runs or recordings): must be at least "
             f"{LEAST_UNITS}."
         )
-    return _drawn(problem, key, jnp.asarray(group), int(group.max()) + 1, count, max_steps, tolerance)
+    return _bootstrap(problem, key, jnp.asarray(group), int(group.max()) + 1, count, max_steps, tolerance)
 
 
 @eqx.filter_jit
-def _drawn(problem, key, group, groups: int, count: int, max_steps: int, tolerance: float) -> Bootstrap:
+def _bootstrap(problem, key, group, groups: int, count: int, max_steps: int, tolerance: float) -> Bootstrap:
     fit = lambda problem, start: optimum(problem, start, max_steps=max_steps, tolerance=tolerance)
     whole = fit(problem, lax.stop_gradient(problem.start())).z
 
     def once(key):
         drawn = jax.random.randint(key, (groups,), 0, groups)
         times = jnp.zeros(groups, whole.dtype).at[drawn].add(1)
-        found = fit(problem.counted(times[group]), whole)
+        found = fit(problem.with_counts(times[group]), whole)
         return jnp.stack(in_units(problem.chosen, problem.line(found.z))), found.converged
 
     values, converged = jax.vmap(once)(jax.random.split(key, count))

@@ -81,14 +81,14 @@ class LevenbergMarquardt(optx.AbstractMinimiser):
 
     def terminate(self, fn, y, args, options, state, tags):
         """Where it is done, or has taken as many steps as `limit` says."""
-        return ended(state, options)
+        return termination(state, options)
 
     def postprocess(self, fn, y, aux, args, options, state, tags, result):
         """The last point is the best."""
         return y, aux, {}
 
 
-def ended(state, options):
+def termination(state, options):
     """Whether a search is over, and with which result of optimistix."""
     spent = state.steps >= options["limit"] if "limit" in options else jnp.asarray(False)
     reached = optx.RESULTS.nonlinear_max_steps_reached

@@ -15,8 +15,8 @@ from jax import lax
 from jaxveh._core.parameter import Parameter, Where, pick, put
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, picked
-from jaxveh.fitting.recorded import listed, spread_on_line
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, scalar_parameters
+from jaxveh.fitting.recorded import as_list, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.solve import solve
 from jaxveh.statespace import StateSpace
@@ -47,11 +47,11 @@ class LikelihoodProblem(AbstractProblem):
     def line(self, z):
         return z
 
-    def filled(self, z):
+    def model_at(self, z):
         return put(self.model, self.chosen, in_units(self.chosen, z))
 
     def cost(self, z):
-        model = self.filled(z)
+        model = self.model_at(z)
         estimates = [scan(self.filter, model, part, self.key) for part in self.rows]
         each = jnp.stack([estimate.log_likelihood for estimate in estimates])
         total = 0.5 * jnp.sum(((z - self.centre) / self.spread) ** 2) - jnp.sum(self.counts * each)
@@ -66,13 +66,13 @@ class LikelihoodProblem(AbstractProblem):
     def covariance(self, z):
         return jnp.linalg.inv(hessian(self.cost, z)), jnp.ones(z.shape, bool)
 
-    def failed(self, cost):
+    def is_failure(self, cost):
         return cost >= REJECTED
 
     def units(self):
         return len(self.rows)
 
-    def counted(self, counts):
+    def with_counts(self, counts):
         return dataclasses.replace(self, counts=counts)
 
 
@@ -105,8 +105,8 @@ def pose_likelihood(
 ) -> LikelihoodProblem:
     """What `maximum_likelihood` solves, for `solve`; arguments and errors as there."""
     filter.check(model)
-    rows = tuple(model.rows(recording) for recording in listed(recordings))
-    chosen = picked(model, where)
+    rows = tuple(model.rows(recording) for recording in as_list(recordings))
+    chosen = scalar_parameters(model, where)
     values = pick(model, chosen)
     centre = on_line(chosen, values)
     spread = spread_on_line(chosen, values, prior)

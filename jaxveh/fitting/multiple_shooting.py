@@ -15,7 +15,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive, is_concrete
 from jaxveh._core.parameter import Parameter, Where, pick, put
 from jaxveh._core.recording import Recording
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, picked
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, scalar_parameters
 from jaxveh.fitting.recorded import spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.segments import Segments, cut
@@ -62,7 +62,7 @@ class ShootingProblem(AbstractProblem):
         """The states at the start of each segment: an array (K,) each."""
         return list(z[len(self.chosen) :].reshape(len(self.states), -1))
 
-    def filled(self, z):
+    def model_at(self, z):
         values = in_units(self.chosen, self.line(z))
         if self.model.chosen is None:
             return put(self.model, self.chosen, values)
@@ -84,14 +84,14 @@ class ShootingProblem(AbstractProblem):
         inverse = jax.scipy.linalg.solve_triangular(root, jnp.eye(p, dtype=root.dtype))
         return inverse @ inverse.T, jnp.ones((p,), bool)
 
-    def failed(self, cost):
+    def is_failure(self, cost):
         # Residuals at their limit do not move with the unknowns: the solver takes a diverged start for an optimum.
         return cost >= 0.5 * LARGEST_RESIDUAL**2
 
     def units(self):
         return self.counts.shape[0]
 
-    def counted(self, counts):
+    def with_counts(self, counts):
         return dataclasses.replace(self, counts=counts)
 
 
@@ -111,7 +111,7 @@ def pose_shooting(
         raise InputError("multiple_shooting: the model's parameters are states already; leave `where` out.")
     known = None
     if model.chosen is None:
-        chosen = picked(model, where)
+        chosen = scalar_parameters(model, where)
         _check_inside(chosen)
         values = pick(model, chosen)
         centre = on_line(chosen, values)
@@ -199,7 +199,7 @@ def _simulate(problem: ShootingProblem, z, starts):
     count = segments.first.shape[0]
     wide = lambda value: jnp.broadcast_to(value, (count,))
     if model.chosen is None:
-        model, state = problem.filled(z), type(model.prior.mean)(*starts)
+        model, state = problem.model_at(z), type(model.prior.mean)(*starts)
     else:
         state = model.chosen.joint_type(*starts, *map(wide, problem.line(z)))
     noise = model.measurement_noise

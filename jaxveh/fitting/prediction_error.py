@@ -18,8 +18,8 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
 from jaxveh.fitting.levenberg_marquardt import Quadratic
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, picked
-from jaxveh.fitting.recorded import listed, spread_on_line
+from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, scalar_parameters
+from jaxveh.fitting.recorded import as_list, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.scoring import FisherScoring
 from jaxveh.fitting.solve import fit_at, solve
@@ -74,7 +74,7 @@ class PredictionErrorProblem(AbstractProblem):
     def line(self, z):
         return z
 
-    def filled(self, z):
+    def model_at(self, z):
         return put(self.model, self.chosen, in_units(self.chosen, z))
 
     def cost(self, z):
@@ -91,18 +91,18 @@ class PredictionErrorProblem(AbstractProblem):
     def covariance(self, z):
         return uncertainty(quadratic(z, self))
 
-    def failed(self, cost):
+    def is_failure(self, cost):
         return ~jnp.isfinite(cost)
 
     def units(self):
         return self.rows.t.shape[0]
 
-    def counted(self, counts):
+    def with_counts(self, counts):
         return dataclasses.replace(self, counts=counts)
 
     def parts(self, z) -> Parts:
         """What the cost at z is made of."""
-        model = self.filled(z)
+        model = self.model_at(z)
         if self.target is None:
             return jax.vmap(lambda rows: self._one(model, rows, None))(self.rows)
         return jax.vmap(lambda rows, values: self._one(model, rows, values))(self.rows, self.target.values)
@@ -115,9 +115,9 @@ class PredictionErrorProblem(AbstractProblem):
         # The normal law's constant stands with each measurement, so that the cost is the likelihood's.
         levels = jnp.where(present, jnp.stack(estimate.info.log_scale, axis=1), 0)
         constant = 0.5 * LOG_2PI * jnp.sum(present, dtype=white.dtype)
-        return Parts(white, levels, self._supervised(estimate, values, counts, white.dtype), constant)
+        return Parts(white, levels, self._target_residuals(estimate, values, counts, white.dtype), constant)
 
-    def _supervised(self, estimate, values, counts, dtype):
+    def _target_residuals(self, estimate, values, counts, dtype):
         if values is None:
             return jnp.zeros((0,), dtype)
         known = jnp.isfinite(values) & counts
@@ -190,13 +190,13 @@ def pose_prediction_error(
     warm_up: int = 0,
 ) -> PredictionErrorProblem:
     """What `prediction_error` solves, for `solve`; arguments and errors as there."""
-    recordings = listed(recordings)
+    recordings = as_list(recordings)
     if len({len(recording) for recording in recordings}) != 1:
         raise InputError("recordings: must be one or several of the same number of rows; cut them to one length.")
     if (mixture := kit.who_lacks(filter, "whitens")) is not None:
         raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
     filter.check(model)
-    chosen = picked(model, where)
+    chosen = scalar_parameters(model, where)
     rows = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[model.rows(recording) for recording in recordings])
     means = pick(model if centre is None else centre, chosen)
     line = on_line(chosen, means)
@@ -260,7 +260,7 @@ def _stepwise(problem: PredictionErrorProblem, max_steps: int, tolerance: float,
         z, state = _block(problem, z, state, tolerance, jnp.asarray(limit))
         best = -float(state.at.cost)
         progress(int(state.steps), max_steps, f"fit: step {int(state.steps)}, log-posterior {best:.1f}")
-    return _concluded(problem, SearchEnd(z, state.steps, state.done), state.at)
+    return _conclude(problem, SearchEnd(z, state.steps, state.done), state.at)
 
 
 @eqx.filter_jit
@@ -269,7 +269,7 @@ def _block(problem: PredictionErrorProblem, z, state, tolerance: float, limit):
 
 
 @eqx.filter_jit
-def _concluded(problem: PredictionErrorProblem, found: SearchEnd, at: Quadratic) -> Fit:
+def _conclude(problem: PredictionErrorProblem, found: SearchEnd, at: Quadratic) -> Fit:
     return fit_at(problem, found, at.cost, uncertainty(at))
 
 

@@ -53,11 +53,11 @@ class AbstractProblem(eqx.Module):
         """The covariance (p, p) of the parameters on their line at an optimum, and which of them (p,) the data know."""
 
     @abc.abstractmethod
-    def filled(self, z) -> Any:
+    def model_at(self, z) -> Any:
         """The model with the parameters at z in place."""
 
     @abc.abstractmethod
-    def failed(self, cost) -> Any:
+    def is_failure(self, cost) -> Any:
         """Whether this cost is no optimum's, such as a diverged simulation's."""
 
     @abc.abstractmethod
@@ -65,7 +65,7 @@ class AbstractProblem(eqx.Module):
         """How many parts the data have that could be drawn anew, one by one: rows of rig data, recordings."""
 
     @abc.abstractmethod
-    def counted(self, counts) -> "AbstractProblem":
+    def with_counts(self, counts) -> "AbstractProblem":
         """The problem in which each part of the data counts so many times, (units,)."""
 
 
@@ -74,7 +74,7 @@ def by_name(chosen: tuple[Parameter, ...], values) -> Parameters:
     return Parameters({p.name: value for p, value in zip(chosen, values, strict=True)})
 
 
-def picked(model: Any, where: Where) -> tuple[Parameter, ...]:
+def scalar_parameters(model: Any, where: Where) -> tuple[Parameter, ...]:
     """The scalar parameters that `where` picks from a model.
 
     **Raises** `InputError` as `resolve`, and for arrays.

@@ -12,7 +12,7 @@ from jaxveh._core.parameter import Parameter, prior_spread
 from jaxveh._core.recording import Recording
 
 
-def listed(recordings: Recording | Sequence[Recording]) -> list[Recording]:
+def as_list(recordings: Recording | Sequence[Recording]) -> list[Recording]:
     """One recording or several, as a list; raises `InputError` for none."""
     recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not recordings:

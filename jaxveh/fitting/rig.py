@@ -16,11 +16,11 @@ from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, resolve
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.progress import Progress, silent
-from jaxveh.fitting.problem import SearchEnd, by_name, on_line, picked
+from jaxveh.fitting.problem import SearchEnd, by_name, on_line, scalar_parameters
 from jaxveh.fitting.result import AbstractFit
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
 from jaxveh.fitting.rig_identify import settle, without
-from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered, spread_of
+from jaxveh.fitting.rig_problem import PULL, RigProblem, contact_of, offered_forces, spread_of
 from jaxveh.fitting.rig_robust import inflation
 from jaxveh.fitting.rig_stages import HELD_COEFFICIENTS, Stage, stages_of
 from jaxveh.fitting.solve import fit_at
@@ -111,10 +111,10 @@ def fit_rig(
     `FilterError` where the joint fit does not converge, unless `throw=False`.
     """
     check_at_least("max_steps", max_steps, 1)
-    data, plan, aside = _prepared(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
+    data, plan, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
     parts = fold_of(rig, folds) if folds else np.full(rig.load.shape, -1)
     joint = _joint(data)
-    plan = [*(plan if staged else ()), without(joint, _held(data, aside), data.names)]
+    plan = [*(plan if staged else ()), without(joint, _held_mask(data, aside), data.names)]
     total = len(plan) + folds
     tyre, reports = law, []
     for k, stage in enumerate(plan):
@@ -124,7 +124,7 @@ def fit_rig(
     settled = settle(data, law, tyre, joint, aside, reports[-1])
     tyre, reports[-1] = settled.tyre, settled.report
     plan = [without(stage, settled.held, data.names) for stage in plan]
-    missed = _missed(data, law, plan, parts, lambda k: progress(len(plan) + k, total, "cross-validation"))
+    missed = _missed_residuals(data, law, plan, parts, lambda k: progress(len(plan) + k, total, "cross-validation"))
     progress(total, total, JOINT)
     validation = rms(data.channels, missed) if folds else dict.fromkeys(data.channels, np.nan)
     if throw and not reports[-1].converged:
@@ -138,7 +138,7 @@ def _check_free(free: Sequence[str], plan: list[Stage]) -> None:
     check_names("free", dict.fromkeys(free), there)
 
 
-def _held(data: RigData, aside: Sequence[str]) -> np.ndarray:
+def _held_mask(data: RigData, aside: Sequence[str]) -> np.ndarray:
     return np.array([name in aside for name in data.names])
 
 
@@ -161,7 +161,7 @@ def pose_rig(
     `noise`: standard deviations by channel; by default those of the law's own residuals, so that a problem at a fitted law has
     the fit's. Other arguments and errors as in `fit_rig`.
     """
-    data, _, aside = _prepared(law, rig, where, free, prior, measured, weights, bounds, robust)
+    data, _, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust)
     levels = data.noise(law) if noise is None else dict(noise)
     check_names("noise", levels, data.channels)
     missing = [name for name in data.channels if name not in levels]
@@ -169,10 +169,10 @@ def pose_rig(
         raise InputError(f"noise: no standard deviation for {', '.join(missing)}.")
     for name, level in levels.items():
         check_positive(f"noise[{name!r}]", level)
-    return data.problem(law, without(_joint(data), _held(data, aside), data.names), levels)
+    return data.problem(law, without(_joint(data), _held_mask(data, aside), data.names), levels)
 
 
-def _prepared(
+def _prepare(
     law, rig, where, free, prior, measured, weights, bounds, robust, max_steps: int = 500, tolerance: float = 1e-6
 ) -> tuple[RigData, list[Stage], tuple[str, ...]]:
     """The data as all stages share them, after every check, the stages before the joint one, and what is held unless asked."""
@@ -182,7 +182,7 @@ def _prepared(
     check_names("weights", extra, channels)
     for name, weight in extra.items():
         check_positive(f"weights[{name!r}]", weight)
-    chosen = None if where is None else tuple(p.name for p in picked(law, where))
+    chosen = None if where is None else tuple(p.name for p in scalar_parameters(law, where))
     plan = stages_of(law, rig, channels, chosen, free)
     _check_free(free, plan)
     aside = tuple(name for stage in plan for name in stage.aside)
@@ -201,16 +201,16 @@ def _joint(data: RigData) -> Stage:
     return Stage(JOINT, data.channels, data.names, np.ones(data.rig.load.shape, bool))
 
 
-def _missed(data, law, plan, parts, told):
+def _missed_residuals(data, law, plan, parts, told):
     """Residuals at rows that a fold's fit did not see, by the fold of each row, `parts` (-1: of none); nan without one."""
     missed = np.full(data.measured.shape, np.nan)
     for k in range(int(parts.max()) + 1):
         told(k)
-        missed[:, parts == k] = _unseen(data, law, plan, parts == k)[:, parts == k]
+        missed[:, parts == k] = _unseen_residuals(data, law, plan, parts == k)[:, parts == k]
     return missed
 
 
-def _unseen(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarray) -> np.ndarray:
+def _unseen_residuals(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarray) -> np.ndarray:
     """Residuals (m, n) of a fit from the same start that did not see some rows."""
     rest = data.without(rows)
     for stage in plan:
@@ -220,7 +220,7 @@ def _unseen(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarra
 
 
 def _channels(law: AbstractTyre, rig: RigTable, contact: Any, measured: Sequence[str] | None) -> tuple[str, ...]:
-    has = offered(law, contact)
+    has = offered_forces(law, contact)
     there = tuple(name for name in kit.RIG_CHANNELS if getattr(rig, name) is not None)
     if measured is None:
         found = tuple(name for name in there if name in has)
@@ -258,7 +258,7 @@ def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None)
 def _result(data: RigData, law, joint: Stage, held: np.ndarray, reports, start_rmse, validation) -> RigFit:
     noise, last = data.noise(law), reports[-1]
     problem = _as_uncertain(data.problem(law, joint, noise), held, joint.coefficients)
-    fit, known = _summed_up(problem, jnp.asarray(last.steps), jnp.asarray(last.converged))
+    fit, known = _summary(problem, jnp.asarray(last.steps), jnp.asarray(last.converged))
     # The noise is that of the fit, with the degrees of freedom that coefficients take.
     count = int(data.present.sum())
     factor = count / (count - int((~held).sum()))
@@ -303,7 +303,7 @@ def _as_uncertain(problem: RigProblem, held: np.ndarray, names: Sequence[str]) -
 
 
 @eqx.filter_jit
-def _summed_up(problem: RigProblem, steps, converged):
+def _summary(problem: RigProblem, steps, converged):
     """The fit that ended where the problem starts, and how many directions of the coefficients the data identify."""
     found = SearchEnd(problem.start(), steps, converged)
     return fit_at(problem, found, problem.cost(found.z), problem.covariance(found.z)), spread_of(found.z, problem)[1]

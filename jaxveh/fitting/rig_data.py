@@ -105,9 +105,9 @@ class RigData:
     def parameters(self, law: AbstractTyre) -> tuple[Parameter, ...]:
         """What is fitted, with its bounds."""
         found = resolve(law, lambda law: [leaf_of(law, name) for name in self.names])
-        return tuple(self._bounded(law, p) for p in found)
+        return tuple(self._with_bounds(law, p) for p in found)
 
-    def _bounded(self, law: AbstractTyre, p: Parameter) -> Parameter:
+    def _with_bounds(self, law: AbstractTyre, p: Parameter) -> Parameter:
         if p.name not in self.chosen.bounds:
             return p
         low, high = self.chosen.bounds[p.name]
@@ -173,7 +173,7 @@ class RigData:
     def loss(self, law: AbstractTyre, stage: Stage, noise: Mapping[str, float]) -> float:
         """What the stage minimises, for several laws by the same noise; infinite where a force is not finite."""
         problem = self.problem(law, stage, noise)
-        bent = problem.bent(problem.weight * jnp.asarray(np.where(self._counts(stage), self.residuals(law), 0.0)))[0]
+        bent = problem.bend(problem.weight * jnp.asarray(np.where(self._counts(stage), self.residuals(law), 0.0)))[0]
         return float(np.nan_to_num(jnp.sum(problem.emphasis[:, None] * bent**2), nan=np.inf))
 
     def _counts(self, stage: Stage) -> np.ndarray:
@@ -204,8 +204,8 @@ class RigData:
         steps, alone = 0, not self.chosen.robust and len(stage.channels) == 1
         while steps < most:
             problem, limit = self.problem(law, stage, self.noise(law)), min(ROUND, most - steps)
-            found, lowered = _descended(problem, jnp.asarray(limit), self.chosen.tolerance)
-            law, steps = problem.filled(found.z), steps + int(found.steps)
+            found, lowered = _descend(problem, jnp.asarray(limit), self.chosen.tolerance)
+            law, steps = problem.model_at(found.z), steps + int(found.steps)
             if 2 * float(lowered) < SETTLED or (alone and bool(found.converged)):
                 return law, steps, True
         return law, steps, False
@@ -222,10 +222,10 @@ def starts_of(law: AbstractTyre, stage: Stage, bounds: Mapping[str, tuple[float,
     for name, values in stage.starts:
         low, high = bounds.get(name, (-np.inf, np.inf))
         choices.append([(name, value) for value in (None, *values) if value is None or low < value < high])
-    return [_started(law, one) for one in itertools.product(*choices)][1:]
+    return [_start_from(law, one) for one in itertools.product(*choices)][1:]
 
 
-def _started(law: AbstractTyre, start: Sequence[tuple[str, float | None]]) -> AbstractTyre:
+def _start_from(law: AbstractTyre, start: Sequence[tuple[str, float | None]]) -> AbstractTyre:
     for name, value in start:
         law = law if value is None else with_leaf(law, name, value)
     return law
@@ -244,7 +244,7 @@ def fold_of(rig: RigTable, folds: int) -> np.ndarray:
 
 
 @eqx.filter_jit
-def _descended(problem: RigProblem, limit, tolerance: float) -> Descent:
+def _descend(problem: RigProblem, limit, tolerance: float) -> Descent:
     """So many steps from where the law is: a block between which the host looks at the noise."""
     return descend(problem, problem.start(), None, tolerance, limit)
 

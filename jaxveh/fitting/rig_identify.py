@@ -49,7 +49,7 @@ def settle(
     """
     names = joint.coefficients
     held = np.array([name in aside for name in names])
-    fixed = _fixed(data, without(joint, held, names))
+    fixed = _fixed_signs(data, without(joint, held, names))
     if isinstance(tyre, MFTyre) and isinstance(start, MFTyre):
         found, steps = _below_one(data, tyre, without(joint, held, names))
         assert isinstance(found, MFTyre)
@@ -57,7 +57,7 @@ def settle(
         report = report._replace(steps=report.steps + steps)
     kept = np.zeros(held.shape, bool)
     while True:
-        found = _unseen(data, start, tyre, joint, held, kept)
+        found = _unidentified_coefficients(data, start, tyre, joint, held, kept)
         if not found:
             break
         tyre, held, kept, report = _hold(data, start, tyre, joint, (held, kept), found, report)
@@ -71,7 +71,7 @@ def without(stage: Stage, held: np.ndarray, names: tuple[str, ...]) -> Stage:
     return stage._replace(coefficients=tuple(name for name in stage.coefficients if name not in still))
 
 
-def _fixed(data: RigData, joint: Stage) -> list[str]:
+def _fixed_signs(data: RigData, joint: Stage) -> list[str]:
     """What may not change its sign: coefficients that are not fitted, and those with bounds."""
     from_file = [f"{section}.{name}" for section, part in _sections() for name in part]
     return [name for name in from_file if name not in joint.coefficients or name in data.chosen.bounds]
@@ -102,7 +102,9 @@ def _below_one(data: RigData, tyre: AbstractTyre, joint: Stage) -> tuple[Abstrac
     return tyre, steps
 
 
-def _unseen(data: RigData, start, tyre, joint: Stage, held: np.ndarray, kept: np.ndarray) -> list[int]:
+def _unidentified_coefficients(
+    data: RigData, start, tyre, joint: Stage, held: np.ndarray, kept: np.ndarray
+) -> list[int]:
     """Which coefficients the data do not identify, the least known first; each next one where those before are held.
 
     By the Gauss-Newton matrix: holding one conditions the others on it, and what was confounded with it may be known then.

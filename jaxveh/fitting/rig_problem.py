@@ -73,20 +73,20 @@ class RigProblem(AbstractProblem):
         # A standard error above one step, a coefficient's own size, is the pull's.
         return spread * self.scale * self.scale[:, None], jnp.diagonal(spread) <= 1.0
 
-    def failed(self, cost):
+    def is_failure(self, cost):
         return jnp.asarray(False)
 
     def units(self):
         return self.measured.shape[1]
 
-    def counted(self, counts):
+    def with_counts(self, counts):
         return dataclasses.replace(self, weight=self.weight * jnp.sqrt(counts))
 
     def values(self, z):
         """Coefficients (p,) at the coordinates z (p,)."""
         return in_units(self.chosen, self.line(z))
 
-    def filled(self, z) -> AbstractTyre:
+    def model_at(self, z) -> AbstractTyre:
         """The law with the coefficients at z."""
         return put(self.law, self.chosen, self.values(z))
 
@@ -96,7 +96,7 @@ class RigProblem(AbstractProblem):
         like = self.measured[0]
         return jnp.stack([jnp.asarray(getattr(found, name), like.dtype) + 0 * like for name in self.channels])
 
-    def bent(self, residual):
+    def bend(self, residual):
         """Residuals in standard deviations, bent beyond `KINK` where the fit is robust, and the slope of the bend."""
         if not self.robust:
             return residual, jnp.ones_like(residual)
@@ -125,12 +125,12 @@ def descend(problem: RigProblem, z, max_steps: int | None, tolerance: float, lim
 
 def loss(z, problem: RigProblem):
     """Half the sum of squared residuals at the coordinates z (p,), in standard deviations, with the prior and the pull."""
-    difference = problem.weight * (problem.forces(problem.filled(z)) - problem.measured)
-    squares = jnp.sum(problem.bent(difference)[0] ** 2, axis=1)
-    return 0.5 * jnp.sum(problem.emphasis * squares) + _known_before(z, problem).cost
+    difference = problem.weight * (problem.forces(problem.model_at(z)) - problem.measured)
+    squares = jnp.sum(problem.bend(difference)[0] ** 2, axis=1)
+    return 0.5 * jnp.sum(problem.emphasis * squares) + _prior_loss(z, problem).cost
 
 
-def _known_before(z, problem: RigProblem) -> Quadratic:
+def _prior_loss(z, problem: RigProblem) -> Quadratic:
     """What the prior and the pull add to the loss."""
     off, rate = (problem.line(z) - problem.centre) / problem.spread, problem.scale / problem.spread
     cost = 0.5 * jnp.sum(off**2) + 0.5 * jnp.sum((problem.pull * z) ** 2)
@@ -150,7 +150,7 @@ def normal_equations(z, problem: RigProblem) -> Quadratic:
     def add(sums: Quadratic, some) -> tuple[Quadratic, None]:
         return jax.tree.map(jnp.add, sums, _of_data(z, block(some))), None
 
-    return lax.scan(add, _known_before(z, problem), table)[0]
+    return lax.scan(add, _prior_loss(z, problem), table)[0]
 
 
 def _of_data(z, problem: RigProblem) -> Quadratic:
@@ -163,7 +163,7 @@ def _of_data(z, problem: RigProblem) -> Quadratic:
         return problem.forces(put(problem.law, problem.chosen, values))
 
     found, pull = jax.vjp(channels, *(jnp.broadcast_to(line[i], (rows,)) for i in range(line.size)))
-    value, slope = problem.bent(problem.weight * (found - problem.measured))
+    value, slope = problem.bend(problem.weight * (found - problem.measured))
     gradient, matrix = jnp.zeros_like(z), jnp.zeros((z.size, z.size), z.dtype)
     for k in range(len(problem.channels)):
         # A row a coefficient: a Jacobian with its rows the other way round would be copied number by number.
@@ -242,7 +242,7 @@ def contact_of(rig) -> Contact:
     )
 
 
-def offered(law: AbstractTyre, contact: Contact) -> tuple[str, ...]:
+def offered_forces(law: AbstractTyre, contact: Contact) -> tuple[str, ...]:
     """The forces and moments that a law has (those that are no plain zero)."""
     one = jax.tree.map(lambda values: values[:1] if jnp.ndim(values) else values, contact)
     found = eqx.filter_eval_shape(law.forces, one)

@@ -75,7 +75,7 @@ class CoefficientGroup(NamedTuple):
     speed: str = ""
     asked: str = ""
 
-    def shown(self, varies: set[str], asked: Collection[str] = ()) -> tuple[str, ...]:
+    def identifiable(self, varies: set[str], asked: Collection[str] = ()) -> tuple[str, ...]:
         """Those that data show in which these inputs vary, and those among `asked`, by their full names."""
         found = self.always.split() + [name for name in self.asked.split() if f"{self.section}.{name}" in asked]
         for name in ("load", "camber", "pressure", "speed"):
@@ -170,7 +170,7 @@ def stages_of(
         # Rows of pure slip show its coefficients alone; without one that was measured, all rows have to do.
         seen = np.isfinite(getattr(rig, group.channel))
         rows = rows & seen if np.any(rows & seen) else seen
-        names = group.shown(varies, free if chosen is None else chosen)
+        names = group.identifiable(varies, free if chosen is None else chosen)
         names = names if chosen is None else tuple(name for name in names if name in chosen)
         if names:
             starts = tuple((one, STARTS[one]) for one in names if one in STARTS)

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import optimistix as optx
 
-from jaxveh.fitting.levenberg_marquardt import Quadratic, ended
+from jaxveh.fitting.levenberg_marquardt import Quadratic, termination
 
 FIRST_DAMPING, RAISED, LOWERED, LEAST_RAISED = 1e-2, 5.0, 0.2, 1e-3
 """Levenberg's damping at the start, its factors after a step that raised and one that lowered the cost, and its least value after
@@ -90,7 +90,7 @@ class FisherScoring(optx.AbstractMinimiser):
 
     def terminate(self, fn, y, args, options, state, tags):
         """Where it is done, or has taken as many steps as `limit` says."""
-        return ended(state, options)
+        return termination(state, options)
 
     def postprocess(self, fn, y, aux, args, options, state, tags, result):
         """The best point was kept."""

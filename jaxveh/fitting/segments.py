@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
-from jaxveh.fitting.recorded import listed
+from jaxveh.fitting.recorded import as_list
 from jaxveh.statespace import Row, StateSpace
 
 
@@ -31,7 +31,7 @@ def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: 
 
     Raises `InputError` for a window that is not positive, or shorter than two steps.
     """
-    recordings = listed(recordings)
+    recordings = as_list(recordings)
     time = np.asarray(recordings[0].time)
     length = round(window / float(np.median(np.diff(time)))) if window > 0 and len(time) > 1 else 0
     if length < 2:

@@ -81,7 +81,7 @@ def fit_at(problem: AbstractProblem, found: SearchEnd, cost, uncertainty: tuple[
     known = known & (variance > 0)
     slopes = jnp.stack([p.domain.slope(value) for p, value in zip(chosen, values, strict=True)])
     std = jnp.where(known, jnp.abs(slopes) * jnp.sqrt(jnp.where(known, variance, 1.0)), jnp.nan)
-    well = found.converged & ~problem.failed(cost)
+    well = found.converged & ~problem.is_failure(cost)
     finite = jnp.all(jnp.isfinite(found.z)) & jnp.isfinite(cost)
     result = jnp.where(well, code(Result.successful), code(Result.not_converged))
     return Fit(
@@ -92,6 +92,6 @@ def fit_at(problem: AbstractProblem, found: SearchEnd, cost, uncertainty: tuple[
         cost=cost,
         steps=found.steps,
         result=jnp.where(finite, result, code(Result.non_finite_state)),
-        model=problem.filled(found.z),
+        model=problem.model_at(found.z),
         chosen=chosen,
     )

@@ -204,13 +204,13 @@ def _value(key: str, value: Any, folder: Path) -> Any:
 
 def _build(kind: type, values: Mapping[str, Any]) -> Any:
     """The dataclass; names every required key that is missing at once."""
-    missing = [entry.name for entry in fields(kind) if _required(entry) and entry.name not in values]
+    missing = [entry.name for entry in fields(kind) if _is_required(entry) and entry.name not in values]
     if missing:
         raise InputError(f"missing key(s): {', '.join(missing)}.")
     return kind(**values)
 
 
-def _required(entry: Any) -> bool:
+def _is_required(entry: Any) -> bool:
     return entry.default is MISSING
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxveh._core.errors import InputError, check, check_finite, check_one_of
-from jaxveh.io.toml import check_keys, read_toml, shortened, toml_number, toml_text
+from jaxveh.io.toml import check_keys, read_toml, shorten, toml_number, toml_text
 
 CHANNEL_MAP_SCHEMA = """\
 # A channel map. Everything but `column` is optional.
@@ -111,7 +111,7 @@ def _entry(where: str, entry: Any) -> Channel:
         raise InputError(f'{where}: has no `column`; add column = "NAME IN THE FILE".')
     group = entry.get("group")
     if group is not None and (isinstance(group, bool) or not isinstance(group, int) or not 0 <= group < MOST_GROUPS):
-        raise InputError(f"{where}: group = {shortened(group)}: must be a whole number from 0 to {MOST_GROUPS - 1}.")
+        raise InputError(f"{where}: group = {shorten(group)}: must be a whole number from 0 to {MOST_GROUPS - 1}.")
     try:
         return Channel(
             column=toml_text(f"{where}: column", entry["column"]),

@@ -14,7 +14,7 @@ from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable
 from jaxveh.io.naming import check_known
 from jaxveh.io.optional import require
-from jaxveh.io.toml import shortened
+from jaxveh.io.toml import shorten
 
 TYRE_COEFFICIENTS = (
     *("p_cx1", "p_dx1", "p_dx3", "p_ex1", "p_kx1", "p_hx1", "p_vx1", "r_bx1", "r_bx2", "r_cx1", "r_ex1", "r_hx1"),
@@ -175,5 +175,5 @@ def _number(name: str, value: Any, low: float, high: float, allowed: str) -> flo
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (math.isfinite(number) and low <= number <= high):
-        raise InputError(f"{name} = {shortened(value)}: must be {allowed}.")
+        raise InputError(f"{name} = {shorten(value)}: must be {allowed}.")
     return number

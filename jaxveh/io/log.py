@@ -14,7 +14,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import Channel
 from jaxveh.io.decimals import decimal
 from jaxveh.io.naming import check_known, listing
-from jaxveh.io.toml import shortened
+from jaxveh.io.toml import shorten
 from jaxveh.io.units import convert, is_unit
 
 TIME_NAMES = ("time", "timestamps", "timestamp", "t")
@@ -144,4 +144,4 @@ def _cell(cell, row: int, what: str) -> float:
             if comma
             else "Correct the cell, or leave the column out by naming the others in a channel map."
         )
-        raise InputError(f"{what}, data row {row + 1}: {shortened(cell)} is not a number. {advice}") from error
+        raise InputError(f"{what}, data row {row + 1}: {shorten(cell)} is not a number. {advice}") from error

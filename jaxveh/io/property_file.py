@@ -47,7 +47,7 @@ class Entry:
     quoted: bool = False
 
     @property
-    def shown(self) -> str:
+    def short_value(self) -> str:
         """The value for a message, shortened."""
         text = repr(self.value)
         return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
@@ -104,7 +104,9 @@ class PropertyFile:
                 )
             return default
         if isinstance(entry.value, str):
-            raise InputError(f"{self.source}, line {entry.line}: {key} = {entry.shown}: must be one finite number.")
+            raise InputError(
+                f"{self.source}, line {entry.line}: {key} = {entry.short_value}: must be one finite number."
+            )
         return entry.value
 
     def text(self, key: str, default: str = "") -> str:
@@ -122,7 +124,7 @@ class PropertyFile:
         known, said = PROPERTY_UNITS[quantity], str(entry.value).strip().lower()
         if said not in known:
             raise InputError(
-                f"{self.source}, line {entry.line}: {quantity} = {entry.shown}: must be one of {', '.join(known)}."
+                f"{self.source}, line {entry.line}: {quantity} = {entry.short_value}: must be one of {', '.join(known)}."
             )
         return known[said]
 
@@ -148,7 +150,7 @@ def _one(source: str, key: str, entries: list[Entry]) -> Entry | None:
     """The first of the entries that have a value. **Raises** `InputError` where they disagree."""
     told = [entry for entry in entries if entry.value != ""]
     if len({str(entry.value) for entry in told}) > 1:
-        places = ", ".join(f"{e.shown} in [{e.section}], line {e.line}" for e in told)
+        places = ", ".join(f"{e.short_value} in [{e.section}], line {e.line}" for e in told)
         raise InputError(f"{source}: {key} has several values: {places}. Leave one.")
     return told[0] if told else None
 
@@ -177,7 +179,7 @@ def parse_property_file(text: str, source: str = "property file") -> PropertyFil
     for number, line in enumerate(lines, start=1):
         # A byte order mark must not hide the first heading, which may be that of the units.
         bare = line.rstrip("\r\n").removeprefix("\ufeff" if number == 1 else "")
-        if heading := _SECTION.match(_uncommented(bare)):
+        if heading := _SECTION.match(_without_comment(bare)):
             section = heading["name"].strip().upper()
             continue
         entry = _ENTRY.match(bare)
@@ -203,7 +205,7 @@ def write_property_file(file: PropertyFile, path: str | Path, *, overwrite: bool
         out.write("".join(file.lines))
 
 
-def _uncommented(line: str) -> str:
+def _without_comment(line: str) -> str:
     return re.split(r"[$!]", line, maxsplit=1)[0]
 
 

@@ -42,11 +42,11 @@ def toml_number(where: str, value: object) -> float:
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise InputError(f"{where} = {shortened(value)}: must be a finite number.")
+        raise InputError(f"{where} = {shorten(value)}: must be a finite number.")
     return number
 
 
-def shortened(value: object) -> str:
+def shorten(value: object) -> str:
     """A value for a message: a stranger's may be pages long."""
     shown = repr(value)
     return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}..."

@@ -15,7 +15,7 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh.io.decimals import decimal
 from jaxveh.io.files import check_readable
-from jaxveh.io.toml import shortened
+from jaxveh.io.toml import shorten
 
 MISSING = ("NOTAVAIL", "NAN")
 """What stands in place of a number that was not measured."""
@@ -157,7 +157,7 @@ def _number(cell: str, line: int, source: str) -> float:
         return decimal(cell)
     except ValueError:
         raise InputError(
-            f"{source}, line {line}: {shortened(cell)} is not a number ({MISSING[0]} is a missing one)."
+            f"{source}, line {line}: {shorten(cell)} is not a number ({MISSING[0]} is a missing one)."
         ) from None
 
 

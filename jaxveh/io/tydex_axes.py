@@ -77,7 +77,7 @@ class _Rig:
             raise InputError(f"{where} = {channel.values!r}: must be a number.")
         return np.broadcast_to(np.asarray(channel.values) * known[channel.unit.casefold()], self.rows).copy()
 
-    def needed(self, name: str, kind: str, for_what: str) -> np.ndarray:
+    def require(self, name: str, kind: str, for_what: str) -> np.ndarray:
         found = self.quantity(name, kind)
         if found is None:
             raise InputError(
@@ -101,22 +101,22 @@ class _Rig:
             if (found := self.quantity(name, "force")) is not None:
                 return found
         if not self.centre:
-            return self._refused(f"F{axis}")
+            return self._refuse(f"F{axis}")
         found = self.quantity(f"F{axis}H", "force")
-        return self._turned("F", axis, "force") if found is None else found
+        return self._rotate("F", axis, "force") if found is None else found
 
     def moment(self, axis: str) -> np.ndarray | None:
         for name in (f"M{axis}W", f"M{axis}"):
             if (found := self.quantity(name, "moment")) is not None:
                 return found
         if not self.centre:
-            return self._refused(f"M{axis}")
+            return self._refuse(f"M{axis}")
         name, found = f"M{axis}H", self.quantity(f"M{axis}H", "moment")
         if found is None:
-            name, found = f"M{axis}C", self._turned("M", axis, "moment")
+            name, found = f"M{axis}C", self._rotate("M", axis, "moment")
         return None if found is None else found + self._arm(axis, name)
 
-    def _refused(self, name: str) -> None:
+    def _refuse(self, name: str) -> None:
         """None where the file has no such quantity of the wheel's centre either; raises where it has."""
         for centre in (f"{name}H", f"{name}C"):
             if self.file.find(centre) is not None:
@@ -125,19 +125,19 @@ class _Rig:
                     "leave `axes` out (TYDEX is ISO-W), or leave it out of `measured`."
                 )
 
-    def _turned(self, kind: str, axis: str, unit: str) -> np.ndarray | None:
+    def _rotate(self, kind: str, axis: str, unit: str) -> np.ndarray | None:
         """A component in C axes, turned by the inclination angle about x."""
         name = f"{kind}{axis}C"
         found = self.quantity(name, unit)
         if found is None or axis == "X":
             return found
-        camber = self.needed("INCLANGL", "angle", name)
-        other = self.needed(f"{kind}{'Z' if axis == 'Y' else 'Y'}C", unit, name)
+        camber = self.require("INCLANGL", "angle", name)
+        other = self.require(f"{kind}{'Z' if axis == 'Y' else 'Y'}C", unit, name)
         return found * np.cos(camber) + (-other if axis == "Y" else other) * np.sin(camber)
 
     def _arm(self, axis: str, name: str) -> np.ndarray | float:
         """Moment about the contact point of the forces that act at the wheel's centre: radius vector times force."""
-        camber = self.needed("INCLANGL", "angle", name)
+        camber = self.require("INCLANGL", "angle", name)
         if axis == "Z" and not camber.any():
             return 0.0
         height, side = self._centre(camber, name)
@@ -150,9 +150,9 @@ class _Rig:
         """Height of the wheel's centre and its place to the left of the contact point, m."""
         height = self.quantity("DSTGRWHC", "length")
         if height is None:
-            height = self.needed("LOADRAD", "length", name) * np.cos(camber)
+            height = self.require("LOADRAD", "length", name) * np.cos(camber)
         return height, -height * np.tan(camber)
 
     def _needed_force(self, axis: str, name: str) -> np.ndarray:
         found = self.force(axis)
-        return self.needed(f"F{axis}W", "force", name) if found is None else found
+        return self.require(f"F{axis}W", "force", name) if found is None else found

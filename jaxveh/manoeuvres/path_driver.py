@@ -77,7 +77,7 @@ class PathDriver(AbstractDriver):
     def start(self, t: Any, motion: Motion) -> Any:
         """The steer that the arc to the point ahead needs in steady state."""
         curvature, needed = self._arc(motion)
-        return driver_state(self.state_names)(self._held(needed * curvature))
+        return driver_state(self.state_names)(self._limit(needed * curvature))
 
     def inputs(self, t: Any, motion: Motion, state: Any) -> DriverInputs:
         v_x, v_x_rate = self.speed.at(t)
@@ -87,7 +87,7 @@ class PathDriver(AbstractDriver):
     def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
         curvature, needed = self._arc(motion)
         now = motion.yaw_rate / regularised_speed(motion.v_x, _CRAWL)
-        wish = self._held(state.steer + self.gain * needed * (curvature - now))
+        wish = self._limit(state.steer + self.gain * needed * (curvature - now))
         rate = (wish - state.steer) / self.reaction_lag
         return driver_state(self.state_names)(smooth_clip(rate, -self.rate_limit, self.rate_limit, self.rate_limit / 8))
 
@@ -100,5 +100,5 @@ class PathDriver(AbstractDriver):
         curvature = 2.0 * target.left / jnp.where(square > 0, square, 1.0)
         return curvature, self.wheelbase + self.understeer_gradient * motion.v_x * motion.v_x
 
-    def _held(self, steer: jax.Array) -> jax.Array:
+    def _limit(self, steer: jax.Array) -> jax.Array:
         return smooth_clip(steer, -self.steer_limit, self.steer_limit, self.steer_limit / 8)

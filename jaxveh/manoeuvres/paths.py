@@ -59,7 +59,7 @@ class AbstractGraph(AbstractPath):
         _, slope = self._slope(x)
         along = distance * _cosine(slope)
         across = self.y(x + along) - y
-        return _turned(along, across, direction)
+        return _rotate(along, across, direction)
 
     def _slope(self, x):
         x = jnp.asarray(x)
@@ -70,7 +70,7 @@ def _cosine(slope):
     return 1.0 / jnp.sqrt(1.0 + slope * slope)
 
 
-def _turned(along, across, direction) -> PathTarget:
+def _rotate(along, across, direction) -> PathTarget:
     cosine, sine = numerics.cos(direction), numerics.sin(direction)
     return PathTarget(along * cosine + across * sine, across * cosine - along * sine)
 
@@ -160,7 +160,7 @@ class Circle(AbstractPath):
         turn_sine, turn_cosine = numerics.sin(further), numerics.cos(further)
         to_x = self.radius * (sine * turn_cosine + cosine * turn_sine)
         to_y = self.radius * (1.0 - (cosine * turn_cosine - sine * turn_sine))
-        return _turned(to_x - x, to_y - y, direction)
+        return _rotate(to_x - x, to_y - y, direction)
 
     def _angle(self, x, y):
         """Sine and cosine of the path's heading at the nearest point, and the distance from the centre."""

@@ -82,18 +82,18 @@ class SpeedControl(AbstractDriver):
         return driver_state(self.state_names)(*self.driver.start(t, motion), 0.0 * motion.v_x)
 
     def inputs(self, t: Any, motion: Motion, state: Any) -> PedalInputs:
-        u, wanted, _ = self._wanted(t, motion, state)
+        u, wanted, _ = self._pedal_inputs(t, motion, state)
         own = getattr(u, "drive_torque", 0.0) - getattr(u, "brake_torque", 0.0)
         torque, edge = self.mass * self.wheel_radius * wanted + own, self.mass * self.wheel_radius * _EDGE
         return PedalInputs(u.steer, u.v_x, u.v_x_rate, smooth_ramp(torque, edge), smooth_ramp(-torque, edge))
 
     def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
-        u, _, cut = self._wanted(t, motion, state)
+        u, _, cut = self._pedal_inputs(t, motion, state)
         free = 1.0 - smooth_step(jnp.abs(cut) / _EDGE)
         rate = free * self.gain * (u.v_x - motion.v_x) / self.integral_time
         return driver_state(self.state_names)(*self.driver.derivatives(t, motion, self._inner(state)), rate)
 
-    def _wanted(self, t, motion, state):
+    def _pedal_inputs(self, t, motion, state):
         """The driver's inputs, the acceleration that the pedals give, and how much of it the limits add."""
         u = self.driver.inputs(t, motion, self._inner(state))
         if not hasattr(u, "v_x"):

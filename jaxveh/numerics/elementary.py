@@ -42,25 +42,25 @@ def sin(x: ArrayLike) -> Array:
     as if the angle had been rounded once more (|x| times the unit roundoff), and stays in [-1, 1]; infinity gives
     NaN.
     """
-    return _sin(_floating(x))
+    return _sin(_as_floats(x))
 
 
 @jax.jit
 def cos(x: ArrayLike) -> Array:
     """Cosine of an angle in rad, any shape; ranges and errors as for `sin`."""
-    return _cos(_floating(x))
+    return _cos(_as_floats(x))
 
 
 @jax.jit
 def tan(x: ArrayLike) -> Array:
     """Tangent of an angle in rad, any shape: relative error below 4e-7 / 1e-15 for |x| <= pi, then slowly growing."""
-    return _tan(_floating(x))
+    return _tan(_as_floats(x))
 
 
 @jax.jit
 def arctan(x: ArrayLike) -> Array:
     """Arctangent in rad, any shape; every finite or infinite x. Absolute error below 2e-7 / 4e-16."""
-    return _arctan(_floating(x))
+    return _arctan(_as_floats(x))
 
 
 @jax.jit
@@ -76,7 +76,7 @@ def arctan2(y: ArrayLike, x: ArrayLike) -> Array:
 
 def sqrt(x: ArrayLike) -> Array:
     """Square root, any shape, correctly rounded; its derivative at 0 is 0 instead of infinite."""
-    return _sqrt(_floating(x))
+    return _sqrt(_as_floats(x))
 
 
 @jax.jit
@@ -94,7 +94,7 @@ def log(x: ArrayLike) -> Array:
 
     0 and subnormal numbers give -infinity, negative numbers NaN.
     """
-    return _log(_floating(x))
+    return _log(_as_floats(x))
 
 
 def log_of_normal(x: Array) -> Array:
@@ -120,7 +120,7 @@ def log_of_normal(x: Array) -> Array:
 # Types
 
 
-def _floating(x: ArrayLike) -> Array:
+def _as_floats(x: ArrayLike) -> Array:
     """As an array of floating point numbers; integers take the default type, as in `jax.numpy`."""
     x = jnp.asarray(x)
     if jnp.issubdtype(x.dtype, jnp.inexact):
@@ -161,7 +161,7 @@ def _reduced_sine(x: Array, half_turns: Array, sign: Array) -> Array:
     return sign * (r + r * t * q)
 
 
-def _alternating(count: Array) -> Array:
+def _alternating_sign(count: Array) -> Array:
     """(-1)^count of whole numbers."""
     half = 0.5 * count
     return 1.0 - 4.0 * (half - jnp.floor(half))
@@ -173,7 +173,7 @@ def _sin(x: Array) -> Array:
         return jnp.sin(x)
     x = _stored(x)
     count = jnp.round(x * (1 / math.pi))
-    return _reduced_sine(x, count, _alternating(count))
+    return _reduced_sine(x, count, _alternating_sign(count))
 
 
 @jax.custom_jvp
@@ -183,7 +183,7 @@ def _cos(x: Array) -> Array:
     x = _stored(x)
     # cos(r + pi / 2 + n pi) = -(-1)^n sin(r): the reduction subtracts n + 1/2 half turns.
     count = jnp.round(x * (1 / math.pi) - 0.5)
-    return _reduced_sine(x, count + 0.5, -_alternating(count))
+    return _reduced_sine(x, count + 0.5, -_alternating_sign(count))
 
 
 @jax.custom_jvp

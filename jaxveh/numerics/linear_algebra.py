@@ -60,7 +60,7 @@ def inverse_psd(factor: Array) -> Array:
         return jnp.swapaxes(inverse, -1, -2) @ inverse
     rows = _inverse_rows(factor)
     upper = [[_dot([row[i] for row in rows[j:]], [row[j] for row in rows[j:]]) for j in range(i, n)] for i in range(n)]
-    return _stacked([[upper[min(i, j)][abs(i - j)] for j in range(n)] for i in range(n)])
+    return _stack([[upper[min(i, j)][abs(i - j)] for j in range(n)] for i in range(n)])
 
 
 @jax.jit
@@ -137,7 +137,7 @@ def _from_rows(rows: Rows) -> Array:
     return jnp.stack([jnp.stack([*row, *[zero] * (len(rows) - len(row))], -1) for row in rows], -2)
 
 
-def _stacked(rows: Rows) -> Array:
+def _stack(rows: Rows) -> Array:
     return jnp.stack([jnp.stack(row, -1) for row in barrier(rows)], -2)
 
 

@@ -68,7 +68,7 @@ def residual(key: Array, weights: Array, n: int | None = None) -> Array:
     drawn = _search(parts, _sorted_parts(key, n, missing, total, weights.dtype))
     draw = jax.lax.iota(jnp.int32, n)
     children = certain.at[drawn].add((draw < missing).astype(jnp.int32), mode="promise_in_bounds")
-    return _ancestors(_cumulated(children), n)
+    return _ancestors(_cumulative_sum(children), n)
 
 
 @jax.jit
@@ -115,11 +115,11 @@ def _size(weights: Array, n: int | None) -> int:
 def _cumulated_parts(weights: Array) -> tuple[Array, Array]:
     """Cumulated weights in whole parts (N,), and their sum: 2^30 or 2^52 but for rounding."""
     parts = _as_parts(weights)
-    cumulated = barrier(_cumulated(parts))
+    cumulated = barrier(_cumulative_sum(parts))
     return cumulated, cumulated[-1]
 
 
-def _cumulated(values: Array) -> Array:
+def _cumulative_sum(values: Array) -> Array:
     """Cumulative sum of whole numbers (N,); the library's takes the CPU up to three times as long."""
     return _cumulated_by_blocks(values) if on_cpu() else jax.lax.cumsum(values)
 
@@ -153,14 +153,14 @@ def _ancestors(passed: Array, n: int) -> Array:
     """Ancestors (n,), where `passed` (N,) counts the children of all particles up to and with each: its last is n."""
     passed = barrier(jnp.clip(passed, 0, n))
     ended = jnp.zeros(n, jnp.int32).at[passed].add(1, mode="drop", indices_are_sorted=True)
-    return barrier(_cumulated(barrier(ended)))
+    return barrier(_cumulative_sum(barrier(ended)))
 
 
 def _sorted_parts(key: Array, n: int, count: Array, total: Array, dtype: jnp.dtype) -> Array:
     """(n,) whole numbers in [0, total): `count` sorted uniform ones, then numbers that mean nothing."""
     spacing = random.exponential(key, (n + 1,), dtype)
     used = jax.lax.iota(jnp.int32, n + 1) <= count
-    cumulated = barrier(_cumulated(_as_parts(jnp.where(used, spacing, 0.0))))
+    cumulated = barrier(_cumulative_sum(_as_parts(jnp.where(used, spacing, 0.0))))
     uniform = cumulated[:-1].astype(dtype) * (1.0 / cumulated[-1].astype(dtype))
     drawn = jnp.floor(uniform * total.astype(dtype)).astype(total.dtype)
     return jnp.clip(drawn, 0, total - 1)

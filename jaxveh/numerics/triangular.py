@@ -24,13 +24,13 @@ def lower_factor(matrix: Array) -> Array:
 
     Where A has a lower rank, L has zeros on its diagonal, and there the derivative leaves out what is not defined.
     """
-    return _orthogonalised(matrix)[0]
+    return _orthogonalise(matrix)[0]
 
 
 @lower_factor.defjvp
 def _lower_factor_jvp(primals, tangents):
     (matrix,), (change,) = primals, tangents
-    factor, turned = _orthogonalised(matrix)
+    factor, turned = _orthogonalise(matrix)
     diagonal = jnp.diagonal(factor)
     # A row that depends on those before has nothing of its own to divide by.
     regular = factor + jnp.diag(jnp.where(diagonal > 0, 0, 1).astype(factor.dtype))
@@ -40,7 +40,7 @@ def _lower_factor_jvp(primals, tangents):
     return factor, jnp.tril(_times(factor, low))
 
 
-def _orthogonalised(matrix: Array) -> tuple[Array, Array]:
+def _orthogonalise(matrix: Array) -> tuple[Array, Array]:
     """L (n, n) and Q^T (n, k) with A = L Q^T; rows of Q^T are orthonormal, or zero where A's depend on those before."""
     n = matrix.shape[0]
     columns, directions, rest = [], [], matrix

@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_at_least, check_positive
 from jaxveh._core.names import check_names
-from jaxveh.observers.base import AbstractObserver, advanced, check_gain, observed
+from jaxveh.observers.base import AbstractObserver, advance, check_gain, observe
 from jaxveh.observers.luenberger import array
 from jaxveh.statespace import StateSpace, kit
 
@@ -87,7 +87,7 @@ class Adaptive(AbstractObserver):
         for name, low, high in self.bounds:
             for value in (low, high):
                 try:
-                    _unconstrained(model, name, value)
+                    _to_real_line(model, name, value)
                 except InputError as error:
                     raise InputError(f"Adaptive.bounds of {name}: {error}") from None
 
@@ -105,7 +105,7 @@ class Adaptive(AbstractObserver):
 
         def moved(change):
             start = belief.vector.at[own].add(belief.memory @ change).at[adapted].add(change)
-            vector = advanced(model, belief, row, start)
+            vector = advance(model, belief, row, start)
             return vector, vector
 
         slope, vector = jax.jacfwd(moved, has_aux=True)(jnp.zeros(len(adapted), belief.vector.dtype))
@@ -113,16 +113,16 @@ class Adaptive(AbstractObserver):
 
     def correct(self, model, belief, row, error, here):
         own, adapted = self._places(model)
-        slope = jax.jacfwd(lambda vector: observed(model, row, vector))(belief.vector)
+        slope = jax.jacfwd(lambda vector: observe(model, row, vector))(belief.vector)
         slope = jnp.where(here[:, None], slope, 0)
         phi = slope[:, own] @ belief.memory + slope[:, adapted]
         gain = self.gain.astype(error.dtype)
-        change = self._adapted(model, belief, row, error, here, phi)
+        change = self._parameter_change(model, belief, row, error, here, phi)
         sensitivity = belief.memory - gain @ phi
         correction = jnp.zeros_like(belief.vector).at[own].set(gain @ error + sensitivity @ change)
         return correction.at[adapted].set(change), sensitivity
 
-    def _adapted(self, model, belief, row, error, here, phi):
+    def _parameter_change(self, model, belief, row, error, here, phi):
         """What the row changes in the parameters (p,)."""
         dtype, dt = error.dtype, row.t - belief.t
         _, adapted = self._places(model)
@@ -138,12 +138,12 @@ class Adaptive(AbstractObserver):
         limits = {name: (low, high) for name, low, high in self.bounds}
         for i, name in enumerate(names):
             if name in limits:
-                low, high = (_unconstrained(model, name, jnp.asarray(value, dtype)) for value in limits[name])
+                low, high = (_to_real_line(model, name, jnp.asarray(value, dtype)) for value in limits[name])
                 change = change.at[i].set(jnp.clip(theta[i] + change[i], low, high) - theta[i])
         return change
 
 
-def _unconstrained(model: StateSpace, name: str, value: Any) -> Any:
+def _to_real_line(model: StateSpace, name: str, value: Any) -> Any:
     """A physical value of a state on its own real line."""
     chosen = () if model.chosen is None else model.chosen.parameters
     domain = {p.field: p.domain for p in chosen}.get(name)

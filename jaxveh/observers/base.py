@@ -55,7 +55,7 @@ class AbstractObserver(AbstractTwoPartFilter):
 
     @abc.abstractmethod
     def predict(self, model: StateSpace, belief: PointBelief, row: Row) -> tuple[Any, Any]:
-        """The state (n,) at the row's time before its measurement, most often `advanced`, and the memory then."""
+        """The state (n,) at the row's time before its measurement, most often `advance`, and the memory then."""
 
     @abc.abstractmethod
     def correct(self, model: StateSpace, belief: PointBelief, row: Row, error: Any, here: Any) -> tuple[Any, Any]:
@@ -76,7 +76,7 @@ class AbstractObserver(AbstractTwoPartFilter):
         belief = ahead
         measured, present = kit.presence(model, row)
         here = jnp.stack([present[name] for name in model.channels])
-        error = jnp.stack([measured[name] for name in model.channels]) - observed(model, row, belief.vector)
+        error = jnp.stack([measured[name] for name in model.channels]) - observe(model, row, belief.vector)
         wraps = jnp.asarray([name in model.angles for name in model.channels])
         error = jnp.where(here, jnp.where(wraps, numerics.wrap_angle(error), error), 0)
         correction, memory = self.correct(model, belief, row, error, here)
@@ -85,14 +85,14 @@ class AbstractObserver(AbstractTwoPartFilter):
         return after, _info(model, row, error, present, vector)
 
 
-def advanced(model: StateSpace, belief: PointBelief, row: Row, vector: Any) -> Any:
+def advance(model: StateSpace, belief: PointBelief, row: Row, vector: Any) -> Any:
     """Where a state (n,) at the belief's time is at the row's time: (n,)."""
     u = model.step_inputs(belief.t, row.t, belief.u, row.u)
     moved = model.transition(belief.t, row.t, belief.state_type(*vector), u)
     return jnp.stack([jnp.asarray(value, vector.dtype) for value in moved])
 
 
-def observed(model: StateSpace, row: Row, vector: Any) -> Any:
+def observe(model: StateSpace, row: Row, vector: Any) -> Any:
     """What the sensors would say of a state (n,): (m,), in the order of the channels."""
     found = model.observation(row.t, type(model.prior.mean)(*vector), row.u)
     return jnp.stack([jnp.asarray(getattr(found, name), vector.dtype) for name in model.channels])

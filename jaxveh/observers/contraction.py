@@ -13,7 +13,7 @@ from scipy import linalg
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.observers.base import check_gain
 from jaxveh.observers.luenberger import array
-from jaxveh.observers.poles import linearised_without
+from jaxveh.observers.poles import slopes_without
 from jaxveh.statespace import StateSpace
 
 
@@ -35,11 +35,11 @@ def contraction_rate(
     check_positive("dt", dt, "s")
     points, gain = list(points), array(gain)
     if not points:
-        raise InputError("contraction_rate: no points.")
+        raise InputError("contraction_rate: there is no point; give at least one.")
     check_gain("gain", gain, model)
     errors = []
     for x, u in points:
-        F, H, kept = linearised_without(model, dt, x, u, leave)
+        F, H, kept = slopes_without(model, dt, x, u, leave)
         errors.append((np.eye(len(F)) - np.asarray(gain)[kept] @ H) @ F)
     fastest = np.max(np.abs(np.linalg.eigvals(errors[0])))
     if fastest >= 1:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, check, float_array
-from jaxveh.observers.base import AbstractObserver, advanced, check_gain
+from jaxveh.observers.base import AbstractObserver, advance, check_gain
 
 
 def array(value: Any) -> jax.Array:
@@ -34,7 +34,7 @@ class Luenberger(AbstractObserver):
         return ()
 
     def predict(self, model, belief, row):
-        return advanced(model, belief, row, belief.vector), ()
+        return advance(model, belief, row, belief.vector), ()
 
     def correct(self, model, belief, row, error, here):
         return self.gain.astype(error.dtype) @ error, ()
@@ -70,7 +70,7 @@ class SlidingMode(AbstractObserver):
         return ()
 
     def predict(self, model, belief, row):
-        return advanced(model, belief, row, belief.vector), ()
+        return advance(model, belief, row, belief.vector), ()
 
     def correct(self, model, belief, row, error, here):
         dtype = error.dtype

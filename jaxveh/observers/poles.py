@@ -14,7 +14,7 @@ from scipy import signal
 
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import check_names, record
-from jaxveh.observers.base import observed
+from jaxveh.observers.base import observe
 from jaxveh.observers.chains import chained_gain
 from jaxveh.statespace import Row, StateSpace, cast
 
@@ -34,7 +34,7 @@ def place_poles(
     observable, naming the mode that leaves no trace.
     """
     check_positive("dt", dt, "s")
-    F, H, kept = linearised_without(model, dt, x, u, leave)
+    F, H, kept = slopes_without(model, dt, x, u, leave)
     names = tuple(model.states[i] for i in kept)
     poles = np.asarray(poles)
     if poles.shape != (len(kept),):
@@ -45,11 +45,11 @@ def place_poles(
         raise InputError(f"poles = {poles}: complex ones must be conjugate pairs.")
     _check_observable(F, H, dt, names)
     gain = np.zeros((len(model.states), len(model.channels)))
-    gain[kept] = _placed(F.astype(float), H.astype(float), np.exp(poles * dt))
+    gain[kept] = _place_poles(F.astype(float), H.astype(float), np.exp(poles * dt))
     return gain
 
 
-def _placed(F: np.ndarray, H: np.ndarray, poles: np.ndarray) -> np.ndarray:
+def _place_poles(F: np.ndarray, H: np.ndarray, poles: np.ndarray) -> np.ndarray:
     # The error after a correction obeys (I - L H) F: the poles of F - L (H F) are placed.
     C = H @ F
     distinct, counts = np.unique(poles, return_counts=True)
@@ -86,11 +86,11 @@ def _slopes(model: StateSpace, end: Any, vector: Any, inputs: Any):
         moved = model.transition(zero, end, kind(*vector), model.step_inputs(zero, end, inputs, inputs))
         return jnp.stack([jnp.asarray(value, vector.dtype) for value in moved])
 
-    see = lambda vector: observed(model, Row(zero, inputs, None), vector)
+    see = lambda vector: observe(model, Row(zero, inputs, None), vector)
     return jax.jacfwd(move)(vector), jax.jacfwd(see)(vector)
 
 
-def linearised_without(model: StateSpace, dt: float, x: Any, u: Any, leave: tuple[str, ...]):
+def slopes_without(model: StateSpace, dt: float, x: Any, u: Any, leave: tuple[str, ...]):
     """The slopes of the states that are not left, (k, k) and (m, k), and their places in the state (k,).
 
     **Raises** `InputError` where another state or a channel depends on one that is left.

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check
-from jaxveh.observers.base import AbstractObserver, advanced, observed
+from jaxveh.observers.base import AbstractObserver, advance, observe
 from jaxveh.observers.luenberger import array
 from jaxveh.statespace import kit
 
@@ -52,11 +52,11 @@ class RecursiveLeastSquares(AbstractObserver):
         return jnp.diag(jnp.diagonal(P)) if self.separate else P
 
     def predict(self, model, belief, row):
-        return advanced(model, belief, row, belief.vector), belief.memory
+        return advance(model, belief, row, belief.vector), belief.memory
 
     def correct(self, model, belief, row, error, here):
         P, start = belief.memory, self.start(model)
-        slope = jax.jacfwd(lambda vector: observed(model, row, vector))(belief.vector)
+        slope = jax.jacfwd(lambda vector: observe(model, row, vector))(belief.vector)
         slope = jnp.where(here[:, None], slope, 0)
         noise = model.measurement_noise.covariance()
         noise = jnp.where(here[:, None] & here[None, :], noise, jnp.eye(len(here), dtype=noise.dtype))
@@ -65,7 +65,7 @@ class RecursiveLeastSquares(AbstractObserver):
             jumped = jnp.any(here & (jnp.square(error) > self.reset**2 * spread))
             P = jnp.where(jumped, start, P)
         gain = _gain(P, slope, noise)
-        after = self._alone(P, slope, noise) if self.separate else _updated(P, gain, slope, noise)
+        after = self._alone(P, slope, noise) if self.separate else _joseph_update(P, gain, slope, noise)
         root = jnp.sqrt(1 / jnp.broadcast_to(self.forgetting.astype(P.dtype), P.shape[:1]))
         after = jnp.where(jnp.any(here), after * root[:, None] * root[None, :], P)
         # Scaled back where a variance has grown beyond its ceiling; correlations stay.
@@ -77,14 +77,14 @@ class RecursiveLeastSquares(AbstractObserver):
         """Each state's variance after the row as if the others were known."""
         columns = slope.T[:, :, None]
         single = jnp.diagonal(P)[:, None, None]
-        return jnp.diag(jax.vmap(lambda p, s: _updated(p, _gain(p, s, noise), s, noise)[0, 0])(single, columns))
+        return jnp.diag(jax.vmap(lambda p, s: _joseph_update(p, _gain(p, s, noise), s, noise)[0, 0])(single, columns))
 
 
 def _gain(P, slope, noise):
     return jnp.linalg.solve(slope @ P @ slope.T + noise, slope @ P).T
 
 
-def _updated(P, gain, slope, noise):
+def _joseph_update(P, gain, slope, noise):
     """P - K phi^T P in Joseph's form, which stays symmetric and positive definite in float32."""
     left = jnp.eye(len(P), dtype=P.dtype) - gain @ slope
     return left @ P @ left.T + gain @ noise @ gain.T

@@ -83,7 +83,7 @@ def footprint(recording: Recording, car: Any, wheelbase: float | None, track: fl
     )
 
 
-def turned(points: Any, angle: float) -> np.ndarray:
+def rotate(points: Any, angle: float) -> np.ndarray:
     """Points (n, 2) turned to the left by an angle (rad)."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.asarray(points) @ np.array([[cosine, sine], [-sine, cosine]])

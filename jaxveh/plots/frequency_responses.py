@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh._core.names import check_names
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import frequency_response as measure
-from jaxveh.plots.panels import shown
+from jaxveh.plots.panels import display_of
 from jaxveh.plots.style import COLOURS, CYCLE, label_above, legend, new_figure, style
 
 POINTS = 200
@@ -63,13 +63,13 @@ def frequency_response(
 
 def _response(column: Any, name: str, frequency: np.ndarray, response: np.ndarray, **line: Any) -> None:
     # Steer is in degrees, so that an angle over it keeps its number.
-    per_degree = shown(name).factor * np.pi / 180
+    per_degree = display_of(name).factor * np.pi / 180
     column[0].plot(frequency, np.abs(response) * per_degree, **line)
     column[1].plot(frequency, np.degrees(np.unwrap(np.angle(response))), **line)
 
 
 def _label(column: Any, name: str, frequency: np.ndarray) -> None:
-    unit = shown(name)
+    unit = display_of(name)
     words = unit.label.partition(" [")[0]
     shown_unit = {"°/s": "1/s", "°": "-"}.get(unit.unit, f"{unit.unit} per °")
     label_above(column[0], f"{words} over steer [{shown_unit}]")

@@ -124,7 +124,7 @@ def _zeros(tree: Any) -> Any:
 
 
 @eqx.filter_jit
-def _traced(law: AbstractTyre, contact: Contact, d_law: Any, d_contact: Any) -> Any:
+def _force_derivative(law: AbstractTyre, contact: Contact, d_law: Any, d_contact: Any) -> Any:
     def forces(law, contact):
         found = law.forces(contact)
         return found.F_x, found.F_y
@@ -138,7 +138,7 @@ def _derivatives(law: AbstractTyre, contact: Contact, d_law: Any = None, d_conta
     d_law = _zeros(law) if d_law is None else d_law
     d_contact = _zeros(contact) if d_contact is None else d_contact
     # A force that a law does not have is a Python number, and has no derivative.
-    found = [0.0 if one is None else one for one in _traced(law, contact, d_law, d_contact)]
+    found = [0.0 if one is None else one for one in _force_derivative(law, contact, d_law, d_contact)]
     return [np.broadcast_to(np.asarray(one, np.float64), shape) for one in found]
 
 

@@ -25,7 +25,7 @@ WHEEL_STYLE = {
 GREY = "#666666"
 
 
-def shown(name: str) -> Quantity:
+def display_of(name: str) -> Quantity:
     """How a quantity of a drive is shown: units are those that the package gives it."""
     return quantity(name)
 
@@ -33,7 +33,7 @@ def shown(name: str) -> Quantity:
 def values(recording: Recording, name: str) -> np.ndarray:
     """A channel in the unit of its axis."""
     taken = drive_channels.sideslip(recording) if name == "sideslip" else drive_channels.channel(recording, name)
-    return shown(name).show(taken)
+    return display_of(name).show(taken)
 
 
 def stack(figure: Any, count: int, each: float = 1.35) -> tuple[Any, np.ndarray]:
@@ -49,7 +49,7 @@ def line(ax: Any, recording: Recording, name: str, **style: Any) -> None:
     ax.plot(
         drive_channels.seconds(recording), values(recording, name), **{"color": CYCLE[0], "linewidth": 1.2, **style}
     )
-    label_above(ax, shown(name).label)
+    label_above(ax, display_of(name).label)
 
 
 def wheels(ax: Any, recording: Recording, prefix: str, factor: Any, label: str) -> None:

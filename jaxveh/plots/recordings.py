@@ -44,7 +44,7 @@ def recording(
             shown = quantity(name, recording.unit(name))
             for start, end, label in spans:
                 ax.axvspan(start, end, color=SHADE, linewidth=0, zorder=0, label=label)
-            _measured(ax, time, shown.show(recording[name]))
+            _draw_measurement(ax, time, shown.show(recording[name]))
             if TRUTH + name in recording:
                 ax.plot(time, shown.show(recording[TRUTH + name]), color=COLOURS["truth"], linewidth=0.9, label="truth")
             _mark_silence(ax, time, np.asarray(recording[name]))
@@ -59,7 +59,7 @@ def _default(recording: Recording) -> list[str]:
     return order(name for name in recording.names if not name.startswith(TRUTH))[:MOST]
 
 
-def _measured(ax: Any, time: np.ndarray, values: np.ndarray) -> None:
+def _draw_measurement(ax: Any, time: np.ndarray, values: np.ndarray) -> None:
     """A line, and a dot for each sample that stands between two gaps, where no line would show it (slow devices)."""
     known = np.isfinite(values)
     beside = np.r_[False, known[:-1]] | np.r_[known[1:], False]

@@ -105,7 +105,7 @@ def _channel(block: Any, name: str, fit: RigFit, rig: RigTable) -> None:
     axes[1, 0].margins(x=0.04)
     for ax, over in ((axes[0, 1], x), (axes[1, 0], load / 1e3)):
         ax.axhline(0.0, color="#444444", lw=0.6)
-        ax.plot(*grouped(over, residual), "-o", color="#d55e00", lw=1.2, ms=2.5, label="mean of neighbours")
+        ax.plot(*group_means(over, residual), "-o", color="#d55e00", lw=1.2, ms=2.5, label="mean of neighbours")
     axes[1, 0].legend(loc="best")
     _histogram(axes[1, 1], residual)
     block.colorbar(shade, ax=axes[0, 1], label="load [kN]")
@@ -120,7 +120,7 @@ def _channel(block: Any, name: str, fit: RigFit, rig: RigTable) -> None:
         ax.set_ylabel(vertical)
 
 
-def grouped(x: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def group_means(x: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The mean of x and of residuals in groups of neighbours: one a value where x has few, else as many rows in each."""
     order = np.argsort(x, kind="stable")
     x, residual = x[order], residual[order]

@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import StepResponse, drive_channels, kit
 from jaxveh.diagnostics import step_response as measure
-from jaxveh.plots.panels import GREY, line, note, shown, stack, values
+from jaxveh.plots.panels import GREY, display_of, line, note, stack, values
 from jaxveh.plots.style import CYCLE, legend, style
 
 
@@ -32,7 +32,7 @@ def step_response(
         figure, axes = stack(figure, 1 + len(outputs), 1.4)
         line(axes[0], recording, "steer")
         for ax, name in zip(axes[1:], outputs, strict=True):
-            found = _found(recording, name, average)
+            found = _measure_response(recording, name, average)
             line(ax, recording, name)
             _mark(ax, recording, name, found)
             axes[0].axvline(found.reference, color=GREY, linewidth=0.7, linestyle=":")
@@ -41,14 +41,14 @@ def step_response(
     return figure
 
 
-def _found(recording: Recording, name: str, average: float) -> StepResponse:
+def _measure_response(recording: Recording, name: str, average: float) -> StepResponse:
     if name == "sideslip":
         recording = recording.replace(sideslip=drive_channels.sideslip(recording))
     return measure(recording, name, average=average)
 
 
 def _mark(ax: Any, recording: Recording, name: str, found: StepResponse) -> None:
-    unit = shown(name)
+    unit = display_of(name)
     before = float(values(recording, name)[0])
     place = lambda share: before + unit.factor * found.steady * share
     ax.axvline(found.reference, color=GREY, linewidth=0.7, linestyle=":")

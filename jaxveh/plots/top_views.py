@@ -12,7 +12,7 @@ from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import drive_channels
 from jaxveh.manoeuvres import Course, cones
-from jaxveh.plots.car_outline import WHEEL, Footprint, footprint, turned, wheel_angles, wheel_forces
+from jaxveh.plots.car_outline import WHEEL, Footprint, footprint, rotate, wheel_angles, wheel_forces
 from jaxveh.plots.panels import round_number
 from jaxveh.plots.style import CYCLE, PAGE_WIDTH, SHADE, label_above, new_figure, style
 
@@ -149,13 +149,13 @@ def _car(ax: Any, recording: Recording, car: Footprint, k: int, every: float) ->
     from matplotlib.patches import Polygon
 
     place, yaw = _place(recording, k)
-    body = place + turned(car.body, yaw)
+    body = place + rotate(car.body, yaw)
     ax.add_patch(Polygon(body, facecolor="#ffffff", alpha=0.55, edgecolor="none", zorder=1.6))
     ax.add_patch(Polygon(body, fill=False, edgecolor="#444444", linewidth=0.7, zorder=2.2))
     angles = wheel_angles(recording, car)
     for name, position in car.wheels.items():
-        ends = turned([(-WHEEL / 2, 0.0), (WHEEL / 2, 0.0)], float(angles[name][k])) + np.array(position)
-        ends = place + turned(ends, yaw)
+        ends = rotate([(-WHEEL / 2, 0.0), (WHEEL / 2, 0.0)], float(angles[name][k])) + np.array(position)
+        ends = place + rotate(ends, yaw)
         ax.plot(ends[:, 0], ends[:, 1], color="#222222", linewidth=1.6, solid_capstyle="butt", zorder=2.3)
     decimals = max(0, -math.floor(math.log10(every) + 1e-9))
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
@@ -185,8 +185,8 @@ def _forces(ax: Any, recording: Recording, car: Footprint, forces: dict, at: lis
     for k in at:
         place, yaw = _place(recording, k)
         for name, position in car.wheels.items():
-            starts.append(place + turned([position], yaw)[0])
-            arrows.append(turned([forces[name][k]], yaw)[0] * scale)
+            starts.append(place + rotate([position], yaw)[0])
+            arrows.append(rotate([forces[name][k]], yaw)[0] * scale)
     starts, arrows = np.array(starts), np.array(arrows)
     ax.quiver(*starts.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, color=FORCE, width=0.012, units="inches", zorder=3,
               headwidth=5, headlength=6, headaxislength=5.5, minlength=0)  # fmt: skip

@@ -47,14 +47,14 @@ def loads(recording: Recording, *, figure: Any = None) -> Any:
     return figure
 
 
-def lifted(recording: Recording) -> np.ndarray:
+def wheel_lift(recording: Recording) -> np.ndarray:
     """Whether any wheel is off the ground, (T,)."""
     each = np.stack([drive_channels.channel(recording, f"load_{wheel}") for wheel in WHEELS])
     return np.min(each, axis=0) < LIFTED * np.mean(each)
 
 
 def _shade_lift(ax: Any, recording: Recording, time: np.ndarray) -> None:
-    up = lifted(recording)
+    up = wheel_lift(recording)
     edges = np.flatnonzero(np.diff(np.r_[False, up, False].astype(int)))
     for start, end in zip(edges[::2], edges[1::2], strict=True):
         ax.axvspan(

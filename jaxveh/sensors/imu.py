@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import check_parameters, parameter
 from jaxveh.sensors.low_pass import LowPass, filtered_rows
-from jaxveh.sensors.rigid_body import POSES, into_axes, specific_force, turning
+from jaxveh.sensors.rigid_body import POSES, into_axes, rotation, specific_force
 from jaxveh.sensors.sensor_set import Position
 from jaxveh.sensors.signal import Signal, as_signals
 from jaxveh.sensors.signal_instrument import AbstractSignalInstrument
@@ -74,7 +74,7 @@ class IMU(AbstractSignalInstrument):
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
         """Accelerations and angular rates in the box's axes."""
-        rates, accelerations = turning(outputs)
+        rates, accelerations = rotation(outputs)
         force = specific_force(outputs, self.position, rates, accelerations)
         turn = (self.alignment.roll, self.alignment.pitch, self.alignment.yaw)
         felt = dict(zip(self.known, (*into_axes(force, *turn), *into_axes(rates, *turn)), strict=True))
@@ -82,4 +82,4 @@ class IMU(AbstractSignalInstrument):
             rows = jnp.stack([felt[name] for name in self.channels], axis=-1)
             steps = jnp.full(times.shape[0] - 1, self.period, rows.dtype)
             felt = dict(zip(self.channels, filtered_rows(self.low_pass, rows, steps).T, strict=True))
-        return self.sent(felt, key)
+        return self.sent_values(felt, key)

@@ -52,7 +52,7 @@ class OpticalSideslip(AbstractSignalInstrument):
         """Velocities and their angle."""
         v_x, v_y = velocity(outputs, self.position)
         true = {"v_x": v_x, "v_y": v_y, "sideslip": numerics.arctan2(v_y, v_x)}
-        said = self.sent(true, key)
+        said = self.sent_values(true, key)
         if self.lowest is None:
             return said
         slow = numerics.hypot(v_x, v_y) < self.lowest

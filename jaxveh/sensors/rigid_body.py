@@ -65,7 +65,7 @@ def of_angles(roll, pitch, roll_rate, pitch_rate, yaw_rate) -> Vector:
     return add((roll_rate, about_y, about_z), turn)
 
 
-def turning(outputs: Mapping[str, jax.Array]) -> tuple[Vector, Vector]:
+def rotation(outputs: Mapping[str, jax.Array]) -> tuple[Vector, Vector]:
     """The body's angular velocity and acceleration in its own axes; the second is the first's exact derivative."""
     at = lambda name: outputs.get(name, jnp.zeros_like(outputs["yaw_rate"]))
     values = (*(at(name) for name in POSES), outputs["yaw_rate"])
@@ -86,7 +86,7 @@ def specific_force(outputs: Mapping[str, jax.Array], position: Any, rates: Vecto
 
 def inertial(outputs: Mapping[str, jax.Array], position: Any) -> dict[str, jax.Array]:
     """What ideal accelerometers (m/s^2) and gyroscopes (rad/s) at `position` on the body say, by channel (`INERTIAL`)."""
-    rates, accelerations = turning(outputs)
+    rates, accelerations = rotation(outputs)
     force = specific_force(outputs, position, rates, accelerations)
     return dict(zip(INERTIAL, (*force, *rates), strict=True))
 

@@ -54,10 +54,10 @@ class Signal(eqx.Module):
         if self.noise is not None:
             said = said + self.noise * white(subkey(key, _NOISE), value.shape[0], value.dtype)
         if self.quantisation is not None:
-            return self.quantisation * self._limited(jnp.round(said / self.quantisation), self.quantisation)
-        return self._limited(said, None)
+            return self.quantisation * self._limit(jnp.round(said / self.quantisation), self.quantisation)
+        return self._limit(said, None)
 
-    def _limited(self, said, step):
+    def _limit(self, said, step):
         """Within the saturation, where there is one; of numbers of steps, within as many whole ones as are in it."""
         if self.saturation is None:
             return said
@@ -87,7 +87,7 @@ def as_signals(signals) -> dict[str, Signal]:
 def check_signals(name: str, signals: Mapping[str, Signal], allowed: Iterable[str]) -> None:
     """Raise unless there is a channel, all are among `allowed`, and each has a `Signal`."""
     if not signals:
-        raise InputError(f"{name}: no channel; there are: {', '.join(allowed)}.")
+        raise InputError(f"{name} is empty: name at least one channel; there are: {', '.join(allowed)}.")
     check_names(name, signals, allowed)
     for channel, signal in signals.items():
         if not isinstance(signal, Signal):

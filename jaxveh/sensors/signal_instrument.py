@@ -37,6 +37,6 @@ class AbstractSignalInstrument(AbstractInstrument):
         """Of the measured channels."""
         return {name: self.known[name] for name in self.channels}
 
-    def sent(self, true: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
+    def sent_values(self, true: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
         """What is sent of the true values by channel, (n,) each."""
         return apply_all(self.signals, self.known, true, self.period, key)

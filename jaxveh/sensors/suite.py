@@ -100,7 +100,7 @@ class Suite(eqx.Module):
         **Raises** `InputError` for an instant that is missing, an output that a device needs and the car lacks, an
         output of another length, or where no device speaks in the duration.
         """
-        truth_times, outputs = _checked(truth_times, as_mapping(outputs, "outputs"))
+        truth_times, outputs = _check_truth(truth_times, as_mapping(outputs, "outputs"))
         times = self.sample_times(duration)
         if not times.size:
             raise InputError(f"Suite.record: no device speaks in the duration = {duration} s: make it longer.")
@@ -161,7 +161,7 @@ def _locate(times: np.ndarray, instants: np.ndarray, who: str) -> np.ndarray:
     return rows
 
 
-def _checked(times: Any, outputs: Mapping[str, Any]) -> tuple[np.ndarray, dict[str, jax.Array]]:
+def _check_truth(times: Any, outputs: Mapping[str, Any]) -> tuple[np.ndarray, dict[str, jax.Array]]:
     if not is_concrete(times):
         raise InputError("Suite.record: truth_times is traced: it must be known outside jit (a NumPy array).")
     times = np.asarray(times, np.float64)

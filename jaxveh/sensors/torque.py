@@ -37,7 +37,9 @@ class AbstractTorque(AbstractSignalInstrument):
 
     def torques(self, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
         """The late torques with their errors, N m."""
-        return self.sent({name: lagged(outputs[name], self.lag, self.period) for name in self.channels}, key)
+        return self.sent_values(
+            {name: first_order_lag(outputs[name], self.lag, self.period) for name in self.channels}, key
+        )
 
 
 class BrakeTorque(AbstractTorque):
@@ -76,7 +78,7 @@ class MotorTorque(AbstractTorque):
         return self.torques(outputs, key)
 
 
-def lagged(values: jax.Array, lag: jax.Array | None, period: float) -> jax.Array:
+def first_order_lag(values: jax.Array, lag: jax.Array | None, period: float) -> jax.Array:
     """The values (n,) through a first-order lag, settled at the first; linear between samples, solved exactly."""
     if lag is None:
         return values

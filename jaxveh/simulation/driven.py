@@ -37,13 +37,13 @@ class Driven(eqx.Module):
         zero = jnp.zeros((), dtype)
         moves = Motion(*[values.get(name, zero) for name in Motion._fields])
         driver = self.driver.start(t, moves)
-        given = self._given(t, moves, driver)
+        given = self._driver_inputs(t, moves, driver)
         if "v_x" in given._fields and "v_x" not in values:
             moves = moves._replace(v_x=jnp.asarray(given.v_x, dtype))
             if "v_x" in self.car.state_type._fields:
                 values["v_x"] = moves.v_x
             driver = self.driver.start(t, moves)
-        car = self.car.start(t, self._given(t, moves, driver), **values)
+        car = self.car.start(t, self._driver_inputs(t, moves, driver), **values)
         return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), DrivenState(car, driver))
 
     def inputs(self, t: Any, x: DrivenState) -> Any:
@@ -68,14 +68,14 @@ class Driven(eqx.Module):
             blind = self.car.vehicle.motion(vehicle, _Unknown())
             given = self.driver.inputs(t, blind, x.driver)
             moves = blind._replace(v_x=given.v_x)
-        return self._given(t, moves, x.driver), moves
+        return self._driver_inputs(t, moves, x.driver), moves
 
     @property
     def _told_speed(self) -> bool:
         return "v_x" in self.car.inputs
 
-    def _given(self, t, moves: Motion, driver) -> Any:
-        return adapted(self.car.vehicle, self.driver.inputs(t, moves, driver), moves)
+    def _driver_inputs(self, t, moves: Motion, driver) -> Any:
+        return adapt_inputs(self.car.vehicle, self.driver.inputs(t, moves, driver), moves)
 
 
 class _Unknown(NamedTuple):
@@ -85,7 +85,7 @@ class _Unknown(NamedTuple):
     steer: Any = 0.0
 
 
-def adapted(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
+def adapt_inputs(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
     """The driver's inputs with those that the car needs and that follow from them.
 
     `steering_wheel` from `steer` by the car's steering ratio; a quarter of the torques for each of four motors. The
@@ -113,7 +113,7 @@ def check_inputs(driven: Driven) -> None:
     vehicle, driver = driven.car.vehicle, driven.driver
     moves = _still(vehicle)
     given = eqx.filter_eval_shape(
-        lambda: adapted(vehicle, driver.inputs(0.0, moves, driver.start(0.0, moves)), moves)
+        lambda: adapt_inputs(vehicle, driver.inputs(0.0, moves, driver.start(0.0, moves)), moves)
     )._fields
     known = (*given, "a_x") if "v_x_rate" in given else given
     missing = [name for name in vehicle.inputs if name not in known]

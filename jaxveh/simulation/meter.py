@@ -20,7 +20,7 @@ _listeners: list[Progress] = []
 
 
 class Meter(diffrax.AbstractProgressMeter):
-    """Tells the listener of `told` how far a solve has come."""
+    """Tells the listener of `meter_for` how far a solve has come."""
 
     def init(self):
         return jnp.zeros(())
@@ -41,7 +41,7 @@ def _tell(progress) -> None:
 
 
 @contextlib.contextmanager
-def told(report: Progress) -> Iterator[diffrax.AbstractProgressMeter]:
+def meter_for(report: Progress) -> Iterator[diffrax.AbstractProgressMeter]:
     """The meter for a solve that `report` hears of; none for `silent`."""
     if report is silent:
         yield diffrax.NoProgressMeter()

@@ -20,7 +20,7 @@ from jaxveh.sensors import AbstractDevice, Instrumented, SensorSet, Suite
 from jaxveh.simulation import stiffness
 from jaxveh.simulation.driven import Driven, check_inputs, driver_name, vehicle_name, with_pedals
 from jaxveh.simulation.events import Event
-from jaxveh.simulation.meter import told
+from jaxveh.simulation.meter import meter_for
 from jaxveh.simulation.solve import Solution, even_grid, grid_through, solve
 from jaxveh.simulation.stiffness import SolverChoice
 from jaxveh.statespace import RK4, RolledRK4
@@ -84,14 +84,14 @@ def simulate(
     the car, rows that are one instant in the car's dtype; `FilterError`, naming time, state and a remedy, where the motion does
     not stay finite. The latter needs `throw=True` and acts on the host; under jit look at the channels.
     """
-    sensors = _fitted(sensors)
+    sensors = _suite_of(sensors)
     _check_event(until)
     driven = driven_car(car, manoeuvre, sensors if isinstance(sensors, SensorSet) else None, road)
     duration, values = driven.driver.duration, {} if start is None else as_mapping(start, "start")
     rows = None if not isinstance(sensors, Suite) else device_rows(sensors, duration)
     grid = lambda step: even_grid(duration, dt, step) if rows is None else grid_through(rows, step)
     times = grid(max_step).rows
-    with told(progress) as meter:
+    with meter_for(progress) as meter:
         run = lambda choice: solve(driven, values, grid(choice.max_step), choice, until, adjoint, meter)
         found = _run(driven, values, run, _choice(solver, stepsize_controller, max_step), times, max_step)
     if throw:
@@ -102,14 +102,14 @@ def simulate(
     return _cut(*_devices(driven, found, times, sensors, duration, key, source), found, until)
 
 
-def _fitted(sensors: Any) -> SensorSet | Suite | None:
+def _suite_of(sensors: Any) -> SensorSet | Suite | None:
     """The sensors, one device as a suite; raises for what are none."""
     if isinstance(sensors, AbstractDevice):
         return Suite(sensors)
     if sensors is None or isinstance(sensors, SensorSet | Suite):
         return sensors
     raise InputError(
-        f"simulate: sensors = {_shown(sensors)}: must be a SensorSet such as sensors.esc(), a Suite of devices such as "
+        f"simulate: sensors = {_describe(sensors)}: must be a SensorSet such as sensors.esc(), a Suite of devices such as "
         "sensors.Suite((sensors.IMU(rate=100.0),)), one device, or None. (The key comes after the sensors: key=...)"
     )
 
@@ -117,11 +117,11 @@ def _fitted(sensors: Any) -> SensorSet | Suite | None:
 def _check_event(until: Any) -> None:
     if not (until is None or isinstance(until, Event)):
         raise InputError(
-            f"simulate: until = {_shown(until)}: must be an Event such as simulation.standstill() (called), or None."
+            f"simulate: until = {_describe(until)}: must be an Event such as simulation.standstill() (called), or None."
         )
 
 
-def _shown(what: Any) -> str:
+def _describe(what: Any) -> str:
     """A short word for what does not belong where it is."""
     if isinstance(what, str):
         return repr(what)
@@ -130,13 +130,13 @@ def _shown(what: Any) -> str:
 
 def driven_car(car: AbstractVehicle, manoeuvre: Any, sensors: SensorSet | None = None, road: Any = None) -> Driven:
     """The car on its road with sensors and driver, as `simulate` integrates it; raises `InputError` where they do not fit."""
-    placed = _placed(car, road)
+    placed = _place_on_road(car, road)
     driven = Driven(Instrumented(placed, sensors), with_pedals(manoeuvre, placed))
     check_inputs(driven)
     return driven
 
 
-def _placed(car: AbstractVehicle, road: Any) -> Travelling:
+def _place_on_road(car: AbstractVehicle, road: Any) -> Travelling:
     """The car with its place on its road: that of `car` itself, or `road`."""
     if not isinstance(car, Travelling):
         _check_not_placed(car)

@@ -15,7 +15,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.result import Result, code
-from jaxveh._core.traced import traced_once
+from jaxveh._core.traced import trace_once
 from jaxveh.simulation.driven import Driven, dtype_of
 from jaxveh.simulation.events import Event
 from jaxveh.simulation.stiffness import SolverChoice
@@ -116,7 +116,7 @@ def _check_distinct(what: str, instants: np.ndarray, dtype) -> None:
 
 
 def _rates(t, x, driven: Driven):
-    return traced_once(Driven.derivatives, driven, t, x)
+    return trace_once(Driven.derivatives, driven, t, x)
 
 
 SCANNED = (RK4, RolledRK4, Heun)
@@ -151,7 +151,7 @@ def _scan(driven: Driven, start, rows, steps, solver, each: int, meter) -> Solut
     (_, told), later = jax.lax.scan(row, (y0, meter.init()), (between, share))
     meter.close(told)
     x = jax.tree.map(lambda first, rest: jnp.concatenate([jnp.asarray(first)[None], rest]), y0, later)
-    return _finished(driven, rows, x, rows[-1], jnp.asarray(False), jnp.ones(len(rows), bool), jnp.asarray(True))
+    return _solution(driven, rows, x, rows[-1], jnp.asarray(False), jnp.ones(len(rows), bool), jnp.asarray(True))
 
 
 @eqx.filter_jit
@@ -181,10 +181,10 @@ def _solve(driven: Driven, start, rows, steps, solver, controller, until, adjoin
     if until is not None:
         x = jax.tree.map(lambda leaf: jnp.where(reached, leaf, jnp.nan), x)
     ended = (solution.result == diffrax.RESULTS.successful) | event
-    return _finished(driven, rows, x, end, event, reached, ended)
+    return _solution(driven, rows, x, end, event, reached, ended)
 
 
-def _finished(driven: Driven, rows, x, end, event, reached, ended) -> Solution:
+def _solution(driven: Driven, rows, x, end, event, reached, ended) -> Solution:
     """The solution of states at the rows."""
     # Row by row, not as a batch: as quick for some hundred rows, and compiled in a third of the time.
     u, outputs, measured = jax.lax.map(lambda at: driven.see(*at), (rows, x))

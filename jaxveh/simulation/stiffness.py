@@ -118,7 +118,7 @@ def fastest_poles(driven: Driven, t: Any, x: Any) -> jax.Array:
     return jnp.maximum(both[: len(t)], both[len(t) :])
 
 
-def looked_at(x: Any, u: Any) -> np.ndarray:
+def sample_rows(x: Any, u: Any) -> np.ndarray:
     """The rows of a simulation that are looked at: evenly from first to last, and the slowest."""
     speed = np.abs(np.asarray(getattr(x.car, "v_x", getattr(u, "v_x", x.car[0]))))
     even = np.linspace(0, len(speed) - 1, LOOKS).round().astype(int)
@@ -127,7 +127,7 @@ def looked_at(x: Any, u: Any) -> np.ndarray:
 
 def worst(driven: Driven, times: np.ndarray, x: Any, u: Any) -> tuple[float, float]:
     """The fastest pole (1/s) over some rows of a simulation, and its time (s); rows that are not finite are left out."""
-    some = looked_at(x, u)
+    some = sample_rows(x, u)
     at = jax.tree.map(lambda leaf: leaf[some], x)
     found = np.asarray(fastest_poles(driven, jnp.asarray(times[some], dtype_of(driven.car.vehicle)), at))
     finite = np.all([np.isfinite(np.asarray(leaf)) for leaf in jax.tree.leaves(at)], axis=0) & np.isfinite(found)

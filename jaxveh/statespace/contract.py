@@ -1,4 +1,4 @@
-"""What a filter is: `init` applies the first row, `step` propagates and applies the next; both report an info."""
+"""What a filter is: `init` applies the first row, `step` propagates and applies the next; both report `info`."""
 
 # No postponed annotations in this file: they would make fields of class variables.
 
@@ -40,7 +40,7 @@ class AbstractFilter(eqx.Module):
 
     What a filter can is declared where it is true, and is *no* otherwise:
 
-    - `whitens`: its infos carry whitened innovations.
+    - `whitens`: its info carries whitened innovations.
     - `smooths`: how it can be smoothed. Each class declares it for itself: what predicts otherwise than the class it comes from
       would be smoothed wrongly without a word, so that this is not inherited (`smoothing_of`).
     - `noise_by_row`: the model's measurement noise may be another in each row, and is taken as it is there. (Not where a filter
@@ -184,7 +184,7 @@ def key_for(filter: AbstractFilter, key: Any) -> Any:
 
 def smoothing_of(filter: Any) -> Smoothing:
     """How a filter can be smoothed: as its own class and those of all filters inside declare, if they agree."""
-    kinds = {_declared(layer) for layer in layers(filter)}
+    kinds = {_declared_smoothing(layer) for layer in layers(filter)}
     return kinds.pop() if len(kinds) == 1 else Smoothing.none
 
 
@@ -193,7 +193,9 @@ def check_smooths(who: str, filter: Any) -> Smoothing:
     kind = smoothing_of(filter)
     if kind is not Smoothing.none:
         return kind
-    name = type(next((layer for layer in layers(filter) if _declared(layer) is Smoothing.none), filter)).__name__
+    name = type(
+        next((layer for layer in layers(filter) if _declared_smoothing(layer) is Smoothing.none), filter)
+    ).__name__
     raise InputError(
         f"{who}: {name} has no smoother: its class does not declare one (`smooths`, which is not inherited). Take a Gaussian "
         "filter or a particle filter that does; a filter of your own declares smooths = Smoothing.gaussian where it predicts as "
@@ -227,5 +229,5 @@ def check_rows_between(who: str, filter: Any) -> None:
         )
 
 
-def _declared(filter: Any) -> Smoothing:
+def _declared_smoothing(filter: Any) -> Smoothing:
     return vars(type(filter)).get("smooths", Smoothing.none)

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import FilterError, InputError, check_whole
 from jaxveh._core.recording import Recording
-from jaxveh.statespace.draw import draw_rows, moved, schedule_rows
+from jaxveh.statespace.draw import draw_rows, propagate, schedule_rows
 from jaxveh.statespace.location import location_covariance
 from jaxveh.statespace.model import StateSpace
 
@@ -94,14 +94,14 @@ def _terms(model: StateSpace, rows: Any, keys: Any) -> tuple[Any, _Terms]:
         (lambda tree: jax.tree.map(lambda leaf: leaf[:-1], tree)),
         (lambda tree: jax.tree.map(lambda v: v[1:], tree)),
     )
-    seen = jax.lax.map(lambda given: _seen(model, *given), (rows, states))
+    seen = jax.lax.map(lambda given: _measured_information(model, *given), (rows, states))
     steps = jax.lax.map(lambda given: _step(model, *given), (head(rows), tail(rows), head(states)))
     law = model.prior.law
     order = np.asarray([law.names.index(name) for name in model.states])
     return location_covariance(law)[order][:, order], _Terms(seen, *steps)
 
 
-def _seen(model: StateSpace, row, states):
+def _measured_information(model: StateSpace, row, states):
     """E[H^T R^-1 H] over states (R,) of the channels present."""
     kind = type(model.prior.mean)
     here = jnp.stack([jnp.isfinite(getattr(row.y, name)) for name in model.channels])
@@ -122,7 +122,7 @@ def _step(model: StateSpace, row, after, states):
     """E[F], the largest deviation from it, the largest |F|, E[F^T Q^-1 F] over noisy states, and Q, of states (R,)."""
     kind = type(model.prior.mean)
     u = model.step_inputs(row.t, after.t, row.u, after.u)
-    move = lambda vector: jnp.stack(moved(model, row.t, after.t, kind(*vector), u))
+    move = lambda vector: jnp.stack(propagate(model, row.t, after.t, kind(*vector), u))
     F = jax.vmap(jax.jacfwd(move))(jnp.stack(states, axis=1))
     mean = jnp.mean(F, axis=0)
     spread, largest = jnp.max(jnp.abs(F - mean), axis=0), jnp.max(jnp.abs(F), axis=0)

@@ -33,7 +33,7 @@ def draw(model: StateSpace, schedule: Recording, key) -> Drawn:
     Angles are drawn unwrapped. **Raises** `InputError` for a schedule without the model's inputs.
     """
     states, rows = _drawn(model, schedule_rows(model, schedule), key)
-    shown = _reported(model, rows, states)
+    shown = _report(model, rows, states)
     truth = {f"{TRUTH}{name}": values for name, values in shown._asdict().items()}
     inputs = {name: schedule[name] for name in model.inputs}
     units = {name: schedule.unit(name) for name in (*model.inputs, *model.channels) if name in schedule}
@@ -57,7 +57,7 @@ def draw_rows(model: StateSpace, rows: Row, key) -> tuple[Any, Row]:
 
     def move(x, given):
         ((t0, u0), (t1, u1)), count = given
-        x = moved(model, t0, t1, x, model.step_inputs(t0, t1, u0, u1))
+        x = propagate(model, t0, t1, x, model.step_inputs(t0, t1, u0, u1))
         if model.process_noise is not None:
             noise = model.process_noise.over(t1 - t0).sample(jax.random.fold_in(process_key, count))
             x = x._replace(**{name: getattr(x, name) + value for name, value in noise.items()})
@@ -84,7 +84,7 @@ def _errors(model: StateSpace, rows: Row, states: Any, key) -> dict:
     return jax.vmap(draw)(jax.random.split(key, rows.t.shape[0]), rows.t, states, rows.u)
 
 
-def moved(model: StateSpace, t0, t1, x, u):
+def propagate(model: StateSpace, t0, t1, x, u):
     """The transition of one state, each field in the precision of the state, so that it can be carried through a scan."""
     to = lambda value, like: jnp.broadcast_to(jnp.asarray(value), jnp.shape(like)).astype(like.dtype)
     return jax.tree.map(to, model.transition(t0, t1, x, u), x)
@@ -94,6 +94,6 @@ _drawn = eqx.filter_jit(draw_rows)
 
 
 @eqx.filter_jit
-def _reported(model: StateSpace, rows: Row, states: Any):
+def _report(model: StateSpace, rows: Row, states: Any):
     shown = jax.vmap(model.report)(rows.t, states, rows.u)
     return jax.tree.map(lambda field: jnp.broadcast_to(field, rows.t.shape), shown)

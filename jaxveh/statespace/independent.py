@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
-from jaxveh.statespace.noise import AbstractNoise, Gaussian, MultivariateGaussian, flatten_batch, masked
+from jaxveh.statespace.noise import AbstractNoise, Gaussian, MultivariateGaussian, flatten_batch, mask_absent
 
 
 class Independent(AbstractNoise):
@@ -54,8 +54,8 @@ class Independent(AbstractNoise):
     def covariance(self):
         return jax.scipy.linalg.block_diag(*[law.covariance() for law in self.laws])
 
-    def scaled(self, factor):
-        return Independent(tuple(law.scaled(factor) for law in self.laws))
+    def times(self, factor):
+        return Independent(tuple(law.times(factor) for law in self.laws))
 
 
 def whiten(law: AbstractNoise, residual: Mapping, present: Mapping) -> dict[str, jax.Array]:
@@ -76,7 +76,7 @@ def whiten(law: AbstractNoise, residual: Mapping, present: Mapping) -> dict[str,
     else:
         std = numerics.sqrt(jnp.diagonal(law.covariance()))
         values, here = flat
-        white = jnp.stack([masked(values, here, name)[0] / std[i] for i, name in enumerate(law.names)])
+        white = jnp.stack([mask_absent(values, here, name)[0] / std[i] for i, name in enumerate(law.names)])
     return {name: white[i].reshape(shape) for i, name in enumerate(law.names)}
 
 

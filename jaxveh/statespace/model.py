@@ -14,7 +14,7 @@ from jaxveh._core.errors import InputError, float_array, is_concrete
 from jaxveh._core.names import check_names, record
 from jaxveh._core.parameter import UNNAMED
 from jaxveh._core.recording import Recording
-from jaxveh._core.traced import traced_once
+from jaxveh._core.traced import trace_once
 from jaxveh.statespace.dependent_noise import MeasurementNoise, StateDependent
 from jaxveh.statespace.noise import AbstractNoise, Gaussian
 from jaxveh.statespace.process import AbstractProcessNoise
@@ -179,18 +179,18 @@ class StateSpace(eqx.Module):
 
     def transition(self, t0, t1, x, u):
         """The state at `t1` without noise, from the state `x` at `t0`."""
-        moved = traced_once(self.transition_function, self.system, t0, t1, x, u)
+        moved = trace_once(self.transition_function, self.system, t0, t1, x, u)
         if getattr(moved, "_fields", None) != x._fields:
-            raise InputError(f"transition returned {_shown(moved)}: must be the state, with {', '.join(x._fields)}.")
+            raise InputError(f"transition returned {_describe(moved)}: must be the state, with {', '.join(x._fields)}.")
         return moved
 
     def observation(self, t, x, u):
         """What the sensors would say without noise."""
-        seen = traced_once(self.observation_function, self.system, t, x, u)
+        seen = trace_once(self.observation_function, self.system, t, x, u)
         lacks = [name for name in self.channels if name not in getattr(seen, "_fields", ())]
         if lacks:
             raise InputError(
-                f"observation returned {_shown(seen)}, without {', '.join(lacks)}: must have every channel of the "
+                f"observation returned {_describe(seen)}, without {', '.join(lacks)}: must have every channel of the "
                 f"measurement noise ({', '.join(self.channels)})."
             )
         return seen
@@ -209,7 +209,7 @@ class StateSpace(eqx.Module):
         return u0 if self.input_path == "held" or not self.inputs else LinearInput(t0, t1, u0, u1)
 
 
-def _shown(value: Any) -> str:
+def _describe(value: Any) -> str:
     """What a function of a model returned, in words."""
     fields = getattr(value, "_fields", None)
     return f"a {type(value).__name__}" if fields is None else f"a NamedTuple with {', '.join(fields)}"

@@ -35,7 +35,7 @@ class AbstractNoise(eqx.Module):
 
     @property
     def adds_up(self) -> bool:
-        """Whether n independent draws add up to the law `scaled` by sqrt(n), as white noise in continuous time must."""
+        """Whether n independent draws add up to the law `times` by sqrt(n), as white noise in continuous time must."""
         return False
 
     @property
@@ -67,7 +67,7 @@ class AbstractNoise(eqx.Module):
         """(k, k) covariance in the order of `names`; raises `InputError` where the law has none."""
 
     @abc.abstractmethod
-    def scaled(self, factor) -> AbstractNoise:
+    def times(self, factor) -> AbstractNoise:
         """The law of `factor` times the noise."""
 
 
@@ -85,7 +85,7 @@ def _scales(values, what: str):
     return record("Scales", values)
 
 
-def masked(residual, present, name):
+def mask_absent(residual, present, name):
     """The residual with zero where absent: replaced before the arithmetic, so that gradients stay finite."""
     here = present[name]
     return jnp.where(here, residual[name], jnp.zeros_like(residual[name])), here
@@ -113,7 +113,7 @@ class Gaussian(AbstractNoise):
     def log_prob(self, residual, present):
         terms = []
         for name, std in self.std._asdict().items():
-            value, here = masked(residual, present, name)
+            value, here = mask_absent(residual, present, name)
             term = -0.5 * (value / std) ** 2 - jnp.log(std) - 0.5 * LOG_2PI
             terms.append(jnp.where(here, term, jnp.zeros_like(term)))
         return sum(terms[1:], terms[0])
@@ -121,7 +121,7 @@ class Gaussian(AbstractNoise):
     def covariance(self):
         return jnp.diag(jnp.stack([std**2 for std in self.std]))
 
-    def scaled(self, factor):
+    def times(self, factor):
         return Gaussian(jax.tree.map(lambda std: std * factor, self.std))
 
 
@@ -165,7 +165,7 @@ class MultivariateGaussian(AbstractNoise):
 
     def _white(self, residual, present):
         """Factor of the marginal covariance (k, k), whitened residuals (k, batch) and presence (k,), itself no batch."""
-        values, here = zip(*[masked(residual, present, name) for name in self.fields], strict=True)
+        values, here = zip(*[mask_absent(residual, present, name) for name in self.fields], strict=True)
         here, values = jnp.stack(here), jnp.stack(jnp.broadcast_arrays(*values))
         # The marginal of the present fields: absent ones become independent with unit variance and zero residual.
         eye = jnp.eye(len(self.fields), dtype=self.matrix.dtype)
@@ -180,7 +180,7 @@ class MultivariateGaussian(AbstractNoise):
     def covariance(self):
         return self.matrix
 
-    def scaled(self, factor):
+    def times(self, factor):
         return MultivariateGaussian(self.fields, self.matrix * factor**2)
 
 
@@ -227,7 +227,7 @@ class StudentT(AbstractNoise):
         constant = jax.lax.lgamma(half) - jax.lax.lgamma(0.5 * dof) - 0.5 * jnp.log(jnp.pi * dof)
         terms = []
         for name, scale in self.scale._asdict().items():
-            value, here = masked(residual, present, name)
+            value, here = mask_absent(residual, present, name)
             term = constant - jnp.log(scale) - half * jnp.log1p((value / scale) ** 2 / dof)
             terms.append(jnp.where(here, term, jnp.zeros_like(term)))
         return sum(terms[1:], terms[0])
@@ -239,7 +239,7 @@ class StudentT(AbstractNoise):
         factor = jnp.where(self.dof > 2, self.dof / jnp.where(self.dof > 2, self.dof - 2, 1), jnp.nan)
         return jnp.diag(jnp.stack([scale**2 * factor for scale in self.scale]))
 
-    def scaled(self, factor):
+    def times(self, factor):
         return StudentT(self.dof, jax.tree.map(lambda scale: scale * factor, self.scale))
 
 
@@ -278,7 +278,7 @@ class CauchyGaussianMixture(AbstractNoise):
     def log_prob(self, residual, present):
         terms = []
         for name, scale, std in zip(self.names, self.scale, self.std, strict=True):
-            value, here = masked(residual, present, name)
+            value, here = mask_absent(residual, present, name)
             heavy = jnp.log(self.weight) - jnp.log(jnp.pi * scale) - jnp.log1p((value / scale) ** 2)
             light = jnp.log1p(-self.weight) - 0.5 * (value / std) ** 2 - jnp.log(std) - 0.5 * LOG_2PI
             term = jnp.logaddexp(heavy, light)
@@ -290,6 +290,6 @@ class CauchyGaussianMixture(AbstractNoise):
             "CauchyGaussianMixture has no covariance: use a particle filter, or a Gaussian or Student-t law."
         )
 
-    def scaled(self, factor):
+    def times(self, factor):
         times = lambda values: jax.tree.map(lambda value: value * factor, values)
         return CauchyGaussianMixture(self.weight, times(self.scale), times(self.std))

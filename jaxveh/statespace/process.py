@@ -40,7 +40,7 @@ class Continuous(AbstractProcessNoise):
         return True
 
     def over(self, dt):
-        return self.law.scaled(jnp.sqrt(dt))
+        return self.law.times(jnp.sqrt(dt))
 
 
 class Discrete(AbstractProcessNoise):

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.traced import traced_once
+from jaxveh._core.traced import trace_once
 from jaxveh.statespace.model import LinearInput
 
 
@@ -124,7 +124,7 @@ class Propagate(eqx.Module):
     steps: int = eqx.field(static=True, default=1)
 
     def __call__(self, system, t0, t1, x, u):
-        term = diffrax.ODETerm(lambda t, y, args: traced_once(_rates, self.derivatives, system, t, y, args))
+        term = diffrax.ODETerm(lambda t, y, args: trace_once(_rates, self.derivatives, system, t, y, args))
         dt = (t1 - t0) / self.steps
         state = None
         for i in range(self.steps):

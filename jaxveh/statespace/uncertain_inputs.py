@@ -77,10 +77,10 @@ class Errors(eqx.Module):
         n = len(self.inside._fields)
         return self.inside(*x[:n]), list(x[n:])
 
-    def added(self, u, errors):
+    def add(self, u, errors):
         """The inputs with their errors, at an instant or along a step."""
         if isinstance(u, LinearInput):
-            return LinearInput(u.t0, u.t1, self.added(u.u0, errors), self.added(u.u1, errors))
+            return LinearInput(u.t0, u.t1, self.add(u.u0, errors), self.add(u.u1, errors))
         return u._replace(**{n: getattr(u, n) + error for n, error in zip(self.inputs, errors, strict=True)})
 
 
@@ -92,8 +92,8 @@ class Moved(eqx.Module):
 
     def __call__(self, system, t0, t1, x, u):
         state, errors = self.errors.split(x)
-        state = self.function(system, t0, t1, state, self.errors.added(u, errors))
-        kept = [_kept(t1 - t0, time) * error for time, error in zip(self.errors.times, errors, strict=True)]
+        state = self.function(system, t0, t1, state, self.errors.add(u, errors))
+        kept = [_share_left(t1 - t0, time) * error for time, error in zip(self.errors.times, errors, strict=True)]
         return self.errors.state_type(*state, *kept)
 
 
@@ -105,7 +105,7 @@ class Observed(eqx.Module):
 
     def __call__(self, system, t, x, u):
         state, errors = self.errors.split(x)
-        return self.function(system, t, state, self.errors.added(u, errors))
+        return self.function(system, t, state, self.errors.add(u, errors))
 
 
 class Wandering(AbstractProcessNoise):
@@ -119,7 +119,7 @@ class Wandering(AbstractProcessNoise):
         return all(time > 0 for time in self.times)
 
     def over(self, dt):
-        fresh = [numerics.sqrt(1.0 - _kept(dt, time) ** 2) for time in self.times]
+        fresh = [numerics.sqrt(1.0 - _share_left(dt, time) ** 2) for time in self.times]
         return eqx.tree_at(
             lambda law: law.std,
             self.law,
@@ -127,6 +127,6 @@ class Wandering(AbstractProcessNoise):
         )
 
 
-def _kept(dt, time: float):
+def _share_left(dt, time: float):
     """How much of an error is left after `dt` (s)."""
     return jnp.exp(-dt / time) if time else jnp.zeros_like(dt)

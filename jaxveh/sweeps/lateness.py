@@ -11,7 +11,7 @@ from jaxveh._core.errors import JaxvehWarning
 
 
 @contextlib.contextmanager
-def told_when_late(what: str, patience: float | None) -> Iterator[None]:
+def warn_when_late(what: str, patience: float | None) -> Iterator[None]:
     """Warn each time that the block has taken another `patience` seconds (None: never), naming `what` it does."""
     if patience is None:
         yield

@@ -16,7 +16,7 @@ from jax.sharding import PartitionSpec as P
 from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh.sweeps.design import Design
-from jaxveh.sweeps.lateness import told_when_late
+from jaxveh.sweeps.lateness import warn_when_late
 from jaxveh.sweeps.swept import Swept, named_leaves
 from jaxveh.sweeps.workers import fit_for
 
@@ -70,10 +70,10 @@ def sweep(
     for _, said, choices in design.combinations():
         one = lambda numbers, *rest, choices=choices: run(design.point(numbers, choices), *rest)
         report = lambda n, said=said, done=done: progress(done + n, total, said or "runs")
-        late = lambda what, said=said: told_when_late(f"{what} ({said})" if said else what, patience)
+        late = lambda what, said=said: warn_when_late(f"{what} ({said})" if said else what, patience)
         found.append(_all(one, given, batch, memory, devices, report, late))
         done += given.runs
-    return Swept(design, given.seeds, _arranged(design, given.seeds, found))
+    return Swept(design, given.seeds, _arrange(design, given.seeds, found))
 
 
 class Given:
@@ -137,7 +137,7 @@ def _program(one, given: Given, batch, memory, devices):
         if len(fit) < width:
             devices = fit
             continue
-        needed = _needed(program)
+        needed = _bytes_needed(program)
         if needed <= memory or batch == width:
             return program, batch
         batch = max(width, int(batch * memory / needed))
@@ -165,7 +165,7 @@ def _arrays(result):
     return {name: jnp.asarray(leaf) for name, leaf in named.items()}
 
 
-def _needed(program) -> float:
+def _bytes_needed(program) -> float:
     """Bytes that a compiled program takes while it runs; 0 where the backend does not say."""
     analysis = program.memory_analysis()
     if analysis is None:
@@ -180,7 +180,7 @@ def _machine_memory() -> float:
     return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
 
 
-def _arranged(design: Design, seeds: int, found: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+def _arrange(design: Design, seeds: int, found: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
     """Values by name with one axis for each of the design's, in its order, then the seeds."""
     chosen = tuple(len(axis.values) for axis in design.choices)
     counted = tuple(len(axis.values) for axis in design.numbers)

@@ -106,7 +106,7 @@ def _at_once(lines: list[str], most: dict[str, int]) -> int:
 
 
 def _waits(line: str) -> bool:
-    return " fft(" in line or (jax.__version_info__[:2] < WHOLE_AGAIN and _handed_out(line))
+    return " fft(" in line or (jax.__version_info__[:2] < WHOLE_AGAIN and _is_lapack_kernel(line))
 
 
 def workers() -> int:
@@ -116,7 +116,7 @@ def workers() -> int:
     return max(int(told) if told else cores, len(jax.devices("cpu")))
 
 
-def _handed_out(line: str) -> bool:
+def _is_lapack_kernel(line: str) -> bool:
     """Whether a line of HLO is a LAPACK kernel whose batch may be large."""
     kernel = _KERNEL.search(line)
     if kernel is None:

@@ -34,7 +34,7 @@ class Contact(NamedTuple):
       the speed itself.
     - `direction` (-): 1 where the wheel travels forwards, -1 backwards, and smooth between in a vehicle. The pneumatic trail lies
       behind the wheel's centre as seen in this direction; laws of an aligning moment multiply it by this, sgn V_cx of the book.
-      All else of a law is that of travelling forwards, rolling resistance too, which vehicles turn round themselves.
+      All else of a law is that of travelling forwards, rolling resistance too, whose sign vehicles reverse themselves.
     """
 
     slip_angle: Any = 0.0

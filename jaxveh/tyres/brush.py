@@ -51,7 +51,7 @@ class Brush(AbstractTwoStiffnesses):
         """F_x, F_y (N) and M_z (N m)."""
         limit = self.limit(contact)
         sigma_x, sigma_y = theoretical(contact)
-        wish_x, wish_y, wish = self.unbounded(sigma_x, sigma_y)
+        wish_x, wish_y, wish = self.unbounded_force(sigma_x, sigma_y)
         held = limit > 0
         g = wish / jnp.where(held, 3 * limit, 1.0)
         sticks = (g < 1) & held

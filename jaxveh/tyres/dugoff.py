@@ -37,14 +37,14 @@ class Dugoff(AbstractTwoStiffnesses):
         limit = self.limit(contact)
         sigma_x, sigma_y = theoretical(contact)
         if self.fading is not None:
-            limit = limit * self._left(contact, sigma_y)
-        wish_x, wish_y, wish = self.unbounded(sigma_x, sigma_y)
+            limit = limit * self._friction_share(contact, sigma_y)
+        wish_x, wish_y, wish = self.unbounded_force(sigma_x, sigma_y)
         slips = 2 * wish > limit
         part = jnp.where(slips, limit / jnp.where(slips, 2 * wish, 1.0), 1.0)
         share = part * (2 - part)
         return Forces(F_x=share * wish_x, F_y=share * wish_y)
 
-    def _left(self, contact: Contact, like):
+    def _friction_share(self, contact: Contact, like):
         """The share of friction that is left at the sliding speed."""
         if contact.speed is None:
             raise InputError("contact.speed = None: Dugoff with fading needs the wheel's speed in m/s.")

@@ -60,7 +60,7 @@ class FialaPolynomial(AbstractTwoStiffnesses):
 
     def _lateral(self, wish, limit):
         branch, most = (1.54, 1.0063) if self.as_printed else (PEAK, PEAK * _polynomial(FORCE, PEAK))
-        q, rises = _normalised(wish, limit, branch)
+        q, rises = _clip_theta(wish, limit, branch)
         return jnp.where(rises, wish * _polynomial(FORCE, q), jnp.sign(wish) * most * limit)
 
     def _moment(self, wish, limit):
@@ -69,13 +69,13 @@ class FialaPolynomial(AbstractTwoStiffnesses):
             height = 0.2258 * self.trail
         else:
             height = length * TAIL * _polynomial(MOMENT, TAIL) * (TAIL - POLE)
-        q, rises = _normalised(wish, limit, TAIL)
+        q, rises = _clip_theta(wish, limit, TAIL)
         # mu F_z / (q - 0.32), without dividing by the limit.
         beyond = limit**2 / jnp.where(rises | (wish == 0), 1.0, jnp.abs(wish) - POLE * limit)
         return -jnp.where(rises, wish * length * _polynomial(MOMENT, q), jnp.sign(wish) * height * beyond)
 
 
-def _normalised(wish, limit, branch: float):
+def _clip_theta(wish, limit, branch: float):
     """|theta|, at most `branch`, and whether it lies below."""
     held = limit > 0
     q = jnp.abs(wish) / jnp.where(held, limit, 1.0)

@@ -28,7 +28,7 @@ class HSRI(AbstractTwoStiffnesses):
         """F_x and F_y, N."""
         limit = self.limit(contact)
         sigma_x, sigma_y = theoretical(contact)
-        wish_x, wish_y, wish = self.unbounded(sigma_x, sigma_y)
+        wish_x, wish_y, wish = self.unbounded_force(sigma_x, sigma_y)
         slips = 2 * wish > limit
         inverse_H = limit / jnp.where(slips, wish, 1.0)
         share = jnp.where(slips, inverse_H - inverse_H**2 / 4, 1.0)

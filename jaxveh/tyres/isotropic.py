@@ -40,6 +40,6 @@ class IsotropicMagicFormula(AbstractTyre):
         # Scaled before its length is taken, so that one length serves the curve and the direction.
         x_x, x_y = self.B * s_x, self.B * s_y
         x = length(x_x, x_y)
-        curved = x - self.E * (x - numerics.arctan(x))
-        per_slip = limit * numerics.sin(self.C * numerics.arctan(curved)) / x
+        bent = x - self.E * (x - numerics.arctan(x))
+        per_slip = limit * numerics.sin(self.C * numerics.arctan(bent)) / x
         return Forces(F_x=per_slip * x_x, F_y=per_slip * x_y)

@@ -79,13 +79,13 @@ class LuGre(AbstractDynamicTyre):
 
     def start(self, contact: Contact) -> LuGreState:
         s_x, s_y = practical(contact)
-        fading_x, fading_y = self._fading(contact, s_x, s_y)
-        return LuGreState(_settled(s_x, fading_x), _settled(s_y, fading_y))
+        fading_x, fading_y = self._fading_rates(contact, s_x, s_y)
+        return LuGreState(_settled_deflection(s_x, fading_x), _settled_deflection(s_y, fading_y))
 
     def derivatives(self, contact: Contact, state: Any) -> LuGreState:
         speed = need_slip_speed(contact, "LuGre")
         s_x, s_y = practical(contact)
-        fading_x, fading_y = self._fading(contact, s_x, s_y)
+        fading_x, fading_y = self._fading_rates(contact, s_x, s_y)
         return LuGreState(speed * (s_x - fading_x * state.z_x), speed * (s_y - fading_y * state.z_y))
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
@@ -99,7 +99,7 @@ class LuGre(AbstractDynamicTyre):
         mu_y = self.stiffness_y * state.z_y + self.damping_y * rates.z_y + self.viscous * speed * s_y
         return Forces(F_x=load * mu_x, F_y=load * mu_y)
 
-    def _fading(self, contact: Contact, s_x, s_y):
+    def _fading_rates(self, contact: Contact, s_x, s_y):
         """Rate at which a deflection is lost, over the slips' speed, 1/m, in both directions."""
         slides = numerics.hypot(s_x, s_y)
         g = self._friction(need_slip_speed(contact, "LuGre") * slides) * jnp.maximum(contact.friction, LEAST_FRICTION)
@@ -130,7 +130,7 @@ def _travels(contact: Contact):
     return forwards * jnp.where(moves, share, 1.0)
 
 
-def _settled(slip, fading):
+def _settled_deflection(slip, fading):
     """The deflection that stays; zero where nothing moves."""
     moves = fading > 0
     return slip / jnp.where(moves, fading, 1.0)

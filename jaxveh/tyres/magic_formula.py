@@ -43,8 +43,8 @@ class MagicFormula(AbstractTyre):
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """Lateral force alone, N, in the shape of slip angle, load and friction together."""
         x = self.B * (contact.slip_angle + self.S_h)
-        curved = x - self.E * (x - numerics.arctan(x))
-        F_y = self.D * numerics.sin(self.C * numerics.arctan(curved)) + self.S_v
+        bent = x - self.E * (x - numerics.arctan(x))
+        F_y = self.D * numerics.sin(self.C * numerics.arctan(bent)) + self.S_v
         return Forces(F_y=self._scale(contact) * F_y)
 
     def _scale(self, contact: Contact):

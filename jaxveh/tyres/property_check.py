@@ -54,17 +54,17 @@ def check_property_file(source: str | Path | PropertyFile) -> list[PropertyFindi
     freely = _freely(tyre)
     return [
         *_model(file, tyre.version),
-        *_missing(file, tyre),
+        *_missing_values(file, tyre),
         *_ranges(file, tyre),
         *_pressure(file, tyre),
-        *_scaling(tyre),
+        *_scaling_findings(tyre),
         *_body(tyre),
         *_shapes(tyre),
         *_usual(tyre, freely),
         *_friction_over_range(freely),
         *_curvature(tyre),
-        *_aligning(tyre),
-        *_combined(tyre),
+        *_aligning_findings(tyre),
+        *_combined_findings(tyre),
         *_moments(tyre),
         *odd_lines(file, tyre),
     ]
@@ -75,10 +75,10 @@ def _model(file: PropertyFile, version: int) -> Iterator[PropertyFinding]:
     if side is None:
         yield PropertyFinding("TYRESIDE", "is missing: the side for which the coefficients hold is not known")
     elif str(side.value).strip().lower() not in SIDES:
-        yield PropertyFinding("TYRESIDE", f"is {side.shown}, neither LEFT nor RIGHT: the tyre cannot be mirrored")
+        yield PropertyFinding("TYRESIDE", f"is {side.short_value}, neither LEFT nor RIGHT: the tyre cannot be mirrored")
     if file.find("FITTYP") is None and kind is not None and str(kind.value).upper().startswith("MF"):
         yield PropertyFinding(
-            "FITTYP", f"is missing: {version / 10:g} is taken because of PROPERTY_FILE_FORMAT = {kind.shown}"
+            "FITTYP", f"is missing: {version / 10:g} is taken because of PROPERTY_FILE_FORMAT = {kind.short_value}"
         )
     elif file.text("FITTYP") == "60":
         yield PropertyFinding("FITTYP", "is 60: the equations of 6.1 are taken")
@@ -98,7 +98,7 @@ def _model(file: PropertyFile, version: int) -> Iterator[PropertyFinding]:
         yield PropertyFinding("ANGLE", f"is {angle!r}: ranges and coefficients are taken in radians all the same")
 
 
-def _missing(file: PropertyFile, tyre: MFTyre) -> Iterator[PropertyFinding]:
+def _missing_values(file: PropertyFile, tyre: MFTyre) -> Iterator[PropertyFinding]:
     """Values of which a default is taken that no one should rely on."""
     wanted = ["LONGVL", "VERTICAL_STIFFNESS"]
     if tyre.version != 52:
@@ -153,7 +153,7 @@ def _pressure(file: PropertyFile, tyre: MFTyre) -> Iterator[PropertyFinding]:
             )
 
 
-def _scaling(tyre: MFTyre) -> Iterator[PropertyFinding]:
+def _scaling_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
     factors = {name: float(value) for name, value in vars(tyre.scaling).items()}
     changed = [f"{name} = {value:g}" for name, value in factors.items() if value != 1]
     if changed:
@@ -179,7 +179,7 @@ def _shapes(tyre: MFTyre) -> Iterator[PropertyFinding]:
         if float(shape) <= 0:
             yield PropertyFinding(key, f"gives a shape factor C of {float(shape):g}: must be positive")
         elif not 1 <= float(shape) <= 2:
-            what = "the force never peaks" if float(shape) < 1 else "the force turns round at large slip"
+            what = "the force never peaks" if float(shape) < 1 else "the force reverses its sign at large slip"
             yield PropertyFinding(key, f"gives a shape factor C of {float(shape):g}: usual are 1 to 2; {what}")
 
 
@@ -256,7 +256,7 @@ def _curvature(tyre: MFTyre) -> Iterator[PropertyFinding]:
             yield PropertyFinding(about, says)
 
 
-def _aligning(tyre: MFTyre) -> Iterator[PropertyFinding]:
+def _aligning_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
     z, df_z = tyre.aligning, _df_z(tyre)
     if float(z.QDZ1) == 0 and float(z.QDZ2) == 0:
         return  # no trail was fitted
@@ -270,8 +270,8 @@ def _aligning(tyre: MFTyre) -> Iterator[PropertyFinding]:
         )
 
 
-def _combined(tyre: MFTyre) -> Iterator[PropertyFinding]:
-    """The weights of combined slip are positive: a force fades with the other slip, and never turns round."""
+def _combined_findings(tyre: MFTyre) -> Iterator[PropertyFinding]:
+    """The weights of combined slip are positive: a force fades with the other slip, and never reverses its sign."""
     r = tyre.ranges
     slip_ratio, slip_angle = min(-float(r.KPUMIN), 0.5), min(float(r.ALPMAX), 0.5)
     if slip_ratio <= 0 or slip_angle <= 0:

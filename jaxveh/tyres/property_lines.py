@@ -55,15 +55,15 @@ def _without_value(file: PropertyFile, known: set[str]) -> Iterator[PropertyFind
     empty = [entry for entry in file.entries if entry.value == "" and entry.key not in told]
     read = [entry for entry in empty if entry.key in known or entry.key in WORDS or entry.section == "UNITS"]
     if read:
-        yield PropertyFinding(_listed(read), "without a value: as if the lines were not there")
+        yield PropertyFinding(_list_keys(read), "without a value: as if the lines were not there")
     if others := [entry for entry in empty if entry not in read and not entry.quoted]:
-        yield PropertyFinding(_listed(others), "without a value, and not read")
+        yield PropertyFinding(_list_keys(others), "without a value, and not read")
 
 
 def _zeros(file: PropertyFile) -> Iterator[PropertyFinding]:
     if zeros := [entry for entry in file.entries if entry.value == 0 and entry.key in NOT_MEASURED]:
         yield PropertyFinding(
-            _listed(zeros), "0, where only a positive number means anything: as if the lines were not there"
+            _list_keys(zeros), "0, where only a positive number means anything: as if the lines were not there"
         )
 
 
@@ -75,7 +75,7 @@ def _texts(file: PropertyFile) -> Iterator[PropertyFinding]:
         if entry.key not in WORDS and entry.section != "UNITS":
             place = f"in [{entry.section}], line {entry.line}"
             yield PropertyFinding(
-                entry.key, f"{place}, is {entry.shown}: neither a number nor in quotes; kept, and not read"
+                entry.key, f"{place}, is {entry.short_value}: neither a number nor in quotes; kept, and not read"
             )
 
 
@@ -104,12 +104,12 @@ def _unread(file: PropertyFile, known: set[str]) -> Iterator[PropertyFinding]:
             if entry.value != neutral:
                 unread.setdefault(entry.section, []).append(entry)
     for section, entries in unread.items():
-        yield PropertyFinding(f"[{section}]", f"{_listed(entries)}: not read, and not neutral")
+        yield PropertyFinding(f"[{section}]", f"{_list_keys(entries)}: not read, and not neutral")
     if DEFLECTIONS in (line.strip().upper() for line in file.lines):
         yield PropertyFinding(DEFLECTIONS, "is not read: the deflection follows VERTICAL_STIFFNESS")
 
 
-def _listed(entries: Iterable[kit.Entry]) -> str:
+def _list_keys(entries: Iterable[kit.Entry]) -> str:
     keys = list(dict.fromkeys(entry.key for entry in entries))
     return (
         ", ".join(keys)

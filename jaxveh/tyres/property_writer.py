@@ -100,13 +100,13 @@ def to_property_file(
         )
     coefficients = list(_coefficients(tyre))
     if like is None:
-        return _noted(_new(tyre, coefficients, side), note)
+        return _with_note(_new(tyre, coefficients, side), note)
     if side is not None:
         raise InputError(f"to_property_file: side = {side!r}: {like.source} tells its own side; leave `side` out.")
     file = _with_version(like, tyre.version)
     for _ in range(ROUNDS):
-        file = _changed(file, coefficients)
-    return _noted(file, note)
+        file = _with_changes(file, coefficients)
+    return _with_note(file, note)
 
 
 def _coefficients(tyre: MFTyre) -> Iterable[_Coefficient]:
@@ -149,10 +149,10 @@ def _with_version(file: PropertyFile, version: int) -> PropertyFile:
             return file
     except InputError:
         pass  # the file does not say: now it does
-    return _added(file, "MODEL", [f"{'FITTYP':<24} = {FITTYP[version]}"])
+    return _with_lines(file, "MODEL", [f"{'FITTYP':<24} = {FITTYP[version]}"])
 
 
-def _changed(file: PropertyFile, coefficients: list[_Coefficient]) -> PropertyFile:
+def _with_changes(file: PropertyFile, coefficients: list[_Coefficient]) -> PropertyFile:
     """The file with those numbers replaced or added that it would not read as the tyre's."""
     said = {one.name: one.value for one in _coefficients(from_property_file(file))}
     replaced: dict[str, float] = {}
@@ -168,7 +168,7 @@ def _changed(file: PropertyFile, coefficients: list[_Coefficient]) -> PropertyFi
             added.setdefault(one.section, []).append(_line(one._replace(unit="-"), number))
     file = file.replace(replaced)
     for section, lines in added.items():
-        file = _added(file, section, lines)
+        file = _with_lines(file, section, lines)
     return file
 
 
@@ -185,7 +185,7 @@ def _in_units(value: float, size: float) -> float:
     return min(candidates, key=lambda one: abs(one * size - value))
 
 
-def _added(file: PropertyFile, section: str, lines: list[str]) -> PropertyFile:
+def _with_lines(file: PropertyFile, section: str, lines: list[str]) -> PropertyFile:
     """The file with lines after the last entry of a section, or with that section at its end."""
     end = "\r\n" if file.lines[0].endswith("\r\n") else "\n"
     last = max((entry.line for entry in file.entries if entry.section == section), default=None)
@@ -197,7 +197,7 @@ def _added(file: PropertyFile, section: str, lines: list[str]) -> PropertyFile:
     return kit.parse_property_file("".join([*before, *(line + end for line in lines), *file.lines[last:]]), file.source)
 
 
-def _noted(file: PropertyFile, note: str) -> PropertyFile:
+def _with_note(file: PropertyFile, note: str) -> PropertyFile:
     """The file with comment lines under its first heading, which readers may want to be the first line."""
     if not note:
         return file

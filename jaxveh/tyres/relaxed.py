@@ -88,7 +88,7 @@ class Relaxed(AbstractDynamicTyre):
         return tuple(STATES[self.of] + axis for axis in self.lags)
 
     def start(self, contact: Contact):
-        settled = self._settled(contact)
+        settled = self._settled_state(contact)
         shape = jnp.broadcast_shapes(*[jnp.shape(value) for value in settled])
         return record_type("RelaxedState", self.state_names)(*[jnp.broadcast_to(value, shape) for value in settled])
 
@@ -97,7 +97,7 @@ class Relaxed(AbstractDynamicTyre):
         if self.of == "force":
             rates = {
                 name: slip_speed * ((end - getattr(state, name)) / lengths[axis])
-                for name, axis, end in zip(self.state_names, self.lags, self._settled(contact), strict=True)
+                for name, axis, end in zip(self.state_names, self.lags, self._settled_state(contact), strict=True)
             }
             return record("RelaxedState", rates)
         slips = dict(zip("xy", practical(contact), strict=True))
@@ -131,7 +131,7 @@ class Relaxed(AbstractDynamicTyre):
             slips["slip_angle"] = numerics.arctan(slips["lateral_slip"])
         return self.tyre.forces(contact._replace(**slips))
 
-    def _settled(self, contact: Contact) -> list:
+    def _settled_state(self, contact: Contact) -> list:
         """The states' values after a long way at this contact, in the order of `lags`."""
         if self.of == "force":
             forces = self.tyre.forces(contact)

@@ -137,13 +137,13 @@ class TMeasy(AbstractTyre):
         limit = contact.friction * (load / self.nominal_load)
         grip = jnp.maximum(contact.friction * jnp.ones_like(load), LEAST_GRIP)
         slip_x, slip_y = (slip / grip for slip in theoretical(contact))
-        F_x, F_y = (limit * force for force in _combined(x, y, slip_x, slip_y, AFTER_PEAK[self.after_peak]))
+        F_x, F_y = (limit * force for force in _combined_forces(x, y, slip_x, slip_y, AFTER_PEAK[self.after_peak]))
         if self.trail is None:
             return Forces(F_x=F_x, F_y=F_y)
         return Forces(F_x=F_x, F_y=F_y, M_z=-contact.direction * self.trail(slip_y) * F_y)
 
 
-def _combined(x: _Numbers, y: _Numbers, slip_x, slip_y, after_peak):
+def _combined_forces(x: _Numbers, y: _Numbers, slip_x, slip_y, after_peak):
     """Forces along both slips, each in the unit of the curves' forces."""
     peaks, bends = x.s_max + y.s_max, x.F_max / x.initial_stiffness + y.F_max / y.initial_stiffness
     norm_x = x.s_max / peaks + x.F_max / x.initial_stiffness / bends

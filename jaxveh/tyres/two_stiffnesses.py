@@ -22,7 +22,7 @@ class AbstractTwoStiffnesses(AbstractTyre):
         """The greatest force, N: friction of tyre and road times the load."""
         return self.friction * contact.friction * need_load(contact, type(self).__name__)
 
-    def unbounded(self, sigma_x: Any, sigma_y: Any) -> tuple[Any, Any, Any]:
+    def unbounded_force(self, sigma_x: Any, sigma_y: Any) -> tuple[Any, Any, Any]:
         """The force that the stiffnesses alone would make of slips, N: along, across, and its size."""
         F_x, F_y = self.slip_stiffness * sigma_x, self.cornering_stiffness * sigma_y
         return F_x, F_y, numerics.hypot(F_x, F_y)

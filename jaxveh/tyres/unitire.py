@@ -35,7 +35,7 @@ class UniTire(AbstractTwoStiffnesses):
         """F_x and F_y, N."""
         limit = self.limit(contact)
         sigma_x, sigma_y = theoretical(contact)
-        wish_x, wish_y, wish = self.unbounded(sigma_x, sigma_y)
+        wish_x, wish_y, wish = self.unbounded_force(sigma_x, sigma_y)
         held = limit > 0
         phi = wish / jnp.where(held, limit, 1.0)
         rises = (phi < SATURATED) & held

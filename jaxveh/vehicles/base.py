@@ -107,7 +107,7 @@ class AbstractVehicle(eqx.Module):
         return self.evaluate(t, x, u, ground)[1]
 
 
-def filled(outputs: Any) -> Any:
+def with_batch_shape(outputs: Any) -> Any:
     """The same NamedTuple, each field with the shape of all: a number or a parameter stands for the whole batch."""
     leaves = jax.tree.leaves(outputs)
     shape = jnp.broadcast_shapes(*[jnp.shape(leaf) for leaf in leaves])

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, filled
+from jaxveh.vehicles.base import AbstractVehicle, with_batch_shape
 from jaxveh.vehicles.limits import AccelerationLimits, SteerLimits
 from jaxveh.vehicles.wheels import gravity
 
@@ -76,23 +76,23 @@ class Commanded(AbstractVehicle):
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         inner = self._inputs(x, u, ground)
-        steer_rate, v_x_rate = self._limited(x, u)
+        steer_rate, v_x_rate = self._limit_commands(x, u)
         rates, outputs = self.vehicle.evaluate(t, self._inner(x), inner, ground)
         own = {"steer": x.steer, "steer_rate": steer_rate, "v_x_rate": v_x_rate}
         shown = record("CommandedOutputs", own | outputs._asdict())
-        return self.state_type(steer_rate, v_x_rate, *rates), filled(shown)
+        return self.state_type(steer_rate, v_x_rate, *rates), with_batch_shape(shown)
 
     def _inner(self, x):
         return self.vehicle.state_type(*x[len(OWN) :])
 
-    def _limited(self, x, u):
-        steer_rate = u.steer_rate if self.steer_limits is None else self.steer_limits.allowed(x.steer, u.steer_rate)
+    def _limit_commands(self, x, u):
+        steer_rate = u.steer_rate if self.steer_limits is None else self.steer_limits.limit(x.steer, u.steer_rate)
         wished, limits = u.acceleration, self.acceleration_limits
-        return steer_rate, wished if limits is None else limits.allowed(x.v_x, wished)
+        return steer_rate, wished if limits is None else limits.limit(x.v_x, wished)
 
     def _inputs(self, x, u, ground: Ground):
         """What the vehicle is told."""
-        steer_rate, v_x_rate = self._limited(x, u)
+        steer_rate, v_x_rate = self._limit_commands(x, u)
         known = {"steer": x.steer, "v_x": x.v_x, "a_x": v_x_rate, "v_x_rate": v_x_rate, "steer_rate": steer_rate}
         told = record("CommandedInputs", {name: known[name] for name in self.vehicle.inputs})
         if "a_x" not in told._fields:

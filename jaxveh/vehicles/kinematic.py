@@ -9,7 +9,7 @@ import jax
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion, filled, given_or_zero
+from jaxveh.vehicles.base import AbstractVehicle, Motion, given_or_zero, with_batch_shape
 from jaxveh.vehicles.wheels import gravity
 
 
@@ -118,4 +118,4 @@ class Kinematic(AbstractKinematic):
             sideslip=numerics.arctan(self.rear_axle_to_reference * curvature),
             curvature=curvature,
         )
-        return KinematicState(moves.yaw_rate), filled(outputs)
+        return KinematicState(moves.yaw_rate), with_batch_shape(outputs)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion, filled
+from jaxveh.vehicles.base import AbstractVehicle, Motion, with_batch_shape
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
 
 
@@ -92,7 +92,7 @@ class KinematicCrawl(AbstractVehicle):
         shown = outputs._replace(
             v_x=moves.v_x, v_y=moves.v_y, yaw_rate=moves.yaw_rate, yaw_acceleration=yaw_acceleration
         )
-        return rates, filled(shown)
+        return rates, with_batch_shape(shown)
 
     def _slow(self, u):
         return jnp.abs(u.v_x) < self.below

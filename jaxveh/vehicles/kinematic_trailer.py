@@ -13,7 +13,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import check
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import Motion, filled, given_or_zero
+from jaxveh.vehicles.base import Motion, given_or_zero, with_batch_shape
 from jaxveh.vehicles.kinematic import AbstractKinematic
 from jaxveh.vehicles.wheels import gravity
 
@@ -121,4 +121,4 @@ class KinematicTrailer(AbstractKinematic):
             trailer_yaw=x.yaw + x.hitch_angle,
             trailer_v_x=u.v_x * cosine - swing * sine,
         )
-        return KinematicTrailerState(yaw_rate, hitch_rate), filled(outputs)
+        return KinematicTrailerState(yaw_rate, hitch_rate), with_batch_shape(outputs)

@@ -1,6 +1,6 @@
 """What those who add a vehicle build with."""
 
-from jaxveh.vehicles.base import filled
+from jaxveh.vehicles.base import with_batch_shape
 from jaxveh.vehicles.drive import AbstractDriven
 from jaxveh.vehicles.given_speed import AbstractToldSpeed
 from jaxveh.vehicles.load_transfer import AbstractShiftingLoads, planar_loads
@@ -32,10 +32,10 @@ __all__ = [
     "body_forces",
     "corners",
     "each_wheel",
-    "filled",
     "planar_loads",
     "rolling_wheels",
     "travel_direction",
     "wheel_names",
     "wheels_of",
+    "with_batch_shape",
 ]

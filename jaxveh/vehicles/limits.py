@@ -29,7 +29,7 @@ class SteerLimits(eqx.Module):
         for name in ("smallest", "slowest"):
             check(f"SteerLimits.{name}", getattr(self, name), lambda v: v < 0, "negative")
 
-    def allowed(self, steer: Any, rate: Any) -> Any:
+    def limit(self, steer: Any, rate: Any) -> Any:
         """The steering rate (rad/s) that becomes of the wished `rate` at the angle `steer` (rad)."""
         stopped = ((steer <= self.smallest) & (rate <= 0)) | ((steer >= self.largest) & (rate >= 0))
         return jnp.where(stopped, 0.0, jnp.clip(rate, self.slowest, self.fastest))
@@ -52,7 +52,7 @@ class AccelerationLimits(eqx.Module):
         check_parameters(self)
         check("AccelerationLimits.backwards", self.backwards, lambda v: v < 0, "negative (m/s)")
 
-    def allowed(self, speed: Any, acceleration: Any) -> Any:
+    def limit(self, speed: Any, acceleration: Any) -> Any:
         """The acceleration (m/s^2) that becomes of the wished one at a speed (m/s)."""
         stopped = ((speed <= self.backwards) & (acceleration <= 0)) | ((speed >= self.forwards) & (acceleration >= 0))
         power = self.largest * self.switching_speed / jnp.maximum(speed, self.switching_speed)

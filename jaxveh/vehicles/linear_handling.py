@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import GRAVITY, Motion, filled, given_or_zero
+from jaxveh.vehicles.base import GRAVITY, Motion, given_or_zero, with_batch_shape
 from jaxveh.vehicles.lateral_system import LateralSystem
 from jaxveh.vehicles.shared import AbstractOneTrack
 from jaxveh.vehicles.single_track import UNITS, SingleTrackOutputs
@@ -38,7 +38,7 @@ class LinearSingleTrack(AbstractOneTrack):
         F_f = C_f (delta - beta - a r / v),  F_r = C_r (-beta + b r / v)
 
     For small angles the speed along the car is that along the path: `v_x` is taken as the latter, so that the velocity has the
-    components `v cos(beta)` and `v sin(beta)`. Backwards (v < 0) the slip angles turn round, as the tyres' forces do. Below
+    components `v cos(beta)` and `v sin(beta)`. Backwards (v < 0) the slip angles reverse sign, as the tyres' forces do. Below
     `crawl_speed` (m/s, 3 by default) |v| in the denominators is `regularised_speed`, so that standstill is an ordinary point.
     A road's bank pushes by `m g_y`; its friction does not count, as always in a linear law.
 
@@ -107,7 +107,7 @@ class LinearSingleTrack(AbstractOneTrack):
             load_front=front * weight * b,
             load_rear=rear * weight * a,
         )
-        return rates, filled(outputs)
+        return rates, with_batch_shape(outputs)
 
     def load_shares(self, u, ground: Ground = LEVEL) -> tuple[Any, Any]:
         """Loads of front and rear axle over those at rest on a level road (-); they multiply the stiffnesses."""

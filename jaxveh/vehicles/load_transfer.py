@@ -17,8 +17,8 @@ from jaxveh.vehicles.wheels import Wheels
 
 
 class AbstractLoadTransfer(eqx.Module):
-    """Which accelerations shift the loads. `felt` are those at an instant; states, where there are any, are the car's, and zero
-    where it runs straight.
+    """Which accelerations shift the loads. `felt_accelerations` are those at an instant; states, where there are any, are the
+    car's, and zero where it runs straight.
 
     Longitudinally it is what the tyres push, over the mass: the air's drag acts at the centre of gravity's height, so that in
     moments about it only forces of the road count.
@@ -28,7 +28,7 @@ class AbstractLoadTransfer(eqx.Module):
     inputs: eqx.AbstractVar[tuple[str, ...]]
 
     @abc.abstractmethod
-    def felt(self, x: Any, u: Any, guess: tuple[Any, Any]) -> tuple[Any, Any]:
+    def felt_accelerations(self, x: Any, u: Any, guess: tuple[Any, Any]) -> tuple[Any, Any]:
         """(a_x, a_y), m/s^2, that the loads feel; `guess` are those of the car in a steady turn under its torques."""
 
     @abc.abstractmethod
@@ -50,7 +50,7 @@ class StaticLoads(AbstractImmediate):
 
     inputs: ClassVar[tuple[str, ...]] = ()
 
-    def felt(self, x, u, guess):
+    def felt_accelerations(self, x, u, guess):
         return 0.0, 0.0
 
 
@@ -64,7 +64,7 @@ class QuasiStatic(AbstractImmediate):
 
     inputs: ClassVar[tuple[str, ...]] = ()
 
-    def felt(self, x, u, guess):
+    def felt_accelerations(self, x, u, guess):
         return guess
 
 
@@ -82,7 +82,7 @@ class LaggedLoads(AbstractLoadTransfer):
     def __check_init__(self):
         check_parameters(self)
 
-    def felt(self, x, u, guess):
+    def felt_accelerations(self, x, u, guess):
         return x.a_x_felt, x.a_y_felt
 
     def rates(self, x, a_x, a_y):
@@ -97,7 +97,7 @@ class MeasuredLoads(AbstractImmediate):
 
     inputs: ClassVar[tuple[str, ...]] = ("a_x", "a_y")
 
-    def felt(self, x, u, guess):
+    def felt_accelerations(self, x, u, guess):
         return u.a_x, u.a_y
 
 
@@ -156,15 +156,15 @@ def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     half_front, half_rear = 0.5 * front, 0.5 * rear
     # The rear takes what the front leaves of the moment, then the front what the rear leaves. Each is read by both wheels of
     # an axle and by the other axle: computed once it is 110 instead of 119 ns a step of 7-DOF cars (float64, 1000 runs).
-    first_front = held(share / track_front * moment, half_front)
-    moved_rear = held(moment * (1.0 / track_rear) - first_front * (track_front / track_rear), half_rear)
+    first_front = limit_transfer(share / track_front * moment, half_front)
+    moved_rear = limit_transfer(moment * (1.0 / track_rear) - first_front * (track_front / track_rear), half_rear)
     moved_rear = numerics.barrier(moved_rear)
-    moved_front = held(moment * (1.0 / track_front) - moved_rear * (track_rear / track_front), half_front)
+    moved_front = limit_transfer(moment * (1.0 / track_front) - moved_rear * (track_rear / track_front), half_front)
     moved_front = numerics.barrier(moved_front)
     return Wheels(half_front - moved_front, half_front + moved_front, half_rear - moved_rear, half_rear + moved_rear)
 
 
-def held(moved: Any, half: Any) -> Any:
+def limit_transfer(moved: Any, half: Any) -> Any:
     """What moves from the left to the right wheel, N, no more than `half` of the axle's load."""
     return jnp.clip(moved, -half, half)
 

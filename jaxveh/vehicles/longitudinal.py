@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion, filled, given_or_zero
+from jaxveh.vehicles.base import AbstractVehicle, Motion, given_or_zero, with_batch_shape
 from jaxveh.vehicles.two_track import air_drag
 from jaxveh.vehicles.wheels import gravity, travel_direction
 
@@ -54,7 +54,7 @@ class Longitudinal(AbstractVehicle):
 
         (m + 4 J_w / r^2) dv/dt = (T_drive - s T_brake) / r - s f_r m g cos(theta) - drag v |v| - m g sin(theta)
 
-    Brakes and rolling resistance turn round smoothly about 0.5 m/s, so that standstill is an ordinary point; a braked car on
+    Brakes and rolling resistance change sign smoothly about 0.5 m/s, so that standstill is an ordinary point; a braked car on
     a slope creeps where they hold the slope's pull.
 
     **Parameters**: `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2, of one wheel), `drag` (N s^2/m^2, half the air's
@@ -121,4 +121,4 @@ class Longitudinal(AbstractVehicle):
             grade_force=grade_force,
             drive_power=drive_force * x.v_x,
         )
-        return LongitudinalState(rate), filled(outputs)
+        return LongitudinalState(rate), with_batch_shape(outputs)

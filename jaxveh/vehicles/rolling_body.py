@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import check
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.vehicles.base import GRAVITY, Motion
-from jaxveh.vehicles.load_transfer import axle_loads, held
+from jaxveh.vehicles.load_transfer import axle_loads, limit_transfer
 from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack
 from jaxveh.vehicles.wheels import Wheels
 
@@ -179,7 +179,7 @@ def roll_loads(car: AbstractRollingTwoTrack, x: Any, a_x: Any, a_y: Any, g_z: An
         )
         direct = share * (car.sprung_mass * centre + unsprung * car.unsprung_height) * a_y
         half = 0.5 * load
-        moved = held((stiffness * x.roll + damping * x.roll_rate + direct) / track, half)
+        moved = limit_transfer((stiffness * x.roll + damping * x.roll_rate + direct) / track, half)
         loads += [half - moved, half + moved]
     return Wheels(*loads)
 

@@ -15,7 +15,7 @@ from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
-from jaxveh.vehicles.base import AbstractVehicle, filled
+from jaxveh.vehicles.base import AbstractVehicle, with_batch_shape
 
 
 class AbstractPlaneBody(AbstractVehicle):
@@ -118,4 +118,4 @@ class AbstractOnTyres(AbstractTwoAxle):
 
     def rates_and_outputs(self, rates: tuple, outputs: dict) -> tuple[Any, Any]:
         """Rates and outputs, by name, as `evaluate` gives them."""
-        return self.state_type(*rates), filled(record(f"{type(self).__name__}Outputs", outputs))
+        return self.state_type(*rates), with_batch_shape(record(f"{type(self).__name__}Outputs", outputs))

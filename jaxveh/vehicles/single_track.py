@@ -15,7 +15,7 @@ from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import Contact
 from jaxveh.vehicles.axles import AxleTyres
-from jaxveh.vehicles.base import GRAVITY, Motion, filled
+from jaxveh.vehicles.base import GRAVITY, Motion, with_batch_shape
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
 from jaxveh.vehicles.shared import AbstractOneTrack, AbstractOnTyres
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
@@ -127,7 +127,7 @@ class SingleTrack(AbstractOnTyres, AbstractOneTrack):
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        cosine, sine = self._steered(u)
+        cosine, sine = self._steer_direction(u)
         contacts = self._contacts(x, u, cosine, sine, ground)
         tyres = self.tyres
         states = tyres.states(x)
@@ -155,7 +155,7 @@ class SingleTrack(AbstractOnTyres, AbstractOneTrack):
             load_front=contacts[0].load,
             load_rear=contacts[1].load,
         )
-        return self.state_type(*rates, *tyres.rates(contacts, states)), filled(outputs)
+        return self.state_type(*rates, *tyres.rates(contacts, states)), with_batch_shape(outputs)
 
     def loads(self, x, u, ground: Ground = LEVEL) -> tuple[jax.Array, jax.Array]:
         """Loads of front and rear axle, N; they may become negative where the car would lift an axle."""
@@ -175,9 +175,9 @@ class SingleTrack(AbstractOnTyres, AbstractOneTrack):
 
     def contacts(self, x, u, ground: Ground = LEVEL) -> tuple[Contact, Contact]:
         """How the front and the rear axle touch the road: slip angles, loads, speeds."""
-        return self._contacts(x, u, *self._steered(u), ground)
+        return self._contacts(x, u, *self._steer_direction(u), ground)
 
-    def _steered(self, u):
+    def _steer_direction(self, u):
         steer = u.steer + self.steer_offset
         return numerics.cos(steer), numerics.sin(steer)
 

@@ -16,7 +16,7 @@ from jaxveh.vehicles.axles import AxleTyres
 from jaxveh.vehicles.base import Motion
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic, axle_loads
 from jaxveh.vehicles.shared import AbstractOneTrack, AbstractOnTyres
-from jaxveh.vehicles.traction import AbstractSpinless, driven
+from jaxveh.vehicles.traction import AbstractSpinless, driven_forces
 from jaxveh.vehicles.wheels import contact, gravity, rolling
 
 STATES = ("v_x", "v_y", "yaw", "yaw_rate")
@@ -71,16 +71,16 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnTyres, AbstractOneTrack):
         return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
 
     def contacts(self, x, u, ground: Ground = LEVEL) -> tuple[Contact, Contact]:
-        return self._touching(x, u, ground)[0]
+        return self._contacts_and_motions(x, u, ground)[0]
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
         tyres, (drive, brake) = self.tyres, self.drive.torques(u)
-        contacts, moves = self._touching(x, u, ground)
+        contacts, moves = self._contacts_and_motions(x, u, ground)
         states = tyres.states(x)
         pushing, slowing = (drive.fl + drive.fr, drive.rl + drive.rr), (brake.fl + brake.fr, brake.rl + brake.rr)
         front, rear = (
-            driven(self, force, at, move.along, *torques)
+            driven_forces(self, force, at, move.along, *torques)
             for force, at, move, *torques in zip(
                 tyres.forces(contacts, states), contacts, moves, pushing, slowing, strict=True
             )
@@ -119,11 +119,11 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnTyres, AbstractOneTrack):
         }
         return self.rates_and_outputs(rates, shown)
 
-    def _touching(self, x, u, ground: Ground):
+    def _contacts_and_motions(self, x, u, ground: Ground):
         """Contacts and motions of the axles."""
         g = _, g_y, g_z = gravity(ground)
         steady = self.steady_a_x(x, u, ground, g), x.v_x * x.yaw_rate - g_y
-        loads = axle_loads(self, self.load_transfer.felt(x, u, steady)[0], g_z)
+        loads = axle_loads(self, self.load_transfer.felt_accelerations(x, u, steady)[0], g_z)
         friction = 0.5 * (ground.friction_fl + ground.friction_fr), 0.5 * (ground.friction_rl + ground.friction_rr)
         turned = (numerics.cos(u.steer), numerics.sin(u.steer)), (1.0, 0.0)
         places = self.wheel_positions[::2]

@@ -11,7 +11,7 @@ from jaxveh._core.errors import InputError, check
 from jaxveh._core.names import as_mapping, check_names, record, record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, filled
+from jaxveh.vehicles.base import AbstractVehicle, with_batch_shape
 
 
 class Steered(AbstractVehicle):
@@ -102,7 +102,7 @@ class Steered(AbstractVehicle):
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         inner_x, inner_u = self._inner(x, u)
         rates, outputs = self.vehicle.evaluate(t, inner_x, inner_u, ground)
-        moment = _aligning(outputs, self.trail)
+        moment = _aligning_moment(outputs, self.trail)
         shown = outputs._asdict() | {"steering_wheel": u.steering_wheel, "steer": inner_u.steer}
         own = ()
         if self.own_states:
@@ -112,13 +112,13 @@ class Steered(AbstractVehicle):
                     "the steering; compliance must be None."
                 )
             spring = (u.steering_wheel / self.ratio - x.steer) / self.compliance
-            own = self._turning(x, spring + moment)
+            own = self._steering_rates(x, spring + moment)
             moment = -spring
         if moment is not None:
             shown["steering_torque"] = -moment / (self.ratio * (1.0 + self.assist))
-        return self.state_type(*rates, *own), filled(record("SteeredOutputs", shown))
+        return self.state_type(*rates, *own), with_batch_shape(record("SteeredOutputs", shown))
 
-    def _turning(self, x, moment) -> tuple:
+    def _steering_rates(self, x, moment) -> tuple:
         if "steer_rate" not in self.own_states:
             return (moment / self.damping,)
         return x.steer_rate, (moment - self.damping * x.steer_rate) / self.inertia
@@ -135,7 +135,7 @@ def _steering(u: Any, steer: Any) -> Any:
     return record("Inputs", given | {"steer": steer})
 
 
-def _aligning(outputs: Any, trail: Any) -> Any:
+def _aligning_moment(outputs: Any, trail: Any) -> Any:
     """Moment of the road on the front wheels about their steering axes, N m; None where the vehicle does not say."""
     if hasattr(outputs, "F_y_fl"):
         return (outputs.M_z_fl + outputs.M_z_fr) - trail * (outputs.F_y_fl + outputs.F_y_fr)

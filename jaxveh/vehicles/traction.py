@@ -29,7 +29,7 @@ _LEAST_LIMIT = 1.0
 """N: so little load cannot be told from a wheel that has lifted, and a division by it is safe."""
 
 
-def saturated(wish: Any) -> Any:
+def saturate(wish: Any) -> Any:
     """`wish` (-) as far as grip allows: exact up to 0.895, at most 0.995, and a parabola between, without a kink."""
     held = jnp.clip(wish, -(_END + _CORNER), _END + _CORNER)
     excess = jnp.maximum(jnp.abs(held) - (_END - _CORNER), 0.0)
@@ -44,7 +44,7 @@ def within_grip(forces: Forces, wish: Any, limit: Any) -> Forces:
     `limit` (N) is the greatest longitudinal force (R. Rajamani, Vehicle Dynamics and Control, 2nd ed., ch. 13.4; the friction
     ellipse of Milliken & Milliken, Race Car Vehicle Dynamics, ch. 2, on forces).
     """
-    share = saturated(wish / jnp.maximum(limit, _LEAST_LIMIT))
+    share = saturate(wish / jnp.maximum(limit, _LEAST_LIMIT))
     left = numerics.sqrt(1.0 - jnp.square(share))
     return forces._replace(F_x=limit * share, F_y=left * forces.F_y, M_z=left * forces.M_z)
 
@@ -67,10 +67,10 @@ class AbstractSpinless(AbstractDriven, AbstractShiftingLoads):
         drive, brake = self.drive.torques(u)
         push = (sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(x.v_x)) / self.wheel_radius
         limit = self.grip * self.mass * (-g[2] * 0.25 * sum_of_wheels(frictions(ground)))
-        return limit * saturated(push / jnp.maximum(limit, _LEAST_LIMIT)) / self.mass
+        return limit * saturate(push / jnp.maximum(limit, _LEAST_LIMIT)) / self.mass
 
 
-def driven(car: AbstractSpinless, forces: Forces, at: Contact, along: Any, drive: Any, brake: Any) -> Forces:
+def driven_forces(car: AbstractSpinless, forces: Forces, at: Contact, along: Any, drive: Any, brake: Any) -> Forces:
     """Forces of a wheel (or axle) of `car` under its torques (N m), where it rolls at `along` (m/s).
 
     The torque less brake and rolling resistance, over the radius, is what the wheel asks of the road; `car.grip` times the
@@ -83,8 +83,8 @@ def driven(car: AbstractSpinless, forces: Forces, at: Contact, along: Any, drive
 
 
 def driven_wheels(car: AbstractSpinless, road: OnRoad, drive: Wheels, brake: Wheels) -> Wheels:
-    """The forces of all wheels under their torques, as `driven`."""
-    under = lambda force, at, move, *torques: driven(car, force, at, move.along, *torques)
+    """The forces of all wheels under their torques, as `driven_forces`."""
+    under = lambda force, at, move, *torques: driven_forces(car, force, at, move.along, *torques)
     return each_wheel(under, road.forces, road.contacts, road.moves, drive, brake)
 
 

@@ -6,7 +6,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import check_names, record, record_type
 from jaxveh.roads import LEVEL, AbstractRoad, Ground, under
-from jaxveh.vehicles.base import AbstractVehicle, Motion, filled
+from jaxveh.vehicles.base import AbstractVehicle, Motion, with_batch_shape
 
 PLACE = ("x", "y")
 
@@ -65,7 +65,7 @@ class Travelling(AbstractVehicle):
         shown = {"x": x.x, "y": x.y, **outputs._asdict()}
         if self.road is not None:
             shown |= ground._asdict()
-        return self.state_type(*_velocity(moves), *rates), filled(record("TravellingOutputs", shown))
+        return self.state_type(*_velocity(moves), *rates), with_batch_shape(record("TravellingOutputs", shown))
 
     def _inner(self, x):
         return self.vehicle.state_type(*x[len(PLACE) :])

@@ -119,21 +119,21 @@ class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
         return Wheels(None, None, None, None)
 
     def contacts(self, x, u, ground: Ground = LEVEL) -> Wheels:
-        return self._touching(x, u, ground)[0]
+        return self._contacts_and_motions(x, u, ground)[0]
 
     def on_road(self, x: Any, u: Any, ground: Ground) -> OnRoad:
         """What the road does to the wheels."""
-        contacts, moves = self._touching(x, u, ground)
+        contacts, moves = self._contacts_and_motions(x, u, ground)
         tyres = self.tyres
         states = tyres.states(x)
         return OnRoad(contacts, moves, tyres.forces(contacts, states), tyres.rates(contacts, states))
 
-    def _touching(self, x, u, ground: Ground) -> tuple[Wheels, Wheels]:
+    def _contacts_and_motions(self, x, u, ground: Ground) -> tuple[Wheels, Wheels]:
         """Contacts and motions of the wheels."""
         moves = rolling_wheels(self.places, self.wheel_speed(x, u), x.v_y, x.yaw_rate, u.steer)
         g = _, g_y, g_z = gravity(ground)
         steady = self.steady_a_x(x, u, ground, g), self.told_or_own_speed(x, u) * x.yaw_rate - g_y
-        loads = self.loads(x, *self.load_transfer.felt(x, u, steady), g_z)
+        loads = self.loads(x, *self.load_transfer.felt_accelerations(x, u, steady), g_z)
         touching = lambda move, load, mu, speed: contact(move, load, mu, self.crawl_speed, speed)
         return each_wheel(touching, moves, loads, frictions(ground), self.rim_speeds(x)), moves
 

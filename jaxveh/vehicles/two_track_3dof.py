@@ -24,7 +24,7 @@ class TwoTrack3DOF(AbstractSpinless, AbstractUprightTwoTrack):
     A wheel's longitudinal force is its torque over the radius, as `traction.within_grip` lets it share the road's grip with the
     lateral force; the tyre's own F_x does not count. Torques that differ from wheel to wheel (`FourMotors`) turn the car. What
     spins the wheels up is left out (4 J / r^2 beside the mass: about 3 %). Loads follow `load_transfer`; brakes and
-    rolling resistance turn round smoothly about 0.5 m/s.
+    rolling resistance change sign smoothly about 0.5 m/s.
 
     **Inputs**: `steer` (rad at the road wheels) and those of `drive` and `load_transfer`.
 

@@ -157,23 +157,23 @@ class Tyres(NamedTuple):
 
     def start(self, contacts: Wheels) -> tuple:
         """The settled states, in the order of `state_names`; of a wheel on the right in the mirror."""
-        return self._gather(lambda tyre, at: tyre.start(at), self._seen(contacts))
+        return self._gather(lambda tyre, at: tyre.start(at), self._mirror(contacts))
 
     def forces(self, contacts: Wheels, states: Wheels) -> Wheels:
         """What the road does to each wheel, in the wheel's axes.
 
         A wheel on the right is the mirror image of the one on the left, its tyre's states included.
         """
-        found = self._each(lambda tyre, at, state: tyre.forces(at, state), self._seen(contacts), states)
+        found = self._each(lambda tyre, at, state: tyre.forces(at, state), self._mirror(contacts), states)
         return each_wheel(
-            lambda forces, right: _turned_back(forces) if right else forces, each_wheel(stored, found), self.right
+            lambda forces, right: _reverse_signs(forces) if right else forces, each_wheel(stored, found), self.right
         )
 
     def rates(self, contacts: Wheels, states: Wheels) -> tuple:
         """The time derivatives, in the order of `state_names`; of a wheel on the right in the mirror."""
-        return self._gather(lambda tyre, at, state: tyre.derivatives(at, state), self._seen(contacts), states)
+        return self._gather(lambda tyre, at, state: tyre.derivatives(at, state), self._mirror(contacts), states)
 
-    def _seen(self, contacts: Wheels) -> Wheels:
+    def _mirror(self, contacts: Wheels) -> Wheels:
         return each_wheel(lambda at, right: kit.mirrored_contact(at) if right else at, contacts, self.right)
 
     def _each(self, function: Callable, *wheels: Wheels) -> Wheels:
@@ -194,7 +194,7 @@ class Tyres(NamedTuple):
         return tuple(value for state in self._each(some, *wheels) if state is not None for value in state)
 
 
-def _turned_back(forces: Forces) -> Forces:
+def _reverse_signs(forces: Forces) -> Forces:
     return forces._replace(F_y=-forces.F_y, M_x=-forces.M_x, M_z=-forces.M_z)
 
 
@@ -234,7 +234,7 @@ def body_forces(positions: Wheels, moves: Wheels, forces: Wheels) -> BodyForces:
 
 
 STANDSTILL = 15 / 16
-"""m/s: below it brakes and rolling resistance turn round smoothly, so that standstill is an ordinary point."""
+"""m/s: below it brakes and rolling resistance change sign smoothly, so that standstill is an ordinary point."""
 
 
 def travel_direction(speed: Any) -> Any:

@@ -132,7 +132,7 @@ def test_a_span_too_short_to_calibrate_on(tmp_path, drive):
 def test_a_log_without_a_channel(tmp_path, drive):
     table = {name: values for name, values in drive.items() if name != "a_x"}
     result, product = estimate(tmp_path, table)
-    assert "log lacks a_x" in error_line(result)
+    assert "the log has no a_x" in error_line(result)
     assert not product.exists()
 
 

@@ -11,7 +11,7 @@ from programs import error_line, run, write_car
 from jaxveh import InputError, Recording, io, roads, simulation, vehicles
 from jaxveh.cli.devices import DEVICES, NoiseOption, devices_of
 from jaxveh.cli.drive_report import numbers_of, print_numbers, steer_at_03g
-from jaxveh.cli.manoeuvre import USUAL, asked, course_of, make
+from jaxveh.cli.manoeuvre import USUAL, course_of, make, parse_manoeuvre
 from jaxveh.cli.vehicle import AS_PRINTED, BUILT_IN, vehicle_of
 from jaxveh.manoeuvres import MANOEUVRES
 from jaxveh.vehicles import kit
@@ -56,21 +56,21 @@ def test_every_manoeuvre_has_usual_values_and_can_be_made():
     assert set(USUAL) == set(MANOEUVRES)
     car = vehicles.passenger_car()
     for name in MANOEUVRES:
-        one = asked(name, None, None, None, (), car)
+        one = parse_manoeuvre(name, None, None, None, (), car)
         assert make(one, jax.random.key(0)).duration > 0
         assert (course_of(one) is not None) == (name.startswith("iso-") or name == "slalom-course")
 
 
 def test_what_the_manoeuvre_wants_of_the_car_comes_from_the_car():
     car = vehicle_of("passenger_car", "seven-dof")
-    brakes = asked("braking-in-a-turn", None, None, None, (), car).options
+    brakes = parse_manoeuvre("braking-in-a-turn", None, None, None, (), car).options
     assert brakes == {"mass": 1420.0, "wheel_radius": pytest.approx(0.3)}
-    path = asked("iso-lane-change", None, None, None, ("wheelbase=3", "width=2"), car)
+    path = parse_manoeuvre("iso-lane-change", None, None, None, ("wheelbase=3", "width=2"), car)
     understeer = float(vehicles.linear_single_track(car).understeer_gradient)
     assert 0.003 < understeer < 0.008
     assert path.options == {"wheelbase": 3.0, "width": 2.0, "understeer_gradient": understeer}
     assert course_of(path).lanes[0].left == pytest.approx((1.1 * 2 + 0.25) / 2)
-    slalom = asked("slalom-course", None, None, None, ("count=4", "spacing=20"), car)
+    slalom = parse_manoeuvre("slalom-course", None, None, None, ("count=4", "spacing=20"), car)
     assert slalom.options["count"] == 4 and [lane.start for lane in course_of(slalom).lanes] == [60, 80, 100, 120]
 
 
@@ -82,7 +82,7 @@ def straight_drive():
 @pytest.mark.parametrize(("name", "title"), [("iso-lane-change", "ISO 3888-1"), ("slalom-course", "slalom")])
 def test_the_clearance_says_of_what_body_it_is(name, title):
     car = vehicle_of("passenger_car", "single-track")
-    found = numbers_of(straight_drive(), asked(name, None, None, None, (), car), car)
+    found = numbers_of(straight_drive(), parse_manoeuvre(name, None, None, None, (), car), car)
     where = f"{title} (body of 4.5 m x 1.8 m centred on the centre of gravity)"
     assert found[where]["clearance"] < 0
 

@@ -18,10 +18,10 @@ from jaxveh.experiments.report import (
     above,
     at_least,
     at_most,
+    leave_open,
     number_asked,
-    stated,
     tally,
-    undecided,
+    with_terms,
 )
 
 README = Path(__file__).parents[2] / "README.md"
@@ -47,16 +47,16 @@ def test_what_took_the_place_of_another_stands_behind_it(name):
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_a_check_of_every_criterion_has_its_terms(name):
-    """`stated` refuses what is left out, and what has no terms."""
+    """`with_terms` refuses what is left out, and what has no terms."""
     criteria = _experiment(name).CRITERIA
-    checks = stated([at_most(one, 0.0, 1.0) for one in reversed(criteria)], criteria)
+    checks = with_terms([at_most(one, 0.0, 1.0) for one in reversed(criteria)], criteria)
     assert [check.name for check in checks] == list(criteria)
     assert all(Terms(check.condition, check.original) == criteria[check.name] for check in checks)
     assert tally(checks).of == number_asked(criteria)
     with pytest.raises(InputError, match="not looked at"):
-        stated([at_most(one, 0.0, 1.0) for one in list(criteria)[1:]], criteria)
+        with_terms([at_most(one, 0.0, 1.0) for one in list(criteria)[1:]], criteria)
     with pytest.raises(InputError, match="without terms: .'more'"):
-        stated([*checks, at_most("more", 0.0, 1.0)], criteria)
+        with_terms([*checks, at_most("more", 0.0, 1.0)], criteria)
 
 
 def row_of(name: str) -> list[str]:
@@ -89,12 +89,12 @@ def test_readme_has_a_row_for_every_paper_and_says_what_its_columns_are():
 def test_a_criterion_holds_by_its_number(make, value, bound, status):
     check = make("a", value, bound)
     assert (check.status, check.holds) == (status, status == HELD)
-    assert not undecided(check).holds and undecided(check).status == OPEN
+    assert not leave_open(check).holds and leave_open(check).status == OPEN
 
 
 def test_what_is_open_and_what_stands_beside_is_not_counted_as_held():
     checks = [
-        Check("a", 0.5, 1.0, HELD), Check("b", 0.5, 1.0, FAILED), undecided(Check("c", 0.5, 1.0, HELD)),
+        Check("a", 0.5, 1.0, HELD), Check("b", 0.5, 1.0, FAILED), leave_open(Check("c", 0.5, 1.0, HELD)),
         Check("b, later", 0.5, 1.0, HELD, "later", "b"), Check("d", 0.5, 1.0, HELD),
     ]  # fmt: skip
     assert tally(checks) == Tally(held=2, failed=1, open=1)

@@ -61,7 +61,7 @@ def test_the_filters_model_is_the_truth_s(slalom):
         drive = drives.Drive(*(jnp.asarray(leaf[seed]) for leaf in slalom))
         rows = model.rows_of(SMALL, drive)
         x = model.State(drive.true_v_x, drive.true_v_y, drive.true_yaw_rate)
-        said = model.seen(true_car(), 0.0, x, rows.u)
+        said = model.sensor_outputs(true_car(), 0.0, x, rows.u)
         for name, level in model.noise_levels(SMALL).items():
             rest = np.asarray(getattr(rows.y, name) - getattr(said, name))[50:]
             assert rest.std() < 1.15 * level and abs(rest.mean()) < 0.3 * level, name
@@ -75,7 +75,7 @@ def test_the_filters_model_is_the_truth_s(slalom):
 def test_the_slip_under_a_pull_is_dugoff_s(pull):
     car, across = true_car(), jnp.array([0.05, 0.4, -0.8])
     along, load, friction = (jnp.full(3, value) for value in (5.5, 3000.0, 0.2))
-    F_y, slip = car._slipping(along, across, load, jnp.full(3, pull), friction)
+    F_y, slip = car._lateral_and_slip(along, across, load, jnp.full(3, pull), friction)
     at = Contact(slip_angle=-jnp.arctan(across / along), slip_ratio=slip, load=load, friction=0.2, speed=along)
     forces = drives.dugoff(SMALL).forces(at)
     np.testing.assert_allclose(forces.F_x, pull, rtol=0.01, atol=1e-9)

@@ -11,7 +11,7 @@ from jaxveh import Parameters, sweeps
 from jaxveh.experiments import mass_grade_aukf as experiment
 from jaxveh.experiments.mass_grade_aukf import criteria
 from jaxveh.experiments.mass_grade_aukf import drives as own_drives
-from jaxveh.experiments.mass_grade_aukf.contestants import WALK, Found, contestants, metrics, pausing
+from jaxveh.experiments.mass_grade_aukf.contestants import WALK, Found, contestants, metrics, pausing_name
 from jaxveh.experiments.mass_grade_aukf.observed import KNOT, Known, bound_of_mass, known_of_mass, predictions
 
 PEDALS = (0.0, 0.2)
@@ -105,7 +105,7 @@ def made_up(study, **errors):
 
 def test_criteria_are_judged_as_they_were_asked_and_what_took_their_place_stands_beside():
     touched = dataclasses.replace(experiment.car(), guesses=(1300.0,))
-    car = made_up(touched, **{pausing(criteria.RATE): 0.012, criteria.RATE: 0.0076})
+    car = made_up(touched, **{pausing_name(criteria.RATE): 0.012, criteria.RATE: 0.0076})
     pulled = (Known(0.06, 0.7, 0.1), Known(0.06, 0.1, 0.1))
     bound, spread = Parameters({"mass": 0.06, "grade": 1.0}), Parameters({"mass": 0.4, "grade": 0.03})
     bounds = dataclasses.make_dataclass("Bounds", ("bounds", "spread"))(bound, spread)
@@ -114,24 +114,24 @@ def test_criteria_are_judged_as_they_were_asked_and_what_took_their_place_stands
         dict.fromkeys(criteria.STILL, bounds),
     )  # fmt: skip
     found = {check.name: check for check in experiment.check(result)}
-    asked, later = (found[criteria.final_mass("car", name)] for name in (pausing(criteria.RATE), criteria.RATE))
+    asked, later = (found[criteria.final_mass("car", name)] for name in (pausing_name(criteria.RATE), criteria.RATE))
     assert (asked.value, asked.status, asked.original) == (pytest.approx(1.2), "failed", "")
     assert (later.value, later.status, later.original) == (pytest.approx(0.76), "held", asked.name)
     for drive in criteria.STILL:
-        asked, later = found[criteria.bounded(drive)], found[criteria.erring(drive)]
+        asked, later = found[criteria.bound_criterion(drive)], found[criteria.error_criterion(drive)]
         assert (asked.value, asked.status) == (pytest.approx(0.15), "failed")
         assert (later.value, later.status) == (pytest.approx(np.hypot(0.7, 0.1) / 0.4), "held")
 
 
 def test_who_pauses_learns_nothing_of_the_mass_while_the_brake_is_touched(drives):
     """As was asked; only where the brake is touched there are such."""
-    assert pausing(criteria.RATE) not in contestants(SMALL)
+    assert pausing_name(criteria.RATE) not in contestants(SMALL)
     study = dataclasses.replace(SMALL, touches=1)
     drive = own_drives.Drive(*(jnp.asarray(leaf[1, 0, :101]) for leaf in drives))
     touched = slice(40, 60)
     drive = drive._replace(braking=jnp.zeros(101).at[touched].set(1.0))
     masses = lambda name: np.asarray(contestants(study)[name].run(study, jnp.asarray(4000.0), drive).mass[touched])
-    assert np.ptp(masses(pausing(criteria.RATE))) < 1e-9 < np.ptp(masses(criteria.RATE))
+    assert np.ptp(masses(pausing_name(criteria.RATE))) < 1e-9 < np.ptp(masses(criteria.RATE))
 
 
 def test_numbers_of_a_known_course():
@@ -147,7 +147,7 @@ def test_numbers_of_a_known_course():
 
 def test_disturbances_are_what_they_say():
     given = own_drives.Drive(*(np.arange(5.0),) * 7)
-    found = own_drives.disturbed(given, late=2, offset=0.1, scale=2.0)
+    found = own_drives.disturb(given, late=2, offset=0.1, scale=2.0)
     np.testing.assert_array_equal(found.torque, [0.0, 0.0, 0.0, 2.0, 4.0])
     np.testing.assert_allclose(found.a_x, np.arange(5.0) + 0.1)
     np.testing.assert_array_equal(found.v_x, given.v_x)

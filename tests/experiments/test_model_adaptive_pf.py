@@ -24,11 +24,11 @@ from jaxveh.experiments.model_adaptive_pf.contestants import (
     TOLD,
     Contestant,
     contestants,
+    dynamics_filter,
+    informed_filter,
     metrics,
-    moved,
     of_a_point,
-    redesigned,
-    told,
+    redesigned_particles,
 )
 from jaxveh.statespace.belief import AbstractBelief
 from jaxveh.statespace.contract import AbstractFilter
@@ -45,7 +45,7 @@ def quick_tyre(study, share=1.0):
 
 def quick_car(study):
     """A truth of three degrees of freedom on lagging linear tyres."""
-    return models.lagging(study, own_drives.model_car(study, quick_tyre(study)))
+    return models.lagging_car(study, own_drives.model_car(study, quick_tyre(study)))
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_the_truth_is_the_printed_car_on_tyres_of_the_printed_stiffness():
 
 def test_a_lagging_tyre_is_the_static_one_after_some_way():
     static = own_drives.model_car(SMALL, own_drives.fiala(SMALL))
-    car = models.lagging(SMALL, static)
+    car = models.lagging_car(SMALL, static)
     model = models.dynamics(SMALL, car, jnp.asarray(14.0))
     assert model.states == ("v_x", "v_y", "yaw_rate", *(f"{w}_deflection_y" for w in ("fl", "fr", "rl", "rr")))
     u = models.record_type("Inputs", models.INPUTS)(*map(jnp.asarray, (0.02, 0.0, 0.0)))
@@ -92,7 +92,9 @@ def test_a_lagging_tyre_is_the_static_one_after_some_way():
     # The right wheel's tyre is a mirror image.
     x = x._replace(fl_deflection_y=jnp.asarray(settled), fr_deflection_y=jnp.asarray(-settled))
     body = models.BodyState(*x[:3])
-    np.testing.assert_allclose(models._seen(car, 0.0, x, u).a_y, models._seen(static, 0.0, body, u).a_y, rtol=1e-3)
+    np.testing.assert_allclose(
+        models._observation(car, 0.0, x, u).a_y, models._observation(static, 0.0, body, u).a_y, rtol=1e-3
+    )
 
 
 def test_noise_has_the_levels_that_the_case_says():
@@ -115,10 +117,13 @@ def test_what_knows_outliers_beats_what_does_not(drives):
     cases = {"both": NOISY, "quiet": experiment.Case()}
     particles = filters.ParticleFilter(60)
     entrants = {
-        PLAIN: Contestant(moved(particles, lags=False), ""),
-        ADAPTIVE: Contestant(moved(filters.HaarParticles(particles), models.mixture, lags=False), ""),
+        PLAIN: Contestant(dynamics_filter(particles, lags=False), ""),
+        ADAPTIVE: Contestant(dynamics_filter(filters.HaarParticles(particles), models.mixture, lags=False), ""),
     }
-    entrants |= {REDESIGNED: Contestant(redesigned(SMALL), ""), TOLD: Contestant(told(filters.Cubature()), "")}
+    entrants |= {
+        REDESIGNED: Contestant(redesigned_particles(SMALL), ""),
+        TOLD: Contestant(informed_filter(filters.Cubature()), ""),
+    }
     raced = experiment.race(SMALL, cases, drives, jax.random.key(0), entrants=entrants, tyre=quick_tyre)
     error = lambda name, case, what="yaw_rate": np.median(raced.of(what, name, case))
     assert error(ADAPTIVE, "both") < 0.8 * error(PLAIN, "both")
@@ -134,7 +139,7 @@ def test_who_is_told_weighs_by_the_true_noise_and_leaves_out_what_is_wild(drives
     """On quiet rows the plain filter's numbers; a row with a wild value and one without it are the same to it."""
     one = own_drives.Drive(*(jnp.asarray(leaf[1, 0]) for leaf in drives))
     car = own_drives.model_car(SMALL, quick_tyre(SMALL))
-    plain, knows = moved(filters.Cubature()), told(filters.Cubature())
+    plain, knows = dynamics_filter(filters.Cubature()), informed_filter(filters.Cubature())
     course = lambda run, drive: np.asarray(run(SMALL, car, drive, jax.random.key(0)).mean.sideslip)
     np.testing.assert_allclose(course(knows, one), course(plain, one), atol=1e-12)
     missing = one._replace(a_y=one.a_y.at[100].set(jnp.nan))
@@ -151,12 +156,12 @@ def test_the_redesigned_filter_follows_with_both_parts(drives):
     one = own_drives.Drive(*(jnp.asarray(leaf[0, 0]) for leaf in drives))
     car = own_drives.model_car(SMALL, quick_tyre(SMALL))
     own = dataclasses.replace(SMALL, short_window=8, heavy_alpha=1.2, fewest=6, initial=9.0)
-    found = redesigned(own)(own, car, one, jax.random.key(0))
+    found = redesigned_particles(own)(own, car, one, jax.random.key(0))
     filter_ = filters.HaarParticles(
         filters.ParticleFilter(60), 8, SMALL.forgetting, fewest=6, initial=9.0, follows="both"
     )
     law = models.mixture(dataclasses.replace(SMALL, alpha=1.2))
-    expected = moved(filter_, lambda study: law)(SMALL, car, one, jax.random.key(0))
+    expected = dynamics_filter(filter_, lambda study: law)(SMALL, car, one, jax.random.key(0))
     np.testing.assert_array_equal(found.mean.sideslip, expected.mean.sideslip)
 
 
@@ -168,7 +173,7 @@ def test_the_robust_filter_shares_the_redesigned_one_s_wavelet(drives):
     filter_ = filters.HaarNoise(
         filters.Contaminated(filters.Cubature(), 0.1, 20.0), 8, SMALL.forgetting, fewest=6, initial=9.0
     )
-    expected = moved(filter_)(SMALL, car, one, None)
+    expected = dynamics_filter(filter_)(SMALL, car, one, None)
     np.testing.assert_array_equal(found.mean.sideslip, expected.mean.sideslip)
 
 
@@ -197,7 +202,7 @@ def test_the_table_by_process_noise_shows_each_ones_own_choice():
     likelihood = np.array([[[-9.0, -9.0, 7.0], [-1.0, -1.0, -8.0]], [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]])
     found = sweeps.Swept(design, 3, {"sideslip": values, "log_likelihood": likelihood})
     raced = experiment.Raced(SMALL, cases, None, found)
-    table = report._pressed(raced)
+    table = report._noise_table(raced)
     assert table.columns == ("estimator", "x 1", "x 2", "its own choice")
     assert [row[0] for row in table.rows] == [PLAIN, TOLD]
     assert table.rows[0][1].startswith("2") and table.rows[0][2].startswith("4")
@@ -370,7 +375,7 @@ def test_the_printed_variance_grows_to_a_standard_deviation():
         prior=ss.Prior(models.BodyState(0.0, 0.0, 0.0), dict.fromkeys(("v_x", "v_y", "yaw_rate"), 1.0)),
     )  # fmt: skip
     window = filters.kit.first_window(filter_.inner, own)
-    seen = jax.jit(filter_._seen)
+    seen = jax.jit(filter_._window_after)
     Measured = models.record_type("Measurements", study.stds)
     for k in range(400):
         window = seen(model, window, ss.Row(jnp.asarray(0.0), None, Measured(*(v[k] for v in noise.values()))))

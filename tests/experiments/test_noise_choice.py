@@ -65,7 +65,7 @@ def passes(monkeypatch):
 
     monkeypatch.setattr(noise, "several_passes", made_up)
     monkeypatch.setattr(noise, "drive_at", lambda *a: None)
-    monkeypatch.setattr(noise, "unexplained", lambda drive: -1e9)
+    monkeypatch.setattr(noise, "unexplained_likelihood", lambda drive: -1e9)
 
 
 def test_both_particle_filters_share_the_noise_of_a_level(monkeypatch, passes):
@@ -85,7 +85,7 @@ def test_both_particle_filters_share_the_noise_of_a_level(monkeypatch, passes):
 
 def test_a_lost_pass_counts_as_what_mean_and_spread_explain(monkeypatch, passes):
     found = jnp.array([5.0, 3.0, -1e9])
-    monkeypatch.setattr(noise, "unexplained", lambda drive: -2.0)
+    monkeypatch.setattr(noise, "unexplained_likelihood", lambda drive: -2.0)
     monkeypatch.setattr(noise, "several_passes", lambda *a: (None, found, jnp.zeros(3)))
     np.testing.assert_allclose(choose_level([noise.Round(2, 3)]).log_likelihood, 4.0)
     # A pass that fails rules the candidate out.
@@ -110,7 +110,7 @@ def test_what_a_mean_and_a_spread_explain():
     rng = np.random.default_rng(0)
     values = {"yaw_rate": rng.normal(0.3, 2.0, 50), "a_y": rng.normal(-1.0, 0.1, 50), "speed": np.ones(50)}
     normal = lambda x: scipy.stats.norm.logpdf(x, x.mean(), x.std()).sum()
-    found = noise.unexplained(Recording(np.arange(50.0), values))
+    found = noise.unexplained_likelihood(Recording(np.arange(50.0), values))
     np.testing.assert_allclose(found, normal(values["yaw_rate"]) + normal(values["a_y"]), rtol=1e-12)
 
 

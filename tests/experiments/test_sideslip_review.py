@@ -127,14 +127,14 @@ def test_the_fast_part_leaves_what_is_slow():
 
 def test_integration_and_fusions_of_a_known_acceleration():
     drive = known(a_y=jnp.full(401, 0.5))
-    found = contestants.integrated(drive, None)
+    found = contestants.integrate_v_y(drive, None)
     np.testing.assert_allclose(found.v_y, 0.5 * drive.time, atol=1e-12)
     nothing = contestants.Found(jnp.zeros(401), jnp.full(401, 0.5), jnp.int32(0))
     pseudo = contestants.pseudo_integrated(1.0, nothing, drive)
     np.testing.assert_allclose(pseudo.v_y, 0.5 * (1 - np.exp(-drive.time)), atol=1e-9)
-    np.testing.assert_array_equal(contestants.switched(1.0, nothing, drive).v_y, 0.0)
-    np.testing.assert_allclose(contestants.switched(0.1, nothing, drive).v_y, found.v_y, atol=1e-12)
-    both = contestants.weighted(contestants.Found(jnp.ones(401), jnp.full(401, 1.0), jnp.int32(0)), nothing)
+    np.testing.assert_array_equal(contestants.switch(1.0, nothing, drive).v_y, 0.0)
+    np.testing.assert_allclose(contestants.switch(0.1, nothing, drive).v_y, found.v_y, atol=1e-12)
+    both = contestants.weighted_mean(contestants.Found(jnp.ones(401), jnp.full(401, 1.0), jnp.int32(0)), nothing)
     np.testing.assert_allclose(both.v_y, 0.2)
     np.testing.assert_allclose(both.std, 0.2**0.5)
 
@@ -170,7 +170,7 @@ def test_printed_errata_do_what_the_report_says():
 )
 def test_a_verdict_is_the_intervals(low, value, high, mark, verdict):
     assert (
-        verdicts.judged(ConfidenceInterval(np.float64(value), np.float64(low), np.float64(high)), 0.0, 0.3, mark)
+        verdicts.judge(ConfidenceInterval(np.float64(value), np.float64(low), np.float64(high)), 0.0, 0.3, mark)
         == verdict
     )
 
@@ -240,8 +240,8 @@ def test_on_a_log_each_half_chooses_the_method_that_scores_the_other():
     found = logged(halves)
     assert found.best == "UKF"
     # The first half's best is the EKF, which scores on the second; the library's own is no choice.
-    assert found.chosen == ("UKF", "EKF")
-    np.testing.assert_allclose(found.crossed, np.sqrt((0.3**2 + 0.4**2) / 2))
+    assert found.choices == ("UKF", "EKF")
+    np.testing.assert_allclose(found.crossed_rmse, np.sqrt((0.3**2 + 0.4**2) / 2))
     least, crossed, smoothed = report._log_checks(logged({"EKF": (0.1, 0.1), "UKF": (0.3, 0.3)}))
     # The least by the rows that score it is no success; that it were too large would be a failure.
     assert (least.value, least.status) == (pytest.approx(0.1), "open")

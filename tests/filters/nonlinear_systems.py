@@ -29,7 +29,7 @@ class LogChiSquared(ss.AbstractNoise):
     def covariance(self):
         raise NotImplementedError
 
-    def scaled(self, factor):
+    def times(self, factor):
         raise NotImplementedError
 
 

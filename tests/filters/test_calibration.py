@@ -125,7 +125,7 @@ def test_simulation_based_calibration_of_nonlinear_models(name):
     assert counts.sum() == 800
     expected = np.sum((counts - 80.0) ** 2) / 80
     assert (found.p_values().x > 0.01) == (expected < 21.666)
-    assert found.calibrated() is right
+    assert found.is_calibrated() is right
 
 
 def test_simulation_based_calibration_of_a_linear_model():
@@ -137,9 +137,9 @@ def test_simulation_based_calibration_of_a_linear_model():
         runs=600,
         batch=300,
     )
-    assert rank(linear()).calibrated()
+    assert rank(linear()).is_calibrated()
     narrow = rank(with_process_noise(0.1), truth=linear())
-    assert not narrow.calibrated()
+    assert not narrow.is_calibrated()
     # Heaps at both ends.
     assert narrow.histogram().x0[[0, -1]].min() > 75
 

@@ -64,14 +64,14 @@ class TestTransport:
         # Whole numbers of twentieths: particle i takes the place of as many.
         counts = rng.multinomial(20, np.full(20, 1 / 20))
         particles = record_type("P", ("x",))(jnp.asarray(x))
-        moved, _ = filters.Transport(1e-4, 3000).moved(particles, jnp.asarray(counts / 20))
+        moved, _ = filters.Transport(1e-4, 3000).move_particles(particles, jnp.asarray(counts / 20))
         np.testing.assert_allclose(moved.x, np.repeat(x, counts), atol=0.02)
 
     def test_the_mean_stays_and_a_field_that_does_not_vary_is_left_alone(self):
         rng = np.random.default_rng(2)
         particles = record_type("P", ("x", "y"))(jnp.asarray(rng.normal(size=30)), jnp.full(30, 7.0))
         weights = jnp.asarray(rng.dirichlet(np.ones(30)))
-        moved, _ = filters.Transport(0.2, 300).moved(particles, weights)
+        moved, _ = filters.Transport(0.2, 300).move_particles(particles, weights)
         np.testing.assert_allclose(jnp.mean(moved.x), jnp.sum(weights * particles.x), atol=1e-4)
         np.testing.assert_allclose(moved.y, 7.0, rtol=1e-12)
 
@@ -98,10 +98,10 @@ class TestTransport:
         particles = record_type("P", ("x",))(jnp.asarray(rng.normal(size=30)))
         weights = jnp.asarray(rng.dirichlet(np.full(30, 0.2)))
         few, many = filters.Transport(1e-3, 1), filters.Transport(0.3, 500)
-        assert not few.moved(particles, weights)[1] and many.moved(particles, weights)[1]
+        assert not few.move_particles(particles, weights)[1] and many.move_particles(particles, weights)[1]
         # All weight on one particle: nothing is misplaced by a plan that is of other weights.
         one = jnp.zeros(30).at[4].set(1.0)
-        assert not filters.Transport(0.3, 500, 10.0).moved(particles, one)[1]
+        assert not filters.Transport(0.3, 500, 10.0).move_particles(particles, one)[1]
 
     def test_without_a_plan_it_is_the_bootstrap_filter_value_and_gradient(self):
         model, rows, _ = one()
@@ -173,8 +173,8 @@ class TestAdaptiveNumber:
             return filters.ParticleBelief(x, jnp.full(2000, 1 / 2000), jnp.arange(2000), key, 0.0, (), jnp.int32(1))
 
         sharp, wide = belief(0.02), belief(3.0)
-        assert int(filter_.filled(sharp)) == 2 and int(filter_.filled(wide)) > 60
-        k = int(filter_.filled(wide)) - 1
+        assert int(filter_.filled_bins(sharp)) == 2 and int(filter_.filled_bins(wide)) > 60
+        k = int(filter_.filled_bins(wide)) - 1
         part = 2 / (9 * k)
         expected = k / 0.1 * (1 - part + 2.3263478740408408 * part**0.5) ** 3
         np.testing.assert_allclose(filter_.number(wide), expected, rtol=1e-12)

@@ -283,7 +283,7 @@ class Wider(AbstractTwoPartWrapper):
     noise_by_row: ClassVar[bool] = True
 
     def _predict(self, model, belief, row):
-        return self.inner._predict(model, belief, row).inflated(jnp.asarray(self.factor))
+        return self.inner._predict(model, belief, row).inflate(jnp.asarray(self.factor))
 
 
 def test_a_wrapper_of_one_part_changes_that_part_alone():

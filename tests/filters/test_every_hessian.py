@@ -40,7 +40,7 @@ def see(system, t, x, u):
     )
 
 
-def curved():
+def nonlinear():
     names = ("x0", "x1", "x2")
     model = ss.StateSpace(
         system={"pull": jnp.asarray(np.array(4.0))},
@@ -88,7 +88,7 @@ def check(found):
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in USUAL else pytest.mark.full) for n in GAUSSIAN])
 def test_on_a_small_model(name):
     line = FILTERS[name]
-    model, where = straight() if line.linear else curved()
+    model, where = straight() if line.linear else nonlinear()
     rows = model.rows(linear_recording(model, rows=ROWS, seed=3))
     check(curvature_and_differences(line.make(), model, rows, where, (1.0 if line.linear else 4.0, 0.3), (1e-3, 1e-4)))
 

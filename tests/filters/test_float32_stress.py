@@ -16,7 +16,7 @@ def stressed():
     """R x 1e-6, Q x 1e-4, P0 x 100, of a stable system: states that grow for ever lose their digits by themselves."""
     model = linear_model(4, 2, seed=16)
     assert np.linalg.eigvals(np.asarray(model.system["A"])).real.max() < 0
-    times = lambda law, factor: law.scaled(jnp.asarray(factor**0.5))
+    times = lambda law, factor: law.times(jnp.asarray(factor**0.5))
     return eqx.tree_at(
         lambda m: (m.measurement_noise, m.process_noise.law, m.prior.law),
         model,

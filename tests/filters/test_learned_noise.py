@@ -129,7 +129,7 @@ class TestHaarParticles:
         filter_.check(mixed)
         own = jnp.array([4.0])
         memory = wavelet.first_window(filter_, own)._replace(variances=9.0 * own)
-        told = filter_._told(mixed, memory).measurement_noise
+        told = filter_._with_memory(mixed, memory).measurement_noise
         np.testing.assert_allclose((told.std.flow, told.scale.flow), (6.0, scale))
 
     def test_what_it_cannot_is_refused(self):

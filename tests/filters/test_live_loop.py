@@ -59,13 +59,13 @@ def test_rows_one_by_one_give_the_scan_bit_for_bit(filter_, dtype, n):
     del traces[:]
     belief, info = init(model, rows[0], key)
     assert not traces
-    infos = [info]
+    every_info = [info]
     for row in rows[1:]:
         belief, info = step(model, belief, row)
-        infos.append(info)
+        every_info.append(info)
     # The program that the scan traced serves the live loop.
     assert not traces
-    together = jax.tree.map(lambda *leaves: jnp.stack(leaves), *infos)
+    together = jax.tree.map(lambda *leaves: jnp.stack(leaves), *every_info)
     for a, b in zip(jax.tree.leaves(together), jax.tree.leaves(estimate.info), strict=True):
         np.testing.assert_array_equal(a, b)
     for a, b in zip(jax.tree.leaves(belief), jax.tree.leaves(estimate.belief), strict=True):

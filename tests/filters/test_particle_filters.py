@@ -41,7 +41,7 @@ FILTERS = [
 
 
 def _many(filter_, model, rows, runs=RUNS, seed=0):
-    """Log-likelihoods, last means and infos of independent runs."""
+    """Log-likelihoods, last means and info of independent runs."""
 
     @jax.jit
     def one(key):
@@ -63,7 +63,7 @@ def _assert_unbiased(log_likelihoods, exact):
 @pytest.mark.parametrize("filter_", FILTERS)
 def test_likelihood_is_unbiased_and_means_are_consistent(filter_):
     model = linear_model(2, 2, seed=7)
-    model = eqx.tree_at(lambda m: m.measurement_noise, model, model.measurement_noise.scaled(3.0))
+    model = eqx.tree_at(lambda m: m.measurement_noise, model, model.measurement_noise.times(3.0))
     recording = linear_recording(model, rows=12)
     exact = kalman(model, recording)
     log_likelihoods, means, ess = _many(filter_, model, model.rows(recording))

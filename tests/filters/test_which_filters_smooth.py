@@ -105,7 +105,7 @@ class Inflated(AbstractStateless):
     factor: float = eqx.field(static=True, default=1.1)
 
     def predict_between(self, model, belief, t, u_next):
-        return self.inner.predict_between(model, belief, t, u_next).inflated(jnp.asarray(self.factor))
+        return self.inner.predict_between(model, belief, t, u_next).inflate(jnp.asarray(self.factor))
 
     def update(self, model, belief, row):
         return self.inner.update(model, belief, row)
@@ -115,7 +115,7 @@ class Shifted(filters.Extended):
     """Of a user: a filter of the package that predicts otherwise; the declaration is not inherited."""
 
     def predict_between(self, model, belief, t, u_next):
-        return super().predict_between(model, belief, t, u_next).inflated(jnp.asarray(1.1))
+        return super().predict_between(model, belief, t, u_next).inflate(jnp.asarray(1.1))
 
 
 class Renamed(Inflated):

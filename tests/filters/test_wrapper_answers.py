@@ -17,7 +17,7 @@ ROWS = 400
 def last_std(filter_, recording, wrong):
     """The sensor's standard deviation that a wrapper believes in at the end."""
     belief = filters.run(filter_, model(wrong), recording).belief
-    own = filter_.adapted(model(wrong), belief)
+    own = filter_.adapted_model(model(wrong), belief)
     return float(own.measurement_noise.std.flow)
 
 

@@ -187,7 +187,7 @@ def test_a_gradient_is_a_program_of_at_most_three_fits(case, changed, core):
 def test_parts_of_the_data_count_as_often_as_they_are_told(problem):
     units = problem.units()
     one, other = np.random.default_rng(0).integers(0, 4, (2, units)).astype(float)
-    cost = lambda counts: float(problem.counted(jnp.asarray(counts)).cost(problem.start()))
+    cost = lambda counts: float(problem.with_counts(jnp.asarray(counts)).cost(problem.start()))
     assert cost(one) + cost(other) == pytest.approx(cost(one + other) + cost(0 * one), rel=1e-9)
     assert cost(np.ones(units)) == pytest.approx(float(problem.cost(problem.start())), rel=1e-12)
 

@@ -41,8 +41,8 @@ def solve(problem, z, max_steps, tolerance):
 
 
 def residuals(z, problem):
-    force = problem.forces(problem.filled(z))
-    return problem.bent(problem.weight * (force - problem.measured))[0].reshape(-1)
+    force = problem.forces(problem.model_at(z))
+    return problem.bend(problem.weight * (force - problem.measured))[0].reshape(-1)
 
 
 @pytest.mark.parametrize("robust", [False, True])
@@ -77,7 +77,7 @@ def test_finds_the_least_squares_of_scipy():
 def test_finds_the_truth_without_noise():
     problem = made(300, noise=0.0)
     solved = solve(problem, jnp.zeros(6), 100, 1e-10)
-    found = problem.filled(solved.z)
+    found = problem.model_at(solved.z)
     # What is left is the pull to the start.
     for name, tolerance in (("B", 2e-3), ("C", 2e-3), ("D", 1e-3), ("E", 1e-2), ("S_h", 2e-3), ("S_v", 2e-2)):
         assert float(getattr(found, name)) == pytest.approx(float(getattr(TRUE, name)), rel=tolerance), name

@@ -8,7 +8,7 @@ import pytest
 
 from jaxveh import InputError, tyres
 from jaxveh.fitting import fit_rig, starting_tyre
-from jaxveh.fitting.rig_problem import offered
+from jaxveh.fitting.rig_problem import offered_forces
 from jaxveh.fitting.rig_start import GENERIC_RIG, RIG_STARTS, rig_facts
 from jaxveh.io import RigTable
 
@@ -54,7 +54,7 @@ def test_every_start_explains_most_of_the_lateral_force(name):
     rig = rig_of()
     law = starting_tyre(name, rig)
     contact = tyres.Contact(*map(jnp.asarray, (rig.slip_angle, rig.slip_ratio, rig.load)), speed=jnp.full(300, 16.7))
-    assert "F_y" in offered(law, contact)
+    assert "F_y" in offered_forces(law, contact)
     # Small slips alone, at the median load: the linear law has no limit, the plain Magic Formula no slip ratio.
     rows = (np.abs(rig.slip_angle) < 0.04) & (rig.slip_ratio == 0) & (rig.load == 4000)
     missed = np.asarray(law.forces(contact).F_y)[rows] - rig.F_y[rows]

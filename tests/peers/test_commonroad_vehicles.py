@@ -5,7 +5,7 @@ and inputs, at and beyond the limits of steering and acceleration too. Their g i
 scaled by ours over theirs. What is not the same, each with its test:
 
 - The rate of the sideslip below 0.1 m/s has tan^2 for tan inside a square (`KinematicCrawl`); the yaw acceleration inherits it.
-- Backwards, above 0.1 m/s, their tyres push the car along its sliding: slip angles do not turn round with the speed, so that
+- Backwards, above 0.1 m/s, their tyres push the car along its sliding: slip angles do not reverse sign with the speed, so that
   all tyre forces have the opposite sign of ours.
 - A trailer at a right angle stays there for ever; ours leaves where the car pulls it away.
 """

@@ -8,10 +8,10 @@ import pytest
 
 from jaxveh import InputError, Recording, diagnostics, manoeuvres, plots, tyres, vehicles
 from jaxveh.manoeuvres import MANOEUVRES
-from jaxveh.plots.car_outline import footprint, turned, wheel_forces
+from jaxveh.plots.car_outline import footprint, rotate, wheel_forces
 from jaxveh.plots.drives import _FIGURES
 from jaxveh.plots.panels import round_number
-from jaxveh.plots.wheel_loads import lifted
+from jaxveh.plots.wheel_loads import wheel_lift
 
 pytestmark = pytest.mark.product
 
@@ -189,7 +189,7 @@ def test_loads_shade_the_lift_of_a_wheel():
     loads = {f"load_{wheel}": 4000.0 + 0 * TIME for wheel in WHEELS}
     loads["load_rl"] = np.where((TIME > 2.0) & (TIME < 3.0), 0.0, 4000.0)
     log = Recording(TIME, {**loads, "a_y": TIME})
-    up = lifted(log)
+    up = wheel_lift(log)
     assert up.sum() == 49 and TIME[up][0] == pytest.approx(2.02)
     figure = plots.loads(log)
     (span,) = figure.axes[0].patches
@@ -231,7 +231,7 @@ def test_arrows_are_the_wheels_forces_turned_into_the_car():
     np.testing.assert_allclose(forces["fl"][0], [-1000.0, -3000.0], atol=1e-9)
     np.testing.assert_allclose(forces["rr"][0], [0.0, 1000.0])
     assert wheel_forces(drive(), feet) == {}
-    np.testing.assert_allclose(turned([(1.0, 0.0)], math.pi / 2), [[0.0, 1.0]], atol=1e-15)
+    np.testing.assert_allclose(rotate([(1.0, 0.0)], math.pi / 2), [[0.0, 1.0]], atol=1e-15)
 
 
 def test_a_single_track_has_its_forces_at_the_axles():

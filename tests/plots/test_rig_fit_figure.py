@@ -7,7 +7,7 @@ import pytest
 from jaxveh import InputError, Parameters, plots
 from jaxveh.fitting import RigFit
 from jaxveh.io import RigTable
-from jaxveh.plots.rig_fit import DOTS, GROUPS, grouped, slip_of
+from jaxveh.plots.rig_fit import DOTS, GROUPS, group_means, slip_of
 from jaxveh.tyres import Brush
 
 ROWS = 60
@@ -97,11 +97,11 @@ def test_many_rows_are_thinned_but_all_of_them_count():
 
 
 def test_means_are_of_neighbours():
-    x, mean = grouped(np.array([2.0, 1.0, 2.0, 1.0]), np.array([4.0, 1.0, 6.0, 3.0]))
+    x, mean = group_means(np.array([2.0, 1.0, 2.0, 1.0]), np.array([4.0, 1.0, 6.0, 3.0]))
     np.testing.assert_array_equal([x, mean], [[1.0, 2.0], [2.0, 5.0]])
     # Pure slip of the other kind: its rows are one group, those of either side are not mixed with them.
     values = np.concatenate([np.zeros(100), np.linspace(-1.0, -0.1, 60), np.linspace(0.1, 1.0, 60)])
-    x, mean = grouped(values, np.sign(values))
+    x, mean = group_means(values, np.sign(values))
     assert set(mean) == {-1.0, 0.0, 1.0} and list(x) == sorted(x)
     assert np.sum(mean == 0) == 1 and mean.size > 8
 

@@ -130,7 +130,7 @@ def test_the_low_pass_is_that_of_recordings():
     ("make", "message"),
     [
         (lambda: IMU(("a_x", "speed"), rate=1.0), r"IMU\.signals: unknown name\(s\) speed; there are: a_x, a_y, a_z"),
-        (lambda: IMU({}, rate=1.0), r"IMU\.signals: no channel; there are: a_x"),
+        (lambda: IMU({}, rate=1.0), r"IMU\.signals is empty: name at least one channel; there are: a_x"),
         (lambda: IMU({"a_x": 0.1}, rate=1.0), r"IMU\.signals: a_x = 0\.1: must be a Signal"),
         (lambda: IMU(3, rate=1.0), "signals = 3: must be a mapping"),
         (lambda: IMU(position=(0, 0, 0), rate=1.0), r"IMU\.position = \(0, 0, 0\): must be a Position"),

@@ -95,9 +95,9 @@ def test_samples_have_the_law_s_moments():
             ss.CauchyGaussianMixture(0.3, {"a": 2.0}, {"a": 0.4}),
             lambda x: 0.3 * scipy.stats.cauchy.cdf(x, scale=2.0) + 0.7 * scipy.stats.norm.cdf(x, scale=0.4),
         ),
-        (ss.StudentT(3.5, {"a": 0.5}).scaled(jnp.asarray(3.0)), scipy.stats.t(3.5, scale=1.5).cdf),
+        (ss.StudentT(3.5, {"a": 0.5}).times(jnp.asarray(3.0)), scipy.stats.t(3.5, scale=1.5).cdf),
         (
-            ss.CauchyGaussianMixture(0.3, {"a": 2.0}, {"a": 0.4}).scaled(jnp.asarray(0.5)),
+            ss.CauchyGaussianMixture(0.3, {"a": 2.0}, {"a": 0.4}).times(jnp.asarray(0.5)),
             lambda x: 0.3 * scipy.stats.cauchy.cdf(x, scale=1.0) + 0.7 * scipy.stats.norm.cdf(x, scale=0.2),
         ),
     ],
@@ -109,11 +109,11 @@ def test_samples_have_the_law_s_distribution(law, distribution):
 def test_covariances_and_scaling():
     np.testing.assert_allclose(LAWS["gaussian"][0].covariance(), np.diag([0.25, 4.0]))
     np.testing.assert_allclose(LAWS["student"][0].covariance(), np.diag([0.25, 4.0]) * 4.5 / 2.5)
-    np.testing.assert_allclose(LAWS["student"][0].scaled(2.0).covariance(), np.diag([1.0, 16.0]) * 4.5 / 2.5)
+    np.testing.assert_allclose(LAWS["student"][0].times(2.0).covariance(), np.diag([1.0, 16.0]) * 4.5 / 2.5)
     law = ss.MultivariateGaussian(("a", "b", "c"), MATRIX)
-    np.testing.assert_allclose(law.scaled(jnp.asarray(2.0)).covariance(), 4 * MATRIX)
+    np.testing.assert_allclose(law.times(jnp.asarray(2.0)).covariance(), 4 * MATRIX)
     both = ss.Independent((law, ss.Gaussian({"d": 3.0})))
-    np.testing.assert_allclose(both.scaled(2.0).covariance(), 4 * scipy.linalg.block_diag(MATRIX, 9.0))
+    np.testing.assert_allclose(both.times(2.0).covariance(), 4 * scipy.linalg.block_diag(MATRIX, 9.0))
     assert both.names == ("a", "b", "c", "d")
     assert both.has_covariance
     assert not ss.Independent(

@@ -1,4 +1,4 @@
-"""The tyre in a mirror: against the tyre whose odd coefficients are turned round by hand."""
+"""The tyre in a mirror: against the tyre whose odd coefficients are reversed in sign by hand."""
 
 import dataclasses
 

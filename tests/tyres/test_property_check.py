@@ -133,7 +133,11 @@ def test_a_good_file_gives_no_alarm(text):
         ("RIM_RADIUS = 0.1905", "RIM_RADIUS = 0.381", "RIM_RADIUS is 0.381 m, not less than UNLOADED_RADIUS"),
         ("FNOMIN = 4000", "FNOMIN = 4", "FNOMIN is 4 N: wheels carry"),
         ("PCX1 = 1.6", "PCX1 = -1.6", "PCX1 gives a shape factor C of -1.6: must be positive"),
-        ("PCY1 = 1.3", "PCY1 = 2.3", "PCY1 gives a shape factor C of 2.3: usual are 1 to 2; the force turns round"),
+        (
+            "PCY1 = 1.3",
+            "PCY1 = 2.3",
+            "PCY1 gives a shape factor C of 2.3: usual are 1 to 2; the force reverses its sign",
+        ),
         ("PCY1 = 1.3", "PCY1 = 0.9", "PCY1 gives a shape factor C of 0.9: usual are 1 to 2; the force never peaks"),
         ("PDX1 = 1.1", "PDX1 = 11", "friction along is 11 at nominal load; usual are 0.2 to 3"),
         ("PDY1 = 1.0", "PDY1 = -0.7", "friction across is -0.7 at nominal load"),

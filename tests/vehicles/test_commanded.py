@@ -21,7 +21,7 @@ DRIVE = vehicles.AccelerationLimits(10.0, 5.0, -12.0, 50.0)
     ],
 )  # fmt: skip
 def test_steering_stops_at_its_angle_and_its_rate(steer, wished, allowed):
-    np.testing.assert_allclose(STEER.allowed(jnp.asarray(steer), jnp.asarray(wished)), allowed, rtol=1e-15)
+    np.testing.assert_allclose(STEER.limit(jnp.asarray(steer), jnp.asarray(wished)), allowed, rtol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_steering_stops_at_its_angle_and_its_rate(steer, wished, allowed):
     ],
 )  # fmt: skip
 def test_acceleration_stops_at_grip_power_and_speed(speed, wished, allowed):
-    np.testing.assert_allclose(DRIVE.allowed(jnp.asarray(speed), jnp.asarray(wished)), allowed, rtol=1e-15)
+    np.testing.assert_allclose(DRIVE.limit(jnp.asarray(speed), jnp.asarray(wished)), allowed, rtol=1e-15)
 
 
 def test_steer_and_speed_become_states_of_the_same_vehicle():

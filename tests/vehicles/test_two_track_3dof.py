@@ -24,7 +24,7 @@ from four_wheel_cars import (
 from jaxveh import InputError, tyres, vehicles
 from jaxveh.roads import LEVEL
 from jaxveh.vehicles import GRAVITY, TwoTrack2DOF, TwoTrack3DOF
-from jaxveh.vehicles.traction import saturated, within_grip
+from jaxveh.vehicles.traction import saturate, within_grip
 
 U = inputs(steer=0.04, drive_torque=400.0, brake_torque=0.0)
 RADIUS = 0.32
@@ -71,7 +71,7 @@ def test_the_ellipse_holds_and_ends_at_a_tenth_of_the_lateral_force():
 
 def test_saturation_has_no_kink_and_finite_slopes():
     wish = jnp.linspace(-1.5, 1.5, 3001)
-    slope = jax.vmap(jax.grad(saturated))(wish)
+    slope = jax.vmap(jax.grad(saturate))(wish)
     assert (np.abs(np.diff(slope)) < 0.0051).all() and slope.min() == 0.0 and slope.max() == 1.0
     lateral = lambda w: within_grip(tyres.Forces(F_y=1.0), w, 1.0).F_y
     assert (np.abs(jax.vmap(jax.grad(lateral))(wish)) < 4.0).all()

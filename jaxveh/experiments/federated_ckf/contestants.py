@@ -100,7 +100,7 @@ def _guess(study: Study, start: Any, drive: Drive) -> Found:
     _, (mean, covariance) = kit.scan_and_keep(filters.Cubature(), model, rows_of(study, drive), None, keep)
     guess = jnp.log(jnp.stack([jnp.asarray(getattr(start, name)) for name in PARAMETERS]))
     vector = jnp.concatenate([mean, jnp.broadcast_to(guess, (mean.shape[0], 4))], axis=1)
-    return _found(vector, jnp.pad(covariance, ((0, 0), (0, 4), (0, 4))))
+    return _result(vector, jnp.pad(covariance, ((0, 0), (0, 4), (0, 4))))
 
 
 def _joint(filter_: Any):
@@ -108,17 +108,17 @@ def _joint(filter_: Any):
         model = joint_model(study, start, drive)
         keep = lambda belief: (jnp.stack(belief.mean), belief.covariance)
         _, (mean, covariance) = kit.scan_and_keep(filter_, model, rows_of(study, drive), None, keep)
-        return _found(mean, covariance)
+        return _result(mean, covariance)
 
     return run
 
 
-def _found(vector: Any, covariance: Any) -> Found:
+def _result(vector: Any, covariance: Any) -> Found:
     v_x, v_y, yaw_rate = vector[:, 0], vector[:, 1], vector[:, 2]
     return Found(v_x, v_y, yaw_rate, jnp.exp(vector[:, 3:]), vector, covariance)
 
 
-def _put(names: tuple[str, ...]):
+def _with_parameters(names: tuple[str, ...]):
     """Parameters by their logarithms into the car."""
 
     def put(car, x):
@@ -128,7 +128,7 @@ def _put(names: tuple[str, ...]):
     return put
 
 
-PUT_BODY, PUT_FRICTION = _put(BLOCKS[1]), _put(BLOCKS[2])
+PUT_BODY, PUT_FRICTION = _with_parameters(BLOCKS[1]), _with_parameters(BLOCKS[2])
 
 
 def _three(filter_: Any):
@@ -158,7 +158,7 @@ def _three(filter_: Any):
         (state, body, friction), (P, P_body, P_friction), _ = take_turns(tuple(members), told, rows)
         covariance = jnp.zeros((state.shape[0], 7, 7)).at[:, :3, :3].set(P)
         covariance = covariance.at[:, 3:4, 3:4].set(P_friction).at[:, 4:, 4:].set(P_body)
-        return _found(jnp.concatenate([state, friction, body], axis=1), covariance)
+        return _result(jnp.concatenate([state, friction, body], axis=1), covariance)
 
     return run
 
@@ -175,8 +175,8 @@ def metrics(study: Study, found: Found, drive: Drive, truth: Any) -> dict[str, A
     rms = lambda rows: jnp.sqrt(jnp.sum(jnp.where(rows, off**2, 0.0)) / _count(rows))
     true = jnp.stack([drive.true_v_x, drive.true_v_y, drive.true_yaw_rate], axis=1)
     error = found.vector - jnp.concatenate([true, jnp.broadcast_to(jnp.log(truth), (t.shape[0], 4))], axis=1)
-    nees = _squared(error[-1, 3:], found.covariance[-1, 3:, 3:]) / 4.0
-    every = jax.vmap(_squared)(error, found.covariance) / 7.0
+    nees = _squared_distance(error[-1, 3:], found.covariance[-1, 3:, 3:]) / 4.0
+    every = jax.vmap(_squared_distance)(error, found.covariance) / 7.0
     share = jnp.abs(found.parameters[-1] / truth - 1.0)
     seen = slice(None, None, round(0.1 / study.dt))
     return {
@@ -197,7 +197,7 @@ def _count(rows: Any) -> Any:
     return jnp.sum(jnp.where(rows, 1.0, 0.0))
 
 
-def _squared(error: Any, covariance: Any) -> Any:
+def _squared_distance(error: Any, covariance: Any) -> Any:
     """e^T P^-1 e; infinite where nothing is believed uncertain."""
     std = jnp.sqrt(jnp.diagonal(covariance))
     factor = numerics.cholesky(covariance / (std[:, None] * std[None, :]))

@@ -71,7 +71,7 @@ def dugoff(study: Study) -> Dugoff:
     return Dugoff(numbers.slip_stiffness, numbers.cornering_stiffness, friction=1.0, fading=study.fading)
 
 
-def peaked() -> Similarity:
+def peaked_tyre() -> Similarity:
     """A Magic Formula of ordinary shape, as stiff as the paper's tyre at a wheel's mean load; less friction shrinks its curve."""
     numbers = sets.ev()
     assert numbers.front is not None and numbers.front.slip_stiffness is not None
@@ -82,7 +82,7 @@ def peaked() -> Similarity:
 
 def truth_of(study: Study, magic_formula: bool = False) -> SevenDOF:
     """The true car: on Dugoff's tyres, or on others of the same stiffness and peak friction, but with a peak."""
-    tyre = peaked() if magic_formula else dugoff(study)
+    tyre = peaked_tyre() if magic_formula else dugoff(study)
     return vehicles.build(sets.ev(), SevenDOF, front=tyre, rear=tyre)
 
 
@@ -127,7 +127,7 @@ def wheel_rates(study: Study, drive: Drive) -> jax.Array:
     return (drive.omega - drive.omega[back]) / over[:, None]
 
 
-def felt(study: Study, drive: Drive) -> tuple[jax.Array, jax.Array]:
+def felt_accelerations(study: Study, drive: Drive) -> tuple[jax.Array, jax.Array]:
     """What the loads follow (m/s^2, (T,) each): the measured accelerations behind the lag of roll and pitch."""
     kept = np.exp(-study.dt / study.load_time)
 

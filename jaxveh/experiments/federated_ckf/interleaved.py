@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh.experiments.federated_ckf.model import MOVE, Planar, State, seen
+from jaxveh.experiments.federated_ckf.model import MOVE, Planar, State, sensor_outputs
 from jaxveh.statespace import AbstractFilter, LinearInput, Row, StateSpace
 
 
@@ -68,7 +68,7 @@ def take_turns(members: tuple[Member, ...], told: Told, rows: Row) -> tuple[Any,
     return tuple(k[0] for k in kept), tuple(k[1] for k in kept), jax.tree.map(join, told, tolds)
 
 
-def moved(told: Told, car: Planar, t, u) -> State:
+def propagate(told: Told, car: Planar, t, u) -> State:
     """Where the car is at `t` with these parameters, from where it was told to be."""
     path = LinearInput(told.t, jnp.where(t > told.t, t, told.t + 1.0), told.u, u)
     return MOVE(car, told.t, t, told.state, path)
@@ -88,4 +88,4 @@ class SeenThrough(eqx.Module):
     def __call__(self, told: Told, t, x, u):
         car, shape = self.put(told.car, x), jnp.shape(x[0])
         here = told._replace(state=jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, shape), told.state))
-        return seen(car, t, moved(here, car, t, u), u)
+        return sensor_outputs(car, t, propagate(here, car, t, u), u)

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import positive
-from jaxveh.experiments.federated_ckf.drives import PULLS, WHEELS, Drive, dugoff, felt, times, wheel_rates
+from jaxveh.experiments.federated_ckf.drives import PULLS, WHEELS, Drive, dugoff, felt_accelerations, times, wheel_rates
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
 from jaxveh.statespace import Continuous, Gaussian, Prior, Propagate, RolledRK4, Row, StateSpace, with_parameters
 from jaxveh.tyres import Dugoff, Forces
@@ -82,7 +82,7 @@ class Planar(eqx.Module):
         """(x, y), m, of the wheels from the centre of gravity."""
         return kit.corners(self.front_axle_to_cg, self.rear_axle_to_cg, self.track_front, self.track_rear)
 
-    def pushed(self, x: State, u: Any) -> Pushed:
+    def push(self, x: State, u: Any) -> Pushed:
         """What the wheels do to the car in the state x with the inputs u (`steer`, `pull_fl` ...)."""
         moves = kit.rolling_wheels(self.places, x.v_x, x.v_y, x.yaw_rate, u.steer)
         pulls = kit.wheels_of(u, "pull")
@@ -109,10 +109,10 @@ class Planar(eqx.Module):
         told = pulls if slips is None else slips
         flat = jnp.broadcast_arrays(*along, *across, *loads, *told, *friction)
         stacked = [jnp.stack(flat[i : i + 4]) for i in range(0, 20, 4)]
-        F_y, slip_ratio = self._slipping(*stacked) if slips is None else self._slipped(*stacked)
+        F_y, slip_ratio = self._lateral_and_slip(*stacked) if slips is None else self._lateral_at_slip(*stacked)
         return kit.Wheels(*[(Forces(F_x=pull, F_y=F_y[i]), slip_ratio[i]) for i, pull in enumerate(pulls)])
 
-    def _slipping(self, along, across, load, pull, friction) -> tuple[Any, Any]:
+    def _lateral_and_slip(self, along, across, load, pull, friction) -> tuple[Any, Any]:
         """Lateral force (N) and slip ratio of wheels that pull with `pull` (N): Dugoff's law solved for the slip.
 
         With W = |C sigma| the force is W l (2 - l), l = min(1, mu F_z / (2 W)), so that sigma_x = pull / (C_x l (2 - l)).
@@ -124,7 +124,7 @@ class Planar(eqx.Module):
         sigma_x = jax.lax.fori_loop(0, TURNS, turn, jnp.zeros_like(tangent))
         return share(sigma_x) * self.tyre.cornering_stiffness * tangent / rolls(sigma_x), rolls(sigma_x) - 1.0
 
-    def _slipped(self, along, across, load, slip_ratio, friction) -> tuple[Any, Any]:
+    def _lateral_at_slip(self, along, across, load, slip_ratio, friction) -> tuple[Any, Any]:
         """Lateral force (N) and slip ratio of wheels whose slip ratio is known."""
         tangent = -across / jnp.maximum(jnp.abs(along), LEAST_SPEED)
         rolls = 1.0 + jnp.clip(slip_ratio, -0.5, 0.5)
@@ -157,18 +157,18 @@ def planar(study: Study, start: Any, measured_slip: bool = False) -> Planar:
 def rates(system: Planar, t, x: State, u) -> State:
     """The equations of motion."""
     del t
-    push = system.pushed(x, u)
+    push = system.push(x, u)
     return State(push.a_x + x.v_y * x.yaw_rate, push.a_y - x.v_x * x.yaw_rate, push.moment / system.yaw_inertia)
 
 
-def seen(system: Planar, t, x: State, u) -> Any:
+def sensor_outputs(system: Planar, t, x: State, u) -> Any:
     """What the sensors say."""
     del t
-    push = system.pushed(x, u)
+    push = system.push(x, u)
     return record_type("Measurements", CHANNELS)(push.a_x, push.a_y, x.yaw_rate, *push.omega)
 
 
-def shown(system: Planar, t, x: State, u) -> Any:
+def reported_state(system: Planar, t, x: State, u) -> Any:
     """The states and the sideslip (rad)."""
     del system, t, u
     names = (*State._fields, "sideslip")
@@ -190,8 +190,8 @@ def states_model(study: Study, car: Planar, drive: Drive) -> StateSpace:
     return StateSpace(
         system=car,
         transition=MOVE,
-        observation=seen,
-        report=shown,
+        observation=sensor_outputs,
+        report=reported_state,
         process_noise=Continuous(
             Gaussian({"v_x": study.speed_noise, "v_y": study.speed_noise, "yaw_rate": study.yaw_noise})
         ),
@@ -216,6 +216,6 @@ def rows_of(study: Study, drive: Drive) -> Row:
     car = sets.ev()
     assert car.wheel_inertia is not None and car.wheel_radius is not None
     pulls = (drive.torque - car.wheel_inertia * wheel_rates(study, drive)) / car.wheel_radius
-    u = record_type("Inputs", INPUTS)(drive.steer, *felt(study, drive), *pulls.T)
+    u = record_type("Inputs", INPUTS)(drive.steer, *felt_accelerations(study, drive), *pulls.T)
     y = record_type("Measurements", CHANNELS)(drive.a_x, drive.a_y, drive.yaw_rate, *drive.omega.T)
     return Row(times(study), u, y)

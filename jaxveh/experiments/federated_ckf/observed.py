@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxveh.diagnostics import Observability, observability_at
 from jaxveh.experiments.federated_ckf.drives import Drive
-from jaxveh.experiments.federated_ckf.model import MOVE, State, noise_levels, planar, rows_of, seen
+from jaxveh.experiments.federated_ckf.model import MOVE, State, noise_levels, planar, rows_of, sensor_outputs
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
 from jaxveh.statespace import LinearInput
 
@@ -36,7 +36,7 @@ def sensitivities(study: Study, true: Start, drive: Drive) -> jax.Array:
         def step(x, given):
             before, after = given
             x = MOVE(own, before.t, after.t, x, LinearInput(before.t, after.t, before.u, after.u))
-            return x, jnp.stack(seen(own, after.t, x, after.u)) / levels
+            return x, jnp.stack(sensor_outputs(own, after.t, x, after.u)) / levels
 
         before, after = jax.tree.map(lambda leaf: leaf[:-1], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
         return jax.lax.scan(step, State(*z[4:7]), (before, after))[1].ravel()
@@ -44,7 +44,7 @@ def sensitivities(study: Study, true: Start, drive: Drive) -> jax.Array:
     return jax.jacfwd(predict)(jnp.concatenate([logs, start, jnp.zeros(1)]))
 
 
-def observed(study: Study, true: Start, drives: Drive) -> dict[str, list[list[Observability]]]:
+def observability_of_drives(study: Study, true: Start, drives: Drive) -> dict[str, list[list[Observability]]]:
     """The observability in each of the drives, (n, m, T), with the rolling resistance `known` and `unknown`: lists (n, m).
 
     Sensitivities are those at the truth. Where wheels barely slide, a filter that believes in more friction sees none slide,

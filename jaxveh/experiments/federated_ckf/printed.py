@@ -103,7 +103,7 @@ def _states(filter_, study: Study) -> Member:
 def _six_states(car, t0, t1, x, u) -> Any:
     """Euler's step; accelerations and yaw moment are those of the forces."""
     dt = t1 - t0
-    push = car.pushed(State(x.v_x, x.v_y, x.yaw_rate), u)
+    push = car.push(State(x.v_x, x.v_y, x.yaw_rate), u)
     return type(x)(
         x.v_x + dt * (x.a_x + x.v_y * x.yaw_rate),
         x.v_y + dt * (x.a_y - x.v_x * x.yaw_rate),
@@ -124,7 +124,7 @@ def _through(put):
 
     def observe(told: Told, t, x, u):
         car = put(told.car, x)
-        push = car.pushed(jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, jnp.shape(x[0])), told.state), u)
+        push = car.push(jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, jnp.shape(x[0])), told.state), u)
         return _twice(push.a_x, push.a_y, told.state.yaw_rate + (t - told.t) * push.moment / car.yaw_inertia)
 
     return observe

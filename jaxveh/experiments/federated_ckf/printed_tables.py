@@ -36,7 +36,7 @@ def as_printed(
     told = part(progress, 0.0, 0.1, "drives")
     drives = drives_of(study, (study.steer,), (0.0,), seeds, key, progress=told)
     drives = jax.tree.map(lambda leaf: leaf[0, 0], drives)
-    found = _raced(study, drives, part(progress, 0.1, 0.8, "estimators"))
+    found = _race(study, drives, part(progress, 0.1, 0.8, "estimators"))
     twice = _twice(study, drives, part(progress, 0.8, 1.0, "shared sensors"))
     progress(1.0, 1.0, "done")
     return [_table(found, seeds), _traces(twice, seeds)]
@@ -51,7 +51,7 @@ def _runs(study: Study) -> dict[str, tuple[Any, str]]:
     return {**first, "as printed": (printed_filters, what), **own, "federated, disjoint sensors": shares[:2]}
 
 
-def _raced(study: Study, drives: Drive, progress: Progress) -> sweeps.Swept:
+def _race(study: Study, drives: Drive, progress: Progress) -> sweeps.Swept:
     start, right = Start(*map(jnp.asarray, dataclasses.astuple(PRINTED_START))), truth(study)
     names = (*[f"{name}_error" for name in PARAMETERS], "sideslip_rmse", "v_x_rmse", "parameters")
 

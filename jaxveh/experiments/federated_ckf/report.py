@@ -24,10 +24,10 @@ from jaxveh.experiments.federated_ckf.criteria import (
     sideslip,
 )
 from jaxveh.experiments.federated_ckf.drives import Drive
-from jaxveh.experiments.federated_ckf.observed import observed
+from jaxveh.experiments.federated_ckf.observed import observability_of_drives
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
 from jaxveh.experiments.federated_ckf.study import Raced, cases, drives_by_case, drives_of, race, race_over, truth
-from jaxveh.experiments.report import Check, Table, above, at_most, interval, spread, stated
+from jaxveh.experiments.report import Check, Table, above, at_most, interval, spread, with_terms
 from jaxveh.sweeps import Swept, compare
 
 STEERS, SPREADS = (3.0, 4.0, 5.0, 8.0), (0.0, 0.1, 0.3)
@@ -69,7 +69,7 @@ def run(study: Study | None = None, *, seeds: int = 20, seed: int = 0, progress:
     told = part(progress, 0.9, 0.96, "steer and speed")
     over = race_over(study, grid, steers, speeds, progress=told)
     progress(0.96, 1.0, "observability")
-    seen = observed(study, Start(*truth(study)), Drive(*(leaf[:, :, 0] for leaf in grid)))
+    seen = observability_of_drives(study, Start(*truth(study)), Drive(*(leaf[:, :, 0] for leaf in grid)))
     progress(1.0, 1.0, "done")
     return Reproduction(seeds, raced, tuple(np.degrees(steers).tolist()), speeds, over, seen)
 
@@ -104,7 +104,7 @@ def check(result: Reproduction) -> list[Check]:
     # Of mu, over the prior's spread: without end where nothing slides.
     smallest = min(float(one.bounds.friction / one.spread.friction) for one in result.seen["known"][0])
     found.append(above(SMALL_STEER, smallest, 1.0))
-    return stated(found, CRITERIA)
+    return with_terms(found, CRITERIA)
 
 
 def _nees(who: str, case: str, value: float) -> list[Check]:

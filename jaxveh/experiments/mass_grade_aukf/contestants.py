@@ -44,8 +44,8 @@ def contestants(study: Study) -> dict[str, Contestant]:
     """All of them by name, the do-nothing ones first; where the brake is touched, those that pause meanwhile, too."""
     found = {
         "first guess": Contestant(_guess, "the mass is the first guess, the grade that of a filter which believes it"),
-        "UKF": Contestant(_walking(spread=0.4), "three states, the grade walks, an honest spread of the mass"),
-        "UKF, timid": Contestant(_walking(spread=0.05), "the same, sure of its first guess by 5 %"),
+        "UKF": Contestant(_walking_grade(spread=0.4), "three states, the grade walks, an honest spread of the mass"),
+        "UKF, timid": Contestant(_walking_grade(spread=0.05), "the same, sure of its first guess by 5 %"),
         "AUKF as printed": Contestant(_adaptive(freeze=True), "eqs 22 to 25 around additive mass"),
         "AUKF": Contestant(_adaptive(freeze=False), "eqs 22 to 24: without the scaled covariance of eq 25"),
         "RLS": Contestant(_least_squares, "two forgetting factors on differences over a second (Vahidi et al. 2005)"),
@@ -56,14 +56,14 @@ def contestants(study: Study) -> dict[str, Contestant]:
     if not study.touches:
         return found
     return found | {
-        pausing("grade rate"): Contestant(
+        pausing_name("grade rate"): Contestant(
             _smooth(waits=True), "pauses while the brake is touched, as the paper has it"
         ),
-        pausing("accelerometer"): Contestant(_smooth(aided=True, waits=True), "the same with the accelerometer"),
+        pausing_name("accelerometer"): Contestant(_smooth(aided=True, waits=True), "the same with the accelerometer"),
     }
 
 
-def pausing(name: str) -> str:
+def pausing_name(name: str) -> str:
     """The name of the contestant that pauses while the brake is touched, where `name` takes its force for an unknown one."""
     return f"{name}, pausing"
 
@@ -75,7 +75,7 @@ FORCE_OF_A_TOUCH = 2.0
 """m/s per root second: what a touched brake may do to the speed, whatever it is; four times the strongest touch over a second."""
 
 
-def _filtered(filter_, model: StateSpace, study: Study, drive: Drive, waits: bool = True) -> Found:
+def _run_filter(filter_, model: StateSpace, study: Study, drive: Drive, waits: bool = True) -> Found:
     """A filter over the drive. While the brake is touched it `waits`, as the paper has it, or takes the brake's force for an
     unknown one: then the speed is free for a while, and the grade goes on as it went."""
     time = times(study, drive.v_x.shape[0])
@@ -104,13 +104,13 @@ def _model(study: Study, guess, drive: Drive, **options) -> StateSpace:
 
 def _guess(study: Study, guess, drive: Drive) -> Found:
     model = _model(study, guess, drive, mass_spread=1e-6, grade_walk=WALK, grade_rate_walk=None)
-    return _filtered(filters.Unscented(), model, study, drive)
+    return _run_filter(filters.Unscented(), model, study, drive)
 
 
-def _walking(spread: float):
+def _walking_grade(spread: float):
     def run(study, guess, drive):
         model = _model(study, guess, drive, mass_spread=spread, grade_walk=WALK, grade_rate_walk=None)
-        return _filtered(filters.Unscented(), model, study, drive)
+        return _run_filter(filters.Unscented(), model, study, drive)
 
     return run
 
@@ -118,7 +118,7 @@ def _walking(spread: float):
 def _smooth(aided: bool = False, bias: float | None = None, waits: bool = False):
     def run(study, guess, drive):
         model = _model(study, guess, drive, a_x=study.a_x if aided else None, a_x_bias=bias)
-        return _filtered(filters.Unscented(), model, study, drive, waits)
+        return _run_filter(filters.Unscented(), model, study, drive, waits)
 
     return run
 
@@ -128,7 +128,7 @@ def _adaptive(freeze: bool):
         model = _model(study, guess, drive, mass_spread=0.4, mass_domain=Real(), grade_walk=WALK, grade_rate_walk=None)
         # Large at first, as the paper has it: a fifth of the truck's mass.
         inner = filters.ShrinkingProcess(filters.Unscented(), {"mass": 0.2 * study.mass})
-        return _filtered(Frozen(inner) if freeze else inner, model, study, drive)
+        return _run_filter(Frozen(inner) if freeze else inner, model, study, drive)
 
     return run
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from jaxveh.experiments.mass_grade_aukf.contestants import pausing
+from jaxveh.experiments.mass_grade_aukf.contestants import pausing_name
 from jaxveh.experiments.mass_grade_aukf.observed import WIDE_KNOT
 from jaxveh.experiments.report import Terms
 
@@ -18,7 +18,7 @@ def final_mass(study: str, estimator: str) -> str:
     return f"{study}, {estimator}: final mass error, %"
 
 
-def settled(study: str, estimator: str) -> str:
+def settling_criterion(study: str, estimator: str) -> str:
     """That of the time to settle."""
     return f"{study}, {estimator}: within 3 % from then on, s"
 
@@ -27,12 +27,12 @@ UPPER = f"truck, {RATE}: upper quartile of the final mass error, %"
 GRADE = f"truck, {RATE}: grade RMSE, degrees"
 
 
-def bounded(drive: str) -> str:
+def bound_criterion(drive: str) -> str:
     """That of the bound of three states."""
     return f"three states, {drive}: bound of the mass over its prior's spread"
 
 
-def erring(drive: str) -> str:
+def error_criterion(drive: str) -> str:
     """That of their error."""
     return f"three states, {drive}: error of the mass over what the prior knew"
 
@@ -55,21 +55,24 @@ CRITERIA = {
     final_mass("truck", RATE): _TRUCK,
     UPPER: _TRUCK,
     GRADE: _TRUCK,
-    settled("truck", RATE): _TRUCK,
+    settling_criterion("truck", RATE): _TRUCK,
     final_mass("truck", AIDED): _TRUCK,
-    settled("truck", AIDED): _TRUCK,
+    settling_criterion("truck", AIDED): _TRUCK,
     **{
         name: terms
         for one in (RATE, AIDED)
         for name, terms in (
-            (final_mass("car", pausing(one)), _PAUSE),
-            (final_mass("car", one), Terms(_UNKNOWN, final_mass("car", pausing(one)))),
+            (final_mass("car", pausing_name(one)), _PAUSE),
+            (final_mass("car", one), Terms(_UNKNOWN, final_mass("car", pausing_name(one)))),
         )
     },
     **{
         name: terms
         for drive in STILL
-        for name, terms in ((bounded(drive), _BOUND), (erring(drive), Terms(_ERROR, bounded(drive))))
+        for name, terms in (
+            (bound_criterion(drive), _BOUND),
+            (error_criterion(drive), Terms(_ERROR, bound_criterion(drive))),
+        )
     },
 }
 """The criteria by name; those that stand beside one as it was asked follow it."""

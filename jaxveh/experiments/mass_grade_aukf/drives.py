@@ -119,10 +119,10 @@ def drive_once(study: Study, pedals, key) -> Drive:
         truth, manoeuvre, None, road=roads.RandomRoad(grade=grade), dt=study.dt, max_step=study.max_step,
         start={"v_x": manoeuvre.manoeuvre.speed.at(0.0)[0] if study.start_speed is None else speed}, throw=False,
     )  # fmt: skip
-    return _seen(study, found, manoeuvre, sensor_key)
+    return _measure(study, found, manoeuvre, sensor_key)
 
 
-def _seen(study: Study, found: Recording, manoeuvre: Touching, key) -> Drive:
+def _measure(study: Study, found: Recording, manoeuvre: Touching, key) -> Drive:
     t = times(study, round(study.duration / study.dt) + 1)
     pulses = manoeuvre.pulses(t)
     # The motor (or the retarder) pulls both ways, and is known; the friction brake under a touch is not.
@@ -140,7 +140,7 @@ def _seen(study: Study, found: Recording, manoeuvre: Touching, key) -> Drive:
     )
 
 
-def disturbed(drive: Drive, *, late: int = 0, offset: float = 0.0, scale: float = 1.0) -> Drive:
+def disturb(drive: Drive, *, late: int = 0, offset: float = 0.0, scale: float = 1.0) -> Drive:
     """Drives, (..., T), whose torque is told `late` rows late and `scale` times too large, and whose accelerometer has an
     `offset` (m/s^2)."""
     rows = np.maximum(np.arange(np.shape(drive.torque)[-1]) - late, 0)

@@ -25,7 +25,7 @@ def figures(result: Reproduction) -> dict[str, Any]:
     return drawn | {"pedals": activity_figure(result.gentle, result.truck)}
 
 
-def _raced(raced: Raced) -> list[tuple[str, str]]:
+def _names_and_colours(raced: Raced) -> list[tuple[str, str]]:
     """Names and colours of the estimators of the figures that were in this race."""
     there = raced.found.design.axis("estimator").labels
     return [(name, colour) for name, colour in zip(SHOWN, SPELLS, strict=True) if name in there]
@@ -36,7 +36,7 @@ def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
     figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 3.6), layout="constrained") if figure is None else figure
     with style():
         axes = figure.subplots()
-        for name, colour in _raced(raced):
+        for name, colour in _names_and_colours(raced):
             mass = raced.found.at("mass", estimator=name, pedals=raced.pedals[-1])[guess]
             error = 100.0 * (mass / raced.study.mass - 1.0)
             low, mid, high = np.nanpercentile(error, [25, 50, 75], axis=0)
@@ -64,7 +64,7 @@ def grade_figure(raced: Raced, seed: int = 0, guess: int = 0, figure: Any = None
         above.plot(time, 3.6 * speed, color=COLOURS["truth"])
         above.set(ylabel="speed [km/h]", title=f"{raced.study.name}, one drive from {raced.study.guesses[guess]:g} kg")
         below.plot(time, np.rad2deg(raced.drives.true_grade[-1, seed, ::every]), color=COLOURS["truth"], label="truth")
-        for name, colour in [pair for pair in _raced(raced) if pair[0] in SHOWN[1:4]]:
+        for name, colour in [pair for pair in _names_and_colours(raced) if pair[0] in SHOWN[1:4]]:
             grade = raced.found.at("grade", estimator=name, pedals=raced.pedals[-1])[guess, seed]
             below.plot(time, np.rad2deg(grade), color=colour, label=name)
         below.set(xlabel="time [s]", ylabel="grade [°]")
@@ -78,7 +78,7 @@ def activity_figure(*raced: Raced, figure: Any = None) -> Any:
     pedals = [p for one in raced for p in one.pedals]
     with style():
         axes = figure.subplots()
-        for i, (name, colour) in enumerate(_raced(raced[0])):
+        for i, (name, colour) in enumerate(_names_and_colours(raced[0])):
             errors = [100.0 * one.found.at("mass_error", estimator=name, pedals=p) for one in raced for p in one.pedals]
             low, mid, high = np.transpose([np.nanpercentile(error, [25, 50, 75]) for error in errors])
             x = np.arange(len(pedals)) + 0.06 * (i - 2)

@@ -12,13 +12,13 @@ import numpy as np
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.diagnostics import Observability
 from jaxveh.experiments.mass_grade_aukf import criteria as named
-from jaxveh.experiments.mass_grade_aukf.contestants import contestants, pausing
+from jaxveh.experiments.mass_grade_aukf.contestants import contestants, pausing_name
 from jaxveh.experiments.mass_grade_aukf.criteria import AIDED, BIASED, CRITERIA, RATE, STILL
-from jaxveh.experiments.mass_grade_aukf.drives import Drive, disturbed, drive_once
+from jaxveh.experiments.mass_grade_aukf.drives import Drive, disturb, drive_once
 from jaxveh.experiments.mass_grade_aukf.observed import Known, bound_of_mass, known_of_mass
 from jaxveh.experiments.mass_grade_aukf.settings import CAR, COMPARED, GRADE_RMSE, TABLE_1, Study, car, truck
 from jaxveh.experiments.mass_grade_aukf.study import Raced, drives_of, race
-from jaxveh.experiments.report import Check, Table, above, at_most, spread, stated
+from jaxveh.experiments.report import Check, Table, above, at_most, spread, with_terms
 
 GENTLE, LIVELY = (0.0, 0.03), 0.1
 """Pedal activities, m/s^2; the checks are of the lively one, whose mean acceleration is the paper's."""
@@ -74,9 +74,11 @@ def run(
     trucks = race(truck_study, (LIVELY,), lively, progress=part(progress, 0.6, 0.7, "truck"))
     gentle = race(truck_study, GENTLE, calm, progress=part(progress, 0.7, 0.8, "truck with gentle pedals"))
     cars = race(car_study, (LIVELY,), own, progress=part(progress, 0.8, 0.87, "car"))
-    raced = _disturbed(truck_study, jax.tree.map(lambda leaf: leaf[:, :few], lively), part(progress, 0.87, 0.97, ""))
+    raced = _disturbance_races(
+        truck_study, jax.tree.map(lambda leaf: leaf[:, :few], lively), part(progress, 0.87, 0.97, "")
+    )
     progress(0.97, 1.0, "observability")
-    seen = _seen(truck_study, calm, lively, truck_key)
+    seen = _example_drive(truck_study, calm, lively, truck_key)
     observed = {
         name: (known_of_mass(truck_study, drive), known_of_mass(truck_study, drive, True))
         for name, drive in seen.items()
@@ -86,7 +88,7 @@ def run(
     return Reproduction(seeds, trucks, cars, gentle, raced, observed, bounds)
 
 
-def _disturbed(study: Study, drives: Drive, progress: Progress) -> dict[str, Raced]:
+def _disturbance_races(study: Study, drives: Drive, progress: Progress) -> dict[str, Raced]:
     changes = {
         f"torque {LATE:g} s late": dict(late=round(LATE / study.dt)),
         "torque 2 % too large": dict(scale=1.02),
@@ -95,11 +97,11 @@ def _disturbed(study: Study, drives: Drive, progress: Progress) -> dict[str, Rac
     found = {}
     for i, (name, change) in enumerate(changes.items()):
         told = part(progress, i / len(changes), (i + 1) / len(changes), name)
-        found[name] = race(study, (LIVELY,), disturbed(drives, **change), only=DISTURBED, progress=told)
+        found[name] = race(study, (LIVELY,), disturb(drives, **change), only=DISTURBED, progress=told)
     return found
 
 
-def _seen(study: Study, gentle: Drive, lively: Drive, key) -> dict[str, Drive]:
+def _example_drive(study: Study, gentle: Drive, lively: Drive, key) -> dict[str, Drive]:
     """One drive by what the driver does."""
     steady = dataclasses.replace(study, speed_std=0.0)
     seen = {STILL[0]: drive_once(steady, 0.0, jax.random.split(key, 2)[0])}
@@ -159,15 +161,15 @@ def check(result: Reproduction) -> list[Check]:
         at_most(named.GRADE, worst(truck, "grade_rmse", RATE), 0.10),
     ]
     for estimator, error, time in ((RATE, 1.0, 60.0), (AIDED, 0.3, 10.0)):
-        for raced, one in ((truck, estimator), (car, pausing(estimator)), (car, estimator)):
+        for raced, one in ((truck, estimator), (car, pausing_name(estimator)), (car, estimator)):
             name = named.final_mass(raced.study.name, one)
             found.append(at_most(name, 100 * worst(raced, "mass_error", one), error))
-        found.append(at_most(named.settled("truck", estimator), worst(truck, "settled", estimator), time))
+        found.append(at_most(named.settling_criterion("truck", estimator), worst(truck, "settled", estimator), time))
     for drive in STILL:
         bounds, (three, _) = result.bounds[drive], result.observed[drive]
-        found.append(above(named.bounded(drive), bounds.bounds.mass / bounds.spread.mass, 1.0))
-        found.append(above(named.erring(drive), three.share, 1.0))
-    return stated(found, CRITERIA)
+        found.append(above(named.bound_criterion(drive), bounds.bounds.mass / bounds.spread.mass, 1.0))
+        found.append(above(named.error_criterion(drive), three.share, 1.0))
+    return with_terms(found, CRITERIA)
 
 
 def tables(result: Reproduction) -> list[Table]:

@@ -51,12 +51,12 @@ class AutoRegressive(AbstractWrapper):
 
     def _step(self, model, belief, row):
         before = belief.inside.mean
-        inside, info = self.inner._step(_told(model, belief.memory), belief.inside, row)
-        pairs = [self._learned(*values) for values in zip(*belief.memory, before, inside.mean, strict=True)]
+        inside, info = self.inner._step(_with_memory(model, belief.memory), belief.inside, row)
+        pairs = [self._learn(*values) for values in zip(*belief.memory, before, inside.mean, strict=True)]
         memory = Learned(*(BodyState(*values) for values in zip(*pairs, strict=True)))
         return kit.Remembering(inside, memory), info
 
-    def _learned(self, a, spread, X, now):
+    def _learn(self, a, spread, X, now):
         """The coefficient and its spread after a row."""
         U, e = self.update, now - a * X
         if self.as_printed:
@@ -66,5 +66,5 @@ class AutoRegressive(AbstractWrapper):
         return a + k * e, (1.0 - k * X) * spread / (1.0 - U)
 
 
-def _told(model: StateSpace, memory: Learned) -> Any:
+def _with_memory(model: StateSpace, memory: Learned) -> Any:
     return eqx.tree_at(lambda m: m.system.keeps, model, memory.keeps)

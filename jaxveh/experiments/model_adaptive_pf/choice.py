@@ -20,7 +20,12 @@ import numpy as np
 
 from jaxveh import filters, sweeps
 from jaxveh._core.progress import Progress, silent
-from jaxveh.experiments.model_adaptive_pf.contestants import contaminated, moved, redesigned, wary
+from jaxveh.experiments.model_adaptive_pf.contestants import (
+    contaminated_cubature,
+    dynamics_filter,
+    redesigned_particles,
+    wary,
+)
 from jaxveh.experiments.model_adaptive_pf.drives import fiala, model_car
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, Study
 from jaxveh.experiments.model_adaptive_pf.study import drives_of
@@ -65,7 +70,7 @@ def robust_likelihoods(
                 wild_share=point.share,
                 wild_factor=point.factor,
             )
-            return moved(filters.HaarNoise(contaminated(own), **wary(own)))(own, car, drive, key)
+            return dynamics_filter(filters.HaarNoise(contaminated_cubature(own), **wary(own)))(own, car, drive, key)
 
         return run
 
@@ -88,7 +93,7 @@ def redesigned_likelihoods(
     def of(window):
         def run(study, car, drive, key, point):
             own = dataclasses.replace(study, short_window=window, heavy_alpha=point.alpha)
-            return redesigned(own)(own, car, drive, key)
+            return redesigned_particles(own)(own, car, drive, key)
 
         return run
 

@@ -13,7 +13,14 @@ from jaxveh import filters
 from jaxveh._core.names import record_type
 from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
 from jaxveh.experiments.model_adaptive_pf.drives import Drive, fiala, model_car
-from jaxveh.experiments.model_adaptive_pf.models import autoregression, dynamics, gaussian, lagging, mixture, rows_of
+from jaxveh.experiments.model_adaptive_pf.models import (
+    autoregression,
+    dynamics,
+    gaussian,
+    lagging_car,
+    mixture,
+    rows_of,
+)
 from jaxveh.experiments.model_adaptive_pf.settings import Study
 from jaxveh.statespace import Estimate, Row
 from jaxveh.tyres import AbstractTyre
@@ -38,31 +45,35 @@ def contestants(study: Study, lags: bool = True) -> dict[str, Contestant]:
     cubature = filters.Cubature()
     student = filters.RobustStudentT(cubature, study.dof)
     printed = AutoRegressive(haar, study.update, as_printed=True)
-    on = lambda filter_, law=gaussian: moved(filter_, law, lags)
+    on = lambda filter_, law=gaussian: dynamics_filter(filter_, law, lags)
     return {
         "open loop": Contestant(_open_loop(lags), "the dynamics alone, from the first row on"),
         PLAIN: Contestant(on(particles), "the dynamics, the data sheet's Gaussian noise"),
-        "PF, no relaxation": Contestant(moved(particles, lags=False), "the same on tyres whose force is there at once"),
-        "AAR as printed": Contestant(regressed(printed), "autoregression, wavelet variance, mixture"),
-        "AAR": Contestant(regressed(AutoRegressive(haar, study.update)), "the same with true least squares"),
+        "PF, no relaxation": Contestant(
+            dynamics_filter(particles, lags=False), "the same on tyres whose force is there at once"
+        ),
+        "AAR as printed": Contestant(regression_filter(printed), "autoregression, wavelet variance, mixture"),
+        "AAR": Contestant(regression_filter(AutoRegressive(haar, study.update)), "the same with true least squares"),
         "PF, wavelet": Contestant(on(haar), "the dynamics, variances from the Haar wavelet"),
         "PF, mixture": Contestant(on(particles, mixture), "the dynamics, Cauchy-Gaussian likelihood"),
         ADAPTIVE: Contestant(on(haar, mixture), "both, the variance that of the Gaussian part"),
         REDESIGNED: Contestant(
-            redesigned(study, lags), "both parts follow the variance, of a short window with a wary start"
+            redesigned_particles(study, lags), "both parts follow the variance, of a short window with a wary start"
         ),
         "strong tracking": Contestant(on(filters.StrongTracking(cubature)), "a cubature filter with a fading factor"),
         CUBATURE: Contestant(on(cubature), "the data sheet's Gaussian noise"),
         "Student-t CKF": Contestant(on(student), "Student's t law with the data sheet's scales"),
         STUDENT: Contestant(on(filters.HaarNoise(student, **wavelet)), "the same, scales from the Haar wavelet"),
         "robust CKF": Contestant(
-            on(contaminated(study)), "noise of which a share is wild, with the data sheet's scales"
+            on(contaminated_cubature(study)), "noise of which a share is wild, with the data sheet's scales"
         ),
         ROBUST: Contestant(
-            on(filters.HaarNoise(contaminated(study), **wary(study))),
+            on(filters.HaarNoise(contaminated_cubature(study), **wary(study))),
             "the same, scales from the wavelet, as the redesigned PF's",
         ),
-        TOLD: Contestant(told(cubature, lags), "knows the truth: told each row's noise level, and which rows are wild"),
+        TOLD: Contestant(
+            informed_filter(cubature, lags), "knows the truth: told each row's noise level, and which rows are wild"
+        ),
     }
 
 
@@ -82,11 +93,11 @@ WILD = 4.0
 """Errors beyond so many standard deviations of their row are wild."""
 
 
-def moved(filter_, law=gaussian, lags: bool = True) -> Run:
+def dynamics_filter(filter_, law=gaussian, lags: bool = True) -> Run:
     """A filter of the dynamics; `lags`: that knows the tyres' relaxation length."""
 
     def run(study, car, drive, key):
-        car = lagging(study, car) if lags else car
+        car = lagging_car(study, car) if lags else car
         model = dynamics(study, car, drive.v_x[0], law(study))
         return filters.scan(filter_, model, rows_of(study, drive), key)
 
@@ -104,24 +115,24 @@ def wary(study: Study) -> dict[str, Any]:
     }
 
 
-def contaminated(study: Study) -> filters.Contaminated:
+def contaminated_cubature(study: Study) -> filters.Contaminated:
     """The cubature filter that knows that a share of what is measured is wild."""
     return filters.Contaminated(filters.Cubature(), study.wild_share, study.wild_factor)
 
 
-def redesigned(study: Study, lags: bool = True) -> Run:
+def redesigned_particles(study: Study, lags: bool = True) -> Run:
     """The particle filter whose law follows the wavelet as a whole, from a window of its own, with tails of its own."""
     law = lambda study: mixture(dataclasses.replace(study, alpha=study.heavy_alpha))
     haar = filters.HaarParticles(filters.ParticleFilter(study.particles), **wary(study), follows="both")
-    return moved(haar, law, lags)
+    return dynamics_filter(haar, law, lags)
 
 
-def told(filter_, lags: bool = True) -> Run:
+def informed_filter(filter_, lags: bool = True) -> Run:
     """A filter of the dynamics that is told the noise's true level row by row, and to leave out what is wild."""
 
     def run(study, car, drive, key):
         names = {name: f"{name}_std" for name in study.stds}
-        car = lagging(study, car) if lags else car
+        car = lagging_car(study, car) if lags else car
         model = dynamics(study, car, drive.v_x[0], more=tuple(names.values()))
         rows = rows_of(study, drive)
         stds = {name: std * drive.level for name, std in study.stds.items()}
@@ -134,7 +145,7 @@ def told(filter_, lags: bool = True) -> Run:
     return run
 
 
-def regressed(filter_, law=mixture) -> Run:
+def regression_filter(filter_, law=mixture) -> Run:
     """A filter of the autoregression."""
 
     def run(study, car, drive, key):
@@ -149,7 +160,7 @@ def _open_loop(lags: bool) -> Run:
         rows = rows_of(study, drive)
         first = jnp.arange(rows.t.shape[0]) == 0
         y = jax.tree.map(lambda values: jnp.where(first, values, jnp.nan), rows.y)
-        model = dynamics(study, lagging(study, car) if lags else car, drive.v_x[0])
+        model = dynamics(study, lagging_car(study, car) if lags else car, drive.v_x[0])
         return filters.scan(filters.Cubature(), model, Row(rows.t, rows.u, y), key)
 
     return run

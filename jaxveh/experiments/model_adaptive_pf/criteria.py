@@ -63,7 +63,7 @@ _KNOWS = {
 }
 
 
-def _asked(question: Question) -> list[Asked]:
+def _check_question(question: Question) -> list[Asked]:
     """As it was asked, and what stands beside it."""
     knows = (NOTHING, WRONG_LENGTH, TOLD_LENGTH)
     return [Asked(question, who, what) for who in (question.asked, question.later) for what in knows]
@@ -74,7 +74,7 @@ def _terms(one: Asked, first: Asked) -> Terms:
     return Terms(_DRIVES + _KNOWS[one.knows] + later, "" if one == first else first.name)
 
 
-ASKED = tuple(one for question in QUESTIONS for one in _asked(question))
+ASKED = tuple(one for question in QUESTIONS for one in _check_question(question))
 
-CRITERIA = {one.name: _terms(one, _asked(one.question)[0]) for one in ASKED}
+CRITERIA = {one.name: _terms(one, _check_question(one.question)[0]) for one in ASKED}
 """The criteria by name; those that stand beside one as it was asked follow it."""

@@ -61,14 +61,14 @@ def dynamics(
     """
     noise = {"v_x": study.v_x_noise, "v_y": study.v_y_noise, "yaw_rate": study.yaw_noise}
     return StateSpace(
-        system=car, transition=Propagate(_rates, Heun()), observation=_seen, report=_shown,
+        system=car, transition=Propagate(_rates, Heun()), observation=_observation, report=_report,
         process_noise=Continuous(Gaussian(noise)), measurement_noise=gaussian(study) if law is None else law,
         prior=prior(study, start_speed, tuple(name for name in car.state_type._fields if name.endswith("deflection_y"))),
         inputs=(*INPUTS, *more), input_path="linear",
     )  # fmt: skip
 
 
-def lagging(study: Study, car: TwoTrack3DOF) -> TwoTrack3DOF:
+def lagging_car(study: Study, car: TwoTrack3DOF) -> TwoTrack3DOF:
     """The car on the same tyres with the study's relaxation length."""
     tyres = lambda c: (c.front, c.rear)
     return eqx.tree_at(tyres, car, [Relaxed(tyre, sigma_y=study.relaxation) for tyre in tyres(car)])
@@ -82,8 +82,8 @@ def autoregression(study: Study, car: TwoTrack3DOF, start_speed, law: AbstractNo
     noise = {"v_x": study.walk_v_x, "v_y": study.walk_v_y, "yaw_rate": study.walk_yaw}
     one = jnp.ones_like(start_speed)
     return StateSpace(
-        system=Regressed(car, BodyState(one, one, one)), transition=_kept, observation=_seen_of_regressed,
-        report=_shown, process_noise=Discrete(Gaussian(noise)), measurement_noise=law, prior=prior(study, start_speed),
+        system=Regressed(car, BodyState(one, one, one)), transition=_decay, observation=_regression_observation,
+        report=_report, process_noise=Discrete(Gaussian(noise)), measurement_noise=law, prior=prior(study, start_speed),
         inputs=INPUTS,
     )  # fmt: skip
 
@@ -124,18 +124,18 @@ def _rates(car: TwoTrack3DOF, t, x, u):
     return type(x)(*(getattr(rates, name) for name in x._fields))
 
 
-def _seen(car: TwoTrack3DOF, t, x, u):
+def _observation(car: TwoTrack3DOF, t, x, u):
     a_y = car.outputs(t, _whole(car, x), u).a_y
     return record_type("BodyOutputs", ("v_x", "a_y", "yaw_rate"))(x.v_x, a_y, x.yaw_rate)
 
 
-def _kept(system: Regressed, t0, t1, x, u):
+def _decay(system: Regressed, t0, t1, x, u):
     return BodyState(*(share * value for share, value in zip(system.keeps, x, strict=True)))
 
 
-def _seen_of_regressed(system: Regressed, t, x, u):
-    return _seen(system.car, t, x, u)
+def _regression_observation(system: Regressed, t, x, u):
+    return _observation(system.car, t, x, u)
 
 
-def _shown(system, t, x, u):
+def _report(system, t, x, u):
     return record_type("Report", (*BodyState._fields, "sideslip"))(*x[:3], numerics.arctan2(x.v_y, x.v_x))

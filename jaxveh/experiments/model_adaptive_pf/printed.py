@@ -13,7 +13,14 @@ import numpy as np
 from jaxveh import filters
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
-from jaxveh.experiments.model_adaptive_pf.contestants import ADAPTIVE, PLAIN, Contestant, contestants, moved, regressed
+from jaxveh.experiments.model_adaptive_pf.contestants import (
+    ADAPTIVE,
+    PLAIN,
+    Contestant,
+    contestants,
+    dynamics_filter,
+    regression_filter,
+)
 from jaxveh.experiments.model_adaptive_pf.drives import fiala, numbers_of
 from jaxveh.experiments.model_adaptive_pf.models import mixture
 from jaxveh.experiments.model_adaptive_pf.report import against
@@ -51,16 +58,16 @@ class PrintedNoise(AbstractWrapper):
 
     def _init(self, model, row, key):
         own = jnp.square(jnp.stack(model.measurement_noise.std))
-        memory = self._seen(model, kit.first_window(self.inner, own), row)
-        inside, info = self.inner.inner._init(self._told(model, memory), row, key)
+        memory = self._window_after(model, kit.first_window(self.inner, own), row)
+        inside, info = self.inner.inner._init(self._with_memory(model, memory), row, key)
         return kit.Remembering(inside, memory), info
 
     def _step(self, model, belief, row):
-        memory = self._seen(model, belief.memory, row)
-        inside, info = self.inner.inner._step(self._told(model, memory), belief.inside, row)
+        memory = self._window_after(model, belief.memory, row)
+        inside, info = self.inner.inner._step(self._with_memory(model, memory), belief.inside, row)
         return kit.Remembering(inside, memory), info
 
-    def _seen(self, model, memory: kit.Window, row) -> kit.Window:
+    def _window_after(self, model, memory: kit.Window, row) -> kit.Window:
         """The window after a row; its `variances` hold the paper's R."""
         forgetting, R = self.inner.forgetting, memory.variances
         now = kit.window_after(
@@ -71,7 +78,7 @@ class PrintedNoise(AbstractWrapper):
         full = now.count >= self.inner.window
         return now._replace(variances=jnp.where(full, forgetting * R + (1.0 - forgetting) * delta, R))
 
-    def _told(self, model, memory: kit.Window) -> Any:
+    def _with_memory(self, model, memory: kit.Window) -> Any:
         R = memory.variances
         stds = math.sqrt(2.0) * R if self.density == "eq 14" else jnp.sqrt(R)
         kind = type(model.measurement_noise.std)
@@ -103,11 +110,17 @@ def entrants(study: Study) -> dict[str, Contestant]:
     whole = AutoRegressive(literal, study.update, as_printed=True)
     return {
         "open loop": contestants(study)["open loop"],
-        PLAIN: Contestant(moved(particles, lags=False), "the dynamics, the data sheet's Gaussian noise"),
-        ADAPTIVE: Contestant(moved(haar, mixture, lags=False), "wavelet variance and mixture, errata corrected"),
-        "eqs 15 and 16": Contestant(moved(variance, mixture, lags=False), "the same, R of eq 16 taken for a variance"),
-        "eqs 14 to 16": Contestant(moved(literal, mixture, lags=False), "the density of eq 14 as well"),
-        "eqs 14 to 25": Contestant(regressed(whole), "the paper: these, and the autoregression of eqs 22 to 25"),
+        PLAIN: Contestant(dynamics_filter(particles, lags=False), "the dynamics, the data sheet's Gaussian noise"),
+        ADAPTIVE: Contestant(
+            dynamics_filter(haar, mixture, lags=False), "wavelet variance and mixture, errata corrected"
+        ),
+        "eqs 15 and 16": Contestant(
+            dynamics_filter(variance, mixture, lags=False), "the same, R of eq 16 taken for a variance"
+        ),
+        "eqs 14 to 16": Contestant(dynamics_filter(literal, mixture, lags=False), "the density of eq 14 as well"),
+        "eqs 14 to 25": Contestant(
+            regression_filter(whole), "the paper: these, and the autoregression of eqs 22 to 25"
+        ),
     }
 
 

@@ -21,7 +21,7 @@ from jaxveh.experiments.model_adaptive_pf.criteria import ASKED, CRITERIA, NOTHI
 from jaxveh.experiments.model_adaptive_pf.drives import Drive
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, PROCESS, WRONG_LENGTHS, Study
 from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
-from jaxveh.experiments.report import Check, Table, at_most, interval, spread, stated
+from jaxveh.experiments.report import Check, Table, at_most, interval, spread, with_terms
 from jaxveh.sweeps import Comparison, compare
 
 ERRORS = {"sideslip": "sideslip, degrees", "v_y": "v_y, m/s", "yaw_rate": "yaw rate, degrees/s"}
@@ -88,7 +88,7 @@ def check(result: Reproduction) -> list[Check]:
     relaxation length, errs 0.78 times as much as the plain one and the robust one 0.75 times, where a cubature filter that is
     told the noise ends at 0.73 (on the report's drives 0.68).
     """
-    return stated([at_most(one.name, value_of(result, one), one.question.bound) for one in ASKED], CRITERIA)
+    return with_terms([at_most(one.name, value_of(result, one), one.question.bound) for one in ASKED], CRITERIA)
 
 
 def value_of(result: Reproduction, one: Asked) -> float:
@@ -113,7 +113,7 @@ def tables(result: Reproduction) -> list[Table]:
         _ratios(raced, CASES, "Sideslip RMSE over the plain particle filter's, by noise"),
         _knowledge(result, "both"),
         _knowledge(result, "constant"),
-        _pressed(result.pressed),
+        _noise_table(result.pressed),
         _absolute(raced, LIMIT, "Near the limit, noise as in 'both': sideslip RMSE in degrees, by the filter's tyre"),
         _ratios(raced, LIMIT, "The same over the plain particle filter's: where the model errs, it rules"),
     ]
@@ -186,7 +186,7 @@ def _knowledge(result: Reproduction, case: str) -> Table:
     )
 
 
-def _pressed(raced: Raced) -> Table:
+def _noise_table(raced: Raced) -> Table:
     rows = []
     for name in _names(raced):
         errors = [spread(raced.of("sideslip", name, case)) for case in raced.cases]

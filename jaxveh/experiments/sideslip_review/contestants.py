@@ -59,22 +59,22 @@ def groups(study: Study, cars: Cars, models: Models) -> list[Group]:
     """All methods. Gains and models are made here, before any tracing."""
     gain, reach = gain_of(study, models.nonlinear), np.asarray(study.boundary)
     sliding = observers.SlidingMode(study.share * gain, (1.0 - study.share) * gain * reach, reach)
-    nonlinear = lambda method: filtered(method, models.nonlinear)
+    nonlinear = lambda method: run_method(method, models.nonlinear)
     deaf = observers.Luenberger(np.zeros((len(models.linear.states), len(models.linear.channels))))
     single = {
-        "open loop": filtered(deaf, models.linear),
+        "open loop": run_method(deaf, models.linear),
         "steady state": steady_state(cars),
-        "integration": integrated,
-        "linear Kalman": filtered(filters.Kalman(), models.linear),
+        "integration": integrate_v_y,
+        "linear Kalman": run_method(filters.Kalman(), models.linear),
         "Luenberger": nonlinear(observers.Luenberger(gain)),
         "sliding mode": nonlinear(sliding),
         "UKF": nonlinear(filters.Unscented()),
         # One drive after the other: side by side, resampling costs more than twice as much.
         "PF": jax.custom_batching.sequential_vmap(nonlinear(filters.ParticleFilter(study.particles))),
         "UPF": jax.custom_batching.sequential_vmap(nonlinear(filters.Guided(study.particles, rule="unscented"))),
-        "handling": filtered(filters.Unscented(), models.handling),
+        "handling": run_method(filters.Unscented(), models.handling),
     }
-    fused = _fused(study, filtered(filters.Kalman(), models.kinematic), nonlinear(filters.Extended()))
+    fused = _fusion(study, run_method(filters.Kalman(), models.kinematic), nonlinear(filters.Extended()))
     return [*(_alone(name, method) for name, method in single.items()), fused]
 
 
@@ -82,7 +82,7 @@ def _alone(name: str, method: Method) -> Group:
     return Group((name,), lambda drive, key: {name: method(drive, key)})
 
 
-def _fused(study: Study, kinematic: Method, extended: Method) -> Group:
+def _fusion(study: Study, kinematic: Method, extended: Method) -> Group:
     """The kinematic and the dynamic filter, and what becomes of both."""
 
     def run(drive: Drive, key) -> dict[str, Found]:
@@ -90,9 +90,9 @@ def _fused(study: Study, kinematic: Method, extended: Method) -> Group:
         return {
             "kinematic Kalman": fast,
             "EKF": slow,
-            "switch": switched(study.switch_at, slow, drive),
+            "switch": switch(study.switch_at, slow, drive),
             "pseudo-integration": pseudo_integrated(study.pseudo_time, slow, drive),
-            "weighted": weighted(fast, slow),
+            "weighted": weighted_mean(fast, slow),
         }
 
     return Group(("kinematic Kalman", "EKF", "switch", "pseudo-integration", "weighted"), run)
@@ -103,7 +103,7 @@ def gain_of(study: Study, model: StateSpace) -> np.ndarray:
     return observers.place_poles(model, study.poles, dt=study.dt, u={"v_x": study.speed}, leave=("yaw",))
 
 
-def filtered(method, model: StateSpace) -> Method:
+def run_method(method, model: StateSpace) -> Method:
     """A filter or an observer over the drive."""
 
     def run(drive: Drive, key) -> Found:
@@ -116,7 +116,7 @@ def filtered(method, model: StateSpace) -> Method:
     return run
 
 
-def integrated(drive: Drive, key) -> Found:
+def integrate_v_y(drive: Drive, key) -> Found:
     """Lateral velocity by trapezia from zero: nothing but sensors, and nothing that forgets."""
     del key
     steps = _middle(drive.a_y - drive.v_x * drive.yaw_rate) * jnp.diff(drive.time)
@@ -151,7 +151,7 @@ def pseudo_integrated(time: float, slow: Found, drive: Drive) -> Found:
     return _from(slow, jax.lax.scan(step, slow.v_y[0], (kept, wanted))[1])
 
 
-def switched(hard: float, slow: Found, drive: Drive) -> Found:
+def switch(hard: float, slow: Found, drive: Drive) -> Found:
     """Nishio et al. (2001) at its simplest: where |a_y| exceeds `hard` (m/s^2) integration goes on from the model's estimate."""
     steps = _middle(drive.a_y - drive.v_x * drive.yaw_rate) * jnp.diff(drive.time)
 
@@ -163,7 +163,7 @@ def switched(hard: float, slow: Found, drive: Drive) -> Found:
     return _from(slow, jax.lax.scan(step, slow.v_y[0], (steps, slow.v_y[1:], drive.a_y[1:]))[1])
 
 
-def weighted(fast: Found, slow: Found) -> Found:
+def weighted_mean(fast: Found, slow: Found) -> Found:
     """Lee (2006): both estimates weighed by the inverses of the variances that their filters state."""
     weights = fast.std**-2, slow.std**-2
     total = weights[0] + weights[1]

@@ -107,10 +107,10 @@ def drive_once(study: Study, scenario: Scenario, key) -> Drive:
         road=road_of(study, scenario, road_key), dt=study.dt, max_step=study.max_step,
         start={"v_x": study.speed}, throw=False,
     )  # fmt: skip
-    return _seen(study, scenario, found, sensor_key)
+    return _measure(study, scenario, found, sensor_key)
 
 
-def _seen(study: Study, scenario: Scenario, found, key) -> Drive:
+def _measure(study: Study, scenario: Scenario, found, key) -> Drive:
     offsets_key, inertial_key, speed_key = jax.random.split(key, 3)
     draws = jax.random.normal(offsets_key, (4,))
     spreads = {"yaw_rate": study.yaw_rate_offset, "a_x": study.a_offset, "a_y": study.a_offset}

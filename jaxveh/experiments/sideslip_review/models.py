@@ -56,25 +56,25 @@ def models_of(cars: Cars, noise: Noise, start_speed: float) -> Models:
         linear=_single_track(cars.linear, dict(noise.linear)),
         nonlinear=_single_track(cars.nonlinear, dict(noise.nonlinear)),
         kinematic=_kinematic(dict(noise.kinematic), start_speed),
-        handling=_handling(cars.handling, dict(noise.handling)),
+        handling=_handling_with_noise(cars.handling, dict(noise.handling)),
     )
 
 
-def _parted(noise: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+def _split_noise(noise: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]:
     """Process and measurement noise."""
     seen = {name.removeprefix(SEEN): std for name, std in noise.items() if name.startswith(SEEN)}
     return {name: std for name, std in noise.items() if not name.startswith(SEEN)}, seen
 
 
 def _single_track(car, noise: dict[str, float]) -> StateSpace:
-    process, seen = _parted(noise)
+    process, seen = _split_noise(noise)
     # At 100 Hz Heun's error is far below the noises, at half the work of a fourth-order method.
     return estimators.state_space(car, sensors.esc(**seen), process_noise=process, solver=Heun())
 
 
 def _kinematic(noise: dict[str, float], start_speed: float) -> StateSpace:
     """v_x' = a_x + r v_y, v_y' = a_y - r v_x: accelerometers and gyroscope are inputs, the wheels' speed is measured."""
-    process, seen = _parted(noise)
+    process, seen = _split_noise(noise)
     return StateSpace(
         transition=Propagate(_drift, Heun()),
         observation=_speed,
@@ -94,8 +94,8 @@ def _speed(system, t, x, u):
     return record_type("Speed", ("v_x",))(x.v_x)
 
 
-def _handling(system: Handling, noise: dict[str, float]) -> StateSpace:
-    process, seen = _parted(noise)
+def _handling_with_noise(system: Handling, noise: dict[str, float]) -> StateSpace:
+    process, seen = _split_noise(noise)
     made = handling_model(system)
     if not noise:
         return made

@@ -36,7 +36,7 @@ class Line(NamedTuple):
 
 def equations() -> Table:
     """What the printed equations say."""
-    rows = [tuple(line) for line in (*_steady(), *_place(), *_slipping(), *_sign(), *_rear())]
+    rows = [tuple(line) for line in (*_steady(), *_place(), *_slip_checks(), *_sign(), *_rear())]
     return Table(
         "The review's equations, as printed and with their errata corrected",
         ("equation", "quantity", "as printed", "corrected", "should be"),
@@ -119,7 +119,7 @@ def braking(ratio: float, slip_angle: float, printed: bool) -> float:
     return full * (1 / H - 1 / (4 * H**2))
 
 
-def _slipping() -> list[Line]:
+def _slip_checks() -> list[Line]:
     """Eq 4 at small slip, where the force is nearly `K lambda`, and beside a slip angle; the library's HSRI tyre judges."""
     tyre, lines = tyres.HSRI(K, K_A), []
     for what, ratio, degrees in (("rolling straight", 0.01, 0.0), ("at 5 degrees", 0.05, 5.0)):

@@ -15,7 +15,7 @@ from jaxveh import estimators, filters, io
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
 from jaxveh.estimators import kit
-from jaxveh.experiments.sideslip_review.contestants import WHAT, groups, pseudo_integrated, switched, weighted
+from jaxveh.experiments.sideslip_review.contestants import WHAT, groups, pseudo_integrated, switch, weighted_mean
 from jaxveh.experiments.sideslip_review.contestants import Found as Estimated
 from jaxveh.experiments.sideslip_review.drives import Drive
 from jaxveh.experiments.sideslip_review.models import Cars, Models, models_of
@@ -66,15 +66,15 @@ class Logged(NamedTuple):
         return self._least(self.rmse)
 
     @property
-    def chosen(self) -> tuple[str, str]:
+    def choices(self) -> tuple[str, str]:
         """The methods that score on the first and on the second half: each the best of the other half."""
         first, second = (self._least({name: both[i] for name, both in self.halves.items()}) for i in (0, 1))
         return second, first
 
     @property
-    def crossed(self) -> float:
+    def crossed_rmse(self) -> float:
         """The RMSE (degrees) of all rows where each half, weighing alike, is scored by the method that the other chose."""
-        errors = [self.halves[name][i] for i, name in enumerate(self.chosen)]
+        errors = [self.halves[name][i] for i, name in enumerate(self.choices)]
         return float(np.sqrt(np.mean(np.square(errors))))
 
     def _least(self, errors: dict[str, float]) -> str:
@@ -101,9 +101,9 @@ def on_log(study: Study, log: Any, car: Any, progress: Progress = silent) -> Log
     made = models_of(cars, noise, float(rest["v_x"][0]))._replace(handling=fit.model)
     drive = drive_of(rest, recording.rows(slice(half, None)))
     progress(0.8, 1.0, "methods")
-    found = _ready(rest, told, fit) | _found(dataclasses.replace(study, speed=speed), cars, made, drive)
-    found[SMOOTHED] = _smoothed(fit.model, rest)
-    return _scored(recording.source, found, drive, noise)
+    found = _ready(rest, told, fit) | _run_estimators(dataclasses.replace(study, speed=speed), cars, made, drive)
+    found[SMOOTHED] = _smooth(fit.model, rest)
+    return _score(recording.source, found, drive, noise)
 
 
 def log_cars(told: io.CarSpecification, model: StateSpace) -> Cars:
@@ -150,7 +150,7 @@ def fitted_noise(cars: Cars, start: Noise, log: Recording, speed: float) -> Nois
     return dataclasses.replace(start, **found)
 
 
-def _found(study: Study, cars: Cars, models: Models, drive: Drive) -> dict[str, Estimated]:
+def _run_estimators(study: Study, cars: Cars, models: Models, drive: Drive) -> dict[str, Estimated]:
     key = jax.random.key(0)
     found = {}
     for group in groups(study, cars, models):
@@ -158,9 +158,9 @@ def _found(study: Study, cars: Cars, models: Models, drive: Drive) -> dict[str, 
     found = {name: found[name] for name in WHAT}
     slow, fast = found["handling"], found["kinematic Kalman"]
     return found | {
-        "handling, switch": switched(study.switch_at, slow, drive),
+        "handling, switch": switch(study.switch_at, slow, drive),
         "handling, pseudo-integration": pseudo_integrated(study.pseudo_time, slow, drive),
-        "handling, weighted": weighted(fast, slow),
+        "handling, weighted": weighted_mean(fast, slow),
     }
 
 
@@ -169,12 +169,12 @@ def _ready(rest: Recording, told, fit) -> dict[str, Estimated]:
     return {name: Estimated(e.mean.v_y, e.std.v_y, e.result) for name, e in zip(READY, made, strict=True)}
 
 
-def _smoothed(model: StateSpace, rest: Recording) -> Estimated:
+def _smooth(model: StateSpace, rest: Recording) -> Estimated:
     made = filters.smooth(filters.Unscented(), model, estimators.clean(rest))
     return Estimated(made.mean.v_y, made.std.v_y, made.filtered.result)
 
 
-def _scored(source: str, found: dict[str, Estimated], drive: Drive, noise: Noise) -> Logged:
+def _score(source: str, found: dict[str, Estimated], drive: Drive, noise: Noise) -> Logged:
     true, rmse, failed, halves, courses = np.asarray(drive.sideslip), {}, {}, {}, {}
     rms = lambda wrong: float(np.degrees(np.sqrt(np.nanmean(wrong**2))))
     middle = len(true) // 2

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import jax
 
 from jaxveh._core.progress import Progress, part, silent
-from jaxveh.experiments.report import Check, Table, at_most, interval, spread, stated, undecided
+from jaxveh.experiments.report import Check, Table, at_most, interval, leave_open, spread, with_terms
 from jaxveh.experiments.sideslip_review.contestants import WHAT
 from jaxveh.experiments.sideslip_review.criteria import (
     CELLS,
@@ -80,24 +80,24 @@ def check(result: Reproduction) -> list[Check]:
     raced = result.raced
     failed = sum(float(values["failed"].sum()) for values in raced.found.values())
     cells = [_cells(CELLS, raced, FIRST_ROWS), _cells(CELLS_FAST, raced, ROWS)]
-    return stated([at_most(RUNS, failed, 0), *cells, *_log_checks(result.logged)], CRITERIA)
+    return with_terms([at_most(RUNS, failed, 0), *cells, *_log_checks(result.logged)], CRITERIA)
 
 
 def _cells(name: str, raced: Raced, rows: Mapping[str, Statistic]) -> Check:
     """How many cells are neither supported nor contradicted; one without a number at all is a failure."""
     found = [cell.verdict for cell in verdicts(raced, rows)]
     check = at_most(name, sum(verdict in (OPEN, "") for verdict in found), 0)
-    return check if check.holds or "" in found else undecided(check)
+    return check if check.holds or "" in found else leave_open(check)
 
 
 def _log_checks(logged: Logged | None) -> list[Check]:
     if logged is None:
-        return [undecided(at_most(name, float("nan"), BEST)) for name in (LOG, LOG_CROSSED, LOG_SMOOTHED)]
+        return [leave_open(at_most(name, float("nan"), BEST)) for name in (LOG, LOG_CROSSED, LOG_SMOOTHED)]
     least = at_most(LOG, logged.rmse[logged.best], BEST)
     return [
         # The least of many by the rows that score it: that it is larger says something, that it is smaller does not.
-        undecided(least) if least.holds else least,
-        at_most(LOG_CROSSED, logged.crossed, BEST),
+        leave_open(least) if least.holds else least,
+        at_most(LOG_CROSSED, logged.crossed_rmse, BEST),
         at_most(LOG_SMOOTHED, logged.rmse[SMOOTHED], BEST),
     ]
 
@@ -204,13 +204,13 @@ def _log_table(result: Reproduction) -> Table:
     if logged is None:
         return Table("Real log: none was given (log=, car=)", ("method", "sideslip RMSE, degrees"), [])
     order = (*READY, *(name for name in logged.rmse if name not in READY))
-    chosen = f"{logged.chosen[0]}; {logged.chosen[1]}"
+    chosen = f"{logged.choices[0]}; {logged.choices[1]}"
     rows = [
         *(
             (name, logged.rmse[name], logged.rmse[name] / BEST, *logged.halves[name], WHAT.get(name, ""))
             for name in order
         ),
-        ("the other half's choice", logged.crossed, logged.crossed / BEST, *_crossed(logged), chosen),
+        ("the other half's choice", logged.crossed_rmse, logged.crossed_rmse / BEST, *_crossed_rmse(logged), chosen),
     ]
     return Table(
         f"Real log, {logged.rows} rows that nothing was fitted to: {logged.source}",
@@ -219,5 +219,5 @@ def _log_table(result: Reproduction) -> Table:
     )
 
 
-def _crossed(logged: Logged) -> list[float]:
-    return [logged.halves[name][i] for i, name in enumerate(logged.chosen)]
+def _crossed_rmse(logged: Logged) -> list[float]:
+    return [logged.halves[name][i] for i, name in enumerate(logged.choices)]

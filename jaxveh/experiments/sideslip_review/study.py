@@ -70,7 +70,7 @@ def race(
     seeds, found = np.shape(drives.v_x)[1], {}
     for i, group in enumerate(chosen):
         told = part(progress, i / len(chosen), (i + 1) / len(chosen), ", ".join(group.names))
-        run = _scored(study, group)
+        run = _score(study, group)
         swept = sweeps.sweep(run, _design(scenarios), seeds, key, data=drives, progress=told)
         for path, values in swept.values.items():
             name, metric = path.rsplit(".", 1)
@@ -78,7 +78,7 @@ def race(
     return Raced(study, scenarios, drives, {name: found[name] for name in WHAT if name in wanted})
 
 
-def _scored(study: Study, group: Group):
+def _score(study: Study, group: Group):
     """The group's run of one drive, as `sweeps.sweep` calls it."""
 
     def run(point, key, drive):

@@ -128,7 +128,7 @@ def limit_of(study: Study, statistic: Statistic) -> float:
     return study.share_limit if statistic.is_share else study.growth_limit
 
 
-def judged(found: ConfidenceInterval, low: float, high: float, expected: bool = True) -> str:
+def judge(found: ConfidenceInterval, low: float, high: float, expected: bool = True) -> str:
     """Whether the number is within the bounds as expected; nobody can tell where its interval has one of them inside."""
     if not np.isfinite([found.value, found.low]).all():
         inside = None if np.isnan(found.value) else False
@@ -149,7 +149,7 @@ def verdicts(raced: Raced, rows: Mapping[str, Statistic] = ROWS) -> list[Verdict
     for row, marks in MARKS.items():
         for method, mark in zip(MARKED, marks, strict=True):
             value, limit = number(raced, rows[row], method), limit_of(raced.study, rows[row])
-            found.append(Verdict(row, rows[row], method, mark, value, limit, judged(value, 0.0, limit, mark)))
+            found.append(Verdict(row, rows[row], method, mark, value, limit, judge(value, 0.0, limit, mark)))
     return found
 
 
@@ -168,5 +168,5 @@ def claims(raced: Raced) -> list[Judged]:
     for claim in CLAIMS:
         ratio = compare(raced.at(*claim.a), raced.at(*claim.b)).ratio
         low, high = (1.0 if bound in (BETTER, 1.0 / BETTER) else bound for bound in (claim.low, claim.high))
-        found.append(Judged(claim, ratio, judged(ratio, claim.low, claim.high), judged(ratio, low, high)))
+        found.append(Judged(claim, ratio, judge(ratio, claim.low, claim.high), judge(ratio, low, high)))
     return found

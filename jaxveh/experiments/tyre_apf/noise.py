@@ -96,8 +96,9 @@ def choose_level(
     """Choose what both particle filters assume at a level of the sensors' noise, resampling as the paper does: the candidate with
     the largest mean of their log-likelihoods, over every pass of each drive. One with which a filter fails is out.
 
-    A pass that explains its drive worse than the mean and the spread of what was measured do (`unexplained`) is lost, and counts
-    as that. With sharp sensors 300 particles lose some drives whatever they assume: how badly (log-likelihoods of -1e9 where
+    A pass that explains its drive worse than the mean and the spread of what was measured do (`unexplained_likelihood`) is
+    lost, and counts as that. With sharp sensors 300 particles lose some drives whatever they assume: how badly (log-likelihoods
+    of -1e9 where
     others have 4e3) would otherwise decide alone, while medians would not mind a third of all drives lost.
 
     `kinds`: the filters, by default the paper's. Each of the `rounds` (at least one) takes the `keep` best of the one before to
@@ -114,7 +115,7 @@ def choose_level(
     return found
 
 
-def unexplained(drive: Recording) -> jax.Array:
+def unexplained_likelihood(drive: Recording) -> jax.Array:
     """The greatest log-likelihood of the drive's measurements to which time, inputs and each other say nothing: normal ones."""
     each = [len(drive[name]) * (jnp.log(2 * jnp.pi * jnp.var(drive[name])) + 1) / 2 for name in ("yaw_rate", "a_y")]
     return -jnp.sum(jnp.stack(each))
@@ -124,7 +125,9 @@ def _best(candidates: np.ndarray, log_likelihood: np.ndarray) -> Choice:
     mean = log_likelihood.mean(axis=1)
     mean = np.where(np.isfinite(mean), mean, -np.inf)
     if not np.isfinite(mean).any():
-        raise InputError(f"all {len(candidates)} candidates fail on a drive: give others, or filters more particles.")
+        raise InputError(
+            f"all {len(candidates)} candidates fail on a drive: give other candidates, or the filters more particles."
+        )
     return Choice(StudyNoise(*map(float, candidates[mean.argmax()])), candidates, log_likelihood)
 
 
@@ -137,7 +140,7 @@ def _of_level(
     def run(point, key):
         own = level._replace(noise=StudyNoise(*values[point.candidate.astype(int)]))
         found = [several_passes(study, filter_, own, again, key) for filter_ in both]
-        least = unexplained(drive_at(study, own, key))
+        least = unexplained_likelihood(drive_at(study, own, key))
         each = [jnp.where(result == 0, jnp.maximum(passes, least), -jnp.inf) for _, passes, result in found]
         return {"log_likelihood": sum(map(jnp.mean, each))}
 

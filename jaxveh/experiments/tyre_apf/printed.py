@@ -67,10 +67,10 @@ def run_printed(printed: Printed, seeds: int, key) -> PrintedOutcome:
 
 @eqx.filter_jit
 def _every_seed(printed: Printed, keys) -> PrintedOutcome:
-    return jax.vmap(lambda key: printed_once(printed, key))(keys)
+    return jax.vmap(lambda key: one_printed_run(printed, key))(keys)
 
 
-def printed_once(printed: Printed, key) -> PrintedOutcome:
+def one_printed_run(printed: Printed, key) -> PrintedOutcome:
     """One seed of the printed experiment. Pure: `vmap` it over keys."""
     car = vehicles.passenger_car_as_printed() if printed.as_printed_geometry else vehicles.passenger_car()
     chosen = resolve(car, tyres)

@@ -14,7 +14,7 @@ from jaxveh._core.errors import check_at_least
 from jaxveh._core.parameter import pick, resolve
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.diagnostics import Observability, kit
-from jaxveh.experiments.report import Check, Table, above, at_least, at_most, stated
+from jaxveh.experiments.report import Check, Table, above, at_least, at_most, with_terms
 from jaxveh.experiments.tyre_apf.criteria import AHEAD, CRITERIA, WHERE
 from jaxveh.experiments.tyre_apf.printed import Printed, closest_share, run_printed
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
@@ -140,7 +140,7 @@ def check(result: Reproduction) -> list[Check]:
             walk[rows].max(),
             bound,
         )
-    return stated(checks, CRITERIA)
+    return with_terms(checks, CRITERIA)
 
 
 def _sharpness_checks(found: Sharpness, which: str = "APF") -> list[Check]:

@@ -94,7 +94,7 @@ def run_saturated(
     return Saturated(tuple(cases), found, bounds)
 
 
-def _recorded(study: Study, manoeuvre, key, throw: bool = False) -> Recording:
+def _record(study: Study, manoeuvre, key, throw: bool = False) -> Recording:
     devices = sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std)
     return simulate(vehicles.passenger_car(), manoeuvre, devices, key=key, dt=1 / study.rate, throw=throw)
 
@@ -103,7 +103,7 @@ def _drives(study: Study, manoeuvre, seeds: int, key) -> dict[str, np.ndarray]:
     """The channels that filters see, (seeds, T)."""
 
     def run(point, key):
-        drive = _recorded(study, manoeuvre, jax.random.fold_in(key, 1))
+        drive = _record(study, manoeuvre, jax.random.fold_in(key, 1))
         return {"time": drive.time} | {name: drive[name] for name in ("yaw_rate", "a_y", "steer", "v_x")}
 
     return dict(sweeps.sweep(run, sweeps.Design(), seeds, key).values)
@@ -112,7 +112,7 @@ def _drives(study: Study, manoeuvre, seeds: int, key) -> dict[str, np.ndarray]:
 def _bounds(study: Study, manoeuvre, where) -> Observability:
     car = vehicles.passenger_car()
     return estimators.observe(
-        model_of(study, car, study.saturated, where, "linear"), _recorded(study, manoeuvre, jax.random.key(0), True)
+        model_of(study, car, study.saturated, where, "linear"), _record(study, manoeuvre, jax.random.key(0), True)
     )
 
 

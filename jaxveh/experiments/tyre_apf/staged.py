@@ -230,11 +230,11 @@ class _Clock:
 
     def _compile(self, name: str, function: Callable, *args):
         start = time.perf_counter()
-        self.compiled[name] = eqx.filter_jit(self._batched(function)).lower(*args).compile()
+        self.compiled[name] = eqx.filter_jit(self._over_batch(function)).lower(*args).compile()
         self.seconds[name] = Seconds(time.perf_counter() - start, float("nan"))
         self.done += 1
 
-    def _batched(self, function: Callable) -> Callable:
+    def _over_batch(self, function: Callable) -> Callable:
         if self.count > 1:
             return lambda *args: jax.vmap(function)(*args)
         # One seed runs as a single user's call would, without the cost of a batch.

@@ -50,7 +50,7 @@ class CalibrationRanks(NamedTuple):
         p_value = lambda counts: chi_squared_tails(float(np.sum((counts - expected) ** 2) / expected), bins - 1)[1]
         return type(self.ranks)(*[p_value(counts) for counts in self.histogram(bins)])
 
-    def calibrated(self, level: float = 0.01, bins: int = 10) -> bool:
+    def is_calibrated(self, level: float = 0.01, bins: int = 10) -> bool:
         """Whether no state's test rejects, so that a right filter is rejected with probability `level` at most (Bonferroni)."""
         check("level", level, lambda p: (p > 0) & (p < 1), "above 0 and below 1")
         return min(self.p_values(bins)) >= level / len(self.ranks)

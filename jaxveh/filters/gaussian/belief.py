@@ -46,7 +46,7 @@ class GaussianBelief(AbstractBelief):
         """(n, n) in the order of the state's fields."""
         return self.matrix if self.matrix is not None else times(self.factor, self.factor.T)
 
-    def inflated(self, factor: Any) -> GaussianBelief:
+    def inflate(self, factor: Any) -> GaussianBelief:
         """The belief with `factor` times its covariance."""
         matrix = None if self.matrix is None else factor * self.matrix
         root = numerics.sqrt(factor) * self.factor

@@ -54,7 +54,7 @@ class AbstractGaussianFilter(AbstractTwoPartFilter):
         """The belief after the row's measurement, at the belief's own time (row.t is taken over, not propagated to)."""
 
     @abc.abstractmethod
-    def adapted(self, model: StateSpace, belief: Any) -> StateSpace:
+    def adapted_model(self, model: StateSpace, belief: Any) -> StateSpace:
         """The model with the noises that this filter takes for true, given what it has seen."""
 
     @property
@@ -114,9 +114,9 @@ class AbstractRuleFilter(AbstractGaussianFilter):
         return observation_image(model, belief, row, kit.presence(model, row)[1])
 
     def update(self, model, belief, row):
-        return corrected(self.form, model, belief, row, self.observe(model, belief, row))
+        return correct(self.form, model, belief, row, self.observe(model, belief, row))
 
-    def adapted(self, model, belief):
+    def adapted_model(self, model, belief):
         return model
 
 
@@ -145,7 +145,7 @@ def check_weights(filter: AbstractRuleFilter, model: StateSpace) -> None:
         )
 
 
-def corrected(
+def correct(
     form: AbstractForm, model: StateSpace, belief: GaussianBelief, row: Row, image: Image
 ) -> tuple[GaussianBelief, Info]:
     """The belief after a row whose measurement has this image under it."""
@@ -227,13 +227,13 @@ def observation_image(model: StateSpace, belief: GaussianBelief, row: Row, prese
         found = []
         for name in model.channels:
             values = jnp.broadcast_to(getattr(observed, name), rows.shape[1:])
-            found.append(jnp.where(present[name], unwrapped(model, name, values), 0))
+            found.append(jnp.where(present[name], unwrap(model, name, values), 0))
         return jnp.stack(found)
 
     return belief.rule.image(see, belief.vector, belief.factor)
 
 
-def unwrapped(model: StateSpace, name: str, values: Any) -> Any:
+def unwrap(model: StateSpace, name: str, values: Any) -> Any:
     """A channel's values (k, ...), angles among them within half a turn of the first; a single one as it is."""
     if name not in model.angles or not values.ndim:
         return values

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import check_whole
-from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, corrected, with_spread
+from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, correct, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import Image, product, times
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
@@ -50,17 +50,17 @@ class Iterated(AbstractGaussianWrapper):
     def observe(self, model, belief, row):
         return self.inner.observe(model, belief, row)
 
-    def adapted(self, model, belief):
+    def adapted_model(self, model, belief):
         return model
 
     def update(self, model, belief, row):
-        posterior, info = corrected(self.inner.form, model, belief, row, self.observe(model, belief, row))
+        posterior, info = correct(self.inner.form, model, belief, row, self.observe(model, belief, row))
 
         def again(gaussian, _):
             vector, spread = gaussian
             seen = self.observe(model, with_spread(belief, vector, spread), row)
-            line = linearised(seen, vector, spread.factor, belief)
-            found, _ = corrected(self.inner.form, model, belief, row, line)
+            line = linearise_image(seen, vector, spread.factor, belief)
+            found, _ = correct(self.inner.form, model, belief, row, line)
             return (found.vector, Spread(found.factor, found.matrix)), None
 
         start = posterior.vector, Spread(posterior.factor, posterior.matrix)
@@ -68,7 +68,7 @@ class Iterated(AbstractGaussianWrapper):
         return with_spread(posterior, vector, spread), info
 
 
-def linearised(image: Image, vector: Any, factor: Any, belief: Any) -> Image:
+def linearise_image(image: Image, vector: Any, factor: Any, belief: Any) -> Image:
     """The image under `belief` of the line, with error, that an image under the Gaussian (vector, factor) stands for."""
     slope, rest = line_through(image, factor)
     X = image.spread

@@ -23,10 +23,12 @@ def check_linear(who: str, model: StateSpace) -> None:
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
     with jax.ensure_compile_time_eval():  # inside jit, too, a model may be made of plain numbers
-        found = jax.tree.map(np.asarray, _curved(model))
+        found = jax.tree.map(np.asarray, _nonlinear_parts(model))
         varies = isinstance(model.measurement_noise, StateDependent) and bool(_noise_varies(model))
-    for curved in found:
-        for (what, names), values in zip((("state", model.states), ("channel", model.channels)), curved, strict=True):
+    for nonlinear in found:
+        for (what, names), values in zip(
+            (("state", model.states), ("channel", model.channels)), nonlinear, strict=True
+        ):
             if np.any(values):
                 name = names[int(np.argmax(values))]
                 raise InputError(f"{who}: {what} {name} is no linear function of the state. Use Extended or Unscented.")
@@ -38,9 +40,9 @@ def check_linear(who: str, model: StateSpace) -> None:
 
 # Compiled: operation by operation it would take longer than filtering a short recording.
 @eqx.filter_jit
-def _curved(model: StateSpace):
-    """Which states and which channels are curved, (n,) and (m,), for inputs of 0 and for inputs of 1."""
-    return [[_is_curved(f, model) for f in _functions(model, value)] for value in (0.0, 1.0)]
+def _nonlinear_parts(model: StateSpace):
+    """Which states and which channels are nonlinear, (n,) and (m,), for inputs of 0 and for inputs of 1."""
+    return [[_is_nonlinear(f, model) for f in _functions(model, value)] for value in (0.0, 1.0)]
 
 
 @eqx.filter_jit
@@ -70,7 +72,7 @@ def _functions(model: StateSpace, value: float):
     return move, see
 
 
-def _is_curved(f, model: StateSpace):
+def _is_nonlinear(f, model: StateSpace):
     start, step = _start_and_step(model)
     here, slope = jax.jvp(f, (start,), (step,))
     there = f(start + step)

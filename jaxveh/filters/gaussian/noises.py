@@ -25,17 +25,17 @@ def covariance_in(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
         std = law.std._asdict()
         variances = jnp.stack([std[name] ** 2 if name in std else jnp.zeros((), dtype) for name in fields])
         return jnp.where(jnp.eye(len(fields), dtype=bool), variances[:, None], jnp.zeros((), dtype))
-    embed = _embedding(law, fields, dtype)
+    embed = _embedding_matrix(law, fields, dtype)
     return times(times(embed, law.covariance()), embed.T)
 
 
 def factor_in(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
     """A factor N (n, q) of that covariance, N N^T, with a column for each of the q fields that carry noise."""
-    embed = _embedding(law, fields, dtype)
+    embed = _embedding_matrix(law, fields, dtype)
     if isinstance(law, Gaussian):
         return embed * jnp.stack(law.std)
     return times(embed, numerics.cholesky(law.covariance()))
 
 
-def _embedding(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
+def _embedding_matrix(law: AbstractNoise, fields: tuple[str, ...], dtype) -> Any:
     return jnp.asarray([[name == other for other in law.names] for name in fields], dtype)

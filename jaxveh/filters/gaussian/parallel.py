@@ -62,7 +62,7 @@ def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, cova
     """
     moves, sees = _lines(rule, model, rows, means, covariances)
     about = means
-    y, R = _measured(model, rows, about)
+    y, R = _measurements(model, rows, about)
     if model.angles:
         # A measured angle is the one of all its turns that is nearest to where its line was laid.
         seen = jnp.einsum("tmn,tn->tm", sees.slope, means) + sees.offset
@@ -73,7 +73,7 @@ def pass_over(rule: AbstractRule, model: StateSpace, rows: Row, means: Any, cova
     found = jax.lax.associative_scan(jax.vmap(_join_filtering), elements)
     filtered = found.b, numerics.symmetric(found.C)
     means, covariances = (leaf[:-1] for leaf in filtered)
-    predicted = jax.vmap(_moved)(moves, means, covariances)
+    predicted = jax.vmap(_propagate)(moves, means, covariances)
     back = jax.vmap(_smoothing_element)(moves, means, covariances, *predicted)
     last = SmoothingElement(jnp.zeros_like(filtered[1][-1]), filtered[0][-1], filtered[1][-1])
     back = jax.tree.map(lambda a, b: jnp.concatenate([a, b[None]]), back, last)
@@ -111,7 +111,7 @@ def _line(image, belief) -> Lines:
     return Lines(slope, image.mean - slope @ belief.vector, product(rest, rest, image.signs))
 
 
-def _measured(model, rows: Row, means):
+def _measurements(model, rows: Row, means):
     """Measurements (T, m), zero where missing, and noise covariances (T, m, m), of unit variance there; those of noise that
     depends on the state at the `means` (T, n)."""
     kind = type(model.prior.mean)
@@ -163,7 +163,7 @@ def _join_filtering(i: Filtering, j: Filtering) -> Filtering:
     )
 
 
-def _moved(move: Lines, m, P):
+def _propagate(move: Lines, m, P):
     return move.slope @ m + move.offset, numerics.symmetric(move.slope @ P @ move.slope.T + move.error)
 
 
@@ -177,9 +177,9 @@ def _join_smoothing(j: SmoothingElement, i: SmoothingElement) -> SmoothingElemen
     return SmoothingElement(i.E @ j.E, i.E @ j.g + i.g, i.E @ j.L @ i.E.T + i.L)
 
 
-def infos_of(model: StateSpace, rows: Row, passed: Passed) -> Any:
-    """The infos (T,) of all rows: what the predictions said of the measurements."""
-    y, R = _measured(model, rows, passed.about)
+def info_of(model: StateSpace, rows: Row, passed: Passed) -> Any:
+    """The info (T,) of all rows: what the predictions said of the measurements."""
+    y, R = _measurements(model, rows, passed.about)
 
     def of(row, y, R, mean, covariance, line):
         _, present = kit.presence(model, row)

@@ -49,7 +49,7 @@ class FixedLag(AbstractWrapper):
 
     A live smoother of constant memory: for what may come late, by `lag` rows, and should be good. Gaussian filters go back by
     their own Rauch-Tung-Striebel steps, particle filters by their ancestors (G. Kitagawa 1996), whose lines are still many over
-    a short lag. Infos are those of the filter. A step costs `lag` steps back.
+    a short lag. The info is that of the filter. A step costs `lag` steps back.
 
     `smooth(filter, model, recording, lag=...)` does the same with each row's estimate in its own place.
     """
@@ -92,7 +92,7 @@ def first_of(filter: Any, model: StateSpace, past: Any, real: Any) -> tuple[Any,
     A belief that is not `real` (L,) is passed over: it is a copy of the one after it.
     """
     if kit.smoothing_of(filter) is Smoothing.particles:
-        return _traced(model, past, real)
+        return _trace_ancestors(model, past, real)
     last = jax.tree.map(lambda leaf: leaf[-1], past)
     before = jax.tree.map(lambda leaf: leaf[:-1], past)
     after = past.t[1:], jax.tree.map(lambda leaf: leaf[1:], past.u)
@@ -106,7 +106,7 @@ def first_of(filter: Any, model: StateSpace, past: Any, real: Any) -> tuple[Any,
     return first.moments(model)
 
 
-def _traced(model: StateSpace, past: ParticleBelief, real: Any) -> tuple[Any, Any]:
+def _trace_ancestors(model: StateSpace, past: ParticleBelief, real: Any) -> tuple[Any, Any]:
     """The same by the ancestors of the last particles."""
     weights = past.weights[-1]
     lines = jnp.arange(weights.shape[0], dtype=past.ancestors.dtype)

@@ -12,7 +12,7 @@ from jaxveh._core.recording import Recording
 from jaxveh._core.result import first_failure
 from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.gaussian.belief import GaussianBelief
-from jaxveh.filters.gaussian.parallel import infos_of, pass_over
+from jaxveh.filters.gaussian.parallel import info_of, pass_over
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.statespace import Estimate, Row, Smoothing, StateSpace, kit, parameters_of
 
@@ -65,16 +65,16 @@ def _smooth(filter, model, rows: Row) -> SmoothedEstimate:
     # The last pass is below.
     path, _ = jax.lax.scan(jax.checkpoint(again), path, length=max(filter.linearisations - 1, 0))
     passed = pass_over(rule, model, rows, *path)
-    infos = infos_of(model, rows, passed)
+    info = info_of(model, rows, passed)
     beliefs = lambda gaussians: jax.vmap(lambda row, m, P: _belief(model, rule, row, m, P))(rows, *gaussians)
     filtered, smoothed = beliefs(passed.filtered), beliefs(passed.smoothed)
     moments = jax.vmap(lambda belief: belief.moments(model))
     mean, std = moments(filtered)
-    result, failed_at = first_failure(infos.result)
+    result, failed_at = first_failure(info.result)
     show = lambda report: parameters_of(model, report)
     last = jax.tree.map(lambda leaf: leaf[-1], filtered)
-    total = jnp.sum(infos.log_likelihood)
-    estimate = Estimate(rows.t, mean, std, total, infos, result, failed_at, last, show(mean), show(std))
+    total = jnp.sum(info.log_likelihood)
+    estimate = Estimate(rows.t, mean, std, total, info, result, failed_at, last, show(mean), show(std))
     return smoothed_estimate(model, estimate, moments(smoothed))
 
 

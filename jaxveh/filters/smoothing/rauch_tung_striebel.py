@@ -41,7 +41,7 @@ def given_later(
 
     Of a wrapped filter with the process noise that it held for true then.
     """
-    own, gaussian = filter.adapted(model, belief), gaussian_of(belief)
+    own, gaussian = filter.adapted_model(model, belief), gaussian_of(belief)
     image = transition_image(own, gaussian, t, u)
     law = None if own.process_noise is None else own.process_noise.over(t - gaussian.t)
     known = Later(later.vector - image.mean, Spread(later.factor, later.matrix))

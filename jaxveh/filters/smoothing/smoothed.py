@@ -15,7 +15,7 @@ class SmoothedEstimate(eqx.Module):
     """Each row's quantities given all rows, or those up to a lag behind it.
 
     `time` (T,); `mean`, `std`: NamedTuples of the model's report with (T,) in each field; `parameters`, `parameters_std` as in
-    `Estimate`; `filtered`: the filter's `Estimate`, with log-likelihood, infos and result. `trajectories`: draws of whole
+    `Estimate`; `filtered`: the filter's `Estimate`, with log-likelihood, info and result. `trajectories`: draws of whole
     paths, the state's NamedTuple with (T, M) in each field, and their `weights` (M,) (particle smoothers, else None).
     """
 

@@ -27,8 +27,8 @@ class AbstractStateless(AbstractGaussianWrapper):
     def observe(self, model, belief, row):
         return self.inner.observe(model, belief, row)
 
-    def adapted(self, model, belief):
-        return self.inner.adapted(model, belief)
+    def adapted_model(self, model, belief):
+        return self.inner.adapted_model(model, belief)
 
 
 class Remembering(AbstractBelief):
@@ -67,9 +67,9 @@ class Remembering(AbstractBelief):
         """Rows so far."""
         return self.inside.count
 
-    def inflated(self, factor):
+    def inflate(self, factor):
         """The belief with `factor` times its covariance."""
-        return Remembering(self.inside.inflated(factor), self.memory)
+        return Remembering(self.inside.inflate(factor), self.memory)
 
     def moments(self, model):
         return self.inside.moments(model)
@@ -83,26 +83,26 @@ class AbstractRemembering(AbstractGaussianWrapper):
         """The memory before the first row."""
 
     @abc.abstractmethod
-    def believed(self, model: StateSpace, memory: Any) -> StateSpace:
+    def believed_model(self, model: StateSpace, memory: Any) -> StateSpace:
         """The model with the noises that the memory says."""
 
     def prior(self, model, row):
         memory = self.start(model)
-        return Remembering(self.inner.prior(self.believed(model, memory), row), memory)
+        return Remembering(self.inner.prior(self.believed_model(model, memory), row), memory)
 
     def predict_between(self, model, belief, t, u_next):
-        own = self.believed(model, belief.memory)
+        own = self.believed_model(model, belief.memory)
         return Remembering(self.inner.predict_between(own, belief.inside, t, u_next), belief.memory)
 
     def observe(self, model, belief, row):
-        return self.inner.observe(self.believed(model, belief.memory), belief.inside, row)
+        return self.inner.observe(self.believed_model(model, belief.memory), belief.inside, row)
 
-    def adapted(self, model, belief):
-        return self.inner.adapted(self.believed(model, belief.memory), belief.inside)
+    def adapted_model(self, model, belief):
+        return self.inner.adapted_model(self.believed_model(model, belief.memory), belief.inside)
 
     def update_inside(self, model: StateSpace, belief: Remembering, row: Row) -> tuple[Remembering, Info]:
         """The filter's own update with the noises that the memory says."""
-        after, info = self.inner.update(self.believed(model, belief.memory), belief.inside, row)
+        after, info = self.inner.update(self.believed_model(model, belief.memory), belief.inside, row)
         return Remembering(after, belief.memory), info
 
 

@@ -65,27 +65,27 @@ class Contaminated(AbstractStateless):
         variances = jnp.where(wild, jnp.square(factor), 1) * own
         before = jnp.sum(jnp.where(wild, jnp.log(share), jnp.log1p(-share)), axis=-1)
         case = lambda values: _by_case(*self.inner.update(with_variances(model, values), belief, row))
-        vectors, covariances, infos = jax.vmap(case)(variances)
-        logs = before + infos.log_likelihood
+        vectors, covariances, every_info = jax.vmap(case)(variances)
+        logs = before + every_info.log_likelihood
         weights = jax.nn.softmax(logs)
         mean, covariance = mixed_covariance(weights, vectors, covariances)
         after = with_spread(belief, mean, self.inner.form.start(covariance), t=row.t, u=row.u, count=belief.count + 1)
-        return after, _info(infos, jnp.exp(before), jax.nn.logsumexp(logs))
+        return after, _info(every_info, jnp.exp(before), jax.nn.logsumexp(logs))
 
 
 def _by_case(after: GaussianBelief, info: Info) -> tuple[Any, Any, Info]:
     return after.vector, after.covariance, info
 
 
-def _info(infos: Info, probabilities: Any, log_likelihood: Any) -> Info:
+def _info(every_info: Info, probabilities: Any, log_likelihood: Any) -> Info:
     """One info of those of every case, whose innovation is the same; `probabilities` (r,) of cases before the row is seen."""
     spread = lambda std: jnp.sqrt(jnp.sum(probabilities * jnp.square(std)))
     nothing = jnp.full_like(log_likelihood, jnp.nan)
     return Info(
         log_likelihood=log_likelihood,
-        innovation=jax.tree.map(lambda each: each[0], infos.innovation),
-        innovation_std=jax.tree.map(spread, infos.innovation_std),
+        innovation=jax.tree.map(lambda each: each[0], every_info.innovation),
+        innovation_std=jax.tree.map(spread, every_info.innovation_std),
         nis=nothing,
         ess=nothing,
-        result=first_failure(infos.result)[0],
+        result=first_failure(every_info.result)[0],
     )

@@ -86,7 +86,7 @@ class Federated(AbstractWrapper):
     variances. `isolate`: what locals measure whose fading mean NIS exceeds this multiple of its expected value is left out of
     the fusion until it falls again (None: never); it is still watched.
 
-    Groups that share a channel count its information twice: `InputError`, unless `overlapping`. Infos are those of the fused
+    Groups that share a channel count its information twice: `InputError`, unless `overlapping`. The info is that of the fused
     prediction with all sensors.
     """
 
@@ -106,7 +106,9 @@ class Federated(AbstractWrapper):
     def __check_init__(self):
         check_kind("Federated", self.inner, AbstractRuleFilter)
         if len(self.groups) < 2:
-            raise InputError(f"Federated.groups: {len(self.groups)}; must be at least two tuples of channels.")
+            raise InputError(
+                f"Federated.groups has {len(self.groups)} member(s): must be at least two tuples of channels."
+            )
         names = [name for group in self.groups for name in group]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice and not self.overlapping:
@@ -116,7 +118,9 @@ class Federated(AbstractWrapper):
             )
         if self.shares is not None:
             if len(self.shares) != len(self.groups):
-                raise InputError(f"Federated.shares: {len(self.shares)} for {len(self.groups)} groups.")
+                raise InputError(
+                    f"Federated.shares has {len(self.shares)} member(s): must be {len(self.groups)}, one for each group."
+                )
             fine = abs(sum(self.shares) - 1) < 1e-9 and min(self.shares) > 0
             check("Federated.shares", self.shares, lambda _: fine, "positive, with the sum 1")
         if self.common and (not self.reset or self.shares is not None or self.by_trace):
@@ -138,33 +142,33 @@ class Federated(AbstractWrapper):
         shares = self.shares or (1 / k,) * k
         shares = jnp.asarray(shares, prior.vector.dtype)
         start = FederatedBelief(prior, (prior,) * k, shares, jnp.ones_like(shares))
-        return self._measured(model, start, prior, self._handed_out(prior, shares), row)
+        return self._update_locals(model, start, prior, self._hand_out(prior, shares), row)
 
     def _step(self, model, belief, row):
         if self.common:
             predicted = self.inner.predict_between(model, belief.master, row.t, row.u)
-            return self._measured(model, belief, predicted, self._handed_out(predicted, belief.shares), row)
+            return self._update_locals(model, belief, predicted, self._hand_out(predicted, belief.shares), row)
         # All locals by one program: they differ in numbers alone.
-        before = self._handed_out(belief.master, belief.shares) if self.reset else _together(belief.locals)
+        before = self._hand_out(belief.master, belief.shares) if self.reset else _together(belief.locals)
 
         def ahead(local, share):
             return self.inner.predict_between(_with_process_noise_over(model, share), local, row.t, row.u)
 
         alone = jax.vmap(ahead)(before, belief.shares)
-        return self._measured(model, belief, self._fused(alone, belief.master), alone, row)
+        return self._update_locals(model, belief, self._fuse(alone, belief.master), alone, row)
 
-    def _handed_out(self, master: GaussianBelief, shares) -> GaussianBelief:
+    def _hand_out(self, master: GaussianBelief, shares) -> GaussianBelief:
         """The locals, one behind the other along the first axis of each array."""
-        return jax.vmap(lambda share: master.inflated(1.0 if self.common else 1.0 / share))(shares)
+        return jax.vmap(lambda share: master.inflate(1.0 if self.common else 1.0 / share))(shares)
 
-    def _measured(self, model, belief: FederatedBelief, predicted: GaussianBelief, ahead: GaussianBelief, row):
+    def _update_locals(self, model, belief: FederatedBelief, predicted: GaussianBelief, ahead: GaussianBelief, row):
         rows = _together([_only(model, row, group).y for group in self.groups])
         own = lambda local, y: self.inner.update(model, local, row._replace(y=y))
         found, _ = jax.vmap(own)(ahead, rows)
         # A local's own prediction is wide, and seldom surprised: sensors are judged by the fused one.
         every = jax.tree.map(lambda one, some: jnp.concatenate([one[None], some]), row.y, rows)
-        infos = jax.vmap(lambda y: own(predicted, y)[1])(every)
-        info, surprise = jax.tree.map(lambda leaf: leaf[0], infos), infos.nis[1:]
+        every_info = jax.vmap(lambda y: own(predicted, y)[1])(every)
+        info, surprise = jax.tree.map(lambda leaf: leaf[0], every_info), every_info.nis[1:]
         counts = jnp.stack([_count(row, group) for group in self.groups])
         ratio = surprise / jnp.maximum(counts, 1.0)
         alarm = jnp.where(counts > 0, self.forgetting * belief.alarm + (1.0 - self.forgetting) * ratio, belief.alarm)
@@ -172,7 +176,7 @@ class Federated(AbstractWrapper):
         # Where every local is suspect there is nothing to judge by.
         trusted = trusted | ~jnp.any(trusted)
         believed = jax.vmap(_either)(trusted, found, ahead)
-        master = self._fused(believed, belief.master, predicted if self.common else None)
+        master = self._fuse(believed, belief.master, predicted if self.common else None)
         master = with_spread(
             master, master.vector, Spread(master.factor, master.matrix), row.t, row.u, belief.count + 1
         )
@@ -189,7 +193,7 @@ class Federated(AbstractWrapper):
         traces = jnp.stack([jnp.sum(local.variances / scale) for local in locals_])
         return (1.0 / traces) / jnp.sum(1.0 / traces)
 
-    def _fused(
+    def _fuse(
         self, beliefs: GaussianBelief, like: GaussianBelief, common: GaussianBelief | None = None
     ) -> GaussianBelief:
         """The Gaussian of all beliefs' information, with the time and inputs of `like`; what is `common` to all counts once."""
@@ -243,7 +247,7 @@ class _Shared(AbstractProcessNoise):
         return self.whole.law
 
     def over(self, dt):
-        return self.whole.over(dt).scaled(1.0 / jnp.sqrt(self.share))
+        return self.whole.over(dt).times(1.0 / jnp.sqrt(self.share))
 
 
 def _with_process_noise_over(model: StateSpace, share) -> StateSpace:

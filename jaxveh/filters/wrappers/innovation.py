@@ -28,7 +28,7 @@ def innovation(filter: AbstractGaussianFilter, model: StateSpace, belief: Any, r
     measured, present = kit.presence(model, row)
     here = jnp.stack([present[name] for name in model.channels])
     error = jnp.stack([measured[name] for name in model.channels]) - image.mean
-    own = filter.adapted(model, belief)
+    own = filter.adapted_model(model, belief)
     law = law_at(own, row, lambda: belief.mean)
     noise = jnp.diagonal(covariance_in(law, model.channels, error.dtype))
     return Innovation(wrapped_innovation(model, error, here), spread_of(image), noise, here)

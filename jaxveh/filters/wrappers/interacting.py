@@ -43,12 +43,12 @@ class MixtureBelief(AbstractBelief):
     @property
     def mean(self):
         """The mixture's mean, the state's NamedTuple."""
-        return _mixed(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[0]
+        return _mixture_moments(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[0]
 
     @property
     def std(self):
         """The mixture's standard deviations, the state's NamedTuple."""
-        return _mixed(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[1]
+        return _mixture_moments(self.probabilities, [(mode.mean, mode.std) for mode in self.modes])[1]
 
     @property
     def covariance(self):
@@ -64,7 +64,7 @@ class MixtureBelief(AbstractBelief):
 
     def moments(self, model):
         # A mode's own model reports its state: what differs are parameters, and the report is of states.
-        return _mixed(self.probabilities, [mode.moments(model) for mode in self.modes])
+        return _mixture_moments(self.probabilities, [mode.moments(model) for mode in self.modes])
 
 
 class InteractingModels(AbstractWrapper):
@@ -91,7 +91,7 @@ class InteractingModels(AbstractWrapper):
         check_kind("InteractingModels", self.inner, AbstractRuleFilter)
         r = len(self.variants)
         if r < 2:
-            raise InputError(f"InteractingModels.variants: {r}; must be at least two.")
+            raise InputError(f"InteractingModels.variants has {r} member(s): must be at least two.")
         for name, value, shape in (("transition", self.transition, (r, r)), ("start", self.start, (r,))):
             if value is not None and value.shape != shape:
                 raise InputError(f"InteractingModels.{name} has shape {value.shape}: must be {shape} for {r} variants.")
@@ -109,7 +109,7 @@ class InteractingModels(AbstractWrapper):
         r, dtype = len(self.variants), row.t.dtype
         before = jnp.full((r,), 1 / r, dtype) if self.start is None else self.start.astype(dtype)
         found = [self.inner.update(mode, self.inner.prior(mode, row), row) for mode in self._modes(model)]
-        return self._weighed(model, row, before, found)
+        return self._weigh(model, row, before, found)
 
     def _step(self, model, belief, row):
         joint = self.transition.astype(row.t.dtype) * belief.probabilities[:, None]
@@ -121,7 +121,7 @@ class InteractingModels(AbstractWrapper):
         for j, mode in enumerate(self._modes(model)):
             mixed = self._mix(belief, from_each[:, j], j)
             found.append(self.inner.update(mode, self.inner.predict_between(mode, mixed, row.t, row.u), row))
-        return self._weighed(model, row, ahead, found)
+        return self._weigh(model, row, ahead, found)
 
     def _modes(self, model):
         return [variant(model) for variant in self.variants]
@@ -131,14 +131,14 @@ class InteractingModels(AbstractWrapper):
         mean, covariance = _of_modes(weights, belief.modes)
         return with_spread(belief.modes[j], mean, self.inner.form.start(covariance))
 
-    def _weighed(self, model, row, before, found):
-        beliefs, infos = zip(*found, strict=True)
-        logs = jnp.stack([info.log_likelihood for info in infos])
+    def _weigh(self, model, row, before, found):
+        beliefs, every_info = zip(*found, strict=True)
+        logs = jnp.stack([info.log_likelihood for info in every_info])
         logs = jnp.where(before > 0, logs, -jnp.inf)
         top = jnp.max(logs)
         weights = before * jnp.exp(logs - top)
         total = jnp.sum(weights)
-        info = _mixture_info(model, row, before, infos, top + jnp.log(total))
+        info = _mixture_info(model, row, before, every_info, top + jnp.log(total))
         return MixtureBelief(tuple(beliefs), weights / total), info
 
 
@@ -156,7 +156,7 @@ def _of_modes(weights, modes):
     return mixed_covariance(weights, stacked(mode.vector for mode in modes), stacked(mode.covariance for mode in modes))
 
 
-def _mixed(weights, moments):
+def _mixture_moments(weights, moments):
     """Mean and standard deviation, NamedTuples, of a mixture of such pairs."""
     means, stds = zip(*moments, strict=True)
     mean = jax.tree.map(lambda *values: sum(w * v for w, v in zip(weights, values, strict=True)), *means)
@@ -169,9 +169,9 @@ def _mixed(weights, moments):
     return mean, jax.tree.map(spread, mean, *means, *stds)
 
 
-def _mixture_info(model, row, weights, infos, log_likelihood) -> Info:
+def _mixture_info(model, row, weights, every_info, log_likelihood) -> Info:
     _, present = kit.presence(model, row)
-    mean, std = _mixed(weights, [(info.innovation, info.innovation_std) for info in infos])
+    mean, std = _mixture_moments(weights, [(info.innovation, info.innovation_std) for info in every_info])
     nothing = jnp.full_like(log_likelihood, jnp.nan)
     return Info(
         log_likelihood=log_likelihood,
@@ -179,5 +179,5 @@ def _mixture_info(model, row, weights, infos, log_likelihood) -> Info:
         innovation_std=kit.by_channel(model, std, present),
         nis=nothing,
         ess=nothing,
-        result=first_failure(jnp.where(weights > 0, jnp.stack([info.result for info in infos]), 0))[0],
+        result=first_failure(jnp.where(weights > 0, jnp.stack([info.result for info in every_info]), 0))[0],
     )

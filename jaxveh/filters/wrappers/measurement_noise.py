@@ -53,11 +53,11 @@ class SageHusa(AbstractRemembering):
         # The model's own variances count as one row.
         return variances, jnp.ones_like(variances)
 
-    def believed(self, model, memory):
+    def believed_model(self, model, memory):
         return with_variances(model, memory[0])
 
     def update(self, model, belief, row):
-        found = innovation(self.inner, self.believed(model, belief.memory), belief.inside, row)
+        found = innovation(self.inner, self.believed_model(model, belief.memory), belief.inside, row)
         after, info = self.update_inside(model, belief, row)
         variances, rows = belief.memory
         share = (1.0 - self.forgetting) / (1.0 - self.forgetting ** (rows + 1.0))
@@ -109,7 +109,7 @@ class VariationalBayes(AbstractRemembering):
         shape = jnp.full_like(variances, 0.5 * self.weight)
         return Precisions(shape, shape * variances)
 
-    def believed(self, model, memory):
+    def believed_model(self, model, memory):
         return with_variances(model, memory.scale / memory.shape)
 
     def update(self, model, belief, row):
@@ -118,7 +118,7 @@ class VariationalBayes(AbstractRemembering):
         shape = jnp.where(here, before.shape + 0.5, before.shape)
 
         def again(scale, _):
-            own = self.believed(model, Precisions(shape, scale))
+            own = self.believed_model(model, Precisions(shape, scale))
             after, _ = self.inner.update(own, belief.inside, row)
             expected = expected_squares(self.inner, model, after, row)
             return jnp.where(here, before.scale + 0.5 * expected, scale), None

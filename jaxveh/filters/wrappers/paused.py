@@ -24,7 +24,7 @@ class Paused(AbstractWrapper):
     The channel holds from its row to the next, whatever the model's `input_path`: the time before a pause's first row is still
     predicted, that before the first row after it is not. Meanwhile the state, and what a wrapped filter remembers, stay. In the
     first row after a pause the spread grows by `widen`, standard deviations by state: what may have happened (`{"v_x": 20.0}`:
-    whatever it was, the next measurement says it anew). Infos of rows in a pause have a log-likelihood of zero and no
+    whatever it was, the next measurement says it anew). The info of a row in a pause has a log-likelihood of zero and no
     innovation.
     """
 
@@ -56,7 +56,7 @@ class Paused(AbstractWrapper):
     def _step(self, model, belief, row):
         waits, waited = self._waits(row.u), self._waits(belief.u)
         ahead = self.inner.predict_between(model, belief, row.t, row.u)
-        here = _choose(waits, belief, self._widened(model, belief))
+        here = _choose(waits, belief, self._widen(model, belief))
         start = _choose(waited, _at(here, t=row.t), ahead)
         after, info = self.inner.update(model, start, self._silent(model, row))
         return _choose(waits, _after(start, row), after), info
@@ -68,7 +68,7 @@ class Paused(AbstractWrapper):
         """The row, without measurements while paused."""
         return row._replace(y=jax.tree.map(lambda value: jnp.where(self._waits(row.u), jnp.nan, value), row.y))
 
-    def _widened(self, model: StateSpace, belief: Any) -> Any:
+    def _widen(self, model: StateSpace, belief: Any) -> Any:
         extra, gaussian = dict(self.widen), gaussian_of(belief)
         added = jnp.diag(jnp.asarray([extra.get(name, 0.0) ** 2 for name in model.states], gaussian.vector.dtype))
         spread = kit.innermost(self.inner).form.start(gaussian.covariance + added)

@@ -50,7 +50,7 @@ class ShrinkingProcess(AbstractRemembering):
     def start(self, model):
         return jnp.asarray([std**2 for _, std in self.extra], model.prior.mean[0].dtype)
 
-    def believed(self, model, memory):
+    def believed_model(self, model, memory):
         return with_extra(model, {name: memory[i] for i, (name, _) in enumerate(self.extra)})
 
     def update(self, model, belief, row):
@@ -94,7 +94,7 @@ class MatchedProcess(AbstractRemembering):
         # How far the corrections are above the model's own variances, and these over the last step.
         return nothing, nothing
 
-    def believed(self, model, memory):
+    def believed_model(self, model, memory):
         extra = jnp.clip(memory[0], 0.0, self._most(memory[0].dtype))
         return with_extra(model, {name: extra[i] for i, (name, _) in enumerate(self.most)})
 

@@ -43,7 +43,7 @@ class StrongTracking(AbstractRemembering):
         # V over the noise; negative before a channel's first row.
         return jnp.full(len(model.channels), -1.0, dtype)
 
-    def believed(self, model, memory):
+    def believed_model(self, model, memory):
         return model
 
     def update(self, model, belief, row):
@@ -57,5 +57,5 @@ class StrongTracking(AbstractRemembering):
         some = expected > 0
         factor = jnp.where(some, jnp.sum(excess) / jnp.where(some, expected, 1.0), 1.0)
         factor = jnp.clip(factor, 1.0, self.ceiling)
-        after, info = self.inner.update(model, belief.inside.inflated(factor), row)
+        after, info = self.inner.update(model, belief.inside.inflate(factor), row)
         return Remembering(after, squares), info

@@ -73,13 +73,13 @@ class VaryingNoise(AbstractWrapper):
         self.inner.check(model)
 
     def _init(self, model, row, key):
-        return self.inner._init(self._told(model, row.u, row.u), row, key)
+        return self.inner._init(self._with_noise_of(model, row.u, row.u), row, key)
 
     def _step(self, model, belief, row):
         moved = row.u if self.process_of == "after" else belief.u
-        return self.inner._step(self._told(model, row.u, moved), belief, row)
+        return self.inner._step(self._with_noise_of(model, row.u, moved), belief, row)
 
-    def _told(self, model: StateSpace, now: Any, moved: Any) -> StateSpace:
+    def _with_noise_of(self, model: StateSpace, now: Any, moved: Any) -> StateSpace:
         """The model with what the inputs `now` say of the measurement, and those `moved` of the process."""
         if self.measurement:
             law = _with(model.measurement_noise, self.measurement, now)

@@ -70,7 +70,7 @@ class HaarNoise(AbstractRemembering):
     def start(self, model):
         return first_window(self, variances_of(model))
 
-    def believed(self, model, memory):
+    def believed_model(self, model, memory):
         return with_variances(model, memory.variances)
 
     def update(self, model, belief, row):
@@ -120,15 +120,15 @@ class HaarParticles(AbstractWrapper):
     def _init(self, model, row, key):
         own = variances_of(model)
         memory = window_after(self, own, first_window(self, own), row_values(model, row))
-        inside, info = self.inner._init(self._told(model, memory), row, key)
+        inside, info = self.inner._init(self._with_memory(model, memory), row, key)
         return Remembering(inside, memory), info
 
     def _step(self, model, belief, row):
         memory = window_after(self, variances_of(model), belief.memory, row_values(model, row))
-        inside, info = self.inner._step(self._told(model, memory), belief.inside, row)
+        inside, info = self.inner._step(self._with_memory(model, memory), belief.inside, row)
         return Remembering(inside, memory), info
 
-    def _told(self, model, memory: Window):
+    def _with_memory(self, model, memory: Window):
         told = with_variances(model, memory.variances)
         if self.follows == "both" and isinstance(model.measurement_noise, CauchyGaussianMixture):
             factors = jnp.sqrt(memory.variances / variances_of(model))

@@ -24,7 +24,7 @@ def factor():
     return coefficient(1.0)
 
 
-def bent(x, E):
+def bend(x, E):
     """`x - E (x - arctan x)`: the argument of both curves."""
     return x - E * (x - numerics.arctan(x))
 
@@ -32,13 +32,13 @@ def bent(x, E):
 def sine_curve(x, B, C, D, E):
     """`D sin(C arctan(B x - E (B x - arctan(B x))))`: forces."""
     x, B, C, D, E = numerics.stored((x, B, C, D, E))
-    return D * numerics.sin(C * numerics.arctan(bent(B * x, E)))
+    return D * numerics.sin(C * numerics.arctan(bend(B * x, E)))
 
 
 def cosine_curve(x, B, C, E):
     """`cos(C arctan(B x - E (B x - arctan(B x))))`: trail, and weights of combined slip."""
     x, B, C, E = numerics.stored((x, B, C, E))
-    return numerics.cos(C * numerics.arctan(bent(B * x, E)))
+    return numerics.cos(C * numerics.arctan(bend(B * x, E)))
 
 
 def weight(x, shift, B, C, E):

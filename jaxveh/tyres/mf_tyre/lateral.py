@@ -135,7 +135,7 @@ class LateralCoefficients(eqx.Module):
         E = curvature(c.REY1 + c.REY2 * at.df_z, at)
         return weight(at.slip_ratio, c.RHY1 + c.RHY2 * at.df_z, B, c.RCY1, E)
 
-    def added(self, at, scaling, mu_y):
+    def ply_steer(self, at, scaling, mu_y):
         """S_Vyk: the lateral force that slip ratio adds ("ply-steer"), N."""
         c = self
         D = mu_y * at.load * (c.RVY1 + c.RVY2 * at.df_z + c.RVY3 * at.sine) * cosine_of_arctan(c.RVY4 * at.tangent)

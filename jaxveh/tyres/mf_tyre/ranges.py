@@ -35,7 +35,7 @@ class Ranges(eqx.Module):
     def __check_init__(self):
         check_parameters(self)
 
-    def fading(self, slip_angle, speed):
+    def fading_factors(self, slip_angle, speed):
         """Factors of slip ratio and slip angle, and the smooth one of shifts, that fade below `VXLOW`."""
         fades = self.VXLOW > 0
         lowest = jnp.where(fades, self.VXLOW, 1.0)

@@ -108,20 +108,20 @@ class Structure(eqx.Module):
         return jnp.maximum(x * self.UNLOADED_RADIUS, 0.0)
 
     def loaded_radius(self, load, camber, wheel: Wheel, dp_i, F_x, F_y):
-        """Loaded radius and vertical deflection of version 6.2, m: the radius at which `carried` is the load."""
+        """Loaded radius and vertical deflection of version 6.2, m: the radius at which `carried_load` is the load."""
         like = wheel.speed * 0 + load * 0 + F_x * 0 + F_y * 0 + camber * 0
         first = self.UNLOADED_RADIUS + like
 
         def missing(radius, given):
             structure, load, *rest = given
-            return structure.carried(radius, *rest)[0] - load
+            return structure.carried_load(radius, *rest)[0] - load
 
         rest = (camber, wheel, dp_i, F_x, F_y)
         # Guesses and tolerance are those of the reference evaluator, whose stop within 1e-6 of the nominal load shows.
         radius = numerics.secant(missing, (self, load + like, *rest), 0.95 * first, first, 1e-6 * self.FNOMIN)
-        return radius, self.carried(radius, *rest)[1]
+        return radius, self.carried_load(radius, *rest)[1]
 
-    def carried(self, radius, camber, wheel: Wheel, dp_i, F_x, F_y):
+    def carried_load(self, radius, camber, wheel: Wheel, dp_i, F_x, F_y):
         """Load at a loaded radius in version 6.2, N, and the deflection, m (MF-Tyre/MF-Swift 6.2 equation manual, 2013)."""
         s = self
         free = wheel.free_radius

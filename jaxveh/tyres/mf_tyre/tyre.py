@@ -103,12 +103,12 @@ class MFTyre(AbstractTyre):
         """Forces, moments and internals at a contact."""
         if contact.load is None:
             raise InputError("contact.load = None: MFTyre scales with load; give the wheel's load in N.")
-        at, s, load = numerics.stored(self._operating(contact)), self.scaling, need_load(contact, "MFTyre")
+        at, s, load = numerics.stored(self._operating_point(contact)), self.scaling, need_load(contact, "MFTyre")
         nominal = s.LFZO * self.structure.FNOMIN
         along = numerics.stored(self.longitudinal.pure(at, s))
         across = numerics.stored(self.lateral.pure(at, s, nominal, self.version))
         weight_y = numerics.stored(self.lateral.weight(at, s))
-        added = self.lateral.added(at, s, across.mu)
+        added = self.lateral.ply_steer(at, s, across.mu)
         F_x = numerics.stored(self.longitudinal.weight(at, s) * along.force)
         F_y = numerics.stored(weight_y * across.force + added)
         if self.version == 52:
@@ -131,7 +131,7 @@ class MFTyre(AbstractTyre):
         mu_y = jnp.abs(across.mu) if self.limits else across.mu
         return jnp.where(at.load > 0, along.mu, 0.0), jnp.where(at.load > 0, mu_y, 0.0)
 
-    def _operating(self, contact: Contact) -> Operating:
+    def _operating_point(self, contact: Contact) -> Operating:
         """The contact within the ranges, in the signs of ISO-W."""
         structure, r = self.structure, self.ranges
         load = need_load(contact, "MFTyre")
@@ -139,7 +139,7 @@ class MFTyre(AbstractTyre):
         pressure = structure.INFLPRES if contact.pressure is None else contact.pressure
         kappa, alpha, camber, smooth = contact.slip_ratio, -contact.slip_angle, contact.camber, jnp.ones_like(speed)
         if self.limits:
-            fading = r.fading(alpha, speed)
+            fading = r.fading_factors(alpha, speed)
             if contact.slip_speed is None:
                 along, across, smooth = numerics.stored(fading)
                 kappa, alpha = kappa * along, alpha * across
@@ -174,7 +174,7 @@ class MFTyre(AbstractTyre):
         """Turn slip: it fades with the slip ratio, and turns with the wheel's course."""
         phi_t = contact.turn_slip
         if self.limits:
-            phi_t = phi_t * numerics.cos(contact.slip_angle) * self.ranges.fading(at.slip_angle, at.speed)[0]
+            phi_t = phi_t * numerics.cos(contact.slip_angle) * self.ranges.fading_factors(at.slip_angle, at.speed)[0]
         wheel = self.structure.wheel(need_load(contact, "MFTyre"), contact.slip_ratio, at.speed, at.dp_i)
         assert self.turn_slip is not None
         return self.turn_slip.spin(at, phi_t, wheel.speed, self.structure.UNLOADED_RADIUS, self.ranges.VXLOW)

@@ -24,7 +24,7 @@ from jaxveh.vehicles.fourteen_dof.suspension import (
     wheel_at,
 )
 from jaxveh.vehicles.fourteen_dof.tyre_contact import ROLLING_SHARE, Touch, axles, reaction, touch
-from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, scaled
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, times
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import (
     Wheels,
@@ -56,13 +56,13 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
       centre, meets the road.
       It rolls with the unloaded radius less a third of the compression, which is also the arm of its longitudinal force
       about the axle: with the smaller loaded radius tyres would make energy. M_x, M_y, M_z of the tyre count; that of
-      rolling resistance turns round with the direction of travel, and `rolling_resistance` comes on top.
+      rolling resistance reverses its sign with the direction of travel, and `rolling_resistance` comes on top.
     - The road is the plane of x and y; slopes tilt gravity. The air's drag acts on the sprung mass' centre of gravity.
 
     Speeds, place and accelerations are those of the *sprung mass'* centre of gravity, in the intermediate axes (x, y in the
     road's plane); `a_x`, `a_y`, `a_z` are what an ideal accelerometer there says in these axes (a_z = g at rest). Springs
     are preloaded for rest on a level road, where `start` puts the car. Slips are those of `wheels.contact`; brakes and
-    rolling resistance turn round smoothly about 0.5 m/s. Wheel hop (about 10 Hz) and spins (see `SevenDOF`) are stiff.
+    rolling resistance change sign smoothly about 0.5 m/s. Wheel hop (about 10 Hz) and spins (see `SevenDOF`) are stiff.
 
     Equations: d'Alembert's principle, see `dynamics.accelerations`. The degrees of freedom are those of T. Shim and C. Ghike,
     Vehicle System Dynamics 45 (2007) 191, with joints inclined for the roll centres and nothing linearised.
@@ -189,11 +189,11 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         """Gravity, drag and the reactions of torques on the body; gravity and the road on the wheels."""
         axes = stand.body.axes
         g = to_body(axes, g)
-        force = add(scaled(self.sprung_mass, g), scaled(-air_drag(self.drag, x.v_x), axes.forward))
+        force = add(times(self.sprung_mass, g), times(-air_drag(self.drag, x.v_x), axes.forward))
         moments = each_wheel(
-            lambda road, shaft, axis: minus(road.moment, scaled(shaft.torque, axis)), roads, shafts, stand.axles
+            lambda road, shaft, axis: minus(road.moment, times(shaft.torque, axis)), roads, shafts, stand.axles
         )
-        momentum = each_wheel(lambda omega, axis: scaled(self.wheel_inertia * omega, axis), omegas, stand.axles)
+        momentum = each_wheel(lambda omega, axis: times(self.wheel_inertia * omega, axis), omegas, stand.axles)
         return accelerations(
             Inertia(self.sprung_mass, self.roll_inertia, self.pitch_inertia, self.yaw_inertia, self.roll_yaw_product),
             joints(self),
@@ -202,7 +202,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
             add(*momentum),
             force,
             add(*moments),
-            each_wheel(lambda road, mass: add(road.force, scaled(mass, g)), roads, unsprung(self)),
+            each_wheel(lambda road, mass: add(road.force, times(mass, g)), roads, unsprung(self)),
             suspension,
         )
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from jaxveh.numerics import solve_scalars, stored
 from jaxveh.vehicles.fourteen_dof.suspension import Joint, Wheel
-from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, times
 from jaxveh.vehicles.wheels import Wheels, each_wheel, sum_of_wheels
 
 
@@ -51,7 +51,7 @@ def accelerations(
     and leaves for the body a symmetric system in (a, alpha), in which each wheel has the inertia of a point mass across its
     joint: m_u (J^T J - q q^T / |d|^2) with J = (1, -[r]x).
     """
-    on_wheel = each_wheel(lambda joint, wheel, F: minus(F, scaled(joint.mass, wheel.bias)), joints, wheels, on_wheels)
+    on_wheel = each_wheel(lambda joint, wheel, F: minus(F, times(joint.mass, wheel.bias)), joints, wheels, on_wheels)
     ways = each_wheel(lambda joint, wheel: (*joint.slope, *cross(wheel.place, joint.slope)), joints, wheels)
     matrix = _matrix(inertia, joints, wheels, ways)
     b = _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension)
@@ -61,7 +61,7 @@ def accelerations(
 
     def travel(joint: Joint, wheel: Wheel, G: Vector, S: Any):
         carried = add(linear, cross(angular, wheel.place))
-        return (dot(joint.slope, minus(G, scaled(joint.mass, carried))) - S) / (joint.mass * joint.square)
+        return (dot(joint.slope, minus(G, times(joint.mass, carried))) - S) / (joint.mass * joint.square)
 
     return Accelerations(linear, angular, each_wheel(travel, joints, wheels, on_wheel, suspension))
 
@@ -69,7 +69,7 @@ def accelerations(
 def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> list:
     """Rows up to the diagonal of the system in (a, alpha): all as one rigid body, less what the joints leave free."""
     m = each_wheel(lambda joint: joint.mass, joints)
-    moment = each_wheel(lambda mass, wheel: scaled(mass, wheel.place), m, wheels)
+    moment = each_wheel(lambda mass, wheel: times(mass, wheel.place), m, wheels)
     s = add(*moment)
     second = lambda a, b: sum_of_wheels(
         each_wheel(lambda f, wheel: getattr(f, a) * getattr(wheel.place, b), moment, wheels)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from jaxveh import numerics
-from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, times
 
 
 class Attitude(NamedTuple):
@@ -38,12 +38,12 @@ def to_road(axes: Attitude, a: Vector) -> Vector:
 
 def to_body(axes: Attitude, a: Vector) -> Vector:
     """A vector of the intermediate axes, in the body's."""
-    return add(scaled(a.x, axes.forward), scaled(a.y, axes.left), scaled(a.z, axes.up))
+    return add(times(a.x, axes.forward), times(a.y, axes.left), times(a.z, axes.up))
 
 
-def turning(axes: Attitude, roll_rate: Any, pitch_rate: Any, yaw_rate: Any) -> Vector:
+def angular_velocity(axes: Attitude, roll_rate: Any, pitch_rate: Any, yaw_rate: Any) -> Vector:
     """The body's angular velocity, rad/s, in its own axes: roll about its x, pitch about `left`, yaw about `up`."""
-    across = add(scaled(pitch_rate, axes.left), scaled(yaw_rate, axes.up))
+    across = add(times(pitch_rate, axes.left), times(yaw_rate, axes.up))
     return across._replace(x=roll_rate + across.x)
 
 
@@ -52,9 +52,9 @@ def angle_accelerations(axes: Attitude, x: Any, omega: Vector, alpha: Vector) ->
 
     `left` turns with the yaw alone and `up` not at all, so that in the body's axes they move with what is left of `omega`.
     """
-    moves_left = cross(minus(scaled(x.yaw_rate, axes.up), omega), axes.left)
+    moves_left = cross(minus(times(x.yaw_rate, axes.up), omega), axes.left)
     moves_up = cross(axes.up, omega)
-    rest = minus(alpha, add(scaled(x.pitch_rate, moves_left), scaled(x.yaw_rate, moves_up)))
+    rest = minus(alpha, add(times(x.pitch_rate, moves_left), times(x.yaw_rate, moves_up)))
     up = axes.up
     yaw = (up.y * rest.y + up.z * rest.z) / (up.y * up.y + up.z * up.z)
     return rest.x - yaw * up.x, dot(axes.left, rest), yaw
@@ -74,4 +74,4 @@ def body_of(x: Any) -> Body:
     """The body's motion out of the car's state."""
     axes = attitude(x.roll, x.pitch)
     velocity = to_body(axes, Vector(x.v_x, x.v_y, x.v_z))
-    return Body(axes, x.z, velocity, turning(axes, x.roll_rate, x.pitch_rate, x.yaw_rate))
+    return Body(axes, x.z, velocity, angular_velocity(axes, x.roll_rate, x.pitch_rate, x.yaw_rate))

@@ -8,7 +8,7 @@ from jaxveh import numerics
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.fourteen_dof.kinematics import Body
 from jaxveh.vehicles.fourteen_dof.parameters import AbstractSuspendedTwoTrack
-from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, scaled
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, times
 from jaxveh.vehicles.wheels import Wheels, each_wheel, front_rear
 
 LEFT = Wheels(1.0, -1.0, 1.0, -1.0)
@@ -81,10 +81,10 @@ def joints(car: AbstractSuspendedTwoTrack) -> Wheels:
 
 def wheel_at(joint: Joint, travel: Any, rate: Any, body: Body) -> Wheel:
     """The wheel's centre at a travel (m, up is positive) and its rate (m/s)."""
-    place = add(joint.place, scaled(travel, joint.slope))
-    along = scaled(rate, joint.slope)
+    place = add(joint.place, times(travel, joint.slope))
+    along = times(rate, joint.slope)
     carried = cross(body.omega, place)
-    bias = cross(body.omega, add(carried, scaled(2.0, along)))
+    bias = cross(body.omega, add(carried, times(2.0, along)))
     return Wheel(place, add(body.velocity, carried, along), bias)
 
 

@@ -11,7 +11,7 @@ from jaxveh.tyres import Contact, Forces
 from jaxveh.vehicles.fourteen_dof.kinematics import Body, to_body, to_road
 from jaxveh.vehicles.fourteen_dof.parameters import AbstractSuspendedTwoTrack
 from jaxveh.vehicles.fourteen_dof.suspension import LEFT, Wheel
-from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, scaled
+from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, times
 from jaxveh.vehicles.wheels import WheelMotion, Wheels, contact, each_wheel, front_rear, travel_direction
 
 ROLLING_SHARE = 1.0 / 3.0
@@ -73,7 +73,7 @@ def touch(
     aside = height * axis.z / flat
     arm = Vector(-sine * aside, cosine * aside, -height)
     # The wheel does not turn with the body about its own axis.
-    held = minus(turns, scaled(dot(turns, axis), axis))
+    held = minus(turns, times(dot(turns, axis), axis))
     at = add(speed, cross(held, arm))
     compression = jnp.maximum(car.wheel_radius - height / flat, 0.0)
     spring = car.tyre_stiffness * compression / flat
@@ -112,10 +112,10 @@ def reaction(
     push = Vector(forces.F_x * c - forces.F_y * s, forces.F_x * s + forces.F_y * c, at.load)
     own = Vector(forces.M_x * c - rolling_moment * s, forces.M_x * s + rolling_moment * c, forces.M_z)
     whole = add(own, cross(how.arm, push))
-    on_body = minus(whole, scaled(dot(whole, axis), axis))
+    on_body = minus(whole, times(dot(whole, axis), axis))
     resisting = car.rolling_resistance * at.load * how.radius * travel_direction(omega * how.radius)
     turning = dot(own, axis) - resisting
-    own_on_body = minus(own, scaled(dot(own, axis), axis))
+    own_on_body = minus(own, times(dot(own, axis), axis))
     taken = (
         forces.F_x * (how.radius * omega - moves.along) - forces.F_y * moves.across
         - dot(own_on_body, how.turns) - turning * omega + how.damped * how.sinks

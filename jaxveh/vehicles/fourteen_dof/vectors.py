@@ -25,7 +25,7 @@ def minus(a: Vector, b: Vector) -> Vector:
     return Vector(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
-def scaled(factor: Any, a: Vector) -> Vector:
+def times(factor: Any, a: Vector) -> Vector:
     """`factor` times a."""
     return Vector(factor * a.x, factor * a.y, factor * a.z)
 

@@ -40,13 +40,13 @@ def build(numbers: CarNumbers, kind: type[V], **options: Any) -> V:
     if "grip" in entries and numbers.front is not None:
         given.setdefault("grip", numbers.front.friction)
     given |= _tyres(numbers, entries, options) | _drive(numbers, entries, options) | options
-    missing = [name for name, entry in entries.items() if _needed(entry) and name not in given]
+    missing = [name for name, entry in entries.items() if _is_required(entry) and name not in given]
     if missing:
         raise InputError(f"{numbers.name}: {kind.__name__} needs {', '.join(missing)}, which its numbers do not hold.")
     return kind(**given)
 
 
-def _needed(entry) -> bool:
+def _is_required(entry) -> bool:
     return entry.default is MISSING and entry.default_factory is MISSING
 
 

@@ -46,7 +46,7 @@ def commonroad_limits(specification: Any) -> tuple[SteerLimits, AccelerationLimi
     driving = ("acceleration_max", "switching_speed", "speed_min", "speed_max")
     missing = [name for name in (*steering, *driving) if getattr(specification, name) is None]
     if missing:
-        raise InputError(f"limits of the vehicle: {', '.join(missing)} missing in the specification.")
+        raise InputError(f"limits of the vehicle: {', '.join(missing)} missing from the specification.")
     return (
         SteerLimits(*[getattr(specification, name) for name in steering]),
         AccelerationLimits(*[getattr(specification, name) for name in driving]),
@@ -56,7 +56,7 @@ def commonroad_limits(specification: Any) -> tuple[SteerLimits, AccelerationLimi
 def _tyre(coefficients, load: float) -> TyreNumbers:
     missing = [name for name in ("p_ky1", "p_kx1", "p_dy1", "p_dx1", "p_cy1", "p_cx1") if name not in coefficients]
     if missing:
-        raise InputError(f"tire: {', '.join(missing)} missing in the specification.")
+        raise InputError(f"tire: {', '.join(missing)} missing from the specification.")
     return TyreNumbers(
         cornering_stiffness=-coefficients["p_ky1"] * load,
         slip_stiffness=coefficients["p_kx1"] * load,

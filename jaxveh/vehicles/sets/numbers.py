@@ -126,7 +126,7 @@ class CarNumbers:
     def wheel_loads(self) -> tuple[float, float]:
         """Loads of a front and of a rear wheel at rest on a level road, N."""
         if self.mass is None:
-            raise InputError(f"{self.name}: mass is not known, and so no load.")
+            raise InputError(f"{self.name}: the mass is missing, from which the loads follow; give it in kg.")
         half = 0.5 * self.mass * GRAVITY / self.wheelbase
         return half * self.rear_axle_to_cg, half * self.front_axle_to_cg
 
@@ -144,10 +144,10 @@ class CarNumbers:
             found |= own if sprung else {name: value for name, value in own.items() if name not in found}
             found |= self._rolling(suspension)
             if not sprung:
-                found |= self._leaning(suspension, found)
+                found |= self._leaning_parameters(suspension, found)
         return {name: value for name, value in found.items() if value is not None}
 
-    def _leaning(self, s: SuspensionNumbers, known: dict[str, Any]) -> dict[str, Any]:
+    def _leaning_parameters(self, s: SuspensionNumbers, known: dict[str, Any]) -> dict[str, Any]:
         """What cars that do not ride on their springs need of them: `unsprung_height`, `roll_yaw_product` about the roll axis
         below the whole car's centre of gravity, and the front axle's share of the lateral transfer (`front_roll_share`): of
         springs and bars by stiffness, of roll centres and unsprung masses by what each axle carries."""

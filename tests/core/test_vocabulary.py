@@ -1,0 +1,124 @@
+"""One word, one meaning: functions are named by what they return or do; words that the glossary replaces stand nowhere."""
+
+import ast
+import importlib
+import inspect
+import json
+import re
+
+import pytest
+from test_names_in_docstrings import EVERYWHERE, ROOMS, ROOT, TREES, exists
+
+TOP = ROOT.parent
+IRREGULAR = {
+    "begun", "bent", "bound", "brought", "built", "caught", "chosen", "cut", "done", "drawn", "driven", "fed", "felt",
+    "found", "frozen", "given", "gone", "grown", "held", "hidden", "kept", "known", "laid", "led", "left", "lost", "made",
+    "meant", "paid", "redone", "said", "seen", "sent", "shown", "sold", "spent", "split", "stuck", "sunk", "taken", "taught",
+    "told", "torn", "understood", "unknown", "unseen", "untold", "won", "wound", "written",
+}  # fmt: skip
+NOUNS = {
+    "bearing", "bed", "bound", "braking", "breed", "building", "cornering", "crossing", "cut", "damping", "driving", "feed",
+    "filtering", "fitting", "heading", "left", "listing", "loading", "logging", "mapping", "need", "parking", "reading",
+    "recording", "red", "resampling", "ring", "rolling", "sampling", "seed", "setting", "smoothing", "spacing", "speed",
+    "split", "steering", "string", "swing", "timing", "warning", "weighting",
+}  # fmt: skip
+PARTICLES = {
+    "again", "all", "apart", "as", "at", "away", "back", "before", "by", "first", "for", "from", "in", "of", "off", "on",
+    "once", "out", "over", "then", "to", "up", "when", "with",
+}  # fmt: skip
+EXEMPT = {
+    "as_printed": "what every paper's package has: the study as the paper prints it",
+    "stratified": "the field's name of a scheme, beside `systematic` and `multinomial`",
+    "unscented": "the field's name of a transform",
+    "passed": "a truth value of a test",
+    "converged": "a truth value of a fit",
+    "held": "a fence of `numerics`",
+    "kept": "a fence of `numerics`",
+    "stored": "a fence of `numerics`",
+}
+ELSEWHERE = {"JAXVEH_SHARED": "a variable of the environment", "peers": "a marker of tests"}
+NOT_OURS = {
+    r"\binfos\b|\ban info\b": "info is a mass noun",
+    r"\bturn(s|ed|ing)? round\b": "reverse the sign",
+    r"\bc_?W\b": "the drag coefficient is c_d",
+    r"\bcurved (model|transition|observation)": "nonlinear",
+    r"\blog lacks\b": "say what is missing from the log, and what it has",
+}
+
+
+def is_participle(word):
+    return word not in NOUNS and (word in IRREGULAR or bool(re.fullmatch(r"[a-z]{2,}(ed|ing)", word)))
+
+
+def is_bare(name):
+    """Whether a name is a participle with no noun: `turned_back`, not `normalised_weights`."""
+    words = name.split("_")
+    return any(map(is_participle, words)) and all(is_participle(word) or word in PARTICLES for word in words)
+
+
+def functions(node):
+    """Functions of a module and methods of its classes, but none inside of a function."""
+    for inside in ast.iter_child_nodes(node):
+        if isinstance(inside, ast.FunctionDef):
+            yield inside
+        elif not isinstance(inside, ast.Lambda):
+            yield from functions(inside)
+
+
+def test_a_bare_participle_is_told_from_a_name():
+    bare = ("turned_back", "seen", "told_when", "fading")
+    good = ("normalised_weights", "propagate", "seed", "with_batch_shape", "is_calibrated")
+    assert all(map(is_bare, bare)) and not any(map(is_bare, good))
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_function_is_named_by_a_bare_participle(room):
+    modules = [importlib.import_module(f"jaxveh.{room}")]
+    if (ROOT / room / "kit.py").exists():
+        modules.append(importlib.import_module(f"jaxveh.{room}.kit"))
+    public = {name for one in modules for name in getattr(one, "__all__", ()) if inspect.isroutine(getattr(one, name))}
+    public |= {
+        function.name
+        for path, tree in TREES.items()
+        if path.relative_to(ROOT).parts[0] == room
+        for function in functions(tree)
+        if not function.name.startswith("_")
+    }
+    assert not sorted(name for name in public if is_bare(name) and name not in EXEMPT)
+
+
+def cells(path):
+    """The text of a notebook's cells, without what they have shown."""
+    return "\n".join("".join(cell["source"]) for cell in json.loads(path.read_text())["cells"])
+
+
+def texts():
+    for path in (*TREES, TOP / "README.md", TOP / "CONTRIBUTING.md", *(TOP / "notebooks").glob("*.md")):
+        yield path, path.read_text()
+    for path in (TOP / "notebooks").glob("*.ipynb"):
+        yield path, cells(path)
+
+
+@pytest.mark.parametrize("words", NOT_OURS)
+def test_words_that_the_glossary_replaces_stand_nowhere(words):
+    found = [
+        f"{path.relative_to(TOP)}: {line.strip()}"
+        for path, text in texts()
+        for line in text.splitlines()
+        if re.search(words, line, re.IGNORECASE if "W" not in words else 0)
+    ]
+    assert not found, NOT_OURS[words]
+
+
+def test_the_glossary_has_each_word_once():
+    table = (TOP / "CONTRIBUTING.md").read_text().split("| word | what it is |")[1].split("\n\n")[0]
+    words = [word.strip() for line in table.splitlines()[2:] for word in line.split("|")[1].split(",")]
+    assert words and len(set(words)) == len(words)
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", "notebooks/filter_kit.md"])
+def test_names_in_backticks_of_a_page_exist(page):
+    prose = re.sub(r"```.*?```", "", (TOP / page).read_text(), flags=re.DOTALL)
+    names = re.findall(r"`([A-Za-z_][\w.]+)(?:\(|`)", prose)
+    files = {path.name for path in TOP.iterdir()} | set(ELSEWHERE)
+    assert not sorted({name for name in names if name not in files and not exists(name, EVERYWHERE)})
