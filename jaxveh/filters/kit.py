@@ -14,6 +14,7 @@ from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, AbstractRuleF
 from jaxveh.filters.gaussian.forms import AbstractForm, Spread
 from jaxveh.filters.gaussian.rules import AbstractRule, Image, Points, Slopes
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
+from jaxveh.filters.outer_belief import AbstractOuterBelief, AbstractTransparentBelief
 from jaxveh.filters.particle import (
     AbstractAhead,
     AbstractParticleFilter,
@@ -72,12 +73,14 @@ __all__ = [
     "AbstractForm",
     "AbstractGaussianFilter",
     "AbstractGaussianWrapper",
+    "AbstractOuterBelief",
     "AbstractParticleFilter",
     "AbstractRemembering",
     "AbstractResampling",
     "AbstractRule",
     "AbstractRuleFilter",
     "AbstractStateless",
+    "AbstractTransparentBelief",
     "AbstractTwoPartFilter",
     "AbstractTwoPartWrapper",
     "AbstractWrapper",

@@ -9,7 +9,8 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
-from jaxveh.statespace import AbstractBelief, Gaussian, Info, Row, StateSpace, kit
+from jaxveh.filters.outer_belief import AbstractTransparentBelief
+from jaxveh.statespace import Gaussian, Info, Row, StateSpace, kit
 
 
 class AbstractStateless(AbstractGaussianWrapper):
@@ -31,48 +32,15 @@ class AbstractStateless(AbstractGaussianWrapper):
         return self.inner.adapted(model, belief)
 
 
-class Remembering(AbstractBelief):
+class Remembering(AbstractTransparentBelief):
     """The belief of the filter `inside`, and what the wrapper remembers: `memory`, a tree of arrays."""
 
     inside: Any
     memory: Any
 
-    @property
-    def mean(self):
-        """The state's mean."""
-        return self.inside.mean
-
-    @property
-    def std(self):
-        """The state's standard deviations."""
-        return self.inside.std
-
-    @property
-    def covariance(self):
-        """(n, n) in the order of the state's fields."""
-        return self.inside.covariance
-
-    @property
-    def t(self):
-        """Time of the last row, s."""
-        return self.inside.t
-
-    @property
-    def u(self):
-        """Inputs of the last row."""
-        return self.inside.u
-
-    @property
-    def count(self):
-        """Rows so far."""
-        return self.inside.count
-
     def inflated(self, factor):
         """The belief with `factor` times its covariance."""
         return Remembering(self.inside.inflated(factor), self.memory)
-
-    def moments(self, model):
-        return self.inside.moments(model)
 
 
 class AbstractRemembering(AbstractGaussianWrapper):
