@@ -10,26 +10,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
 from jaxveh.filters.outer_belief import AbstractTransparentBelief
-from jaxveh.statespace import Gaussian, Info, Row, StateSpace, kit
-
-
-class AbstractStateless(AbstractGaussianWrapper):
-    """A filter around another, `inner`, that remembers nothing: its belief is that of its filter."""
-
-    # No postponed annotations in this file: they would make fields of class variables.
-    noise_by_row: ClassVar[bool] = True
-
-    def prior(self, model, row):
-        return self.inner.prior(model, row)
-
-    def predict_between(self, model, belief, t, u_next):
-        return self.inner.predict_between(model, belief, t, u_next)
-
-    def observe(self, model, belief, row):
-        return self.inner.observe(model, belief, row)
-
-    def adapted(self, model, belief):
-        return self.inner.adapted(model, belief)
+from jaxveh.statespace import Gaussian, Info, Row, Smoothing, StateSpace, kit
 
 
 class Remembering(AbstractTransparentBelief):
@@ -72,6 +53,18 @@ class AbstractRemembering(AbstractGaussianWrapper):
         """The filter's own update with the noises that the memory says."""
         after, info = self.inner.update(self.believed(model, belief.memory), belief.inside, row)
         return Remembering(after, belief.memory), info
+
+
+class AbstractLearnedNoise(AbstractRemembering):
+    """A filter around another that learns the variances of its sensors. Their noise must be Gaussian, a standard deviation a
+    channel."""
+
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
+    rows_between: ClassVar[bool] = True
+
+    def check(self, model):
+        check_independent(type(self).__name__, model)
+        self.inner.check(model)
 
 
 def gaussian_of(belief: Any) -> GaussianBelief:
