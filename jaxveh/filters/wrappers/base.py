@@ -10,7 +10,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
 from jaxveh.filters.outer_belief import AbstractTransparentBelief
-from jaxveh.statespace import Gaussian, Info, Row, Smoothing, StateSpace, kit
+from jaxveh.statespace import Gaussian, Info, Row, StateSpace, kit
 
 
 class Remembering(AbstractTransparentBelief):
@@ -59,7 +59,6 @@ class AbstractLearnedNoise(AbstractRemembering):
     """A filter around another that learns the variances of its sensors. Their noise must be Gaussian, a standard deviation a
     channel."""
 
-    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     rows_between: ClassVar[bool] = True
 
     def check(self, model):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -18,6 +18,7 @@ from jaxveh.filters.wrappers.base import (
 )
 from jaxveh.filters.wrappers.innovation import innovation
 from jaxveh.filters.wrappers.robust import expected_squares
+from jaxveh.statespace import Smoothing
 
 
 class SageHusa(AbstractLearnedNoise):
@@ -30,6 +31,7 @@ class SageHusa(AbstractLearnedNoise):
     predictions. Errors of the model count as noise of the sensor. The noise must be Gaussian, a standard deviation a channel.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     inner: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)
     floor: float = eqx.field(static=True, default=0.01)
@@ -80,6 +82,7 @@ class VariationalBayes(AbstractLearnedNoise):
     channel.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     inner: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)
     weight: float = eqx.field(static=True, default=10.0)

@@ -24,7 +24,6 @@ class AbstractReweighting(AbstractStateless):
     """A filter around another that takes each row's noise for larger where a residual is. The noise must be Gaussian, a standard
     deviation a channel."""
 
-    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     rows_between: ClassVar[bool] = True
 
     def check(self, model):
@@ -43,6 +42,7 @@ class Huber(AbstractReweighting):
     a standard deviation a channel. Not around a filter that learns variances: inside it.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     inner: AbstractGaussianFilter
     threshold: float = eqx.field(static=True, default=1.345)
 
@@ -69,6 +69,7 @@ class RobustStudentT(AbstractReweighting):
     t law. The noise must be Gaussian, a standard deviation a channel.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     inner: AbstractGaussianFilter
     dof: float = eqx.field(static=True, default=4.0)
     iterations: int = eqx.field(static=True, default=3)

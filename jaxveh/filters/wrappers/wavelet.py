@@ -16,7 +16,7 @@ from jaxveh.filters.wrappers.base import (
     variances_of,
     with_variances,
 )
-from jaxveh.statespace import AbstractFilter, AbstractWrapper, CauchyGaussianMixture, Gaussian, kit
+from jaxveh.statespace import AbstractFilter, AbstractWrapper, CauchyGaussianMixture, Gaussian, Smoothing, kit
 
 # The median of the absolute value of a standard normal number.
 NORMAL_MEDIAN = 0.6744897501960817
@@ -65,6 +65,7 @@ class HaarNoise(AbstractHaar, AbstractLearnedNoise):
     from the first row on, `initial` is what that row is worth: what is believed then for no reason, a slow state keeps.
     """
 
+    smooths: ClassVar[Smoothing] = Smoothing.gaussian
     inner: AbstractGaussianFilter
 
     def start(self, model):
