@@ -26,7 +26,7 @@ from jaxveh.filters.particle import (
     replace_lost,
     without,
 )
-from jaxveh.statespace import Smoothing, kit
+from jaxveh.statespace import Smoothing
 
 
 class FirstStage(NamedTuple):
@@ -55,8 +55,7 @@ class LookedAhead(AbstractAhead):
 
     def update(self, filter_: Any, model, row):
         before, stage = self.before, self.stage
-        measured, present = kit.presence(model, row)
-        logs, after = log_prob(model, row, self.particles, measured, present)
+        logs, after = log_prob(model, row, self.particles)
         chosen_ahead = gather((stage.ahead,), stage.ancestors)[0]
         # Of the particles before, of which a number that adapts may have left others than it takes.
         n = jnp.asarray(before.weights.shape[0], logs.dtype)
@@ -122,13 +121,12 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
     def _predict(self, model, belief, row):
         draw, noise = jax.random.split(jax.random.fold_in(belief.key, belief.count))
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
-        measured, present = kit.presence(model, row)
         lookahead = lookahead_for(model) if self.lookahead is None else self.lookahead
         to = (belief.t, row.t)
         characteristic, lost = numerics.barrier(
             replace_lost(lookahead.propagate(model, *to, belief.particles, u), belief.particles)
         )
-        ahead, residual = lookahead.log_prob(model, row, characteristic, measured, present, row.t - belief.t)
+        ahead, residual = lookahead.log_prob(model, row, characteristic, row.t - belief.t)
         log_weights = log_of(belief.weights)
         ahead = soften(ahead, log_weights, ~lost, lookahead.defensive)
         if self.gradient == "score":

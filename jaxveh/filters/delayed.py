@@ -12,10 +12,11 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.names import check_names
 from jaxveh._core.result import Result, code
-from jaxveh.statespace import AbstractBelief, AbstractFilter, AbstractWrapper, Info, Row, StateSpace, kit
+from jaxveh.filters.outer_belief import AbstractTransparentBelief
+from jaxveh.statespace import AbstractFilter, AbstractWrapper, Info, Row, StateSpace, kit
 
 
-class DelayedBelief(AbstractBelief):
+class DelayedBelief(AbstractTransparentBelief):
     """The newest belief `inside`; the last rows in the order of their times, `rows` with (depth,) leaves, those that are `real`
     (depth,), and the belief `base` before the first of them; `said`: the log-likelihood of all rows so far; `began`: the first
     row's time."""
@@ -27,37 +28,6 @@ class DelayedBelief(AbstractBelief):
     base_said: jax.Array
     said: jax.Array
     began: Any
-
-    @property
-    def mean(self):
-        """The newest belief's mean."""
-        return self.inside.mean
-
-    @property
-    def t(self):
-        """The newest time, s."""
-        return self.inside.t
-
-    @property
-    def u(self):
-        """The inputs there."""
-        return self.inside.u
-
-    @property
-    def count(self):
-        """Rows and late measurements so far."""
-        return self.inside.count
-
-    @property
-    def covariance(self):
-        """(n, n) of the newest belief."""
-        return self.inside.covariance
-
-    def sample(self, key, draws):
-        return self.inside.sample(key, draws)
-
-    def moments(self, model):
-        return self.inside.moments(model)
 
 
 class Delayed(AbstractWrapper):

@@ -63,9 +63,8 @@ class FirstGuided(AbstractAhead):
 
     def update(self, filter_: Any, model, row):
         n = filter_.particles
-        measured, present = kit.presence(model, row)
-        logs, _ = log_prob(model, row, self.particles, measured, present)
-        _, residual = log_prob(model, row, self.unmeasured, measured, present)
+        logs, _ = log_prob(model, row, self.particles)
+        _, residual = log_prob(model, row, self.unmeasured)
         weights, log_likelihood, alive = numerics.normalise(without(self.astray, logs - self.log_drawn))
         ancestors = jnp.arange(n, dtype=jnp.int32)
         belief = ParticleBelief(self.particles, weights, ancestors, self.key, row.t, row.u, jnp.int32(1))
@@ -91,9 +90,8 @@ class Proposed(AbstractAhead):
 
     def update(self, filter_: Any, model, row):
         before, stage = self.before, self.stage
-        measured, present = kit.presence(model, row)
-        after, _ = log_prob(model, row, self.particles, measured, present)
-        _, residual = log_prob(model, row, self.moved, measured, present)
+        after, _ = log_prob(model, row, self.particles)
+        _, residual = log_prob(model, row, self.moved)
         kept = log_chosen(filter_, log_of(stage.weights), stage.ancestors)
         n = jnp.log(jnp.asarray(before.weights.shape[0], after.dtype))
         log_first, chosen_ahead = stage.log_mean, stage.ahead[stage.ancestors]

@@ -13,7 +13,8 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, AbstractRuleFilter, check_covariances, with_spread
 from jaxveh.filters.gaussian.forms import AbstractForm, Spread
 from jaxveh.filters.gaussian.rules import AbstractRule, Image, Points, Slopes
-from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
+from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper, AbstractStateless
+from jaxveh.filters.outer_belief import AbstractOuterBelief, AbstractTransparentBelief
 from jaxveh.filters.particle import (
     AbstractAhead,
     AbstractParticleFilter,
@@ -30,7 +31,6 @@ from jaxveh.filters.particle import (
 )
 from jaxveh.filters.wrappers.base import (
     AbstractRemembering,
-    AbstractStateless,
     Remembering,
     gaussian_of,
     variances_of,
@@ -72,12 +72,14 @@ __all__ = [
     "AbstractForm",
     "AbstractGaussianFilter",
     "AbstractGaussianWrapper",
+    "AbstractOuterBelief",
     "AbstractParticleFilter",
     "AbstractRemembering",
     "AbstractResampling",
     "AbstractRule",
     "AbstractRuleFilter",
     "AbstractStateless",
+    "AbstractTransparentBelief",
     "AbstractTwoPartFilter",
     "AbstractTwoPartWrapper",
     "AbstractWrapper",

@@ -43,7 +43,7 @@ class AbstractLookahead(eqx.Module):
         """Raise `InputError` where the model has not what this needs."""
 
     @abc.abstractmethod
-    def log_prob(self, model: StateSpace, row, ahead, measured, present, dt) -> tuple[Any, dict]:
+    def log_prob(self, model: StateSpace, row, ahead, dt) -> tuple[Any, dict]:
         """Of particles `ahead` ((N,) in each field), about log p(y | x_{k-1}) (N,), and the residuals there by channel."""
 
     def propagate(self, model: StateSpace, t0, t1, x, u) -> Any:
@@ -78,7 +78,8 @@ class PredictiveLikelihood(AbstractLookahead):
         check_gaussian("PredictiveLikelihood", "process noise", model.process_noise.law, advice)
         check_gaussian("PredictiveLikelihood", "measurement noise", kind_of_law(model), advice)
 
-    def log_prob(self, model, row, ahead, measured, present, dt):
+    def log_prob(self, model, row, ahead, dt):
+        measured, present = kit.presence(model, row)
         law, R = noises(model, row, ahead, dt)
         seen, slopes = slopes_of(model, row, ahead, law.names)
         residual = {name: measured[name] - value for name, value in zip(model.channels, seen, strict=True)}
@@ -110,8 +111,8 @@ class PointLookahead(AbstractLookahead):
     def check(self, model):
         del model
 
-    def log_prob(self, model, row, ahead, measured, present, dt):
-        return log_prob(model, row, ahead, measured, present)
+    def log_prob(self, model, row, ahead, dt):
+        return log_prob(model, row, ahead)
 
     def propagate(self, model, t0, t1, x, u):
         if self.characteristic is None:

@@ -80,8 +80,9 @@ def check_particle_settings(particles: int, threshold: float, gradient: str = "s
         raise InputError(f"threshold = {threshold}: must be from 0 (never resample) to 1 (every step).")
 
 
-def log_prob(model: StateSpace, row, particles, measured, present):
-    """log p(y | x) of each particle over the channels present, (N,), and the predicted measurements by channel."""
+def log_prob(model: StateSpace, row, particles):
+    """log p(y | x) of each particle over the channels present, (N,), and by channel what was measured less what it predicts."""
+    measured, present = kit.presence(model, row)
     n = particles[0].shape[0]
     observed = model.observation(row.t, particles, row.u)
     predicted = {name: jnp.broadcast_to(getattr(observed, name), (n,)) for name in model.channels}
@@ -212,8 +213,7 @@ class Expected(AbstractAhead):
     count: Any
 
     def update(self, filter_: Any, model, row):
-        measured, present = kit.presence(model, row)
-        logs, residual = log_prob(model, row, self.particles, measured, present)
+        logs, residual = log_prob(model, row, self.particles)
         weights, log_mean, alive = numerics.normalise(without(self.lost, logs + self.drawn.log_weights))
         belief = ParticleBelief(self.particles, weights, self.drawn.ancestors, self.key, row.t, row.u, self.count + 1)
         # normalise gives the log of the mean over N of what sums to the likelihood.

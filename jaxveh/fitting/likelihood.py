@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,10 +11,11 @@ import jax.numpy as jnp
 import optimistix as optx
 from jax import lax
 
-from jaxveh._core.parameter import Parameter, Where, pick, put
+from jaxveh._core.parameter import Parameter, Where, pick
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, scalar_parameters
+from jaxveh.fitting.filter_problem import AbstractFilterProblem
+from jaxveh.fitting.problem import SearchEnd, on_line, scalar_parameters
 from jaxveh.fitting.recorded import as_list, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.solve import solve
@@ -25,7 +25,7 @@ REJECTED = 1e8
 """The cost of a point where the filter fails: finite, so that the line search steps back."""
 
 
-class LikelihoodProblem(AbstractProblem):
+class LikelihoodProblem(AbstractFilterProblem):
     """A filter's negative log-likelihood of recordings, and what of the model is to be fitted.
 
     `rows`: a tuple, one a recording; `counts` (recordings,): how many times each counts. `centre`, `spread` (p,): the prior on
@@ -41,20 +41,11 @@ class LikelihoodProblem(AbstractProblem):
     key: Any
     chosen: tuple[Parameter, ...] = eqx.field(static=True)
 
-    def start(self):
-        return on_line(self.chosen, pick(self.model, self.chosen))
-
-    def line(self, z):
-        return z
-
-    def model_at(self, z):
-        return put(self.model, self.chosen, in_units(self.chosen, z))
-
     def cost(self, z):
         model = self.model_at(z)
         estimates = [scan(self.filter, model, part, self.key) for part in self.rows]
         each = jnp.stack([estimate.log_likelihood for estimate in estimates])
-        total = 0.5 * jnp.sum(((z - self.centre) / self.spread) ** 2) - jnp.sum(self.counts * each)
+        total = self.prior_cost(z) - jnp.sum(self.counts * each)
         failed = jnp.any(jnp.stack([estimate.result != 0 for estimate in estimates])) | ~jnp.isfinite(total)
         return jnp.where(failed, REJECTED, total)
 
@@ -71,9 +62,6 @@ class LikelihoodProblem(AbstractProblem):
 
     def units(self):
         return len(self.rows)
-
-    def with_counts(self, counts):
-        return dataclasses.replace(self, counts=counts)
 
 
 def hessian(cost, z):

@@ -127,13 +127,7 @@ def pose_shooting(
     count = int(np.sum(segments.first)) if is_concrete(segments.first) else 1
     counts, tie = jnp.ones(count, centre.dtype), jnp.asarray(tie, centre.dtype)
     return ShootingProblem(
-        model=model,
-        segments=segments,
-        tie=tie,
-        counts=counts,
-        centre=centre,
-        prior=known,
-        chosen=chosen,
+        model=model, segments=segments, tie=tie, counts=counts, centre=centre, prior=known, chosen=chosen
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -13,12 +12,13 @@ import numpy as np
 import optimistix as optx
 
 from jaxveh._core.errors import InputError, check_positive, is_concrete
-from jaxveh._core.parameter import Parameter, Where, pick, put
+from jaxveh._core.parameter import Parameter, Where, pick
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, scan
+from jaxveh.fitting.filter_problem import AbstractFilterProblem
 from jaxveh.fitting.levenberg_marquardt import Quadratic
-from jaxveh.fitting.problem import AbstractProblem, SearchEnd, in_units, on_line, scalar_parameters
+from jaxveh.fitting.problem import SearchEnd, on_line, scalar_parameters
 from jaxveh.fitting.recorded import as_list, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.scoring import FisherScoring
@@ -50,7 +50,7 @@ class _Name(eqx.Module):
     name: str = eqx.field(static=True)
 
 
-class PredictionErrorProblem(AbstractProblem):
+class PredictionErrorProblem(AbstractFilterProblem):
     """A Gaussian filter's negative log-likelihood of recordings of one length, as squares of its whitened innovations, and what
     of the model is to be fitted.
 
@@ -68,17 +68,8 @@ class PredictionErrorProblem(AbstractProblem):
     warm_up: int = eqx.field(static=True)
     chosen: tuple[Parameter, ...] = eqx.field(static=True)
 
-    def start(self):
-        return on_line(self.chosen, pick(self.model, self.chosen))
-
-    def line(self, z):
-        return z
-
-    def model_at(self, z):
-        return put(self.model, self.chosen, in_units(self.chosen, z))
-
     def cost(self, z):
-        return _cost(self, self.parts(z)) + 0.5 * jnp.sum(((z - self.centre) / self.spread) ** 2)
+        return _cost(self, self.parts(z)) + self.prior_cost(z)
 
     def unit(self):
         """What counts as one in a step: the prior's spread, without a prior one on the line, (p,)."""
@@ -96,9 +87,6 @@ class PredictionErrorProblem(AbstractProblem):
 
     def units(self):
         return self.rows.t.shape[0]
-
-    def with_counts(self, counts):
-        return dataclasses.replace(self, counts=counts)
 
     def parts(self, z) -> Parts:
         """What the cost at z is made of."""

@@ -97,27 +97,32 @@ class _Rig:
         return np.abs(trajectory * np.cos(slip_angle))
 
     def force(self, axis: str) -> np.ndarray | None:
-        for name in (f"F{axis}W", f"F{axis}"):
-            if (found := self.quantity(name, "force")) is not None:
-                return found
-        if not self.centre:
-            return self._refuse(f"F{axis}")
+        found = self._at_contact("F", axis, "force")
+        if found is not None or not self.centre:
+            return found
         found = self.quantity(f"F{axis}H", "force")
         return self._rotate("F", axis, "force") if found is None else found
 
     def moment(self, axis: str) -> np.ndarray | None:
-        for name in (f"M{axis}W", f"M{axis}"):
-            if (found := self.quantity(name, "moment")) is not None:
-                return found
-        if not self.centre:
-            return self._refuse(f"M{axis}")
+        found = self._at_contact("M", axis, "moment")
+        if found is not None or not self.centre:
+            return found
         name, found = f"M{axis}H", self.quantity(f"M{axis}H", "moment")
         if found is None:
             name, found = f"M{axis}C", self._rotate("M", axis, "moment")
         return None if found is None else found + self._arm(axis, name)
 
-    def _refuse(self, name: str) -> None:
-        """None where the file has no such quantity of the wheel's centre either; raises where it has."""
+    def _at_contact(self, kind: str, axis: str, unit: str) -> np.ndarray | None:
+        """A component in axes of the contact patch (W), as it stands in the file; None where the file has none."""
+        for name in (f"{kind}{axis}W", f"{kind}{axis}"):
+            if (found := self.quantity(name, unit)) is not None:
+                return found
+        if not self.centre:
+            self._refuse_centre(f"{kind}{axis}")
+        return None
+
+    def _refuse_centre(self, name: str) -> None:
+        """Raise where the file has this quantity of the wheel's centre, whose axes are not converted."""
         for centre in (f"{name}H", f"{name}C"):
             if self.file.find(centre) is not None:
                 raise InputError(

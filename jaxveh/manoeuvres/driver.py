@@ -9,6 +9,7 @@ import equinox as eqx
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record_type
+from jaxveh._core.parameter import check_parameters
 from jaxveh.manoeuvres.base import AbstractManoeuvre
 from jaxveh.vehicles import Motion
 
@@ -18,9 +19,14 @@ class AbstractDriver(eqx.Module):
 
     Array leaves are parameters. States (reaction lag, integrals) are scalars of a NamedTuple whose fields are
     `state_names`; a simulation carries them beside the car's. Elementwise, from t = 0 to `duration` (s).
+
+    **Raises** `InputError` for parameters outside their domain.
     """
 
     duration: eqx.AbstractVar[float]
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @property
     @abc.abstractmethod

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.manoeuvres.base import DriverInputs
 from jaxveh.manoeuvres.driver import AbstractDriver, Motion, driver_state
 from jaxveh.manoeuvres.paths import AbstractPath
@@ -60,7 +60,6 @@ class PathDriver(AbstractDriver):
     shortest_preview: jax.Array = positive("m", default=2.0)
 
     def __check_init__(self):
-        check_parameters(self)
         for name, kind in (("path", AbstractPath), ("speed", AbstractSpeed)):
             if not isinstance(getattr(self, name), kind):
                 given = type(getattr(self, name)).__name__

@@ -31,7 +31,13 @@ class Beside(NamedTuple):
 
 
 class AbstractPath(eqx.Module):
-    """A smooth curve on the ground, through the world's origin along x unless it says otherwise; elementwise."""
+    """A smooth curve on the ground, through the world's origin along x unless it says otherwise; elementwise.
+
+    **Raises** `InputError` for parameters outside their domain.
+    """
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @abc.abstractmethod
     def beside(self, x: Any, y: Any) -> Beside:
@@ -80,9 +86,6 @@ class Straight(AbstractGraph):
 
     left: jax.Array = parameter("m", scale=1.0, default=0.0)
 
-    def __check_init__(self):
-        check_parameters(self)
-
     def y(self, x: jax.Array) -> jax.Array:
         return jnp.broadcast_to(self.left, jnp.shape(x))
 
@@ -103,7 +106,7 @@ class LaneChanges(AbstractGraph):
     back_to: jax.Array = parameter("m", scale=10.0)
 
     def __check_init__(self):
-        check_parameters(self)
+        check_parameters(self)  # first, so that what is not finite is named itself
         check_positive("LaneChanges.over_to - over_from", self.over_to - self.over_from, "m")
         check_positive("LaneChanges.back_to - back_from", self.back_to - self.back_from, "m")
 
@@ -128,7 +131,6 @@ class Sine(AbstractGraph):
     periods: jax.Array = positive("-", default=3.0)
 
     def __check_init__(self):
-        check_parameters(self)
         check("Sine.periods", self.periods, lambda v: v >= 1, "at least 1, for its ends to fade")
 
     def y(self, x: jax.Array) -> jax.Array:
@@ -146,7 +148,6 @@ class Circle(AbstractPath):
     radius: jax.Array = parameter("m", scale=10.0)
 
     def __check_init__(self):
-        check_parameters(self)
         check("Circle.radius", self.radius, lambda v: v != 0, "other than 0 m")
 
     def beside(self, x: Any, y: Any) -> Beside:

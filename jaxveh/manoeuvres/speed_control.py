@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs
 from jaxveh.manoeuvres.driver import AbstractDriver, Motion, as_driver, driver_state
 from jaxveh.numerics import smooth_clip, smooth_ramp, smooth_step
@@ -65,9 +65,6 @@ class SpeedControl(AbstractDriver):
         self.gain, self.integral_time = gain, integral_time
         self.drag_area, self.rolling_resistance = drag_area, rolling_resistance
         self.drive_limit, self.brake_limit = drive_limit, brake_limit
-
-    def __check_init__(self):
-        check_parameters(self)
 
     @property
     def state_names(self):

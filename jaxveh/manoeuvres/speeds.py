@@ -16,7 +16,13 @@ from jaxveh.numerics import gauss_markov_harmonics, smooth_ramp, sum_of_harmonic
 
 
 class AbstractSpeed(eqx.Module):
-    """A smooth function of time, its array leaves are its parameters."""
+    """A smooth function of time, its array leaves are its parameters.
+
+    **Raises** `InputError` for parameters outside their domain.
+    """
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @abc.abstractmethod
     def v_x(self, t: Any) -> jax.Array:
@@ -34,7 +40,6 @@ class SteadySpeed(AbstractSpeed):
     speed: jax.Array = parameter("m/s", scale=20.0)
 
     def __check_init__(self):
-        check_parameters(self)
         check_at_least("speed", self.speed, 0.0)
 
     def v_x(self, t: Any) -> jax.Array:
@@ -57,7 +62,6 @@ class ChangingSpeed(AbstractSpeed):
     edge: float = eqx.field(static=True, default=1.0)
 
     def __check_init__(self):
-        check_parameters(self)
         check_at_least("before", self.before, 0.0)
         check_at_least("after", self.after, 0.0)
         check_positive("time", self.time, "s")
@@ -80,9 +84,6 @@ class WaveringSpeed(AbstractSpeed):
     std: jax.Array = parameter("m/s", scale=1.0)
     frequencies: jax.Array = parameter("Hz", scale=0.1)
     phases: jax.Array = parameter("rad", scale=1.0)
-
-    def __check_init__(self):
-        check_parameters(self)
 
     def v_x(self, t: Any) -> jax.Array:
         wanted = self.mean + self.std * sum_of_harmonics(t, self.frequencies, self.phases)

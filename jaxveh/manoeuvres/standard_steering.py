@@ -17,7 +17,19 @@ from jaxveh.manoeuvres.base import AbstractSteering, check_drive
 from jaxveh.numerics import smooth_ramp
 
 
-class SineWithDwell(AbstractSteering):
+class AbstractRounded(AbstractSteering):
+    """Steering from `start` (s) on, whose corners are rounded over `edge` (s)."""
+
+    _: KW_ONLY
+    edge: float = eqx.field(static=True)
+    start: float = eqx.field(static=True)
+
+    def since(self, t: jax.Array, begin: float) -> jax.Array:
+        """The time since `begin` (s), zero before, with the corner rounded."""
+        return smooth_ramp(t - begin, self.edge / 2)
+
+
+class SineWithDwell(AbstractRounded):
     """One sine period of steer whose second peak is held for a while (FMVSS 126: 49 CFR 571.126, S7.9).
 
     The sine's phase runs at its frequency, stands still during the dwell, and starts and stops smoothly within `edge`,
@@ -27,46 +39,35 @@ class SineWithDwell(AbstractSteering):
     _: KW_ONLY
     frequency: float = eqx.field(static=True)
     dwell: float = eqx.field(static=True)
-    edge: float = eqx.field(static=True)
-    start: float = eqx.field(static=True)
 
     def form(self, t: jax.Array) -> jax.Array:
         period, held = 1.0 / self.frequency, self.start + 0.75 / self.frequency
         runs = ((self.start, held), (held + self.dwell, self.start + period + self.dwell))
-        running = sum(_since(t, begin, self.edge) - _since(t, end, self.edge) for begin, end in runs)
+        running = sum(self.since(t, begin) - self.since(t, end) for begin, end in runs)
         return numerics.sin((2 * math.pi * self.frequency) * running)
 
 
-class RampSteer(AbstractSteering):
+class RampSteer(AbstractRounded):
     """Steer that grows linearly from `start` for `rise` and is then held (ISO 4138, constant speed, variable steer)."""
 
     _: KW_ONLY
     rise: float = eqx.field(static=True)
-    edge: float = eqx.field(static=True)
-    start: float = eqx.field(static=True)
 
     def form(self, t: jax.Array) -> jax.Array:
-        rising = _since(t, self.start, self.edge) - _since(t, self.start + self.rise, self.edge)
+        rising = self.since(t, self.start) - self.since(t, self.start + self.rise)
         return rising / self.rise
 
 
-class Slalom(AbstractSteering):
+class Slalom(AbstractRounded):
     """A number of sine periods of steer, as between cones."""
 
     _: KW_ONLY
     frequency: float = eqx.field(static=True)
     periods: float = eqx.field(static=True)
-    edge: float = eqx.field(static=True)
-    start: float = eqx.field(static=True)
 
     def form(self, t: jax.Array) -> jax.Array:
-        running = _since(t, self.start, self.edge) - _since(t, self.start + self.periods / self.frequency, self.edge)
+        running = self.since(t, self.start) - self.since(t, self.start + self.periods / self.frequency)
         return numerics.sin((2 * math.pi * self.frequency) * running)
-
-
-def _since(t: jax.Array, start: float, edge: float) -> jax.Array:
-    """The time since `start`, zero before, with the corner rounded over `edge`."""
-    return smooth_ramp(t - start, edge / 2)
 
 
 def sine_with_dwell(

@@ -81,12 +81,7 @@ def double_lane_change(
     end = start + 2 * period + pause
     check("duration", duration, lambda d: d >= end, f"at least start + 2 period + pause = {end:g} s")
     return DoubleLaneChange(
-        duration=float(duration),
-        speed=speed,
-        steer=steer,
-        start=float(start),
-        period=float(period),
-        pause=float(pause),
+        start=float(start), period=float(period), pause=float(pause), duration=float(duration), speed=speed, steer=steer
     )
 
 
@@ -123,10 +118,6 @@ def swept_sine(
     check_positive("edge", edge, "s")
     check("edge", edge, lambda e: 2 * e <= duration, f"at most half the duration, {duration / 2:g} s")
     return SweptSine(
-        duration=float(duration),
-        speed=speed,
-        steer=steer,
-        from_frequency=float(from_frequency),
-        to_frequency=float(to_frequency),
-        edge=float(edge),
-    )
+        from_frequency=float(from_frequency), to_frequency=float(to_frequency), edge=float(edge),
+        duration=float(duration), speed=speed, steer=steer,
+    )  # fmt: skip

@@ -122,3 +122,9 @@ def check_gain(name: str, gain: Any, model: StateSpace, states: tuple[str, ...] 
             f"{', '.join(model.channels)}."
         )
     check_finite(name, gain)
+
+
+def check_one_or_each(name: str, values: Any, each: tuple[str, ...]) -> None:
+    """Raise `InputError` unless values are one number, or one for each of the names."""
+    if values.shape not in ((), (len(each),)):
+        raise InputError(f"{name} has shape {values.shape}: must be one, or one for each of {', '.join(each)}.")

@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, float_array
-from jaxveh.observers.base import AbstractObserver, advance, check_gain
+from jaxveh._core.errors import check, float_array
+from jaxveh.observers.base import AbstractObserver, check_gain, check_one_or_each
 
 
 def array(value: Any) -> jax.Array:
@@ -16,7 +16,17 @@ def array(value: Any) -> jax.Array:
     return float_array(value if eqx.is_array(value) else np.asarray(value, float))
 
 
-class Luenberger(AbstractObserver):
+class AbstractMemoryless(AbstractObserver):
+    """An observer that remembers nothing but its state, which the model alone moves between rows."""
+
+    def start(self, model):
+        return ()
+
+    def predict(self, model, belief, row):
+        return advance(model, belief, row, belief.vector), ()
+
+
+class Luenberger(AbstractMemoryless):
     """`x = x- + gain e`, a constant `gain` (n, m) a step (D. Luenberger 1964). `place_poles` makes one.
 
     The estimate's error obeys `(I - gain H) F`: on a linear model it dies out with these poles. On another it dies out as long as
@@ -30,17 +40,11 @@ class Luenberger(AbstractObserver):
     def check(self, model):
         check_gain("Luenberger.gain", self.gain, model)
 
-    def start(self, model):
-        return ()
-
-    def predict(self, model, belief, row):
-        return advance(model, belief, row, belief.vector), ()
-
     def correct(self, model, belief, row, error, here):
         return self.gain.astype(error.dtype) @ error, ()
 
 
-class SlidingMode(AbstractObserver):
+class SlidingMode(AbstractMemoryless):
     """`x = x- + gain e + switching s(e / boundary)`, s(z) = z / (1 + |z|) for the sign, without its chatter.
 
     (J.-J. Slotine, J. Hedrick & E. Misawa 1987.) The switching gain (n, m) bounds what a wrong model may add in a step; within
@@ -58,19 +62,9 @@ class SlidingMode(AbstractObserver):
         check("SlidingMode.boundary", self.boundary, lambda b: b > 0, "positive")
 
     def check(self, model):
-        if self.boundary.ndim > 1 or (self.boundary.ndim == 1 and len(self.boundary) != len(model.channels)):
-            raise InputError(
-                f"SlidingMode.boundary has shape {self.boundary.shape}: must be one, or one for each of "
-                f"{', '.join(model.channels)}."
-            )
+        check_one_or_each("SlidingMode.boundary", self.boundary, model.channels)
         check_gain("SlidingMode.gain", self.gain, model)
         check_gain("SlidingMode.switching", self.switching, model)
-
-    def start(self, model):
-        return ()
-
-    def predict(self, model, belief, row):
-        return advance(model, belief, row, belief.vector), ()
 
     def correct(self, model, belief, row, error, here):
         dtype = error.dtype

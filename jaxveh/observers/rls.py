@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check
-from jaxveh.observers.base import AbstractObserver, advance, observe
+from jaxveh.observers.base import AbstractObserver, advance, check_one_or_each, observe
 from jaxveh.observers.luenberger import array
 from jaxveh.statespace import kit
 
@@ -38,11 +38,7 @@ class RecursiveLeastSquares(AbstractObserver):
         check("RecursiveLeastSquares.reset", self.reset, lambda r: r > 0, "positive")
 
     def check(self, model):
-        if self.forgetting.ndim > 1 or (self.forgetting.ndim == 1 and len(self.forgetting) != len(model.states)):
-            raise InputError(
-                f"RecursiveLeastSquares.forgetting has shape {self.forgetting.shape}: must be one, or one for each of "
-                f"{', '.join(model.states)}."
-            )
+        check_one_or_each("RecursiveLeastSquares.forgetting", self.forgetting, model.states)
         kit.check_fixed("RecursiveLeastSquares", model.measurement_noise, "Take a filter.")
         if not model.measurement_noise.has_covariance:
             raise InputError("RecursiveLeastSquares: the measurement noise has no variances, which weigh the channels.")

@@ -86,7 +86,6 @@ class RandomRoad(AbstractRoad):
     friction: jax.Array = positive("-", default=1.0)
 
     def __check_init__(self):
-        check_parameters(self)
         for name in ("grade", "bank", "log_friction"):
             given = getattr(self, name)
             if given is not None and not isinstance(given, Variation):

@@ -9,7 +9,7 @@ import jax
 
 from jaxveh import numerics
 from jaxveh._core.errors import check
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.numerics import smooth_bump, smooth_step
 from jaxveh.roads.base import AbstractRoad, Surface, place, surface
 
@@ -32,7 +32,6 @@ class Hill(AbstractRoad):
     friction: jax.Array = positive("-", default=1.0)
 
     def __check_init__(self):
-        check_parameters(self)
         check("Hill.crest", self.crest, lambda v: v >= 0, "at least 0 m")
 
     def elevation(self, s: Any) -> jax.Array:
@@ -65,7 +64,6 @@ class Banked(AbstractRoad):
     friction: jax.Array = positive("-", default=1.0)
 
     def __check_init__(self):
-        check_parameters(self)
         check("Banked.bank", self.bank, lambda v: abs(v) < math.pi / 2, "within a quarter turn", "It is in rad.")
 
     def at(self, s: Any, y: Any = 0.0) -> Surface:

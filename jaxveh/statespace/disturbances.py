@@ -31,62 +31,55 @@ class Disturbances(eqx.Module):
         """The disturbances' own states."""
         return tuple(DISTURBANCE_PREFIX + name for name in self.states)
 
-    def split(self, x, kind):
-        """The model's own state, and each disturbance by the state that it pushes."""
-        n = len(x) - len(self.states)
-        return kind(*x[:n]), dict(zip(self.states, x[n:], strict=True))
 
-
-class DisturbedTransition(eqx.Module):
-    """Half of the push before the model's own step and half after: exact to second order in the step."""
+class AbstractDisturbed(eqx.Module):
+    """One of the model's functions, of a state that disturbances follow; `state_type` is the model's own."""
 
     function: Callable = eqx.field(static=True)
     disturbances: Disturbances = eqx.field(static=True)
     state_type: Any = eqx.field(static=True)
 
+    def split(self, x):
+        """The model's own state, and each disturbance by the state that it pushes."""
+        pushed = self.disturbances.states
+        n = len(x) - len(pushed)
+        return self.state_type(*x[:n]), dict(zip(pushed, x[n:], strict=True))
+
+
+class DisturbedTransition(AbstractDisturbed):
+    """Half of the push before the model's own step and half after: exact to second order in the step."""
+
     def __call__(self, system, t0, t1, x, u):
-        state, rates = self.disturbances.split(x, self.state_type)
+        state, rates = self.split(x)
         half = 0.5 * (t1 - t0)
         push = lambda state: state._replace(**{name: getattr(state, name) + half * d for name, d in rates.items()})
         state = push(self.function(system, t0, t1, push(state), u))
         return type(x)(*state, *rates.values())
 
 
-class DisturbedObservation(eqx.Module):
+class DisturbedObservation(AbstractDisturbed):
     """The model's own observation, with what its channels feel of the disturbances."""
 
-    function: Callable = eqx.field(static=True)
-    disturbances: Disturbances = eqx.field(static=True)
-    state_type: Any = eqx.field(static=True)
-
     def __call__(self, system, t, x, u):
-        state, rates = self.disturbances.split(x, self.state_type)
+        state, rates = self.split(x)
         found = self.function(system, t, state, u)
         for name, channel in self.disturbances.felt:
             found = found._replace(**{channel: getattr(found, channel) + rates[name]})
         return found
 
 
-class DisturbedNoise(eqx.Module):
+class DisturbedNoise(AbstractDisturbed):
     """The law of the model's own state: a disturbance is no noise of a sensor."""
 
-    function: Callable = eqx.field(static=True)
-    disturbances: Disturbances = eqx.field(static=True)
-    state_type: Any = eqx.field(static=True)
-
     def __call__(self, system, t, x, u):
-        return self.function(system, t, self.disturbances.split(x, self.state_type)[0], u)
+        return self.function(system, t, self.split(x)[0], u)
 
 
-class DisturbedReport(eqx.Module):
+class DisturbedReport(AbstractDisturbed):
     """The model's own report followed by the disturbances."""
 
-    function: Callable = eqx.field(static=True)
-    disturbances: Disturbances = eqx.field(static=True)
-    state_type: Any = eqx.field(static=True)
-
     def __call__(self, system, t, x, u):
-        state, rates = self.disturbances.split(x, self.state_type)
+        state, rates = self.split(x)
         own = self.function(system, t, state, u)
         return record_type("Report", (*own._fields, *self.disturbances.names))(*own, *rates.values())
 

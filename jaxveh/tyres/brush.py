@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import check_one_of
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.slip import theoretical
 from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
@@ -44,7 +44,6 @@ class Brush(AbstractTwoStiffnesses):
     slides: str = eqx.field(static=True, default="along deflection")
 
     def __check_init__(self):
-        check_parameters(self)
         check_one_of("Brush.slides", self.slides, SLIDES)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_at_least
-from jaxveh._core.parameter import check_parameters, parameter
+from jaxveh._core.parameter import parameter
 from jaxveh.tyres.base import Contact, Forces
 from jaxveh.tyres.slip import theoretical
 from jaxveh.tyres.two_stiffnesses import AbstractTwoStiffnesses
@@ -28,7 +28,6 @@ class Dugoff(AbstractTwoStiffnesses):
     fading: jax.Array | None = parameter("s/m", scale=0.01, default=None)
 
     def __check_init__(self):
-        check_parameters(self)
         if self.fading is not None:
             check_at_least("Dugoff.fading", self.fading, 0.0)
 

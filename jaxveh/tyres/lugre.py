@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_at_least, check_positive
-from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh._core.parameter import parameter, positive
 from jaxveh.numerics import polynomials
 from jaxveh.tyres.base import AbstractDynamicTyre, Contact, Forces, need_load, need_slip_speed, need_speed
 from jaxveh.tyres.slip import LOCKED, practical
@@ -72,7 +72,6 @@ class LuGre(AbstractDynamicTyre):
     state_names: ClassVar[tuple[str, ...]] = LuGreState._fields
 
     def __check_init__(self):
-        check_parameters(self)
         for name in ("damping_x", "damping_y", "viscous"):
             check_at_least(f"LuGre.{name}", getattr(self, name), 0.0)
         check_positive("LuGre.exponent", self.exponent)

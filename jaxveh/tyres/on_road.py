@@ -6,7 +6,7 @@ from typing import Any
 
 import jax
 
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_static
 
 
@@ -27,7 +27,6 @@ class OnRoad(AbstractTyre):
 
     def __check_init__(self):
         need_static("OnRoad.tyre", self.tyre)
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """The wrapped tyre's forces (N) and moments (N m)."""

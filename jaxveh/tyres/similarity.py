@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.parameter import check_parameters, positive
+from jaxveh._core.parameter import positive
 from jaxveh.tyres.base import AbstractTyre, Contact, Forces, need_load, need_static
 from jaxveh.tyres.slip import length, share, theoretical
 
@@ -45,7 +45,6 @@ class Similarity(AbstractTyre):
 
     def __check_init__(self):
         need_static("Similarity.tyre", self.tyre)
-        check_parameters(self)
 
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         """F_y and, with a `slip_stiffness_ratio`, F_x, N."""

@@ -6,7 +6,13 @@ from jaxveh.vehicles.given_speed import AbstractToldSpeed
 from jaxveh.vehicles.load_transfer import AbstractShiftingLoads, planar_loads
 from jaxveh.vehicles.rolling_body import AbstractRollingTwoTrack
 from jaxveh.vehicles.sets import CARS, FIDELITIES
-from jaxveh.vehicles.shared import AbstractOneTrack, AbstractOnTyres, AbstractPlaneBody, AbstractTwoAxle
+from jaxveh.vehicles.shared import (
+    AbstractOnAxleTyres,
+    AbstractOneTrack,
+    AbstractOnTyres,
+    AbstractPlaneBody,
+    AbstractTwoAxle,
+)
 from jaxveh.vehicles.traction import AbstractSpinless
 from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack, AbstractTwoTrack, air_drag, rolling_wheels
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
@@ -17,6 +23,7 @@ __all__ = [
     "FIDELITIES",
     "AbstractDriven",
     "AbstractLoadedTwoTrack",
+    "AbstractOnAxleTyres",
     "AbstractOnTyres",
     "AbstractOneTrack",
     "AbstractPlaneBody",

@@ -14,11 +14,8 @@ from jaxveh.vehicles.wheels import body_forces, gravity
 class Roll4DOF(AbstractSpinless, AbstractRollingTwoTrack):
     """`TwoTrack3DOF` with a body that rolls: longitudinal, lateral, yaw and roll.
 
-    Around the roll axis, which joins the roll centres, the sprung mass leans on springs and dampers; all else stays upright. The
-    equations, coupled by the sprung mass's height over the axis, are exact in the roll angle but for the inertias' tilting, and
-    stand in `rolling_body.roll_accelerations`; for small angles and rates they are those of R. Rajamani (Vehicle Dynamics and
-    Control, 2nd ed., ch. 15) and M. Abe (Vehicle Handling Dynamics, ch. 6), there partly in SAE axes, here in ISO 8855: roll is
-    positive with the left side up, which is how a car leans in a left turn, and its centre of gravity then moves by -h sin(phi):
+    The body leans as that of `Roll3DOF`, with its sources, its signs (roll is positive with the left side up) and what it leaves
+    out; the forward speed is a state:
 
         m (dv_x/dt - v_y r)                         = sum X_i - drag v_x |v_x| + m g_x
         m (dv_y/dt + v_x r) - m_s h dp/dt           = sum Y_i + m g_y

@@ -15,6 +15,7 @@ from jaxveh._core.names import check_names, record, record_type
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
+from jaxveh.vehicles.axles import AxleTyres
 from jaxveh.vehicles.base import AbstractVehicle, with_batch_shape
 
 
@@ -119,3 +120,11 @@ class AbstractOnTyres(AbstractTwoAxle):
     def rates_and_outputs(self, rates: tuple, outputs: dict) -> tuple[Any, Any]:
         """Rates and outputs, by name, as `evaluate` gives them."""
         return self.state_type(*rates), with_batch_shape(record(f"{type(self).__name__}Outputs", outputs))
+
+
+class AbstractOnAxleTyres(AbstractOnTyres, AbstractOneTrack):
+    """A car on one track with tyres: an axle's are together one law."""
+
+    @property
+    def tyres(self) -> AxleTyres:
+        return AxleTyres(self.front, self.rear)

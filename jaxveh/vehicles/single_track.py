@@ -14,10 +14,9 @@ from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import Contact
-from jaxveh.vehicles.axles import AxleTyres
 from jaxveh.vehicles.base import GRAVITY, Motion, with_batch_shape
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
-from jaxveh.vehicles.shared import AbstractOneTrack, AbstractOnTyres
+from jaxveh.vehicles.shared import AbstractOnAxleTyres
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
 from jaxveh.vehicles.wheels import gravity, travel_direction
 
@@ -63,7 +62,7 @@ UNITS = {
 }
 
 
-class SingleTrack(AbstractOnTyres, AbstractOneTrack):
+class SingleTrack(AbstractOnAxleTyres):
     """A vehicle on one track: two axles, a given forward speed, no roll.
 
     In the body's axes, with delta the steer at the road wheels, a and b the distances of the axles from the centre of
@@ -108,10 +107,6 @@ class SingleTrack(AbstractOnTyres, AbstractOneTrack):
         """`SingleTrackState`, followed by the states of dynamic tyres as `front_<name>`, `rear_<name>`."""
         extra = self.tyres.state_names
         return record_type("SingleTrackState", (*self.own_states, *extra)) if extra else SingleTrackState
-
-    @property
-    def tyres(self) -> AxleTyres:
-        return AxleTyres(self.front, self.rear)
 
     @property
     def units(self):

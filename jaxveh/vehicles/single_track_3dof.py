@@ -12,10 +12,9 @@ from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import Contact
 from jaxveh.vehicles import two_track
-from jaxveh.vehicles.axles import AxleTyres
 from jaxveh.vehicles.base import Motion
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic, axle_loads
-from jaxveh.vehicles.shared import AbstractOneTrack, AbstractOnTyres
+from jaxveh.vehicles.shared import AbstractOnAxleTyres
 from jaxveh.vehicles.traction import AbstractSpinless, driven_forces
 from jaxveh.vehicles.wheels import contact, gravity, rolling
 
@@ -29,7 +28,7 @@ UNITS = {
 }
 
 
-class SingleTrack3DOF(AbstractSpinless, AbstractOnTyres, AbstractOneTrack):
+class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
     """A vehicle on one track that speeds up and slows down: v_x, v_y and yaw rate.
 
     With X, Y the axles' forces in the car's axes, a and b the axles' distances from the centre of gravity (R. Rajamani, Vehicle
@@ -58,10 +57,6 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnTyres, AbstractOneTrack):
     def own_states(self):
         """`v_x`, `v_y`, `yaw`, `yaw_rate`, then the states of the load transfer."""
         return (*STATES, *self.load_transfer.state_names)
-
-    @property
-    def tyres(self) -> AxleTyres:
-        return AxleTyres(self.front, self.rear)
 
     @property
     def units(self):

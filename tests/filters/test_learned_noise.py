@@ -132,6 +132,13 @@ class TestHaarParticles:
         told = filter_._with_memory(mixed, memory).measurement_noise
         np.testing.assert_allclose((told.std.flow, told.scale.flow), (6.0, scale))
 
+    def test_draws_of_what_it_knows_are_its_particles(self):
+        _, recording = walk(20, 2, np.full(20, 3.0))
+        filter_ = filters.HaarParticles(filters.ParticleFilter(10))
+        belief = filters.run(filter_, model(1.0), recording, key=jax.random.key(0)).belief
+        drawn = belief.sample(jax.random.key(1), 50).level
+        assert np.isin(drawn, belief.inside.particles.level).all()
+
     def test_what_it_cannot_is_refused(self):
         with pytest.raises(InputError, match="HaarNoise is for"):
             filters.HaarParticles(filters.Kalman())

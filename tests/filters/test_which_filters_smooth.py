@@ -12,7 +12,8 @@ from filter_systems import linear_recording
 from test_every_filter import FILTERS, linear
 
 from jaxveh import InputError, filters
-from jaxveh.filters.wrappers.base import AbstractStateless, gaussian_of
+from jaxveh.filters.gaussian.wrapper import AbstractStateless
+from jaxveh.filters.wrappers.base import gaussian_of
 from jaxveh.statespace.contract import Smoothing, smoothing_of
 
 ROWS = 8

@@ -14,11 +14,11 @@ from jaxveh._core.errors import check_whole
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, correct, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import Image, product, times
-from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
+from jaxveh.filters.gaussian.wrapper import AbstractStateless
 from jaxveh.statespace import Smoothing
 
 
-class Iterated(AbstractGaussianWrapper):
+class Iterated(AbstractStateless):
     """`inner`, whose update is repeated with the observation linearised under the last posterior.
 
     With `Extended` the iterated extended Kalman filter, Gauss-Newton for the most probable state (B. Bell & F. Cathey 1993);
@@ -28,7 +28,6 @@ class Iterated(AbstractGaussianWrapper):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     inner: AbstractRuleFilter
     iterations: int = eqx.field(static=True, default=4)
@@ -40,18 +39,6 @@ class Iterated(AbstractGaussianWrapper):
     @property
     def linearisations(self):
         return self.iterations
-
-    def prior(self, model, row):
-        return self.inner.prior(model, row)
-
-    def predict_between(self, model, belief, t, u_next):
-        return self.inner.predict_between(model, belief, t, u_next)
-
-    def observe(self, model, belief, row):
-        return self.inner.observe(model, belief, row)
-
-    def adapted_model(self, model, belief):
-        return model
 
     def update(self, model, belief, row):
         posterior, info = correct(self.inner.form, model, belief, row, self.observe(model, belief, row))

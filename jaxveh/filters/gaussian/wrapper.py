@@ -1,5 +1,7 @@
 """What all filters around Gaussian filters have in common."""
 
+from typing import ClassVar
+
 import equinox as eqx
 
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind
@@ -9,7 +11,7 @@ from jaxveh.statespace import AbstractWrapper
 class AbstractGaussianWrapper(AbstractGaussianFilter, AbstractWrapper):
     """A Gaussian filter around another, `inner`: a subclass writes what it does otherwise than that."""
 
-    # No postponed annotations in this file: they would make a field of it.
+    # No postponed annotations in this file: they would make fields of it and of class variables.
     inner: eqx.AbstractVar[AbstractGaussianFilter]
 
     def __check_init__(self):
@@ -17,3 +19,21 @@ class AbstractGaussianWrapper(AbstractGaussianFilter, AbstractWrapper):
 
     def check(self, model):
         self.inner.check(model)
+
+
+class AbstractStateless(AbstractGaussianWrapper):
+    """A filter around another, `inner`, that remembers nothing: its belief is that of its filter."""
+
+    noise_by_row: ClassVar[bool] = True
+
+    def prior(self, model, row):
+        return self.inner.prior(model, row)
+
+    def predict_between(self, model, belief, t, u_next):
+        return self.inner.predict_between(model, belief, t, u_next)
+
+    def observe(self, model, belief, row):
+        return self.inner.observe(model, belief, row)
+
+    def adapted_model(self, model, belief):
+        return self.inner.adapted_model(model, belief)

@@ -10,35 +10,21 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import check_whole
 from jaxveh.filters.choosing import check_ancestors
+from jaxveh.filters.outer_belief import AbstractOuterBelief
 from jaxveh.filters.particle import ParticleBelief
 from jaxveh.filters.smoothing.rauch_tung_striebel import given_later
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.filters.wrappers.base import gaussian_of
-from jaxveh.statespace import AbstractBelief, AbstractFilter, AbstractWrapper, Row, Smoothing, StateSpace, kit
+from jaxveh.statespace import AbstractFilter, AbstractWrapper, Row, Smoothing, StateSpace, kit
 
 
-class LaggedBelief(AbstractBelief):
+class LaggedBelief(AbstractOuterBelief):
     """The newest belief `inside`; the last beliefs as one with (lag + 1, ...) leaves, oldest first, in `past`; and what the
     report says of the oldest, given the newest: `shown`, mean and standard deviation."""
 
     inside: Any
     past: Any
     shown: Any
-
-    @property
-    def t(self):
-        """Time of the newest row, s."""
-        return self.inside.t
-
-    @property
-    def u(self):
-        """Inputs of the newest row."""
-        return self.inside.u
-
-    @property
-    def count(self):
-        """Rows so far."""
-        return self.inside.count
 
     def moments(self, model):
         return self.shown

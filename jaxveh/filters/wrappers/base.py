@@ -9,70 +9,19 @@ import jax.numpy as jnp
 from jaxveh._core.errors import InputError
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.wrapper import AbstractGaussianWrapper
-from jaxveh.statespace import AbstractBelief, Gaussian, Info, Row, StateSpace, kit
+from jaxveh.filters.outer_belief import AbstractTransparentBelief
+from jaxveh.statespace import Gaussian, Info, Row, StateSpace, kit
 
 
-class AbstractStateless(AbstractGaussianWrapper):
-    """A filter around another, `inner`, that remembers nothing: its belief is that of its filter."""
-
-    # No postponed annotations in this file: they would make fields of class variables.
-    noise_by_row: ClassVar[bool] = True
-
-    def prior(self, model, row):
-        return self.inner.prior(model, row)
-
-    def predict_between(self, model, belief, t, u_next):
-        return self.inner.predict_between(model, belief, t, u_next)
-
-    def observe(self, model, belief, row):
-        return self.inner.observe(model, belief, row)
-
-    def adapted_model(self, model, belief):
-        return self.inner.adapted_model(model, belief)
-
-
-class Remembering(AbstractBelief):
+class Remembering(AbstractTransparentBelief):
     """The belief of the filter `inside`, and what the wrapper remembers: `memory`, a tree of arrays."""
 
     inside: Any
     memory: Any
 
-    @property
-    def mean(self):
-        """The state's mean."""
-        return self.inside.mean
-
-    @property
-    def std(self):
-        """The state's standard deviations."""
-        return self.inside.std
-
-    @property
-    def covariance(self):
-        """(n, n) in the order of the state's fields."""
-        return self.inside.covariance
-
-    @property
-    def t(self):
-        """Time of the last row, s."""
-        return self.inside.t
-
-    @property
-    def u(self):
-        """Inputs of the last row."""
-        return self.inside.u
-
-    @property
-    def count(self):
-        """Rows so far."""
-        return self.inside.count
-
     def inflate(self, factor):
         """The belief with `factor` times its covariance."""
         return Remembering(self.inside.inflate(factor), self.memory)
-
-    def moments(self, model):
-        return self.inside.moments(model)
 
 
 class AbstractRemembering(AbstractGaussianWrapper):
@@ -104,6 +53,17 @@ class AbstractRemembering(AbstractGaussianWrapper):
         """The filter's own update with the noises that the memory says."""
         after, info = self.inner.update(self.believed_model(model, belief.memory), belief.inside, row)
         return Remembering(after, belief.memory), info
+
+
+class AbstractLearnedNoise(AbstractRemembering):
+    """A filter around another that learns the variances of its sensors. Their noise must be Gaussian, a standard deviation a
+    channel."""
+
+    rows_between: ClassVar[bool] = True
+
+    def check(self, model):
+        check_independent(type(self).__name__, model)
+        self.inner.check(model)
 
 
 def gaussian_of(belief: Any) -> GaussianBelief:

@@ -12,7 +12,7 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.names import as_groups, as_names, check_names
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
-from jaxveh.filters.wrappers.base import AbstractStateless
+from jaxveh.filters.gaussian.wrapper import AbstractStateless
 from jaxveh.statespace import Smoothing, StateSpace
 
 

@@ -13,7 +13,8 @@ from jaxveh._core.errors import InputError, check, float_array
 from jaxveh._core.result import first_failure
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
-from jaxveh.filters.wrappers.base import AbstractStateless, check_independent, variances_of, with_variances
+from jaxveh.filters.gaussian.wrapper import AbstractStateless
+from jaxveh.filters.wrappers.base import check_independent, variances_of, with_variances
 from jaxveh.filters.wrappers.interacting import mixed_covariance
 from jaxveh.statespace import Info, Smoothing
 

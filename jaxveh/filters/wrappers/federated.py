@@ -17,50 +17,18 @@ from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import times
-from jaxveh.statespace import AbstractBelief, AbstractProcessNoise, AbstractWrapper, Row, StateSpace
+from jaxveh.filters.outer_belief import AbstractTransparentBelief
+from jaxveh.statespace import AbstractProcessNoise, AbstractWrapper, Row, StateSpace
 
 
-class FederatedBelief(AbstractBelief):
-    """The `master`, a Gaussian; the `locals`; their `shares` (k,) of the information; and how they fared: `alarm` (k,), the
-    fading mean of NIS over its expected value."""
+class FederatedBelief(AbstractTransparentBelief):
+    """The master, a Gaussian, `inside`; the `locals`; their `shares` (k,) of the information; and how they fared: `alarm` (k,),
+    the fading mean of NIS over its expected value."""
 
-    master: GaussianBelief
+    inside: GaussianBelief
     locals: tuple[GaussianBelief, ...]
     shares: jax.Array
     alarm: jax.Array
-
-    @property
-    def t(self):
-        """Time of the last row, s."""
-        return self.master.t
-
-    @property
-    def u(self):
-        """Inputs of the last row."""
-        return self.master.u
-
-    @property
-    def count(self):
-        """Rows so far."""
-        return self.master.count
-
-    @property
-    def mean(self):
-        """The master's mean."""
-        return self.master.mean
-
-    @property
-    def std(self):
-        """The master's standard deviations."""
-        return self.master.std
-
-    @property
-    def covariance(self):
-        """The master's (n, n)."""
-        return self.master.covariance
-
-    def moments(self, model):
-        return self.master.moments(model)
 
 
 class Federated(AbstractWrapper):
@@ -146,16 +114,16 @@ class Federated(AbstractWrapper):
 
     def _step(self, model, belief, row):
         if self.common:
-            predicted = self.inner.predict_between(model, belief.master, row.t, row.u)
+            predicted = self.inner.predict_between(model, belief.inside, row.t, row.u)
             return self._update_locals(model, belief, predicted, self._hand_out(predicted, belief.shares), row)
         # All locals by one program: they differ in numbers alone.
-        before = self._hand_out(belief.master, belief.shares) if self.reset else _together(belief.locals)
+        before = self._hand_out(belief.inside, belief.shares) if self.reset else _together(belief.locals)
 
         def ahead(local, share):
             return self.inner.predict_between(_with_process_noise_over(model, share), local, row.t, row.u)
 
         alone = jax.vmap(ahead)(before, belief.shares)
-        return self._update_locals(model, belief, self._fuse(alone, belief.master), alone, row)
+        return self._update_locals(model, belief, self._fuse(alone, belief.inside), alone, row)
 
     def _hand_out(self, master: GaussianBelief, shares) -> GaussianBelief:
         """The locals, one behind the other along the first axis of each array."""
@@ -176,7 +144,7 @@ class Federated(AbstractWrapper):
         # Where every local is suspect there is nothing to judge by.
         trusted = trusted | ~jnp.any(trusted)
         believed = jax.vmap(_either)(trusted, found, ahead)
-        master = self._fuse(believed, belief.master, predicted if self.common else None)
+        master = self._fuse(believed, belief.inside, predicted if self.common else None)
         master = with_spread(
             master, master.vector, Spread(master.factor, master.matrix), row.t, row.u, belief.count + 1
         )

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxveh._core.errors import check_positive
 from jaxveh._core.names import record
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
-from jaxveh.filters.wrappers.base import AbstractStateless
+from jaxveh.filters.gaussian.wrapper import AbstractStateless
 from jaxveh.filters.wrappers.innovation import innovation
 from jaxveh.statespace import Smoothing
 

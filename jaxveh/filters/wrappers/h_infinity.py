@@ -12,7 +12,7 @@ from jaxveh._core.errors import check, float_array
 from jaxveh._core.names import check_names
 from jaxveh._core.result import Result, code
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
-from jaxveh.filters.wrappers.base import AbstractStateless
+from jaxveh.filters.gaussian.wrapper import AbstractStateless
 
 
 class HInfinity(AbstractStateless):

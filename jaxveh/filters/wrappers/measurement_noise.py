@@ -11,9 +11,8 @@ import jax.numpy as jnp
 from jaxveh._core.errors import check, check_whole
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.wrappers.base import (
-    AbstractRemembering,
+    AbstractLearnedNoise,
     Remembering,
-    check_independent,
     variances_of,
     with_variances,
 )
@@ -22,7 +21,7 @@ from jaxveh.filters.wrappers.robust import expected_squares
 from jaxveh.statespace import Smoothing
 
 
-class SageHusa(AbstractRemembering):
+class SageHusa(AbstractLearnedNoise):
     """`inner` with measurement variances by matching the innovations' (A. Sage & G. Husa 1969, in fading form).
 
         R <- (1 - d) R + d (e^2 - H P H^T),    d = (1 - b) / (1 - b^(k+1)),    b = `forgetting`
@@ -33,7 +32,6 @@ class SageHusa(AbstractRemembering):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    rows_between: ClassVar[bool] = True
     inner: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)
     floor: float = eqx.field(static=True, default=0.01)
@@ -43,10 +41,6 @@ class SageHusa(AbstractRemembering):
         check("SageHusa.forgetting", self.forgetting, lambda b: (b > 0) & (b < 1), "between 0 and 1")
         check("SageHusa.floor", self.floor, lambda v: (v > 0) & (v <= 1), "above 0 and at most 1")
         check("SageHusa.ceiling", self.ceiling, lambda v: v >= 1, "at least 1")
-
-    def check(self, model):
-        check_independent("SageHusa", model)
-        self.inner.check(model)
 
     def start(self, model):
         variances = variances_of(model)
@@ -76,7 +70,7 @@ class Precisions(NamedTuple):
     scale: Any
 
 
-class VariationalBayes(AbstractRemembering):
+class VariationalBayes(AbstractLearnedNoise):
     """`inner` with measurement variances as unknowns of inverse-gamma laws (S. Sarkka & A. Nummenmaa 2009).
 
     Between rows the laws forget: shape and scale times `forgetting`, so that 1 / (1 - forgetting) rows are remembered. In a row
@@ -89,7 +83,6 @@ class VariationalBayes(AbstractRemembering):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    rows_between: ClassVar[bool] = True
     inner: AbstractGaussianFilter
     forgetting: float = eqx.field(static=True, default=0.98)
     weight: float = eqx.field(static=True, default=10.0)
@@ -99,10 +92,6 @@ class VariationalBayes(AbstractRemembering):
         check("VariationalBayes.forgetting", self.forgetting, lambda b: (b > 0) & (b <= 1), "above 0 and at most 1")
         check("VariationalBayes.weight", self.weight, lambda v: v > 0, "positive")
         check_whole("VariationalBayes.iterations", self.iterations)
-
-    def check(self, model):
-        check_independent("VariationalBayes", model)
-        self.inner.check(model)
 
     def start(self, model):
         variances = variances_of(model)

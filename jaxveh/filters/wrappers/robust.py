@@ -10,8 +10,8 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import check_positive, check_whole
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
+from jaxveh.filters.gaussian.wrapper import AbstractStateless
 from jaxveh.filters.wrappers.base import (
-    AbstractStateless,
     check_independent,
     variances_of,
     with_variances,
@@ -20,7 +20,20 @@ from jaxveh.filters.wrappers.innovation import innovation, spread_of
 from jaxveh.statespace import Smoothing, kit
 
 
-class Huber(AbstractStateless):
+class AbstractReweighting(AbstractStateless):
+    """A filter around another that takes each row's noise for larger where a residual is. The noise must be Gaussian, a standard
+    deviation a channel."""
+
+    rows_between: ClassVar[bool] = True
+
+    def check(self, model):
+        who = type(self).__name__
+        check_independent(who, model)
+        kit.check_noise_by_row(who, self.inner)
+        self.inner.check(model)
+
+
+class Huber(AbstractReweighting):
     """`inner` with Huber's loss of the innovations: linear beyond `threshold` standard deviations of the prediction.
 
     Each channel's noise variance is divided by the weight `min(1, threshold / |e|)`, e the innovation over its predicted
@@ -30,17 +43,11 @@ class Huber(AbstractStateless):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    rows_between: ClassVar[bool] = True
     inner: AbstractGaussianFilter
     threshold: float = eqx.field(static=True, default=1.345)
 
     def __check_init__(self):
         check_positive("Huber.threshold", self.threshold)
-
-    def check(self, model):
-        check_independent("Huber", model)
-        kit.check_noise_by_row("Huber", self.inner)
-        self.inner.check(model)
 
     def update(self, model, belief, row):
         found = innovation(self.inner, model, belief, row)
@@ -50,7 +57,7 @@ class Huber(AbstractStateless):
         return self.inner.update(with_variances(model, variances_of(model) / weight), belief, row)
 
 
-class RobustStudentT(AbstractStateless):
+class RobustStudentT(AbstractReweighting):
     """`inner` for noise of Student's t law with `dof` degrees of freedom and the model's standard deviations as scales.
 
     A t law is a Gaussian whose precision is itself random; variational Bayes finds the precision and the state in turns, with
@@ -63,7 +70,6 @@ class RobustStudentT(AbstractStateless):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    rows_between: ClassVar[bool] = True
     inner: AbstractGaussianFilter
     dof: float = eqx.field(static=True, default=4.0)
     iterations: int = eqx.field(static=True, default=3)
@@ -71,11 +77,6 @@ class RobustStudentT(AbstractStateless):
     def __check_init__(self):
         check_positive("RobustStudentT.dof", self.dof)
         check_whole("RobustStudentT.iterations", self.iterations)
-
-    def check(self, model):
-        check_independent("RobustStudentT", model)
-        kit.check_noise_by_row("RobustStudentT", self.inner)
-        self.inner.check(model)
 
     def update(self, model, belief, row):
         scale = variances_of(model)

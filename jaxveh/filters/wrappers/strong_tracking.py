@@ -35,9 +35,6 @@ class StrongTracking(AbstractRemembering):
         check("StrongTracking.softening", self.softening, lambda v: v >= 1, "at least 1")
         check("StrongTracking.ceiling", self.ceiling, lambda v: v >= 1, "at least 1")
 
-    def check(self, model):
-        self.inner.check(model)
-
     def start(self, model):
         dtype = model.prior.mean[0].dtype
         # V over the noise; negative before a channel's first row.

@@ -11,13 +11,12 @@ from jaxveh._core.errors import InputError, check, check_one_of
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter
 from jaxveh.filters.particle import AbstractParticleFilter
 from jaxveh.filters.wrappers.base import (
-    AbstractRemembering,
+    AbstractLearnedNoise,
     Remembering,
-    check_independent,
     variances_of,
     with_variances,
 )
-from jaxveh.statespace import AbstractWrapper, CauchyGaussianMixture, Gaussian, Smoothing, kit
+from jaxveh.statespace import AbstractFilter, AbstractWrapper, CauchyGaussianMixture, Gaussian, Smoothing, kit
 
 # The median of the absolute value of a standard normal number.
 NORMAL_MEDIAN = 0.6744897501960817
@@ -32,7 +31,23 @@ class Window(NamedTuple):
     variances: Any
 
 
-class HaarNoise(AbstractRemembering):
+class AbstractHaar(AbstractWrapper):
+    """A filter around another that takes its variances from a `Window`, by the settings that `HaarNoise` tells of."""
+
+    rows_between: ClassVar[bool] = True
+    inner: AbstractFilter
+    window: int = eqx.field(static=True, default=64)
+    forgetting: float = eqx.field(static=True, default=0.9)
+    floor: float = eqx.field(static=True, default=0.01)
+    ceiling: float = eqx.field(static=True, default=1e4)
+    fewest: int | None = eqx.field(static=True, default=None)
+    initial: float = eqx.field(static=True, default=1.0)
+
+    def __check_init__(self):
+        check_settings(self)
+
+
+class HaarNoise(AbstractHaar, AbstractLearnedNoise):
     """`inner` with measurement variances from the Haar wavelet's highest band of the last `window` samples
     (Qin et al. 2014).
 
@@ -51,21 +66,7 @@ class HaarNoise(AbstractRemembering):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
-    rows_between: ClassVar[bool] = True
     inner: AbstractGaussianFilter
-    window: int = eqx.field(static=True, default=64)
-    forgetting: float = eqx.field(static=True, default=0.9)
-    floor: float = eqx.field(static=True, default=0.01)
-    ceiling: float = eqx.field(static=True, default=1e4)
-    fewest: int | None = eqx.field(static=True, default=None)
-    initial: float = eqx.field(static=True, default=1.0)
-
-    def __check_init__(self):
-        check_settings(self)
-
-    def check(self, model):
-        check_independent("HaarNoise", model)
-        self.inner.check(model)
 
     def start(self, model):
         return first_window(self, variances_of(model))
@@ -78,7 +79,7 @@ class HaarNoise(AbstractRemembering):
         return self.update_inside(model, Remembering(belief.inside, memory), row)
 
 
-class HaarParticles(AbstractWrapper):
+class HaarParticles(AbstractHaar):
     """What `HaarNoise` does, around a particle `inner`, whose likelihood need not be Gaussian.
 
     The settings are those of `HaarNoise`. Of a `CauchyGaussianMixture` the variances are those of its Gaussian part (Qin et al.
@@ -88,14 +89,7 @@ class HaarParticles(AbstractWrapper):
     **Raises** `InputError` for settings out of range, a filter without particles, or a law of another kind.
     """
 
-    rows_between: ClassVar[bool] = True
     inner: AbstractParticleFilter
-    window: int = eqx.field(static=True, default=64)
-    forgetting: float = eqx.field(static=True, default=0.9)
-    floor: float = eqx.field(static=True, default=0.01)
-    ceiling: float = eqx.field(static=True, default=1e4)
-    fewest: int | None = eqx.field(static=True, default=None)
-    initial: float = eqx.field(static=True, default=1.0)
     follows: str = eqx.field(static=True, default="gaussian")
 
     def __check_init__(self):
@@ -104,7 +98,6 @@ class HaarParticles(AbstractWrapper):
             raise InputError(
                 f"HaarParticles: {kind} inside: must be a particle filter; HaarNoise is for Gaussian ones."
             )
-        check_settings(self)
         check_one_of("HaarParticles.follows", self.follows, ("gaussian", "both"))
 
     def check(self, model):

@@ -1,0 +1,44 @@
+"""What fits by a filter's likelihood have in common."""
+
+# No postponed annotations here: equinox does not see an AbstractVar in a string.
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import pick, put
+from jaxveh.filters import AbstractFilter
+from jaxveh.fitting.problem import AbstractProblem, in_units, on_line
+from jaxveh.statespace import StateSpace
+
+
+class AbstractFilterProblem(AbstractProblem):
+    """A cost of leaves of a filter's model, whose coordinates are the parameters (p,) on their bijectors' line.
+
+    `counts` (recordings,): how many times each recording counts. `centre`, `spread` (p,): the prior on that line, a spread of
+    infinity for none.
+    """
+
+    filter: eqx.AbstractVar[AbstractFilter]
+    model: eqx.AbstractVar[StateSpace]
+    counts: eqx.AbstractVar[jax.Array]
+    centre: eqx.AbstractVar[jax.Array]
+    spread: eqx.AbstractVar[jax.Array]
+
+    def start(self):
+        return on_line(self.chosen, pick(self.model, self.chosen))
+
+    def line(self, z):
+        return z
+
+    def model_at(self, z):
+        return put(self.model, self.chosen, in_units(self.chosen, z))
+
+    def prior_cost(self, z):
+        """The prior's negative logarithm at z, up to a constant: a scalar."""
+        return 0.5 * jnp.sum(((z - self.centre) / self.spread) ** 2)
+
+    def with_counts(self, counts):
+        return dataclasses.replace(self, counts=counts)
