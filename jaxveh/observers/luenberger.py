@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import check, float_array
-from jaxveh.observers.base import AbstractObserver, check_gain, check_one_or_each
+from jaxveh.observers.base import AbstractObserver, advance, check_gain, check_one_or_each
 
 
 def array(value: Any) -> jax.Array:
