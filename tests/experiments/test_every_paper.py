@@ -16,7 +16,7 @@ ALWAYS_THE_SAME = {
     ("tyre_apf", "_bounds"): "as above",
     ("tyre_apf", "curves_figure"): "the shade of the prior's draws",
     ("tyre_apf", "main"): "a program that chose what `settings` has, on drives of its own",
-    ("sideslip_review", "_found"): "one real log, judged once",
+    ("sideslip_review", "_run_estimators"): "one real log, judged once",
 }
 """Functions that make a key without being asked for a seed, and why."""
 
