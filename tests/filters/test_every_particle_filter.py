@@ -19,7 +19,6 @@ from nonlinear_systems import X, Y, as_recording, grid_filter, simulate
 from jaxveh import JaxvehWarning, Result, filters, numerics
 from jaxveh import statespace as ss
 from jaxveh.numerics import resampling
-from jaxveh.statespace.measurements import presence
 
 N, SEEDS, ROWS = 500, 16, 40
 CASES = ("sharp", "middle", "coarse", "two peaks")
@@ -189,7 +188,7 @@ def test_the_first_stage_is_the_exact_predictive_likelihood_of_a_linear_model():
     for spoken in ((0, 1), (1,), ()):
         y = {f"y{i}": rng.normal() for i in spoken}
         row = system.row(1.0, {"force": 0.7}, y)
-        found, _ = filters.PredictiveLikelihood().log_prob(system, row, particles, *presence(system, row), 0.05)
+        found, _ = filters.PredictiveLikelihood().log_prob(system, row, particles, 0.05)
         e = np.array([y[f"y{i}"] for i in spoken]) - (H @ np.stack(particles) + D[:, None] * 0.7)[list(spoken)].T
         S = (H @ Q @ H.T + R)[np.ix_(spoken, spoken)]
         exact = scipy.stats.multivariate_normal(np.zeros(len(spoken)), S).logpdf(e) if spoken else np.zeros(7)
