@@ -90,8 +90,8 @@ def _forces(chassis, x, motion, u):
 
 def _derivatives(system, t, motion, u):
     chassis, x = system
-    # Each force has two consumers; without a barrier XLA computes it twice.
-    front, rear = numerics.barrier(_forces(chassis, x, motion, u))
+    # Each force has two consumers; without a fence XLA computes it twice.
+    front, rear = numerics.fence(_forces(chassis, x, motion, u))
     return Motion(
         (front + rear) / chassis.mass - u.v_x * motion.yaw_rate,
         motion.yaw_rate,

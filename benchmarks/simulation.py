@@ -62,7 +62,7 @@ def simulate(
 
     def inputs(t):
         steer = p.amplitude * numerics.sin(2 * np.pi * p.frequency * t)
-        return Inputs(*numerics.barrier((steer, jnp.full_like(t, p.drive_torque), jnp.zeros_like(t))))
+        return Inputs(*numerics.fence((steer, jnp.full_like(t, p.drive_torque), jnp.zeros_like(t))))
 
     def rates(t, x, cars):
         return cars.derivatives(t, x, inputs(t))

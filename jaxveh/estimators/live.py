@@ -13,7 +13,7 @@ import numpy as np
 
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
-from jaxveh.numerics import always, apart
+from jaxveh.numerics import apart
 from jaxveh.statespace import AbstractFilter, Info, Row, StateSpace
 
 
@@ -70,8 +70,8 @@ def _clean_rows(cleaning: AbstractCleaning, time: Any, values: dict[str, Any]) -
         jax.tree.map(lambda leaf: leaf[0], (time, values)),
         jax.tree.map(lambda leaf: leaf[1:], (time, values)),
     )
-    memory, start = apart(cleaning.first, always(first[0]), *first)
-    body = lambda memory, row: apart(cleaning.next, always(row[0]), memory, *row)
+    memory, start = apart(cleaning.first, first[0], *first)
+    body = lambda memory, row: apart(cleaning.next, row[0], memory, *row)
     _, rest = jax.lax.scan(body, memory, rest)
     return jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), start, rest)
 
@@ -128,14 +128,14 @@ class Live(eqx.Module):
 
 @eqx.filter_jit
 def _live_init(live: Live, row: Row) -> tuple[LiveBelief, LiveAnswer]:
-    memory, values = apart(live.cleaning.first, always(row.t), row.t, _values(row))
+    memory, values = apart(live.cleaning.first, row.t, row.t, _values(row))
     belief, info = live.filter.init(live.model, _with(row, values), live.key)
     return LiveBelief(belief, memory), LiveAnswer(*belief.moments(live.model), info)
 
 
 @eqx.filter_jit
 def _live_step(live: Live, before: LiveBelief, row: Row) -> tuple[LiveBelief, LiveAnswer]:
-    memory, values = apart(live.cleaning.next, always(row.t), before.memory, row.t, _values(row))
+    memory, values = apart(live.cleaning.next, row.t, before.memory, row.t, _values(row))
     belief, info = live.filter.step(live.model, before.belief, _with(row, values))
     return LiveBelief(belief, memory), LiveAnswer(*belief.moments(live.model), info)
 

@@ -123,7 +123,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         lookahead = lookahead_for(model) if self.lookahead is None else self.lookahead
         to = (belief.t, row.t)
-        characteristic, lost = numerics.barrier(
+        characteristic, lost = numerics.fence(
             replace_lost(lookahead.propagate(model, *to, belief.particles, u), belief.particles)
         )
         ahead, residual = lookahead.log_prob(model, row, characteristic, row.t - belief.t)
@@ -139,7 +139,7 @@ class AuxiliaryParticleFilter(AbstractParticleFilter):
         else:
             chosen = gather(belief.particles, ancestors)
             moved, lost = replace_lost(model.transition(*to, chosen, u), chosen)
-        moved, lost = numerics.barrier((add_noise(model, noise, moved, row.t - belief.t), lost))
+        moved, lost = numerics.fence((add_noise(model, noise, moved, row.t - belief.t), lost))
         stage = FirstStage(ahead, first, log_first, ancestors, resampled, alive)
         return LookedAhead(moved, lost, belief, characteristic, residual, stage)
 

@@ -101,7 +101,7 @@ class Ensemble(AbstractTwoPartFilter):
         moved = model.transition(belief.t, t, belief.members, u)
         # Another key each time: between two rows there may be several predictions.
         draw, key = jax.random.split(jax.random.fold_in(belief.key, belief.count))
-        moved = numerics.barrier(add_noise(model, draw, moved, t - belief.t))
+        moved = numerics.fence(add_noise(model, draw, moved, t - belief.t))
         return EnsembleBelief(moved, key, t, belief.u, belief.count)
 
     def update(self, model: StateSpace, belief: EnsembleBelief, row: Row) -> tuple[EnsembleBelief, Info]:

@@ -190,7 +190,7 @@ class Guided(AbstractParticleFilter):
         prior = Spread(numerics.cholesky(covariance), covariance)
         rule = _rule_of(self.rule, len(law.names))
         propose = jax.vmap(lambda x: _proposal(model, rule, row, x, law.names, prior))
-        proposals = numerics.barrier(propose(moved))
+        proposals = numerics.fence(propose(moved))
         logs = without(lost, log_of(belief.weights))
         first, log_first, alive = numerics.normalise(logs + proposals.log_ahead if self.auxiliary else logs)
         ancestors, resampled = choose_ancestors(self, draw, first)

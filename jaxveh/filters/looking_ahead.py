@@ -90,7 +90,7 @@ class PredictiveLikelihood(AbstractLookahead):
         spread = _marginal(_image(law, slopes), R, here)
         count = sum(h.astype(R.dtype) for h in here)
         logs = _log_normal(spread, filled) - 0.5 * kit.LOG_2PI * count
-        return numerics.barrier(logs), residual
+        return numerics.fence(logs), residual
 
 
 class PointLookahead(AbstractLookahead):
@@ -185,7 +185,7 @@ def slopes_of(model: StateSpace, row, particles, names: tuple[str, ...]) -> tupl
     one = jnp.ones(n, particles[0].dtype)
     along = lambda name: jax.jvp(lambda v: see(particles._replace(**{name: v})), (getattr(particles, name),), (one,))[1]
     slopes = [list(row) for row in zip(*[along(name) for name in names], strict=True)]
-    return numerics.barrier((see(particles), slopes))
+    return numerics.fence((see(particles), slopes))
 
 
 def _image(law: AbstractNoise, slopes: list) -> list[list]:

@@ -235,7 +235,7 @@ class Marginalised(AbstractParticleFilter):
             return _condition_on_first(mean, times(times(J, P), J.T) + Q, white)
 
         moved = jax.vmap(move, in_axes=(0, 0, 1))(points, covariances, white)
-        moved = numerics.barrier(moved)
+        moved = numerics.fence(moved)
         particles, lost = replace_lost(_as_state(self, model, moved.z.T, moved.x.T), points)
         lost = lost | ~jnp.all(jnp.isfinite(moved.P), axis=(1, 2))
         P = jnp.where(lost[:, None, None], covariances, moved.P)

@@ -94,7 +94,7 @@ def log_prob(model: StateSpace, row, particles):
         logs = jax.vmap(of)(particles, residual)
     else:
         logs = model.measurement_noise.log_prob(residual, present)
-    return numerics.barrier(jnp.broadcast_to(logs, (n,))), residual
+    return numerics.fence(jnp.broadcast_to(logs, (n,))), residual
 
 
 def add_noise(model: StateSpace, key, particles, dt):
@@ -249,7 +249,7 @@ class ParticleFilter(AbstractParticleFilter):
         particles, drawn = self._draw_particles(draw, belief)
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved, lost = replace_lost(model.transition(belief.t, row.t, particles, u), particles)
-        moved, lost = numerics.barrier((add_noise(model, noise, moved, row.t - belief.t), lost))
+        moved, lost = numerics.fence((add_noise(model, noise, moved, row.t - belief.t), lost))
         return Expected(moved, drawn, lost, belief.key, belief.count)
 
     def _draw_particles(self, key, belief):

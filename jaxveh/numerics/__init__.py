@@ -5,9 +5,9 @@ All are safe to jit, batch and differentiate.
 
 from jaxveh.numerics import polynomials, sigma_points
 from jaxveh.numerics.angles import wrap_angle
-from jaxveh.numerics.apart import always, apart
 from jaxveh.numerics.blocks import sum_in_blocks
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
+from jaxveh.numerics.fences import apart, fence, fence_blocks, fenced
 from jaxveh.numerics.harmonics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
 from jaxveh.numerics.linear_algebra import (
     cholesky,
@@ -19,7 +19,7 @@ from jaxveh.numerics.linear_algebra import (
     solve_psd,
     symmetric,
 )
-from jaxveh.numerics.platform import barrier, barriers_hold, kept, on_cpu, stored
+from jaxveh.numerics.platform import barriers_hold, on_cpu
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 from jaxveh.numerics.roots import secant
@@ -31,12 +31,10 @@ from jaxveh.numerics.tangents import derivative_alone
 from jaxveh.numerics.triangular import lower_factor
 
 __all__ = [
-    "always",
     "apart",
     "arctan",
     "arctan2",
     "band_harmonics",
-    "barrier",
     "barriers_hold",
     "cauchy",
     "cholesky",
@@ -44,12 +42,14 @@ __all__ = [
     "derivative_alone",
     "ess",
     "exponential",
+    "fence",
+    "fence_blocks",
+    "fenced",
     "gauss_markov_harmonics",
     "hypot",
     "interpolate_linear",
     "interpolate_smooth",
     "inverse_psd",
-    "kept",
     "log",
     "log_det",
     "lower_factor",
@@ -73,7 +73,6 @@ __all__ = [
     "solve_psd",
     "solve_scalars",
     "sqrt",
-    "stored",
     "stratified",
     "student_t",
     "sum_in_blocks",

@@ -21,7 +21,8 @@ from jax.typing import ArrayLike
 
 from jaxveh.numerics import polynomials
 from jaxveh.numerics.float_bits import float_layout, sign_of
-from jaxveh.numerics.platform import Tree, barrier, on_cpu
+from jaxveh.numerics.fences import Tree, fence
+from jaxveh.numerics.platform import on_cpu
 
 _TANGENT_OF_PI_8 = math.sqrt(2) - 1
 _TANGENT_OF_3_PI_8 = math.sqrt(2) + 1
@@ -142,9 +143,9 @@ def _ours(*arguments: Array) -> bool:
     return on_cpu() and all(x.dtype in (jnp.float32, jnp.float64) and not x.weak_type for x in arguments)
 
 
-def _stored(values: Tree) -> Tree:
+def _fence_many(values: Tree) -> Tree:
     """Arguments as arrays in memory, where they are many: else XLA computes what they are made of once for each use."""
-    return barrier(values) if jax.tree.leaves(values)[0].size >= _MANY else values
+    return fence(values) if jax.tree.leaves(values)[0].size >= _MANY else values
 
 
 # Sine and cosine
@@ -171,7 +172,7 @@ def _alternating_sign(count: Array) -> Array:
 def _sin(x: Array) -> Array:
     if not _ours(x):
         return jnp.sin(x)
-    x = _stored(x)
+    x = _fence_many(x)
     count = jnp.round(x * (1 / math.pi))
     return _reduced_sine(x, count, _alternating_sign(count))
 
@@ -180,7 +181,7 @@ def _sin(x: Array) -> Array:
 def _cos(x: Array) -> Array:
     if not _ours(x):
         return jnp.cos(x)
-    x = _stored(x)
+    x = _fence_many(x)
     # cos(r + pi / 2 + n pi) = -(-1)^n sin(r): the reduction subtracts n + 1/2 half turns.
     count = jnp.round(x * (1 / math.pi) - 0.5)
     return _reduced_sine(x, count + 0.5, -_alternating_sign(count))
@@ -238,7 +239,7 @@ def _arctan_polynomial(turned: Array, r: Array) -> Array:
 def _arctan(x: Array) -> Array:
     if not _ours(x):
         return jnp.arctan(x)
-    x = _stored(x)
+    x = _fence_many(x)
     # |x| as a product, because the derivative of |x| is 0 at 0.
     sign = sign_of(x)
     turned, top, bottom = _three_ranges(sign * x, jnp.ones_like(x))
@@ -249,7 +250,7 @@ def _arctan(x: Array) -> Array:
 def _arctan2(y: Array, x: Array) -> Array:
     if not _ours(x, y):
         return _library_arctan2(y, x)
-    x, y = _stored(jnp.broadcast_arrays(x, y))
+    x, y = _fence_many(jnp.broadcast_arrays(x, y))
     largest = float(jnp.finfo(x.dtype).max) / 4  # so that infinities and sums of the two stay finite
     sign = sign_of(y)
     left = x < 0.0

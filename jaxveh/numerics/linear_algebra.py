@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxveh.numerics.elementary import log
-from jaxveh.numerics.platform import barrier
+from jaxveh.numerics.fences import fence
 
 WRITTEN_OUT = 8
 """The largest number of rows whose formulas are written out in scalars."""
@@ -133,12 +133,12 @@ def _inverse_rows(factor: Array) -> Rows:
 def _from_rows(rows: Rows) -> Array:
     """The lower triangular matrix (..., n, n) of its rows of scalars (...,)."""
     zero = jnp.zeros_like(rows[0][0])
-    rows = barrier(rows)  # or each entry of the stack would be computed from the beginning again
+    rows = fence(rows)  # or each entry of the stack would be computed from the beginning again
     return jnp.stack([jnp.stack([*row, *[zero] * (len(rows) - len(row))], -1) for row in rows], -2)
 
 
 def _stack(rows: Rows) -> Array:
-    return jnp.stack([jnp.stack(row, -1) for row in barrier(rows)], -2)
+    return jnp.stack([jnp.stack(row, -1) for row in fence(rows)], -2)
 
 
 def _by_columns(solve: Callable[[Array, list[Array]], list[Array]], factor: Array, b: Array) -> Array:
@@ -153,7 +153,7 @@ def _by_columns(solve: Callable[[Array, list[Array]], list[Array]], factor: Arra
     # A matrix is solved for all columns at once: a row of it stands where a vector has a scalar.
     entries = factor if vector else factor[..., None, :, :]
     rows = [b[..., i] if vector else b[..., i, :] for i in range(n)]
-    return jnp.stack(barrier(solve(entries, rows)), -1 if vector else -2)
+    return jnp.stack(fence(solve(entries, rows)), -1 if vector else -2)
 
 
 def _library_solve(factor: Array, b: Array, *, transposed: bool) -> Array:

@@ -16,7 +16,8 @@ from jax import Array
 from jax.typing import ArrayLike, DTypeLike
 
 from jaxveh.numerics.elementary import log_of_normal, sqrt
-from jaxveh.numerics.platform import barrier, barriers_hold, on_cpu
+from jaxveh.numerics.fences import fence
+from jaxveh.numerics.platform import barriers_hold, on_cpu
 from jaxveh.numerics.words import half_turn_of_word, sin_cos_of_word
 
 Shape = int | Sequence[int]
@@ -82,7 +83,7 @@ def _normal(key: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
     half = (count + 1) // 2
     if barriers_hold():
         sines, cosines = _normal_pairs(key, half, dtype)
-        return barrier(jnp.concatenate((sines, cosines))[:count]).reshape(shape)
+        return fence(jnp.concatenate((sines, cosines))[:count]).reshape(shape)
     # The same numbers without a concatenation, into which XLA would draw everything, scalar by scalar.
     place, first_half = _places(count)
     sines, cosines = _box_muller(*_blocks(key, place), dtype)
@@ -121,7 +122,7 @@ def _cauchy(key: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
 @partial(jax.jit, static_argnums=(2, 3))
 def _student_t(key: Array, df: Array, shape: tuple[int, ...], dtype: jnp.dtype) -> Array:
     count = math.prod(shape)
-    first, second = barrier(_word_pairs(key, jax.lax.iota(jnp.uint32, count), count, dtype))
+    first, second = fence(_word_pairs(key, jax.lax.iota(jnp.uint32, count), count, dtype))
     surprise = -2.0 * log_of_normal(_positive_unit(first, dtype)).reshape(shape)
     largest = 0.9 * math.log(float(jnp.finfo(dtype).max))  # so that the square root's argument stays finite
     radius = sqrt(df * jnp.expm1(jnp.minimum(surprise / df, largest)))
@@ -159,15 +160,15 @@ def _box_muller(first: Array, second: Array, dtype: jnp.dtype) -> tuple[Array, A
 
 
 def _normal_pairs(key: Array, count: int, dtype: jnp.dtype) -> tuple[Array, Array]:
-    return barrier(_box_muller(*_stored_blocks(key, count), dtype))
+    return fence(_box_muller(*_stored_blocks(key, count), dtype))
 
 
 def _words(key: Array, count: int, dtype: jnp.dtype) -> Array:
     """`count` words as wide as `dtype`."""
     if dtype == jnp.float64:
-        return barrier(_double_words(key, jax.lax.iota(jnp.uint32, count)))
+        return fence(_double_words(key, jax.lax.iota(jnp.uint32, count)))
     if barriers_hold():
-        return jnp.concatenate(barrier(_blocks(key, jax.lax.iota(jnp.uint32, (count + 1) // 2))))[:count]
+        return jnp.concatenate(fence(_blocks(key, jax.lax.iota(jnp.uint32, (count + 1) // 2))))[:count]
     place, first_half = _places(count)
     return jnp.where(first_half, *_blocks(key, place))
 
@@ -218,8 +219,8 @@ def _stored_blocks(key: Array, count: int) -> tuple[Array, Array]:
     """Both words of the first `count` blocks, computed once: XLA would compute a block for each of its two words."""
     place = jax.lax.iota(jnp.uint32, count)
     if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
-        return barrier(_blocks(key, place))
-    both = barrier(_double_words(key, place))
+        return fence(_blocks(key, place))
+    both = fence(_double_words(key, place))
     return (both >> jnp.asarray(32, jnp.uint64)).astype(jnp.uint32), both.astype(jnp.uint32)
 
 

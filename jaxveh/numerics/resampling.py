@@ -19,7 +19,8 @@ from jax import Array
 
 from jaxveh.numerics import random, sums
 from jaxveh.numerics.elementary import log
-from jaxveh.numerics.platform import barrier, on_cpu
+from jaxveh.numerics.fences import fence
+from jaxveh.numerics.platform import on_cpu
 
 
 @partial(jax.jit, static_argnums=2, static_argnames="n")
@@ -37,10 +38,10 @@ def stratified(key: Array, weights: Array, n: int | None = None) -> Array:
     """One uniform offset for each of n strata (Kitagawa, 1996)."""
     n = _size(weights, n)
     parts, total = _cumulated_parts(weights)
-    offsets = barrier(random.uniform(key, (n,), weights.dtype))
+    offsets = fence(random.uniform(key, (n,), weights.dtype))
     position = _position(parts, total, n, weights.dtype)
     whole = jnp.minimum(jnp.floor(position), n - 1)
-    stratum = barrier(whole.astype(jnp.int32))
+    stratum = fence(whole.astype(jnp.int32))
     # All strata below the position's are passed, its own if the offset is.
     passed = stratum + (offsets[stratum] < position - whole).astype(jnp.int32)
     return _ancestors(jnp.where(parts == total, n, passed), n)
@@ -92,7 +93,7 @@ def normalise(log_weights: Array) -> tuple[Array, Array, Array]:
     largest = jax.lax.stop_gradient(jnp.max(jnp.where(living, log_weights, -jnp.inf)))
     largest = jnp.where(alive, largest, 0.0)
     shifted = jnp.where(living, log_weights, largest) - largest
-    raw = barrier(jnp.where(living, jnp.exp(shifted), 0.0))
+    raw = fence(jnp.where(living, jnp.exp(shifted), 0.0))
     total = jnp.where(alive, sums.total(raw), 1.0)
     weights = jnp.where(alive, raw * (1.0 / total), 1.0 / count)
     log_mean = jnp.where(alive, largest + log(total) - math.log(count), -jnp.inf)
@@ -115,7 +116,7 @@ def _size(weights: Array, n: int | None) -> int:
 def _cumulated_parts(weights: Array) -> tuple[Array, Array]:
     """Cumulated weights in whole parts (N,), and their sum: 2^30 or 2^52 but for rounding."""
     parts = _as_parts(weights)
-    cumulated = barrier(_cumulative_sum(parts))
+    cumulated = fence(_cumulative_sum(parts))
     return cumulated, cumulated[-1]
 
 
@@ -132,7 +133,7 @@ def _cumulated_by_blocks(values: Array) -> Array:
     columns = [blocks[:, 0]]
     for j in range(1, block):
         columns.append(columns[-1] + blocks[:, j])
-    sums = barrier(jnp.stack(columns, axis=1))
+    sums = fence(jnp.stack(columns, axis=1))
     if count > 1:
         totals = sums[:, -1]
         sums = sums + (_cumulated_by_blocks(totals) - totals)[:, None]
@@ -141,7 +142,7 @@ def _cumulated_by_blocks(values: Array) -> Array:
 
 def _as_parts(weights: Array) -> Array:
     bits, integer = (30, jnp.int32) if weights.dtype == jnp.float32 else (52, jnp.int64)
-    return barrier(jnp.round(weights * (2.0**bits / sums.total(weights))).astype(integer))
+    return fence(jnp.round(weights * (2.0**bits / sums.total(weights))).astype(integer))
 
 
 def _position(parts: Array, total: Array, n: int, dtype: jnp.dtype) -> Array:
@@ -151,16 +152,16 @@ def _position(parts: Array, total: Array, n: int, dtype: jnp.dtype) -> Array:
 
 def _ancestors(passed: Array, n: int) -> Array:
     """Ancestors (n,), where `passed` (N,) counts the children of all particles up to and with each: its last is n."""
-    passed = barrier(jnp.clip(passed, 0, n))
+    passed = fence(jnp.clip(passed, 0, n))
     ended = jnp.zeros(n, jnp.int32).at[passed].add(1, mode="drop", indices_are_sorted=True)
-    return barrier(_cumulative_sum(barrier(ended)))
+    return fence(_cumulative_sum(fence(ended)))
 
 
 def _sorted_parts(key: Array, n: int, count: Array, total: Array, dtype: jnp.dtype) -> Array:
     """(n,) whole numbers in [0, total): `count` sorted uniform ones, then numbers that mean nothing."""
     spacing = random.exponential(key, (n + 1,), dtype)
     used = jax.lax.iota(jnp.int32, n + 1) <= count
-    cumulated = barrier(_cumulative_sum(_as_parts(jnp.where(used, spacing, 0.0))))
+    cumulated = fence(_cumulative_sum(_as_parts(jnp.where(used, spacing, 0.0))))
     uniform = cumulated[:-1].astype(dtype) * (1.0 / cumulated[-1].astype(dtype))
     drawn = jnp.floor(uniform * total.astype(dtype)).astype(total.dtype)
     return jnp.clip(drawn, 0, total - 1)
@@ -168,4 +169,4 @@ def _sorted_parts(key: Array, n: int, count: Array, total: Array, dtype: jnp.dty
 
 def _search(cumulated: Array, drawn: Array) -> Array:
     """The first particle whose cumulated parts exceed each drawn number."""
-    return barrier(jnp.searchsorted(cumulated, drawn, side="right").astype(jnp.int32))
+    return fence(jnp.searchsorted(cumulated, drawn, side="right").astype(jnp.int32))

@@ -4,7 +4,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from jaxveh.numerics.platform import barrier, on_cpu
+from jaxveh.numerics.fences import fence
+from jaxveh.numerics.platform import on_cpu
 
 _LANES = 40
 """Sums side by side: enough for the processor's vectors and to hide an addition's latency."""
@@ -22,6 +23,6 @@ def total(values: Array) -> Array:
     if count < 2 or not on_cpu():
         return jnp.sum(values)
     # The barrier keeps XLA from making one sum of the two again.
-    lanes = barrier(jnp.sum(values[: count * _LANES].reshape(count, _LANES), axis=0))
+    lanes = fence(jnp.sum(values[: count * _LANES].reshape(count, _LANES), axis=0))
     rest = values[count * _LANES :]
     return jnp.sum(lanes) + jnp.sum(rest) if rest.size else jnp.sum(lanes)

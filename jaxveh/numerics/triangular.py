@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxveh.numerics.linear_algebra import solve_lower
-from jaxveh.numerics.platform import barrier
+from jaxveh.numerics.fences import fence
 
 
 @jax.custom_jvp
@@ -52,7 +52,7 @@ def _orthogonalise(matrix: Array) -> tuple[Array, Array]:
         along = jnp.sum(rest[1:] * direction, axis=-1)
         columns.append(jnp.concatenate([jnp.zeros(i, matrix.dtype), length[None], along]))
         directions.append(direction)
-        rest = barrier(rest[1:] - along[:, None] * direction)
+        rest = fence(rest[1:] - along[:, None] * direction)
     return jnp.stack(columns, axis=-1), jnp.stack(directions)
 
 

@@ -30,7 +30,7 @@ class Event(eqx.Module):
         def crossing(t, y, args, **_):
             # diffrax compares it with a number of the default precision, whatever that of the car is. Looked at and kept for
             # the next step it must be one number: rounded in two ways, a fall that ends a step would be seen by neither.
-            return numerics.kept(jnp.asarray(self.condition(args, t, y), float))
+            return numerics.fence(jnp.asarray(self.condition(args, t, y), float), firm=True)
 
         return diffrax.Event(crossing, Falling(tolerance=tolerance), direction=False)
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, final
 import equinox as eqx
 
 from jaxveh._core.errors import InputError
-from jaxveh.numerics import always, apart
+from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.model import Row, StateSpace
 
@@ -73,12 +73,12 @@ class AbstractFilter(eqx.Module):
 
         **Raises** `InputError` without a key where the filter draws random numbers.
         """
-        return apart(self._init, always(row.t), model, row, key_for(self, key))
+        return apart(self._init, row.t, model, row, key_for(self, key))
 
     @final
     def step(self, model: StateSpace, belief: Any, row: Row) -> tuple[AbstractBelief, Info]:
         """The belief after the next row."""
-        return apart(self._step, belief.count >= 0, model, belief, row)
+        return apart(self._step, belief.count, model, belief, row)
 
     @abc.abstractmethod
     def check(self, model: StateSpace) -> None:

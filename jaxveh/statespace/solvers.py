@@ -57,7 +57,7 @@ class RK4(AbstractOneStep):
         half = t0 + (t1 - t0) / 2
 
         def stage(t, y):
-            return numerics.kept(terms.vf_prod(t, y, args, dt))
+            return numerics.fence(terms.vf_prod(t, y, args, dt), firm=True)
 
         def ahead(share, k):
             return jax.tree.map(lambda y, d: y + share * d, y0, k)
@@ -67,7 +67,7 @@ class RK4(AbstractOneStep):
         k3 = stage(half, ahead(0.5, k2))
         k4 = stage(t1, ahead(1.0, k3))
         y1 = jax.tree.map(lambda y, a, b, c, d: y + (a + 2 * b + 2 * c + d) / 6, y0, k1, k2, k3, k4)
-        return numerics.barrier(y1)
+        return numerics.fence(y1)
 
 
 class RolledRK4(AbstractOneStep):
@@ -89,7 +89,7 @@ class RolledRK4(AbstractOneStep):
             k, y1 = carry
             reach, weight = given
             y = jax.tree.map(lambda y, d: y + reach * d, y0, k)
-            k = numerics.kept(terms.vf_prod(t0 + reach * (t1 - t0), y, args, dt))
+            k = numerics.fence(terms.vf_prod(t0 + reach * (t1 - t0), y, args, dt), firm=True)
             return (k, jax.tree.map(lambda y, d: y + weight * d, y1, k)), None
 
         reaches, weights = jnp.array([0, 0.5, 0.5, 1], dtype), jnp.array([1 / 6, 1 / 3, 1 / 3, 1 / 6], dtype)
@@ -107,9 +107,9 @@ class Heun(AbstractOneStep):
 
     def end(self, terms, t0, t1, y0, args):
         dt = terms.contr(t0, t1)
-        k1 = numerics.barrier(terms.vf_prod(t0, y0, args, dt))
-        k2 = numerics.barrier(terms.vf_prod(t1, jax.tree.map(jnp.add, y0, k1), args, dt))
-        return numerics.barrier(jax.tree.map(lambda y, a, b: y + 0.5 * (a + b), y0, k1, k2))
+        k1 = numerics.fence(terms.vf_prod(t0, y0, args, dt))
+        k2 = numerics.fence(terms.vf_prod(t1, jax.tree.map(jnp.add, y0, k1), args, dt))
+        return numerics.fence(jax.tree.map(lambda y, a, b: y + 0.5 * (a + b), y0, k1, k2))
 
 
 class Propagate(eqx.Module):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from jaxveh import numerics
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces
-from jaxveh.vehicles.wheels import state_names, state_of, stored
+from jaxveh.vehicles.wheels import state_names, state_of
 
 AXLES = ("front", "rear")
 
@@ -30,9 +31,10 @@ class AxleTyres(NamedTuple):
         settled = [t.start(at) for t, at in zip(self, contacts, strict=True) if isinstance(t, AbstractDynamicTyre)]
         return tuple(value for state in settled for value in state)
 
+    @numerics.fenced
     def forces(self, contacts: tuple[Contact, Contact], states: tuple[Any, Any]) -> tuple[Forces, Forces]:
         """What the road does to each axle, in the wheels' axes."""
-        front, rear = (stored(tyre.forces(*at)) for tyre, *at in zip(self, contacts, states, strict=True))
+        front, rear = (tyre.forces(*at) for tyre, *at in zip(self, contacts, states, strict=True))
         return front, rear
 
     def rates(self, contacts: tuple[Contact, Contact], states: tuple[Any, Any]) -> tuple:

@@ -136,6 +136,7 @@ class WheelWeights(AxleWeights, Protocol):
     def front_roll_share(self) -> Any: ...
 
 
+@numerics.fenced
 def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     """Wheel loads, N, of a rigid car whose body neither rolls nor pitches visibly.
 
@@ -158,9 +159,9 @@ def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     # an axle and by the other axle: computed once it is 110 instead of 119 ns a step of 7-DOF cars (float64, 1000 runs).
     first_front = limit_transfer(share / track_front * moment, half_front)
     moved_rear = limit_transfer(moment * (1.0 / track_rear) - first_front * (track_front / track_rear), half_rear)
-    moved_rear = numerics.barrier(moved_rear)
+    moved_rear = numerics.fence(moved_rear)
     moved_front = limit_transfer(moment * (1.0 / track_front) - moved_rear * (track_rear / track_front), half_front)
-    moved_front = numerics.barrier(moved_front)
+    moved_front = numerics.fence(moved_front)
     return Wheels(half_front - moved_front, half_front + moved_front, half_rear - moved_rear, half_rear + moved_rear)
 
 

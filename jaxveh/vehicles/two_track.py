@@ -140,9 +140,14 @@ class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
 
 def rolling_wheels(places: Wheels, v_x: Any, v_y: Any, yaw_rate: Any, steer: Any) -> Wheels:
     """How wheels at `places` ((x, y), m) move over the road; both front wheels turn by the steer (rad)."""
-    turn = numerics.barrier((numerics.cos(steer), numerics.sin(steer)))
+    turn = _cosine_and_sine(steer)
     turned = Wheels(turn, turn, (1.0, 0.0), (1.0, 0.0))
     return each_wheel(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), places, turned)
+
+
+@numerics.fenced
+def _cosine_and_sine(steer: Any) -> tuple[Any, Any]:
+    return numerics.cos(steer), numerics.sin(steer)
 
 
 def air_drag(drag: Any, v_x: Any) -> Any:

@@ -1,7 +1,7 @@
 """Every place of the package where a derivative is not what jax makes of arithmetic, and what tests it there.
 
 A derivative rule, a primitive, a value without derivative, a loop of unknown length or a callback that is not in `PLACES` fails.
-Fences (`barrier`, `kept`, `stored`, `apart`) stand here where they are made; who uses them needs no line.
+Fences (`numerics/fences.py`) stand here where they are made; who uses them needs no line.
 """
 
 import ast
@@ -62,13 +62,13 @@ PLACES = {
     "filters/transport.py": {"stop_gradient": "the largest logarithm, which cancels in the sum of exponentials"},
     "numerics/blocks.py": {"filter_custom_jvp": EVERY},
     "numerics/elementary.py": {"custom_jvp": EVERY, "stop_gradient": EVERY, "bitcast_convert_type": EVERY},
-    "numerics/float_bits.py": {"bitcast_convert_type": EVERY},
-    "numerics/held.py": {
+    "numerics/fences.py": {
         "Primitive": EVERY,
         "optimization_barrier": EVERY,
+        "custom_jvp": HESSIAN,
         "bitcast_convert_type": "the condition of a branch that is always taken",
     },
-    "numerics/platform.py": {"optimization_barrier": EVERY},
+    "numerics/float_bits.py": {"bitcast_convert_type": EVERY},
     "numerics/resampling.py": {"stop_gradient": EVERY},
     "numerics/roots.py": {"stop_gradient": EVERY, "while_loop": EVERY},
     "numerics/tangents.py": {"Primitive": SCORES},
@@ -76,10 +76,6 @@ PLACES = {
     "numerics/words.py": {"bitcast_convert_type": "whole numbers of random words"},
     "simulation/meter.py": {"callback": "tells how far a run is; no number comes back"},
     "simulation/solve.py": {"diffeqsolve": "tests/simulation, by the adjoint that is asked for"},
-    "numerics/apart.py": {
-        "custom_jvp": HESSIAN,
-        "bitcast_convert_type": "the condition of a branch that is always taken",
-    },
 }
 
 

@@ -32,9 +32,6 @@ EXEMPT = {
     "unscented": "the field's name of a transform",
     "passed": "a truth value of a test",
     "converged": "a truth value of a fit",
-    "held": "a fence of `numerics`",
-    "kept": "a fence of `numerics`",
-    "stored": "a fence of `numerics`",
 }
 ELSEWHERE = {"JAXVEH_SHARED": "a variable of the environment", "peers": "a marker of tests"}
 NOT_OURS = {

@@ -73,13 +73,14 @@ class AligningCoefficients(eqx.Module):
         lateral force that acts on the trail: F_y without camber, weighted (4.E74), in version 5.2 F_y less what slip ratio adds.
         """
         F_x, F_y, on_trail = forces
-        slip = numerics.stored((K_xk / not_zero(pure.stiffness)) ** 2 * at.slip_ratio**2)
-        trail = numerics.stored(self._trail(at, scaling, structure, slip))
-        residual = numerics.stored(self._residual(at, scaling, structure, pure, slip, weight_y))
+        slip = _slip_share(at, K_xk, pure.stiffness)
+        trail = self._trail(at, scaling, structure, slip)
+        residual = self._residual(at, scaling, structure, pure, slip, weight_y)
         arm = self.SSZ1 + self.SSZ2 * F_y / structure.FNOMIN + (self.SSZ3 + self.SSZ4 * at.df_z) * at.camber
         arm = structure.UNLOADED_RADIUS * arm * scaling.LS
         return AligningParts(-trail * on_trail + residual + arm * F_x, trail, residual)
 
+    @numerics.fenced
     def _trail(self, at, scaling, structure, slip):
         """Pneumatic trail (4.E73 with A55, A58, A60), m: the other way in backward travel (4.E42)."""
         c, camber = self, at.camber
@@ -94,9 +95,10 @@ class AligningCoefficients(eqx.Module):
         side = 1 + (c.QEZ4 + c.QEZ5 * at.sine) * (2 / math.pi) * numerics.arctan(B * c.QCZ1 * alpha)
         E = curvature(bend * side, at)
         # The factor LFZO is not in the book; the reference evaluator has it, after TNO's own solver.
-        curve = cosine_curve(_equivalent(alpha, slip), B, c.QCZ1, E) * numerics.stored(_cosine_of_course(at))
+        curve = cosine_curve(_equivalent(alpha, slip), B, c.QCZ1, E) * _cosine_of_course(at)
         return D * curve * at.smooth * scaling.LFZO
 
+    @numerics.fenced
     def _residual(self, at, scaling, structure, pure, slip, weight_y):
         """Residual torque M_zr (4.E75 with A54), N m: the other way in backward travel (4.E47)."""
         c = self
@@ -114,6 +116,12 @@ class AligningCoefficients(eqx.Module):
         return (D + turning) * numerics.cos(shape * numerics.arctan(B * _equivalent(alpha, slip))) * at.smooth
 
 
+@numerics.fenced
+def _slip_share(at, K_xk, K_ya):
+    """The square of the slip ratio's part in the equivalent slip angles (A54, A55): of the trail's and of the residual's."""
+    return (K_xk / not_zero(K_ya)) ** 2 * at.slip_ratio**2
+
+
 def _per_friction(scale, mu):
     """`scale / mu`; without friction there is no force that the result could act on."""
     slippery = mu == 0
@@ -125,6 +133,7 @@ def _equivalent(alpha, slip):
     return numerics.arctan(numerics.sqrt(numerics.tan(alpha) ** 2 + slip)) * sign(alpha)
 
 
+@numerics.fenced
 def _cosine_of_course(at):
     """cos(alpha'): the wheel's speed over that of its contact centre (4.E6)."""
     course = jnp.abs(at.speed) * jnp.sqrt(1 + numerics.tan(at.slip_angle) ** 2)

@@ -31,13 +31,13 @@ def bend(x, E):
 
 def sine_curve(x, B, C, D, E):
     """`D sin(C arctan(B x - E (B x - arctan(B x))))`: forces."""
-    x, B, C, D, E = numerics.stored((x, B, C, D, E))
+    x, B, C, D, E = numerics.fence_blocks((x, B, C, D, E))
     return D * numerics.sin(C * numerics.arctan(bend(B * x, E)))
 
 
 def cosine_curve(x, B, C, E):
     """`cos(C arctan(B x - E (B x - arctan(B x))))`: trail, and weights of combined slip."""
-    x, B, C, E = numerics.stored((x, B, C, E))
+    x, B, C, E = numerics.fence_blocks((x, B, C, E))
     return numerics.cos(C * numerics.arctan(bend(B * x, E)))
 
 

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters
 from jaxveh.tyres.mf_tyre.formula import coefficient, cosine_of_arctan, curvature, not_zero, sign, sine_curve, weight
 
@@ -61,6 +62,7 @@ class LongitudinalCoefficients(eqx.Module):
     def __check_init__(self):
         check_parameters(self)
 
+    @numerics.fenced
     def pure(self, at, scaling) -> PureLongitudinal:
         """F_x0 and what it is made of."""
         c, s = self, scaling
@@ -78,6 +80,7 @@ class LongitudinalCoefficients(eqx.Module):
         B_x = K_xk / not_zero(C_x * D_x)
         return PureLongitudinal(sine_curve(kappa, B_x, C_x, D_x, E_x) + S_Vx, K_xk, mu_x)
 
+    @numerics.fenced
     def weight(self, at, scaling):
         """G_xa: the share of F_x0 that is left at a slip angle."""
         c = self

@@ -38,8 +38,8 @@ class OverturningCoefficients(eqx.Module):
         c, camber = self, at.camber
         load = jnp.where(at.load < least_load, at.load**3 / jnp.where(least_load > 0, least_load, 1) ** 2, at.load)
         share, side = load / structure.FNOMIN, F_y / structure.FNOMIN
-        level = numerics.stored(numerics.cos(c.QSX5 * numerics.arctan((c.QSX6 * share) ** 2)))
-        lean = numerics.stored(numerics.sin(c.QSX7 * camber + c.QSX8 * numerics.arctan(c.QSX9 * side)))
+        level = numerics.cos(c.QSX5 * numerics.arctan((c.QSX6 * share) ** 2))
+        lean = numerics.sin(c.QSX7 * camber + c.QSX8 * numerics.arctan(c.QSX9 * side))
         with_load = (
             c.QSX1 * scaling.LVMX - c.QSX2 * camber * (1 + c.PPMX1 * at.dp_i) + c.QSX3 * side + c.QSX4 * (level * lean)
         )

@@ -40,10 +40,11 @@ class RollingCoefficients(eqx.Module):
             moment = -structure.UNLOADED_RADIUS * load * scaling.LMY * sum_
         else:
             sum_ = sum_ + (c.QSY5 + c.QSY6 * share) * at.camber**2
-            powers = numerics.stored(_power(share, c.QSY7) * _power(at.pressure / structure.NOMPRES, c.QSY8))
+            powers = _power(share, c.QSY7) * _power(at.pressure / structure.NOMPRES, c.QSY8)
             moment = -structure.UNLOADED_RADIUS * structure.FNOMIN * scaling.LMY * sum_ * powers
-        return moment * numerics.stored(self._rolls(at, ranges, slip_ratio))
+        return moment * self._rolls(at, ranges, slip_ratio)
 
+    @numerics.fenced
     def _rolls(self, at, ranges, slip_ratio):
         """1 for a wheel that rolls forward, -1 backward, smooth between: about the locked wheel, and zero at standstill.
 
@@ -58,6 +59,7 @@ class RollingCoefficients(eqx.Module):
         return jnp.where(moves, turns, 0.0)
 
 
+@numerics.fenced
 def _power(base, exponent):
     """`base^exponent` of a base that may be zero, where it and its derivatives are zero."""
     some = base > 0

@@ -103,14 +103,14 @@ class MFTyre(AbstractTyre):
         """Forces, moments and internals at a contact."""
         if contact.load is None:
             raise InputError("contact.load = None: MFTyre scales with load; give the wheel's load in N.")
-        at, s, load = numerics.stored(self._operating_point(contact)), self.scaling, need_load(contact, "MFTyre")
+        at, s, load = self._operating_point(contact), self.scaling, need_load(contact, "MFTyre")
         nominal = s.LFZO * self.structure.FNOMIN
-        along = numerics.stored(self.longitudinal.pure(at, s))
-        across = numerics.stored(self.lateral.pure(at, s, nominal, self.version))
-        weight_y = numerics.stored(self.lateral.weight(at, s))
+        along = self.longitudinal.pure(at, s)
+        across = self.lateral.pure(at, s, nominal, self.version)
+        weight_y = self.lateral.weight(at, s)
         added = self.lateral.ply_steer(at, s, across.mu)
-        F_x = numerics.stored(self.longitudinal.weight(at, s) * along.force)
-        F_y = numerics.stored(weight_y * across.force + added)
+        F_x = numerics.fence_blocks(self.longitudinal.weight(at, s) * along.force)
+        F_y = numerics.fence_blocks(weight_y * across.force + added)
         if self.version == 52:
             on_trail = F_y - added
         else:
@@ -131,6 +131,7 @@ class MFTyre(AbstractTyre):
         mu_y = jnp.abs(across.mu) if self.limits else across.mu
         return jnp.where(at.load > 0, along.mu, 0.0), jnp.where(at.load > 0, mu_y, 0.0)
 
+    @numerics.fenced
     def _operating_point(self, contact: Contact) -> Operating:
         """The contact within the ranges, in the signs of ISO-W."""
         structure, r = self.structure, self.ranges
@@ -141,10 +142,10 @@ class MFTyre(AbstractTyre):
         if self.limits:
             fading = r.fading_factors(alpha, speed)
             if contact.slip_speed is None:
-                along, across, smooth = numerics.stored(fading)
+                along, across, smooth = fading
                 kappa, alpha = kappa * along, alpha * across
             else:
-                smooth = numerics.stored(fading[2])
+                smooth = fading[2]
             kappa, alpha = jnp.clip(kappa, r.KPUMIN, r.KPUMAX), jnp.clip(alpha, r.ALPMIN, r.ALPMAX)
             camber = jnp.clip(camber, r.CAMMIN, r.CAMMAX)
             load, pressure = jnp.minimum(load, r.FZMAX), jnp.clip(pressure, r.PRESMIN, r.PRESMAX)

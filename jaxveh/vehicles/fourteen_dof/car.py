@@ -123,7 +123,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
             forces,
             omegas,
         )
-        roads, shafts = numerics.stored((roads, self._shafts(stand, u, omegas)))
+        shafts = self._shafts(stand, u, omegas)
         suspension, damping = suspension_forces(self, wheels_of(x, "travel"), wheels_of(x, "travel_rate"))
         found = self._accelerate(x, stand, roads, shafts, suspension, omegas, g)
         roll, pitch, yaw = angle_accelerations(body.axes, x, body.omega, found.angular)
@@ -159,9 +159,10 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         }
         return self.rates_and_outputs(rates, shown)
 
+    @numerics.fenced
     def _stand(self, x, u, ground: Ground) -> Stand:
         """How the car stands on the road, before any tyre force."""
-        body = numerics.stored(body_of(x))
+        body = body_of(x)
         wheels = each_wheel(
             lambda joint, travel, rate: wheel_at(joint, travel, rate, body),
             joints(self), wheels_of(x, "travel"), wheels_of(x, "travel_rate"),
@@ -171,9 +172,9 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
             lambda wheel, axis, omega, mu: touch(self, body, wheel, axis, omega, mu),
             wheels, turned, wheels_of(x, "omega"), frictions(ground),
         )  # fmt: skip
-        stand = Stand(body, wheels, turned, Wheels(*[b[0] for b in both]), Wheels(*[b[1] for b in both]))
-        return numerics.stored(stand)
+        return Stand(body, wheels, turned, Wheels(*[b[0] for b in both]), Wheels(*[b[1] for b in both]))
 
+    @numerics.fenced
     def _shafts(self, stand: Stand, u, omegas: Wheels) -> Wheels:
         """Torques of motors and brakes, which sit on the body."""
         drive, brake = self.drive.torques(u)

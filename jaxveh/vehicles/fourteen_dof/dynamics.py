@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from jaxveh.numerics import solve_scalars, stored
+from jaxveh.numerics import fenced, solve_scalars
 from jaxveh.vehicles.fourteen_dof.suspension import Joint, Wheel
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, times
 from jaxveh.vehicles.wheels import Wheels, each_wheel, sum_of_wheels
@@ -55,9 +55,7 @@ def accelerations(
     ways = each_wheel(lambda joint, wheel: (*joint.slope, *cross(wheel.place, joint.slope)), joints, wheels)
     matrix = _matrix(inertia, joints, wheels, ways)
     b = _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension)
-    matrix, b = stored((matrix, b))
-    found = stored(solve_scalars(matrix, b))
-    linear, angular = Vector(*found[:3]), Vector(*found[3:])
+    linear, angular = _solve(matrix, b)
 
     def travel(joint: Joint, wheel: Wheel, G: Vector, S: Any):
         carried = add(linear, cross(angular, wheel.place))
@@ -66,6 +64,14 @@ def accelerations(
     return Accelerations(linear, angular, each_wheel(travel, joints, wheels, on_wheel, suspension))
 
 
+@fenced
+def _solve(matrix: list, b: list) -> tuple[Vector, Vector]:
+    """Accelerations a and alpha of the body."""
+    found = solve_scalars(matrix, b)
+    return Vector(*found[:3]), Vector(*found[3:])
+
+
+@fenced
 def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> list:
     """Rows up to the diagonal of the system in (a, alpha): all as one rigid body, less what the joints leave free."""
     m = each_wheel(lambda joint: joint.mass, joints)
@@ -90,6 +96,7 @@ def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> l
     return [[entry - free(i, j) for j, entry in enumerate(row)] for i, row in enumerate(rigid)]
 
 
+@fenced
 def _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension) -> list:
     """Forces and moments on all as one rigid body, less what the joints do not carry."""
     I, w = inertia, omega

@@ -96,6 +96,7 @@ class Reaction(NamedTuple):
     dissipation: Any
 
 
+@numerics.fenced
 def reaction(
     car: AbstractSuspendedTwoTrack, body: Body, at: Contact, how: Touch, forces: Forces, omega: Any
 ) -> Reaction:

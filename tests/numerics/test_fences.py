@@ -1,4 +1,4 @@
-"""One place decides by platform, and a barrier changes nothing but speed."""
+"""One place decides by platform, and a fence changes nothing but speed."""
 
 import jax
 import jax.numpy as jnp
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxveh import numerics
-from jaxveh.numerics import platform
+from jaxveh.numerics import fences
 
 pytestmark = pytest.mark.product
 
@@ -16,8 +16,12 @@ def holds(f, x, barriers):
     return ("optimization_barrier" if barriers else "stablehlo.case") in jax.jit(f).lower(x).as_text()
 
 
-def _with_barrier(x):
-    first, second = numerics.barrier((x * x, jnp.sin(x)))
+def firm(tree):
+    return numerics.fence(tree, firm=True)
+
+
+def _with_fence(x):
+    first, second = numerics.fence((x * x, jnp.sin(x)))
     return jnp.sum(first * second)
 
 
@@ -43,13 +47,13 @@ X = jnp.asarray([0.3, -1.2, 2.0])
     ],
     ids=["call", "jit", "grad", "jacfwd", "hessian", "checkpoint", "vmap", "vmap_grad", "linearize"],
 )
-def test_barrier_is_the_identity_under(transform):
-    np.testing.assert_allclose(transform(_with_barrier)(X), transform(_without)(X), rtol=1e-14)
+def test_a_fence_is_the_identity_under(transform):
+    np.testing.assert_allclose(transform(_with_fence)(X), transform(_without)(X), rtol=1e-14)
 
 
-def test_barrier_keeps_structure_and_types():
+def test_a_fence_keeps_structure_and_types():
     tree = {"a": (jnp.ones(2, jnp.float32), jnp.arange(3, dtype=jnp.int32)), "b": [jnp.asarray(True)]}
-    result = numerics.barrier(tree)
+    result = numerics.fence(tree)
     assert jax.tree.structure(result) == jax.tree.structure(tree)
     assert [leaf.dtype for leaf in jax.tree.leaves(result)] == [leaf.dtype for leaf in jax.tree.leaves(tree)]
 
@@ -62,34 +66,34 @@ def test_the_platform_is_the_default_device_s():
         assert numerics.on_cpu()
 
 
-def test_elsewhere_there_is_no_barrier(monkeypatch):
-    assert "optimization_barrier" in str(jax.make_jaxpr(lambda x: numerics.barrier(x))(X))
+def test_elsewhere_there_is_no_fence(monkeypatch):
+    assert "optimization_barrier" in str(jax.make_jaxpr(lambda x: numerics.fence(x))(X))
     monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
     assert not numerics.on_cpu()
     assert numerics.barriers_hold()
-    assert "optimization_barrier" not in str(jax.make_jaxpr(lambda x: numerics.barrier(x))(X))
+    assert "optimization_barrier" not in str(jax.make_jaxpr(lambda x: numerics.fence(x))(X))
 
 
 @pytest.mark.parametrize("barriers", [True, False])
-def test_stored_holds_what_fits_the_cache_alone(barriers, monkeypatch):
-    monkeypatch.setattr(platform, "barriers_hold", lambda: barriers)
+def test_blocks_fenced_are_what_fits_the_cache_alone(barriers, monkeypatch):
+    monkeypatch.setattr(fences, "barriers_hold", lambda: barriers)
 
     def held(size):
-        return holds(lambda x: numerics.stored((x, 1.0)), jnp.ones(size), barriers)
+        return holds(lambda x: numerics.fence_blocks((x, 1.0)), jnp.ones(size), barriers)
 
     assert [held(size) for size in (31, 32, 4096, 4097)] == [False, True, True, False]
-    assert numerics.stored((2.0, None)) == (2.0, None)
+    assert numerics.fence_blocks((2.0, None)) == (2.0, None)
 
 
 @pytest.mark.parametrize("barriers", [True, False])
-@pytest.mark.parametrize("hold", [numerics.stored, numerics.kept])
+@pytest.mark.parametrize("hold", [numerics.fence_blocks, firm])
 def test_what_is_held_is_decided_of_the_whole_batch(barriers, hold, monkeypatch):
     """A scalar that is one of forty is as long as an array of forty; and a branch stays one."""
-    monkeypatch.setattr(platform, "barriers_hold", lambda: barriers)
+    monkeypatch.setattr(fences, "barriers_hold", lambda: barriers)
     law = lambda x: jnp.prod(jnp.stack(hold((jnp.sin(x), x * x))))
     assert holds(jax.vmap(law), jnp.ones(40), barriers)
     assert holds(jax.vmap(jax.grad(law)), jnp.ones(40), barriers)
-    assert holds(law, jnp.asarray(1.0), barriers) == (hold is numerics.kept)
+    assert holds(law, jnp.asarray(1.0), barriers) == (hold is firm)
     x = jnp.linspace(-2.0, 2.0, 40)
     np.testing.assert_allclose(jax.vmap(jax.grad(law))(x), jnp.cos(x) * x**2 + 2 * x * jnp.sin(x), rtol=1e-13)
     twice = jax.vmap(jax.vmap(law, in_axes=0), in_axes=1)(jnp.stack([x, 2 * x]))
@@ -99,21 +103,21 @@ def test_what_is_held_is_decided_of_the_whole_batch(barriers, hold, monkeypatch)
 def test_what_is_held_may_be_split_over_devices():
     mesh, along = jax.sharding.Mesh(np.asarray(jax.devices()[:1]), ("runs",)), jax.sharding.PartitionSpec("runs")
     for checked in (True, False):
-        split = jax.shard_map(jax.vmap(numerics.kept), mesh=mesh, in_specs=along, out_specs=along, check_vma=checked)
+        split = jax.shard_map(jax.vmap(firm), mesh=mesh, in_specs=along, out_specs=along, check_vma=checked)
         np.testing.assert_array_equal(jax.jit(split)(X), X)
 
 
 @pytest.mark.parametrize("barriers", [True, False])
 @pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
-def test_stored_changes_no_number_and_no_derivative(barriers, dtype, monkeypatch):
-    monkeypatch.setattr(platform, "barriers_hold", lambda: barriers)
+def test_blocks_changes_no_number_and_no_derivative(barriers, dtype, monkeypatch):
+    monkeypatch.setattr(fences, "barriers_hold", lambda: barriers)
     x = jnp.linspace(-2, 2, 200, dtype=dtype).at[0].set(jnp.nan)
 
     def curve(x, between):
         a, b, c = between((jnp.sin(x), x * x, 3))
         return jnp.exp(a) * b + c * a
 
-    ours, theirs = (lambda x, between=between: curve(x, between) for between in (numerics.stored, lambda tree: tree))
+    ours, theirs = (lambda x, between=between: curve(x, between) for between in (numerics.fence_blocks, lambda tree: tree))
     for derivative in (
         lambda f: jax.jit(f)(x),
         lambda f: jax.vjp(f, x)[1](x[::-1]),
@@ -126,33 +130,33 @@ def test_stored_changes_no_number_and_no_derivative(barriers, dtype, monkeypatch
             np.testing.assert_allclose(one, other, rtol=1e-5 if dtype == jnp.float32 else 1e-13)
 
 
-def test_stored_by_a_branch_is_left_by_xla(monkeypatch):
-    monkeypatch.setattr(platform, "barriers_hold", lambda: False)
-    compiled = jax.jit(lambda x: numerics.stored((jnp.sin(x),))).lower(jnp.ones(500)).compile().as_text()
+def test_blocks_by_a_branch_is_left_by_xla(monkeypatch):
+    monkeypatch.setattr(fences, "barriers_hold", lambda: False)
+    compiled = jax.jit(lambda x: numerics.fence_blocks((jnp.sin(x),))).lower(jnp.ones(500)).compile().as_text()
     assert "conditional(" in compiled
 
 
 @pytest.mark.parametrize("barriers", [True, False])
 @pytest.mark.parametrize("size", [(), (1,), (5000,)])
-def test_kept_holds_every_size_and_changes_no_number(size, barriers, monkeypatch):
-    monkeypatch.setattr(platform, "barriers_hold", lambda: barriers)
+def test_firm_holds_every_size_and_changes_no_number(size, barriers, monkeypatch):
+    monkeypatch.setattr(fences, "barriers_hold", lambda: barriers)
     law = lambda between: lambda x: jnp.sum(jnp.prod(jnp.stack(between((jnp.sin(x), x * x))), axis=0))
-    ours, theirs = law(numerics.kept), law(lambda tree: tree)
+    ours, theirs = law(firm), law(lambda tree: tree)
     x = jnp.full(size, 0.3)
     assert holds(ours, x, barriers)
     for derivative in (lambda f: f, jax.grad, jax.jacfwd, lambda f: lambda x: jax.vmap(f)(jnp.stack([x, 2 * x]))):
         np.testing.assert_allclose(derivative(ours)(x), derivative(theirs)(x), rtol=1e-13)
 
 
-def test_kept_leaves_alone_what_has_no_arrays(monkeypatch):
-    assert numerics.kept((None, ())) == (None, ())
+def test_firm_leaves_alone_what_has_no_arrays(monkeypatch):
+    assert firm((None, ())) == (None, ())
     monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
-    assert "optimization_barrier" not in str(jax.make_jaxpr(lambda x: numerics.kept((x,)))(X))
+    assert "optimization_barrier" not in str(jax.make_jaxpr(lambda x: firm((x,)))(X))
 
 
-def test_stored_of_several_types_at_once(monkeypatch):
-    monkeypatch.setattr(platform, "barriers_hold", lambda: False)
+def test_blocks_of_several_types_at_once(monkeypatch):
+    monkeypatch.setattr(fences, "barriers_hold", lambda: False)
     given = jnp.ones(200), jnp.ones(200, jnp.float32), jnp.ones(200, jnp.int32)
-    for one, other in zip(jax.jit(numerics.stored)(given), given, strict=True):
+    for one, other in zip(jax.jit(numerics.fence_blocks)(given), given, strict=True):
         assert one.dtype == other.dtype
         np.testing.assert_array_equal(one, other)
