@@ -155,15 +155,14 @@ class Tyres(NamedTuple):
         """The settled states, in the order of `state_names`; of a wheel on the right in the mirror."""
         return self._gather(lambda tyre, at: tyre.start(at), self._mirror(contacts))
 
+    @numerics.fenced
     def forces(self, contacts: Wheels, states: Wheels) -> Wheels:
         """What the road does to each wheel, in the wheel's axes.
 
         A wheel on the right is the mirror image of the one on the left, its tyre's states included.
         """
         found = self._each(lambda tyre, at, state: tyre.forces(at, state), self._mirror(contacts), states)
-        return each_wheel(
-            lambda forces, right: _reverse_signs(forces) if right else forces, each_wheel(stored, found), self.right
-        )
+        return each_wheel(lambda forces, right: _reverse_signs(forces) if right else forces, found, self.right)
 
     def rates(self, contacts: Wheels, states: Wheels) -> tuple:
         """The time derivatives, in the order of `state_names`; of a wheel on the right in the mirror."""
