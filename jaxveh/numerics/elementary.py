@@ -20,8 +20,8 @@ from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jaxveh.numerics import polynomials
-from jaxveh.numerics.float_bits import float_layout, sign_of
 from jaxveh.numerics.fences import Tree, fence
+from jaxveh.numerics.float_bits import float_layout, sign_of
 from jaxveh.numerics.platform import on_cpu
 
 _TANGENT_OF_PI_8 = math.sqrt(2) - 1

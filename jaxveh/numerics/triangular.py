@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from jaxveh.numerics.linear_algebra import solve_lower
 from jaxveh.numerics.fences import fence
+from jaxveh.numerics.linear_algebra import solve_lower
 
 
 @jax.custom_jvp

@@ -117,7 +117,9 @@ def test_blocks_changes_no_number_and_no_derivative(barriers, dtype, monkeypatch
         a, b, c = between((jnp.sin(x), x * x, 3))
         return jnp.exp(a) * b + c * a
 
-    ours, theirs = (lambda x, between=between: curve(x, between) for between in (numerics.fence_blocks, lambda tree: tree))
+    ours, theirs = (
+        lambda x, between=between: curve(x, between) for between in (numerics.fence_blocks, lambda tree: tree)
+    )
     for derivative in (
         lambda f: jax.jit(f)(x),
         lambda f: jax.vjp(f, x)[1](x[::-1]),
