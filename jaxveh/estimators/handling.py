@@ -92,7 +92,7 @@ class Handling(eqx.Module):
         F_f, F_r = (self._axle(*one) for one in zip(tyres, contacts, along, errors, asymmetries, strict=True))
         return F_f * numerics.cos(steer) + along[0] * numerics.sin(steer), F_f, F_r, F_x, contacts
 
-    @numerics.fenced
+    @numerics.fence_results
     def _axle(self, tyre, contact, F_x, error, asymmetry):
         # Grip in newton at this load: what the longitudinal force takes its share of.
         grip = tyre.D * contact.load / tyre.nominal_load if tyre.nominal_load is not None else tyre.D

@@ -7,7 +7,7 @@ from jaxveh.numerics import polynomials, sigma_points
 from jaxveh.numerics.angles import wrap_angle
 from jaxveh.numerics.blocks import sum_in_blocks
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
-from jaxveh.numerics.fences import apart, fence, fence_blocks, fenced
+from jaxveh.numerics.fences import apart, fence, fence_blocks, fence_results
 from jaxveh.numerics.harmonics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
 from jaxveh.numerics.linear_algebra import (
     cholesky,
@@ -44,7 +44,7 @@ __all__ = [
     "exponential",
     "fence",
     "fence_blocks",
-    "fenced",
+    "fence_results",
     "gauss_markov_harmonics",
     "hypot",
     "interpolate_linear",

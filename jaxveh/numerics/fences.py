@@ -1,12 +1,12 @@
 """Fences: where XLA on the CPU is made to compute once, and to store, what it would compute again for each that reads it.
 
 One rule: what several read, and what costs more to compute than to store, is fenced where it leaves the function that makes it.
-There it is a decorator (`fenced`) or the last thing that happens; formulas stay as they are in the book. What a fence wins is
-said where it stands, unless it is a new state, weights or random words, which every particle filter reads many times.
+There it is a decorator (`fence_results`) or the last thing that happens; formulas of tyres and vehicles stay as they are in the book,
+and the few that do not say by a figure why (`tests/core/test_where_fences_stand.py`).
 
 - `fence(tree)`: an optimization barrier. XLA keeps to it from jax 0.12 on; before, only speed is lost.
 - `fence(tree, firm=True)`: in every version of jax.
-- `@fenced`, `fence_blocks(tree)`: firm, for arrays long enough to be worth it and short enough for the processor's cache.
+- `@fence_results`, `fence_blocks(tree)`: firm, for arrays long enough to be worth it and short enough for the processor's cache.
 - `apart(function, ...)`: a whole function as a program of its own, whose *bits* do not depend on its surroundings.
 
 All are the identity for values, batches and derivatives. On other platforms than the CPU the first three are nothing.
@@ -60,7 +60,7 @@ def fence_blocks(tree: Tree) -> Tree:
     return _of_traced(tree, _firmly(worth=True))
 
 
-def fenced(method: Method) -> Method:
+def fence_results(method: Method) -> Method:
     """A function or method whose result goes through `fence_blocks`."""
 
     @functools.wraps(method)

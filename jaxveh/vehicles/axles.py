@@ -31,7 +31,7 @@ class AxleTyres(NamedTuple):
         settled = [t.start(at) for t, at in zip(self, contacts, strict=True) if isinstance(t, AbstractDynamicTyre)]
         return tuple(value for state in settled for value in state)
 
-    @numerics.fenced
+    @numerics.fence_results
     def forces(self, contacts: tuple[Contact, Contact], states: tuple[Any, Any]) -> tuple[Forces, Forces]:
         """What the road does to each axle, in the wheels' axes."""
         front, rear = (tyre.forces(*at) for tyre, *at in zip(self, contacts, states, strict=True))

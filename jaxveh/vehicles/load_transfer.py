@@ -136,7 +136,7 @@ class WheelWeights(AxleWeights, Protocol):
     def front_roll_share(self) -> Any: ...
 
 
-@numerics.fenced
+@numerics.fence_results
 def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     """Wheel loads, N, of a rigid car whose body neither rolls nor pitches visibly.
 

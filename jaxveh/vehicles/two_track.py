@@ -145,7 +145,7 @@ def rolling_wheels(places: Wheels, v_x: Any, v_y: Any, yaw_rate: Any, steer: Any
     return each_wheel(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), places, turned)
 
 
-@numerics.fenced
+@numerics.fence_results
 def _cosine_and_sine(steer: Any) -> tuple[Any, Any]:
     return numerics.cos(steer), numerics.sin(steer)
 

@@ -118,7 +118,7 @@ def contact(
     )
 
 
-@numerics.fenced
+@numerics.fence_results
 def _slips(moves: WheelMotion, slip_speed: Any, wheel_speed: Any) -> tuple[Any, Any]:
     """Lateral slip and slip ratio, which every law of forces reads several times."""
     inverse = 1.0 / slip_speed
@@ -155,7 +155,7 @@ class Tyres(NamedTuple):
         """The settled states, in the order of `state_names`; of a wheel on the right in the mirror."""
         return self._gather(lambda tyre, at: tyre.start(at), self._mirror(contacts))
 
-    @numerics.fenced
+    @numerics.fence_results
     def forces(self, contacts: Wheels, states: Wheels) -> Wheels:
         """What the road does to each wheel, in the wheel's axes.
 

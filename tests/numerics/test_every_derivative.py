@@ -91,7 +91,7 @@ CASES: dict[str, Callable] = {
     "fence": fenced(numerics.fence),
     "fence, firm": fenced(functools.partial(numerics.fence, firm=True)),
     "fence_blocks": fenced(numerics.fence_blocks),
-    "fenced": fenced(numerics.fenced(lambda pair: pair)),
+    "fence_results": fenced(numerics.fence_results(lambda pair: pair)),
     "gauss_markov_harmonics": lambda x: mixed(numerics.gauss_markov_harmonics(KEY, 1 + x, 2.0, 4, x.dtype)[0]),
     "hypot": lambda x: numerics.hypot(x, 1 - x),
     "interpolate_linear": table(numerics.interpolate_linear),

@@ -80,7 +80,7 @@ class AligningCoefficients(eqx.Module):
         arm = structure.UNLOADED_RADIUS * arm * scaling.LS
         return AligningParts(-trail * on_trail + residual + arm * F_x, trail, residual)
 
-    @numerics.fenced
+    @numerics.fence_results
     def _trail(self, at, scaling, structure, slip):
         """Pneumatic trail (4.E73 with A55, A58, A60), m: the other way in backward travel (4.E42)."""
         c, camber = self, at.camber
@@ -98,7 +98,7 @@ class AligningCoefficients(eqx.Module):
         curve = cosine_curve(_equivalent(alpha, slip), B, c.QCZ1, E) * _cosine_of_course(at)
         return D * curve * at.smooth * scaling.LFZO
 
-    @numerics.fenced
+    @numerics.fence_results
     def _residual(self, at, scaling, structure, pure, slip, weight_y):
         """Residual torque M_zr (4.E75 with A54), N m: the other way in backward travel (4.E47)."""
         c = self
@@ -116,7 +116,7 @@ class AligningCoefficients(eqx.Module):
         return (D + turning) * numerics.cos(shape * numerics.arctan(B * _equivalent(alpha, slip))) * at.smooth
 
 
-@numerics.fenced
+@numerics.fence_results
 def _slip_share(at, K_xk, K_ya):
     """The square of the slip ratio's part in the equivalent slip angles (A54, A55): of the trail's and of the residual's."""
     return (K_xk / not_zero(K_ya)) ** 2 * at.slip_ratio**2
@@ -133,7 +133,7 @@ def _equivalent(alpha, slip):
     return numerics.arctan(numerics.sqrt(numerics.tan(alpha) ** 2 + slip)) * sign(alpha)
 
 
-@numerics.fenced
+@numerics.fence_results
 def _cosine_of_course(at):
     """cos(alpha'): the wheel's speed over that of its contact centre (4.E6)."""
     course = jnp.abs(at.speed) * jnp.sqrt(1 + numerics.tan(at.slip_angle) ** 2)

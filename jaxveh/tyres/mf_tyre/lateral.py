@@ -92,7 +92,7 @@ class LateralCoefficients(eqx.Module):
     def __check_init__(self):
         check_parameters(self)
 
-    @numerics.fenced
+    @numerics.fence_results
     def pure(self, at, scaling, nominal_load, version: int) -> PureLateral:
         """F_y0 and what it is made of, at the point's camber; `nominal_load` is F_z0 with its scale."""
         c, s, sine = self, scaling, at.sine
@@ -129,7 +129,7 @@ class LateralCoefficients(eqx.Module):
             K_ya * numerics.sin(c.PKY4 * numerics.arctan(at.load / nominal_load / unless_zero(reach))) * at.spin.zeta_3
         )
 
-    @numerics.fenced
+    @numerics.fence_results
     def weight(self, at, scaling):
         """G_yk: the share of F_y0 that is left at a slip ratio."""
         c = self

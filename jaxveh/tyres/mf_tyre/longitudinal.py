@@ -62,7 +62,7 @@ class LongitudinalCoefficients(eqx.Module):
     def __check_init__(self):
         check_parameters(self)
 
-    @numerics.fenced
+    @numerics.fence_results
     def pure(self, at, scaling) -> PureLongitudinal:
         """F_x0 and what it is made of."""
         c, s = self, scaling
@@ -80,7 +80,7 @@ class LongitudinalCoefficients(eqx.Module):
         B_x = K_xk / not_zero(C_x * D_x)
         return PureLongitudinal(sine_curve(kappa, B_x, C_x, D_x, E_x) + S_Vx, K_xk, mu_x)
 
-    @numerics.fenced
+    @numerics.fence_results
     def weight(self, at, scaling):
         """G_xa: the share of F_x0 that is left at a slip angle."""
         c = self

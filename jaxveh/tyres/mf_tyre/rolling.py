@@ -44,7 +44,7 @@ class RollingCoefficients(eqx.Module):
             moment = -structure.UNLOADED_RADIUS * structure.FNOMIN * scaling.LMY * sum_ * powers
         return moment * self._rolls(at, ranges, slip_ratio)
 
-    @numerics.fenced
+    @numerics.fence_results
     def _rolls(self, at, ranges, slip_ratio):
         """1 for a wheel that rolls forward, -1 backward, smooth between: about the locked wheel, and zero at standstill.
 
@@ -59,7 +59,7 @@ class RollingCoefficients(eqx.Module):
         return jnp.where(moves, turns, 0.0)
 
 
-@numerics.fenced
+@numerics.fence_results
 def _power(base, exponent):
     """`base^exponent` of a base that may be zero, where it and its derivatives are zero."""
     some = base > 0

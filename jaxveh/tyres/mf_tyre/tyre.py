@@ -132,7 +132,7 @@ class MFTyre(AbstractTyre):
         mu_y = jnp.abs(across.mu) if self.limits else across.mu
         return jnp.where(at.load > 0, along.mu, 0.0), jnp.where(at.load > 0, mu_y, 0.0)
 
-    @numerics.fenced
+    @numerics.fence_results
     def _operating_point(self, contact: Contact) -> Operating:
         """The contact within the ranges, in the signs of ISO-W."""
         structure, r = self.structure, self.ranges

@@ -159,7 +159,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         }
         return self.rates_and_outputs(rates, shown)
 
-    @numerics.fenced
+    @numerics.fence_results
     def _stand(self, x, u, ground: Ground) -> Stand:
         """How the car stands on the road, before any tyre force."""
         body = body_of(x)
@@ -174,7 +174,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         )  # fmt: skip
         return Stand(body, wheels, turned, Wheels(*[b[0] for b in both]), Wheels(*[b[1] for b in both]))
 
-    @numerics.fenced
+    @numerics.fence_results
     def _shafts(self, stand: Stand, u, omegas: Wheels) -> Wheels:
         """Torques of motors and brakes, which sit on the body."""
         drive, brake = self.drive.torques(u)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from jaxveh.numerics import fenced, solve_scalars
+from jaxveh.numerics import fence_results, solve_scalars
 from jaxveh.vehicles.fourteen_dof.suspension import Joint, Wheel
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, times
 from jaxveh.vehicles.wheels import Wheels, each_wheel, sum_of_wheels
@@ -64,14 +64,14 @@ def accelerations(
     return Accelerations(linear, angular, each_wheel(travel, joints, wheels, on_wheel, suspension))
 
 
-@fenced
+@fence_results
 def _solve(matrix: list, b: list) -> tuple[Vector, Vector]:
     """Accelerations a and alpha of the body."""
     found = solve_scalars(matrix, b)
     return Vector(*found[:3]), Vector(*found[3:])
 
 
-@fenced
+@fence_results
 def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> list:
     """Rows up to the diagonal of the system in (a, alpha): all as one rigid body, less what the joints leave free."""
     m = each_wheel(lambda joint: joint.mass, joints)
@@ -96,7 +96,7 @@ def _matrix(inertia: Inertia, joints: Wheels, wheels: Wheels, ways: Wheels) -> l
     return [[entry - free(i, j) for j, entry in enumerate(row)] for i, row in enumerate(rigid)]
 
 
-@fenced
+@fence_results
 def _right_side(inertia, joints, wheels, ways, omega, spin, force, moment, on_wheel, suspension) -> list:
     """Forces and moments on all as one rigid body, less what the joints do not carry."""
     I, w = inertia, omega

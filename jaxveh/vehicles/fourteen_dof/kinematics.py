@@ -70,7 +70,7 @@ class Body(NamedTuple):
     omega: Vector
 
 
-@numerics.fenced
+@numerics.fence_results
 def body_of(x: Any) -> Body:
     """The body's motion out of the car's state."""
     axes = attitude(x.roll, x.pitch)

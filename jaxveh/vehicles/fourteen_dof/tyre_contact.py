@@ -96,7 +96,7 @@ class Reaction(NamedTuple):
     dissipation: Any
 
 
-@numerics.fenced
+@numerics.fence_results
 def reaction(
     car: AbstractSuspendedTwoTrack, body: Body, at: Contact, how: Touch, forces: Forces, omega: Any
 ) -> Reaction:
