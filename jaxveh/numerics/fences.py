@@ -1,8 +1,8 @@
 """Fences: where XLA on the CPU is made to compute once, and to store, what it would compute again for each that reads it.
 
 One rule: what several read, and what costs more to compute than to store, is fenced where it leaves the function that makes it.
-There it is a decorator (`fence_results`) or the last thing that happens; formulas of tyres and vehicles stay as they are in the book,
-and the few that do not say by a figure why (`tests/core/test_where_fences_stand.py`).
+There it is a decorator (`fence_results`) or the last thing that happens; formulas of tyres and vehicles stay as they are in the
+book, and the few that do not say by a figure why (`tests/core/test_where_fences_stand.py`).
 
 - `fence(tree)`: an optimization barrier. XLA keeps to it from jax 0.12 on; before, only speed is lost.
 - `fence(tree, firm=True)`: in every version of jax.
