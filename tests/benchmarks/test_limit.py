@@ -8,7 +8,11 @@ from benchmarks.limit import coefficients
 from benchmarks.peers import numpy_filters
 from benchmarks.problems import single_track, speed_and_mass
 
-pytestmark = pytest.mark.skipif(limit.unavailable() is not None, reason=str(limit.unavailable()))
+# Building it takes the compiler minutes.
+pytestmark = [
+    pytest.mark.skipif(limit.unavailable() is not None, reason=str(limit.unavailable())),
+    pytest.mark.studies,
+]
 
 # This machine's vectors, 32-byte ones as on a machine without AVX-512, and no AVX at all (slow to compile).
 FLAGS = [

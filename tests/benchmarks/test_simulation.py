@@ -22,6 +22,7 @@ def ours(problem, dtype=np.float64, solver=None):
     return np.stack(x)
 
 
+@pytest.mark.studies
 @needs_limit
 # 13 leave the last pack short; a single run is computed in scalars.
 @pytest.mark.parametrize("runs", [1, 13, 200])
@@ -34,6 +35,7 @@ def test_library_and_limit_agree(runs):
     assert np.abs(x[3]).max() > 0.1 and np.abs(x[4, -1] * problem.body["wheel_radius"] - x[0, -1]).max() > 1e-2
 
 
+@pytest.mark.studies
 @needs_limit
 def test_single_precision_follows_double():
     problem = drives(40, rows=40, seed=4)
@@ -72,6 +74,7 @@ def test_gradient_follows_finite_differences():
         np.testing.assert_allclose(difference, 2 * np.sum(slope * step), rtol=1e-4, err_msg=jax.tree_util.keystr(path))
 
 
+@pytest.mark.studies
 def test_two_devices_give_what_one_gives():
     command = [sys.executable, "-m", "benchmarks.two_cores", "--runs", "4", "--rows", "1", "--rounds", "1"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2], check=False)

@@ -39,6 +39,7 @@ def test_ours_equals_numpy(given, expected):
     assert_same(found, expected, 1e-9)
 
 
+@pytest.mark.studies
 @pytest.mark.skipif(limit.unavailable() is not None, reason=str(limit.unavailable()))
 @pytest.mark.parametrize(
     "flags",

@@ -6,6 +6,7 @@ which an error would come up.
 
 import inspect
 
+import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -120,7 +121,7 @@ def test_a_car_of_seven_degrees_of_freedom_is_followed():
     """Speed and spins among the states, torques as inputs: no longer an AttributeError in `run`."""
     car = CARS["seven-dof"]()
     devices = sensors.esc(v_x=0.1)
-    model = estimators.state_space(car, devices, start={"v_x": 20.0}, solver=Heun())
+    model = estimators.state_space(car, devices, start={"v_x": 20.0}, solver=diffrax.Euler())
     assert float(model.prior.mean.omega_rr) == pytest.approx(20.0 / float(car.wheel_radius))
     rows, dt = 24, 0.005
     time = dt * np.arange(rows)
