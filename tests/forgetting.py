@@ -1,4 +1,7 @@
-"""Traces of one module forgotten, for tests that replace what it asks while tracing; `jax.clear_caches` would forget all tests' programs."""
+"""Traces of one module forgotten, for tests that replace what it asks while tracing.
+
+`jax.clear_caches` would forget the programs of all tests.
+"""
 
 
 def forget_traces(*modules):

@@ -70,7 +70,7 @@ from jaxveh.filters.wrappers import (
     VariationalBayes,
     VaryingNoise,
 )
-from jaxveh.statespace import AbstractBelief, AbstractFilter, Estimate, Info, Smoothing, run, scan
+from jaxveh.statespace import AbstractBelief, AbstractFilter, Estimate, Gradient, Info, Smoothing, run, scan
 
 __all__ = [
     "AbstractBelief",
@@ -103,6 +103,7 @@ __all__ = [
     "GaussHermite",
     "GaussianBelief",
     "Genealogy",
+    "Gradient",
     "Guided",
     "HInfinity",
     "HaarNoise",

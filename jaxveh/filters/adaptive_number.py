@@ -38,6 +38,7 @@ class AdaptiveNumber(AbstractWrapper):
     beliefs of the largest size with weights of zero behind. Under `vmap` all branches run, and nothing is saved.
     """
 
+    has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     inner: AbstractParticleFilter

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -13,7 +13,7 @@ from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.names import check_names
 from jaxveh._core.result import Result, code
 from jaxveh.filters.outer_belief import AbstractTransparentBelief
-from jaxveh.statespace import AbstractFilter, AbstractWrapper, Info, Row, StateSpace, kit
+from jaxveh.statespace import AbstractFilter, AbstractWrapper, Gradient, Info, Row, StateSpace, kit
 
 
 class DelayedBelief(AbstractTransparentBelief):
@@ -46,6 +46,12 @@ class Delayed(AbstractWrapper):
     inner: AbstractFilter
     delays: tuple[tuple[str, float], ...] = eqx.field(static=True)
     depth: int = eqx.field(static=True)
+
+    has_covariance: ClassVar[bool] = True
+
+    @property
+    def gradients(self):
+        return Gradient.exact
 
     def __init__(self, inner: AbstractFilter, delays: Mapping[str, float] | None = None, depth: int = 20):
         self.inner, self.delays, self.depth = inner, tuple(sorted((delays or {}).items())), depth

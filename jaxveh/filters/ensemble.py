@@ -16,7 +16,7 @@ from jaxveh.filters.gaussian.forms import masked_factor
 from jaxveh.filters.gaussian.noises import law_at
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.filters.particle import add_noise
-from jaxveh.statespace import AbstractBelief, AbstractTwoPartFilter, Info, Row, StateSpace, kit
+from jaxveh.statespace import AbstractBelief, AbstractTwoPartFilter, Gradient, Info, Row, StateSpace, kit
 
 
 class EnsembleBelief(AbstractBelief):
@@ -67,10 +67,15 @@ class Ensemble(AbstractTwoPartFilter):
     """
 
     whitens: ClassVar[bool] = True
+    has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     members: int = eqx.field(static=True)
     perturbed: bool = eqx.field(static=True, default=False)
+
+    @property
+    def gradients(self):
+        return Gradient.exact
 
     def __check_init__(self):
         check_whole("members", self.members, 2)

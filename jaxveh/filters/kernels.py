@@ -21,6 +21,7 @@ class AbstractKernel(AbstractTwoPartWrapper):
     """A particle filter whose particles are replaced, before each step, by draws from kernels about them."""
 
     # No postponed annotations in this file: they would make fields of these.
+    has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     inner: eqx.AbstractVar[AbstractParticleFilter]
 

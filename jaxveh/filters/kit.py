@@ -45,6 +45,7 @@ from jaxveh.statespace import (
     AbstractTwoPartFilter,
     AbstractTwoPartWrapper,
     AbstractWrapper,
+    Gradient,
     Info,
     Row,
     Smoothing,
@@ -53,8 +54,11 @@ from jaxveh.statespace import (
 from jaxveh.statespace import kit as contract
 
 by_channel = contract.by_channel
+check_covariance = contract.check_covariance
+check_gradients = contract.check_gradients
 check_noise_by_row = contract.check_noise_by_row
 check_rows_between = contract.check_rows_between
+gradients_of = contract.gradients_of
 innermost = contract.innermost
 input_result = contract.input_result
 key_for = contract.key_for
@@ -86,6 +90,7 @@ __all__ = [
     "DrawnParticles",
     "Expected",
     "GaussianBelief",
+    "Gradient",
     "Image",
     "Info",
     "Innovation",
@@ -101,7 +106,9 @@ __all__ = [
     "Window",
     "add_noise",
     "by_channel",
+    "check_covariance",
     "check_covariances",
+    "check_gradients",
     "check_noise_by_row",
     "check_particle_settings",
     "check_rows_between",
@@ -110,6 +117,7 @@ __all__ = [
     "first_window",
     "gather",
     "gaussian_of",
+    "gradients_of",
     "innermost",
     "innovation",
     "input_result",

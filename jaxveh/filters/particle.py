@@ -15,6 +15,7 @@ from jaxveh.filters.particle_belief import ParticleBelief
 from jaxveh.statespace import (
     AbstractBelief,
     AbstractTwoPartFilter,
+    Gradient,
     Info,
     Row,
     Smoothing,
@@ -39,6 +40,7 @@ class AbstractParticleFilter(AbstractTwoPartFilter):
     """
 
     # No postponed annotations in this file: they would make fields of these.
+    has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     particles: eqx.AbstractVar[int]
@@ -50,6 +52,10 @@ class AbstractParticleFilter(AbstractTwoPartFilter):
     def scheme(self) -> AbstractResampling:
         """`resampling`, and what it can; a plain function draws ancestors and leaves equal weights."""
         return as_resampling(self.resampling)
+
+    @property
+    def gradients(self):
+        return Gradient.on_average if self.gradient == "score" else Gradient.none
 
     @property
     def needs_key(self):

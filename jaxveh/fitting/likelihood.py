@@ -13,7 +13,7 @@ from jax import lax
 
 from jaxveh._core.parameter import Parameter, Where, pick
 from jaxveh._core.recording import Recording
-from jaxveh.filters import AbstractFilter, scan
+from jaxveh.filters import AbstractFilter, Gradient, kit, scan
 from jaxveh.fitting.filter_problem import AbstractFilterProblem
 from jaxveh.fitting.problem import SearchEnd, on_line, scalar_parameters
 from jaxveh.fitting.recorded import as_list, spread_on_line
@@ -92,6 +92,7 @@ def pose_likelihood(
     key=None,
 ) -> LikelihoodProblem:
     """What `maximum_likelihood` solves, for `solve`; arguments and errors as there."""
+    kit.check_gradients("maximum_likelihood", filter, Gradient.on_average)
     filter.check(model)
     rows = tuple(model.rows(recording) for recording in as_list(recordings))
     chosen = scalar_parameters(model, where)
@@ -121,8 +122,8 @@ def maximum_likelihood(
 
     `where` sees the StateSpace: `lambda m: (m.system.vehicle.front.B, m.measurement_noise.std.a_y)`. With `prior` (relative
     spreads, one number or by name) around the present values, the fit is a MAP fit. BFGS on the real line of each
-    leaf's bijector. With a particle filter give a `key`: the same for every evaluation, and remember that its gradient
-    is biased. Under `jit`, `vmap` and `grad` as it is; see `solve`.
+    leaf's bijector. With a particle filter give a `key`, the same for every evaluation: its gradient is right on average, and its
+    value jumps where other particles are chosen. Under `jit`, `vmap` and `grad` as it is; see `solve`.
 
     **Returns** a `Fit` whose `model` carries the new values; standard errors from the Hessian at the optimum.
     **Raises** `InputError` as `run` does; `FilterError` where the solver does not converge, unless `throw=False`.

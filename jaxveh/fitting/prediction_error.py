@@ -23,7 +23,7 @@ from jaxveh.fitting.recorded import as_list, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.scoring import FisherScoring
 from jaxveh.fitting.solve import fit_at, solve
-from jaxveh.statespace import StateSpace, kit
+from jaxveh.statespace import Gradient, StateSpace, kit
 
 LOG_2PI = float(np.log(2 * np.pi))
 
@@ -183,6 +183,7 @@ def pose_prediction_error(
         raise InputError("recordings: must be one or several of the same number of rows; cut them to one length.")
     if (mixture := kit.who_lacks(filter, "whitens")) is not None:
         raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
+    kit.check_gradients("prediction_error", filter, Gradient.exact)
     filter.check(model)
     chosen = scalar_parameters(model, where)
     rows = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[model.rows(recording) for recording in recordings])

@@ -7,6 +7,7 @@ from jaxveh.statespace.contract import (
     AbstractTwoPartFilter,
     AbstractTwoPartWrapper,
     AbstractWrapper,
+    Gradient,
     Smoothing,
 )
 from jaxveh.statespace.cramer_rao import PosteriorBound, posterior_cramer_rao
@@ -43,6 +44,7 @@ __all__ = [
     "Drawn",
     "Estimate",
     "Gaussian",
+    "Gradient",
     "Heun",
     "Independent",
     "Info",

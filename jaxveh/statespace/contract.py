@@ -27,6 +27,15 @@ class Smoothing(enum.Enum):
     particles = "particles"
 
 
+class Gradient(enum.Enum):
+    """What the derivatives of a filter's log-likelihood are: `none`, not to be followed; `on_average`, right on average over
+    keys, while for a given key the value jumps where other particles are chosen; `exact`, the slopes of its value."""
+
+    none = 0
+    on_average = 1
+    exact = 2
+
+
 class AbstractFilter(eqx.Module):
     """The contract of every filter.
 
@@ -41,6 +50,8 @@ class AbstractFilter(eqx.Module):
     What a filter can is declared where it is true, and is *no* otherwise:
 
     - `whitens`: its info carries whitened innovations.
+    - `has_covariance`: its belief has the `mean` and the `covariance` of the state.
+    - `gradients`: what the derivatives of its log-likelihood are (`gradients_of`).
     - `smooths`: how it can be smoothed. Each class declares it for itself: what predicts otherwise than the class it comes from
       would be smoothed wrongly without a word, so that this is not inherited (`smoothing_of`).
     - `noise_by_row`: the model's measurement noise may be another in each row, and is taken as it is there. (Not where a filter
@@ -52,6 +63,7 @@ class AbstractFilter(eqx.Module):
     """
 
     whitens: ClassVar[bool] = False
+    has_covariance: ClassVar[bool] = False
     smooths: ClassVar[Smoothing] = Smoothing.none
     noise_by_row: ClassVar[bool] = False
     rows_between: ClassVar[bool] = False
@@ -61,6 +73,11 @@ class AbstractFilter(eqx.Module):
         for name in ("init", "step"):
             if name in vars(cls):
                 raise TypeError(f"{cls.__name__}.{name}: is final. Write _{name}, which it runs.")
+
+    @property
+    def gradients(self) -> Gradient:
+        """What the derivatives of its log-likelihood are."""
+        return Gradient.none
 
     @property
     def needs_key(self) -> bool:
@@ -205,8 +222,37 @@ def check_smooths(who: str, filter: Any) -> Smoothing:
 
 def who_lacks(filter: Any, capability: str) -> str | None:
     """The name of the outermost filter, of a filter and all inside it, that does not declare a capability (`whitens`,
-    `noise_by_row`, `rows_between`), or None."""
+    `has_covariance`, `noise_by_row`, `rows_between`), or None."""
     return next((type(layer).__name__ for layer in layers(filter) if not getattr(layer, capability)), None)
+
+
+def gradients_of(filter: Any) -> Gradient:
+    """What the derivatives of a filter's log-likelihood are: the least that it and the filters inside declare."""
+    return min((layer.gradients for layer in layers(filter)), key=lambda kind: kind.value)
+
+
+def check_gradients(who: str, filter: Any, least: Gradient) -> None:
+    """Raise `InputError` where the derivatives of the filter's log-likelihood are less than `least`."""
+    kind = gradients_of(filter)
+    if kind.value < least.value:
+        name = next(type(layer).__name__ for layer in layers(filter) if layer.gradients is kind)
+        wanted = "a Gaussian filter in the form Covariance() or SquareRoot()"
+        if least is Gradient.on_average:
+            wanted += ", or a particle filter with gradient='score'"
+        raise InputError(
+            f"{who}: follows derivatives, and those of this {name} are `Gradient.{kind.name}`: must be at least "
+            f"`Gradient.{least.name}`. Take {wanted}."
+        )
+
+
+def check_covariance(who: str, filter: Any) -> None:
+    """Raise `InputError` where the filter's belief has no covariance of the state."""
+    kind = who_lacks(filter, "has_covariance")
+    if kind is not None:
+        raise InputError(
+            f"{who}: {kind} knows no covariance of the state (`has_covariance`). Take a Gaussian filter, an ensemble or a "
+            "particle filter."
+        )
 
 
 def check_noise_by_row(who: str, filter: Any) -> None:

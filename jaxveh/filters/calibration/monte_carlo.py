@@ -62,6 +62,7 @@ def monte_carlo(
     truth = model if truth is None else truth
     check_whole("runs", runs)
     check_truth(model, truth)
+    kit.check_covariance("monte_carlo", filter)
     filter.check(model)
     rows = kit.schedule_rows(truth, schedule)
     found = in_batches(

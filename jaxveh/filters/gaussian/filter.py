@@ -20,6 +20,7 @@ from jaxveh.statespace import (
     AbstractBelief,
     AbstractNoise,
     AbstractTwoPartFilter,
+    Gradient,
     Info,
     Row,
     StateDependent,
@@ -36,6 +37,11 @@ class AbstractGaussianFilter(AbstractTwoPartFilter):
     """
 
     whitens: ClassVar[bool] = True
+    has_covariance: ClassVar[bool] = True
+
+    @property
+    def gradients(self):
+        return Gradient.exact
 
     @abc.abstractmethod
     def prior(self, model: StateSpace, row: Row) -> AbstractBelief:
@@ -90,6 +96,10 @@ class AbstractRuleFilter(AbstractGaussianFilter):
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     form: eqx.AbstractVar[AbstractForm]
+
+    @property
+    def gradients(self):
+        return Gradient.exact if self.form.differentiable else Gradient.none
 
     @abc.abstractmethod
     def rule(self, n: int) -> AbstractRule:

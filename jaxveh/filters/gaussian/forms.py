@@ -52,11 +52,13 @@ class AbstractForm(eqx.Module):
     - `negative_weights`: it takes rules of which some weights are negative.
     - `keeps_matrix`: each `Spread` has the covariance itself as its `matrix`.
     - `triangular`: each factor is lower triangular.
+    - `differentiable`: its derivatives are slopes of its values.
     """
 
     negative_weights: ClassVar[bool] = False
     keeps_matrix: ClassVar[bool] = False
     triangular: ClassVar[bool] = False
+    differentiable: ClassVar[bool] = False
 
     @abc.abstractmethod
     def start(self, covariance: Any) -> Spread:
@@ -95,6 +97,7 @@ class Covariance(AbstractForm):
     negative_weights: ClassVar[bool] = True
     keeps_matrix: ClassVar[bool] = True
     triangular: ClassVar[bool] = True
+    differentiable: ClassVar[bool] = True
 
     def start(self, covariance):
         return Spread(numerics.cholesky(covariance), covariance)
@@ -135,6 +138,7 @@ class SquareRoot(AbstractForm):
     """
 
     triangular: ClassVar[bool] = True
+    differentiable: ClassVar[bool] = True
 
     def start(self, covariance):
         return Spread(numerics.cholesky(covariance), None)

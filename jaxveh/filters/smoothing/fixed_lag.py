@@ -15,7 +15,7 @@ from jaxveh.filters.particle import ParticleBelief
 from jaxveh.filters.smoothing.rauch_tung_striebel import given_later
 from jaxveh.filters.smoothing.smoothed import SmoothedEstimate, smoothed_estimate
 from jaxveh.filters.wrappers.base import gaussian_of
-from jaxveh.statespace import AbstractFilter, AbstractWrapper, Row, Smoothing, StateSpace, kit
+from jaxveh.statespace import AbstractFilter, AbstractWrapper, Gradient, Row, Smoothing, StateSpace, kit
 
 
 class LaggedBelief(AbstractOuterBelief):
@@ -43,6 +43,10 @@ class FixedLag(AbstractWrapper):
     noise_by_row: ClassVar[bool] = True
     inner: AbstractFilter
     lag: int = eqx.field(static=True)
+
+    @property
+    def gradients(self):
+        return Gradient.exact
 
     def __check_init__(self):
         check_lag(self.inner, self.lag)

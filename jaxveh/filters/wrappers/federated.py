@@ -18,7 +18,7 @@ from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.gaussian.rules import times
 from jaxveh.filters.outer_belief import AbstractTransparentBelief
-from jaxveh.statespace import AbstractProcessNoise, AbstractWrapper, Row, StateSpace
+from jaxveh.statespace import AbstractProcessNoise, AbstractWrapper, Gradient, Row, StateSpace
 
 
 class FederatedBelief(AbstractTransparentBelief):
@@ -59,6 +59,7 @@ class Federated(AbstractWrapper):
     """
 
     whitens: ClassVar[bool] = True
+    has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     inner: AbstractRuleFilter
@@ -70,6 +71,10 @@ class Federated(AbstractWrapper):
     isolate: float | None = eqx.field(static=True, default=None)
     forgetting: float = eqx.field(static=True, default=0.9)
     overlapping: bool = eqx.field(static=True, default=False)
+
+    @property
+    def gradients(self):
+        return Gradient.exact
 
     def __check_init__(self):
         check_kind("Federated", self.inner, AbstractRuleFilter)

@@ -16,7 +16,7 @@ from jaxveh._core.result import first_failure
 from jaxveh.filters.choosing import log_of
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import AbstractRuleFilter, check_kind, with_spread
-from jaxveh.statespace import AbstractBelief, AbstractWrapper, Info, StateSpace, kit
+from jaxveh.statespace import AbstractBelief, AbstractWrapper, Gradient, Info, StateSpace, kit
 
 
 class MixtureBelief(AbstractBelief):
@@ -78,6 +78,7 @@ class InteractingModels(AbstractWrapper):
     and weighs them by their likelihoods. `belief.probabilities` are those after the last row. Innovations are the mixture's.
     """
 
+    has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     inner: AbstractRuleFilter
     variants: tuple[Callable[[StateSpace], StateSpace], ...] = eqx.field(static=True)
@@ -86,6 +87,10 @@ class InteractingModels(AbstractWrapper):
         default=None,
         converter=lambda v: None if v is None else float_array(v if eqx.is_array(v) else np.asarray(v, float)),
     )
+
+    @property
+    def gradients(self):
+        return Gradient.exact
 
     def __check_init__(self):
         check_kind("InteractingModels", self.inner, AbstractRuleFilter)

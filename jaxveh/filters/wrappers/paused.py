@@ -14,7 +14,7 @@ from jaxveh._core.names import check_names
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, check_kind, with_spread
 from jaxveh.filters.gaussian.forms import Spread
 from jaxveh.filters.wrappers.base import gaussian_of, with_gaussian
-from jaxveh.statespace import AbstractWrapper, StateSpace, kit
+from jaxveh.statespace import AbstractWrapper, Gradient, StateSpace, kit
 
 
 class Paused(AbstractWrapper):
@@ -29,11 +29,16 @@ class Paused(AbstractWrapper):
     """
 
     whitens: ClassVar[bool] = True
+    has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     inner: AbstractGaussianFilter
     channel: str = eqx.field(static=True)
     widen: tuple[tuple[str, float], ...] = eqx.field(static=True)
+
+    @property
+    def gradients(self):
+        return Gradient.exact
 
     def __init__(self, inner: AbstractGaussianFilter, channel: str, widen: Mapping[str, float]):
         self.inner, self.channel, self.widen = inner, channel, tuple(sorted(dict(widen).items()))

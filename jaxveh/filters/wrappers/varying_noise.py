@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.names import check_names
-from jaxveh.statespace import AbstractFilter, AbstractWrapper, Continuous, Discrete, Gaussian, StateSpace, kit
+from jaxveh.statespace import AbstractFilter, AbstractWrapper, Continuous, Discrete, Gaussian, Gradient, StateSpace, kit
 
 
 class VaryingNoise(AbstractWrapper):
@@ -24,12 +24,17 @@ class VaryingNoise(AbstractWrapper):
     """
 
     whitens: ClassVar[bool] = True
+    has_covariance: ClassVar[bool] = True
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     inner: AbstractFilter
     measurement: tuple[tuple[str, str], ...] = eqx.field(static=True)
     process: tuple[tuple[str, str], ...] = eqx.field(static=True)
     process_of: str = eqx.field(static=True)
+
+    @property
+    def gradients(self):
+        return Gradient.exact
 
     def __init__(
         self,

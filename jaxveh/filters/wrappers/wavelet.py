@@ -34,6 +34,7 @@ class Window(NamedTuple):
 class AbstractHaar(AbstractWrapper):
     """A filter around another that takes its variances from a `Window`, by the settings that `HaarNoise` tells of."""
 
+    has_covariance: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
     inner: AbstractFilter
     window: int = eqx.field(static=True, default=64)
