@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh.sweeps import ConfidenceInterval
 
-HELD, FAILED, OPEN = "held", "failed", "open"
+MET, FAILED, OPEN = "met", "failed", "open"
 """What becomes of a criterion: it is met, it is not, or what was found cannot decide."""
 
 
@@ -30,7 +30,7 @@ Criteria = Mapping[str, Terms]
 
 
 class Check(NamedTuple):
-    """One criterion: what was found, the bound, `status` (held, failed or open), and its `Terms`."""
+    """One criterion: what was found, the bound, `status` (met, failed or open), and its `Terms`."""
 
     name: str
     value: float
@@ -41,25 +41,25 @@ class Check(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether it is held; what is open is not."""
-        return self.status == HELD
+        """Whether it is met; what is open is not."""
+        return self.status == MET
 
 
 class Tally(NamedTuple):
-    """How many criteria, as they were asked, there are, `of`, and how many are `held`, `failed` and `open`."""
+    """How many criteria, as they were asked, there are, `of`, and how many are `met`, `failed` and `open`."""
 
-    held: int
+    met: int
     failed: int
     open: int
 
     @property
     def of(self) -> int:
         """All of them."""
-        return self.held + self.failed + self.open
+        return self.met + self.failed + self.open
 
     def __str__(self) -> str:
         rest = [f"{count} {what}" for what, count in ((FAILED, self.failed), (OPEN, self.open)) if count]
-        return f"{self.held} of {self.of}" + (f" ({', '.join(rest)})" if rest else "")
+        return f"{self.met} of {self.of}" + (f" ({', '.join(rest)})" if rest else "")
 
 
 class Table(NamedTuple):
@@ -91,7 +91,7 @@ def leave_open(check: Check) -> Check:
 
 
 def _make_check(name: str, value, bound: float, holds) -> Check:
-    return Check(name, float(value), float(bound), HELD if holds else FAILED)
+    return Check(name, float(value), float(bound), MET if holds else FAILED)
 
 
 def with_terms(checks: Iterable[Check], criteria: Criteria) -> list[Check]:
@@ -111,7 +111,7 @@ def with_terms(checks: Iterable[Check], criteria: Criteria) -> list[Check]:
 def tally(checks: Iterable[Check]) -> Tally:
     """The count of the criteria as they were asked: those that stand beside them are shown, and not counted."""
     asked = [check.status for check in checks if not check.original]
-    return Tally(*(asked.count(status) for status in (HELD, FAILED, OPEN)))
+    return Tally(*(asked.count(status) for status in (MET, FAILED, OPEN)))
 
 
 def number_asked(criteria: Criteria) -> int:

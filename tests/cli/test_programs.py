@@ -183,8 +183,8 @@ def papers(monkeypatch):
             Table("printed", ("a",), [("x",)]),
         )
         checks = [
-            Check("UKF front", 0.5, 0.8, "held", "told the noise"), Check("PF front", float("nan"), 0.8, "failed"),
-            Check("PF front, redesigned", 0.7, 0.8, "held", "made later", "PF front"),
+            Check("UKF front", 0.5, 0.8, "met", "told the noise"), Check("PF front", float("nan"), 0.8, "failed"),
+            Check("PF front, redesigned", 0.7, 0.8, "met", "made later", "PF front"),
         ]  # fmt: skip
         return SimpleNamespace(
             run=run, tables=lambda found: [honest, printed], check=lambda found: checks,
@@ -210,10 +210,10 @@ def test_reproduce_prints_tables_and_writes_checks(tmp_path, papers):
     assert "told the noise" in result.stdout and "made later" in result.stdout
     content = read_json(numbers)
     assert content["checks"][0] == {
-        "name": "UKF front", "value": 0.5, "bound": 0.8, "status": "held", "condition": "told the noise", "original": "",
+        "name": "UKF front", "value": 0.5, "bound": 0.8, "status": "met", "condition": "told the noise", "original": "",
     }  # fmt: skip
     assert content["checks"][1]["value"] is None
-    assert content["tally"] == {"held": 1, "failed": 1, "open": 0}
+    assert content["tally"] == {"met": 1, "failed": 1, "open": 0}
     assert content["tables"][1]["rows"] == [["x"]]
     assert content["manifest"]["configuration"] == {"seeds": 7, "study": {"particles": 20}}
 
@@ -232,8 +232,8 @@ def test_reproduce_all_goes_through_every_paper(tmp_path, papers, monkeypatch):
     def program(name, options, folder, tell, family):
         asked[name] = {option: value for option, value in options.items() if value is not None}
         tell("done")
-        checks = [{"name": "UKF", "value": 0.5, "bound": 0.8, "status": "held"}, {"name": "PF", "status": "open"}]
-        found = {"held": 2, "failed": 0, "open": 0} if name == "first" else {"held": 1, "failed": 0, "open": 1}
+        checks = [{"name": "UKF", "value": 0.5, "bound": 0.8, "status": "met"}, {"name": "PF", "status": "open"}]
+        found = {"met": 2, "failed": 0, "open": 0} if name == "first" else {"met": 1, "failed": 0, "open": 1}
         return all_papers.Done(int(name == "failing"), f"tables of {name}\n", {"checks": checks, "tally": found}, 61.4)
 
     monkeypatch.setattr(all_papers, "run_program", program)
@@ -243,7 +243,7 @@ def test_reproduce_all_goes_through_every_paper(tmp_path, papers, monkeypatch):
     assert asked == {"first": {"--seed": 3}, "second": {"--seed": 3}}
     assert result.stdout.index("tables of first") < result.stdout.index("tables of second")
     assert "2 of 2" in result.stdout and "1 of 2 (1 open)" in result.stdout and "61" in result.stdout
-    assert json.loads(numbers.read_text())["second"]["checks"][0]["status"] == "held"
+    assert json.loads(numbers.read_text())["second"]["checks"][0]["status"] == "met"
     monkeypatch.setattr("jaxveh.cli.reproduce.PAPERS", {"failing": "a paper"})
     result = run("reproduce", "all")
     assert result.exit_code == 1 and "failing failed" in result.stderr

@@ -10,7 +10,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.cli.reproduce import PAPERS, _experiment
 from jaxveh.experiments.report import (
     FAILED,
-    HELD,
+    MET,
     OPEN,
     Check,
     Tally,
@@ -82,22 +82,22 @@ def test_readme_has_a_row_for_every_paper_and_says_what_its_columns_are():
 
 
 @pytest.mark.parametrize(("make", "value", "bound", "status"), [
-    (at_most, 1.0, 1.0, HELD), (at_most, 1.1, 1.0, FAILED), (at_most, NONE, 1.0, FAILED),
-    (above, 1.0, 1.0, FAILED), (above, LARGE, 1.0, HELD), (above, NONE, 1.0, FAILED),
-    (at_least, 1.0, 1.0, HELD), (at_least, 0.9, 1.0, FAILED), (at_least, NONE, 1.0, FAILED),
+    (at_most, 1.0, 1.0, MET), (at_most, 1.1, 1.0, FAILED), (at_most, NONE, 1.0, FAILED),
+    (above, 1.0, 1.0, FAILED), (above, LARGE, 1.0, MET), (above, NONE, 1.0, FAILED),
+    (at_least, 1.0, 1.0, MET), (at_least, 0.9, 1.0, FAILED), (at_least, NONE, 1.0, FAILED),
 ])  # fmt: skip
 def test_a_criterion_holds_by_its_number(make, value, bound, status):
     check = make("a", value, bound)
-    assert (check.status, check.holds) == (status, status == HELD)
+    assert (check.status, check.holds) == (status, status == MET)
     assert not leave_open(check).holds and leave_open(check).status == OPEN
 
 
 def test_what_is_open_and_what_stands_beside_is_not_counted_as_held():
     checks = [
-        Check("a", 0.5, 1.0, HELD), Check("b", 0.5, 1.0, FAILED), leave_open(Check("c", 0.5, 1.0, HELD)),
-        Check("b, later", 0.5, 1.0, HELD, "later", "b"), Check("d", 0.5, 1.0, HELD),
+        Check("a", 0.5, 1.0, MET), Check("b", 0.5, 1.0, FAILED), leave_open(Check("c", 0.5, 1.0, MET)),
+        Check("b, later", 0.5, 1.0, MET, "later", "b"), Check("d", 0.5, 1.0, MET),
     ]  # fmt: skip
-    assert tally(checks) == Tally(held=2, failed=1, open=1)
+    assert tally(checks) == Tally(met=2, failed=1, open=1)
     assert tally(checks).of == 4
     assert str(tally(checks)) == "2 of 4 (1 failed, 1 open)"
     assert str(tally(checks[:1])) == "1 of 1"

@@ -37,7 +37,7 @@ def sideslip(case: str) -> str:
 _OWN = (
     "medians over the drives; the filter has the truth's own law and numbers of the tyres (Dugoff), and is told steer, motor "
     "torques, air and rolling resistance and the sensors' noise; the prior's spread of log mu was made 0.8 after one drive in 40 "
-    "was lost with 1.0, with which all of these held, too"
+    "was lost with 1.0, with which all of these were met, too"
 )
 _OTHER = (
     "the same where the truth's tyre is a Magic Formula of equal stiffness and peak friction, and the filter's law is Dugoff's; "
