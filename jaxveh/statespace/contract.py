@@ -247,32 +247,31 @@ def check_gradients(who: str, filter: Any, least: Gradient) -> None:
 
 def check_covariance(who: str, filter: Any) -> None:
     """Raise `InputError` where the filter's belief has no covariance of the state."""
-    kind = who_lacks(filter, "has_covariance")
-    if kind is not None:
-        raise InputError(
-            f"{who}: {kind} knows no covariance of the state (`has_covariance`). Take a Gaussian filter, an ensemble or a "
-            "particle filter."
-        )
+    says = (
+        "knows no covariance of the state (`has_covariance`). Take a Gaussian filter, an ensemble or a particle filter."
+    )
+    _check_declared("has_covariance", who, filter, says)
 
 
 def check_noise_by_row(who: str, filter: Any) -> None:
     """Raise `InputError` where a filter inside takes a measurement noise of its own for the one that it is given."""
-    kind = who_lacks(filter, "noise_by_row")
-    if kind is not None:
-        raise InputError(
-            f"{who}: {kind} inside it does not take its measurement noise row by row (`noise_by_row`), and would replace what "
-            f"{who} says. Put {who} inside: {kind}({who}(...))."
-        )
+    says = (
+        "inside it does not take its measurement noise row by row (`noise_by_row`), and would replace what {who} says. "
+    )
+    _check_declared("noise_by_row", who, filter, says + "Put {who} inside: {kind}({who}(...)).")
 
 
 def check_rows_between(who: str, filter: Any) -> None:
     """Raise `InputError` where a filter's step is another with a row put in between."""
-    kind = who_lacks(filter, "rows_between")
+    says = "inside it takes no late rows (`rows_between`): what it does in each step it would do once more. "
+    _check_declared("rows_between", who, filter, says + "Take a filter that does, or give the rows in their order.")
+
+
+def _check_declared(capability: str, who: str, filter: Any, says: str) -> None:
+    """Raise `InputError` where a filter, or one inside it, the `kind`, does not declare what `who` needs."""
+    kind = who_lacks(filter, capability)
     if kind is not None:
-        raise InputError(
-            f"{who}: {kind} inside it takes no late rows (`rows_between`): what it does in each step it would do once more. "
-            "Take a filter that does, or give the rows in their order."
-        )
+        raise InputError(f"{who}: {kind} {says.format(who=who, kind=kind)}")
 
 
 def _declared_smoothing(filter: Any) -> Smoothing:
