@@ -51,21 +51,18 @@ from jaxveh.statespace import (
     Smoothing,
     StateSpace,
 )
-from jaxveh.statespace.kit import (
-    by_channel,
-    check_covariance,
-    check_gradients,
-    check_noise_by_row,
-    check_rows_between,
-    gradients_of,
-    innermost,
-    input_result,
-    key_for,
-    layers,
-    presence,
-    smoothing_of,
-    who_lacks,
-)
+from jaxveh.statespace import kit as contract
+
+by_channel = contract.by_channel
+check_noise_by_row = contract.check_noise_by_row
+check_rows_between = contract.check_rows_between
+innermost = contract.innermost
+input_result = contract.input_result
+key_for = contract.key_for
+layers = contract.layers
+presence = contract.presence
+smoothing_of = contract.smoothing_of
+who_lacks = contract.who_lacks
 
 __all__ = [
     "NORMAL_MEDIAN",
@@ -106,9 +103,7 @@ __all__ = [
     "Window",
     "add_noise",
     "by_channel",
-    "check_covariance",
     "check_covariances",
-    "check_gradients",
     "check_noise_by_row",
     "check_particle_settings",
     "check_rows_between",
@@ -117,7 +112,6 @@ __all__ = [
     "first_window",
     "gather",
     "gaussian_of",
-    "gradients_of",
     "innermost",
     "innovation",
     "input_result",

@@ -13,13 +13,13 @@ from jax import lax
 
 from jaxveh._core.parameter import Parameter, Where, pick
 from jaxveh._core.recording import Recording
-from jaxveh.filters import AbstractFilter, Gradient, kit, scan
+from jaxveh.filters import AbstractFilter, Gradient, scan
 from jaxveh.fitting.filter_problem import AbstractFilterProblem
 from jaxveh.fitting.problem import SearchEnd, on_line, scalar_parameters
 from jaxveh.fitting.recorded import as_list, spread_on_line
 from jaxveh.fitting.result import Fit, raise_unfinished
 from jaxveh.fitting.solve import solve
-from jaxveh.statespace import StateSpace
+from jaxveh.statespace import StateSpace, kit
 
 REJECTED = 1e8
 """The cost of a point where the filter fails: finite, so that the line search steps back."""

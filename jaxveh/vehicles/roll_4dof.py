@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.rolling_body import AbstractRollingTwoTrack, roll_accelerations, roll_outputs
-from jaxveh.vehicles.traction import AbstractSpinless, drive_power, driven_wheels
+from jaxveh.vehicles.traction import AbstractSpinless, drive_power, driven_over
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
-from jaxveh.vehicles.wheels import body_forces, gravity
+from jaxveh.vehicles.wheels import gravity
 
 
 class Roll4DOF(AbstractSpinless, AbstractRollingTwoTrack):
@@ -37,10 +37,7 @@ class Roll4DOF(AbstractSpinless, AbstractRollingTwoTrack):
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        drive, brake = self.drive.torques(u)
-        road = self.on_road(x, u, ground)
-        forces = driven_wheels(self, road, drive, brake)
-        push = body_forces(self.places, road.moves, forces)
+        road, forces, push, drive = driven_over(self, x, u, ground)
         g_x, g_y, g_z = gravity(ground)
         X = push.F_x - air_drag(self.drag, x.v_x)
         a_x, a_y = X / self.mass, push.F_y / self.mass

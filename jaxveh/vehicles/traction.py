@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +15,15 @@ from jaxveh.tyres import Contact, Forces
 from jaxveh.vehicles.drive import AbstractDriven
 from jaxveh.vehicles.load_transfer import AbstractShiftingLoads
 from jaxveh.vehicles.two_track import OnRoad
-from jaxveh.vehicles.wheels import Wheels, each_wheel, frictions, sum_of_wheels, travel_direction
+from jaxveh.vehicles.wheels import (
+    BodyForces,
+    Wheels,
+    body_forces,
+    each_wheel,
+    frictions,
+    sum_of_wheels,
+    travel_direction,
+)
 
 LEAST_SHARE = 0.1
 """The share of its lateral force that a wheel keeps however large the torque (as `tyres.Fiala` does): F_x ends at
@@ -82,10 +90,23 @@ def driven_forces(car: AbstractSpinless, forces: Forces, at: Contact, along: Any
     return within_grip(forces, wish, car.grip * at.friction * load)
 
 
-def driven_wheels(car: AbstractSpinless, road: OnRoad, drive: Wheels, brake: Wheels) -> Wheels:
-    """The forces of all wheels under their torques, as `driven_forces`."""
+class Driven(NamedTuple):
+    """What the road does under the torques of motors and brakes: to the wheels, `road` before them and `forces` under them, and
+    to the body, `push`; `drive`: the motors' torques, N m."""
+
+    road: OnRoad
+    forces: Wheels
+    push: BodyForces
+    drive: Wheels
+
+
+def driven_over(car: AbstractSpinless, x: Any, u: Any, ground: Ground) -> Driven:
+    """How the road carries a car whose wheels' forces are `driven_forces`."""
+    drive, brake = car.drive.torques(u)
+    road = car.on_road(x, u, ground)
     under = lambda force, at, move, *torques: driven_forces(car, force, at, move.along, *torques)
-    return each_wheel(under, road.forces, road.contacts, road.moves, drive, brake)
+    forces = each_wheel(under, road.forces, road.contacts, road.moves, drive, brake)
+    return Driven(road, forces, body_forces(car.places, road.moves, forces), drive)
 
 
 def drive_power(car: AbstractSpinless, drive: Wheels, moves: Wheels) -> Any:

@@ -6,8 +6,8 @@ import pytest
 from test_every_filter import FILTERS, batch, recordings
 
 from jaxveh import InputError, filters, fitting, observers
-from jaxveh.filters import Gradient, kit
-from jaxveh.statespace import AbstractFilter
+from jaxveh.filters import Gradient
+from jaxveh.statespace import AbstractFilter, kit
 
 SCORED = {"ParticleFilter", "AuxiliaryParticleFilter", "Guided", "Marginalised"}
 """Whose derivatives test_particle_gradients compares with exact ones."""
@@ -23,7 +23,7 @@ def test_derivatives_are_exact_where_they_are_tested_to_be(name):
 
 
 def test_what_is_not_declared_is_no():
-    assert not AbstractFilter.has_covariance and not kit.AbstractForm.differentiable
+    assert not AbstractFilter.has_covariance and not filters.AbstractForm.differentiable
     # A wrapper is no better than what it goes around, and one that says nothing is `none`.
     assert kit.gradients_of(filters.FixedLag(filters.ParticleFilter(10), 2)) is Gradient.on_average
     assert kit.gradients_of(filters.FixedLag(filters.Cubature(form=filters.SingularValues()), 2)) is Gradient.none
