@@ -1,6 +1,8 @@
 """Every fit of `fitting.__all__`: one shape of result; its core under jit, vmap and grad, against differences.
 
 A new fit is one line in `CASES`: its problem, its program on the same problem, and where the problem keeps data, noise and prior.
+
+What compiles is shared: one `fitting.solve` a case, at the case's tolerance, and one linearisation for derivatives in both modes.
 """
 
 from collections.abc import Callable
@@ -18,7 +20,7 @@ from test_maximum_likelihood import LEVELS
 from test_maximum_likelihood import model as diffuse
 
 from jaxveh import InputError, Parameters, Recording, filters, fitting, tyres
-from jaxveh.fitting.solve import curvature, optimum
+from jaxveh.fitting.solve import optimum
 
 FILTER = filters.Unscented()
 YEARS = Recording(np.arange(1871.0, 1911.0), {"flow": NILE[:40]})
@@ -29,9 +31,8 @@ FRICTION = lambda tyre: {"along": tyre.slip_stiffness, "friction": tyre.friction
 
 def nile():
     """The Nile's level, of which something is known before: what that is shows in the fit."""
-    return eqx.tree_at(
-        lambda m: (m.prior.mean.level, m.prior.law.std.level), diffuse(), (jnp.asarray(1000.0), jnp.asarray(150.0))
-    )
+    known = jnp.asarray(1000.0, float), jnp.asarray(150.0, float)
+    return eqx.tree_at(lambda m: (m.prior.mean.level, m.prior.law.std.level), diffuse(), known)
 
 
 def a_rig(points=8):
@@ -123,14 +124,37 @@ def core(case, changed):
     return lambda by: fitting.solve(changed(by), tolerance=case.tolerance).unconstrained
 
 
+@pytest.fixture(scope="module")
+def own(case):
+    """What the fit's own program found."""
+    return case.fit()
+
+
+@pytest.fixture(scope="module")
+def solved(case, problem):
+    return fitting.solve(problem, tolerance=case.tolerance)
+
+
+@pytest.fixture(scope="module")
+def slopes(core):
+    """The program of the derivatives (p, 3) of the fitted parameters: in forward mode, and in reverse mode."""
+
+    def both(by):
+        along = jax.linearize(core, by)[1]
+        against = jax.linear_transpose(along, by)
+        return jax.vmap(along, out_axes=1)(jnp.eye(3)), jax.vmap(against)(jnp.eye(2))[0]
+
+    return jax.jit(both).lower(jnp.zeros(3))
+
+
 def test_every_fit_and_every_problem_has_a_case():
     assert set(FITS) == set(CASES)
     assert {type(case.pose()) for case in CASES.values()} == set(PROBLEMS)
 
 
 @pytest.mark.parametrize("by", ["program", "core"])
-def test_results_have_one_shape(case, problem, by):
-    fit = case.fit() if by == "program" else fitting.solve(problem)
+def test_results_have_one_shape(problem, own, solved, by):
+    fit = own if by == "program" else solved
     p = len(fit.names)
     assert isinstance(fit, fitting.AbstractFit) and p == 2 == len(fit.chosen)
     for found in (fit.parameters, fit.parameters_std):
@@ -152,54 +176,59 @@ def test_a_search_that_stops_short_says_so(case, problem):
     assert all(np.isnan(leaf) for leaf in jax.tree.leaves(fit.parameters_std))
 
 
-def test_derivatives_equal_differences(case, changed, core):
-    """With respect to data, noise and prior, of parameters: in reverse mode, forward mode, and of a batch."""
+def test_derivatives_equal_differences(case, problem, changed, slopes):
+    """With respect to data, noise and prior, of parameters: in reverse mode, and in forward mode."""
     h = 2e-3
+    steepness = jax.jit(lambda z, by: jax.grad(lambda z: changed(by).cost(z))(z))
+    # A search ends where its cost shows no more gain, at half of the digits: steps of Newton's are the rest.
+    middle = jax.jit(lambda: optimum(problem, problem.start(), max_steps=200, tolerance=case.tolerance).z)()
+    middle, step = np.asarray(middle), 1e-5
+    sides = [
+        (steepness(middle + step * e, np.zeros(3)), steepness(middle - step * e, np.zeros(3)))
+        for e in np.eye(middle.size)
+    ]
+    inverse = np.linalg.inv([np.subtract(*ends) / (2 * step) for ends in sides])
 
     def exactly(by):
-        # A search ends where its cost shows no more gain, at half of the digits: a step of Newton's is the rest.
-        problem = changed(by)
-        z = optimum(problem, problem.start(), max_steps=200, tolerance=case.tolerance).z
-        matrix, _ = curvature(lambda z, free: problem.cost(z), z, ())
-        return problem.line(z - jnp.linalg.solve(matrix, jax.grad(problem.cost)(z)))
+        z = middle
+        for _ in range(12):
+            z = z - np.asarray(steepness(z, by)) @ inverse
+        return np.asarray(problem.line(z))
 
-    points = jnp.concatenate([step * jnp.eye(3) for step in (h, -h, 2 * h, -2 * h)])
-    near, back, far, behind = jax.jit(jax.vmap(exactly))(points).reshape(4, 3, -1)
-    differences = ((8 * (near - back) - (far - behind)) / (12 * h)).T
-    reverse = jax.jit(jax.jacrev(core))(jnp.zeros(3))
+    near, back, far, behind = ([exactly(share * e) for e in np.eye(3)] for share in (h, -h, 2 * h, -2 * h))
+    differences = ((8 * np.subtract(near, back) - np.subtract(far, behind)) / (12 * h)).T
+    forward, reverse = slopes.compile()(jnp.zeros(3))
     assert (np.abs(differences) > 1e-5).all()
     np.testing.assert_allclose(reverse, differences, rtol=1e-4, atol=1e-9)
-    np.testing.assert_allclose(jax.jit(jax.jacfwd(core))(jnp.zeros(3)), reverse, rtol=1e-8)
+    np.testing.assert_allclose(forward, reverse, rtol=1e-8)
 
 
-def test_a_batch_is_its_members(core):
+def test_a_batch_is_its_members(case, solved, changed, core):
     points = jnp.asarray([[0.0, 0.0, 0.0], [0.02, -0.1, 0.1]])
-    alone = jax.jit(core)
-    np.testing.assert_allclose(jax.jit(jax.vmap(core))(points), [alone(point) for point in points], rtol=1e-6)
+    other = fitting.solve(eqx.filter_jit(changed)(points[1]), tolerance=case.tolerance)
+    alone = [solved.unconstrained, other.unconstrained]
+    np.testing.assert_allclose(jax.jit(jax.vmap(core))(points), alone, rtol=1e-6)
 
 
-def test_a_gradient_is_a_program_of_at_most_three_fits(case, changed, core):
-    length = lambda function: len(jax.jit(function).lower(jnp.zeros(3)).as_text())
+def test_derivatives_are_a_program_of_at_most_three_fits(case, changed, slopes):
     fit = lambda by: jax.tree.leaves(eqx.filter(fitting.solve(changed(by), tolerance=case.tolerance), eqx.is_array))
-    assert length(jax.grad(lambda by: core(by)[0])) < 3 * length(fit)
+    assert len(slopes.as_text()) < 3 * len(jax.jit(fit).lower(jnp.zeros(3)).as_text())
 
 
 def test_parts_of_the_data_count_as_often_as_they_are_told(problem):
     units = problem.units()
     one, other = np.random.default_rng(0).integers(0, 4, (2, units)).astype(float)
-    cost = lambda counts: float(problem.with_counts(jnp.asarray(counts)).cost(problem.start()))
-    assert cost(one) + cost(other) == pytest.approx(cost(one + other) + cost(0 * one), rel=1e-9)
-    assert cost(np.ones(units)) == pytest.approx(float(problem.cost(problem.start())), rel=1e-12)
+    cost = jax.jit(lambda counts: problem.with_counts(counts).cost(problem.start()))
+    assert cost(one) + cost(other) == pytest.approx(float(cost(one + other) + cost(0 * one)), rel=1e-9)
+    assert cost(np.ones(units)) == pytest.approx(float(jax.jit(lambda: problem.cost(problem.start()))()), rel=1e-12)
 
 
-def test_program_and_core_end_alike(case, problem):
-    fit = case.fit()
+def test_program_and_core_end_alike(case, problem, own, solved):
     if isinstance(problem, fitting.RigProblem):
         # Where the fit ended, with its noise: its last round pulled to where it began.
-        problem = fit.problem
-    core = fitting.solve(problem, tolerance=case.tolerance)
-    off = np.subtract(jax.tree.leaves(core.parameters), jax.tree.leaves(fit.parameters))
-    assert (np.abs(off) < 0.05 * np.asarray(jax.tree.leaves(fit.parameters_std))).all()
+        solved = fitting.solve(own.problem, tolerance=case.tolerance)
+    off = np.subtract(jax.tree.leaves(solved.parameters), jax.tree.leaves(own.parameters))
+    assert (np.abs(off) < 0.05 * np.asarray(jax.tree.leaves(own.parameters_std))).all()
 
 
 @pytest.mark.parametrize(("prior", "message"), [(-1.0, "prior spread of"), ({"nothing": 1.0}, "prior: unknown")])

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from rig_sweeps import measured_of, peak, plan, table, truth
+from rig_sweeps import forces, measured_of, peak, plan, table, truth
 from shared_data import shared
 
 from jaxveh import fitting, io, tyres
@@ -21,7 +21,7 @@ CURVED = ("PEX", "PEY", "REX", "REY")
 def noisy_table(channels, seed, rows=slice(None)):
     """What a rig would measure of the reference tyre at the inputs of the shared table, with 2 % noise."""
     inputs = io.read_rig_table(shared("mfeval_mf61.csv")).take(rows)
-    found, random = truth().forces(contact_of(inputs)), np.random.default_rng(seed)
+    found, random = forces(truth(), contact_of(inputs)), np.random.default_rng(seed)
     measured = dict.fromkeys(("F_x", "F_y", "M_x", "M_y", "M_z"))
     for name in channels:
         clean = np.asarray(getattr(found, name))

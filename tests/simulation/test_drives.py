@@ -108,12 +108,12 @@ def test_a_wheel_that_lifts_ends_a_drive():
 
 def test_the_fastest_pole_is_the_spectral_radius():
     driven = simulation.driven_car(seven(), straight())
-    x = driven.start(jnp.asarray(0.0), float, v_x=7.0)
+    x = jax.jit(lambda: driven.start(jnp.asarray(0.0), float, v_x=7.0))()
     flat, back = jax.flatten_util.ravel_pytree(x)
-    jacobian = jax.jacfwd(lambda z: jax.flatten_util.ravel_pytree(driven.derivatives(0.0, back(z)))[0])(flat)
+    jacobian = jax.jit(jax.jacfwd(lambda z: jax.flatten_util.ravel_pytree(driven.derivatives(0.0, back(z)))[0]))(flat)
     expected = np.max(np.abs(np.linalg.eigvals(np.asarray(jacobian))))
     assert expected > 500.0
-    assert float(simulation.fastest_pole(driven, 0.0, x)) == pytest.approx(expected, rel=0.02)
+    assert float(jax.jit(lambda x: simulation.fastest_pole(driven, 0.0, x))(x)) == pytest.approx(expected, rel=0.02)
 
 
 def test_a_slow_car_gets_short_steps_and_a_crawling_one_an_implicit_solver():

@@ -140,12 +140,13 @@ def test_gradients_equal_finite_differences_in_both_modes():
         manoeuvre = eqx.tree_at(lambda m: m.steer, lane_change(), at[1])
         return jnp.sum(simulate(car, manoeuvre, sensors.esc(), adjoint=adjoint)["true.yaw_rate"] ** 2)
 
-    at, steps = jnp.asarray([6.9986, 0.1], float), (1e-4, 1e-6)
-    ends = [[miss(at.at[i].add(sign * step)) for sign in (1, -1)] for i, step in enumerate(steps)]
-    expected = [(up - down) / (2 * step) for (up, down), step in zip(ends, steps, strict=True)]
-    np.testing.assert_allclose(jax.grad(miss)(at), expected, rtol=1e-6)
-    along = jax.jvp(lambda z: miss(z, diffrax.ForwardMode()), (at,), (jnp.asarray([1.0, 0.0], float),))[1]
-    np.testing.assert_allclose(along, expected[0], rtol=1e-6)
+    # Values and gradients by one program.
+    both = jax.jit(jax.value_and_grad(miss))
+    at, steps = np.asarray([6.9986, 0.1]), np.asarray([1e-4, 1e-6])
+    expected = [(both(at + side)[0] - both(at - side)[0]) / (2 * side.sum()) for side in np.diag(steps)]
+    np.testing.assert_allclose(both(at)[1], expected, rtol=1e-6)
+    forward = jax.jit(lambda z, way: jax.jvp(lambda z: miss(z, diffrax.ForwardMode()), (z,), (way,))[1])
+    np.testing.assert_allclose(forward(at, np.asarray([1.0, 0.0])), expected[0], rtol=1e-6)
 
 
 def test_float32_cars_make_float32_recordings(drive):
@@ -230,9 +231,15 @@ def test_equal_steps_are_diffrax_s_own_and_both_modes_differentiate():
         drive = simulate(car, lane_change(), dt=0.05, max_step=0.01, throw=False, **more)
         return jnp.stack([drive[f"true.{name}"][-1] for name in names])
 
-    mass = jnp.asarray(1420.0)
-    through = last(mass, adjoint=diffrax.RecursiveCheckpointAdjoint())
-    np.testing.assert_allclose(last(mass), through, rtol=1e-12)
-    forward, reverse = jax.jacfwd(last)(mass), jax.jacrev(last)(mass)
+    @jax.jit
+    def with_slopes(mass):
+        value, along = jax.linearize(last, mass)
+        against = jax.linear_transpose(along, mass)
+        return value, along(jnp.ones(())), jax.vmap(against)(jnp.eye(2))[0]
+
+    mass = np.asarray(1420.0)
+    through = jax.jit(lambda mass: last(mass, adjoint=diffrax.RecursiveCheckpointAdjoint()))(mass)
+    value, forward, reverse = with_slopes(mass)
+    np.testing.assert_allclose(value, through, rtol=1e-12)
     np.testing.assert_allclose(forward, reverse, rtol=1e-9)
-    np.testing.assert_allclose(forward, (last(mass + 1.0) - last(mass - 1.0)) / 2.0, rtol=1e-5)
+    np.testing.assert_allclose(forward, (with_slopes(mass + 1.0)[0] - with_slopes(mass - 1.0)[0]) / 2.0, rtol=1e-5)

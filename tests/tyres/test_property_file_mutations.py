@@ -14,8 +14,11 @@ from jaxveh import io, tyres
 from jaxveh._core.errors import InputError
 from jaxveh.tyres import Contact
 
-COUNT, MANY = 1000, 10_000
-"""Mutations of the project's own files, and as many of the shared ones: in the default run and in the full one."""
+COUNT, MANY = 400, 12_000
+"""Mutations of the project's own files, and as many of the shared ones: in the default run, and in the full one, which has
+those of the default run among its own (its seeds begin with the same one)."""
+
+SEEDS = range(1, 7)
 
 LARGE = 1e9
 """Coefficients of a tyre are smaller, stiffnesses of trucks included."""
@@ -63,16 +66,16 @@ def check_outcomes(files, count, seed, folder):
 
 @pytest.mark.parametrize("files", FILES)
 def test_a_finite_tyre_or_an_error(files, tmp_path):
-    found = check_outcomes(FILES[files](tmp_path), COUNT, 1, tmp_path)
+    found = check_outcomes(FILES[files](tmp_path), COUNT, SEEDS[0], tmp_path)
     # Neither is what nearly always happens: the mutations are of both kinds.
     assert 0.1 * COUNT < found < 0.9 * COUNT
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("seed", range(2, 7))
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("files", FILES)
 def test_a_finite_tyre_or_an_error_many_times(files, seed, tmp_path):
-    assert check_outcomes(FILES[files](tmp_path), MANY // 5, seed, tmp_path)
+    assert check_outcomes(FILES[files](tmp_path), MANY // len(SEEDS), seed, tmp_path)
 
 
 def test_what_is_read_is_written_byte_for_byte(tmp_path):

@@ -366,12 +366,14 @@ def test_a_batch_and_vmap_equal_single_cars(name):
 def test_outputs_have_the_shape_of_the_batch(name):
     """All of them, loads that nothing moves and inputs that all share included; the rates of a batch of states likewise."""
     car, (x, u) = made(name), stirred(name)
-    many = lambda tree: jax.tree.map(lambda value: value + jnp.zeros((2, 3)), tree)
+    many = lambda tree: jax.tree.map(lambda value: np.broadcast_to(value, (2, 3)), tree)
+    # Traced and not run.
+    shapes = lambda function, x, u, ground: jax.eval_shape(lambda x, u: function(0.0, x, u, ground), x, u)
     for ground in (LEVEL, ROUGH):
-        rates, outputs = car.evaluate(0.0, many(x), many(u), ground)
+        rates, outputs = shapes(car.evaluate, many(x), many(u), ground)
         assert not {field: v.shape for field, v in (rates._asdict() | outputs._asdict()).items() if v.shape != (2, 3)}
         for mixed in ((many(x), u), (x, many(u))):
-            outputs = car.outputs(0.0, *mixed, ground)
+            outputs = shapes(car.outputs, *mixed, ground)
             assert not {field: v.shape for field, v in outputs._asdict().items() if v.shape != (2, 3)}
 
 

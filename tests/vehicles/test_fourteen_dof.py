@@ -118,22 +118,20 @@ def size(given):
     return sum(jnp.sum(jnp.square(v)) for v in (*rate, *shown))
 
 
-@pytest.mark.parametrize("where", ["standing", "in the air", "locked"])
-def test_values_and_gradients_are_finite(where):
+def test_values_and_gradients_are_finite():
+    """Standing, in the air and with locked wheels, forwards and backwards: a batch, as it is not compiled."""
     car = make(tyres.Relaxed(tyres.Brush(8e4, 7e4), 0.4, 0.5), ackermann=0.3)
     u = inputs(0.0, 0.0, 500.0)
-    values = {
-        "standing": {},
-        "in the air": {"z": 1.2, "v_x": 10.0},
-        "locked": {"v_x": 10.0} | dict.fromkeys(wheel_names("omega"), 0.0),
-    }[where]
-    x = car.start(0.0, u, **values)
+    cases = [{}, {"z": 1.2, "v_x": 10.0}, {"v_x": 10.0} | dict.fromkeys(wheel_names("omega"), 0.0)]
+    forwards = [car.start(0.0, u, **values) for values in cases]
+    states = [*forwards, *(x._replace(v_x=-x.v_x) for x in forwards)]
+    xs = jax.tree.map(lambda *values: jnp.asarray(np.array(values, float)), *states)
+    us = jax.tree.map(lambda value: jnp.asarray(np.full(len(states), value)), u)
 
-    value, slopes = size((car, x, u))
+    value, slopes = size((car, xs, us))
     assert np.isfinite(value)
     leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(slopes)]
     assert len(leaves) > 60 and all(np.isfinite(leaf).all() for leaf in leaves)
-    assert np.isfinite(np.asarray(size((car, x._replace(v_x=-x.v_x), u))[0]))
 
 
 def test_ice_on_a_slope_pulls_along_it():

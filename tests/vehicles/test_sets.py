@@ -288,6 +288,7 @@ def test_a_cars_rolling_resistance_counts_once(kind):
     u = record("Inputs", {name: jnp.asarray(0.0) for name in car.inputs})
     x = car.start(0.0, u, v_x=25.0)
     # A wheel that is held back takes the body with it only once it slips: what slows the spins says it at once.
-    rates = eqx.filter_jit(car.derivatives)(0.0, x, u)
+    # Of one wheel: nothing else is compiled.
+    rate = eqx.filter_jit(lambda car, x, u: car.derivatives(0.0, x, u).omega_fl)(car, x, u)
     asked = numbers.rolling_resistance * numbers.wheel_loads()[0] * numbers.wheel_radius
-    np.testing.assert_allclose(-rates.omega_fl * numbers.wheel_inertia, asked, rtol=0.05)
+    np.testing.assert_allclose(-rate * numbers.wheel_inertia, asked, rtol=0.05)
