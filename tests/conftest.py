@@ -89,8 +89,8 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 def program_of(case):
-    """`Kalman` of `test_some_property[Kalman-linear]`."""
-    return case.partition("[")[2].rstrip("]").removesuffix("-linear").removesuffix("-pendulum")
+    """`Kalman` of `test_some_property[Kalman-straight]`."""
+    return case.partition("[")[2].rstrip("]").removesuffix("-straight").removesuffix("-swinging")
 
 
 @pytest.fixture(scope="module", autouse=True)

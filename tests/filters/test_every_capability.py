@@ -1,4 +1,9 @@
-"""What a filter declares is what it does: each of `FILTERS`, each capability, both ways."""
+"""What a filter declares is what it does: each of `FILTERS`, each capability, both ways.
+
+A filter is one program, which all of its tests share: the recordings are of one length, with empty rows behind the last, and what
+takes the noise of a row is always told one, that of the model where nothing else is said. (That it is then the filter itself is
+in test_data_reality; in `-m full`, of each.)
+"""
 
 import functools
 import inspect
@@ -58,8 +63,17 @@ def able(name, flag):
     return who_lacks(filter_named(name), flag) is None
 
 
-def scanned(filter_, model, rows):
-    return filters.scan(filter_, model, rows, jax.random.key(0))
+def scanned(filter_, model, rows, key=0):
+    return filters.scan(filter_, model, rows, jax.random.key(key))
+
+
+def told(name):
+    """The filter, told the spread of its first channel where it can be."""
+    filter_ = filter_named(name)
+    return filters.VaryingNoise(filter_, {"y0": "told"}) if name in TOLD else filter_
+
+
+TOLD = [n for n in NOW if able(n, "noise_by_row") and n not in NOT_TOLD]
 
 
 def told_model(own):
@@ -96,14 +110,17 @@ def told_rows(model, values=None, y0=None):
     channels = {name: np.array(recording[name]) for name in (*model.channels, "force")}
     if y0 is not None:
         channels["y0"][ROW] = y0
-    return model.rows(recording.replace(**channels, told=np.full(25, 0.4) if values is None else values))
+    rows = model.rows(recording.replace(**channels, told=np.full(25, 0.4) if values is None else values))
+    return jax.tree.map(np.asarray, rows)
 
 
-def beyond(rows, count):
-    """`count` empty rows behind the last, so that rows without and with others between are one program."""
-    later = jax.tree.map(lambda leaf: jnp.concatenate([leaf, jnp.full(count, leaf[-1])]), rows)
-    t = later.t.at[-count:].add(0.1 * jnp.arange(1.0, count + 1.0))
-    return later._replace(t=t, y=jax.tree.map(lambda leaf: leaf.at[-count:].set(jnp.nan), later.y))
+def filled(rows):
+    """Empty rows behind the last, up to as many as there are with others between: all are one program."""
+    count = 25 + 24 * BETWEEN - rows.t.size
+    later = jax.tree.map(lambda leaf: np.append(leaf, np.full(count, leaf[-1])), rows)
+    t = rows.t[-1] + 0.1 * np.arange(1.0, count + 1.0)
+    y = jax.tree.map(lambda leaf: np.append(leaf, np.full(count, np.nan)), rows.y)
+    return later._replace(t=np.append(rows.t, t), y=y)
 
 
 def own_model(name):
@@ -114,24 +131,30 @@ def own_model(name):
 
 @functools.cache
 def answer(name, what, own=None):
-    """The estimate of a filter's rows: `plain`, `longer` by empty rows between, or with y0 of one row `missing` or `given`."""
-    model = told_model(own or turning)
-    rows = told_rows(model, y0={"missing": np.nan, "given": 3.0}.get(what))
-    rows = with_empty_rows(rows, BETWEEN) if what == "longer" else beyond(rows, BETWEEN * 24)
-    return scanned(filter_named(name), model, rows)
+    """The estimate of a filter's rows: `plain`, `longer` by empty rows between, or with y0 of one row `missing`, `given`, or of a
+    `huge` spread."""
+    model = told_model(own or own_model(name))
+    values = np.full(25, 0.4)
+    values[ROW] = HUGE if what == "huge" else 0.4
+    rows = told_rows(model, values, {"missing": np.nan, "given": 3.0, "huge": 0.5}.get(what))
+    return scanned(told(name), model, filled(with_empty_rows(rows, BETWEEN) if what == "longer" else rows))
 
 
-@pytest.mark.parametrize("name", [n for n in NOW if able(n, "noise_by_row") and n not in NOT_TOLD])
+@pytest.mark.parametrize("name", TOLD)
 def test_noise_of_a_row_is_taken_as_it_is_told(name):
-    """A channel of a huge spread in one row is as good as missing there, and has the model's own spread in all others."""
-    own, values = own_model(name), np.full(25, 0.4)
-    model = told_model(own)
-    values[ROW] = HUGE
-    told = scanned(filters.VaryingNoise(filter_named(name), {"y0": "told"}), model, told_rows(model, values, y0=0.5))
-    missing, given = answer(name, "missing", own), answer(name, "given", own)
-    for found, expected in zip(told.mean, missing.mean, strict=True):
+    """A channel of a huge spread in one row is as good as missing there."""
+    huge, missing, given = (answer(name, what) for what in ("huge", "missing", "given"))
+    for found, expected in zip(huge.mean, missing.mean, strict=True):
         np.testing.assert_allclose(found[: ROW + 1], expected[: ROW + 1], rtol=1e-4, atol=1e-4)
     assert abs(given.mean.x0[ROW] - missing.mean.x0[ROW]) > 1e-3
+
+
+@pytest.mark.full  # By default of one filter in test_data_reality: what is told is written into the model of any.
+@pytest.mark.parametrize("name", TOLD)
+def test_told_the_model_s_own_noise_it_is_the_filter_itself(name):
+    model = told_model(own_model(name))
+    plain, told_it = scanned(filter_named(name), model, filled(told_rows(model))), answer(name, "plain")
+    np.testing.assert_allclose(np.stack(told_it.mean), np.stack(plain.mean), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", [n for n in ONCE if not able(n, "noise_by_row")])
@@ -167,19 +190,18 @@ def turning():
 def with_empty_rows(rows, count):
     """`count` rows without a measurement put between each two, at which the inputs are still those of the row before."""
     parts = np.arange(count + 1) / (count + 1)
-    t = np.asarray(rows.t)
+    t = rows.t
     times = np.append((t[:-1, None] + np.diff(t)[:, None] * parts).reshape(-1), t[-1])
     place = np.arange(times.size) // (count + 1)
     real = np.arange(times.size) % (count + 1) == 0
     taken = jax.tree.map(lambda leaf: leaf[place], rows)
-    y = jax.tree.map(lambda leaf: jnp.where(real, leaf, jnp.nan), taken.y)
-    return taken._replace(t=jnp.asarray(times), y=y)
+    return taken._replace(t=times, y=jax.tree.map(lambda leaf: np.where(real, leaf, np.nan), taken.y))
 
 
 def beside(name):
     """Estimates of the rows that both have: as they are, and with two empty rows between each two."""
-    shown = lambda found: np.asarray(jnp.stack([*found.mean, *found.std]))
-    return shown(answer(name, "plain"))[:, :25], shown(answer(name, "longer"))[:, :: BETWEEN + 1]
+    shown = lambda found: np.stack([*found.mean, *found.std])
+    return shown(answer(name, "plain", turning))[:, :25], shown(answer(name, "longer", turning))[:, :: BETWEEN + 1]
 
 
 @pytest.mark.parametrize("name", [n for n in NOT_DRAWN if able(n, "rows_between")])
@@ -205,16 +227,12 @@ def test_what_acts_in_each_step_is_changed_by_empty_rows_and_refused(name):
 @pytest.mark.parametrize("name", DRAWN)
 def test_the_spread_of_particles_without_measurements_depends_on_time_alone(name):
     """Over 40 rows as over 4: their own number of draws makes spreads scatter by 5 %."""
-    model = linear()
-    rows = model.rows(recordings("linear")[0])
-    few = jax.tree.map(lambda leaf: leaf[:4], rows)
-    few = few._replace(y=jax.tree.map(lambda leaf: jnp.full_like(leaf, jnp.nan), few.y))
-    ends = []
+    model, ends = told_model(linear), []
+    few = jax.tree.map(lambda leaf: leaf[:4], told_rows(model))
+    few = few._replace(y=jax.tree.map(lambda leaf: np.full(4, np.nan), few.y))
     for given in (few, with_empty_rows(few, 12)):
-        found = eqx.filter_vmap(lambda key, given=given: filters.scan(filter_named(name), model, given, key))(
-            jax.random.split(jax.random.key(1), 4)
-        )
-        ends.append(np.sqrt(np.mean([std[:, -1] ** 2 for std in found.std], axis=1)))
+        stds = [np.stack(scanned(told(name), model, filled(given), key).std)[:, given.t.size - 1] for key in range(4)]
+        ends.append(np.sqrt(np.mean(np.square(stds), axis=0)))
     # The transition is Heun's or Euler's, whose steps are not those of their sum: the spread of it differs by a little.
     ratio = ends[1] / ends[0]
     if able(name, "rows_between"):
@@ -225,16 +243,16 @@ def test_the_spread_of_particles_without_measurements_depends_on_time_alone(name
 
 @pytest.mark.parametrize("name", NOT_DRAWN)
 def test_whitened_innovations_add_up_where_they_are_declared(name):
-    found = answer(name, "plain")
+    found = answer(name, "plain", turning)
     if not able(name, "whitens"):
         kind = who_lacks(filter_named(name), "whitens")
         assert found.info.whitened is None, (
             f"{kind} hands on whitened innovations, and does not declare it: whitens = True"
         )
         return
-    white, scale = jnp.stack(found.info.whitened), jnp.stack(found.info.log_scale)
-    here = jnp.isfinite(jnp.stack(found.info.innovation))
-    sums = jnp.sum(jnp.where(here, -0.5 * white**2 - scale - 0.5 * np.log(2 * np.pi), 0.0))
+    white, scale = np.stack(found.info.whitened), np.stack(found.info.log_scale)
+    here = np.isfinite(np.stack(found.info.innovation))
+    sums = np.sum(np.where(here, -0.5 * white**2 - scale - 0.5 * np.log(2 * np.pi), 0.0))
     np.testing.assert_allclose(sums, found.log_likelihood, rtol=1e-9)
 
 

@@ -1,12 +1,12 @@
 """What holds for every filter, each in turn: a new one is a line in `FILTERS` that says what it can.
 
-Each filter and model are one program, which the tests share: log-likelihood, estimate and gradient of a batch of two recordings
-with irregular steps, missing channels and rows without any measurement. By default every filter, but for those that vary another
-(`seldom`), meets the linear model, and in turn one of: the nonlinear model, float32, a live loop. `pytest -m full` runs the
-rest of the product.
+Each filter is one program, which the tests share: log-likelihood, estimate and gradient of a batch of two recordings with
+irregular steps, missing channels and rows without any measurement. A linear and a nonlinear model differ in numbers alone
+(`straight`, `swinging`), so that the program is one for both. By default every filter, but for those that vary another
+(`seldom`), meets both, and every third float32, or a live loop. `pytest -m full` runs the rest of the product.
 
 Gradients are two thirds of a program's compilation, so that float32 goes without (a gradient has its leaf's dtype), and so does
-what has no slope to compare with, but for the linear model on every third turn.
+what has no slope to compare with, but for every third.
 """
 
 import functools
@@ -19,7 +19,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from families import left_out
-from filter_systems import kalman, linear_model, linear_recording
+from filter_systems import kalman, linear_model, linear_observation, linear_recording, linear_transition
+from recorded_numbers import check_recorded
 
 from jaxveh import InputError, Recording, filters
 from jaxveh import statespace as ss
@@ -28,6 +29,7 @@ from jaxveh.filters import Covariance, SingularValues, SquareRoot
 from jaxveh.numerics import sigma_points
 
 N = 200
+NAMES = ("x0", "x1", "x2")
 
 
 class Line(NamedTuple):
@@ -178,19 +180,58 @@ def see_swing(system, t, x, u):
 
 
 def pendulum():
-    names = ("x0", "x1", "x2")
     return ss.StateSpace(
         system={"pull": jnp.asarray(np.array(9.0))},
         transition=swing,
         observation=see_swing,
         process_noise=ss.Continuous(ss.Gaussian({"x0": 0.1, "x1": 0.5, "x2": 0.05})),
         measurement_noise=ss.Gaussian({"y0": 0.1, "y1": 0.2}),
-        prior=ss.Prior(record_type("X", names)(0.5, 0.0, 0.1), dict(zip(names, (0.3, 0.5, 0.1), strict=True))),
+        prior=ss.Prior(record_type("X", NAMES)(0.5, 0.0, 0.1), dict(zip(NAMES, (0.3, 0.5, 0.1), strict=True))),
         inputs=("force",),
     )
 
 
-MODELS = {"linear": linear, "pendulum": pendulum}
+def straight_or_swung(system, t0, t1, x, u):
+    """x + dt (A x + B force), and the pull of a pendulum."""
+    moved = linear_transition(system, t0, t1, x, u)
+    return moved._replace(x1=moved.x1 - (t1 - t0) * system["pull"] * jnp.sin(x.x0))
+
+
+def see_bent(system, t, x, u):
+    """H x + D force, and what is seen of a pendulum."""
+    y = linear_observation(system, t, x, u)
+    return type(y)(y.y0 + system["bend"] * jnp.sin(x.x0), y.y1 + system["bend"] * jnp.cos(x.x0))
+
+
+def straight():
+    """`linear`, as the tree of numbers that `swinging` is."""
+    model = linear()
+    return ss.StateSpace(
+        system={**model.system, "pull": jnp.asarray(np.array(0.0)), "bend": jnp.asarray(np.array(0.0))},
+        transition=straight_or_swung, observation=see_bent, process_noise=model.process_noise,
+        measurement_noise=model.measurement_noise, prior=model.prior, inputs=model.inputs,
+    )  # fmt: skip
+
+
+def swinging():
+    """A pendulum under a force, whose angle is seen with an offset."""
+    A = np.array([[0.0, 1.0, 0.0], [0.0, -0.1, 0.0], [0.0, 0.0, 0.0]])
+    system = {
+        "A": A, "B": np.array([0.0, 1.0, 0.0]), "H": np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]), "D": np.zeros(2),
+        "pull": np.array(9.0), "bend": np.array(1.0),
+    }  # fmt: skip
+    spread, law = np.array([[1.0, 0.2, 0.0], [0.2, 1.0, 0.1], [0.0, 0.1, 1.0]]), ss.MultivariateGaussian
+    process, prior = (np.outer(std, std) * spread for std in ([0.1, 0.5, 0.05], [0.3, 0.5, 0.1]))
+    return ss.StateSpace(
+        system=jax.tree.map(jnp.asarray, system), transition=straight_or_swung, observation=see_bent,
+        process_noise=ss.Continuous(law(NAMES, process)), measurement_noise=ss.Gaussian({"y0": 0.1, "y1": 0.2}),
+        prior=ss.Prior(record_type("X", NAMES)(0.5, 0.0, 0.1), law(NAMES, prior)), inputs=("force",),
+    )  # fmt: skip
+
+
+MODELS = {"linear": linear, "pendulum": pendulum, "straight": straight, "swinging": swinging}
+BOTH = ("straight", "swinging")
+"""What every filter meets; other files take the first two."""
 
 
 @functools.cache
@@ -252,13 +293,13 @@ KEYS = jax.random.split(jax.random.key(7), 2)
 def found(filter_name, model_name):
     model, rows = batch(model_name)
     line = FILTERS[filter_name]
-    if line.differentiable or (model_name == "linear" and turn(filter_name) in ("live", "")):
+    if line.differentiable or turn(filter_name) == "gradient":
         return batch_with_gradients(line.make(), model, rows, KEYS)
     return batch_of_values(line.make(), model, rows, KEYS), ()
 
 
-NEXT = ("pendulum", "float32", "live")
-"""What a filter meets besides the linear model, in turn."""
+NEXT = ("gradient", "float32", "live")
+"""What a filter meets besides both models, in turn; the first is for those that are not differentiable."""
 
 
 def turn(name):
@@ -268,7 +309,7 @@ def turn(name):
 
 def case(name, what, *more):
     """A parameter: of the default run where it is this filter's turn, else of the full one."""
-    mine = not FILTERS[name].seldom and what in ("linear", turn(name))
+    mine = not FILTERS[name].seldom and what in (*BOTH, turn(name))
     return pytest.param(name, *more, marks=[] if mine else pytest.mark.full)
 
 
@@ -277,14 +318,14 @@ def names(what, condition=lambda line: True):
 
 
 def cases(condition=lambda line: True):
-    pairs = [(name, model) for name, line in FILTERS.items() for model in MODELS if condition(line)]
-    return [case(name, model, model) for name, model in pairs if not (FILTERS[name].linear and model != "linear")]
+    pairs = [(name, model) for name, line in FILTERS.items() for model in BOTH if condition(line)]
+    return [case(name, model, model) for name, model in pairs if not (FILTERS[name].linear and model != "straight")]
 
 
-@pytest.mark.parametrize("name", names("linear", lambda line: line.exact))
+@pytest.mark.parametrize("name", names("straight", lambda line: line.exact))
 def test_on_linear_models_it_is_the_exact_answer(name):
-    (value, estimate), _ = found(name, "linear")
-    for i, recording in enumerate(recordings("linear")):
+    (value, estimate), _ = found(name, "straight")
+    for i, recording in enumerate(recordings("straight")):
         exact = kalman_of(recording)
         np.testing.assert_allclose(value[i], exact["log_likelihood"].sum(), rtol=1e-9)
         if FILTERS[name].late:
@@ -346,10 +387,31 @@ def test_its_gradient_is_that_of_differences(name, model):
     np.testing.assert_allclose(slope, (values[0] - values[1]) / (2 * h), rtol=2e-5, atol=1e-5)
 
 
+@pytest.mark.parametrize("name", names("gradient", lambda line: not line.differentiable))
+def test_a_gradient_that_is_no_slope_is_a_number(name):
+    """Of `found` where it has one; where this is not the filter's turn, of a program more."""
+    _, gradient = found(name, "straight")
+    if not gradient:
+        _, gradient = batch_with_gradients(FILTERS[name].make(), *batch("straight"), KEYS)
+    for leaf in jax.tree.leaves(gradient):
+        assert np.isfinite(leaf).all()
+
+
+@pytest.mark.parametrize("name", names("straight"))
+def test_its_estimates_are_those_recorded(name):
+    """Of both models; variants of another filter (`seldom`) are on record in test_recorded_estimates, too."""
+    kept = {}
+    for model in BOTH if not FILTERS[name].linear else BOTH[:1]:
+        (value, estimate), _ = found(name, model)
+        rows = lambda leaf: leaf[:, 2::9]  # of which one says nothing
+        kept[model] = value, jax.tree.map(rows, (estimate.mean, estimate.std, estimate.info))
+    check_recorded(__file__, name, kept)
+
+
 @pytest.mark.parametrize("name", names("live", lambda line: not line.drawn))
 def test_a_live_loop_gives_the_scan_s_answer(name):
-    filter_, (model, rows) = FILTERS[name].make(), batch("linear")
-    (value, estimate), _ = found(name, "linear")
+    filter_, (model, rows) = FILTERS[name].make(), batch("straight")
+    (value, estimate), _ = found(name, "straight")
     step = eqx.filter_jit(filter_.step)
     one = jax.tree.map(lambda leaf: leaf[0], rows)
     row = lambda k: jax.tree.map(lambda leaf: leaf[k], one)
@@ -364,8 +426,8 @@ def test_a_live_loop_gives_the_scan_s_answer(name):
 
 @pytest.mark.parametrize("name", names("float32"))
 def test_float32_stays_float32_and_says_the_same(name):
-    (value, estimate), _ = found(name, "linear")
-    model, rows = batch("linear", jnp.float32)
+    (value, estimate), _ = found(name, "straight")
+    model, rows = batch("straight", jnp.float32)
     single, short = batch_of_values(FILTERS[name].make(), model, rows, KEYS)
     assert {leaf.dtype for leaf in (single, *short.mean, *short.std)} == {np.dtype("float32")}
     assert not np.asarray(short.result).any()

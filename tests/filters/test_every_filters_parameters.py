@@ -1,14 +1,18 @@
 """Estimated parameters have one shape, whoever estimated them: every filter of the package, and every smoother.
 
-Filters are traced alone, not run: names and shapes are all that is looked at. Fits are in `tests/fitting/test_every_fit.py`,
+Filters are traced alone, not run: names and shapes are all that is looked at. Their measurement noise depends on the state where
+they take such a law, so that it is seen of each in the same trace that they do. Fits are in `tests/fitting/test_every_fit.py`,
 observers in `tests/observers/test_every_observer.py`, a sweep's runs in `tests/sweeps/test_sweep.py`.
 """
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
+import numpy as np
 import pytest
 from filter_systems import linear_observation, linear_recording, linear_transition
 from test_every_filter import FILTERS, linear
+from test_state_dependent_noise import ONE_LAW, never_changes, with_noise
 
 from jaxveh import Parameters, filters
 from jaxveh import statespace as ss
@@ -51,6 +55,7 @@ def model():
 
 
 MODEL = model()
+STATE_DEPENDENT = with_noise(MODEL, ss.StateDependent(never_changes, ("y0", "y1")))
 RECORDING = linear_recording(MODEL, rows=ROWS)
 
 
@@ -64,7 +69,12 @@ def check(estimate):
 def test_a_filter_s_parameters_are_found_as_in_the_car(name):
     line = FILTERS[name]
     key = jax.random.key(0) if line.drawn else None
-    check(eqx.filter_eval_shape(filters.scan, line.make(), MODEL, MODEL.rows(RECORDING), key))
+    taken = MODEL if name in ONE_LAW else STATE_DEPENDENT
+    line.make().check(taken)
+    estimate = eqx.filter_eval_shape(filters.scan, line.make(), taken, MODEL.rows(RECORDING), key)
+    check(estimate)
+    floats = [leaf.dtype for leaf in jax.tree.leaves(estimate) if jnp.issubdtype(leaf.dtype, jnp.floating)]
+    assert set(floats) == {np.dtype("float64")}
 
 
 @pytest.mark.parametrize("lag", [None, 2])

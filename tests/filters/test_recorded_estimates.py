@@ -1,5 +1,6 @@
 """What every filter makes of a short recording, by every setting that changes it, as recorded.
 
+Of those that test_every_filter runs by default, it compares what it found, too: here they are left to `-m full`.
 Particles, too: their draws are of a key, and rounding moves an ancestor about once in a thousand million draws.
 """
 
@@ -66,7 +67,12 @@ def short(filter_, model, rows, key):
     return jax.tree.map(lambda leaf: leaf[2::3] if leaf.ndim else leaf, kept)
 
 
-@pytest.mark.parametrize("name", MAKERS)
+def case(name):
+    there = name in FILTERS and not FILTERS[name].seldom
+    return pytest.param(name, marks=[pytest.mark.full] if there else [])
+
+
+@pytest.mark.parametrize("name", [case(name) for name in MAKERS])
 def test_estimates_are_those_recorded(name):
     filter_, linear = MAKERS[name](), name in FILTERS and FILTERS[name].linear
     model, rows = batch("linear" if linear else "pendulum")

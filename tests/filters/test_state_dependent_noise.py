@@ -229,10 +229,11 @@ def with_noise(model, noise):
 
 
 DEFAULT = ("Ensemble", "strong tracking", "federated", "guided, fully adapted")
-"""Of which numbers are compared in the default run; the others are only traced there, or have tests above."""
+"""Of which numbers are compared in the default run; the others are only traced there, in test_every_filters_parameters, or have
+tests above."""
 
 
-@pytest.mark.product
+@pytest.mark.full  # By default test_every_filters_parameters traces every filter with such a law.
 @pytest.mark.parametrize("name", [name for name in FILTERS if name not in ONE_LAW])
 def test_every_other_filter_takes_it(name):
     model, rows = batch("linear")
