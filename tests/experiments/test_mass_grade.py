@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from rolled import rolled_simulate
 
 from jaxveh import Parameters, sweeps
 from jaxveh.experiments import mass_grade_aukf as experiment
@@ -15,12 +16,14 @@ from jaxveh.experiments.mass_grade_aukf.contestants import WALK, Found, contesta
 from jaxveh.experiments.mass_grade_aukf.observed import KNOT, Known, bound_of_mass, known_of_mass, predictions
 
 PEDALS = (0.0, 0.2)
-SMALL = experiment.truck(duration=60.0, dt=0.1, max_step=0.005, guesses=(4000.0,))
+SMALL = experiment.truck(duration=60.0, dt=0.1, max_step=0.01, guesses=(4000.0,))
 
 
 @pytest.fixture(scope="module")
 def drives():
-    return experiment.drives_of(SMALL, PEDALS, 3, jax.random.key(5))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(own_drives, "simulate", rolled_simulate)
+        return experiment.drives_of(SMALL, PEDALS, 3, jax.random.key(5))
 
 
 def test_the_drive_is_a_gentle_one(drives):
