@@ -121,8 +121,8 @@ def test_what_knows_outliers_beats_what_does_not(drives):
         ADAPTIVE: Contestant(dynamics_filter(filters.HaarParticles(particles), models.mixture, lags=False), ""),
     }
     entrants |= {
-        REDESIGNED: Contestant(redesigned_particles(SMALL, lags=False), ""),
-        TOLD: Contestant(informed_filter(filters.Cubature(), lags=False), ""),
+        REDESIGNED: Contestant(redesigned_particles(SMALL), ""),
+        TOLD: Contestant(informed_filter(filters.Cubature()), ""),
     }
     raced = experiment.race(SMALL, cases, drives, jax.random.key(0), entrants=entrants, tyre=quick_tyre)
     error = lambda name, case, what="yaw_rate": np.median(raced.of(what, name, case))

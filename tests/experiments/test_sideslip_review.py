@@ -6,7 +6,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from rolled import rolled_simulate
 from shared_data import shared
 
 from jaxveh import estimators, io, vehicles
@@ -44,7 +43,6 @@ def quick_tyre(study, axle, stiffness, grip):
 def drives():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(own_drives, "_tyre", quick_tyre)
-        patch.setattr(own_drives, "simulate", rolled_simulate)
         return experiment.drives_of(SMALL, 3, jax.random.key(5), scenarios=NAMES)
 
 

@@ -4,11 +4,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from rolled import rolled_simulate
 
 from jaxveh import numerics, sweeps
 from jaxveh.experiments.tyre_apf import Study, saturated, sharpness
-from jaxveh.experiments.tyre_apf import study as own_study
 from jaxveh.experiments.tyre_apf.printed import closest_share
 from jaxveh.experiments.tyre_apf.sweep_figures import saturated_figure, sharpness_figure
 
@@ -70,7 +68,6 @@ def test_single_shooting_finds_what_made_the_data():
 
 def test_errors_of_the_prior_are_one_standard_deviation(monkeypatch):
     monkeypatch.setattr(sharpness, "KINDS", {"PF": sharpness.KINDS["PF"]})
-    monkeypatch.setattr(own_study, "simulate", rolled_simulate)
     study = Study(duration=6.0, rate=20.0)
     found = sharpness.run_sharpness(study, 20, jax.random.key(0), counts=(20,), again=3).found[20]
     assert sharpness.pairs(found) == []
