@@ -57,15 +57,18 @@ def test_the_fault_is_what_it_says(slalom):
 
 def test_the_filters_model_is_the_truth_s(slalom):
     """At the true states and parameters it says what was measured, but for noise, and moves as the truth does."""
-    for seed in range(2):
-        drive = drives.Drive(*(jnp.asarray(leaf[seed]) for leaf in slalom))
+
+    @jax.jit
+    def said_and_rates(car, drive):
         rows = model.rows_of(SMALL, drive)
         x = model.State(drive.true_v_x, drive.true_v_y, drive.true_yaw_rate)
-        said = model.sensor_outputs(true_car(), 0.0, x, rows.u)
+        return rows, x, model.sensor_outputs(car, 0.0, x, rows.u), model.rates(car, 0.0, x, rows.u)
+
+    for seed in range(2):
+        rows, x, said, rates = said_and_rates(true_car(), drives.Drive(*(leaf[seed] for leaf in slalom)))
         for name, level in model.noise_levels(SMALL).items():
             rest = np.asarray(getattr(rows.y, name) - getattr(said, name))[50:]
             assert rest.std() < 1.15 * level and abs(rest.mean()) < 0.3 * level, name
-        rates = model.rates(true_car(), 0.0, x, rows.u)
         for rate, values in zip(rates, x, strict=True):
             slope = np.gradient(values, SMALL.dt)
             assert np.abs(rate - slope)[50:-1].max() < 0.02 * np.abs(slope).max() + 0.01

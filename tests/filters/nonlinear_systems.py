@@ -2,6 +2,7 @@
 
 from collections import namedtuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -56,6 +57,7 @@ def growth():
     )
 
 
+@eqx.filter_jit
 def simulate(model, key, rows):
     """A draw of the model: states (T,) and measurements (T,) at the times 0, 1, 2, ..."""
     keys = jax.random.split(key, 2 * rows).reshape(rows, 2)
@@ -78,22 +80,26 @@ def as_recording(measured):
     return Recording(np.arange(float(len(measured))), {"y": np.asarray(measured)})
 
 
-def grid_filter(model, measured, low, high, points=2000):
+def grid_filter(model, measured, low, high, points=800):
     """Log-likelihood and posterior means (T,) by sums over a grid of states from `low` to `high`."""
     grid = np.linspace(low, high, points)
     width = grid[1] - grid[0]
     spread = float(model.process_noise.law.std[0])
     density = lambda z, s: np.exp(-0.5 * (z / s) ** 2) / (s * np.sqrt(2 * np.pi))
     here = {"y": jnp.asarray(True)}
+    parts = jax.jit(
+        lambda k, y: (
+            model.transition(k - 1.0, k, X(jnp.asarray(grid)), None).x,
+            model.measurement_noise.log_prob({"y": y - model.observation(k, X(jnp.asarray(grid)), None).y}, here),
+        )
+    )
     weights = density(grid - float(model.prior.mean.x), float(model.prior.law.std[0]))
     total, means = 0.0, []
     for k, y in enumerate(np.asarray(measured)):
+        moved, log_likely = parts(float(k), y)
         if k:
-            moved = np.asarray(model.transition(float(k - 1), float(k), X(jnp.asarray(grid)), None).x)
-            weights = density(grid[:, None] - moved[None], spread) @ weights * width
-        seen = model.observation(float(k), X(jnp.asarray(grid)), None).y
-        likely = np.exp(np.asarray(model.measurement_noise.log_prob({"y": y - seen}, here)))
-        weights = weights * likely
+            weights = density(grid[:, None] - np.asarray(moved)[None], spread) @ weights * width
+        weights = weights * np.exp(np.asarray(log_likely))
         part = weights.sum() * width
         weights, total = weights / part, total + np.log(part)
         means.append((weights * grid).sum() * width)

@@ -43,7 +43,7 @@ def row(k):
 
 @pytest.mark.parametrize("name", [*KINDS, *OTHERS])
 def test_a_broken_run_goes_on_bit_for_bit(name, tmp_path):
-    filter_, model = (KINDS[name], MODEL) if name in KINDS else (OTHERS[name], INDEPENDENT)
+    filter_, model = kind_and_model(name)
     step = eqx.filter_jit(filter_.step)
     first, _ = filter_.init(model, row(0), jax.random.key(4))
     whole = first
@@ -78,43 +78,59 @@ def test_a_file_of_another_filter_is_refused(tmp_path):
 
 
 LIVE = """
-    import json, sys
+    import json, pathlib, sys
     import jax, jax.export, numpy as np
     jax.config.update("jax_enable_x64", True)
-    folder, data = sys.argv[1:]
-    init, step = (
-        jax.export.deserialize(bytearray(open(f"{folder}/{name}.jaxexport", "rb").read())) for name in ("init", "step")
-    )
-    rows = np.load(data)
-    total = 0.0
-    for k, (t, u, y) in enumerate(zip(rows["t"], rows["u"], rows["y"])):
-        state, mean, std, numbers = init.call(t, u, y) if k == 0 else step.call(state, t, u, y)
-        total += float(numbers[0])
+    data, *folders = map(pathlib.Path, sys.argv[1:])
+    rows, said = np.load(data), {}
+    for folder in folders:
+        init, step = (
+            jax.export.deserialize(bytearray((folder / f"{name}.jaxexport").read_bytes())) for name in ("init", "step")
+        )
+        total = 0.0
+        for k, (t, u, y) in enumerate(zip(rows["t"], rows["u"], rows["y"])):
+            state, mean, std, numbers = init.call(t, u, y) if k == 0 else step.call(state, t, u, y)
+            total += float(numbers[0])
+        said[folder.name] = [total, list(map(float, mean)), list(map(float, std))]
     assert not any(name == "jaxveh" or name.startswith("jaxveh.") for name in sys.modules)
-    print(json.dumps([total, list(map(float, mean)), list(map(float, std))]))
+    print(json.dumps(said))
 """
+EXPORTED = ("square root", "APF", "interacting")
+KEY = jax.random.key(4)
 
 
-@pytest.mark.parametrize("name", ["square root", "APF", "interacting"])
-def test_an_exported_filter_runs_without_this_package(name, tmp_path):
-    filter_, model = (KINDS[name], MODEL) if name in KINDS else (OTHERS[name], INDEPENDENT)
-    key = jax.random.key(4)
-    folder = filters.export_filter(tmp_path / "filter", filter_, model, key=key)
+def kind_and_model(name):
+    return (KINDS[name], MODEL) if name in KINDS else (OTHERS[name], INDEPENDENT)
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    """The folders of filters, and what one program without this package says with each."""
+    place = tmp_path_factory.mktemp("exported")
+    folders = {name: filters.export_filter(place / name, *kind_and_model(name), key=KEY) for name in EXPORTED}
+    data, script = place / "rows.npz", place / "live.py"
+    np.savez(data, t=ROWS.t, u=np.stack(ROWS.u, axis=1), y=np.stack(ROWS.y, axis=1))
+    script.write_text(textwrap.dedent(LIVE))
+    done = subprocess.run(
+        [sys.executable, "-I", *map(str, (script, data, *folders.values()))],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return folders, json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("name", EXPORTED)
+def test_an_exported_filter_runs_without_this_package(name, exported):
+    (filter_, model), folder = kind_and_model(name), exported[0][name]
     described = json.loads((folder / "names.json").read_text())
     assert described["inputs"] == ["force"] and described["channels"] == ["y0", "y1"]
     assert described["report"] == ["x0", "x1", "x2"]
-    data = tmp_path / "rows.npz"
-    np.savez(data, t=ROWS.t, u=np.stack(ROWS.u, axis=1), y=np.stack(ROWS.y, axis=1))
-    script = tmp_path / "live.py"
-    script.write_text(textwrap.dedent(LIVE))
-    done = subprocess.run(
-        [sys.executable, "-I", str(script), str(folder), str(data)], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    total, mean, std = json.loads(done.stdout)
-    expected = filters.run(filter_, model, RECORDING, key=key)
+    total, mean, std = exported[1][name]
+    expected = filters.run(filter_, model, RECORDING, key=KEY)
     np.testing.assert_allclose(total, expected.log_likelihood, rtol=1e-12)
     np.testing.assert_allclose(mean, [leaf[-1] for leaf in expected.mean], rtol=1e-10)
     np.testing.assert_allclose(std, [leaf[-1] for leaf in expected.std], rtol=1e-10)
     with pytest.raises(InputError, match="exists already"):
-        filters.export_filter(folder, filter_, MODEL, key=key)
+        filters.export_filter(folder, filter_, MODEL, key=KEY)

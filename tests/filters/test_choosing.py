@@ -1,4 +1,7 @@
-"""Choosing particles in ways that let derivatives through, in numbers that adapt, and beside Kalman filters of their own."""
+"""Choosing particles in ways that let derivatives through, in numbers that adapt, and beside Kalman filters of their own.
+
+What is looked at of one filter and model comes from one program: values and slopes, at a point and beside it, for all seeds.
+"""
 
 import equinox as eqx
 import jax
@@ -18,10 +21,10 @@ SEEDS = 60
 
 
 def runs(filter_, model, rows, seeds=SEEDS):
-    """Log-likelihoods (seeds,) and last means (seeds, n)."""
+    """Log-likelihoods (seeds,), last means (seeds, n) and effective numbers of particles (seeds, T)."""
     of = lambda key: filters.scan(filter_, model, rows, key)
     found = jax.jit(jax.vmap(of))(jax.random.split(jax.random.key(3), seeds))
-    return np.asarray(found.log_likelihood), np.stack(found.mean, axis=-1)[:, -1]
+    return np.asarray(found.log_likelihood), np.stack(found.mean, axis=-1)[:, -1], np.asarray(found.info.ess)
 
 
 def one():
@@ -29,9 +32,22 @@ def one():
     return model, jax.tree.map(lambda leaf: leaf[0], rows), kalman_of(recordings("linear")[0])
 
 
+def values_and_slopes(filter_, scales):
+    """Log-likelihoods of one key with the dynamics times each of `scales`, and their derivatives by it."""
+    model, rows, _ = one()
+    with_ = lambda scale: eqx.tree_at(lambda m: m.system["A"], model, scale * model.system["A"])
+    value = lambda scale: filters.scan(filter_, with_(scale), rows, jax.random.key(2)).log_likelihood
+    both = jax.jit(jax.value_and_grad(value))
+    return np.array([both(scale) for scale in scales]).T
+
+
+def moved(scheme, particles, weights):
+    return jax.jit(scheme.move_particles)(particles, weights)
+
+
 def test_scores_carry_derivatives_of_every_order_through_a_scan():
     """A mean over draws with held chances and their scores has the derivatives of the mean itself."""
-    gains = jnp.asarray([1.0, -2.0, 0.5])
+    gains = np.array([1.0, -2.0, 0.5])
     chances = lambda x: jax.nn.softmax(jnp.stack([x, x * x, 1 - x]))
 
     def drawn(x):
@@ -41,21 +57,25 @@ def test_scores_carry_derivatives_of_every_order_through_a_scan():
     def three_steps(mean):
         return lambda x: jax.lax.scan(lambda c, _: (x + 0.3 * mean(c), None), x, None, length=3)[0]
 
-    x = jnp.asarray(0.4, jnp.float64)
-    ours, exact = three_steps(drawn), three_steps(lambda x: jnp.sum(chances(x) * gains))
-    for _ in range(3):
-        ours, exact = jax.grad(ours), jax.grad(exact)
-        np.testing.assert_allclose(ours(x), exact(x), rtol=1e-12)
+    def derivatives(of):
+        first = jax.grad(of)
+        second = jax.grad(first)
+        return lambda x: (first(x), second(x), jax.grad(second)(x))
+
+    ours, exact = derivatives(three_steps(drawn)), derivatives(three_steps(lambda x: jnp.sum(chances(x) * gains)))
+    found, expected = jax.jit(lambda x: (ours(x), exact(x)))(np.float64(0.4))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
     assert score(jnp.asarray(-jnp.inf)) == 0.0
 
 
 class TestTransport:
     def test_the_plan_s_margins_are_the_weights(self):
         rng = np.random.default_rng(0)
-        points, weights = jnp.asarray(rng.normal(size=(2, 40))), jnp.asarray(rng.dirichlet(np.ones(40)))
-        plan = transport_plan(distances(points), log_of(weights), 0.05, 200)
-        np.testing.assert_allclose(jnp.sum(plan, axis=1), 1.0, rtol=1e-12)
-        np.testing.assert_allclose(jnp.sum(plan, axis=0) / 40, weights, atol=1e-5)
+        points, weights = rng.normal(size=(2, 40)), rng.dirichlet(np.ones(40))
+        of = lambda points, weights: transport_plan(distances(points), log_of(weights), 0.05, 200)
+        plan = np.asarray(jax.jit(of)(points, weights))
+        np.testing.assert_allclose(plan.sum(axis=1), 1.0, rtol=1e-12)
+        np.testing.assert_allclose(plan.sum(axis=0) / 40, weights, atol=1e-5)
 
     def test_with_little_smoothing_it_is_the_transport_in_order(self):
         """In one dimension the optimal map keeps the order: quantiles go to quantiles."""
@@ -63,60 +83,43 @@ class TestTransport:
         x = np.sort(rng.normal(size=20))
         # Whole numbers of twentieths: particle i takes the place of as many.
         counts = rng.multinomial(20, np.full(20, 1 / 20))
-        particles = record_type("P", ("x",))(jnp.asarray(x))
-        moved, _ = filters.Transport(1e-4, 3000).move_particles(particles, jnp.asarray(counts / 20))
-        np.testing.assert_allclose(moved.x, np.repeat(x, counts), atol=0.02)
+        found, _ = moved(filters.Transport(1e-4, 3000), record_type("P", ("x",))(x), counts / 20)
+        np.testing.assert_allclose(found.x, np.repeat(x, counts), atol=0.02)
 
     def test_the_mean_stays_and_a_field_that_does_not_vary_is_left_alone(self):
         rng = np.random.default_rng(2)
-        particles = record_type("P", ("x", "y"))(jnp.asarray(rng.normal(size=30)), jnp.full(30, 7.0))
-        weights = jnp.asarray(rng.dirichlet(np.ones(30)))
-        moved, _ = filters.Transport(0.2, 300).move_particles(particles, weights)
-        np.testing.assert_allclose(jnp.mean(moved.x), jnp.sum(weights * particles.x), atol=1e-4)
-        np.testing.assert_allclose(moved.y, 7.0, rtol=1e-12)
+        particles = record_type("P", ("x", "y"))(rng.normal(size=30), np.full(30, 7.0))
+        weights = rng.dirichlet(np.ones(30))
+        found, _ = moved(filters.Transport(0.2, 300), particles, weights)
+        np.testing.assert_allclose(np.mean(found.x), np.sum(weights * particles.x), atol=1e-4)
+        np.testing.assert_allclose(found.y, 7.0, rtol=1e-12)
 
     def test_its_bias_falls_with_the_smoothing(self):
         model, rows, exact = one()
         total = exact["log_likelihood"].sum()
         bias = {}
         for epsilon in (2.0, 0.1):
-            logs, _ = runs(filters.ParticleFilter(60, filters.Transport(epsilon, 40)), model, rows, 40)
+            logs, *_ = runs(filters.ParticleFilter(40, filters.Transport(epsilon, 30)), model, rows, 16)
             bias[epsilon] = abs(np.mean(logs) - total)
         assert bias[0.1] < 0.25 * bias[2.0]
 
     def test_its_gradient_is_that_of_differences(self):
         """Of one key the likelihood is smooth; with little smoothing so steep that differences do not tell."""
-        model, rows, _ = one()
         filter_ = filters.ParticleFilter(40, filters.Transport(0.5, 20))
-        with_ = lambda scale: eqx.tree_at(lambda m: m.system["A"], model, scale * model.system["A"])
-        value = jax.jit(lambda scale: filters.scan(filter_, with_(scale), rows, jax.random.key(2)).log_likelihood)
-        difference = (value(1.0 + 1e-6) - value(1.0 - 1e-6)) / 2e-6
-        np.testing.assert_allclose(jax.jit(jax.grad(value))(1.0), difference, rtol=1e-5)
+        values, slopes = values_and_slopes(filter_, [1.0, 1.0 + 1e-6, 1.0 - 1e-6])
+        np.testing.assert_allclose(slopes[0], (values[1] - values[2]) / 2e-6, rtol=1e-5)
 
     def test_a_plan_that_misplaces_weight_is_told_however_far_the_particles_are_spread(self):
         rng = np.random.default_rng(3)
-        particles = record_type("P", ("x",))(jnp.asarray(rng.normal(size=30)))
-        weights = jnp.asarray(rng.dirichlet(np.full(30, 0.2)))
+        particles, weights = record_type("P", ("x",))(rng.normal(size=30)), rng.dirichlet(np.full(30, 0.2))
         few, many = filters.Transport(1e-3, 1), filters.Transport(0.3, 500)
-        assert not few.move_particles(particles, weights)[1] and many.move_particles(particles, weights)[1]
+        assert not moved(few, particles, weights)[1] and moved(many, particles, weights)[1]
         # All weight on one particle: nothing is misplaced by a plan that is of other weights.
-        one = jnp.zeros(30).at[4].set(1.0)
-        assert not filters.Transport(0.3, 500, 10.0).move_particles(particles, one)[1]
+        assert not moved(filters.Transport(0.3, 500, 10.0), particles, np.eye(30)[4])[1]
 
     def test_without_a_plan_it_is_the_bootstrap_filter_value_and_gradient(self):
-        model, rows, _ = one()
         never = filters.Transport(0.3, 1, 1e-12)
-        with_ = lambda scale: eqx.tree_at(lambda m: m.system["A"], model, scale * model.system["A"])
-        of = lambda scheme: jax.jit(
-            jax.value_and_grad(
-                lambda scale: (
-                    filters.scan(
-                        filters.ParticleFilter(40, scheme), with_(scale), rows, jax.random.key(2)
-                    ).log_likelihood
-                )
-            )
-        )(1.0)
-        found, plain = of(never), of(numerics.systematic)
+        found, plain = (values_and_slopes(filters.ParticleFilter(40, s), [1.0]) for s in (never, numerics.systematic))
         np.testing.assert_allclose(found, plain, rtol=1e-9)
 
     def test_it_is_for_the_bootstrap_filter_alone(self):
@@ -132,7 +135,7 @@ class TestTransport:
 class TestSoft:
     def test_the_likelihood_stays_unbiased(self):
         model, rows, exact = one()
-        logs, _ = runs(filters.ParticleFilter(800, filters.Soft(0.7)), model, rows)
+        logs, *_ = runs(filters.ParticleFilter(800, filters.Soft(0.7)), model, rows)
         ratio = np.exp(logs - exact["log_likelihood"].sum())
         assert abs(ratio.mean() - 1.0) < 3.0 * ratio.std() / np.sqrt(SEEDS)
 
@@ -166,19 +169,21 @@ class TestSoft:
 class TestAdaptiveNumber:
     def test_a_wide_belief_takes_more_than_a_sharp_one_as_fox_says(self):
         filter_ = filters.AdaptiveNumber(filters.ParticleFilter(2000), {"x0": 0.1}, sizes=(100, 500, 2000))
-        key = jax.random.key(0)
 
-        def belief(spread):
-            x = record_type("P", ("x0",))(spread * jax.random.normal(jax.random.key(1), (2000,)))
-            return filters.ParticleBelief(x, jnp.full(2000, 1 / 2000), jnp.arange(2000), key, 0.0, (), jnp.int32(1))
+        @jax.jit
+        def bins_and_number(spread, key):
+            x = record_type("P", ("x0",))(spread * jax.random.normal(key, (2000,)))
+            weights, themselves = jnp.full(2000, 1 / 2000), jnp.arange(2000)
+            belief = filters.ParticleBelief(x, weights, themselves, key, 0.0, (), jnp.int32(1))
+            return filter_.filled_bins(belief), filter_.number(belief)
 
-        sharp, wide = belief(0.02), belief(3.0)
-        assert int(filter_.filled_bins(sharp)) == 2 and int(filter_.filled_bins(wide)) > 60
-        k = int(filter_.filled_bins(wide)) - 1
+        (few, sharp), (many, wide) = (bins_and_number(spread, jax.random.key(1)) for spread in (0.02, 3.0))
+        assert int(few) == 2 and int(many) > 60
+        k = int(many) - 1
         part = 2 / (9 * k)
         expected = k / 0.1 * (1 - part + 2.3263478740408408 * part**0.5) ** 3
-        np.testing.assert_allclose(filter_.number(wide), expected, rtol=1e-12)
-        assert float(filter_.number(sharp)) < 100 < float(filter_.number(wide))
+        np.testing.assert_allclose(wide, expected, rtol=1e-12)
+        assert float(sharp) < 100 < float(wide)
 
     @pytest.mark.parametrize(
         "kind", [filters.ParticleFilter, pytest.param(filters.AuxiliaryParticleFilter, marks=pytest.mark.full)]
@@ -186,11 +191,9 @@ class TestAdaptiveNumber:
     def test_the_likelihood_stays_unbiased_while_the_number_changes(self, kind):
         model, rows, exact = one()
         filter_ = filters.AdaptiveNumber(kind(1000), {"x0": 0.4, "x1": 0.4}, sizes=(200, 500, 1000), error=0.1)
-        logs, _ = runs(filter_, model, rows)
+        logs, _, alive = runs(filter_, model, rows)
         ratio = np.exp(logs - exact["log_likelihood"].sum())
         assert abs(ratio.mean() - 1.0) < 3.5 * ratio.std() / np.sqrt(SEEDS)
-        estimate = filters.scan(filter_, model, rows, jax.random.key(0))
-        alive = np.asarray(estimate.info.ess)
         assert alive.max() <= 1000
 
     def test_sizes_that_do_not_rise_to_the_filter_s_number_are_refused(self):
@@ -207,8 +210,8 @@ class TestMarginalised:
         """With all but one state linear it is nearer to the exact answer than a filter that draws all."""
         model, rows, exact = one()
         total = exact["log_likelihood"].sum()
-        drawn, _ = runs(filters.ParticleFilter(100), model, rows)
-        marginal, means = runs(filters.Marginalised(100, ("x1", "x2")), model, rows)
+        drawn, *_ = runs(filters.ParticleFilter(100), model, rows)
+        marginal, means, _ = runs(filters.Marginalised(100, ("x1", "x2")), model, rows)
         assert np.std(marginal) < 0.5 * np.std(drawn)
         ratio = np.exp(marginal - total)
         assert abs(ratio.mean() - 1.0) < 3.5 * ratio.std() / np.sqrt(SEEDS)
@@ -226,8 +229,12 @@ class TestMarginalised:
 
     def test_spreads_count_those_within_and_between_particles(self):
         model, rows, exact = one()
-        belief = filters.scan(filters.Marginalised(2000, ("x2",)), model, rows, jax.random.key(5)).belief
-        np.testing.assert_allclose(belief.covariance, exact["covariance"][-1], rtol=0.35, atol=0.01)
-        np.testing.assert_allclose(
-            [float(s) for s in belief.moments(model)[1]], np.sqrt(np.diagonal(belief.covariance)), rtol=1e-9
-        )
+
+        @jax.jit
+        def spreads(key):
+            belief = filters.scan(filters.Marginalised(2000, ("x2",)), model, rows, key).belief
+            return belief.covariance, belief.moments(model)[1]
+
+        covariance, std = spreads(jax.random.key(5))
+        np.testing.assert_allclose(covariance, exact["covariance"][-1], rtol=0.35, atol=0.01)
+        np.testing.assert_allclose(std, np.sqrt(np.diagonal(covariance)), rtol=1e-9)

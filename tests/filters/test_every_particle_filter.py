@@ -19,6 +19,7 @@ from nonlinear_systems import X, Y, as_recording, grid_filter, simulate
 from jaxveh import JaxvehWarning, Result, filters, numerics
 from jaxveh import statespace as ss
 from jaxveh.numerics import resampling
+from jaxveh.statespace import driver
 
 N, SEEDS, ROWS = 500, 16, 40
 CASES = ("sharp", "middle", "coarse", "two peaks")
@@ -57,11 +58,10 @@ def given():
     models = [model(case) for case in CASES]
     measured = [simulate(m, jax.random.key(6), ROWS)[1] for m in models]
     rows = [m.rows(as_recording(y)) for m, y in zip(models, measured, strict=True)]
-    exact = [
-        float(filters.scan(filters.Kalman(), m, r).log_likelihood) for m, r in zip(models[:3], rows[:3], strict=True)
-    ]
-    exact.append(grid_filter(models[3], measured[3], -45, 45, 1000)[0])
-    stack = lambda trees: jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
+    kalman = jax.jit(lambda model, rows: filters.scan(filters.Kalman(), model, rows).log_likelihood)
+    exact = [float(kalman(m, r)) for m, r in zip(models[:3], rows[:3], strict=True)]
+    exact.append(grid_filter(models[3], measured[3], -45, 45)[0])
+    stack = lambda trees: jax.tree.map(lambda *leaves: np.stack(leaves), *trees)
     return stack(models), stack(rows), np.array(exact)
 
 
@@ -202,7 +202,7 @@ def test_the_first_row_is_guided():
     exact = scipy.stats.norm(0.0, (20.0**2 + 0.2**2) ** 0.5).logpdf(11.0)
     for rule in ("extended", "unscented"):
         first = lambda key, rule=rule: filters.Guided(N, rule).init(system, row, key)
-        belief, info = jax.vmap(first)(jax.random.split(jax.random.key(1), 50))
+        belief, info = jax.jit(jax.vmap(first))(jax.random.split(jax.random.key(1), 50))
         np.testing.assert_allclose(info.log_likelihood, exact, atol=0.05)
         np.testing.assert_allclose(belief.particles.x.shape, (50, N))
         assert np.mean(info.ess) > 0.8 * N
@@ -219,20 +219,18 @@ def test_a_tenth_of_the_first_particles_are_the_prior_s_own():
     density = scipy.stats.norm(10.0, 10.0).pdf(x) * scipy.stats.norm(0.05 * x**2, 2.0).pdf(5.0)
     exact, other = np.trapezoid(density, x), np.trapezoid(density * (x < 0), x)
     first = lambda key: filters.Guided(2 * N).init(system, row, key)
-    belief, info = jax.vmap(first)(jax.random.split(jax.random.key(1), 60))
+    belief, info = jax.jit(jax.vmap(first))(jax.random.split(jax.random.key(1), 60))
     there = np.sum(np.asarray(belief.weights) * (np.asarray(belief.particles.x) < 0), axis=1)
     np.testing.assert_allclose(np.median(there), other / exact, rtol=0.2)
     np.testing.assert_allclose(np.median(info.log_likelihood), np.log(exact), atol=0.03)
 
 
 class TestTransport:
-    filter_ = filters.ParticleFilter(100, filters.Transport(0.1, 40))
-
     def test_its_means_are_finite_on_the_growth_model(self):
         system, recording = drawn_from("two peaks", ROWS)
-        rows = system.rows(recording)
-        found = jax.jit(jax.vmap(lambda key: filters.scan(self.filter_, system, rows, key)))(
-            jax.random.split(jax.random.key(1), 20)
+        rows, filter_ = system.rows(recording), filters.ParticleFilter(60, filters.Transport(0.1, 40))
+        found = jax.jit(jax.vmap(lambda key: filters.scan(filter_, system, rows, key)))(
+            jax.random.split(jax.random.key(1), 8)
         )
         assert not np.asarray(found.result).any()
         assert np.isfinite(found.mean.x).all()
@@ -245,10 +243,15 @@ class TestTransport:
         system = ss.cast(sharp, dtype)
         recording = as_recording([0.1, 0.4, -0.2, 0.9])
         filter_ = filters.ParticleFilter(50, filters.Transport(1e-3, 4))
-        with pytest.warns(JaxvehWarning, match="the transport plan did not converge, and particles were resampled"):
-            found = filters.run(filter_, system, recording, key=jax.random.key(0))
+
+        def of(system):
+            found = filters.scan(filter_, system, system.rows(recording), jax.random.key(0))
+            return found.log_likelihood, found
+
+        slopes, found = jax.jit(jax.grad(of, has_aux=True))(system)
         where = np.asarray(found.info.remark) == Result.transport_not_converged
         assert where.any()
-        of = lambda s: filters.scan(filter_, s, system.rows(recording), jax.random.key(0)).log_likelihood
-        slopes = jax.tree.leaves(jax.grad(of)(system))
+        with pytest.warns(JaxvehWarning, match="the transport plan did not converge, and particles were resampled"):
+            driver.warn_of_remarks(found, filter_)
+        slopes = jax.tree.leaves(slopes)
         assert all(np.isfinite(leaf).all() for leaf in slopes), slopes

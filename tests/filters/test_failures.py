@@ -28,6 +28,18 @@ def _rows(flow):
     return ss.Row(jnp.arange(float(len(flow))), (), ss.model.record("Measurements", {"flow": jnp.asarray(flow)}))
 
 
+@eqx.filter_jit
+def _estimate_and_gradient(filter_, model, rows):
+    """One program for everything that is looked at of eight rows."""
+
+    def of(model):
+        estimate = filters.scan(filter_, model, rows, KEY)
+        return estimate.log_likelihood, estimate
+
+    gradient, estimate = jax.grad(of, has_aux=True)(model)
+    return estimate, gradient
+
+
 @pytest.mark.parametrize("filter_", [filters.Unscented(), PF, APF], ids=lambda f: type(f).__name__)
 class TestEveryFilter:
     model = nile_model(1000.0, 300.0)
@@ -47,7 +59,7 @@ class TestEveryFilter:
         assert float(after.std.level) == pytest.approx(expected, rel=1e-12 if loose == 0 else 0.35)
 
     def test_an_infinite_measurement_is_a_code_and_an_error_of_the_row(self, filter_):
-        estimate = filters.scan(filter_, self.model, _rows(_with_flow(5, np.inf)), KEY)
+        estimate, _ = _estimate_and_gradient(filter_, self.model, _rows(_with_flow(5, np.inf)))
         assert Result(int(estimate.result)) is Result.non_finite_input
         assert int(estimate.failed_at) == 5
         codes = np.asarray(estimate.info.result)
@@ -60,7 +72,7 @@ class TestEveryFilter:
 
     def test_raised_failures_name_row_time_channel_and_reason(self, filter_):
         recording = Recording(np.arange(8.0) / 4, {"flow": _with_flow(5, 1234.5)})
-        failed = filters.scan(filter_, self.model, _rows(_with_flow(5, np.inf)), KEY)
+        failed, _ = _estimate_and_gradient(filter_, self.model, _rows(_with_flow(5, np.inf)))
         expected = (
             rf"{type(filter_).__name__} failed in row 5 \(t = 1\.25 s; flow = 1234\.5\): an input or a measurement"
         )
@@ -68,8 +80,7 @@ class TestEveryFilter:
             driver.raise_failure(failed, filter_, self.model, recording)
 
     def test_gradients_stay_finite_with_missing_data(self, filter_):
-        flow = _with_flow(3, np.nan)
-        gradient = jax.grad(lambda m: filters.scan(filter_, m, _rows(flow), KEY).log_likelihood)(self.model)
+        _, gradient = _estimate_and_gradient(filter_, self.model, _rows(_with_flow(3, np.nan)))
         leaves = np.concatenate([np.ravel(leaf) for leaf in jax.tree.leaves(gradient)])
         assert np.isfinite(leaves).all()
         assert np.abs(leaves).max() > 0
@@ -114,7 +125,7 @@ def test_all_particles_dead(filter_):
         estimate = filters.scan(filter_, model, rows, KEY)
         return jnp.stack([estimate.log_likelihood, estimate.mean.level.sum(), estimate.info.ess.sum()]), estimate
 
-    gradients, estimate = jax.jacrev(of, has_aux=True)(model)
+    gradients, estimate = jax.jit(jax.jacrev(of, has_aux=True))(model)
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(gradients))
     assert np.abs(gradients.measurement_noise.std.flow).max() > 0
     assert Result(int(estimate.result)) is Result.all_particles_dead

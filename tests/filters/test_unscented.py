@@ -104,13 +104,19 @@ def _differences(function, model, step=1e-6):
             yield i, paths[i], nudge / step, (ends[0] - ends[1]) / (2 * step)
 
 
+def _value_and_gradient(filter_, model, recording):
+    """The log-likelihood as a function of the model, and its gradient's leaves at this one; one program is both."""
+    rows = model.rows(recording)
+    both = jax.jit(jax.value_and_grad(lambda m: filters.scan(filter_, m, rows).log_likelihood))
+    return lambda m: both(m)[0], jax.tree.leaves(both(model)[1])
+
+
 def test_gradient_equals_differences_in_every_leaf():
     model = linear_model(2, 2, seed=9)
     # A law by field for the prior and the process noise, so that their standard deviations are leaves too.
     model = eqx.tree_at(lambda m: m.prior.law, model, ss.Gaussian({"x0": 0.7, "x1": 1.2}))
     recording = linear_recording(model, rows=12)
-    value = lambda m: filters.run(filters.Unscented(), m, recording).log_likelihood
-    gradient = jax.tree.leaves(jax.grad(value)(model))
+    value, gradient = _value_and_gradient(filters.Unscented(), model, recording)
     seen = set()
     for i, path, direction, slope in _differences(value, model):
         seen.add(path)
@@ -134,8 +140,7 @@ def test_gradient_of_a_nonlinear_model_with_parameters_as_states_equals_differen
     time = np.linspace(0, 1, 15)
     angle = np.where(np.arange(15) % 4 == 1, np.nan, 0.3 * np.cos(2 * time))
     recording = Recording(time, {"angle": angle, "rate": np.where(np.arange(15) == 5, np.nan, -0.6 * np.sin(2 * time))})
-    value = lambda m: filters.run(filters.Unscented(alpha=0.8), m, recording).log_likelihood
-    gradient = jax.tree.leaves(jax.grad(value)(model))
+    value, gradient = _value_and_gradient(filters.Unscented(alpha=0.8), model, recording)
     count = 0
     for i, path, direction, slope in _differences(value, model):
         np.testing.assert_allclose(np.sum(gradient[i] * direction), slope, rtol=2e-6, atol=2e-7, err_msg=path)
