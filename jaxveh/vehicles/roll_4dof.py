@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.rolling_body import AbstractRollingTwoTrack, roll_accelerations, roll_outputs
-from jaxveh.vehicles.traction import AbstractSpinless, drive_power, driven_over
+from jaxveh.vehicles.traction import AbstractSpinless, drive_power, drive_over_road
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import gravity
 
@@ -37,7 +37,7 @@ class Roll4DOF(AbstractSpinless, AbstractRollingTwoTrack):
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        road, forces, push, drive = driven_over(self, x, u, ground)
+        road, forces, push, drive = drive_over_road(self, x, u, ground)
         g_x, g_y, g_z = gravity(ground)
         X = push.F_x - air_drag(self.drag, x.v_x)
         a_x, a_y = X / self.mass, push.F_y / self.mass

@@ -100,7 +100,7 @@ class Driven(NamedTuple):
     drive: Wheels
 
 
-def driven_over(car: AbstractSpinless, x: Any, u: Any, ground: Ground) -> Driven:
+def drive_over_road(car: AbstractSpinless, x: Any, u: Any, ground: Ground) -> Driven:
     """How the road carries a car whose wheels' forces are `driven_forces`."""
     drive, brake = car.drive.torques(u)
     road = car.on_road(x, u, ground)

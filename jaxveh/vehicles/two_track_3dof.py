@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.traction import AbstractSpinless, drive_power, driven_over
+from jaxveh.vehicles.traction import AbstractSpinless, drive_power, drive_over_road
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
 from jaxveh.vehicles.wheels import gravity
@@ -35,7 +35,7 @@ class TwoTrack3DOF(AbstractSpinless, AbstractUprightTwoTrack):
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        road, forces, push, drive = driven_over(self, x, u, ground)
+        road, forces, push, drive = drive_over_road(self, x, u, ground)
         g_x, g_y, _ = gravity(ground)
         a_x = (push.F_x - air_drag(self.drag, x.v_x)) / self.mass
         a_y = push.F_y / self.mass
