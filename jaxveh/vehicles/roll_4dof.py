@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.rolling_body import AbstractRollingTwoTrack, roll_accelerations, roll_outputs
-from jaxveh.vehicles.traction import AbstractSpinless, drive_power, drive_over_road
+from jaxveh.vehicles.traction import AbstractSpinless, drive_over_road, drive_power
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import gravity
 

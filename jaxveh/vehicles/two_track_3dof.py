@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.traction import AbstractSpinless, drive_power, drive_over_road
+from jaxveh.vehicles.traction import AbstractSpinless, drive_over_road, drive_power
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
 from jaxveh.vehicles.wheels import gravity
