@@ -20,7 +20,14 @@ def gradients(filter_, seeds=SEEDS):
     leaves, rest = eqx.partition(model, eqx.is_inexact_array)
     of = lambda leaves, key: filters.scan(filter_, eqx.combine(leaves, rest), one, key).log_likelihood
     found = jax.jit(jax.vmap(jax.grad(of), in_axes=(None, 0)))(leaves, jax.random.split(jax.random.key(1), seeds))
-    chosen = (found.system["A"], found.system["H"], *found.measurement_noise.std, found.process_noise.law.matrix)
+    # Of a symmetric matrix a filter may read one triangle.
+    matrix = found.process_noise.law.matrix
+    chosen = (
+        found.system["A"],
+        found.system["H"],
+        *found.measurement_noise.std,
+        0.5 * (matrix + matrix.swapaxes(-1, -2)),
+    )
     return np.concatenate([np.asarray(leaf).reshape(seeds, -1) for leaf in chosen], axis=1)
 
 
@@ -29,7 +36,20 @@ def exact_gradient():
     return gradients(filters.Kalman(), 1)[0]
 
 
-@pytest.mark.parametrize("make", [filters.ParticleFilter, filters.AuxiliaryParticleFilter, filters.Guided])
+def marginalised(particles):
+    return filters.Marginalised(particles, ("x2",))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        filters.ParticleFilter,
+        filters.AuxiliaryParticleFilter,
+        filters.Guided,
+        # The share of choosing is that of the first; declared in test_declared_gradients.
+        pytest.param(marginalised, marks=pytest.mark.full),
+    ],
+)
 def test_scores_give_the_exact_gradient_within_their_scatter(make):
     exact = exact_gradient()
     found = gradients(make(1000))
