@@ -33,6 +33,9 @@ KEPT_AT_MOST = 2e9
 MOST_MAPPINGS = 45000
 """Of 65530; forgetting them takes a quarter of a minute each time, so it is done seldom."""
 
+LOOKED_AFTER = 25
+"""Programs compiled: a filter's takes up to 500 mappings."""
+
 COLOURS = 3
 
 # Traces and programs are many objects that live long; looking through them for cycles after every few hundred new ones took 8 %
@@ -93,11 +96,29 @@ def program_of(case):
     return case.partition("[")[2].rstrip("]").removesuffix("-straight").removesuffix("-swinging")
 
 
-@pytest.fixture(scope="module", autouse=True)
+def pytest_sessionstart():
+    """Count what is compiled, which says when to count mappings: they take a twentieth of a second, too long after each test."""
+    jax.monitoring.register_event_duration_secs_listener(count_programs)
+
+
+compiled = 0
+
+
+def count_programs(event, duration, **more):
+    del duration, more
+    global compiled
+    compiled += event.endswith("backend_compile_duration")
+
+
+@pytest.fixture(autouse=True)
 def room_for_programs():
-    """Compiled programs are forgotten before they are too many: each takes four memory mappings, of which Linux gives a process
-    65530, and one more ends it."""
+    """Compiled programs are forgotten before they are too many: each takes four to 500 memory mappings, of which Linux gives a
+    process 65530, and one more ends it. Some files of the full run take more than half of them alone."""
     yield
+    global compiled
+    if compiled < LOOKED_AFTER:
+        return
+    compiled = 0
     mappings = Path("/proc/self/maps")
     if mappings.exists() and mappings.read_bytes().count(b"\n") > MOST_MAPPINGS:
         jax.clear_caches()

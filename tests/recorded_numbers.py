@@ -3,7 +3,7 @@
 They say that nothing has changed, for every member of a family at once and cheaply; that it is right is said elsewhere, against
 closed forms, references and peers. Who changes a number on purpose records it anew and looks at the difference:
 
-    JAXVEH_RECORD=1 python -m pytest -n 0 -k recorded && git diff --stat tests/recorded
+    JAXVEH_RECORD=1 python -m pytest -n 0 -m "full or not full" -k recorded && git diff --stat tests/recorded
 """
 
 import dataclasses

@@ -6,7 +6,8 @@ book, and the few that do not say by a figure why (`tests/core/test_where_fences
 
 - `fence(tree)`: an optimization barrier. XLA keeps to it from jax 0.12 on; before, only speed is lost.
 - `fence(tree, firm=True)`: in every version of jax.
-- `@fence_results`, `fence_blocks(tree)`: firm, for arrays long enough to be worth it and short enough for the processor's cache.
+- `@fence_results`, `fence_blocks(tree)`: firm, for arrays short enough for the processor's cache, and long enough to be
+  worth a branch.
 - `apart(function, ...)`: a whole function as a program of its own, whose *bits* do not depend on its surroundings.
 
 All are the identity for values, batches and derivatives. On other platforms than the CPU the first three are nothing.
@@ -33,7 +34,8 @@ Tree = TypeVar("Tree")
 Method = TypeVar("Method", bound=Callable)
 
 MANY = 32
-"""From this size on computing numbers twice costs more than storing them: 60 vmapped cars gain, 12 hardly."""
+"""From this size on computing numbers twice costs more than a branch around them: 60 vmapped cars gain, 12 hardly. Where XLA
+keeps to barriers they cost nothing, and every size counts."""
 
 CACHED = 2**15
 """Bytes of an array of which a few dozen fit into a processor's own cache."""
@@ -52,7 +54,7 @@ def fence(tree: Tree, *, firm: bool = False) -> Tree:
 
 
 def fence_blocks(tree: Tree) -> Tree:
-    """`tree`, of which the arrays long enough to be worth it and short enough for the cache are fenced firmly.
+    """`tree`, of which the arrays short enough for the cache are fenced firmly; before jax 0.12 those of at least 32 numbers.
 
     For values with several readers in an elementwise law of many terms: blocks of a batch are computed once, as are their
     cotangents, and a whole batch, which would have to go to memory and back, is still fused.
@@ -154,8 +156,8 @@ def apart(function, number, *operands):
     """`function(*operands)` as a program of its own, so that a step's bits do not depend on what surrounds it.
 
     XLA fuses a step with its surroundings, differently in a scan, in a live loop and beside other outputs, and rounds
-    differently with it. It never fuses across a conditional; `number`, any number that the step is given and is not
-    differentiated by (its time, its count), makes one that always holds. Called outside jit, this is compiled once as well.
+    differently with it. It never fuses across a conditional; `number`, any that the step is given (its time, its
+    count), makes one that always holds. Called outside jit, this is compiled once as well.
     Transformations pass through; under differentiation there is no conditional, which would cost a copy of all that the
     backward pass needs.
     """

@@ -22,7 +22,7 @@ def total(values: Array) -> Array:
     count = size // _LANES
     if count < 2 or not on_cpu():
         return jnp.sum(values)
-    # The barrier keeps XLA from making one sum of the two again.
+    # The fence keeps XLA from making one sum of the two again.
     lanes = fence(jnp.sum(values[: count * _LANES].reshape(count, _LANES), axis=0))
     rest = values[count * _LANES :]
     return jnp.sum(lanes) + jnp.sum(rest) if rest.size else jnp.sum(lanes)

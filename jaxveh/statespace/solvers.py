@@ -47,7 +47,7 @@ class RK4(AbstractOneStep):
     """The classical Runge-Kutta method of fourth order (Kutta 1901), fixed step, no error estimate.
 
     The stages are written out: a Butcher tableau keeps a stage buffer that costs 1.3 times in a batch and 2 to 4 times
-    under `vmap`. A barrier after each stage keeps XLA from computing a stage anew in every consumer.
+    under `vmap`. A fence after each stage keeps XLA from computing a stage anew in every consumer.
     """
 
     step_order: ClassVar[int] = 4

@@ -15,7 +15,7 @@ from jaxveh.experiments.mass_grade_aukf.contestants import WALK, Found, contesta
 from jaxveh.experiments.mass_grade_aukf.observed import KNOT, Known, bound_of_mass, known_of_mass, predictions
 
 PEDALS = (0.0, 0.2)
-SMALL = experiment.truck(duration=60.0, dt=0.1, max_step=0.01, guesses=(4000.0,))
+SMALL = experiment.truck(duration=60.0, dt=0.1, max_step=0.005, guesses=(4000.0,))
 
 
 @pytest.fixture(scope="module")
@@ -216,6 +216,11 @@ def test_no_contestant_looks_ahead(name):
     )
     run = jax.jit(lambda drive: contestants(study)[name].run(study, jnp.asarray(4000.0), drive))
     found, changed = run(drive), run(other)
-    assert not np.allclose(found.mass[last + 1 :], changed.mass[last + 1 :], rtol=1e-6) or name == "first guess"
+    # The filter as printed has its mass frozen by then; whether rounding thaws it is not the question.
+    moved = [
+        not np.allclose(getattr(found, n)[last + 1 :], getattr(changed, n)[last + 1 :], rtol=1e-6)
+        for n in ("mass", "grade")
+    ]
+    assert any(moved) or name == "first guess"
     np.testing.assert_allclose(changed.mass[: last + 1], found.mass[: last + 1], rtol=1e-9)
     np.testing.assert_allclose(changed.grade[: last + 1], found.grade[: last + 1], atol=1e-9)

@@ -80,7 +80,7 @@ def as_recording(measured):
     return Recording(np.arange(float(len(measured))), {"y": np.asarray(measured)})
 
 
-def grid_filter(model, measured, low, high, points=800):
+def grid_filter(model, measured, low, high, points=2000):
     """Log-likelihood and posterior means (T,) by sums over a grid of states from `low` to `high`."""
     grid = np.linspace(low, high, points)
     width = grid[1] - grid[0]

@@ -120,8 +120,7 @@ CHECKED = {
 @pytest.mark.parametrize("name", CHECKED)
 def test_simulation_based_calibration_of_nonlinear_models(name):
     filter_, model, right = CHECKED[name]
-    # Four draws to a bin: most of the time goes into them, and 99 find hardly more.
-    found = filters.simulation_based_calibration(filter_, model(), SHORT, jax.random.key(8), runs=800, draws=39)
+    found = filters.simulation_based_calibration(filter_, model(), SHORT, jax.random.key(8), runs=800)
     counts = found.histogram().x
     assert counts.sum() == 800
     expected = np.sum((counts - 80.0) ** 2) / 80

@@ -99,7 +99,7 @@ class TestTransport:
         total = exact["log_likelihood"].sum()
         bias = {}
         for epsilon in (2.0, 0.1):
-            logs, *_ = runs(filters.ParticleFilter(40, filters.Transport(epsilon, 30)), model, rows, 16)
+            logs, *_ = runs(filters.ParticleFilter(60, filters.Transport(epsilon, 40)), model, rows, 40)
             bias[epsilon] = abs(np.mean(logs) - total)
         assert bias[0.1] < 0.25 * bias[2.0]
 

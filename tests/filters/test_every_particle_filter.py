@@ -60,7 +60,7 @@ def given():
     rows = [m.rows(as_recording(y)) for m, y in zip(models, measured, strict=True)]
     kalman = jax.jit(lambda model, rows: filters.scan(filters.Kalman(), model, rows).log_likelihood)
     exact = [float(kalman(m, r)) for m, r in zip(models[:3], rows[:3], strict=True)]
-    exact.append(grid_filter(models[3], measured[3], -45, 45)[0])
+    exact.append(grid_filter(models[3], measured[3], -45, 45, 1000)[0])
     stack = lambda trees: jax.tree.map(lambda *leaves: np.stack(leaves), *trees)
     return stack(models), stack(rows), np.array(exact)
 
@@ -228,9 +228,9 @@ def test_a_tenth_of_the_first_particles_are_the_prior_s_own():
 class TestTransport:
     def test_its_means_are_finite_on_the_growth_model(self):
         system, recording = drawn_from("two peaks", ROWS)
-        rows, filter_ = system.rows(recording), filters.ParticleFilter(60, filters.Transport(0.1, 40))
+        rows, filter_ = system.rows(recording), filters.ParticleFilter(100, filters.Transport(0.1, 40))
         found = jax.jit(jax.vmap(lambda key: filters.scan(filter_, system, rows, key)))(
-            jax.random.split(jax.random.key(1), 8)
+            jax.random.split(jax.random.key(1), 20)
         )
         assert not np.asarray(found.result).any()
         assert np.isfinite(found.mean.x).all()

@@ -38,13 +38,8 @@ def _counted(dtype, seed=2, n=2):
 @pytest.mark.parametrize(
     ("filter_", "dtype", "n"),
     [
-        # Each filter and each dtype; the other two pairs, whose parts are all here, in the full run.
-        pytest.param(FILTERS[0], jnp.float64, 2, id="UKF-float64"),
-        pytest.param(FILTERS[0], jnp.float32, 2, id="UKF-float32"),
-        pytest.param(FILTERS[1], jnp.float64, 2, id="PF-float64"),
-        pytest.param(FILTERS[1], jnp.float32, 2, id="PF-float32", marks=pytest.mark.full),
-        pytest.param(FILTERS[2], jnp.float64, 2, id="APF-float64", marks=pytest.mark.full),
-        pytest.param(FILTERS[2], jnp.float32, 2, id="APF-float32"),
+        *[pytest.param(f, jnp.float64, 2, id=f"{name}-float64") for f, name in zip(FILTERS, IDS, strict=True)],
+        *[pytest.param(f, jnp.float32, 2, id=f"{name}-float32") for f, name in zip(FILTERS, IDS, strict=True)],
         pytest.param(FILTERS[0], jnp.float64, 5, id="UKF-5-states"),
     ],
 )

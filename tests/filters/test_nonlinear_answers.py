@@ -1,7 +1,6 @@
 """Particle filters on nonlinear models against a dense grid, and NEES of Gaussian filters."""
 
 import functools
-import itertools
 
 import equinox as eqx
 import jax
@@ -39,17 +38,8 @@ def runs(filter_, model, rows, keys):
     return found.log_likelihood, found.mean.x, found.result
 
 
-# Each filter has the other model; this one has two more filters, and the auxiliary one in `test_every_particle_filter.py`.
-REPEATED = (("auxiliary", "growth"), ("multinomial, by ESS", "growth"))
-
-
-@pytest.mark.parametrize(
-    ("name", "model"),
-    [
-        pytest.param(*both, marks=[pytest.mark.full] * (both in REPEATED))
-        for both in itertools.product(PARTICLE, MODELS)
-    ],
-)
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("name", PARTICLE)
 def test_likelihood_and_means_are_the_grid_s_within_their_scatter(name, model):
     if "guided" in name and model == "volatility":
         pytest.skip("its measurement noise has no covariance")
@@ -75,8 +65,7 @@ GAUSSIAN = {
 }
 
 
-# On this model each of the others gives the Kalman filter's means and variances (`test_every_filter.py`), and so its NEES.
-@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.full] * (n != "Kalman")) for n in GAUSSIAN])
+@pytest.mark.parametrize("name", GAUSSIAN)
 def test_nees_is_in_its_band_where_the_model_is_linear(name):
     model = linear_model(3, 2, seed=3)
     model = eqx.tree_at(lambda m: m.measurement_noise, model, ss.Gaussian({"y0": 0.4, "y1": 0.3}))

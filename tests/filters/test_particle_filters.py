@@ -88,7 +88,7 @@ def _growth(system, t0, t1, x, u):
     return State(x.x / 2 + 25 * x.x / (1 + x.x**2) + 8 * jnp.cos(1.2 * t1))
 
 
-def _grid_filter(measured, std, points=1201):
+def _grid_filter(measured, std, points=3001):
     """Log-likelihood and means of the growth model by Bayes' rule on a dense grid."""
     grid = np.linspace(-60, 60, points)
     width = grid[1] - grid[0]

@@ -14,7 +14,7 @@ from jaxveh import io, tyres
 from jaxveh._core.errors import InputError
 from jaxveh.tyres import Contact
 
-COUNT, MANY = 400, 12_000
+COUNT, MANY = 1000, 12_000
 """Mutations of the project's own files, and as many of the shared ones: in the default run, and in the full one, which has
 those of the default run among its own (its seeds begin with the same one)."""
 

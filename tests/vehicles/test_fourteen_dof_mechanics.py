@@ -157,10 +157,10 @@ def test_energy_stays_without_friction_and_dampers():
         travel_fl=0.02, travel_rate_rr=0.4,
     )  # fmt: skip
     none = lambda t: inputs()
-    states, work = drive(car, x, none, 1.2)
-    energy = np.asarray(energies(car, states, none, 1.2))
+    states, work = drive(car, x, none, 4.0)
+    energy = np.asarray(energies(car, states, none, 4.0))
     rest = car.start(0.0, inputs(), v_x=3.0, v_y=-1.0)
-    swing = energy[0] - energies(car, jax.tree.map(lambda v: jnp.broadcast_to(v, (11,)), rest), none, 1.2)[0]
+    swing = energy[0] - energies(car, jax.tree.map(lambda v: jnp.broadcast_to(v, (11,)), rest), none, 4.0)[0]
     assert swing > 500  # J of bouncing, rolling, pitching, yawing
     assert np.ptp(np.asarray(states.z)) > 0.02 and np.ptp(np.asarray(states.roll)) > 0.05
     assert np.ptp(np.asarray(states.pitch)) > 0.03
