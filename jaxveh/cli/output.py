@@ -40,7 +40,7 @@ def check_report(out: Path | None, numbers: Path | None) -> None:
     if out is not None:
         if out.exists() and not out.is_dir():
             raise InputError(f"--out {out}: is a file; name a folder.")
-        io.optional.require("matplotlib", "drawing figures", "plot")
+        io.kit.require("matplotlib", "drawing figures", "plot")
     if numbers is not None:
         # The suffix keeps a slip of the keyboard from replacing a log or a car.
         if numbers.suffix.lower() != ".json":
