@@ -82,5 +82,5 @@ def curves(calibration: Calibration, car: CarSpecification, part: Recording) -> 
         "car file": vehicles.from_specification(car),
         "fitted": vehicles.from_specification(fitted_car(calibration, car)),
     }
-    found = estimate(part, calibration)
+    found = estimate(calibration, part)
     return cars, {"front": found.mean.slip_angle_front, "rear": found.mean.slip_angle_rear}

@@ -12,6 +12,7 @@ from jaxveh.diagnostics.log_findings import SEVERITIES, LogFinding
 from jaxveh.diagnostics.log_plausibility import check_car
 from jaxveh.diagnostics.observability import Observability, from_sensitivities, observability_at
 from jaxveh.diagnostics.particles import Ancestry, ParticleHealth, ancestry, particle_health
+from jaxveh.diagnostics.scores import Score, score_band
 from jaxveh.diagnostics.sine_with_dwell import SineWithDwellTest, sine_with_dwell
 from jaxveh.diagnostics.steady_state import SteadyTurns, Understeer, steady_turns, understeer
 from jaxveh.diagnostics.step_response import StepResponse, step_response
@@ -27,6 +28,7 @@ __all__ = [
     "Observability",
     "ParticleHealth",
     "Peaks",
+    "Score",
     "SineWithDwellTest",
     "SteadyTurns",
     "StepResponse",
@@ -50,6 +52,7 @@ __all__ = [
     "observability_at",
     "particle_health",
     "peaks",
+    "score_band",
     "sine_with_dwell",
     "steady_turns",
     "step_response",

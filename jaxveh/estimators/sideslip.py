@@ -13,6 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
+from jaxveh.diagnostics import Score, score_band
 from jaxveh.estimators.cleaning import BLIND, HandlingCleaning, clean
 from jaxveh.estimators.contract import Calibration, Need, check_needs, cut_pieces, model_of, span_of
 from jaxveh.estimators.handling import Handling, handling_model
@@ -215,28 +216,48 @@ def live(
     return Live(filter or Unscented(), model_of(NAME, source, model), HandlingCleaning(), key)
 
 
-def score(car: CarSpecification, found: Estimate, recording: Recording) -> dict[str, float]:
-    """Errors of an estimate against a reference recording with `v_y`, over its finite rows, next to the open-loop linear model's.
+def least_speed_of(car: CarSpecification) -> float:
+    """Speed (m/s) below which sideslip is not scored unless one says otherwise: 3, and 0.5 for cars with less than a metre between
+    the axles. Slower, it is the quotient of two small numbers."""
+    return 3.0 if car.wheelbase >= 1.0 else 0.5
 
-    Keys: `sideslip_rmse_deg`, `sideslip_coverage_95` (share of rows inside the 95 % band), the same for `v_y`, and
-    `open_loop_sideslip_rmse_deg` for the car's file with linear tyres, steered from rest: the do-nothing baseline.
+
+def score(
+    car: CarSpecification, found: Estimate, recording: Recording, *, least_speed: float | None = None
+) -> dict[str, float]:
+    """Errors of an estimate against a reference recording with `v_y`, next to the open-loop linear model's: the car's file with
+    linear tyres, steered from rest, which is the do-nothing baseline.
+
+    Over the rows where the reference is finite and `v_x` at least `least_speed` (m/s, default `least_speed_of`). **Returns** by
+    name, for sideslip in degrees (`sideslip_rmse_deg`) and for `v_y` in m/s (`v_y_rmse`), what `diagnostics.Score` has: the
+    error as measured, its constant part and the rest (an INS that is turned against the car by half a degree says so in every
+    row), the largest, coverage of the bands, CRPS; the errors of the baseline as `open_loop_sideslip_...`; `rows` and
+    `least_speed`.
+
+    **Raises** `InputError` where no row is left.
     """
     v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
-    truth = {"v_y": v_y, "sideslip": np.arctan2(v_y, v_x)}
-    known = np.isfinite(v_y)
-    if not known.any():
-        raise InputError("score: the reference v_y is NaN in every row; there is nothing to score against.")
-    rms = lambda error: float(np.sqrt(np.mean(error[known] ** 2)))
-    inside = {
-        name: np.abs(np.asarray(getattr(found.mean, name)) - truth[name]) <= 1.96 * np.asarray(getattr(found.std, name))
-        for name in truth
+    floor = least_speed_of(car) if least_speed is None else least_speed
+    fast = v_x >= floor
+    if not (fast & np.isfinite(v_y)).any():
+        raise InputError(
+            f"score: no row has both a reference v_y and a speed of at least {floor:g} m/s; there is nothing to score against."
+        )
+    truth = {"sideslip": np.degrees(np.arctan2(v_y, v_x)), "v_y": v_y}
+    baseline = np.degrees(open_loop(from_specification(car), recording)["sideslip"])
+    units = {"sideslip": np.degrees(1.0), "v_y": 1.0}
+    scores = {
+        name: score_band(true, *(units[name] * np.asarray(getattr(of, name)) for of in (found.mean, found.std)), fast)
+        for name, true in truth.items()
     }
-    baseline = open_loop(from_specification(car), recording)
-    return {
-        "sideslip_rmse_deg": np.degrees(rms(np.asarray(found.mean.sideslip) - truth["sideslip"])),
-        "open_loop_sideslip_rmse_deg": np.degrees(rms(baseline["sideslip"] - truth["sideslip"])),
-        "sideslip_coverage_95": float(np.mean(inside["sideslip"][known])),
-        "v_y_rmse": rms(np.asarray(found.mean.v_y) - truth["v_y"]),
-        "v_y_coverage_95": float(np.mean(inside["v_y"][known])),
-        "rows": int(known.sum()),
-    }
+    named = _named("sideslip", "_deg", scores["sideslip"]) | _named("v_y", "", scores["v_y"])
+    plain = _named("open_loop_sideslip", "_deg", score_band(truth["sideslip"], baseline, which=fast))
+    without_bands = {name: value for name, value in plain.items() if not np.isnan(value)}
+    return named | without_bands | {"rows": scores["sideslip"].rows, "least_speed": floor}
+
+
+def _named(quantity: str, unit: str, found: Score) -> dict[str, float]:
+    """A score's numbers by the names of the JSON file; shares have no unit."""
+    numbers = found._asdict()
+    del numbers["rows"]
+    return {f"{quantity}_{name}{'' if name.startswith('coverage') else unit}": value for name, value in numbers.items()}

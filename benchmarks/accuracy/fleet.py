@@ -1,0 +1,203 @@
+"""A fleet of simulated cars: the whole car on winding roads, with the sensors of production cars and car files that are wrong.
+
+The truth is the car of fourteen degrees of freedom on MF-Tyres. Nothing of it but the laws of mechanics is shared with what
+estimates: that is a single track on its own tyre law, which neither rolls nor pitches and knows no road.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import Recording, io, manoeuvres, numerics, roads, sensors, simulate, vehicles
+
+from .logs import Log
+
+DT = 0.01
+"""s: rows of the logs."""
+
+MAX_STEP = 0.002
+"""s: of the simulation; shorter than what wheel hop and spins at these speeds ask for."""
+
+LATEST = 5
+"""Rows by which the steering channel comes later than the inertial unit's, or earlier, at most."""
+
+
+class Drive(NamedTuple):
+    """A way of driving: the mean `speed` (m/s) on dry road, and how much of the tyres' grip the corners take at their sharpest."""
+
+    speed: float
+    grip: float
+
+
+DRIVES = {
+    "motorway": Drive(30.0, 0.25),
+    "country road": Drive(22.0, 0.45),
+    "brisk": Drive(20.0, 0.65),
+    "at the limit": Drive(18.0, 0.9),
+}
+
+SPREADS = {"mass": 0.15, "yaw_inertia": 0.2, "cg": 0.1}
+"""Relative standard deviations of what a car's file says, about the truth; `cg`: of the distance to the front axle."""
+
+STIFFNESS = (0.6, 1.6)
+"""What a car's file says of an axle's cornering stiffness over the truth: even on the logarithm between these."""
+
+BIASES = {"a_y": 0.3, "a_x": 0.3, "yaw_rate": np.radians(0.3), "steer": np.radians(0.5), "v_x": 0.005}
+"""Standard deviations of constant sensor errors: m/s^2, rad/s, rad at the road wheels; of the speed's gain."""
+
+
+class WindingRoad(manoeuvres.AbstractGraph):
+    """A road whose curvature is random along x: harmonics of equal energy between two wavelengths.
+
+    `curvature` (1/m): its standard deviation. `wavenumbers` (1/m) and `phases` (rad): (n,) each.
+    """
+
+    curvature: jax.Array
+    wavenumbers: jax.Array
+    phases: jax.Array
+
+    def y(self, x):
+        k = 2 * jnp.pi * self.wavenumbers
+        turns = k * jnp.asarray(x)[..., None] + self.phases
+        # y'' of each harmonic has the standard deviation `curvature` / sqrt(n); the road leaves the origin along x.
+        size = self.curvature * jnp.sqrt(2.0 / self.wavenumbers.size) / k**2
+        wave = numerics.sin(turns) - numerics.sin(self.phases) - k * jnp.asarray(x)[..., None] * numerics.cos(self.phases)
+        return jnp.sum(size * wave, axis=-1)
+
+
+class Run(NamedTuple):
+    """One run's numbers, or those of many side by side: the car, its road, its driver, its sensors' constant errors, a key."""
+
+    car: Any
+    road: Any
+    driver: Any
+    biases: Any
+    key: Any
+
+
+class FleetLog(NamedTuple):
+    """A `Log` of the fleet, and what nobody is told: the car's name, its drive, the road's friction and bank."""
+
+    log: Log
+    car: str
+    drive: str
+    friction: float
+    banked: bool
+
+
+def cars() -> dict[str, vehicles.CarNumbers]:
+    """The parameter sets that have a suspension, on tyres of one law."""
+    made = {name: make() for name, make in vehicles.sets.CARS.items()}
+    plain = lambda tyre: dataclasses.replace(tyre, coefficients=None)
+    return {
+        name: dataclasses.replace(numbers, front=plain(numbers.front), rear=plain(numbers.rear), four_motors=False)
+        for name, numbers in made.items()
+        if numbers.suspension is not None
+    }
+
+
+def fleet(runs: int, seed: int = 0, duration: float = 90.0) -> list[FleetLog]:
+    """`runs` logs of `duration` s, every car and every drive in turn; simulated by one program."""
+    rng, numbers = np.random.default_rng(seed), cars()
+    names, drives = list(numbers), list(DRIVES)
+    plans = [(names[i % len(names)], drives[(i // len(names)) % len(drives)]) for i in range(runs)]
+    drawn = [_draw(numbers[car], DRIVES[drive], rng, duration) for car, drive in plans]
+    stacked = jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *[run for run, _ in drawn])
+    said, truth = _simulate(stacked)
+    said, truth = (jax.tree.map(np.asarray, one) for one in (said, truth))
+    found = []
+    for i, ((car, drive), (run, told)) in enumerate(zip(plans, drawn, strict=True)):
+        channels = _late({name: values[i] for name, values in said.items()}, int(rng.integers(-LATEST, LATEST + 1)))
+        v_y = truth["v_y"][i] + told.cg_error * truth["yaw_rate"][i]
+        recording = Recording(DT * np.arange(len(v_y)), {**channels, "v_y": v_y}, source=f"fleet {i}")
+        # The reference is the truth where the file says that the centre of gravity is.
+        name = f"fleet {i}: {car}, {drive}"
+        banked = bool(run.road.bank.std > 1e-6)
+        found.append(FleetLog(Log(name, told.file, recording), car, drive, float(run.road.friction), banked))
+    return found
+
+
+class Told(NamedTuple):
+    """A car's file, and by how much (m) its centre of gravity is ahead of the true one."""
+
+    file: io.CarSpecification
+    cg_error: float
+
+
+def _draw(numbers: vehicles.CarNumbers, drive: Drive, rng: np.random.Generator, duration: float) -> tuple[Run, Told]:
+    friction = rng.uniform(0.4, 1.0)
+    key = jax.random.key(int(rng.integers(2**31)))
+    bank, speed, way, own = jax.random.split(key, 4)
+    car = vehicles.build(numbers, vehicles.FourteenDOF)
+    bank_std = 0.04 if rng.random() < 0.5 else 1e-9
+    road = roads.RandomRoad(bank=roads.gauss_markov(bank_std, 60.0, bank), friction=friction)
+    grip = friction * min(numbers.front.friction, numbers.rear.friction)
+    mean = drive.speed * np.sqrt(min(grip, 1.0)) * rng.uniform(0.85, 1.15)
+    wanted = manoeuvres.wavering_speed(mean, 0.1 * mean, speed, time=15.0)
+    # The sharpest of a sum of many harmonics is about two and a half times its standard deviation.
+    curvature = drive.grip * grip * vehicles.GRAVITY / mean**2 / 2.5
+    path = WindingRoad(curvature, *numerics.band_harmonics(way, 1.0 / 400.0, 1.0 / 60.0, 40))
+    driver = manoeuvres.SpeedControl(
+        manoeuvres.PathDriver(path, wanted, duration, wheelbase=numbers.wheelbase), car.mass, wheel_radius=numbers.wheel_radius
+    )
+    biases = {name: std * rng.normal() for name, std in BIASES.items()}
+    return Run(car, road, driver, biases, own), _told(numbers, rng)
+
+
+def _told(numbers: vehicles.CarNumbers, rng: np.random.Generator) -> Told:
+    factor = lambda name: float(np.exp(SPREADS[name] * rng.normal()))
+    stiffness = lambda tyre: 2.0 * tyre.cornering_stiffness * float(np.exp(rng.uniform(*np.log(STIFFNESS))))
+    front_axle_to_cg = min(numbers.front_axle_to_cg * factor("cg"), 0.75 * numbers.wheelbase)
+    file = io.CarSpecification(
+        mass=numbers.mass * factor("mass"), yaw_inertia=numbers.yaw_inertia * factor("yaw_inertia"),
+        front_axle_to_cg=front_axle_to_cg, rear_axle_to_cg=numbers.wheelbase - front_axle_to_cg,
+        front_cornering_stiffness=stiffness(numbers.front), rear_cornering_stiffness=stiffness(numbers.rear),
+    )  # fmt: skip
+    return Told(file, numbers.front_axle_to_cg - front_axle_to_cg)
+
+
+SEEN = ("v_x", "v_y", "yaw_rate", "a_x", "a_y", "a_z", "yaw_acceleration", "steer", "grade", "bank")
+POSES = ("roll", "pitch", "roll_rate", "pitch_rate", "roll_acceleration", "pitch_acceleration")
+
+
+@eqx.filter_jit
+@eqx.filter_vmap
+def _simulate(run: Run) -> tuple[dict, dict]:
+    """What the sensors say, and the truth."""
+    drive = simulate(
+        run.car, run.driver, road=run.road, dt=DT, max_step=MAX_STEP, solver="explicit", throw=False
+    )
+    truth = {name: drive[f"true.{name}"] for name in (*SEEN, *POSES)}
+    said = {}
+    for device in _devices(run.biases):
+        said |= device.read(DT * jnp.arange(len(drive)), truth, run.key)
+    said["v_x"] = truth["v_x"] * (1 + run.biases["v_x"])
+    return said, {name: truth[name] for name in ("v_y", "yaw_rate")}
+
+
+def _devices(biases: dict) -> tuple:
+    degree = np.pi / 180
+    accelerometer = lambda name: sensors.Signal(noise=0.05, bias=biases[name], quantisation=1.25e-3)
+    imu = sensors.IMU(
+        {
+            "a_x": accelerometer("a_x"),
+            "a_y": accelerometer("a_y"),
+            "yaw_rate": sensors.Signal(noise=0.1 * degree, bias=biases["yaw_rate"], quantisation=0.005 * degree),
+        },
+        low_pass=sensors.LowPass(15.0),
+        rate=1 / DT,
+    )
+    steer = sensors.Signal(bias=biases["steer"], quantisation=0.1 * degree / 16)
+    return imu, sensors.SteeringAngle(steer, backlash=degree / 16, rate=1 / DT)
+
+
+def _late(channels: dict[str, np.ndarray], rows: int) -> dict[str, np.ndarray]:
+    """The steer comes `rows` rows later than all else, or earlier where negative."""
+    at = np.clip(np.arange(len(channels["steer"])) - rows, 0, len(channels["steer"]) - 1)
+    return channels | {"steer": channels["steer"][at]}

@@ -1,0 +1,73 @@
+"""The table, and what of all lines together matters."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+
+import numpy as np
+
+from .measure import Line
+
+HEAD = (
+    "log", "setting", "RMSE [deg]", "open loop", "as told", "over open loop", "over as told", "without constant",
+    "worst", "in 50 %", "in 95 %", "CRPS", "constant band",
+)  # fmt: skip
+
+
+def show(lines: Sequence[Line], title: str) -> None:
+    """Print a table of lines."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", caption=_caption(), caption_justify="left")
+    for i, name in enumerate(HEAD):
+        table.add_column(name, justify="left" if i < 2 else "right")
+    for line in lines:
+        table.add_row(*_cells(line))
+    Console(width=180).print(table)
+    for line in lines:
+        if line.failed:
+            print(f"{line.log}, {line.setting}: {line.failed}")
+
+
+def _caption() -> str:
+    return (
+        "without constant: the errors' part that is not constant, over that of the open loop; constant band: CRPS of the same "
+        "estimate with the one constant band that suits it best"
+    )
+
+
+def _cells(line: Line) -> list[str]:
+    if line.failed:
+        return [line.log, line.setting, "failed", *[""] * (len(HEAD) - 3)]
+    digits = lambda value, places=3: f"{value:.{places}f}"
+    return [
+        line.log, line.setting, digits(line.rmse), digits(line.open_loop), digits(line.as_told),
+        digits(line.over_open_loop, 2), digits(line.over_as_told, 2), digits(line.over_open_loop_without_constant, 2),
+        digits(line.worst, 1), digits(line.coverage_50, 2), digits(line.coverage_95, 2),
+        digits(line.crps), digits(line.crps_constant),
+    ]  # fmt: skip
+
+
+def summary(lines: Sequence[Line]) -> dict[str, float]:
+    """Of many lines of one setting: quantiles of the error over the open loop's, shares, and coverage."""
+    done = [line for line in lines if not line.failed]
+    if not done:
+        return {"runs": len(lines), "failed": len(lines)}
+    over = [line.over_open_loop for line in done]
+    return {
+        "runs": len(lines),
+        "failed": len(lines) - len(done),
+        "over_open_loop_median": statistics.median(over),
+        "over_open_loop_90": float(np.quantile(over, 0.9)),
+        "over_open_loop_worst": max(over),
+        "worse_than_open_loop": float(np.mean([value > 1.0 for value in over])),
+        "over_as_told_median": statistics.median(line.over_as_told for line in done),
+        "rmse_median_deg": statistics.median(line.rmse for line in done),
+        "open_loop_median_deg": statistics.median(line.open_loop for line in done),
+        "coverage_50": float(np.mean([line.coverage_50 for line in done])),
+        "coverage_95": float(np.mean([line.coverage_95 for line in done])),
+        "coverage_95_lowest_tenth": float(np.quantile([line.coverage_95 for line in done], 0.1)),
+        "crps_over_constant_band": statistics.median(line.crps / line.crps_constant for line in done),
+    }

@@ -1,0 +1,79 @@
+"""How good an estimate is: errors, bands and their worth, of an estimate and of a baseline beside it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+
+NORMAL_HALF, NORMAL_95 = 0.6744897501960817, 1.959963984540054
+"""Half the widths of the central 50 and 95 % of a standard normal law."""
+
+
+class Score(NamedTuple):
+    """How an estimate fares against a reference, in the reference's unit.
+
+    - `rmse`; `constant`: the mean of the error, such as a reference's misalignment, and `rmse_without_constant`: without it;
+      `worst`: the largest absolute error.
+    - `coverage_50`, `coverage_95`: shares of rows inside the central bands; `crps`: the continuous ranked probability score, the
+      lower the better; `crps_constant`: that of the same mean with the one constant standard deviation that suits it best. NaN
+      for an estimate without standard deviations.
+    - `rows`: how many were scored.
+    """
+
+    rmse: float
+    constant: float
+    rmse_without_constant: float
+    worst: float
+    coverage_50: float
+    coverage_95: float
+    crps: float
+    crps_constant: float
+    rows: int
+
+
+def score_band(reference: np.ndarray, mean: np.ndarray, std: np.ndarray | None = None, which: np.ndarray | None = None) -> Score:
+    """`mean` and `std` (T,) against a `reference` (T,), over its finite rows, of those `which` (T,) says.
+
+    **Raises** `InputError` where no row is left.
+    """
+    known = np.isfinite(reference) if which is None else np.isfinite(reference) & which
+    if not known.any():
+        raise InputError("score_band: the reference is NaN in every row that counts; there is nothing to score against.")
+    error = (np.asarray(mean) - reference)[known]
+    constant = float(np.mean(error))
+    rms = lambda values: float(np.sqrt(np.mean(values**2)))
+    without = rms(error - constant)
+    if std is None:
+        bands = [math.nan] * 4
+    else:
+        width = np.maximum(np.asarray(std)[known], 1e-300)
+        away = np.abs(error) / width
+        inside = [float(np.mean(away <= half)) for half in (NORMAL_HALF, NORMAL_95)]
+        bands = [*inside, float(np.mean(width * _crps(away))), _crps_of_best_constant(error)]
+    return Score(rms(error), constant, without, float(np.max(np.abs(error))), *bands, int(known.sum()))
+
+
+def _crps(away: np.ndarray) -> np.ndarray:
+    """The score of a standard normal law at a distance from its mean (T. Gneiting and A. E. Raftery, J. Am. Stat. Assoc. 102
+    (2007), eq. 21)."""
+    density = np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
+    below = 0.5 * (1 + _erf(away / math.sqrt(2)))
+    return away * (2 * below - 1) + 2 * density - 1 / math.sqrt(math.pi)
+
+
+_erf = np.vectorize(math.erf, otypes=[float])
+
+
+def _crps_of_best_constant(error: np.ndarray) -> float:
+    """The least score of a constant standard deviation, among those from a twentieth to twice the errors' root mean square."""
+    size = float(np.sqrt(np.mean(error**2)))
+    if size == 0:
+        return 0.0
+    widths = size * np.geomspace(0.05, 2.0, 30)
+    # Sorted errors, thinned: the score is an integral over their distribution.
+    some = np.quantile(np.abs(error), (np.arange(500) + 0.5) / 500)
+    return float(min(np.mean(width * _crps(some / width)) for width in widths))
