@@ -1,7 +1,6 @@
 """Mass and grade of a car that the filter's own model drives: known answers, honest spreads, mistakes named."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -59,7 +58,7 @@ def test_a_mass_may_be_additive_and_a_grade_may_walk():
     model = estimators.mass_and_grade.model(car(1100.0), mass_domain=Real(), grade_walk=2e-3, grade_rate_walk=None)
     assert model.states == ("v_x", "grade", "mass")
     np.testing.assert_allclose(model.prior.mean.mass, 1100.0)
-    np.testing.assert_allclose(jnp.sqrt(jnp.diagonal(model.prior.covariance()))[2], 0.4 * 1100.0)
+    np.testing.assert_allclose(np.sqrt(np.diagonal(model.prior.covariance()))[2], 0.4 * 1100.0)
     assert set(model.process_noise.law.names) == {"v_x", "grade"}
 
 

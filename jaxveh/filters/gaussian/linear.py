@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -22,7 +24,9 @@ def check_linear(who: str, model: StateSpace) -> None:
     """
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
-    with jax.ensure_compile_time_eval():  # inside jit, too, a model may be made of plain numbers
+    # Inside jit, too, a model may be made of plain numbers. Outside, it would only compile constants one by one.
+    inside = not is_concrete(jnp.zeros(()))
+    with jax.ensure_compile_time_eval() if inside else contextlib.nullcontext():
         found = jax.tree.map(np.asarray, _nonlinear_parts(model))
         varies = isinstance(model.measurement_noise, StateDependent) and bool(_noise_varies(model))
     for nonlinear in found:
