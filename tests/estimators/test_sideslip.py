@@ -23,9 +23,9 @@ def log(rows=ROWS):
 
 
 @functools.cache
-def drive(rows=ROWS, seed=0):
+def drive():
     """A car on a winding road that follows the linear single track at modest lateral acceleration, 100 Hz."""
-    rng = np.random.default_rng(seed)
+    rows, rng = ROWS, np.random.default_rng(0)
     time = np.arange(rows) * 0.01
     steer = 0.02 * np.sin(2 * np.pi * 0.4 * time) + 0.01 * np.sin(2 * np.pi * 0.17 * time + 1.0)
     v_x = np.full(rows, 20.0)

@@ -15,6 +15,13 @@ from jaxveh.filters.gaussian.belief import rows_of
 from jaxveh.statespace import StateDependent, StateSpace
 
 
+def computing():
+    """Inside jit, too, a model may be made of plain numbers, and be computed with. Outside, it would only have constants compiled
+    one by one."""
+    inside = not is_concrete(jnp.zeros(()))
+    return jax.ensure_compile_time_eval() if inside else contextlib.nullcontext()
+
+
 def check_linear(who: str, model: StateSpace) -> None:
     """Raise `InputError` naming the first value that is no linear function of the state.
 
@@ -24,9 +31,7 @@ def check_linear(who: str, model: StateSpace) -> None:
     """
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
-    # Inside jit, too, a model may be made of plain numbers. Outside, it would only compile constants one by one.
-    inside = not is_concrete(jnp.zeros(()))
-    with jax.ensure_compile_time_eval() if inside else contextlib.nullcontext():
+    with computing():
         found = jax.tree.map(np.asarray, _nonlinear_parts(model))
         varies = isinstance(model.measurement_noise, StateDependent) and bool(_noise_varies(model))
     for nonlinear in found:
