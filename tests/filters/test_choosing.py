@@ -8,9 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from drawn_systems import drawn, exact, linear
 from filter_systems import linear_model
-from test_every_filter import batch, kalman_of, pendulum, recordings
-from two_states import drawn, exact, linear
+from test_every_filter import pendulum
 
 from jaxveh import InputError, filters, numerics
 from jaxveh import statespace as ss
@@ -95,13 +95,12 @@ class TestTransport:
         np.testing.assert_allclose(found.y, 7.0, rtol=1e-12)
 
     def test_its_bias_falls_with_the_smoothing(self):
-        model, rows = batch("linear")
-        rows = jax.tree.map(lambda leaf: np.asarray(leaf)[0], rows)
-        total = kalman_of(recordings("linear")[0])["log_likelihood"].sum()
-        bias = {}
+        model, total, bias = linear(n=3), exact(n=3)["log_likelihood"].sum(), {}
         for epsilon in (2.0, 0.1):
             # They scatter by about one and a half, and the larger bias is some fifty.
-            logs, *_ = runs(filters.ParticleFilter(60, filters.Transport(epsilon, 40)), model, rows, 10)
+            logs, *_ = runs(
+                filters.ParticleFilter(60, filters.Transport(epsilon, 40)), model, model.rows(drawn(n=3)), 10
+            )
             bias[epsilon] = abs(np.mean(logs) - total)
         assert bias[0.1] < 0.25 * bias[2.0]
 

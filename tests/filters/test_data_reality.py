@@ -5,8 +5,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from drawn_systems import drawn, linear
 from filter_systems import kalman, linear_model, linear_recording
-from two_states import drawn, linear
 
 from jaxveh import FilterError, InputError, Recording, Result, filters
 from jaxveh import statespace as ss

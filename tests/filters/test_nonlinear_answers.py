@@ -49,8 +49,9 @@ def test_likelihood_and_means_are_the_grid_s_within_their_scatter(name, model):
     if model == "growth" and isinstance(PARTICLE[name], filters.ParticleFilter):
         system = growth_like_volatility()
     rows = system.rows(as_recording(measured))
-    logs, found, results = runs(PARTICLE[name], system, rows, jax.random.split(jax.random.key(5), SEEDS))
-    assert not np.asarray(results).any()
+    keys = jax.random.split(jax.random.key(5), SEEDS)
+    logs, found, results = map(np.asarray, runs(PARTICLE[name], system, rows, keys))
+    assert not results.any()
     # The likelihood itself is unbiased, its logarithm half a variance low.
     spread = np.std(logs)
     assert abs(np.mean(logs) + 0.5 * spread**2 - total) < 4.0 * spread / np.sqrt(SEEDS) + 1e-3

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
-from two_states import drawn, linear
+from drawn_systems import drawn, linear
 
 from jaxveh import filters
 

@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from drawn_systems import drawn
+from drawn_systems import linear as of_two_states
 from filter_systems import linear_model, linear_recording, spd
 from test_every_filter import FILTERS, KEYS, batch, batch_of_values, linear
-from two_states import drawn
-from two_states import linear as of_two_states
 
 from jaxveh import InputError, Recording, filters, fitting, observers
 from jaxveh import statespace as ss
@@ -50,10 +50,14 @@ def stochastic_volatility(beta, phi, sigma):
     )
 
 
-@functools.cache
 def returns(rows):
+    return every_return().rows(slice(0, rows))
+
+
+@functools.cache
+def every_return():
     """Drawn from the model, as the 750 returns themselves are not ours; with a holiday."""
-    schedule = Recording(np.arange(float(rows)), {})
+    schedule = Recording(np.arange(750.0), {})
     recording = ss.draw(stochastic_volatility(**POUND_DOLLAR), schedule, jax.random.key(3)).recording
     values = np.array(recording["returns"])
     values[10] = np.nan
@@ -91,15 +95,19 @@ def test_the_pound_dollar_model_has_the_grid_s_likelihood_and_means(filter_):
     exact, means = grid_answer()
     rows = model.rows(recording)
     found = jax.vmap(lambda key: filters.scan(filter_, model, rows, key))(jax.random.split(jax.random.key(0), 6))
-    assert not np.asarray(found.result).any()
-    scatter = np.std(found.log_likelihood, ddof=1)
+    found = jax.tree.map(
+        np.asarray, (found.result, found.log_likelihood, found.mean.h, found.info.innovation_std.returns)
+    )
+    result, logs, h, stds = found
+    assert not result.any()
+    scatter = np.std(logs, ddof=1)
     assert 0.01 < scatter < 1.0
     # A likelihood that is unbiased has a logarithm that is low by half its variance.
-    assert abs(np.mean(found.log_likelihood) + 0.5 * scatter**2 - exact) < 4 * scatter / 6**0.5
-    assert np.sqrt(np.mean((np.mean(found.mean.h, 0) - means) ** 2)) < 0.02
+    assert abs(np.mean(logs) + 0.5 * scatter**2 - exact) < 4 * scatter / 6**0.5
+    assert np.sqrt(np.mean((np.mean(h, 0) - means) ** 2)) < 0.02
     # What a row was expected to be: as wide as the volatilities.
-    assert np.isnan(found.info.innovation_std.returns[:, 10]).all()
-    z = np.array(recording["returns"]) / np.array(found.info.innovation_std.returns[0])
+    assert np.isnan(stds[:, 10]).all()
+    z = np.array(recording["returns"]) / stds[0]
     np.testing.assert_allclose(np.nanmean(z**2), 1.0, atol=0.15)
 
 

@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from drawn_systems import linear
 from filter_systems import linear_model, linear_recording, nile_model, see_level, stay
 from test_learned_noise import model, rmse, walk
-from two_states import linear
 
 from jaxveh import InputError, Recording, Result, filters
 from jaxveh import statespace as ss
@@ -113,9 +113,9 @@ def test_matched_process_leaves_a_right_model_nearly_alone():
 
 
 @functools.cache
-def faulty(rows=200):
+def faulty():
     """A linear model with two sensors, of which the second lies from the middle on."""
-    base = linear()
+    rows, base = 200, linear()
     schedule = linear_recording(base, rows, seed=4)
     truth, recording = ss.draw(base, schedule, jax.random.key(0))
     lies = np.array(recording["y1"])
@@ -238,7 +238,7 @@ def scaled(factor):
 
 
 def test_smoothers_of_what_they_would_get_wrong_are_refused():
-    base, _, recording, _ = faulty(20)
+    base, _, recording, _ = faulty()
     key = jax.random.key(0)
     for what, filter_ in (
         ("Marginalised has no smoother", filters.Marginalised(20, ("x1",))),

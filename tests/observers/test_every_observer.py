@@ -215,8 +215,7 @@ def test_its_gradient_is_that_of_differences(name, model_name):
         moved = jax.tree.unflatten(tree, moved)
         values.append(whole(*eqx.combine(moved, rest), rows)[0][0])
     slope = sum(
-        np.sum(g * s, axis=tuple(range(1, g.ndim)))
-        for g, s in zip(jax.tree.leaves(gradient), steps, strict=True)
+        np.sum(g * s, axis=tuple(range(1, g.ndim))) for g, s in zip(jax.tree.leaves(gradient), steps, strict=True)
     )
     np.testing.assert_allclose(slope, (values[0] - values[1]) / (2 * h), rtol=1e-5, atol=1e-7)
 

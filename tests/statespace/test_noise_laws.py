@@ -226,7 +226,10 @@ def test_strict_float32(float32):
     residuals = {name: jnp.asarray(value.astype(np.float32)) for name, value in residual().items()}
     laws = (ss.Gaussian({"a": 1.0}), ss.StudentT(4.0, {"a": 1.0}), ss.MultivariateGaussian(("a", "b", "c"), MATRIX))
     for law in (*laws, ss.Independent((ss.Gaussian({"b": 1.0}), ss.StudentT(4.0, {"a": 1.0})))):
-        found = jax.eval_shape(
-            lambda law=law: (law.log_prob(residuals, present("a", "b", "c")), law.covariance()),
-        ), jax.eval_shape(lambda law=law: law.sample(jax.random.key(0), (3,)))
+        found = (
+            jax.eval_shape(
+                lambda law=law: (law.log_prob(residuals, present("a", "b", "c")), law.covariance()),
+            ),
+            jax.eval_shape(lambda law=law: law.sample(jax.random.key(0), (3,))),
+        )
         assert {leaf.dtype.name for leaf in jax.tree.leaves(found)} == {"float32"}
