@@ -15,7 +15,7 @@ from jaxveh._core.names import as_names, check_names, record
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, log_chosen, log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
-from jaxveh.filters.gaussian.linear import computing
+from jaxveh.filters.gaussian.linear import concrete_values
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.gaussian.rules import Image, product, times
 from jaxveh.filters.particle import (
@@ -288,7 +288,7 @@ def _check_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
     """Raise `InputError` naming the first value that is not linear in the states `linear`. Tracers pass."""
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
-    with computing():
+    with concrete_values():
         found = jax.tree.map(np.asarray, _nonlinear_in(linear, model))
     for what, names, nonlinear in zip(("state", "channel"), (model.states, model.channels), found, strict=True):
         if nonlinear.any():

@@ -15,7 +15,7 @@ from jaxveh.filters.gaussian.belief import rows_of
 from jaxveh.statespace import StateDependent, StateSpace
 
 
-def computing():
+def concrete_values():
     """Inside jit, too, a model may be made of plain numbers, and be computed with. Outside, it would only have constants compiled
     one by one."""
     inside = not is_concrete(jnp.zeros(()))
@@ -31,7 +31,7 @@ def check_linear(who: str, model: StateSpace) -> None:
     """
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
-    with computing():
+    with concrete_values():
         found = jax.tree.map(np.asarray, _nonlinear_parts(model))
         varies = isinstance(model.measurement_noise, StateDependent) and bool(_noise_varies(model))
     for nonlinear in found:
