@@ -6,6 +6,7 @@ import zipfile
 from pathlib import Path
 from typing import Any, TypeVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -76,7 +77,7 @@ def load_belief(path: str | Path, like: B) -> B:
 def _states(belief: Any) -> tuple[str, ...]:
     """The names of the states, where the belief has a mean."""
     try:
-        return belief.mean._fields
+        return eqx.filter_eval_shape(lambda belief: belief.mean, belief)._fields
     except InputError:
         return ()
 

@@ -57,6 +57,7 @@ def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace,
         numbers = jnp.stack([jnp.asarray(getattr(info, name), dtype) for name in NUMBERS])
         return tuple(_plain(leaf) for leaf in leaves), jnp.stack(mean), jnp.stack(std), numbers
 
+    @jax.jit
     def init(t, u, y):
         return shown(*filter.init(model, _row(model, t, u, y), key))
 
@@ -65,7 +66,7 @@ def export_filter(folder: str | Path, filter: AbstractFilter, model: StateSpace,
         leaves = [_restore_key(leaf, kind) for leaf, kind in zip(state, kinds, strict=True)]
         return shown(*filter.step(model, jax.tree.unflatten(tree, leaves), _row(model, t, u, y)))
 
-    first = jax.export.export(jax.jit(init))(*like)
+    first = jax.export.export(init)(*like)
     state = jax.eval_shape(init, *like)[0]
     then = jax.export.export(jax.jit(step))(state, *like)
     described = {

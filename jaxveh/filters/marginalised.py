@@ -15,6 +15,7 @@ from jaxveh._core.names import as_names, check_names, record
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, log_chosen, log_of
 from jaxveh.filters.gaussian.filter import check_covariances, check_gaussian, wrapped_innovation
 from jaxveh.filters.gaussian.forms import Covariance, Spread
+from jaxveh.filters.gaussian.linear import concrete_values
 from jaxveh.filters.gaussian.noises import covariance_in
 from jaxveh.filters.gaussian.rules import Image, product, times
 from jaxveh.filters.particle import (
@@ -287,11 +288,20 @@ def _check_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
     """Raise `InputError` naming the first value that is not linear in the states `linear`. Tracers pass."""
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
-    with jax.ensure_compile_time_eval():  # inside jit, too, a model may be made of plain numbers
-        _check_each_linear_in(linear, model)
+    with concrete_values():
+        found = jax.tree.map(np.asarray, _nonlinear_in(linear, model))
+    for what, names, nonlinear in zip(("state", "channel"), (model.states, model.channels), found, strict=True):
+        if nonlinear.any():
+            raise InputError(
+                f"Marginalised: {what} {names[int(np.argmax(nonlinear))]} is not linear in {', '.join(linear)}. "
+                "Name fewer states in `linear`, or use Guided."
+            )
 
 
-def _check_each_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
+# Compiled: operation by operation it would take longer than filtering a short recording.
+@eqx.filter_jit
+def _nonlinear_in(linear: tuple[str, ...], model: StateSpace) -> list[Any]:
+    """Which states and which channels are not linear in the states `linear`, (n,) and (m,)."""
     dtype = model.prior.mean[0].dtype
     t0, t1 = jnp.zeros((), dtype), jnp.asarray(0.01, dtype)
     u = record("Inputs", {name: jnp.asarray(1.0, dtype) for name in model.inputs})
@@ -300,16 +310,13 @@ def _check_each_linear_in(linear: tuple[str, ...], model: StateSpace) -> None:
     point = type(model.prior.mean)(**{n: m + 0.1 * spread[n] for n, m in model.prior.mean._asdict().items()})
     move = lambda x: model.transition(t0, t1, x, model.step_inputs(t0, t1, u, u))
     see = lambda x: model.observation(t0, x, u)
-    for what, names, f in (("state", model.states, move), ("channel", model.channels, see)):
+    found = []
+    for names, f in ((model.states, move), (model.channels, see)):
         seen, slopes = _slopes(linear, point, lambda x, f=f, names=names: [getattr(f(x), n) for n in names])
         step = jnp.stack([spread[name] * np.cos(1.0 + 2.0 * i) for i, name in enumerate(linear)])
         moved = point._replace(**{n: getattr(point, n) + step[i] for i, n in enumerate(linear)})
         there = jnp.stack([jnp.asarray(getattr(f(moved), n), dtype) for n in names])
         slope = times(slopes, step)
         size = jnp.abs(seen) + jnp.abs(slope) + jnp.abs(there)
-        nonlinear = np.asarray(jnp.abs(there - seen - slope) > 1e3 * jnp.finfo(dtype).eps * size)
-        if nonlinear.any():
-            raise InputError(
-                f"Marginalised: {what} {names[int(np.argmax(nonlinear))]} is not linear in {', '.join(linear)}. "
-                "Name fewer states in `linear`, or use Guided."
-            )
+        found.append(jnp.abs(there - seen - slope) > 1e3 * jnp.finfo(dtype).eps * size)
+    return found

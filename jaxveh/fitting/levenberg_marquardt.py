@@ -58,7 +58,9 @@ class LevenbergMarquardt(optx.AbstractMinimiser):
         zeros = jnp.zeros_like(y)
         infinite = jnp.full((), jnp.inf, y.dtype)
         at = Quadratic(infinite, zeros, jnp.zeros((y.size, y.size), y.dtype))
-        return _Search(at, jnp.asarray(True), zeros, jnp.full((), FIRST, y.dtype), jnp.asarray(0), jnp.asarray(False))
+        return _Search(
+            at, jnp.asarray(True), zeros, jnp.full((), FIRST, y.dtype), jnp.zeros((), int), jnp.asarray(False)
+        )
 
     def step(self, fn, y, args, options, state, tags):
         """One damped step, taken or refused."""

@@ -62,7 +62,8 @@ class FisherScoring(optx.AbstractMinimiser):
 
     def begin(self, y) -> _Search:
         """A search that has not looked at anything."""
-        none, past = jnp.asarray(0), jnp.zeros((SECANTS, y.size), y.dtype)
+        # Of a type of their own, as they come back: weak ones would be another program.
+        none, past = jnp.zeros((), int), jnp.zeros((SECANTS, y.size), y.dtype)
         at = Quadratic(jnp.full((), jnp.inf, y.dtype), jnp.zeros_like(y), jnp.zeros((y.size, y.size), y.dtype))
         damping = jnp.full((), FIRST_DAMPING, y.dtype)
         return _Search(at, y, past, past, damping, none, none - 1, jnp.asarray(False))

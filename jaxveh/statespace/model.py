@@ -66,8 +66,8 @@ class Prior(eqx.Module):
 
     def covariance(self) -> jax.Array:
         """(n, n) covariance in the order of the state's fields."""
-        order = np.array([self.law.names.index(name) for name in self.mean._fields])
-        return self.law.covariance()[order][:, order]
+        order, matrix = [self.law.names.index(name) for name in self.mean._fields], self.law.covariance()
+        return matrix if order == sorted(order) else matrix[np.ix_(order, order)]
 
 
 class StateSpace(eqx.Module):

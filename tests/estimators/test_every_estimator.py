@@ -34,12 +34,14 @@ def of_sideslip():
 def of_mass_and_grade():
     known = {"wheel_radius": 0.3, "drag": 0.4, "rolling_resistance": 0.012}
     file = dataclasses.replace(test_sideslip.CAR, mass=1100.0, **known)
-    return Case(test_mass_and_grade.drive(duration=40.0)[0], file, vehicles.Longitudinal(1100.0, **known))
+    return Case(test_mass_and_grade.drive()[0].rows(slice(0, 400)), file, vehicles.Longitudinal(1100.0, **known))
 
 
 CASES = {"sideslip": of_sideslip, "mass_and_grade": of_mass_and_grade}
 SLOW = ("sideslip",)
 """To be fitted: by the full run."""
+SHORT = 120
+"""Rows of a log of which only the filter's answer is looked at."""
 
 
 @functools.cache
@@ -136,7 +138,7 @@ def test_an_optional_channel_is_asked_for_by_a_model_that_reads_it(name):
         if need.optional:
             model = one.model(case.car, **{need.channel: 0.05})
             assert need.channel in model.channels
-            less = case.log.without(need.channel)
+            less = case.log.without(need.channel).rows(slice(0, SHORT))
             one.estimate(case.car, less)
             with pytest.raises(InputError, match=f"{need.channel} .* is missing from the log"):
                 one.estimate(model, less)
@@ -151,7 +153,7 @@ def same(found, expected):
 @every
 def test_a_file_a_vehicle_a_model_and_a_calibration_are_sources(name):
     one, case = estimator(name), case_of(name)
-    log, model = case.log.rows(slice(0, 60)), one.model(case.car)
+    log, model = case.log.rows(slice(0, SHORT)), one.model(case.car)
     expected = one.estimate(case.car, log)
     told = estimators.Calibration(name, SimpleNamespace(model=model), (0.0, 1.0))
     for source in (case.vehicle, model, told):
@@ -179,7 +181,7 @@ def live_answers(live, rows):
 @every
 def test_live_says_what_it_says_of_a_log(name, with_key):
     """States bit for bit; what is computed of them for the report to rounding, since a scan fuses it otherwise."""
-    one, case, count = estimator(name), case_of(name), 120
+    one, case, count = estimator(name), case_of(name), SHORT
     options = {"filter": filters.ParticleFilter(64), "key": jax.random.key(3)} if with_key else {}
     log = spoilt(case.log, required(name))
     found = one.estimate(case.car, log.rows(slice(0, count)), **options)

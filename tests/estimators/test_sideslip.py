@@ -1,10 +1,12 @@
 """Sideslip from logs: cleaning, a car with known parameters, the real log."""
 
+import functools
+
 import numpy as np
 import pytest
 from shared_data import shared
 
-from jaxveh import InputError, Recording, estimators, io
+from jaxveh import InputError, Recording, estimators, io, vehicles
 
 CAR = io.CarSpecification(
     mass=1420.0, yaw_inertia=2124.0, front_axle_to_cg=0.96, rear_axle_to_cg=1.59,
@@ -12,15 +14,22 @@ CAR = io.CarSpecification(
 )  # fmt: skip
 
 
-def log(rows=3000, seed=0):
+ROWS = 3000
+
+
+def log(rows=ROWS):
+    """The first rows of a drive on a winding road."""
+    return drive().rows(slice(0, rows))
+
+
+@functools.cache
+def drive():
     """A car on a winding road that follows the linear single track at modest lateral acceleration, 100 Hz."""
-    rng = np.random.default_rng(seed)
+    rows, rng = ROWS, np.random.default_rng(0)
     time = np.arange(rows) * 0.01
     steer = 0.02 * np.sin(2 * np.pi * 0.4 * time) + 0.01 * np.sin(2 * np.pi * 0.17 * time + 1.0)
     v_x = np.full(rows, 20.0)
     recording = Recording(time, {"steer": steer, "v_x": v_x})
-    from jaxveh import vehicles
-
     truth = estimators.open_loop(vehicles.from_specification(CAR), recording)
     yaw_rate, v_y = truth["yaw_rate"], truth["v_y"]
     a_y = np.gradient(v_y, time) + v_x * yaw_rate
@@ -66,11 +75,11 @@ def test_a_short_span_and_an_unknown_reference_are_refused():
     with pytest.raises(InputError, match="at least 20 s"):
         estimators.sideslip.calibrate(CAR, log(1000))
     with pytest.raises(InputError, match="uses"):
-        estimators.sideslip.calibrate(CAR, log(3000), uses=("course",))
+        estimators.sideslip.calibrate(CAR, log(), uses=("course",))
 
 
 def test_estimates_the_sideslip_of_a_car_as_told_and_scores_it():
-    recording = log(3000)
+    recording = log()
     found = estimators.sideslip.estimate(CAR, recording.without("v_y"))
     numbers = estimators.sideslip.score(CAR, found, recording)
     assert numbers["rows"] == 3000
@@ -83,7 +92,7 @@ def test_estimates_the_sideslip_of_a_car_as_told_and_scores_it():
 
 
 def test_the_reference_cannot_reach_a_blind_estimate():
-    recording = log(1500)
+    recording = log()
     found = estimators.sideslip.estimate(CAR, recording)
     blind = estimators.sideslip.estimate(CAR, recording.without("v_y"))
     np.testing.assert_array_equal(np.asarray(found.mean.sideslip), np.asarray(blind.mean.sideslip))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jaxveh import estimators, filters, manoeuvres, sensors, simulate, vehicles
+from jaxveh.statespace import Heun
 from jaxveh.vehicles.linearisation import linear_single_track
 
 SEEDS = 40
@@ -64,7 +65,7 @@ def test_scores_agree_with_the_kalman_filters_and_held_ancestors_do_not(name, gr
     car, noise, coefficients, reference, particles = CARS[name]
     manoeuvre = manoeuvres.double_lane_change(speed=25.0, steer=0.05)
     recording = simulate(vehicles.passenger_car(), manoeuvre, sensors.esc(), key=jax.random.key(0), dt=0.05)
-    model = estimators.state_space(car, sensors.esc(), process_noise=noise | NOISE, minimum_speed=0.0, steps=2)
+    model = estimators.state_space(car, sensors.esc(), process_noise=noise | NOISE, minimum_speed=0.0, solver=Heun())
     # Noisier sensors than the drive's: the particles' likelihood then scatters by less than one.
     levels = model.measurement_noise.std
     model = eqx.tree_at(lambda m: m.measurement_noise.std, model, jax.tree.map(lambda level: 4.0 * level, levels))

@@ -32,8 +32,9 @@ def drive():
 @pytest.fixture(scope="module")
 def model():
     return estimators.state_space(
-        vehicles.passenger_car(), sensors.esc(), estimate=tyres, report=("sideslip", "F_yf"), steps=2
-    )
+        vehicles.passenger_car(), sensors.esc(), estimate=tyres, report=("sideslip", "F_yf"), steps=2,
+        minimum_speed=3.0, solver=statespace.Heun(),
+    )  # fmt: skip
 
 
 def test_a_parameter_has_one_name_on_every_road(model, drive):
@@ -82,10 +83,9 @@ def test_noise_levels_stand_once(model):
     assert float(model.measurement_noise.std.a_y) == 0.1
 
 
-def test_holds_the_state_below_the_minimum_speed():
-    model = estimators.state_space(vehicles.passenger_car(), sensors.esc(), minimum_speed=3.0)
-    n = 6
-    speed = np.array([5.0, 5.0, 1.0, 1.0, 0.0, 5.0])
+def test_holds_the_state_below_the_minimum_speed(model, drive):
+    n = len(drive)
+    speed = np.array([5.0, 5.0, 1.0, 1.0, 0.0, *[5.0] * (n - 5)])
     recording = Recording(
         np.arange(n) * 0.01,
         {"v_x": speed, "steer": np.full(n, 0.1), "yaw_rate": np.full(n, np.nan), "a_y": np.full(n, np.nan)},

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from filter_systems import kalman, linear_model, linear_recording
-from nonlinear_systems import growth, volatility
+from nonlinear_systems import growth, growth_like_volatility, volatility
 
 from jaxveh import FilterError, InputError, Recording, diagnostics, filters
 from jaxveh import statespace as ss
@@ -73,15 +73,19 @@ def test_wrong_noises_are_found_out_by_every_test(name, verdict):
     assert not diagnostics.whiteness(found, lags=6, confidence=SURE).white
 
 
+@functools.cache
+def bound():
+    return ss.posterior_cramer_rao(linear(), schedule(), jax.random.key(0), runs=2)
+
+
 def test_the_right_filter_is_at_the_bound_and_no_other():
-    bound = ss.posterior_cramer_rao(linear(), schedule(), jax.random.key(0), runs=2)
-    found = filters.rmse_beside_bound(runs("right"), bound)
+    found = filters.rmse_beside_bound(runs("right"), bound())
     squares = runs("right").error ** 2
     np.testing.assert_allclose(found.rmse.x0, np.sqrt(squares[:, :, 0].mean(axis=0)))
-    np.testing.assert_array_equal(found.bound.x0, bound.std.x0)
+    np.testing.assert_array_equal(found.bound.x0, bound().std.x0)
     # For Gaussian errors: a share 1 / sqrt(2 R) of the root mean square error.
     np.testing.assert_allclose(np.mean(found.standard_error.x1 / found.rmse.x1), (2 * RUNS) ** -0.5, rtol=0.1)
-    for right, wrong in zip(found.table(), filters.rmse_beside_bound(runs("Q x 0.1"), bound).table(), strict=True):
+    for right, wrong in zip(found.table(), filters.rmse_beside_bound(runs("Q x 0.1"), bound()).table(), strict=True):
         name, rmse, line, share = right
         assert name == wrong[0]
         assert share == line / rmse
@@ -90,7 +94,7 @@ def test_the_right_filter_is_at_the_bound_and_no_other():
 
 
 def test_a_bound_of_something_else_is_refused():
-    other = ss.posterior_cramer_rao(linear(), schedule().rows(slice(0, 5)), jax.random.key(0), runs=2)
+    other = bound()._replace(time=schedule().time[:5])
     with pytest.raises(InputError, match="has 5 rows at other times than the runs' 40"):
         filters.rmse_beside_bound(runs("right"), other)
     with pytest.raises(InputError, match="bound: is of y, the runs of x0, x1"):
@@ -110,7 +114,7 @@ def test_batches_make_the_same_runs_and_report():
 SHORT = Recording(np.arange(12.0), {})
 CHECKED = {
     "particles": (filters.ParticleFilter(200), volatility, True),
-    "particles, two peaks": (filters.ParticleFilter(200), growth, True),
+    "particles, two peaks": (filters.ParticleFilter(200), growth_like_volatility, True),
     "auxiliary": (filters.AuxiliaryParticleFilter(200), volatility, True),
     "guided, two peaks": (filters.Guided(200), growth, True),
     "Gaussian where beliefs have two peaks": (filters.Unscented(), growth, False),

@@ -1,5 +1,6 @@
 """Particle filters against exact answers: Kalman on linear models, a dense grid on a nonlinear one, scipy's densities."""
 
+import functools
 from collections import namedtuple
 
 import equinox as eqx
@@ -88,7 +89,7 @@ def _growth(system, t0, t1, x, u):
     return State(x.x / 2 + 25 * x.x / (1 + x.x**2) + 8 * jnp.cos(1.2 * t1))
 
 
-def _grid_filter(measured, std, points=3001):
+def _grid_filter(measured, std, points=1001):
     """Log-likelihood and means of the growth model by Bayes' rule on a dense grid."""
     grid = np.linspace(-60, 60, points)
     width = grid[1] - grid[0]
@@ -140,11 +141,22 @@ def test_growth_model_equals_a_dense_grid(kind, std):
 )
 def test_heavy_tails_weigh_by_scipy_s_densities(law, density):
     model = eqx.tree_at(lambda m: m.measurement_noise, nile_model(1000.0, 300.0), law)
-    belief, info = filters.ParticleFilter(500).init(model, model.row(0.0, {}, {"flow": 3000.0}), jax.random.key(1))
+    init = eqx.filter_jit(filters.ParticleFilter(500).init)
+    belief, info = init(model, model.row(0.0, {}, {"flow": 3000.0}), jax.random.key(1))
     likelihoods = density(3000.0 - np.asarray(belief.particles.level))
     np.testing.assert_allclose(info.log_likelihood, np.log(likelihoods.mean()), rtol=1e-12)
     np.testing.assert_allclose(belief.weights, likelihoods / likelihoods.sum(), rtol=1e-10)
     np.testing.assert_allclose(info.ess, likelihoods.sum() ** 2 / (likelihoods**2).sum(), rtol=1e-9)
+
+
+@functools.cache
+def restless():
+    """A model, a drive drawn from it, and the exact answer."""
+    model = linear_model(2, 2, seed=7)
+    model = eqx.tree_at(lambda m: m.measurement_noise, model, ss.Gaussian({"y0": 0.6, "y1": 0.5}))
+    recording = ss.draw(model, linear_recording(model, rows=12), jax.random.key(0)).recording
+    R = ss.MultivariateGaussian(("y0", "y1"), np.diag([0.36, 0.25]))
+    return model, recording, kalman(eqx.tree_at(lambda m: m.measurement_noise, model, R), recording)
 
 
 @pytest.mark.parametrize(
@@ -161,11 +173,7 @@ def test_heavy_tails_weigh_by_scipy_s_densities(law, density):
 )
 def test_innovations_and_their_spread_are_the_kalman_filter_s(filter_):
     """Process noise is most of what a step adds, so that a spread without it would be far off."""
-    model = linear_model(2, 2, seed=7)
-    model = eqx.tree_at(lambda m: m.measurement_noise, model, ss.Gaussian({"y0": 0.6, "y1": 0.5}))
-    recording = ss.draw(model, linear_recording(model, rows=12), jax.random.key(0)).recording
-    R = ss.MultivariateGaussian(("y0", "y1"), np.diag([0.36, 0.25]))
-    exact = kalman(eqx.tree_at(lambda m: m.measurement_noise, model, R), recording)
+    model, recording, exact = restless()
     info = filters.run(filter_, model, recording, key=jax.random.key(1)).info
     std = np.stack(info.innovation_std, axis=-1)
     np.testing.assert_allclose(std, exact["innovation_std"], rtol=0.05)
@@ -176,22 +184,27 @@ def test_belief_s_summaries():
     rng = np.random.default_rng(0)
     particles, weights = rng.normal(3.0, 2.0, size=(2, 400)), rng.uniform(size=400)
     weights /= weights.sum()
-    pair = namedtuple("Pair", "a b")(*jnp.asarray(particles))
-    belief = filters.ParticleBelief(
-        pair, jnp.asarray(weights), jnp.arange(400), jax.random.key(0), jnp.asarray(0.0), (), jnp.int32(0)
-    )
-    np.testing.assert_allclose(belief.mean, particles @ weights, rtol=1e-12)
+    pair = namedtuple("Pair", "a b")(*particles)
+
+    @jax.jit
+    def summaries(pair, weights):
+        belief = filters.ParticleBelief(
+            pair, weights, np.arange(400), jax.random.key(0), jnp.asarray(0.0), (), jnp.int32(0)
+        )
+        moments = belief.mean, belief.covariance, belief.std
+        return moments, (belief.quantile(0.05), belief.quantile(0.95)), belief.moments(nile_model())
+
+    (mean, covariance, std), (low, high), (shown, spread) = summaries(pair, weights)
+    np.testing.assert_allclose(mean, particles @ weights, rtol=1e-12)
     expected = np.cov(particles, aweights=weights, ddof=0)
-    np.testing.assert_allclose(belief.covariance, expected, rtol=1e-12)
-    np.testing.assert_allclose(belief.std, np.sqrt(np.diag(expected)), rtol=1e-12)
-    low, high = belief.quantile(0.05), belief.quantile(0.95)
+    np.testing.assert_allclose(covariance, expected, rtol=1e-12)
+    np.testing.assert_allclose(std, np.sqrt(np.diag(expected)), rtol=1e-12)
     for field, row in zip("ab", particles, strict=True):
         at_most = weights[row <= getattr(low, field)].sum()
         assert 0.05 <= at_most < 0.05 + weights.max() + 1e-12
         assert weights[row <= getattr(high, field)].sum() >= 0.95
-    shown, spread = belief.moments(nile_model())
-    np.testing.assert_allclose(shown, belief.mean, rtol=1e-12)
-    np.testing.assert_allclose(spread, belief.std, rtol=1e-10)
+    np.testing.assert_allclose(shown, mean, rtol=1e-12)
+    np.testing.assert_allclose(spread, std, rtol=1e-10)
 
 
 def test_a_report_is_averaged_over_the_particles():
@@ -205,13 +218,17 @@ def test_a_report_is_averaged_over_the_particles():
         prior=base.prior,
         report=lambda s, t, x, u: shown(x.level**2, t),
     )
-    belief, _ = filters.ParticleFilter(200).init(model, model.row(7.0, {}, {}), jax.random.key(1))
-    mean, std = belief.moments(model)
+
+    @eqx.filter_jit
+    def after_a_row(filter_):
+        belief, _ = filter_.init(model, model.row(7.0, {}, {}), jax.random.key(1))
+        return belief, *belief.moments(model)
+
+    belief, mean, std = after_a_row(filters.ParticleFilter(200))
     levels = np.asarray(belief.particles.level)
     np.testing.assert_allclose(mean, (np.mean(levels**2), 7.0), rtol=1e-12)
     np.testing.assert_allclose(std, (np.std(levels**2), 0.0), rtol=1e-9)
-    gaussian, _ = filters.Unscented().init(model, model.row(7.0, {}, {}))
-    mean, std = gaussian.moments(model)
+    _, mean, std = after_a_row(filters.Unscented())
     # The unscented transform is exact to second order: E[x^2] = 10^2 + 3^2; its beta is 2.
     np.testing.assert_allclose(mean, (109.0, 7.0), rtol=1e-12)
     np.testing.assert_allclose(std, (np.sqrt(2 * 9.0**2 + (60.0**2)), 0.0), rtol=1e-9)

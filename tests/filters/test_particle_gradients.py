@@ -6,7 +6,7 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
-from test_every_filter import batch
+from drawn_systems import drawn, linear
 
 from jaxveh import filters
 
@@ -15,13 +15,12 @@ SEEDS = 40
 
 def gradients(filter_, seeds=SEEDS):
     """(seeds, k): with respect to the dynamics, the observation and the noise levels of both kinds."""
-    model, rows = batch("linear")
-    one = jax.tree.map(lambda leaf: leaf[0], rows)
+    model, rows = linear(), linear().rows(drawn(15))
     leaves, rest = eqx.partition(model, eqx.is_inexact_array)
-    of = lambda leaves, key: filters.scan(filter_, eqx.combine(leaves, rest), one, key).log_likelihood
+    of = lambda leaves, key: filters.scan(filter_, eqx.combine(leaves, rest), rows, key).log_likelihood
     found = jax.jit(jax.vmap(jax.grad(of), in_axes=(None, 0)))(leaves, jax.random.split(jax.random.key(1), seeds))
     # Of a symmetric matrix a filter may read one triangle.
-    matrix = found.process_noise.law.matrix
+    matrix = np.asarray(found.process_noise.law.matrix)
     chosen = (
         found.system["A"],
         found.system["H"],
@@ -37,7 +36,7 @@ def exact_gradient():
 
 
 def marginalised(particles):
-    return filters.Marginalised(particles, ("x2",))
+    return filters.Marginalised(particles, ("x1",))
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from drawn_systems import drawn
+from drawn_systems import linear as of_two_states
 from filter_systems import linear_model, linear_recording, spd
 from test_every_filter import FILTERS, KEYS, batch, batch_of_values, linear
 
@@ -48,14 +50,23 @@ def stochastic_volatility(beta, phi, sigma):
     )
 
 
-@functools.cache
 def returns(rows):
+    return every_return().rows(slice(0, rows))
+
+
+@functools.cache
+def every_return():
     """Drawn from the model, as the 750 returns themselves are not ours; with a holiday."""
-    schedule = Recording(np.arange(float(rows)), {})
+    schedule = Recording(np.arange(750.0), {})
     recording = ss.draw(stochastic_volatility(**POUND_DOLLAR), schedule, jax.random.key(3)).recording
     values = np.array(recording["returns"])
     values[10] = np.nan
     return Recording(recording.time, {"returns": values})
+
+
+@functools.cache
+def grid_answer():
+    return grid_filter(np.array(returns(750)["returns"]), **POUND_DOLLAR)
 
 
 def grid_filter(y, beta, phi, sigma, nodes=500):
@@ -81,18 +92,22 @@ def grid_filter(y, beta, phi, sigma, nodes=500):
 )
 def test_the_pound_dollar_model_has_the_grid_s_likelihood_and_means(filter_):
     recording, model = returns(750), stochastic_volatility(**POUND_DOLLAR)
-    exact, means = grid_filter(np.array(recording["returns"]), **POUND_DOLLAR)
+    exact, means = grid_answer()
     rows = model.rows(recording)
     found = jax.vmap(lambda key: filters.scan(filter_, model, rows, key))(jax.random.split(jax.random.key(0), 6))
-    assert not np.asarray(found.result).any()
-    scatter = np.std(found.log_likelihood, ddof=1)
+    found = jax.tree.map(
+        np.asarray, (found.result, found.log_likelihood, found.mean.h, found.info.innovation_std.returns)
+    )
+    result, logs, h, stds = found
+    assert not result.any()
+    scatter = np.std(logs, ddof=1)
     assert 0.01 < scatter < 1.0
     # A likelihood that is unbiased has a logarithm that is low by half its variance.
-    assert abs(np.mean(found.log_likelihood) + 0.5 * scatter**2 - exact) < 4 * scatter / 6**0.5
-    assert np.sqrt(np.mean((np.mean(found.mean.h, 0) - means) ** 2)) < 0.02
+    assert abs(np.mean(logs) + 0.5 * scatter**2 - exact) < 4 * scatter / 6**0.5
+    assert np.sqrt(np.mean((np.mean(h, 0) - means) ** 2)) < 0.02
     # What a row was expected to be: as wide as the volatilities.
-    assert np.isnan(found.info.innovation_std.returns[:, 10]).all()
-    z = np.array(recording["returns"]) / np.array(found.info.innovation_std.returns[0])
+    assert np.isnan(stds[:, 10]).all()
+    z = np.array(recording["returns"]) / stds[0]
     np.testing.assert_allclose(np.nanmean(z**2), 1.0, atol=0.15)
 
 
@@ -120,10 +135,13 @@ def worse_when_turning(system, t, x, u):
 
 
 def turning_model():
-    model = linear_model(3, 2, seed=5)
+    model = linear_model(2, 2, seed=5)
     system = {**model.system, "R": jnp.asarray(spd(np.random.default_rng(1), 2, 0.2))}
     noise = ss.StateDependent(worse_when_turning, ("y0", "y1"))
     return with_noise(eqx.tree_at(lambda m: m.system, model, system), noise)
+
+
+TURNS = linear_recording(linear_model(2, 2, seed=5), rows=12)
 
 
 def kalman_at_predicted_means(model, recording):
@@ -163,7 +181,7 @@ GAUSSIAN = {
 
 @pytest.mark.parametrize("name", GAUSSIAN)
 def test_gaussian_filters_take_the_covariance_at_the_prediction_s_mean(name):
-    model, recording = turning_model(), linear_recording(linear_model(3, 2, seed=5), rows=12)
+    model, recording = turning_model(), TURNS
     total, means = kalman_at_predicted_means(model, recording)
     found = filters.run(GAUSSIAN[name], model, recording)
     np.testing.assert_allclose(found.log_likelihood, total, rtol=1e-9)
@@ -171,10 +189,11 @@ def test_gaussian_filters_take_the_covariance_at_the_prediction_s_mean(name):
 
 
 def test_its_numbers_have_gradients_in_gaussian_filters():
-    model, recording = turning_model(), linear_recording(linear_model(3, 2, seed=5), rows=12)
+    model, recording = turning_model(), TURNS
     rows = model.rows(recording)
     at = lambda R: eqx.tree_at(lambda m: m.system["R"], model, R)
-    slope = jax.grad(lambda R: filters.scan(filters.Extended(), at(R), rows).log_likelihood)(model.system["R"])
+    of = lambda R: filters.scan(filters.Extended(), at(R), rows).log_likelihood
+    slope = np.asarray(jax.jit(jax.grad(of))(model.system["R"]))
     step = 1e-6 * np.array([[1.0, 0.5], [0.5, -2.0]])
     values = [kalman_at_predicted_means(at(model.system["R"] + sign * step), recording)[0] for sign in (1, -1)]
     np.testing.assert_allclose(np.sum(slope * step), (values[0] - values[1]) / 2, rtol=1e-6)
@@ -182,7 +201,7 @@ def test_its_numbers_have_gradients_in_gaussian_filters():
 
 def test_the_parallel_smoother_takes_it_where_it_linearises():
     """One pass about the prior's mean: the noise of all rows is that of this mean."""
-    model, recording = turning_model(), linear_recording(linear_model(3, 2, seed=5), rows=12)
+    model, recording = turning_model(), TURNS
     found = filters.smooth_parallel(filters.Iterated(filters.Extended(), 1), model, recording)
     at = model.prior.mean.x0
 
@@ -196,12 +215,16 @@ def test_the_parallel_smoother_takes_it_where_it_linearises():
 
 
 def test_each_particle_counts_with_its_own_law_and_missing_channels_with_none():
-    model, recording = turning_model(), linear_recording(linear_model(3, 2, seed=5), rows=9)
-    rows = model.rows(recording)
-    row = jax.tree.map(lambda leaf: leaf[0], rows)
-    row = row._replace(y=row.y._replace(y0=jnp.asarray(jnp.nan), y1=jnp.asarray(0.7)))
-    belief, info = filters.ParticleFilter(50).init(model, row, jax.random.key(0))
-    x = np.stack(model.prior.sample(jax.random.split(jax.random.key(0))[0], (50,)))
+    model = turning_model()
+    row = model.row(TURNS.time[0], {"force": TURNS["force"][0]}, {"y1": 0.7})
+
+    @jax.jit
+    def after_a_row(key):
+        drawn = model.prior.sample(jax.random.split(key)[0], (50,))
+        return *filters.ParticleFilter(50).init(model, row, key), jnp.stack(drawn)
+
+    belief, info, x = after_a_row(jax.random.key(0))
+    x = np.asarray(x)
     R = (1.0 + 0.5 * x[0] ** 2 + 0.3 * float(row.u.force) ** 2) * float(model.system["R"][1, 1])
     e = 0.7 - np.asarray(model.system["H"])[1] @ x - float(model.system["D"][1] * row.u.force)
     density = np.exp(-0.5 * e**2 / R) / np.sqrt(2 * np.pi * R)
@@ -233,6 +256,14 @@ DEFAULT = ("Ensemble", "strong tracking", "federated", "guided, fully adapted")
 tests above."""
 
 
+def batch_for(name):
+    """What two states say suffices, but for filters that name the third."""
+    if name not in DEFAULT:
+        return batch("linear")
+    model, drives = of_two_states(), [drawn(seed=seed) for seed in (1, 2)]
+    return model, jax.tree.map(lambda *leaves: np.stack(leaves), *map(model.rows, drives))
+
+
 @pytest.mark.full  # By default test_every_filters_parameters traces every filter with such a law.
 @pytest.mark.parametrize("name", [name for name in FILTERS if name not in ONE_LAW])
 def test_every_other_filter_takes_it(name):
@@ -250,7 +281,7 @@ def test_every_other_filter_takes_it(name):
     "name", [pytest.param(n, marks=[] if n in DEFAULT else pytest.mark.full) for n in FILTERS if n not in ONE_LAW]
 )
 def test_every_filter_takes_a_law_that_never_changes_for_the_law_itself(name):
-    model, rows = batch("linear")
+    model, rows = batch_for(name)
     other = with_noise(model, ss.StateDependent(never_changes, ("y0", "y1")))
     (value, estimate), (same, expected) = (batch_of_values(FILTERS[name].make(), m, rows, KEYS) for m in (other, model))
     np.testing.assert_allclose(value, same, rtol=1e-10)
@@ -288,7 +319,7 @@ def chosen_beta():
             "VaryingNoise.measurement: the measurement noise of y0, y1 depends on the state",
         ),
         (
-            lambda m: ss.posterior_cramer_rao(m, linear_recording(linear_model(3, 2)), jax.random.key(0), runs=2),
+            lambda m: ss.posterior_cramer_rao(m, TURNS, jax.random.key(0), runs=2),
             "StateDependent: its Fisher information is not known here",
         ),
         (

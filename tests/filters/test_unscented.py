@@ -36,7 +36,7 @@ def test_covariance_along_the_way_is_the_kalman_filter_s():
     recording = linear_recording(model, rows=12)
     exact, rows, filter_ = kalman(model, recording), model.rows(recording), filters.Unscented()
     init, step = eqx.filter_jit(filter_.init), eqx.filter_jit(filter_.step)
-    row = lambda k: jax.tree.map(lambda leaf: leaf[k], rows)
+    row = lambda k: jax.tree.map(lambda leaf: np.asarray(leaf)[k], rows)
     belief, _ = init(model, row(0))
     for k in range(1, 12):
         belief, _ = step(model, belief, row(k))
@@ -86,7 +86,7 @@ def test_an_angle_wraps_in_the_innovation_and_among_the_points():
 
 def _differences(function, model, step=1e-6):
     """Central differences in every entry of every array leaf; matrices of covariance are moved symmetrically."""
-    leaves, treedef = jax.tree.flatten(model)
+    leaves, treedef = jax.tree.flatten(jax.tree.map(np.asarray, model))
     paths = [jax.tree_util.keystr(path) for path, _ in jax.tree_util.tree_flatten_with_path(model)[0]]
     for i, leaf in enumerate(leaves):
         for index in np.ndindex(leaf.shape):

@@ -1,5 +1,6 @@
 """A mass on a spring, a pendulum, a regression, and what they really do."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -93,9 +94,9 @@ def drive(model, x, time, inputs, during=lambda k: {}, noise=0.0, seed=0):
     """
     rng, u_type, states, seen = np.random.default_rng(seed), record_type("U", model.inputs), [], []
     x = type(model.prior.mean)(*[np.float64(value) for value in x])
-    std = model.measurement_noise.std
+    std, known = model.measurement_noise.std, jax.tree.map(np.asarray, model.system)
     for k, t in enumerate(time):
-        system = {**model.system, **during(k)} if during(k) else model.system
+        system = {**known, **during(k)} if during(k) else known
         u = u_type(*[inputs[name][k] for name in model.inputs])
         y = model.observation_function(system, t, x, u)
         states.append([float(value) for value in x])

@@ -1,5 +1,7 @@
 """The adaptive observer: errors apart, Lyapunov's function, what excitation decides, and what holds it without."""
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -55,23 +57,21 @@ def test_the_state_s_own_error_has_the_placed_poles_while_the_parameters_move():
     # What the parameters' error does not explain, x - Y theta, obeys (I - gain H) F alone, whatever the adaptation does.
     states, recording = drive(model(), (0.4, -0.3), TIME, RICH)
     made, system = observer(), joint(pull=1.5, gain=0.7)
-    rows = system.rows(recording)
-    belief, _ = made.init(system, ss.Row(*[_at(part, 0) for part in rows]))
+    rows = jax.tree.map(np.asarray, system.rows(recording))
+    row = lambda k: jax.tree.map(lambda leaf: leaf[k], rows)
+    init, advance = eqx.filter_jit(made.init), eqx.filter_jit(made.step)
+    belief, _ = init(system, row(0))
     F, H = observers.linearised_step(mass(channels=("place",)), DT)
     step = (np.eye(2) - np.asarray(made.gain) @ H) @ F
     expected = None
     for k in range(60):
         if k:
-            belief, _ = made.step(system, belief, ss.Row(*[_at(part, k) for part in rows]))
+            belief, _ = advance(system, belief, row(k))
         found = np.asarray(belief.vector)
         own = states[k] - found[:2] - np.asarray(belief.memory) @ (np.array([0.5, 2.0]) - found[2:])
         expected = own if expected is None else step @ expected
         np.testing.assert_allclose(own, expected, atol=1e-12)
     assert np.abs(found[2:] - [1.5, 0.7]).max() > 0.05
-
-
-def _at(part, k):
-    return type(part)(*[leaf[k] for leaf in part]) if hasattr(part, "_fields") else part[k]
 
 
 @pytest.mark.parametrize("rate", [1e-4, 3e-3, 1e6])

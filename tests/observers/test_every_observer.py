@@ -120,6 +120,7 @@ LIVE = [case(name, OBSERVERS[name].models[0]) for name in ("Luenberger", "adapti
 FIRST = [case(name, model, model != line.models[0]) for name, line in OBSERVERS.items() for model in line.models]
 
 
+@functools.cache
 def recording(model_name, seed):
     model, start = STARTS[model_name]()
     rng = np.random.default_rng(seed)
@@ -137,9 +138,9 @@ def batch(name, model_name, dtype=np.float64):
     line = OBSERVERS[name]
     model = line.prepare(STARTS[model_name]()[0])
     truths, drives = zip(*[recording(model_name, seed) for seed in (1, 2)], strict=True)
-    rows = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[model.rows(drive) for drive in drives])
-    rows = rows._replace(t=rows.t - rows.t[:, :1])
-    return line.make(model), ss.cast(model, dtype), ss.cast(rows, dtype), np.stack(truths)
+    rows = jax.tree.map(lambda *leaves: np.stack(leaves), *[model.rows(drive) for drive in drives])
+    rows = jax.tree.map(lambda leaf: leaf.astype(dtype), rows._replace(t=rows.t - rows.t[:, :1]))
+    return line.make(model), ss.cast(model, dtype), rows, np.stack(truths)
 
 
 @eqx.filter_jit
@@ -157,7 +158,7 @@ def whole(observer, model, rows):
 @functools.cache
 def found(name, model_name):
     observer, model, rows, _ = batch(name, model_name)
-    return whole(observer, model, rows)
+    return jax.tree.map(np.asarray, whole(observer, model, rows))
 
 
 @pytest.mark.parametrize(("name", "model_name"), CASES)
@@ -206,14 +207,15 @@ def test_its_gradient_is_that_of_differences(name, model_name):
     leaves, rest = eqx.partition((observer, model), eqx.is_inexact_array)
     rng = np.random.default_rng(5)
     flat, tree = jax.tree.flatten(leaves)
-    steps = [jnp.asarray(rng.uniform(0.2, 1.0, leaf.shape)) * 0.1 * jnp.abs(leaf) for leaf in flat]
+    flat = [np.asarray(leaf) for leaf in flat]
+    steps = [rng.uniform(0.2, 1.0, leaf.shape) * 0.1 * np.abs(leaf) for leaf in flat]
     h, values = 1e-5, []
     for sign in (1, -1):
-        moved = jax.tree.unflatten(tree, [leaf + sign * h * s for leaf, s in zip(flat, steps, strict=True)])
+        moved = [jnp.asarray(leaf + sign * h * s) for leaf, s in zip(flat, steps, strict=True)]
+        moved = jax.tree.unflatten(tree, moved)
         values.append(whole(*eqx.combine(moved, rest), rows)[0][0])
     slope = sum(
-        np.sum(np.asarray(g) * np.asarray(s), axis=tuple(range(1, g.ndim)))
-        for g, s in zip(jax.tree.leaves(gradient), steps, strict=True)
+        np.sum(g * s, axis=tuple(range(1, g.ndim))) for g, s in zip(jax.tree.leaves(gradient), steps, strict=True)
     )
     np.testing.assert_allclose(slope, (values[0] - values[1]) / (2 * h), rtol=1e-5, atol=1e-7)
 
@@ -223,8 +225,8 @@ def test_a_live_loop_gives_the_scan_s_answer(name, model_name):
     (_, estimate), _ = found(name, model_name)
     observer, model, rows, _ = batch(name, model_name)
     row = lambda k: jax.tree.map(lambda leaf: leaf[0, k], rows)
-    belief, _ = observer.init(model, row(0))
-    step = eqx.filter_jit(observer.step)
+    init, step = eqx.filter_jit(observer.init), eqx.filter_jit(observer.step)
+    belief, _ = init(model, row(0))
     for k in range(1, 40):
         belief, _ = step(model, belief, row(k))
     np.testing.assert_allclose(belief.moments(model)[0], [leaf[0, 39] for leaf in estimate.mean], rtol=1e-11)

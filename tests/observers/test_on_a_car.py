@@ -1,5 +1,6 @@
 """Observers of a car's sideslip, from yaw rate and lateral acceleration: a wrong start, a bank, a road that turns slippery."""
 
+import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -23,7 +24,7 @@ def car(friction=0.9):
 
 
 def model(**settings):
-    return estimators.state_space(car(), sensors.esc(), report=(), solver=ss.Heun(), **settings)
+    return estimators.state_space(car(), sensors.esc(), report=(), solver=diffrax.Euler(), **settings)
 
 
 def frictions(car):

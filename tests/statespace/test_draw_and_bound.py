@@ -108,8 +108,7 @@ def test_on_nonlinear_models_it_is_the_last_block_of_the_whole_trajectory_s_info
     key = jax.random.key(4)
     bound = ss.posterior_cramer_rao(model, recording, key, runs)
     rows = schedule_rows(model, recording)
-    states = jax.vmap(lambda k: draw_rows(model, rows, k)[0].x)(jax.random.split(key, runs))
-    x = np.asarray(states)
+    x = np.asarray(jax.jit(jax.vmap(lambda k: draw_rows(model, rows, k)[0].x))(jax.random.split(key, runs)))
     F, H = 1 + 0.5 * np.cos(x), 1 + 0.2 * x
     # Fisher information of a t law's location, by quadrature.
     z = np.linspace(-300, 300, 2_000_001)

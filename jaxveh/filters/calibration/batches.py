@@ -37,7 +37,7 @@ def in_batches(one_batch: Callable, key, runs: int, batch: int | None, progress:
     for first in range(0, runs, batch):
         progress(first, runs, stage)
         which = np.minimum(np.arange(first, first + batch), runs - 1)
-        part = one_batch(keys[jnp.asarray(which)])
+        part = one_batch(keys if batch == runs else keys[jnp.asarray(which)])
         found.append(jax.tree.map(lambda leaf, n=min(batch, runs - first): np.asarray(leaf)[:n], part))
     progress(runs, runs, stage)
     return jax.tree.map(lambda *parts: np.concatenate(parts), *found)

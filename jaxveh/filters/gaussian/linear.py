@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -13,6 +15,13 @@ from jaxveh.filters.gaussian.belief import rows_of
 from jaxveh.statespace import StateDependent, StateSpace
 
 
+def concrete_values():
+    """Inside jit, too, a model may be made of plain numbers, and be computed with. Outside, it would only have constants compiled
+    one by one."""
+    inside = not is_concrete(jnp.zeros(()))
+    return jax.ensure_compile_time_eval() if inside else contextlib.nullcontext()
+
+
 def check_linear(who: str, model: StateSpace) -> None:
     """Raise `InputError` naming the first value that is no linear function of the state.
 
@@ -22,7 +31,7 @@ def check_linear(who: str, model: StateSpace) -> None:
     """
     if not all(is_concrete(leaf) for leaf in jax.tree.leaves((model.system, model.prior))):
         return
-    with jax.ensure_compile_time_eval():  # inside jit, too, a model may be made of plain numbers
+    with concrete_values():
         found = jax.tree.map(np.asarray, _nonlinear_parts(model))
         varies = isinstance(model.measurement_noise, StateDependent) and bool(_noise_varies(model))
     for nonlinear in found:
