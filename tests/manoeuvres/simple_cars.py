@@ -1,10 +1,13 @@
 """Cars of the tests' own: a linear single track at the wanted speed, and a mass on a slope that torques drive."""
 
+import dataclasses
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
+from jaxveh import manoeuvres
 from jaxveh.manoeuvres import Motion
 
 
@@ -56,8 +59,13 @@ def runge_kutta(rates, x0, times):
     return jax.lax.scan(step, x0, times)[1]
 
 
-@jax.jit
 def drive(car, driver, times, start=(0.0, 0.0, 0.0)):
+    """`driven` as NumPy arrays. How long the driver would drive is no matter, so that drivers of a kind share a program."""
+    return jax.tree.map(np.asarray, driven(car, dataclasses.replace(driver, duration=1.0), times, start))
+
+
+@jax.jit
+def driven(car, driver, times, start):
     """A linear car at the wanted speed under a driver, from (x, y, yaw): its motion and his state, (T,) each."""
 
     def motion_of(t, body):
@@ -76,8 +84,25 @@ def drive(car, driver, times, start=(0.0, 0.0, 0.0)):
     return jax.vmap(motion_of)(times, bodies), own
 
 
+def clearance(x, y, yaw, width, length, course, centre=0.0):
+    """The clearance of a body that is driven through a course, and whether it passes."""
+    return [np.asarray(found) for found in _clearance(x, y, yaw, width, length, course.lanes, centre)]
+
+
 @jax.jit
+def _clearance(x, y, yaw, width, length, lanes, centre):
+    # The lanes are operands: one program for all courses of as many.
+    at = (x, y, yaw, width, length, manoeuvres.Course("of these lanes", lanes), centre)
+    return manoeuvres.clearance(*at), manoeuvres.passes(*at)
+
+
 def push(driver, times, mass, radius, grade, v_0):
+    """`pushed` as NumPy arrays."""
+    return jax.tree.map(np.asarray, pushed(driver, times, mass, radius, grade, v_0))
+
+
+@jax.jit
+def pushed(driver, times, mass, radius, grade, v_0):
     """A mass that torques push along a slope, without drag of its own: speeds, inputs and states, (T,) each."""
     motion_of = lambda v: Motion(0.0 * v, 0.0 * v, 0.0 * v, v, 0.0 * v, 0.0 * v)
 

@@ -51,11 +51,12 @@ def batch():
 @pytest.mark.parametrize("dtype", [pytest.param(jnp.float32, marks=pytest.mark.full), jnp.float64])
 def test_values_and_gradients_are_finite_in_their_precision(driver, batch, dtype):
     driver, batch, t = cast(driver, dtype), cast(batch, dtype), jnp.asarray(5.0, dtype)
-    state = driver.start(t, batch)
+    state = eqx.filter_jit(driver.start)(t, batch)
     assert state._fields == driver.state_names
-    assert type(driver.derivatives(t, batch, state)) is type(state)
+    assert type(jax.eval_shape(driver.derivatives, t, batch, state)) is type(state)
     assert {leaf.dtype for leaf in state} <= {jnp.dtype(dtype)}
 
+    @eqx.filter_jit
     @eqx.filter_value_and_grad(has_aux=True)
     def total(args):
         driver, t, batch, state = args
@@ -69,27 +70,40 @@ def test_values_and_gradients_are_finite_in_their_precision(driver, batch, dtype
 
 def test_a_batch_is_its_members(driver, batch):
     t = jnp.asarray(5.0)
-    state = driver.start(t, batch)
     whole = lambda t, m, x: everything(driver, t, m, x)
-    mapped = jax.jit(jax.vmap(whole, in_axes=(None, 0, 0)))(t, batch, state)
+
+    @jax.jit
+    def together(t, batch):
+        state = driver.start(t, batch)
+        return state, jax.vmap(whole, in_axes=(None, 0, 0))(t, batch, state)
+
+    @jax.jit
+    def alone(t, motion):
+        state = driver.start(t, motion)
+        return state, whole(t, motion, state)
+
+    state, mapped = together(t, batch)
     for number, motion in enumerate(MOTIONS):
-        own = driver.start(t, arrays(motion))
-        np.testing.assert_allclose([leaf[number] for leaf in state], list(own), rtol=1e-11, atol=1e-12)
-        np.testing.assert_allclose(mapped[number], whole(t, arrays(motion), own), rtol=1e-11, atol=1e-12)
+        own, said = alone(t, arrays(motion))
+        np.testing.assert_allclose([np.asarray(leaf)[number] for leaf in state], list(own), rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(np.asarray(mapped)[number], said, rtol=1e-11, atol=1e-12)
 
 
 def test_gradients_are_those_of_differences(driver):
     t, motion = jnp.asarray(5.0), arrays(MOTIONS[0])
-    state = driver.start(t, motion)
+    state = eqx.filter_jit(driver.start)(t, motion)
     if driver.state_names:
         state = type(state)(*[leaf + 0.01 for leaf in state])
-    found = lambda args: everything(driver, *args)
+    # Values and slopes by one program.
+    found = jax.jit(lambda args, along: jax.jvp(lambda args: everything(driver, *args), (args,), (along,)))
     leaves, treedef = jax.tree.flatten((t, motion, state))
     for number in range(len(leaves)):
-        along = jax.tree.unflatten(treedef, [jnp.asarray(float(i == number)) for i in range(len(leaves))])
-        column = jax.jvp(found, ((t, motion, state),), (along,))[1]
-        up, down = (jax.tree.map(lambda v, d, h=h: v + d * h, (t, motion, state), along) for h in (1e-6, -1e-6))
-        difference = (found(up) - found(down)) / 2e-6
+        along = jax.tree.unflatten(treedef, [np.asarray(float(i == number)) for i in range(len(leaves))])
+        _, column = found((t, motion, state), along)
+        up, down = (
+            jax.tree.map(lambda v, d, h=h: np.asarray(v) + d * h, (t, motion, state), along) for h in (1e-6, -1e-6)
+        )
+        difference = (np.asarray(found(up, along)[0]) - np.asarray(found(down, along)[0])) / 2e-6
         np.testing.assert_allclose(column, difference, rtol=1e-5, atol=1e-5)
 
 

@@ -73,7 +73,7 @@ def stacked(manoeuvre, t):
 
 
 def times(manoeuvre, count):
-    return jnp.linspace(0.0, manoeuvre.duration, count)
+    return np.linspace(0.0, manoeuvre.duration, count)
 
 
 def test_it_starts_straight_at_its_speed_and_keeps_its_amplitude(line, manoeuvre):
@@ -140,10 +140,11 @@ def test_parameters_have_the_gradients_of_differences(manoeuvre):
     t = 0.0123 + 0.97 * times(manoeuvre, 37)
 
     @jax.jit
+    @jax.value_and_grad
     def total(leaves):
         inputs = stacked(eqx.combine(jax.tree.unflatten(treedef, leaves), rest), t)
-        return jnp.sum(jnp.sin(jnp.arange(37.0)) * inputs)
+        return jnp.sum(np.sin(np.arange(37.0)) * inputs)
 
-    for number, gradient in enumerate(jax.jit(jax.grad(total))(leaves)):
+    for number, gradient in enumerate(total(leaves)[1]):
         up, down = ([v + (i == number) * step for i, v in enumerate(leaves)] for step in (1e-6, -1e-6))
-        np.testing.assert_allclose(jnp.sum(gradient), (total(up) - total(down)) / 2e-6, rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(np.sum(gradient), (total(up)[0] - total(down)[0]) / 2e-6, rtol=1e-5, atol=1e-5)

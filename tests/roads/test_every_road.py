@@ -68,11 +68,17 @@ def stacked(road, s, y):
     return jnp.stack(road.at(s, y))
 
 
+@eqx.filter_jit
+def seen(road, s, y):
+    """`stacked`, compiled as one: operation by operation each takes a program of its own."""
+    return stacked(road, s, y)
+
+
 S, Y = np.linspace(-20.3, 149.7, 86), np.linspace(-2.0, 2.0, 86)
 
 
 def test_values_are_those_of_a_road(road):
-    surface = road.at(S, Y)
+    surface = roads.Surface(*np.asarray(seen(road, S, Y)))
     assert all(np.shape(leaf) == (86,) and np.isfinite(leaf).all() for leaf in surface)
     assert (surface.friction > 0).all()
     assert (np.abs(surface.grade) < np.pi / 2).all() and (np.abs(surface.bank) < np.pi / 2).all()
@@ -82,59 +88,65 @@ def test_values_are_those_of_a_road(road):
 def test_what_varies_is_as_stated(name):
     line = ROADS[name]
     road = line.make()
-    along, across = np.ptp(stacked(road, S, 0.0), axis=1), np.ptp(stacked(road, 0.0, Y), axis=1)
+    along, across = np.ptp(seen(road, S, 0 * S), axis=1), np.ptp(seen(road, 0 * Y, Y), axis=1)
     assert np.any(along > 1e-3) == line.along and np.any(across > 1e-3) == line.across
 
 
 def test_scalars_arrays_jit_and_vmap_agree(road):
     whole = stacked(road, S, Y)
-    np.testing.assert_allclose(jax.jit(stacked)(road, S, Y), whole, rtol=1e-11, atol=1e-13)
-    np.testing.assert_allclose(jax.vmap(road.at)(jnp.asarray(S), jnp.asarray(Y)), whole, rtol=1e-11, atol=1e-13)
-    np.testing.assert_allclose(
-        stacked(road, 30.0, 0.5), stacked(road, np.array([30.0]), np.array([0.5]))[:, 0], rtol=1e-12
-    )
-    assert stacked(road, S[:, None], Y[:3]).shape == (3, 86, 3)
+    np.testing.assert_allclose(seen(road, S, Y), whole, rtol=1e-11, atol=1e-13)
+    mapped = jax.jit(lambda road, s, y: jax.vmap(road.at)(s, y))(road, S, Y)
+    np.testing.assert_allclose(mapped, whole, rtol=1e-11, atol=1e-13)
+    # As many as above, so that no operation is compiled anew.
+    same = np.asarray(stacked(road, np.full(86, 30.0), np.full(86, 0.5)))
+    np.testing.assert_allclose(np.broadcast_to(stacked(road, 30.0, 0.5), (86, 3)).T, same, rtol=1e-12)
+    assert jax.eval_shape(stacked, road, S[:, None], Y[:3]).shape == (3, 86, 3)
 
 
 def test_roads_in_a_batch(road):
     arrays, rest = eqx.partition(road, eqx.is_array)
-    batch = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), arrays)
-    both = jax.vmap(lambda arrays: stacked(eqx.combine(arrays, rest), S, Y))(batch)
-    np.testing.assert_allclose(both[1], stacked(road, S, Y), rtol=1e-11, atol=1e-13)
+    batch = jax.tree.map(lambda leaf: np.stack([leaf, leaf]), arrays)
+    both = jax.jit(jax.vmap(lambda arrays: stacked(eqx.combine(arrays, rest), S, Y)))(batch)
+    np.testing.assert_allclose(np.asarray(both)[1], seen(road, S, Y), rtol=1e-11, atol=1e-13)
 
 
 def test_derivatives_are_finite_and_continuous_as_stated(line, road):
-    for direction in (0, 1):
+    along, across = (lambda s: stacked(road, s, 0.05)), (lambda y: stacked(road, 35.0, y))
 
-        def value(r, direction=direction):
-            return stacked(road, *((r, 0.05) if direction == 0 else (35.0, r)))
+    def derivatives(value, r):
+        """Values and as many derivatives as are continuous."""
+        found = []
+        for _ in range(line.smooth + 1):
+            found.append(jax.vmap(value)(r))
+            value = jax.jacfwd(value)
+        return found
 
-        for order in range(line.smooth + 1):
-            if order:
-                value = jax.jacfwd(value)
-            ends = (-20.0, 150.0) if direction == 0 else (-2.0, 2.0)
-            jumps = [
-                np.max(np.abs(np.diff(jax.jit(jax.vmap(value))(jnp.linspace(*ends, n)), axis=0))) for n in (2001, 8001)
-            ]
-            assert np.isfinite(jumps).all()
-            assert jumps[1] <= 0.35 * jumps[0] + 1e-12
+    # All of them by one program, and the coarse steps are every fourth of the fine ones.
+    everything = jax.jit(lambda s, y: derivatives(along, s) + derivatives(across, y))
+    for values in everything(np.linspace(-20.0, 150.0, 8001), np.linspace(-2.0, 2.0, 8001)):
+        jumps = [np.max(np.abs(np.diff(np.asarray(values)[::stride], axis=0))) for stride in (4, 1)]
+        assert np.isfinite(jumps).all()
+        assert jumps[1] <= 0.35 * jumps[0] + 1e-12
 
 
 def test_parameters_have_the_gradients_of_differences(road):
     leaves, rest = eqx.partition(road, eqx.is_inexact_array)
     leaves, treedef = jax.tree.flatten(leaves)
-    weights = jnp.array([1.0, 10.0, 7.0])
+    weights = np.array([1.0, 10.0, 7.0])
 
+    # Values and gradients by one program.
+    @jax.jit
+    @jax.value_and_grad
     def total(leaves):
         return jnp.sum(weights @ stacked(eqx.combine(jax.tree.unflatten(treedef, leaves), rest), S, Y))
 
-    for number, gradient in enumerate(jax.grad(total)(leaves)):
+    for number, gradient in enumerate(total(leaves)[1]):
         up, down = ([v + (i == number) * step for i, v in enumerate(leaves)] for step in (1e-6, -1e-6))
-        np.testing.assert_allclose(jnp.sum(gradient), (total(up) - total(down)) / 2e-6, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(np.sum(gradient), (total(up)[0] - total(down)[0]) / 2e-6, rtol=1e-5, atol=1e-6)
 
 
 def test_precision_stays(road):
     single = statespace.cast(road, jnp.float32)
-    surface = single.at(jnp.asarray(S, jnp.float32), jnp.asarray(Y, jnp.float32))
+    surface = eqx.filter_jit(lambda road, s, y: road.at(s, y))(single, np.float32(S), np.float32(Y))
     assert {leaf.dtype for leaf in surface} == {jnp.dtype(jnp.float32)}
-    np.testing.assert_allclose(jnp.stack(surface), stacked(road, S, Y), atol=3e-5)
+    np.testing.assert_allclose(np.stack(surface), seen(road, S, Y), atol=3e-5)

@@ -56,13 +56,16 @@ def test_level_ground_is_the_default():
 
 def test_jit_vmap_gradient_and_precision():
     road = roads.Combined(roads.SplitMu(1.0, 0.3, 1.0), roads.Hill(3.0))
-    x, y, yaw = jnp.linspace(0.0, 90.0, 7), jnp.linspace(-1.0, 1.0, 7), jnp.linspace(0.0, 6.0, 7)
+    x, y, yaw = np.linspace(0.0, 90.0, 7), np.linspace(-1.0, 1.0, 7), np.linspace(0.0, 6.0, 7)
     ground = lambda x, y, yaw: jnp.stack(roads.under(road, x, y, yaw, WHEELS))
-    np.testing.assert_allclose(
-        jax.jit(jax.vmap(ground, out_axes=1))(x, y, yaw), ground(x, y, yaw), rtol=1e-12, atol=1e-14
-    )
-    slope = jax.jacfwd(ground, argnums=2)(30.0, 0.1, 0.3)
-    np.testing.assert_allclose(slope, (ground(30.0, 0.1, 0.3 + 1e-6) - ground(30.0, 0.1, 0.3 - 1e-6)) / 2e-6, atol=1e-8)
-    single = [value.astype(jnp.float32) for value in (x, y, yaw)]
-    small = jax.tree.map(lambda leaf: leaf.astype(jnp.float32), road)
-    assert {leaf.dtype for leaf in roads.under(small, *single, WHEELS)} == {jnp.dtype(jnp.float32)}
+    together, mapped = jax.jit(lambda *at: (ground(*at), jax.vmap(ground, out_axes=1)(*at)))(x, y, yaw)
+    np.testing.assert_allclose(mapped, together, rtol=1e-12, atol=1e-14)
+    each = [ground(*at) for at in zip(x.tolist(), y.tolist(), yaw.tolist(), strict=True)]
+    np.testing.assert_allclose(np.stack(each, axis=1), together, rtol=1e-12, atol=1e-14)
+    slope = jax.jit(jax.jacfwd(ground, argnums=2))(30.0, 0.1, 0.3)
+    up, down = (np.asarray(ground(30.0, 0.1, 0.3 + step)) for step in (1e-6, -1e-6))
+    np.testing.assert_allclose(slope, (up - down) / 2e-6, atol=1e-8)
+    single = [value.astype(np.float32) for value in (x, y, yaw)]
+    small = jax.tree.map(lambda leaf: np.float32(leaf), road)
+    found = jax.jit(lambda road, *at: roads.under(road, *at, WHEELS))(small, *single)
+    assert {leaf.dtype for leaf in found} == {jnp.dtype(jnp.float32)}

@@ -11,8 +11,8 @@ from jaxveh.sensors import GNSS, Position, Signal
 STATE = {"v_x": 19.0, "v_y": -2.0, "yaw": 2.8, "yaw_rate": 0.7, "x": 100.0, "y": -50.0}
 
 
-def heard(device, n=1, key=None, **state):
-    outputs = {name: jnp.full(n, value) for name, value in (STATE | state).items()}
+def heard(device, n=21, key=None, **state):
+    outputs = {name: jnp.asarray(np.full(n, value)) for name, value in (STATE | state).items()}
     said = device.read(np.arange(n) / device.rate, outputs, key)
     return {name: np.asarray(value) for name, value in said.items()}
 
@@ -38,6 +38,7 @@ def test_the_antenna_moves_with_the_rolling_body():
     arm = np.array([-1.0, 0.4, 1.2])
     motion = {"roll_rate": 0.3, "pitch_rate": -0.2, "roll": 0.1, "pitch": 0.05}
 
+    @jax.jit
     def path(t):
         yaw, pitch, roll = 2.8 + 0.7 * t, 0.05 - 0.2 * t, 0.1 + 0.3 * t
         z = lambda a: jnp.array([[jnp.cos(a), -jnp.sin(a), 0], [jnp.sin(a), jnp.cos(a), 0], [0, 0, 1]])
@@ -46,7 +47,7 @@ def test_the_antenna_moves_with_the_rolling_body():
         start = jnp.array([100.0, -50.0, 0.0]) + t * (z(2.8) @ jnp.array([19.0, -2.0, 0.0]))
         return start + z(yaw) @ y(pitch) @ x(roll) @ arm
 
-    place, velocity = path(0.0), jax.jacfwd(path)(0.0)
+    place, velocity = jax.jvp(path, (0.0,), (1.0,))
     said = heard(GNSS(position=Signal(), antenna=Position(*arm), rate=5.0), **motion)
     np.testing.assert_allclose([said["x"][0], said["y"][0]], place[:2], rtol=1e-12)
     np.testing.assert_allclose(said["speed"][0], np.hypot(*velocity[:2]), rtol=1e-12)
@@ -72,12 +73,12 @@ def test_the_position_has_errors_of_its_own_in_each_direction():
 
 def test_a_slow_car_has_no_course():
     slow = heard(GNSS(lowest=1.0, rate=5.0), v_x=0.5, v_y=0.0)
-    assert np.isnan(slow["course"]).all() and slow["speed"] == 0.5
+    assert np.isnan(slow["course"]).all() and (slow["speed"] == 0.5).all()
     assert np.isfinite(heard(GNSS(lowest=1.0, rate=5.0), v_x=1.5)["course"]).all()
 
 
 def test_nothing_is_said_in_outages():
-    said = heard(GNSS(outages=((1.0, 2.0), (3.0, 3.4)), position=Signal(), rate=5.0), 21)
+    said = heard(GNSS(outages=((1.0, 2.0), (3.0, 3.4)), position=Signal(), rate=5.0))
     silent = [5, 6, 7, 8, 9, 15, 16]
     for value in said.values():
         np.testing.assert_array_equal(np.flatnonzero(np.isnan(value)), silent)
@@ -89,7 +90,7 @@ def test_random_outages_come_with_the_key_and_take_all_channels():
     np.testing.assert_allclose(np.isnan(said["speed"]).mean(), 0.2 / (0.2 + 0.5), rtol=0.15)
     for value in said.values():
         np.testing.assert_array_equal(np.isnan(value), np.isnan(said["speed"]))
-    assert not np.isnan(heard(device, 100)["speed"]).any()
+    assert not np.isnan(heard(device, 20000)["speed"]).any()
 
 
 @pytest.mark.parametrize(

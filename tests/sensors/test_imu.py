@@ -14,7 +14,7 @@ PLANAR = {"a_x": 1.0, "a_y": 2.0, "yaw_rate": 0.5, "yaw_acceleration": 3.0}
 
 
 def rows(values):
-    return {name: jnp.full(3, value) for name, value in values.items()}
+    return {name: jnp.asarray(np.full(3, value)) for name, value in values.items()}
 
 
 def read(imu, values):
@@ -101,7 +101,7 @@ def test_a_flat_car_presses_on_a_slope_with_the_gravity_normal_to_it():
 def test_gyroscopes_leave_out_that_the_road_turns():
     """Roads are quasi-static: a bank that rises along the way is no roll rate."""
     imu = IMU(("roll_rate", "pitch_rate"), rate=100.0)
-    said = imu.read(np.arange(3) / 100.0, rows(PLANAR) | {"bank": jnp.linspace(0.0, 0.05, 3)})
+    said = imu.read(np.arange(3) / 100.0, rows(PLANAR) | {"bank": jnp.asarray(np.linspace(0.0, 0.05, 3))})
     assert all((np.asarray(value) == 0).all() for value in said.values())
 
 
@@ -118,8 +118,8 @@ def test_each_channel_has_errors_of_its_own():
 
 def test_the_low_pass_is_that_of_recordings():
     times = np.arange(200) / 100.0
-    wave = {name: jnp.sin(5 * jnp.asarray(times) + place) for place, name in enumerate(PLANAR)}
-    said = IMU(low_pass=LowPass(8.0), rate=100.0).read(times, wave)
+    wave = {name: np.sin(5 * times + place) for place, name in enumerate(PLANAR)}
+    said = jax.jit(lambda wave: IMU(low_pass=LowPass(8.0), rate=100.0).read(times, wave))(wave)
     expected = low_pass(Recording(times, wave), ("a_x", "a_y", "yaw_rate"), 8.0)
     for name, value in said.items():
         np.testing.assert_allclose(value, expected[name], rtol=1e-9, atol=1e-12)

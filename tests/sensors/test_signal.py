@@ -12,7 +12,7 @@ from jaxveh.sensors.spans import as_spans, check_spans, inside
 from jaxveh.statespace import cast
 
 PERIOD = 0.01
-RAMP = jnp.linspace(-2.0, 2.0, 401)
+RAMP = jnp.asarray(np.linspace(-2.0, 2.0, 401))
 
 
 def test_without_errors_it_says_the_truth():
@@ -24,7 +24,7 @@ def test_gain_and_offset_are_exact():
 
 
 def test_noise_has_its_spread_and_is_white():
-    noise = np.asarray(Signal(noise=0.2).apply(jnp.zeros(20000), PERIOD, jax.random.key(1)))
+    noise = np.asarray(Signal(noise=0.2).apply(jnp.asarray(np.zeros(20000)), PERIOD, jax.random.key(1)))
     # Three standard errors of each statistic.
     assert abs(noise.mean()) < 3 * 0.2 / np.sqrt(20000)
     np.testing.assert_allclose(noise.std(), 0.2, rtol=3 / np.sqrt(2 * 20000))
@@ -33,12 +33,17 @@ def test_noise_has_its_spread_and_is_white():
 
 def test_without_a_key_nothing_is_random():
     signal = Signal(noise=0.2, drift=1.0, bias=0.1)
-    np.testing.assert_array_equal(signal.apply(jnp.zeros(10), PERIOD), 0.1)
+    np.testing.assert_array_equal(signal.apply(0 * RAMP, PERIOD), 0.1)
 
 
 def spread(process):
     """Variances over 4000 runs at each instant."""
-    return np.var(jax.vmap(process)(jax.random.split(jax.random.key(2), 4000)), axis=0)
+    return np.var(runs(process), axis=0)
+
+
+def runs(process):
+    """4000 of them, drawn by one program."""
+    return np.asarray(jax.jit(lambda key: jax.vmap(process)(jax.random.split(key, 4000)))(jax.random.key(2)))
 
 
 def test_the_walks_variance_grows_with_time():
@@ -51,36 +56,37 @@ def test_the_walks_variance_grows_with_time():
 def test_the_gauss_markov_process_has_its_variance_and_memory():
     time = 0.5
     draw = lambda key: gauss_markov(key, 401, jnp.asarray(0.3), jnp.asarray(time), PERIOD, jnp.float64)
-    runs = np.asarray(jax.vmap(draw)(jax.random.split(jax.random.key(2), 4000)))
+    drawn = runs(draw)
     t = PERIOD * np.arange(401)
     expected = 0.09 * time / 2 * -np.expm1(-2 * t / time)
-    assert (runs[:, 0] == 0).all()
-    np.testing.assert_allclose(runs.var(axis=0)[1:], expected[1:], rtol=4 * np.sqrt(2 / 4000))
-    correlation = np.corrcoef(runs[:, 350], runs[:, 400])[0, 1]
+    assert (drawn[:, 0] == 0).all()
+    np.testing.assert_allclose(drawn.var(axis=0)[1:], expected[1:], rtol=4 * np.sqrt(2 / 4000))
+    correlation = np.corrcoef(drawn[:, 350], drawn[:, 400])[0, 1]
     np.testing.assert_allclose(correlation, np.exp(-0.5 / time), atol=4 / np.sqrt(4000))
 
 
 def test_a_signal_drifts_as_its_processes_do():
-    zeros, key = jnp.zeros(401), jax.random.key(5)
+    zeros, key = 0 * RAMP, jax.random.key(5)
     walked = spread(lambda key: Signal(drift=0.3).apply(zeros, PERIOD, key))
     np.testing.assert_allclose(walked[-1], 0.09 * 4.0, rtol=4 * np.sqrt(2 / 4000))
     forgot = spread(lambda key: Signal(drift=0.3, drift_time=0.5).apply(zeros, PERIOD, key))
     np.testing.assert_allclose(forgot[-1], 0.09 * 0.25, rtol=4 * np.sqrt(2 / 4000))
-    both = Signal(drift=0.3, noise=0.1).apply(zeros, PERIOD, key)
-    alone = Signal(noise=0.1).apply(zeros, PERIOD, key) + Signal(drift=0.3).apply(zeros, PERIOD, key)
+    several = Signal(drift=0.3, noise=0.1), Signal(noise=0.1), Signal(drift=0.3)
+    both, noise, drift = jax.jit(lambda key: [signal.apply(zeros, PERIOD, key) for signal in several])(key)
+    alone = np.asarray(noise) + np.asarray(drift)
     np.testing.assert_allclose(both, alone, rtol=1e-12)
 
 
 def test_saturation_cuts_both_sides_after_the_offset():
     said = Signal(bias=0.5, saturation=1.0).apply(RAMP, PERIOD)
-    np.testing.assert_allclose(said, np.clip(RAMP + 0.5, -1, 1), rtol=1e-12)
+    np.testing.assert_allclose(said, np.clip(np.asarray(RAMP) + 0.5, -1, 1), rtol=1e-12)
     assert said.min() == -1 and said.max() == 1
 
 
 def test_quantisation_rounds_to_steps_last():
     said = np.asarray(Signal(bias=0.03, quantisation=0.25).apply(RAMP, PERIOD))
     np.testing.assert_allclose(said / 0.25, np.round(said / 0.25), atol=1e-12)
-    assert np.max(np.abs(said - (RAMP + 0.03))) <= 0.125 + 1e-12
+    assert np.max(np.abs(said - (np.asarray(RAMP) + 0.03))) <= 0.125 + 1e-12
     assert len(np.unique(said)) == 17
 
 

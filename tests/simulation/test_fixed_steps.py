@@ -1,5 +1,6 @@
 """Equal steps of a diffrax solver: against a closed form, against diffeqsolve, in batches, in gradients."""
 
+import functools
 import sys
 from typing import NamedTuple
 
@@ -44,21 +45,21 @@ def test_time_reaches_the_rates():
 
 
 def test_it_is_diffeqsolve():
-    expected = diffrax.diffeqsolve(
-        diffrax.ODETerm(rates), statespace.RK4(), 0.0, 1.0, None, START, 4.0,
+    expected = jax.jit(lambda start: diffrax.diffeqsolve(
+        diffrax.ODETerm(rates), statespace.RK4(), 0.0, 1.0, None, start, 4.0,
         saveat=diffrax.SaveAt(t0=True, steps=True), max_steps=10,
-        stepsize_controller=diffrax.StepTo(ts=jnp.linspace(0.0, 1.0, 11)),
-    ).ys  # fmt: skip
+        stepsize_controller=diffrax.StepTo(ts=jnp.asarray(np.linspace(0.0, 1.0, 11))),
+    ).ys)(START)  # fmt: skip
     x = simulation.fixed_steps(rates, START, 4.0, rows=10, step=0.1)
-    np.testing.assert_allclose(x.place, expected.place[:11], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(x.place, np.asarray(expected.place)[:11], rtol=1e-12, atol=1e-14)
 
 
 def test_a_batch_is_its_runs():
-    stiffness = jnp.array([1.0, 4.0, 9.0])
-    wide = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (3,)), START)
+    stiffness = jnp.asarray(np.array([1.0, 4.0, 9.0]))
+    wide = jax.tree.map(lambda leaf: jnp.asarray(np.full(3, leaf)), START)
     whole = simulation.fixed_steps(rates, wide, stiffness, rows=3, step=0.01, steps_a_row=4)
     mapped = jax.vmap(lambda k: simulation.fixed_steps(rates, START, k, rows=3, step=0.01, steps_a_row=4), out_axes=1)
-    np.testing.assert_allclose(whole.place, mapped(stiffness).place, rtol=1e-14)
+    np.testing.assert_allclose(whole.place, jax.jit(mapped)(stiffness).place, rtol=1e-14)
 
 
 @pytest.mark.parametrize("barriers", [True, False])
@@ -73,20 +74,28 @@ def test_blocks_are_the_whole_batch(runs, barriers, monkeypatch):
         shapes.append(x.place.shape)
         return rates(t, x, stiffness * scale)
 
-    stiffness, scale = jnp.linspace(1.0, 9.0, runs), jnp.asarray(1.1)
-    start = Spring(jnp.linspace(-1.0, 1.0, runs), jnp.zeros(runs))
-    run = lambda stiffness, block: simulation.fixed_steps(
-        seen, start, (stiffness, scale), rows=3, step=0.01, steps_a_row=4, block=block
-    )
-    whole = run(stiffness, None)
+    stiffness, scale = np.linspace(1.0, 9.0, runs), jnp.asarray(1.1)
+    start = Spring(jnp.asarray(np.linspace(-1.0, 1.0, runs)), jnp.asarray(np.zeros(runs)))
+
+    # The states, and the slopes of a number of them, by one program.
+    @functools.partial(jax.jit, static_argnums=1)
+    def run(stiffness, block):
+        def size(stiffness):
+            given = dict(rows=3, step=0.01, steps_a_row=4, block=block)
+            x = simulation.fixed_steps(seen, start, (stiffness, scale), **given)
+            return jnp.sum(x.speed[-1] ** 2), x
+
+        (_, x), slope = jax.value_and_grad(size, has_aux=True)(stiffness)
+        return x, slope
+
+    whole, slope = run(stiffness, None)
     shapes.clear()
-    cut = run(stiffness, 3)
+    cut, slope_cut = run(stiffness, 3)
     assert set(shapes) == {(3,) if barriers else (runs,)}
     assert cut.place.shape == (4, runs)
     for a, b in zip(cut, whole, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-14, atol=1e-15)
-    slope = lambda block: jax.grad(lambda k: jnp.sum(run(k, block).speed[-1] ** 2))(stiffness)
-    np.testing.assert_allclose(slope(3), slope(None), rtol=1e-12)
+    np.testing.assert_allclose(slope_cut, slope, rtol=1e-12)
 
 
 def test_blocks_as_long_as_the_batch_and_of_one_run_change_nothing():
@@ -107,8 +116,9 @@ def test_gradients_are_those_of_the_closed_form(solver):
         -1
     ]
     expected = -np.sin(2.0) / 4  # d cos(sqrt(k) t) / dk at t = 1, k = 4
-    np.testing.assert_allclose(jax.grad(place)(4.0), expected, rtol=1e-7)
-    np.testing.assert_allclose(jax.jacfwd(place)(4.0), expected, rtol=1e-7)
+    reverse, forward = jax.jit(lambda k: (jax.grad(place)(k), jax.jacfwd(place)(k)))(4.0)
+    np.testing.assert_allclose(reverse, expected, rtol=1e-7)
+    np.testing.assert_allclose(forward, expected, rtol=1e-7)
 
 
 def test_single_precision_stays_single():

@@ -32,10 +32,12 @@ class Frictionless(AbstractTyre):
 
 
 class AllMoments(AbstractTyre):
-    """Every force and moment, linear and quick to compile; camber and load count."""
+    """Every force and moment, linear and quick to compile; camber and load count. `share`: of them all; 0 is ice."""
+
+    share: Any = eqx.field(converter=jnp.asarray, default=1.0)
 
     def forces(self, contact, state=None):
-        load, slip, camber = contact.load, contact.slip_angle, contact.camber
+        load, slip, camber = self.share * contact.load, contact.slip_angle, contact.camber
         return Forces(
             F_x=18.0 * load * contact.slip_ratio,
             F_y=load * (14.0 * slip + 0.9 * camber),

@@ -36,15 +36,23 @@ def _residuals(car, x, unknown, steer):
 def steady(car, v_x, steer):
     """The state and inputs of a steady turn, by Newton's method with differences for slopes."""
     x = car.start(0.0, inputs(), v_x=v_x)
-    unknown = jnp.stack([*[getattr(x, name) for name in UNKNOWN], jnp.zeros(())])
+    unknown = np.array([*[float(getattr(x, name)) for name in UNKNOWN], 0.0])
     for _ in range(12):
-        moved = unknown[:, None] + jnp.eye(len(unknown), len(unknown) + 1, 1) * 1e-7
-        columns = _residuals(car, x, moved, jnp.asarray(steer))
+        moved = unknown[:, None] + np.eye(len(unknown), len(unknown) + 1, 1) * 1e-7
+        columns = np.asarray(_residuals(car, x, moved, np.asarray(steer)))
         value, slope = columns[:, 0], (columns[:, 1:] - columns[:, :1]) / 1e-7
-        unknown = unknown - jnp.linalg.solve(slope, value)
+        unknown = unknown - np.linalg.solve(slope, value)
     assert np.max(np.abs(value)) < 1e-8
-    x = x._replace(**dict(zip(UNKNOWN, unknown[:-1], strict=True)))
+    x = x._replace(**{name: jnp.asarray(found) for name, found in zip(UNKNOWN, unknown[:-1], strict=True)})
     return x, inputs(steer, 1e3 * unknown[-1])
+
+
+@eqx.filter_jit
+def mechanism_of(car, x, steer):
+    """Places and masses of its wheels, its rotation, its inertia, and at this steer the wheels' axes and slants."""
+    mechanism, turned = Mechanism(car), Mechanism(car, steer)
+    q, _ = mechanism.coordinates(x._replace(yaw=jnp.zeros(())))
+    return mechanism.centres(q), mechanism.masses, body_to_world(q), mechanism.inertia, turned.axes, turned.slants(q)
 
 
 def test_load_transfer_of_a_steady_turn_balances_the_moments():
@@ -53,26 +61,23 @@ def test_load_transfer_of_a_steady_turn_balances_the_moments():
     car = make(POINT, roll_yaw_product=0.0, rolling_resistance=0.0, drive=AxleDrive(front_drive=0.0))
     x, u = steady(car, 22.0, 0.03)
     shown = evaluate(car, x, u)[1]
-    mechanism = Mechanism(car)
-    q, _ = mechanism.coordinates(x._replace(yaw=jnp.zeros(())))
-    places = np.vstack([[0.0, 0.0, float(x.z)], mechanism.centres(q)])
-    masses = np.array([1370.0, *mechanism.masses])
+    centres, unsprung, R, inertia, axes, slants = (np.asarray(found) for found in mechanism_of(car, x, 0.03))
+    places = np.vstack([[0.0, 0.0, float(x.z)], centres])
+    masses = np.array([1370.0, *unsprung])
     rate = float(x.yaw_rate)
     accelerations = np.array([-rate * float(x.v_y), rate * float(x.v_x)]) - rate**2 * places[:, :2]
     loads = np.array([float(getattr(shown, name)) for name in wheel_names("load")])
-    R = np.asarray(body_to_world(q))
-    turned = R @ np.asarray(mechanism.inertia) @ R.T
+    turned = R @ inertia @ R.T
     spin = np.sum([1.3 * float(w) * R[:, 1] for w in [getattr(x, name) for name in wheel_names("omega")]][2:], axis=0)
     front = np.array([-np.sin(0.03), np.cos(0.03), 0.0])
     spin = spin + 1.3 * float(x.omega_fl + x.omega_fr) * R @ front
     momentum = np.cross([0.0, 0.0, rate], turned @ [0.0, 0.0, rate] + spin)
     # Roll: weights and loads on their levers, and heights times lateral forces of inertia.
-    axes = np.asarray(Mechanism(car, 0.03).axes) @ R.T
+    axes = axes @ R.T
     contacts = places[1:, 1] + places[1:, 2] * axes[:, 2] * axes[:, 1] / (1 - axes[:, 2] ** 2)
     roll = np.sum(contacts * loads) - GRAVITY * np.sum(masses * places[:, 1])
     roll += np.sum(masses * places[:, 2] * accelerations[:, 1]) - momentum[0]
     # The arm of longitudinal forces about an axle that rolls and pitches: rolling radius instead of the slant.
-    slants = np.asarray(Mechanism(car, 0.03).slants(q))
     F_x = np.array([float(getattr(shown, name)) for name in wheel_names("F_x")])
     roll += np.sum((slants - 0.33 + (0.33 - slants) / 3) * F_x * axes[:, 0])
     transfer = abs(loads[1] + loads[3] - loads[0] - loads[2]) * 0.76

@@ -120,7 +120,8 @@ def test_accelerations_are_those_of_lagrange(case):
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10 * np.max(np.abs(expected)))
 
 
-def drive(car, x, u_of, seconds, rtol=1e-11, max_steps=200_000):
+@eqx.filter_jit
+def _drive(car, x, u_of, seconds, rtol):
     """The state after so many seconds, and the work that the car says it took up; (x, work)."""
 
     def rates(t, carried, args):
@@ -132,17 +133,23 @@ def drive(car, x, u_of, seconds, rtol=1e-11, max_steps=200_000):
     times = jnp.linspace(0.0, seconds, 11)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(rates), diffrax.Dopri8(), 0.0, seconds, None, (x, jnp.zeros(())), (car, None),
-        saveat=diffrax.SaveAt(ts=times), max_steps=max_steps,
+        saveat=diffrax.SaveAt(ts=times), max_steps=200_000,
         stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol),
     )  # fmt: skip
     return solution.ys
 
 
-drive = eqx.filter_jit(drive)
+def drive(car, x, u_of, seconds, rtol=1e-11):
+    """Tolerance and time are operands: one program for all of them."""
+    return _drive(car, x, u_of, np.asarray(seconds), np.asarray(rtol))
+
+
+def energies(car, states, u_of, seconds):
+    return _energies(car, states, u_of, np.asarray(seconds))
 
 
 @eqx.filter_jit
-def energies(car, states, u_of, seconds):
+def _energies(car, states, u_of, seconds):
     def one(x, t):
         mechanism = Mechanism(car, u_of(t).steer)
         return mechanism.energy(*mechanism.coordinates(x))
@@ -150,13 +157,23 @@ def energies(car, states, u_of, seconds):
     return jax.vmap(one)(states, jnp.linspace(0.0, seconds, 11))
 
 
+def pedals(steer, drive_torque, brake_torque):
+    """Inputs over time: held steer, a torque that swings, brakes from 0.8 s on."""
+    return jax.tree_util.Partial(_pedals, *map(jnp.asarray, (steer, drive_torque, brake_torque)))
+
+
+def _pedals(steer, drive_torque, brake_torque, t):
+    return Inputs(steer, drive_torque * jnp.sin(4.0 * t), brake_torque * jnp.clip(t - 0.8, 0.0, 1.0))
+
+
 def test_energy_stays_without_friction_and_dampers():
-    car = lossless()
+    # On ice; the tyre's class is that of the next test's, so that both are one program.
+    car = eqx.tree_at(lambda c: (c.front, c.rear), lossless(), (AllMoments(0.0), AllMoments(0.0)))
     x = car.start(
         0.0, inputs(), v_x=3.0, v_y=-1.0, z=0.60, roll=0.05, pitch=-0.03, yaw_rate=0.7, roll_rate=0.4, pitch_rate=0.3,
         travel_fl=0.02, travel_rate_rr=0.4,
     )  # fmt: skip
-    none = lambda t: inputs()
+    none = pedals(0.0, 0.0, 0.0)
     states, work = drive(car, x, none, 4.0)
     energy = np.asarray(energies(car, states, none, 4.0))
     rest = car.start(0.0, inputs(), v_x=3.0, v_y=-1.0)
@@ -173,7 +190,7 @@ def test_energy_lost_is_what_the_outputs_say(tyre):
     car = make(AllMoments() if tyre == "moments" else None, **ODD)
     seconds = 1.5
     # Held steer: a steer that turns does work on the wheels.
-    u_of = lambda t: Inputs(jnp.asarray(0.06), 2500.0 * jnp.sin(4.0 * t), 3000.0 * jnp.clip(t - 0.8, 0.0, 1.0))
+    u_of = pedals(0.06, 2500.0, 3000.0)
     x = car.start(0.0, u_of(jnp.asarray(0.0)), v_x=22.0, roll=0.03, pitch_rate=0.3, z=0.60)
     states, work = drive(car, x, u_of, seconds, rtol=1e-9)
     energy = np.asarray(energies(car, states, u_of, seconds))

@@ -65,7 +65,7 @@ def test_values_and_gradients_are_finite_at_any_speed(name, dtype):
 
     for leaf in jax.tree.leaves(everything(np.array([0.0, 1e-3, 0.1, 3.0, -3.0, 25.0], dtype))):
         assert leaf.dtype == dtype
-        assert jnp.all(jnp.isfinite(leaf))
+        assert np.all(np.isfinite(leaf))
 
 
 @pytest.mark.parametrize("name", MAKERS)
@@ -81,17 +81,19 @@ def test_a_car_at_rest_stays_at_rest(name):
 def test_gradients_equal_finite_differences(name):
     vehicle = made(name)
     leaves, tree = jax.tree.flatten((vehicle, *point(vehicle)))
-    start = jnp.asarray([float(leaf) for leaf in leaves])
+    start = np.asarray([float(leaf) for leaf in leaves])
 
+    # Values and gradients by one program.
     @jax.jit
+    @jax.value_and_grad
     def mixed(values):
         c, x, u = jax.tree.unflatten(tree, list(values))
         return sum(weight * rate for weight, rate in enumerate(c.derivatives(0.0, x, u), 1))
 
-    gradient = jax.jit(jax.grad(mixed))(start)
+    gradient = np.asarray(mixed(start)[1])
     for i, value in enumerate(start):
         step = 1e-5 * max(abs(float(value)), 0.1)
-        up, down = (float(mixed(start.at[i].add(sign * step))) for sign in (1, -1))
+        up, down = (float(mixed(start + sign * step * np.eye(len(start))[i])[0]) for sign in (1, -1))
         np.testing.assert_allclose(gradient[i], (up - down) / (2 * step), rtol=1e-6, atol=1e-7)
 
 

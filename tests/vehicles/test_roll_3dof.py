@@ -60,6 +60,14 @@ def kinetic_energy(q, speed):
     )
 
 
+@jax.jit
+def lagrange(q, speed):
+    """The mass matrix, and what the kinetic energy puts beside the forces."""
+    by_speed = jax.grad(kinetic_energy, 1)
+    drift = jax.jvp(lambda q: by_speed(q, speed), (q,), (speed,))[1]
+    return jax.jacfwd(by_speed, 1)(q, speed), jax.grad(kinetic_energy)(q, speed) - drift
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_accelerations_are_those_of_lagranges_equations(seed):
     rng = np.random.default_rng(seed)
@@ -68,7 +76,7 @@ def test_accelerations_are_those_of_lagranges_equations(seed):
     X, Y, N = 5e3 * rng.normal(size=3)
     g = np.array([1.5, -2.0, -9.3])
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    q, speed = jnp.array([3.0, -2.0, yaw, roll]), jnp.array([*(turn @ v), yaw_rate, roll_rate])
+    q, speed = np.array([3.0, -2.0, yaw, roll]), np.array([*(turn @ v), yaw_rate, roll_rate])
     s, c = np.sin(roll), np.cos(roll)
     force = np.array(
         [
@@ -77,10 +85,8 @@ def test_accelerations_are_those_of_lagranges_equations(seed):
             -M_S * ARM * (g[1] * c + g[2] * s) - STIFFNESS * roll - DAMPING * roll_rate,
         ]
     )
-    by_speed = jax.grad(kinetic_energy, 1)
-    drift = jax.jvp(lambda q: by_speed(q, speed), (q,), (speed,))[1]
-    mass = jax.jacfwd(by_speed, 1)(q, speed)
-    expected = np.linalg.solve(mass, force + jax.grad(kinetic_energy)(q, speed) - drift)
+    mass, pull = lagrange(q, speed)
+    expected = np.linalg.solve(mass, force + pull)
     a_x, a_y = turn.T @ expected[:2] - g[:2]
     x = record("X", {"roll": jnp.asarray(roll), "roll_rate": roll_rate, "yaw_rate": yaw_rate})
     car = car_of(Roll3DOF)
@@ -117,7 +123,7 @@ def test_speeds_and_accelerations_belong_to_the_centre_of_gravity(kind):
         return begins * t + bends * t**2 / 2 + aside * jnp.stack([-jnp.sin(yaw), jnp.cos(yaw)])
 
     moves = jax.jacfwd(way)
-    velocity, acceleration = turn.T @ moves(0.0), turn.T @ jax.jacfwd(moves)(0.0)
+    velocity, acceleration = (turn.T @ np.asarray(v) for v in jax.jit(lambda t: (moves(t), jax.jacfwd(moves)(t)))(0.0))
     np.testing.assert_allclose((out.v_x, out.v_y), velocity, rtol=1e-10)
     np.testing.assert_allclose((out.a_x, out.a_y), acceleration - np.array(gravity(SLOPES)[:2]), rtol=1e-10)
     np.testing.assert_allclose(out.sideslip, np.arctan2(*velocity[::-1]), rtol=1e-10)
@@ -147,7 +153,7 @@ def test_small_motions_are_those_of_the_textbook():
         found = car.derivatives(0.0, x, inputs(steer=0.0, v_x=v)._replace(steer=z[4]))
         return jnp.stack([found.v_y, found.yaw_rate, found.roll, found.roll_rate])
 
-    found = np.asarray(jax.jacfwd(rates)(jnp.zeros(5)))
+    found = np.asarray(jax.jit(jax.jacfwd(rates))(np.zeros(5)))
     a, b, C_f, C_r, S = 1.15, 1.55, 120e3, 132e3, M_S * ARM
     # Rows: lateral, yaw, roll angle, roll; columns: v_y, r, phi, p, steer.
     right = np.array(

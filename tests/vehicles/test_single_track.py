@@ -66,12 +66,19 @@ def linear_matrix(car, v):
     )
 
 
-def numerical_matrix(car, v):
-    def rates(pair):
-        rate = car.derivatives(0.0, state(pair[0], 0.0, pair[1]), inputs(0.0, v))
+@eqx.filter_jit
+def slopes(car, v):
+    """d(rates of v_y and yaw rate) / d(v_y, yaw rate, steer) of straight running, (2, 3)."""
+
+    def rates(z):
+        rate = car.derivatives(0.0, state(z[0], 0.0, z[1]), inputs(z[2], v))
         return jnp.stack([rate.v_y, rate.yaw_rate])
 
-    return np.asarray(jax.jacfwd(rates)(jnp.zeros(2)))
+    return jax.jacfwd(rates)(jnp.zeros(3))
+
+
+def numerical_matrix(car, v):
+    return np.asarray(slopes(car, np.asarray(v)))[:, :2]
 
 
 @pytest.mark.parametrize("v", [5.0, 25.0, 60.0])
@@ -82,12 +89,7 @@ def test_poles_are_those_of_the_linear_single_track(car, v):
 
 def steady(car, steer, v):
     """(v_y, r) of steady cornering for a small steer, from the linearised right-hand side."""
-
-    def rates(z):
-        rate = car.derivatives(0.0, state(z[0], 0.0, z[1]), inputs(z[2], v))
-        return jnp.stack([rate.v_y, rate.yaw_rate])
-
-    jacobian = np.asarray(jax.jacfwd(rates)(jnp.zeros(3)))
+    jacobian = np.asarray(slopes(car, np.asarray(v)))
     return np.linalg.solve(jacobian[:, :2], -jacobian[:, 2] * steer)
 
 
@@ -200,7 +202,7 @@ def test_rk4_at_100_hz_is_stable_at_standstill(car):
     def push(x, _):
         return RK4().step(term, 0.0, 0.01, x, inputs(0.0, 0.0), None, False)[0], None
 
-    x, _ = jax.lax.scan(push, state(0.3, 0.0, 0.2), length=500)
+    x, _ = jax.jit(lambda x: jax.lax.scan(push, x, length=500))(state(0.3, 0.0, 0.2))
     np.testing.assert_allclose([x.v_y, x.yaw_rate], 0.0, atol=1e-6)
 
 
@@ -211,13 +213,13 @@ def test_reversing_pushes_a_sliding_wheel_back_all_the_same():
 
 
 def test_regularised_speed_joins_twice_differentiable():
-    v = jnp.asarray([0.0, 0.5, 1.9999999, 2.0, 2.0000001, 7.0, -0.5, -7.0])
+    v = np.asarray([0.0, 0.5, 1.9999999, 2.0, 2.0000001, 7.0, -0.5, -7.0])
     speed = lambda x: vehicles.regularised_speed(x, 2.0)
-    values = jax.vmap(speed)(v)
+    all_three = jax.jit(jax.vmap(lambda v: (speed(v), jax.grad(speed)(v), jax.grad(jax.grad(speed))(v))))
+    values, slope, curvature = (np.asarray(found) for found in all_three(v))
     np.testing.assert_allclose(values[:1], 0.75)
     np.testing.assert_allclose(values[3:6], [2.0, 2.0000001, 7.0], rtol=1e-15)
     np.testing.assert_allclose(values[6:], [values[1], 7.0])
-    slope, curvature = jax.vmap(jax.grad(speed))(v), jax.vmap(jax.grad(jax.grad(speed)))(v)
     np.testing.assert_allclose(slope[2:5], 1.0, atol=1e-6)
     np.testing.assert_allclose(curvature[2:5], 0.0, atol=1e-6)
 
@@ -227,26 +229,31 @@ def test_gradients_equal_finite_differences(car):
     leaves, tree = jax.tree.flatten((car, x, u))
     start = np.array([float(leaf) for leaf in leaves])
 
+    # Values and gradients by one program.
+    @jax.jit
+    @jax.value_and_grad
     def rate(values):
         c, x, u = jax.tree.unflatten(tree, list(values))
         rates = c.derivatives(0.0, x, u)
         return rates.v_y + 3 * rates.yaw_rate
 
-    gradient = jax.grad(rate)(jnp.asarray(start))
+    gradient = np.asarray(rate(start)[1])
     for i, value in enumerate(start):
         step = 1e-6 * max(abs(value), 0.1)
-        up, down = (float(rate(jnp.asarray(start).at[i].add(sign * step))) for sign in (1, -1))
+        up, down = (float(rate(start + sign * step * np.eye(len(start))[i])[0]) for sign in (1, -1))
         np.testing.assert_allclose(gradient[i], (up - down) / (2 * step), rtol=1e-5, atol=1e-7)
 
 
 def test_batches_of_states_and_of_cars_equal_single_ones(car):
-    v_y = jnp.linspace(-1.0, 1.0, 5)
+    v_y = np.linspace(-1.0, 1.0, 5)
     batch = jax.jit(lambda x: car.derivatives(0.0, x, inputs(0.05)))(SingleTrackState(v_y, 0 * v_y, 0.2 + v_y))
+    batch = jax.tree.map(np.asarray, batch)
     for i, v in enumerate(v_y):
         single = car.derivatives(0.0, state(v, 0.0, 0.2 + v), inputs(0.05))
         np.testing.assert_allclose([batch.v_y[i], batch.yaw_rate[i]], [single.v_y, single.yaw_rate], rtol=1e-12)
-    masses = jnp.asarray([1300.0, 1500.0])
-    heavy = jax.vmap(lambda m: eqx.tree_at(lambda c: c.mass, car, m).derivatives(0.0, state(0.3), inputs(0.05)))(masses)
+    masses = np.asarray([1300.0, 1500.0])
+    of_mass = lambda m: eqx.tree_at(lambda c: c.mass, car, m).derivatives(0.0, state(0.3), inputs(0.05))
+    heavy = jax.tree.map(np.asarray, jax.jit(jax.vmap(of_mass))(masses))
     assert heavy.v_y.shape == (2,)
     np.testing.assert_allclose(heavy.v_y[0] * 1300, heavy.v_y[1] * 1500, rtol=1e-12)
 
