@@ -265,7 +265,7 @@ def draw(model, rows, seed):
         y = model.observation(row.t, x, row.u)._asdict()
         return {channel: y[channel] + error[channel] for channel in model.channels}
 
-    before, after = (jax.tree.map(lambda leaf: leaf[part], rows) for part in (slice(None, -1), slice(1, None)))
+    before, after = (jax.tree.map(lambda leaf: leaf[:-1], rows), jax.tree.map(lambda leaf: leaf[1:], rows))
     first = model.prior.sample(prior)
     _, rest = jax.lax.scan(move, first, (jnp.arange(1, rows.t.size), before, after))
     start = see(0, jax.tree.map(lambda leaf: leaf[0], rows), first)

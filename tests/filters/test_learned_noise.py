@@ -31,8 +31,8 @@ ROWS = 1200
 
 
 def run(filter_, model, recording, **more):
-    """`filters.run` with rows that say nothing behind the last, up to `ROWS`: recordings of all lengths are one program, and what is
-    learned of measurements stays as it was after the last."""
+    """`filters.run` with rows that say nothing behind the last, up to `ROWS`: recordings of all lengths are one program, and what
+    is learned of measurements stays as it was after the last."""
     count = len(recording.time)
     flow = np.append(recording["flow"], np.full(ROWS - count, np.nan))
     return filters.run(filter_, model, Recording(np.arange(float(ROWS)), {"flow": flow}), **more)
