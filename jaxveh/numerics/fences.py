@@ -164,6 +164,8 @@ def apart(function, number, *operands):
     arrays, rest = eqx.partition((function, operands), eqx.is_array)
     leaves, structure = jax.tree.flatten(arrays)
 
+    # Traced once, and written out wherever it is called: below it is four times.
+    @functools.partial(jax.jit, inline=True)
     def together(*leaves):
         function, operands = eqx.combine(jax.tree.unflatten(structure, leaves), rest)
         return function(*operands)

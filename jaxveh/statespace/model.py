@@ -66,8 +66,11 @@ class Prior(eqx.Module):
 
     def covariance(self) -> jax.Array:
         """(n, n) covariance in the order of the state's fields."""
-        order, matrix = [self.law.names.index(name) for name in self.mean._fields], self.law.covariance()
-        return matrix if order == sorted(order) else matrix[np.ix_(order, order)]
+        covariance, names = self.law.covariance(), self.law.names
+        if names == self.mean._fields:
+            return covariance
+        order = np.array([names.index(name) for name in self.mean._fields])
+        return covariance[order][:, order]
 
 
 class StateSpace(eqx.Module):

@@ -240,22 +240,36 @@ def recordings(name):
     model, made = MODELS[name](), []
     for seed in (1, 2):
         recording = linear_recording(model, rows=25, seed=seed)
-        rows, keys = model.rows(recording), jax.random.split(jax.random.key(seed), 3)
-        x = model.prior.sample(keys[0])
-        values = {channel: np.array(recording[channel]) for channel in model.channels}
-        for k in range(25):
-            row = jax.tree.map(lambda leaf, k=k: leaf[k], rows)
-            if k:
-                noise = model.process_noise.over(row.t - last.t).sample(jax.random.fold_in(keys[1], k))  # noqa: F821
-                x = model.transition(last.t, row.t, x, last.u)  # noqa: F821
-                x = x._replace(**{n: getattr(x, n) + v for n, v in noise.items()})
-            y = model.observation(row.t, x, row.u)._asdict()
-            error = model.measurement_noise.sample(jax.random.fold_in(keys[2], k))
-            for channel, value in values.items():
-                value[k] = np.where(np.isfinite(value[k]), y[channel] + error[channel], np.nan)
-            last = row  # noqa: F841
+        drawn = draw(model, model.rows(recording), np.array(seed))
+        values = {
+            channel: np.where(np.isfinite(recording[channel]), drawn[channel], np.nan) for channel in model.channels
+        }
         made.append(Recording(np.array(recording.time), {**values, "force": np.array(recording["force"])}))
     return made
+
+
+@eqx.filter_jit
+def draw(model, rows, seed):
+    """What is measured of a draw of the model, (T,) by channel, at the times and with the inputs of `rows`."""
+    prior, process, measurement = jax.random.split(jax.random.key(seed), 3)
+
+    def move(x, given):
+        k, last, row = given
+        noise = model.process_noise.over(row.t - last.t).sample(jax.random.fold_in(process, k))
+        x = model.transition(last.t, row.t, x, last.u)
+        x = x._replace(**{name: getattr(x, name) + value for name, value in noise.items()})
+        return x, see(k, row, x)
+
+    def see(k, row, x):
+        error = model.measurement_noise.sample(jax.random.fold_in(measurement, k))
+        y = model.observation(row.t, x, row.u)._asdict()
+        return {channel: y[channel] + error[channel] for channel in model.channels}
+
+    before, after = (jax.tree.map(lambda leaf: leaf[:-1], rows), jax.tree.map(lambda leaf: leaf[1:], rows))
+    first = model.prior.sample(prior)
+    _, rest = jax.lax.scan(move, first, (jnp.arange(1, rows.t.size), before, after))
+    start = see(0, jax.tree.map(lambda leaf: leaf[0], rows), first)
+    return jax.tree.map(lambda one, others: jnp.append(one, others), start, rest)
 
 
 def value(filter_, model, rows, key):
@@ -279,11 +293,11 @@ def batch_with_gradients(filter_, model, rows, keys):
 def batch(name, dtype=None):
     model = MODELS[name]()
     rows = [model.rows(r) for r in recordings(name)]
-    rows = jax.tree.map(lambda *leaves: jnp.stack(leaves), *rows)
+    rows = jax.tree.map(lambda *leaves: np.stack(leaves), *rows)
     if dtype is None:
-        return model, rows
+        return model, jax.tree.map(jnp.asarray, rows)
     rows = rows._replace(t=rows.t - rows.t[:, :1])
-    return ss.cast(model, dtype), ss.cast(rows, dtype)
+    return ss.cast(model, dtype), jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), rows)
 
 
 KEYS = jax.random.split(jax.random.key(7), 2)
@@ -373,7 +387,8 @@ def test_its_gradient_is_that_of_differences(name, model):
     rng = np.random.default_rng(5)
     flat, tree = jax.tree.flatten(leaves)
     # Of matrices the symmetric part.
-    steps = [jnp.asarray(rng.normal(size=leaf.shape)) * (1e-2 + jnp.abs(leaf)) for leaf in flat]
+    flat = [np.asarray(leaf) for leaf in flat]
+    steps = [rng.normal(size=leaf.shape) * (1e-2 + np.abs(leaf)) for leaf in flat]
     steps = [0.5 * (s + s.T) if s.ndim == 2 and s.shape[0] == s.shape[1] else s for s in steps]
     slope = sum(
         np.sum(np.asarray(g) * np.asarray(s), axis=tuple(range(1, g.ndim)))
@@ -382,7 +397,8 @@ def test_its_gradient_is_that_of_differences(name, model):
     h, values = 1e-5, []
     _, rows = batch(model)
     for sign in (1, -1):
-        moved = jax.tree.unflatten(tree, [leaf + sign * h * s for leaf, s in zip(flat, steps, strict=True)])
+        moved = [jnp.asarray(leaf + sign * h * s) for leaf, s in zip(flat, steps, strict=True)]
+        moved = jax.tree.unflatten(tree, moved)
         values.append(batch_with_gradients(FILTERS[name].make(), eqx.combine(moved, rest), rows, KEYS)[0][0])
     np.testing.assert_allclose(slope, (values[0] - values[1]) / (2 * h), rtol=2e-5, atol=1e-5)
 
@@ -413,13 +429,13 @@ def test_a_live_loop_gives_the_scan_s_answer(name):
     filter_, (model, rows) = FILTERS[name].make(), batch("straight")
     (value, estimate), _ = found(name, "straight")
     step = eqx.filter_jit(filter_.step)
-    one = jax.tree.map(lambda leaf: leaf[0], rows)
-    row = lambda k: jax.tree.map(lambda leaf: leaf[k], one)
+    rows = jax.tree.map(np.asarray, rows)
+    row = lambda k: jax.tree.map(lambda leaf: jnp.asarray(leaf[0, k]), rows)
     belief, info = filter_.init(model, row(0))
-    total = info.log_likelihood
+    total = float(info.log_likelihood)
     for k in range(1, 25):
         belief, info = step(model, belief, row(k))
-        total = total + info.log_likelihood
+        total += float(info.log_likelihood)
     np.testing.assert_allclose(total, value[0], rtol=1e-12)
     np.testing.assert_allclose(belief.moments(model)[0], [leaf[0, -1] for leaf in estimate.mean], rtol=1e-10)
 

@@ -59,31 +59,34 @@ def test_what_declares_nothing_is_refused(name):
         filters.FixedLag(filter_, 2)
 
 
+@eqx.filter_jit
+def forwards(filter_, model, rows):
+    """Vectors and covariances of each row's belief, and of what was predicted of each row but the first."""
+    first, rest = jax.tree.map(lambda leaf: leaf[0], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
+    shown = lambda belief: (gaussian_of(belief).vector, gaussian_of(belief).covariance)
+    belief, _ = filter_.init(model, first)
+
+    def onward(belief, row):
+        ahead = filter_.predict_between(model, belief, row.t, row.u)
+        after, _ = filter_.update(model, ahead, row)
+        return after, (shown(after), shown(ahead))
+
+    _, (after, ahead) = jax.lax.scan(onward, belief, rest)
+    return jax.tree.map(lambda one, others: jnp.concatenate([one[None], others]), shown(belief), after), ahead
+
+
 def by_hand(filter_, model, recording):
     """Rauch, Tung & Striebel in NumPy through the filter's own beliefs and its own predictions."""
-    rows = model.rows(recording)
-    row = lambda k: jax.tree.map(lambda leaf: leaf[k], rows)
-
-    @eqx.filter_jit
-    def look(belief, next_row):
-        ahead = gaussian_of(filter_.predict_between(model, belief, next_row.t, next_row.u))
-        return ahead, filter_.step(model, belief, next_row)[0]
-
-    belief, _ = filter_.init(model, row(0))
-    beliefs, aheads = [gaussian_of(belief)], []
-    for k in range(1, ROWS):
-        ahead, belief = look(belief, row(k))
-        beliefs.append(gaussian_of(belief))
-        aheads.append(ahead)
+    found = jax.tree.map(np.asarray, forwards(filter_, model, model.rows(recording)))
+    (vectors, covariances), (ahead_vectors, ahead_covariances) = found
     A, t = np.asarray(model.system["A"]), np.asarray(recording.time)
-    m, P = np.asarray(beliefs[-1].vector), np.asarray(beliefs[-1].covariance)
+    m, P = vectors[-1], covariances[-1]
     means, spreads = [m], [np.sqrt(np.diag(P))]
     for k in range(ROWS - 2, -1, -1):
-        now, ahead = beliefs[k], aheads[k]
-        before, F = np.asarray(now.covariance), np.eye(len(m)) + (t[k + 1] - t[k]) * A
-        G = before @ F.T @ np.linalg.inv(np.asarray(ahead.covariance))
-        m = np.asarray(now.vector) + G @ (m - np.asarray(ahead.vector))
-        P = before + G @ (P - np.asarray(ahead.covariance)) @ G.T
+        before, F = covariances[k], np.eye(len(m)) + (t[k + 1] - t[k]) * A
+        G = before @ F.T @ np.linalg.inv(ahead_covariances[k])
+        m = vectors[k] + G @ (m - ahead_vectors[k])
+        P = before + G @ (P - ahead_covariances[k]) @ G.T
         means.insert(0, m)
         spreads.insert(0, np.sqrt(np.diag(P)))
     return np.array(means), np.array(spreads)
