@@ -395,7 +395,7 @@ def test_bad_input(name):
 
 def test_float32_drives_are_looked_at_in_float64():
     car = eqx.tree_at(lambda c: c.mass, linear_car(), jnp.asarray(1420.0))
-    drive = simulate(car, manoeuvres.step_steer(20.0, 0.02, duration=6.0), max_step=0.01)
+    drive = simulate(car, manoeuvres.step_steer(20.0, 0.02, duration=3.0), max_step=0.01)
     single = Recording(drive.time, {name: np.asarray(drive[name], np.float32) for name in drive.names})
     np.testing.assert_allclose(step_response(single), step_response(drive), rtol=1e-3)
 
