@@ -79,8 +79,13 @@ def show(file: Annotated[Path, TYRE], out: options.Out = None, numbers: options.
 
 def _free_rolling(tyre: tyres.MFTyre, load: jax.Array) -> dict[str, list[float]]:
     """All outputs at these loads, by name."""
-    found = eqx.filter_jit(lambda tyre, at: tyre.outputs(at))(tyre, tyres.Contact(load=load))
+    found = _outputs(tyre, tyres.Contact(load=load))
     return {name: np.broadcast_to(value, load.shape).tolist() for name, value in found._asdict().items()}
+
+
+@eqx.filter_jit
+def _outputs(tyre: tyres.MFTyre, at: tyres.Contact) -> Any:
+    return tyre.outputs(at)
 
 
 def _draw(tyre: tyres.MFTyre, out: Path) -> None:

@@ -7,9 +7,6 @@ from typing import Any
 
 import numpy as np
 
-# SciPy comes with JAX.
-from scipy import linalg
-
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.observers.base import check_gain
 from jaxveh.observers.luenberger import array
@@ -46,6 +43,9 @@ def contraction_rate(
         raise InputError(
             f"contraction_rate: at the first point a step multiplies the error by {fastest:.6g}: must be below 1."
         )
+    # SciPy comes with JAX; whoever imports the package need not wait for this part of it.
+    from scipy import linalg
+
     weight = np.linalg.inv(np.asarray(model.prior.covariance(), float)[np.ix_(kept, kept)])
     factor = np.linalg.cholesky(linalg.solve_discrete_lyapunov(errors[0].T, weight))
     # |e|_P of a step is the largest singular value of L^T M L^-T.

@@ -9,9 +9,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-# SciPy comes with JAX.
-from scipy import signal
-
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import check_names, record
 from jaxveh.observers.base import observe
@@ -50,6 +47,9 @@ def place_poles(
 
 
 def _place_poles(F: np.ndarray, H: np.ndarray, poles: np.ndarray) -> np.ndarray:
+    # SciPy comes with JAX; importing this part of it takes a third as long as importing all of the package.
+    from scipy import signal
+
     # The error after a correction obeys (I - L H) F: the poles of F - L (H F) are placed.
     C = H @ F
     distinct, counts = np.unique(poles, return_counts=True)

@@ -16,6 +16,8 @@ from jaxveh.tyres import AbstractTyre, Contact
 POINTS = 181
 SLIP_ANGLE = np.radians(18.0)
 SLIP_RATIO = 0.3
+ROOM = 4 * POINTS
+"""Points of the longest line, for which each is compiled."""
 COMBINED = (1.0, 2.0, 4.0, 10.0)
 """Degrees of slip angle whose forces of combined slip are drawn."""
 
@@ -55,11 +57,14 @@ def tyre(law: AbstractTyre, loads: Sequence[float], *, figure: Any = None) -> An
 def forces_at(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any) -> Any:
     """Forces at a load (N) as NumPy arrays of the shape to which slip angles (rad) and slip ratios broadcast."""
     shape = np.broadcast_shapes(np.shape(slip_angle), np.shape(slip_ratio))
-    wide = lambda value: jnp.asarray(np.broadcast_to(value, shape), float)
+    # Lines of different lengths are one program.
+    size = (max(ROOM, *shape),) if len(shape) == 1 else shape
+    wide = lambda value: jnp.asarray(np.resize(np.broadcast_to(value, shape), size), float)
     found = _evaluate(
         law, Contact(slip_angle=wide(slip_angle), slip_ratio=wide(slip_ratio), load=jnp.asarray(load, float))
     )
-    return jax.tree.map(lambda value: np.broadcast_to(np.asarray(value), shape), found)
+    shown = tuple(slice(0, count) for count in shape)
+    return jax.tree.map(lambda value: np.broadcast_to(np.asarray(value), size)[shown], found)
 
 
 @eqx.filter_jit

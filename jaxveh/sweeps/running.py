@@ -92,7 +92,7 @@ class Given:
         self.seeds, self.shape = int(seeds), (*points, int(seeds))
         self.runs = int(np.prod(self.shape))
         self.grid, self.data = design.grid(), data
-        self.keys = None if key is None else jax.random.split(key, self.seeds)
+        self.keys = None if key is None else _on_the_host(jax.random.split(key, self.seeds))
         for name, leaf in parts.items():
             if np.shape(leaf)[: len(self.shape)] != self.shape:
                 names = ", ".join([axis.name for axis in design.numbers] + ["seeds"])
@@ -104,9 +104,18 @@ class Given:
         place = np.unravel_index(which, self.shape)
         point = which // self.shape[-1]
         numbers = {name: jnp.asarray(values[point]) for name, values in self.grid.items()}
-        keys = () if self.keys is None else (self.keys[jnp.asarray(place[-1])],)
+        keys = () if self.keys is None else (self.keys(place[-1]),)
         own = () if self.data is None else (jax.tree.map(lambda leaf: jnp.asarray(leaf[place]), self.data),)
         return numbers, *keys, *own
+
+
+def _on_the_host(keys: jax.Array) -> Callable[[np.ndarray], jax.Array]:
+    """What picks some of the keys by number: NumPy does, for which nothing is compiled."""
+    if not jnp.issubdtype(keys.dtype, jax.dtypes.prng_key):
+        raw = np.asarray(keys)
+        return lambda which: jnp.asarray(raw[which])
+    words, impl = np.asarray(jax.random.key_data(keys)), jax.random.key_impl(keys)
+    return lambda which: jax.random.wrap_key_data(jnp.asarray(words[which]), impl=impl)
 
 
 def _all(one, given: Given, batch, memory, devices, report, late) -> dict[str, np.ndarray]:

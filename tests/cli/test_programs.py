@@ -60,7 +60,7 @@ def test_simulate_then_check(tmp_path):
 
 
 def test_the_same_seed_simulates_the_same_drive(tmp_path):
-    settings = ("--manoeuvre", "step-steer", "--duration", "2", "--rate", "50")
+    settings = ("--manoeuvre", "step-steer", "--duration", "4", "--rate", "50")  # the program of the test above
     files = []
     for name, seed in (("a", 3), ("b", 3), ("c", 4)):
         files.append(tmp_path / f"{name}.csv")

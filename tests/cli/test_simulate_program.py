@@ -17,6 +17,8 @@ from jaxveh.manoeuvres import MANOEUVRES
 from jaxveh.vehicles import kit
 
 QUICK = ("--duration", "1", "--rate", "50", "--manoeuvre", "step-steer", "--set", "start=0.1")
+LINEAR = (*QUICK, "--fidelity", "linear", "--set", "ramp=0.05", "--duration", "2")
+"""One program for those to whom the car is all the same."""
 
 
 def simulate(*arguments):
@@ -142,9 +144,7 @@ def test_settings_options_and_road_reach_the_drive(tmp_path):
 
 def test_numbers_of_the_standard_and_figures(tmp_path):
     out, numbers = tmp_path / "figures", tmp_path / "numbers.json"
-    result = simulate(
-        *QUICK, "--fidelity", "linear", "--set", "ramp=0.05", "--duration", "2", "--out", out, "--json", numbers
-    )
+    result = simulate(*LINEAR, "--out", out, "--json", numbers)
     assert result.exit_code == 0, result.output
     assert sorted(path.name for path in out.iterdir()) == ["channels.png", "drive.png", "loads.png", "top_view.png"]
     found = read_json(numbers)["numbers"]["step response of yaw_rate (ISO 7401)"]
@@ -281,7 +281,7 @@ def test_nothing_to_write_is_refused():
 def test_a_product_that_exists_is_kept_unless_forced(tmp_path):
     drive = tmp_path / "drive.csv"
     drive.write_text("mine")
-    assert "exists already" in error_line(simulate(*QUICK, "-o", drive))
+    assert "exists already" in error_line(simulate(*LINEAR, "-o", drive))
     assert drive.read_text() == "mine"
-    assert simulate(*QUICK, "-o", drive, "--force").exit_code == 0
-    assert len(io.read_recording(drive)) == 51
+    assert simulate(*LINEAR, "-o", drive, "--force").exit_code == 0
+    assert len(io.read_recording(drive)) == 101

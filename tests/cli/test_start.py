@@ -4,7 +4,13 @@ import os
 import subprocess
 import sys
 
-PROBE = "from jaxveh.cli import prepare; prepare(); import os, jax; print(os.environ['XLA_FLAGS'], jax.config.jax_enable_x64)"
+import jax
+
+from jaxveh.cli import prepare
+
+SETTINGS = "print(os.environ.get('XLA_FLAGS'), jax.config.jax_enable_x64)"
+PROBE = f"import jaxveh, jaxveh.cli, os, jax; {SETTINGS}; jaxveh.cli.prepare(); {SETTINGS}"
+"""What is set by importing, and what by a program's start."""
 
 
 def python(*arguments, **environment):
@@ -15,18 +21,16 @@ def python(*arguments, **environment):
     return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=env, timeout=300)
 
 
-def test_wide_vectors_and_float64():
-    assert python("-c", PROBE).stdout.split() == ["--xla_cpu_prefer_vector_width=512", "True"]
+def test_importing_sets_nothing_and_a_program_wide_vectors_and_float64():
+    imported, prepared = python("-c", PROBE).stdout.splitlines()
+    assert imported.split() == ["None", "False"]
+    assert prepared.split() == ["--xla_cpu_prefer_vector_width=512", "True"]
 
 
-def test_the_users_flag_stays():
-    flags = python("-c", PROBE, XLA_FLAGS="--xla_cpu_prefer_vector_width=256").stdout.split()
-    assert flags == ["--xla_cpu_prefer_vector_width=256", "True"]
-
-
-def test_importing_the_package_sets_nothing():
-    probe = "import jaxveh, jaxveh.cli, os, jax; print(os.environ.get('XLA_FLAGS'), jax.config.jax_enable_x64)"
-    assert python("-c", probe).stdout.split() == ["None", "False"]
+def test_the_users_flag_stays(monkeypatch):
+    monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_prefer_vector_width=256")
+    prepare()
+    assert os.environ["XLA_FLAGS"] == "--xla_cpu_prefer_vector_width=256" and jax.config.jax_enable_x64
 
 
 def test_without_the_extra_one_line_says_what_to_install():

@@ -1,8 +1,10 @@
 """Numbers of standards on drives that know them: answers made by hand, and a linear car in closed form."""
 
+import functools
 import math
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -192,8 +194,6 @@ def test_step_response_of_a_linear_car():
 
 @pytest.mark.parametrize("kind", ["swept", "random"])
 def test_frequency_response_of_a_linear_car(kind):
-    import jax
-
     car, speed = linear_car(), 25.0
     if kind == "swept":
         manoeuvre = manoeuvres.swept_sine(speed, 0.01, 0.2, 2.5, 40.0)
@@ -234,9 +234,15 @@ def test_understeer_gradient_of_a_linear_car():
     assert set(drive_numbers(drive, "ramp-steer")) == {"peaks"}
 
 
+@functools.cache
+def dwell_steer():
+    steering = manoeuvres.sine_with_dwell(20.0, 0.1, duration=10.0)
+    return np.asarray(jax.jit(lambda time: steering.inputs(time).steer)(TIME))
+
+
 def dwell_drive(peak_yaw=0.4, left=(0.1, 0.05), y=3.0, side=1.0):
     """A sine with dwell from t = 1 s on, whose yaw rate has a peak of 0.4 at 2.5 s and is left at 1 and 1.75 s after its end."""
-    steer = np.asarray(manoeuvres.sine_with_dwell(20.0, 0.1, duration=10.0).inputs(jnp.asarray(TIME)).steer)
+    steer = dwell_steer()
     completed = 1.0 + 1 / 0.7 + 0.5
     knots = [0.0, 1.0, 1.5, 2.5, completed + 1.0, completed + 1.75, 10.0]
     yaw_rate = np.interp(TIME, knots, [0.0, 0.0, 0.3, -peak_yaw, -left[0], -left[1], 0.0])

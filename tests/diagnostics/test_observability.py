@@ -40,9 +40,10 @@ def test_start_states_as_nuisance_are_marginalised():
 
 
 def test_a_product_trades_and_the_words_name_both():
-    time = jnp.linspace(0, 3, 50)
-    predict = lambda z: jnp.concatenate([jnp.exp(z[0] + z[1]) * jnp.sin(time), 30 * z[2] * jnp.cos(time)])
-    found = observability_at(predict, jnp.asarray([0.2, 0.3, 1.0]), ("gain", "mass", "drag"), np.full(3, 0.1))
+    time = np.linspace(0, 3, 50)
+    predict = lambda z: jnp.concatenate([jnp.exp(z[0] + z[1]) * np.sin(time), 30 * z[2] * np.cos(time)])
+    at = jnp.asarray([0.2, 0.3, 1.0])
+    found = observability_at(jax.jit(predict), at, ("gain", "mass", "drag"), np.full(3, 0.1))
     assert found.condition_number > 1e20
     assert "gain" in found.trade()
     assert "mass" in found.trade()
@@ -52,7 +53,7 @@ def test_a_product_trades_and_the_words_name_both():
     assert found.unobservable() == ("gain", "mass")
     assert found.observable() == ("drag",)
     # Opposite signs in the measurement: they rise together.
-    ratio = lambda z: jnp.exp(z[0] - z[1]) * jnp.sin(time)
+    ratio = jax.jit(lambda z: jnp.exp(z[0] - z[1]) * np.sin(time))
     assert "rising with it" in observability_at(ratio, jnp.zeros(2), ("gain", "mass"), np.full(2, 0.1)).trade()
 
 

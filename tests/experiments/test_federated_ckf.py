@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -74,13 +75,19 @@ def test_the_filters_model_is_the_truth_s(slalom):
             assert np.abs(rate - slope)[50:-1].max() < 0.02 * np.abs(slope).max() + 0.01
 
 
+@eqx.filter_jit
+def under_a_pull(car, law, along, across, load, pull, friction):
+    """Lateral forces that the car finds for a pull, and the law's forces at the slip that goes with it."""
+    F_y, slip = car._lateral_and_slip(along, across, load, pull, friction)
+    at = Contact(slip_angle=-jnp.arctan(across / along), slip_ratio=slip, load=load, friction=friction, speed=along)
+    return F_y, law.forces(at)
+
+
 @pytest.mark.parametrize("pull", [-150.0, 0.0, 120.0])
 def test_the_slip_under_a_pull_is_dugoff_s(pull):
-    car, across = true_car(), jnp.array([0.05, 0.4, -0.8])
-    along, load, friction = (jnp.full(3, value) for value in (5.5, 3000.0, 0.2))
-    F_y, slip = car._lateral_and_slip(along, across, load, jnp.full(3, pull), friction)
-    at = Contact(slip_angle=-jnp.arctan(across / along), slip_ratio=slip, load=load, friction=0.2, speed=along)
-    forces = drives.dugoff(SMALL).forces(at)
+    along, load, pulls, friction = (np.full(3, value) for value in (5.5, 3000.0, pull, 0.2))
+    across = np.array([0.05, 0.4, -0.8])
+    F_y, forces = under_a_pull(true_car(), drives.dugoff(SMALL), along, across, load, pulls, friction)
     np.testing.assert_allclose(forces.F_x, pull, rtol=0.01, atol=1e-9)
     np.testing.assert_allclose(forces.F_y, F_y, rtol=2e-3)
 
@@ -99,7 +106,7 @@ def test_the_joint_filter_finds_the_car_and_its_gate_keeps_the_fault_out(slalom)
 
 def test_small_steer_says_nothing_of_friction(driven):
     """Where no wheel slides, Dugoff's force does not depend on friction: its sensitivity is zero, not small."""
-    first = drives.Drive(*(jnp.asarray(leaf[:, 0, 0]) for leaf in driven))
+    first = drives.Drive(*(leaf[:, 0, 0] for leaf in driven))
     true = Start(*study.truth(SMALL))
     small, large = np.asarray(jax.jit(jax.vmap(lambda drive: observed.sensitivities(SMALL, true, drive)))(first))
     assert np.abs(small[:, 0]).max() == 0.0 < np.abs(large[:, 0]).max()
@@ -121,8 +128,9 @@ def test_estimators_that_take_turns_believe_what_was_told_a_row_ago():
         Member(filters.Cubature(), make(), lambda t: t.state, lambda mean, t: t._replace(car=mean.level)),
         Member(filters.Cubature(), make(), lambda t: t.car, lambda mean, t: t._replace(state=mean.level)),
     )
-    rows = Row(jnp.arange(3.0), record_type("Inputs", ())(), record_type("Measurements", ("sum",))(jnp.full(3, 2.0)))
-    (one, two), _, _ = take_turns(members, Told(rows.t[0], rows.u, jnp.array(0.0), jnp.array(0.0)), rows)
+    rows = Row(np.arange(3.0), record_type("Inputs", ())(), record_type("Measurements", ("sum",))(np.full(3, 2.0)))
+    told = Told(rows.t[0], rows.u, np.array(0.0), np.array(0.0))
+    (one, two), _, _ = jax.jit(lambda told, rows: take_turns(members, told, rows))(told, rows)
     a = b = 0.0
     for k in range(3):
         gain = 1.0 / (k + 2.0)
@@ -132,14 +140,13 @@ def test_estimators_that_take_turns_believe_what_was_told_a_row_ago():
 
 def test_numbers_of_a_known_course():
     rows, right = 301, study.truth(SMALL)
-    zeros = jnp.zeros(rows)
+    zeros = np.zeros(rows)
     drive = drives.Drive(*(zeros,) * 10)._replace(true_v_x=zeros + 5.0)
-    off = jnp.log(jnp.asarray(right)) + jnp.log(jnp.array([1.0, 1.02, 1.0, 1.0]))
-    vector = jnp.concatenate([jnp.array([5.0, 5.0 * np.tan(0.01), 0.0]), off])
-    vector = jnp.broadcast_to(vector, (rows, 7))
-    covariance = jnp.broadcast_to(jnp.diag(jnp.array([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4, 1e-4])), (rows, 7, 7))
-    found = contestants.Found(vector[:, 0], vector[:, 1], vector[:, 2], jnp.exp(vector[:, 3:]), vector, covariance)
-    seen = contestants.metrics(SMALL, found, drive, jnp.asarray(right))
+    off = np.log(right) + np.log([1.0, 1.02, 1.0, 1.0])
+    vector = np.tile(np.concatenate([[5.0, 5.0 * np.tan(0.01), 0.0], off]), (rows, 1))
+    covariance = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4, 1e-4]), (rows, 1, 1))
+    found = contestants.Found(vector[:, 0], vector[:, 1], vector[:, 2], np.exp(vector[:, 3:]), vector, covariance)
+    seen = jax.jit(lambda *given: contestants.metrics(SMALL, *given))(found, drive, right)
     np.testing.assert_allclose(seen["mass_error"], 0.02, rtol=1e-9)
     np.testing.assert_allclose(seen["sideslip_rmse"], np.rad2deg(0.01), rtol=1e-6)
     np.testing.assert_allclose(seen["nees"], (np.log(1.02) / 0.01) ** 2 / 4, rtol=1e-6)

@@ -1,8 +1,9 @@
 """Figures of drives show the data and the numbers that they were given, with units; recordings are made by hand."""
 
+import functools
 import math
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 import pytest
 
@@ -128,8 +129,14 @@ def test_handling_diagram_of_several_and_without_a_wheelbase():
     assert label(bare.axes[0]) == "steer [°]" and not bare.axes[0].texts
 
 
+@functools.cache
+def dwell_steer():
+    steering = manoeuvres.sine_with_dwell(20.0, 0.1)
+    return np.asarray(jax.jit(lambda time: steering.inputs(time).steer)(TIME))
+
+
 def dwell(left=0.1):
-    steer = np.asarray(manoeuvres.sine_with_dwell(20.0, 0.1).inputs(jnp.asarray(TIME)).steer)
+    steer = dwell_steer()
     yaw_rate = np.interp(TIME, [0, 1, 1.5, 2.5, 3.9, 4.7, 6], [0, 0, 0.3, -0.4, -left, -left / 2, 0])
     y = np.where(TIME >= 1.0, 3 * (TIME - 1.0) ** 2, 0.0)
     return Recording(TIME, {"steer": steer, "yaw_rate": yaw_rate, "yaw": 0 * TIME, "x": 20 * TIME, "y": y})

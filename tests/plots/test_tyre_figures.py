@@ -1,6 +1,6 @@
 """Figures of tyres: forces that are the law's, limits and slopes that are known in closed form, units that fit."""
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 import pytest
 
@@ -23,6 +23,16 @@ def lateral_only():
     return vehicles.passenger_car().front
 
 
+@jax.jit
+def _forces(law, slip_angle, slip_ratio, load):
+    return law.forces(Contact(slip_angle=slip_angle, slip_ratio=slip_ratio, load=load))
+
+
+def forces_of(law, slip_angle=0.0, slip_ratio=0.0, load=LOAD):
+    """The law's forces, one program a shape."""
+    return _forces(law, *(np.array(value, float) for value in np.broadcast_arrays(slip_angle, slip_ratio, load)))
+
+
 def lines(ax, name):
     return [np.stack(one.get_data()) for one in ax.get_lines() if one.get_label() == name]
 
@@ -42,11 +52,11 @@ def test_the_tyre_figure_shows_the_law_s_forces(brush):
     figure = plots.tyre(brush, [2000.0, LOAD])
     across, along, moment, combined = figure.axes
     (shown,) = lines(across, "4 kN")
-    found = brush.forces(Contact(slip_angle=jnp.radians(jnp.asarray(shown[0])), load=LOAD))
+    found = forces_of(brush, np.radians(shown[0]))
     np.testing.assert_allclose(shown[1], np.asarray(found.F_y) / 1e3, rtol=1e-12)
     np.testing.assert_allclose(lines(moment, "4 kN")[0][1], found.M_z, rtol=1e-12)
     (shown,) = lines(along, "2 kN")
-    found = brush.forces(Contact(slip_ratio=jnp.asarray(shown[0]) / 100, load=2000.0))
+    found = forces_of(brush, slip_ratio=shown[0] / 100, load=2000.0)
     np.testing.assert_allclose(shown[1], np.asarray(found.F_x) / 1e3, rtol=1e-12)
     assert combined.get_ylabel() == "lateral force [kN] at 4 kN"
 
@@ -70,7 +80,7 @@ def test_curves_of_a_slip_angle_go_both_ways_with_one_entry_in_the_legend(brush)
     (straight,) = lines(ax, "slip angle 0°")
     np.testing.assert_array_equal(straight[1], 0.0)
     left, right = lines(ax, "±3°")
-    pure = float(brush.forces(Contact(slip_angle=jnp.radians(3.0), load=LOAD)).F_y) / 1e3
+    pure = float(forces_of(brush, np.radians(3.0)).F_y) / 1e3
     np.testing.assert_allclose(left[1][RATIOS // 2], pure, rtol=1e-12)
     np.testing.assert_allclose(right[1], -left[1], rtol=1e-12)
     (legend,) = figure.legends
@@ -122,12 +132,11 @@ def test_sensitivities_are_differences_of_forces_in_newtons(brush):
     shown = panels(figure)
     assert bar_labels(figure)[2:] == ["p dF_x/dp [N]", "p dF_y/dp [N]"] * 2
     angle = np.linspace(-np.radians(18), np.radians(18), POINTS)
-    contact = Contact(slip_angle=jnp.asarray(angle), slip_ratio=jnp.asarray(0.3), load=LOAD)
     step = 1e-4
     for name, change in (("friction", dict(friction=MU)), ("cornering_stiffness", dict(cornering_stiffness=STIFFNESS))):
         settings = dict(slip_stiffness=SLIP_STIFFNESS, cornering_stiffness=STIFFNESS, friction=MU)
         high, low = (
-            Brush(**{**settings, **{key: value * share for key, value in change.items()}}).forces(contact)
+            forces_of(Brush(**{**settings, **{key: value * share for key, value in change.items()}}), angle, 0.3)
             for share in (1 + step, 1 - step)
         )
         for force in ("F_x", "F_y"):

@@ -1,5 +1,6 @@
 """A sweep's arrays stand where the design says, whatever the chunks, the memory and the devices."""
 
+import functools
 import subprocess
 import sys
 import textwrap
@@ -30,14 +31,25 @@ def run(point, key):
     return {"value": point.law(point.scale * drawn) + point.shift, "deep": {"pair": jnp.stack([drawn, point.shift])}}
 
 
+@functools.cache
+def swept():
+    """The design with four seeds, which several tests look at."""
+    return sweeps.sweep(run, DESIGN, 4, KEY)
+
+
+def drawn_by(seeds):
+    """What each seed draws."""
+    return np.asarray(jax.jit(jax.vmap(jax.random.normal))(jax.random.split(KEY, seeds)))
+
+
 def expected(seeds):
-    drawn = np.asarray(jax.vmap(jax.random.normal)(jax.random.split(KEY, seeds)))
+    drawn = drawn_by(seeds)
     scale, shift = np.array([1.0, 10.0])[:, None, None], np.array([0.0, 0.5, 1.0])[None, :, None]
     return np.stack([2.0 * (scale * drawn) + shift, (scale * drawn) ** 2 + shift], axis=1), drawn
 
 
 def test_every_value_stands_in_its_place():
-    found = sweeps.sweep(run, DESIGN, 4, KEY)
+    found = swept()
     values, drawn = expected(4)
     assert found["value"].shape == (2, 2, 3, 4)
     np.testing.assert_allclose(found["value"], values, rtol=1e-14)
@@ -53,7 +65,7 @@ def test_every_value_stands_in_its_place():
 def test_chunks_make_the_same_and_report():
     said = []
     report = lambda done, total, stage: said.append((done, total, stage))
-    whole, parts = sweeps.sweep(run, DESIGN, 4, KEY), sweeps.sweep(run, DESIGN, 4, KEY, batch=7, progress=report)
+    whole, parts = swept(), sweeps.sweep(run, DESIGN, 4, KEY, batch=7, progress=report)
     for name in ("value", "deep.pair"):
         np.testing.assert_allclose(parts[name], whole[name], rtol=1e-14)
     assert said[:6] == [
@@ -114,7 +126,7 @@ def test_runs_on_data_alone_need_no_key():
         lambda point, key, drive: {"x": drive, "drawn": jax.random.normal(key)}, design, key=KEY, data=drives
     )
     np.testing.assert_array_equal(with_keys["x"], drives)
-    np.testing.assert_array_equal(with_keys["drawn"][0], jax.vmap(jax.random.normal)(jax.random.split(KEY, 3)))
+    np.testing.assert_array_equal(with_keys["drawn"][0], drawn_by(3))
 
 
 def test_parameters_of_every_run_are_found_as_in_the_car():
@@ -134,7 +146,7 @@ def test_parameters_of_every_run_are_found_as_in_the_car():
 
 def test_a_design_without_axes_is_one_point():
     found = sweeps.sweep(lambda point, key: {"x": jax.random.normal(key)}, sweeps.Design(), 3, KEY)
-    np.testing.assert_array_equal(found["x"], jax.vmap(jax.random.normal)(jax.random.split(KEY, 3)))
+    np.testing.assert_array_equal(found["x"], drawn_by(3))
 
 
 ON_TWO = """
@@ -177,15 +189,15 @@ def test_two_devices_make_what_one_makes():
             "must be a mapping or a NamedTuple of arrays",
         ),
         (
-            lambda: sweeps.sweep(run, DESIGN, 1, KEY)["rmse"],
+            lambda: swept()["rmse"],
             r"value: unknown name\(s\) rmse; there are: deep.pair, value",
         ),
         (
-            lambda: sweeps.sweep(run, DESIGN, 1, KEY).at("value", law="cube"),
+            lambda: swept().at("value", law="cube"),
             "law = 'cube': the design has double, square",
         ),
         (
-            lambda: sweeps.sweep(run, DESIGN, 1, KEY).at("value", lw="double"),
+            lambda: swept().at("value", lw="double"),
             "axis = 'lw': the design has scale, law, shift",
         ),
     ],
