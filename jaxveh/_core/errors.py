@@ -74,6 +74,10 @@ def float_array(value) -> Any:
 
     A Python float or a weak type would be a new compilation; see `equinox.field(converter=...)`.
     """
+    if type(value) is float:
+        # NumPy converts it in two thirds of the time: a tyre has hundreds.
+        with np.errstate(over="ignore"):
+            return jax.numpy.asarray(np.asarray(value, jax.dtypes.canonicalize_dtype(float)))
     if isinstance(value, (jax.Array, np.ndarray, np.generic)) and np.issubdtype(value.dtype, np.floating):
         weak = getattr(value, "weak_type", False)
         return jax.numpy.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float if weak else value.dtype))

@@ -14,7 +14,6 @@ from jaxveh.fitting.result import Fit
 MOST_STEPS = 200
 
 
-@eqx.filter_jit
 def solve(
     problem: AbstractProblem,
     start=None,
@@ -32,13 +31,19 @@ def solve(
 
     **Returns** a `Fit`; how it ended is its `result`.
     """
+    # An array: with another tolerance it is the same program.
+    return _solve(problem, start, jnp.asarray(tolerance), max_steps=max_steps, standard_errors=standard_errors)
+
+
+@eqx.filter_jit
+def _solve(problem: AbstractProblem, start, tolerance, *, max_steps: int, standard_errors: bool) -> Fit:
     start = problem.start() if start is None else start
     found = optimum(problem, lax.stop_gradient(start), max_steps=max_steps, tolerance=tolerance)
     return fit_at(problem, found, problem.cost(found.z), problem.covariance(found.z) if standard_errors else None)
 
 
 @eqx.filter_custom_jvp
-def optimum(problem: AbstractProblem, start, *, max_steps: int, tolerance: float) -> SearchEnd:
+def optimum(problem: AbstractProblem, start, *, max_steps: int, tolerance) -> SearchEnd:
     """Where a search from the coordinates `start` (n,) ends."""
     return problem.search(start, max_steps, tolerance)
 

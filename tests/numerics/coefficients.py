@@ -24,12 +24,12 @@ def sine_remainder(t: Array) -> Array:
 
 def arctangent_remainder(t: Array) -> Array:
     """(arctan r / r - 1) / r^2 by its Taylor series, for r^2 <= 0.18."""
-    return np.sum([(-1) ** n * t ** (n - 1) / np.longdouble(2 * n + 1) for n in range(1, 40)], axis=0)
+    return np.polynomial.polynomial.polyval(t, [(-1) ** n / np.longdouble(2 * n + 1) for n in range(1, 40)])
 
 
 def hyperbolic_arctangent_remainder(t: Array) -> Array:
     """(artanh r / r - 1) / r^2 by its Taylor series, for r^2 <= 0.18."""
-    return np.sum([t ** (n - 1) / np.longdouble(2 * n + 1) for n in range(1, 40)], axis=0)
+    return np.polynomial.polynomial.polyval(t, [1 / np.longdouble(2 * n + 1) for n in range(1, 40)])
 
 
 def cosine_remainder(t: Array) -> Array:

@@ -11,7 +11,7 @@ from jaxveh import numerics
 @pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
 @pytest.mark.parametrize("size", [1, 39, 79, 80, 81, 1000, 1003])
 def test_total_is_the_sum(size, dtype):
-    values = jax.random.normal(jax.random.key(size), (size,), dtype)
+    values = np.random.default_rng(size).normal(size=size).astype(dtype)
     expected = np.sum(np.asarray(values, np.float64))
     found = numerics.total(values)
     assert found.dtype == dtype
@@ -19,12 +19,12 @@ def test_total_is_the_sum(size, dtype):
 
 
 def test_total_of_every_element_counts_once_in_value_and_gradient():
-    weights = jnp.arange(1003.0)
-    gradient = jax.grad(lambda x: numerics.total(weights * x))(jnp.ones(1003))
+    weights = np.arange(1003.0)
+    gradient = jax.jit(jax.grad(lambda x: numerics.total(weights * x)))(np.ones(1003))
     np.testing.assert_array_equal(gradient, weights)
     assert numerics.total(weights) == 1003 * 1002 / 2
 
 
 def test_total_of_a_batch_is_that_of_each_row():
-    rows = jax.random.normal(jax.random.key(0), (3, 130))
-    np.testing.assert_allclose(jax.vmap(numerics.total)(rows), rows.sum(axis=1), atol=1e-12)
+    rows = np.random.default_rng(0).normal(size=(3, 130))
+    np.testing.assert_allclose(jax.jit(jax.vmap(numerics.total))(rows), rows.sum(axis=1), atol=1e-12)

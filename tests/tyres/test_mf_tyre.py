@@ -54,7 +54,7 @@ def compared(request):
     rows = pd.read_csv(shared(table)).astype(float)
     rows = rows[rows.useMode == mode]
     assert len(rows) == 1086
-    column = lambda name: jnp.asarray(rows[name].to_numpy())
+    column = lambda name: rows[name].to_numpy()
     contact = Contact(
         slip_angle=-column("in_alpha"),
         slip_ratio=column("in_kappa"),
@@ -103,37 +103,53 @@ def test_internals_are_the_reference_s(compared, name):
 
 
 @jax.jit
-def total(tyre, contact):
-    return sum(tyre.forces(contact))
+def with_finite_gradients(tyre, contact):
+    """The forces, and whether all gradients of their sum are finite.
 
+    Compiled once a version; looked at inside, as a program without hundreds of results compiles in half the time.
+    """
 
-@jax.jit
-def finite_gradients(tyre, contact):
-    """Compiled once a version; looked at inside, as a program without hundreds of results compiles in half the time."""
-    found = jax.value_and_grad(total, argnums=(0, 1))(tyre, contact)
-    return jnp.all(jnp.stack([jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(found)]))
+    def total(tyre, contact):
+        forces = tyre.forces(contact)
+        return sum(forces), forces
+
+    (value, forces), found = jax.value_and_grad(total, argnums=(0, 1), has_aux=True)(tyre, contact)
+    return forces, jnp.all(jnp.stack([jnp.isfinite(leaf).all() for leaf in jax.tree.leaves((value, found))]))
 
 
 @pytest.mark.parametrize("name", shared_names("tyres", "*.tir"))
 def test_every_file_evaluates_with_finite_gradients(name):
     tyre = tyre_of(name)
-    load = tyre.structure.FNOMIN
-    for slips in ([0.0, 0.0, 0.0, 1.0], [0.1, -0.05, 0.02, 0.7], [0.0, 0.1, 0.0, 1.0], [0.1, 0.0, 0.0, 0.0]):
-        angle, ratio, camber, share = (jnp.asarray(value) for value in slips)
-        point = Contact(slip_angle=angle, slip_ratio=ratio, camber=camber, load=share * load, friction=jnp.asarray(1.0))
-        assert finite_gradients(tyre, point)
+    load = np.asarray(tyre.structure.FNOMIN)
+
+    def found(*slips, share):
+        angle, ratio, camber, friction = (np.asarray(value) for value in (*slips, 1.0))
+        point = Contact(
+            slip_angle=angle, slip_ratio=ratio, camber=camber, load=np.asarray(share * load), friction=friction
+        )
+        return with_finite_gradients(tyre, point)
+
+    assert found(0.0, 0.0, 0.0, share=1.0)[1]
+    assert found(0.1, -0.05, 0.02, share=0.7)[1]
+    assert found(0.0, 0.1, 0.0, share=1.0)[1]
+    assert found(0.1, 0.0, 0.0, share=0.0)[1]
     # Signs of this package: a positive slip angle pushes left, a positive slip ratio forward.
-    found = tyre.forces(Contact(slip_angle=jnp.asarray(0.05), slip_ratio=jnp.asarray(0.05), load=load))
-    assert found.F_y > 0 and found.F_x >= 0
+    forces, _ = found(0.05, 0.05, 0.0, share=1.0)
+    assert forces.F_y > 0 and forces.F_x >= 0
 
 
 def test_stiffnesses_are_slopes_and_forces_vanish_with_load():
     tyre = tyre_of(FILES["mfeval_pacejkabook.csv"])
-    load = tyre.structure.FNOMIN
-    slope = tyres.cornering_stiffness(tyre, Contact(load=load))
-    np.testing.assert_allclose(slope, tyre.outputs(Contact(load=load)).K_ya, rtol=1e-6)
-    # A wheel off the ground.
-    off = tyre.forces(Contact(slip_angle=jnp.asarray(0.1), slip_ratio=jnp.asarray(0.1), load=jnp.asarray(-100.0)))
+
+    @jax.jit
+    def found(load):
+        # The last one: a wheel off the ground.
+        off = Contact(slip_angle=jnp.asarray(0.1), slip_ratio=jnp.asarray(0.1), load=jnp.asarray(-100.0))
+        contact = Contact(load=load)
+        return tyres.cornering_stiffness(tyre, contact), tyre.outputs(contact).K_ya, tyre.forces(off)
+
+    slope, stiffness, off = found(tyre.structure.FNOMIN)
+    np.testing.assert_allclose(slope, stiffness, rtol=1e-6)
     assert all(float(value) == 0.0 for value in off)
 
 
@@ -141,29 +157,36 @@ def test_gradients_equal_differences():
     tyre = tyre_of(FILES["mfeval_mf61.csv"])
     rng = np.random.default_rng(0)
 
-    @jax.jit
     def forces(slips):
         a, k, g, load = slips
-        return jnp.stack(tyre.forces(Contact(slip_angle=a, slip_ratio=k, camber=g, load=load, speed=jnp.asarray(20.0))))
+        found = tyre.forces(Contact(slip_angle=a, slip_ratio=k, camber=g, load=load, speed=jnp.asarray(20.0)))
+        return jnp.stack(found), jnp.stack(found)
 
-    slopes = jax.jit(jax.jacfwd(forces))
+    both = jax.jit(jax.jacfwd(forces, has_aux=True))
     for _ in range(20):
-        point = jnp.asarray(
+        point = np.array(
             [rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2), rng.uniform(-0.05, 0.05), rng.uniform(2e3, 9e3)]
         )
-        steps = jnp.diag(jnp.asarray([1e-6, 1e-6, 1e-6, 1e-2]))
-        numeric = jnp.stack([(forces(point + h) - forces(point - h)) / (2 * jnp.sum(h)) for h in steps], axis=1)
-        scale = jnp.asarray([[1e5, 1e5, 1e5, 1.0]])
-        np.testing.assert_allclose(slopes(point) / scale, numeric / scale, atol=2e-6)
+        steps = np.diag([1e-6, 1e-6, 1e-6, 1e-2])
+        ends = [(both(point + h)[1], both(point - h)[1]) for h in steps]
+        numeric = np.stack([np.subtract(*end) / (2 * np.sum(h)) for end, h in zip(ends, steps, strict=True)], axis=1)
+        scale = np.array([[1e5, 1e5, 1e5, 1.0]])
+        np.testing.assert_allclose(np.asarray(both(point)[0]) / scale, numeric / scale, atol=2e-6)
 
 
 def test_friction_scales_and_what_is_unknown_is_nominal():
     tyre = tyre_of(FILES["mfeval_mf61.csv"])
-    contact = Contact(slip_angle=jnp.asarray(0.3), load=tyre.structure.FNOMIN)
-    slippery = tyre.forces(contact._replace(friction=0.4))
-    assert 0.35 < slippery.F_y / tyre.forces(contact).F_y < 0.45
-    told = contact._replace(speed=tyre.structure.LONGVL, pressure=tyre.structure.INFLPRES)
-    np.testing.assert_array_equal(tyre.forces(told).M_z, tyre.forces(contact).M_z)
+    nominal = tyre.structure
+
+    @jax.jit
+    def found(angle):
+        contact = Contact(slip_angle=angle, load=nominal.FNOMIN)
+        told = contact._replace(speed=nominal.LONGVL, pressure=nominal.INFLPRES)
+        return [tyre.forces(at) for at in (contact, contact._replace(friction=0.4), told)]
+
+    plain, slippery, told = found(0.3)
+    assert 0.35 < slippery.F_y / plain.F_y < 0.45
+    np.testing.assert_array_equal(told.M_z, plain.M_z)
 
 
 def test_bad_requests_name_the_value():
@@ -231,16 +254,20 @@ def test_turn_slip_is_the_reference_s():
 
 def test_turn_slip_is_smooth_at_zero_and_refused_in_52():
     tyre = dataclasses.replace(version_62(), spins=True)
-    contact = Contact(*(jnp.asarray(value) for value in (0.0, 0.0, 4000.0, 0.0, 1.0, 20.0)))
+    contact = Contact(*map(np.asarray, (0.0, 0.0, 4000.0, 0.0, 1.0, 20.0)))
+
+    def found(phi, tyre=tyre, **more):
+        at = {name: np.asarray(value) for name, value in ({"turn_slip": phi} | more).items()}
+        return with_finite_gradients(tyre, contact._replace(**at))
+
     for phi, camber in ((0.0, 0.0), (0.0, 0.02), (1e-3, 0.0), (30.0, 0.0)):
-        at = contact._replace(turn_slip=jnp.asarray(phi), camber=jnp.asarray(camber))
-        assert finite_gradients(tyre, at), (phi, camber)
+        assert found(phi, camber=camber)[1], (phi, camber)
     # A section of zeros is a tyre that spin does not shift.
     zeros = dataclasses.replace(tyre, turn_slip=jax.tree.map(jnp.zeros_like, tyre.turn_slip))
-    assert finite_gradients(zeros, contact._replace(turn_slip=jnp.asarray(0.1), camber=jnp.asarray(0.02)))
+    assert found(0.1, zeros, camber=0.02)[1]
     # Turning on the spot needs a moment against the turn, and leaves less force sideways.
-    slides = contact._replace(slip_angle=jnp.asarray(0.1))
-    assert abs(tyre.forces(slides._replace(turn_slip=jnp.asarray(2.0))).F_y) < abs(tyre.forces(slides).F_y)
+    turning, straight = (found(phi, slip_angle=0.1)[0] for phi in (2.0, 0.0))
+    assert abs(turning.F_y) < abs(straight.F_y)
     with pytest.raises(tyres.base.InputError, match="version 5.2 has no turn slip"):
         dataclasses.replace(tyre, version=52)
 
@@ -249,13 +276,14 @@ def test_the_loaded_radius_of_62_carries_the_load_and_has_its_derivatives():
     tyre = version_62()
 
     @jax.jit
+    @jax.value_and_grad
     def radius(x):
         load, angle, camber = x
         contact = Contact(slip_angle=angle, load=load, camber=camber, speed=jnp.asarray(20.0))
         return tyre.outputs(contact).R_l
 
-    point, steps = jnp.asarray([5000.0, 0.05, 0.02]), jnp.diag(jnp.asarray([100.0, 1e-3, 1e-3]))
-    numeric = [(radius(point + h) - radius(point - h)) / (2 * jnp.sum(h)) for h in steps]
-    slopes = jax.grad(radius)(point)
+    point, steps = np.array([5000.0, 0.05, 0.02]), np.diag([100.0, 1e-3, 1e-3])
+    numeric = [(float(radius(point + h)[0]) - float(radius(point - h)[0])) / (2 * np.sum(h)) for h in steps]
+    _, slopes = radius(point)
     np.testing.assert_allclose(slopes, numeric, rtol=2e-3)
     assert float(slopes[0]) < 0

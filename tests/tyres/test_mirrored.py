@@ -59,14 +59,18 @@ def by_hand(tyre):
 
 def contacts(n=400):
     key = np.random.default_rng(7)
-    draw = lambda low, high: jnp.asarray(key.uniform(low, high, n))
+    draw = lambda low, high: key.uniform(low, high, n)
     return Contact(
         draw(-0.4, 0.4), draw(-0.5, 0.5), draw(500.0, 12000.0), draw(-0.12, 0.12), draw(0.5, 1.1), draw(0.3, 40.0),
         draw(2e5, 3.5e5),
     )  # fmt: skip
 
 
-forces = eqx.filter_jit(lambda tyre, at: jnp.stack(tyre.forces(at)))
+of_program = eqx.filter_jit(lambda tyre, at: jnp.stack(tyre.forces(at)))
+
+
+def forces(tyre, at):
+    return np.asarray(of_program(tyre, at))
 
 
 @pytest.mark.parametrize("version", [52, 61])
@@ -85,7 +89,7 @@ def test_forces_of_a_mirrored_contact_are_mirrored():
     tyre, at = in_full(61, True), contacts()
     turned = at._replace(slip_angle=-at.slip_angle, camber=-at.camber)
     F_x, F_y, M_x, M_y, M_z = forces(tyres.Mirrored(tyre), turned)
-    np.testing.assert_array_equal(jnp.stack([F_x, -F_y, -M_x, M_y, -M_z]), forces(tyre, at))
+    np.testing.assert_array_equal([F_x, -F_y, -M_x, M_y, -M_z], forces(tyre, at))
     np.testing.assert_array_equal(forces(tyres.Mirrored(tyres.Mirrored(tyre)), at), forces(tyre, at))
 
 
@@ -96,8 +100,8 @@ def test_every_input_is_odd_or_even():
 
 def test_parameters_stay_one_set_and_gradients_reach_them():
     tyre = tyres.Mirrored(in_full(61, True))
-    at = Contact(slip_angle=jnp.asarray(0.02), load=jnp.asarray(5000.0), slip_ratio=jnp.asarray(0.0))
-    slope = jax.grad(lambda tyre: tyre.forces(at).F_y)(tyre)
+    at = Contact(slip_angle=np.asarray(0.02), load=np.asarray(5000.0), slip_ratio=np.asarray(0.0))
+    slope = jax.jit(jax.grad(lambda tyre, at: tyre.forces(at).F_y))(tyre, at)
     assert float(slope.tyre.lateral.PVY1) < 0 < -float(slope.tyre.lateral.PKY1)
 
 

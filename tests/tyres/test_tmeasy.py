@@ -55,7 +55,7 @@ def test_the_rise_is_rills_rational_and_the_fall_a_cubic(slip):
 
 @pytest.mark.parametrize("edge", [0.16, 0.60])
 def test_the_curve_is_smooth_where_its_parts_meet(edge):
-    slope = jax.grad(lambda s: TYRE.forces(Contact(jnp.arctan(s), load=N)).F_y)
+    slope = jax.jit(jax.grad(lambda s: TYRE.forces(Contact(jnp.arctan(s), load=N)).F_y))
     np.testing.assert_allclose([slope(edge - 1e-7), slope(edge + 1e-7)], 0.0, atol=0.1)
 
 
@@ -104,7 +104,7 @@ def test_combined_slip_is_rills(angle):
 
 
 def test_zero_slip_has_the_slope_of_each_direction():
-    slopes = jax.jacfwd(lambda x: jnp.stack(TYRE.forces(Contact(x[0], x[1], N))[:2]))(jnp.zeros(2))
+    slopes = jax.jit(jax.jacfwd(lambda x: jnp.stack(TYRE.forces(Contact(x[0], x[1], N))[:2])))(np.zeros(2))
     np.testing.assert_allclose(slopes, [[0, 90e3], [75e3, 0]], rtol=1e-12)
 
 
@@ -174,12 +174,12 @@ def test_two_parabolas_after_the_peak(direction, curve):
     for slip in (meet + 1e-9, 0.5 * (meet + curve.s_slide), curve.s_slide):
         np.testing.assert_allclose(force(slip), curve.F_slide + second * (curve.s_slide - slip) ** 2, rtol=1e-12)
     # Value and slope meet at all three places, and the second derivative at the peak, which the cubic's does not.
-    slope, turn = jax.grad(force), jax.grad(jax.grad(force))
+    slope, turn = jax.jit(jax.grad(force)), jax.jit(jax.grad(jax.grad(force)))
     for edge in (curve.s_max, meet, curve.s_slide):
         np.testing.assert_allclose(force(edge - 1e-9), force(edge + 1e-9), rtol=1e-6)
         np.testing.assert_allclose(slope(edge - 1e-9), slope(edge + 1e-9), atol=1e-2)
     np.testing.assert_allclose(turn(curve.s_max - 1e-7), turn(curve.s_max + 1e-7), rtol=1e-3)
-    cubic = jax.grad(jax.grad(lambda slip: force(slip, TYRE)))
+    cubic = jax.jit(jax.grad(jax.grad(lambda slip: force(slip, TYRE))))
     assert abs(cubic(curve.s_max - 1e-7) / cubic(curve.s_max + 1e-7) - 1) > 0.2
 
 
