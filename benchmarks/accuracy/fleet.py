@@ -29,7 +29,7 @@ LATEST = 5
 
 
 class Drive(NamedTuple):
-    """A way of driving: the mean `speed` (m/s) on dry road, and how much of the tyres' grip the corners take at their sharpest."""
+    """A way of driving: the mean `speed` (m/s) on dry road, and the share of the tyres' grip that the sharpest corners take."""
 
     speed: float
     grip: float
@@ -67,7 +67,9 @@ class WindingRoad(manoeuvres.AbstractGraph):
         turns = k * jnp.asarray(x)[..., None] + self.phases
         # y'' of each harmonic has the standard deviation `curvature` / sqrt(n); the road leaves the origin along x.
         size = self.curvature * jnp.sqrt(2.0 / self.wavenumbers.size) / k**2
-        wave = numerics.sin(turns) - numerics.sin(self.phases) - k * jnp.asarray(x)[..., None] * numerics.cos(self.phases)
+        wave = (
+            numerics.sin(turns) - numerics.sin(self.phases) - k * jnp.asarray(x)[..., None] * numerics.cos(self.phases)
+        )
         return jnp.sum(size * wave, axis=-1)
 
 
@@ -108,7 +110,9 @@ def fleet(runs: int, seed: int = 0, duration: float = 90.0) -> list[FleetLog]:
     names, drives = list(numbers), list(DRIVES)
     plans = [(names[i % len(names)], drives[(i // len(names)) % len(drives)]) for i in range(runs)]
     drawn = [_draw(numbers[car], DRIVES[drive], rng, duration) for car, drive in plans]
-    stacked = jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *[run for run, _ in drawn])
+    stacked = jax.tree.map(
+        lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *[run for run, _ in drawn]
+    )
     said, truth = _simulate(stacked)
     said, truth = (jax.tree.map(np.asarray, one) for one in (said, truth))
     found = []
@@ -144,7 +148,9 @@ def _draw(numbers: vehicles.CarNumbers, drive: Drive, rng: np.random.Generator, 
     curvature = drive.grip * grip * vehicles.GRAVITY / mean**2 / 2.5
     path = WindingRoad(curvature, *numerics.band_harmonics(way, 1.0 / 400.0, 1.0 / 60.0, 40))
     driver = manoeuvres.SpeedControl(
-        manoeuvres.PathDriver(path, wanted, duration, wheelbase=numbers.wheelbase), car.mass, wheel_radius=numbers.wheel_radius
+        manoeuvres.PathDriver(path, wanted, duration, wheelbase=numbers.wheelbase),
+        car.mass,
+        wheel_radius=numbers.wheel_radius,
     )
     biases = {name: std * rng.normal() for name, std in BIASES.items()}
     return Run(car, road, driver, biases, own), _told(numbers, rng)
@@ -170,9 +176,7 @@ POSES = ("roll", "pitch", "roll_rate", "pitch_rate", "roll_acceleration", "pitch
 @eqx.filter_vmap
 def _simulate(run: Run) -> tuple[dict, dict]:
     """What the sensors say, and the truth."""
-    drive = simulate(
-        run.car, run.driver, road=run.road, dt=DT, max_step=MAX_STEP, solver="explicit", throw=False
-    )
+    drive = simulate(run.car, run.driver, road=run.road, dt=DT, max_step=MAX_STEP, solver="explicit", throw=False)
     truth = {name: drive[f"true.{name}"] for name in (*SEEN, *POSES)}
     said = {}
     for device in _devices(run.biases):

@@ -35,14 +35,18 @@ class Score(NamedTuple):
     rows: int
 
 
-def score_band(reference: np.ndarray, mean: np.ndarray, std: np.ndarray | None = None, which: np.ndarray | None = None) -> Score:
+def score_band(
+    reference: np.ndarray, mean: np.ndarray, std: np.ndarray | None = None, which: np.ndarray | None = None
+) -> Score:
     """`mean` and `std` (T,) against a `reference` (T,), over its finite rows, of those `which` (T,) says.
 
     **Raises** `InputError` where no row is left.
     """
     known = np.isfinite(reference) if which is None else np.isfinite(reference) & which
     if not known.any():
-        raise InputError("score_band: the reference is NaN in every row that counts; there is nothing to score against.")
+        raise InputError(
+            "score_band: the reference is NaN in every row that counts; there is nothing to score against."
+        )
     error = (np.asarray(mean) - reference)[known]
     constant = float(np.mean(error))
     rms = lambda values: float(np.sqrt(np.mean(values**2)))

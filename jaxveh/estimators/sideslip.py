@@ -217,8 +217,8 @@ def live(
 
 
 def least_speed_of(car: CarSpecification) -> float:
-    """Speed (m/s) below which sideslip is not scored unless one says otherwise: 3, and 0.5 for cars with less than a metre between
-    the axles. Slower, it is the quotient of two small numbers."""
+    """Speed (m/s) below which sideslip is not scored unless one says otherwise: 3, and 0.5 for cars of less than a metre between
+    their axles. Slower, it is the quotient of two small numbers."""
     return 3.0 if car.wheelbase >= 1.0 else 0.5
 
 
@@ -229,7 +229,7 @@ def score(
     linear tyres, steered from rest, which is the do-nothing baseline.
 
     Over the rows where the reference is finite and `v_x` at least `least_speed` (m/s, default `least_speed_of`). **Returns** by
-    name, for sideslip in degrees (`sideslip_rmse_deg`) and for `v_y` in m/s (`v_y_rmse`), what `diagnostics.Score` has: the
+    name, for sideslip in degrees (`sideslip_rmse_deg`) and for v_y in m/s, what `diagnostics.Score` has: the
     error as measured, its constant part and the rest (an INS that is turned against the car by half a degree says so in every
     row), the largest, coverage of the bands, CRPS; the errors of the baseline as `open_loop_sideslip_...`; `rows` and
     `least_speed`.

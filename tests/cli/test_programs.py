@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from programs import columns, error_line, run, write_car, write_log
 
-from jaxveh import io
+from jaxveh import estimators, io
+from jaxveh.estimators import Calibration
 
 
 def read_json(path):
@@ -140,6 +141,23 @@ def test_truth_that_says_nothing_of_sideslip(tmp_path, drive):
     result, product = estimate(tmp_path, drive, "--truth", "a_y")
     assert "--truth = 'a_y': must be one of 'v_y', 'sideslip'." in error_line(result)
     assert not product.exists()
+
+
+def test_fit_draws_the_force_curves(tmp_path, drive, monkeypatch):
+    """The fit itself stands aside: the car as told in its place."""
+    from jaxveh.cli import sideslip
+
+    def calibrate(car, part, uses, progress):
+        return Calibration("sideslip", SimpleNamespace(model=estimators.sideslip.model(car)), (0.0, 4.0))
+
+    monkeypatch.setattr(sideslip, "calibrate", calibrate)
+    monkeypatch.setattr(sideslip, "fitted_parameters", lambda calibration: {"fitted": {}})
+    product, out = tmp_path / "fitted.toml", tmp_path / "figures"
+    arguments = ("fit", write_log(tmp_path, drive), "--vehicle", write_car(tmp_path), "-o", product, "--out", out)
+    result = run(*arguments)
+    assert result.exit_code == 0, result.output
+    assert io.read_car(product).mass == 1420.0
+    assert (out / "force_curves.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.studies

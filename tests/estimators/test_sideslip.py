@@ -2,6 +2,8 @@
 
 import functools
 
+import dataclasses
+
 import numpy as np
 import pytest
 from shared_data import shared
@@ -89,6 +91,21 @@ def test_estimates_the_sideslip_of_a_car_as_told_and_scores_it():
     # The score counts what it is told: shifting the reference by one degree is one degree of error.
     off = recording.replace(v_y=np.asarray(recording["v_y"]) - np.radians(1.0) * 20.0)
     assert estimators.sideslip.score(CAR, found, off)["sideslip_rmse_deg"] == pytest.approx(1.0, abs=0.15)
+
+
+def test_slow_rows_are_not_scored():
+    recording = log(1500)
+    v_x = np.where(np.arange(1500) < 600, 2.0, 20.0)
+    slow = recording.replace(v_x=v_x, v_y=np.where(v_x < 3.0, 1.0, np.asarray(recording["v_y"])))
+    found = estimators.sideslip.estimate(CAR, slow.without("v_y"))
+    score = lambda **more: estimators.sideslip.score(CAR, found, slow, **more)
+    numbers = score()
+    assert (numbers["rows"], numbers["least_speed"]) == (900, 3.0)
+    assert score(least_speed=1.0)["rows"] == 1500
+    small = dataclasses.replace(CAR, front_axle_to_cg=0.15, rear_axle_to_cg=0.18)
+    assert estimators.sideslip.least_speed_of(small) == 0.5
+    with pytest.raises(InputError, match="speed of at least 30 m/s"):
+        score(least_speed=30.0)
 
 
 def test_the_reference_cannot_reach_a_blind_estimate():
