@@ -1,8 +1,7 @@
 """Sideslip from logs: cleaning, a car with known parameters, the real log."""
 
-import functools
-
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
