@@ -51,14 +51,16 @@ def score_band(
     constant = float(np.mean(error))
     rms = lambda values: float(np.sqrt(np.mean(values**2)))
     without = rms(error - constant)
-    if std is None:
-        bands = [math.nan] * 4
-    else:
+    inside_50 = inside_95 = crps = crps_constant = math.nan
+    if std is not None:
         width = np.maximum(np.asarray(std)[known], 1e-300)
         away = np.abs(error) / width
-        inside = [float(np.mean(away <= half)) for half in (NORMAL_HALF, NORMAL_95)]
-        bands = [*inside, float(np.mean(width * _crps(away))), _crps_of_best_constant(error)]
-    return Score(rms(error), constant, without, float(np.max(np.abs(error))), *bands, int(known.sum()))
+        inside_50, inside_95 = (float(np.mean(away <= half)) for half in (NORMAL_HALF, NORMAL_95))
+        crps, crps_constant = float(np.mean(width * _crps(away))), _crps_of_best_constant(error)
+    return Score(
+        rmse=rms(error), constant=constant, rmse_without_constant=without, worst=float(np.max(np.abs(error))),
+        coverage_50=inside_50, coverage_95=inside_95, crps=crps, crps_constant=crps_constant, rows=int(known.sum()),
+    )  # fmt: skip
 
 
 def _crps(away: np.ndarray) -> np.ndarray:

@@ -247,7 +247,7 @@ def score(
     baseline = np.degrees(open_loop(from_specification(car), recording)["sideslip"])
     units = {"sideslip": np.degrees(1.0), "v_y": 1.0}
     scores = {
-        name: score_band(true, *(units[name] * np.asarray(getattr(of, name)) for of in (found.mean, found.std)), fast)
+        name: score_band(true, units[name] * found[name], units[name] * np.asarray(getattr(found.std, name)), fast)
         for name, true in truth.items()
     }
     named = _named("sideslip", "_deg", scores["sideslip"]) | _named("v_y", "", scores["v_y"])
