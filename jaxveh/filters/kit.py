@@ -18,6 +18,7 @@ from jaxveh.filters.outer_belief import AbstractOuterBelief, AbstractTransparent
 from jaxveh.filters.particle import (
     AbstractAhead,
     AbstractParticleFilter,
+    AbstractProposalFilter,
     DrawnParticles,
     Expected,
     ParticleBelief,
@@ -75,6 +76,7 @@ __all__ = [
     "AbstractGaussianWrapper",
     "AbstractOuterBelief",
     "AbstractParticleFilter",
+    "AbstractProposalFilter",
     "AbstractRemembering",
     "AbstractResampling",
     "AbstractRule",

@@ -230,10 +230,10 @@ class Expected(AbstractAhead):
         return belief, info
 
 
-class ParticleFilter(AbstractParticleFilter):
-    """The bootstrap particle filter (Gordon, Salmond & Smith 1993; Sarkka 2013, algorithm 7.4, the transition as proposal)."""
+class AbstractProposalFilter(AbstractParticleFilter):
+    """A particle filter whose noise is drawn as `propose` says and weighed for it; all else is the bootstrap filter's: first
+    particles from the prior, resampling before each step (Sarkka 2013, algorithm 7.4)."""
 
-    smooths: ClassVar[Smoothing] = Smoothing.particles
     particles: int = eqx.field(static=True)
     resampling: Scheme = eqx.field(static=True, default=numerics.systematic)
     threshold: float = eqx.field(static=True, default=1.0)
@@ -241,6 +241,11 @@ class ParticleFilter(AbstractParticleFilter):
 
     def __check_init__(self):
         check_particle_settings(self.particles, self.threshold, self.gradient)
+
+    @abc.abstractmethod
+    def propose(self, model: StateSpace, particles: Any, row: Row, dt: Any, key: Any) -> tuple[Any, Any]:
+        """The particles with their noise, from where the transition left them `dt` seconds later; and by how much more likely
+        each noise is under the model than it was to be drawn, as a logarithm (N,), None where it was drawn from the model."""
 
     def _start(self, model, row, key):
         particles, key = start_particles(self, model, row, key)
@@ -255,7 +260,11 @@ class ParticleFilter(AbstractParticleFilter):
         particles, drawn = self._draw_particles(draw, belief)
         u = model.step_inputs(belief.t, row.t, belief.u, row.u)
         moved, lost = replace_lost(model.transition(belief.t, row.t, particles, u), particles)
-        moved, lost = numerics.fence((add_noise(model, noise, moved, row.t - belief.t), lost))
+        moved, ratio = self.propose(model, moved, row, row.t - belief.t, noise)
+        if ratio is not None:
+            logs = drawn.log_weights + ratio
+            drawn = drawn._replace(weights=numerics.normalise(logs)[0], log_weights=logs)
+        moved, lost = numerics.fence((moved, lost))
         return Expected(moved, drawn, lost, belief.key, belief.count)
 
     def _draw_particles(self, key, belief):
@@ -273,3 +282,12 @@ class ParticleFilter(AbstractParticleFilter):
         themselves = jnp.arange(n, dtype=jnp.int32)
         kept = belief.particles, DrawnParticles(themselves, belief.weights, logs, code(Result.successful))
         return jax.tree.map(lambda new, old: jnp.where(resampled, new, old), (found.particles, drawn), kept)
+
+
+class ParticleFilter(AbstractProposalFilter):
+    """The bootstrap particle filter (Gordon, Salmond & Smith 1993; Sarkka 2013, algorithm 7.4, the transition as proposal)."""
+
+    smooths: ClassVar[Smoothing] = Smoothing.particles
+
+    def propose(self, model, particles, row, dt, key):
+        return add_noise(model, key, particles, dt), None
