@@ -178,8 +178,9 @@ def test_log_likelihood_scatter_halves_with_four_times_the_particles():
     np.testing.assert_allclose(many.log_mean_likelihood, np.log(np.mean(np.exp(logs - logs[0]))) + logs[0])
     np.testing.assert_allclose(few.log_mean_likelihood, many.log_mean_likelihood, atol=4 * few.std / np.sqrt(200))
     assert many.particles_for(400, std=many.std / 2) == 1600
+    assert many._replace(std=2.4).particles_for(400) == 1600
     assert few._replace(std=1.2).good_for_pmmh
-    assert not few._replace(std=0.5).good_for_pmmh
+    assert [few._replace(std=std).good_for_pmmh for std in (0.5, 1.01, 1.69, 1.71)] == [False, True, True, False]
 
 
 def test_what_is_kept_of_every_row():

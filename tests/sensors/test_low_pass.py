@@ -98,3 +98,9 @@ def test_float32_recordings_stay_float32():
 def test_bad_input_raises_by_name_value_and_range(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_it_passes_20_hz_unless_told():
+    plain = low_pass(drive(), "steer")["steer"]
+    np.testing.assert_array_equal(plain, low_pass(drive(), "steer", 20.0, order=2)["steer"])
+    assert np.max(np.abs(plain - low_pass(drive(), "steer", 21.0)["steer"])) > 1e-6
