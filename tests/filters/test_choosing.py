@@ -97,9 +97,8 @@ class TestTransport:
     def test_its_bias_falls_with_the_smoothing(self):
         model, total, bias = linear(n=3), exact(n=3)["log_likelihood"].sum(), {}
         for epsilon in (2.0, 0.1):
-            # They scatter by about one and a half, and the larger bias is some fifty.
             logs, *_ = runs(
-                filters.ParticleFilter(60, filters.Transport(epsilon, 40)), model, model.rows(drawn(n=3)), 10
+                filters.ParticleFilter(60, filters.Transport(epsilon, 40)), model, model.rows(drawn(n=3)), 40
             )
             bias[epsilon] = abs(np.mean(logs) - total)
         assert bias[0.1] < 0.25 * bias[2.0]

@@ -228,7 +228,7 @@ def test_a_tenth_of_the_first_particles_are_the_prior_s_own():
 class TestTransport:
     def test_its_means_are_finite_on_the_growth_model(self):
         system, recording = drawn_from("two peaks")
-        rows, filter_ = system.rows(recording), filters.ParticleFilter(50, filters.Transport(0.1, 40))
+        rows, filter_ = system.rows(recording), filters.ParticleFilter(100, filters.Transport(0.1, 40))
         found = jax.jit(jax.vmap(lambda key: filters.scan(filter_, system, rows, key)))(
             jax.random.split(jax.random.key(1), 20)
         )
