@@ -59,6 +59,29 @@ def test_some_lost_particles_leave_the_others_whole(name):
     np.testing.assert_allclose(estimate.mean.level[-1], free.mean.level[-1], atol=40.0)
 
 
+def test_a_marginalised_particle_whose_covariance_is_lost_in_part_is_lost():
+    """Its mean stays finite, and so does the other linear state's variance."""
+
+    def transition(system, t0, t1, x, u):
+        # Of no value where the level is low, of endless slope: the drift itself is 0 there.
+        slope = jnp.where(x.level > 900.0, 0.0, 1e200)
+        return x._replace(drift=slope * x.drift)
+
+    model = ss.StateSpace(
+        transition=transition,
+        observation=see_level,
+        process_noise=ss.Discrete(ss.Gaussian({"level": 40.0, "drift": 1.0, "bias": 1.0})),
+        measurement_noise=ss.Gaussian({"flow": 120.0}),
+        prior=ss.Prior(
+            record("Level", {"level": 1000.0, "drift": 0.0, "bias": 0.0}), {"level": 300.0, "drift": 1.0, "bias": 1.0}
+        ),
+    )
+    estimate = filters.run(filters.Marginalised(N, ("drift", "bias")), model, GAPS, key=KEY)
+    for values in (*estimate.mean, *estimate.std, estimate.info.log_likelihood):
+        assert np.isfinite(values).all()
+    assert np.max(estimate.std.drift) < 10
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_all_particles_lost_is_told_in_their_row(name):
     # In the second row, which has no measurement.

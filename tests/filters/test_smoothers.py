@@ -7,8 +7,9 @@ import pytest
 from filter_systems import kalman, linear_model, linear_recording
 from test_every_filter import linear, recordings
 
-from jaxveh import InputError, filters
+from jaxveh import InputError, Recording, filters
 from jaxveh import statespace as ss
+from jaxveh._core.names import record
 from jaxveh.filters import Covariance, SingularValues, SquareRoot
 
 pytestmark = pytest.mark.product
@@ -67,6 +68,27 @@ def test_in_parallel_over_time_it_is_the_same(filter_):
     np.testing.assert_allclose(np.stack(found.filtered.mean), np.stack(loop.mean), rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(found.filtered.info.log_likelihood, loop.info.log_likelihood, rtol=1e-8, atol=1e-10)
     np.testing.assert_allclose(found.filtered.info.nis, loop.info.nis, rtol=1e-8, atol=1e-10)
+
+
+def test_in_parallel_over_time_an_angle_may_be_measured_turns_away():
+    def model(angles):
+        return ss.StateSpace(
+            transition=lambda s, t0, t1, x, u: x._replace(heading=x.heading + (t1 - t0) * x.rate),
+            observation=lambda s, t, x, u: record("Y", {"heading": x.heading}),
+            process_noise=ss.Continuous(ss.Gaussian({"heading": 0.1, "rate": 0.1})),
+            measurement_noise=ss.Gaussian({"heading": 0.1}),
+            prior=ss.Prior(record("X", {"heading": np.pi, "rate": 0.3}), {"heading": 0.2, "rate": 0.2}),
+            angles=angles,
+        )
+
+    time = np.arange(30.0)
+    heading = np.pi + np.sin(0.3 * time)  # across the cut, near where it is linearised first
+    wrapped = np.mod(heading + np.pi, 2 * np.pi) - np.pi
+    about = filters.Iterated(filters.Extended(), 1)
+    exact = filters.smooth(filters.Kalman(), model(()), Recording(time, {"heading": heading}))
+    found = filters.smooth_parallel(about, model(("heading",)), Recording(time, {"heading": wrapped}))
+    np.testing.assert_allclose(np.stack(found.mean), np.stack(exact.mean), rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(np.stack(found.std), np.stack(exact.std), rtol=1e-9)
 
 
 @pytest.mark.parametrize(("method", "most"), [(filters.BackwardSampling(1000), 0.1), (filters.Genealogy(), 0.4)])

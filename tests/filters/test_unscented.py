@@ -84,6 +84,27 @@ def test_an_angle_wraps_in_the_innovation_and_among_the_points():
     np.testing.assert_allclose(estimate.info.innovation_std.heading, [np.hypot(0.1, 0.2)], rtol=1e-9)
 
 
+def test_a_report_has_the_spread_of_its_points_with_negative_weights_too():
+    squares = lambda s, t, x, u: type(x)(jnp.square(x.a), x.a * x.b)
+    model = ss.StateSpace(
+        transition=lambda s, t0, t1, x, u: x,
+        observation=lambda s, t, x, u: ss.model.record("Y", {"y": x.a}),
+        process_noise=None,
+        measurement_noise=ss.Gaussian({"y": 1e6}),
+        prior=ss.Prior(ss.model.record("X", {"a": 1.0, "b": 2.0}), {"a": 0.5, "b": 0.3}),
+        report=squares,
+    )
+    estimate = filters.run(filters.Unscented(alpha=0.5, beta=0.0), model, Recording([0.0], {"y": [1.0]}))
+    # n + lambda = 0.5: points half a variance away, weights of 1, and of -3 and -2.25 in the middle.
+    steps = np.sqrt(0.5) * np.array([[0, 0.5, 0, -0.5, 0], [0, 0, 0.3, 0, -0.3]])
+    a, b = np.array([[1.0], [2.0]]) + steps
+    values = np.array([a * a, a * b])
+    mean = values @ [-3, 1, 1, 1, 1]
+    spread = np.square(values - mean[:, None]) @ [-2.25, 1, 1, 1, 1]
+    np.testing.assert_allclose(np.concatenate(estimate.mean), mean, rtol=1e-9)
+    np.testing.assert_allclose(np.square(np.concatenate(estimate.std)), spread, rtol=1e-9)
+
+
 def _differences(function, model, step=1e-6):
     """Central differences in every entry of every array leaf; matrices of covariance are moved symmetrically."""
     leaves, treedef = jax.tree.flatten(jax.tree.map(np.asarray, model))

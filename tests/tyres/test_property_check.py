@@ -150,6 +150,8 @@ def test_a_good_file_gives_no_alarm(text):
         ("VERTICAL_STIFFNESS = 200000", "VERTICAL_STIFFNESS = 2e6", "deflection over radius is 0.00638"),
         ("QDZ1 = 0.1", "QDZ1 = -0.1", "pneumatic trail over radius is -0.1 at nominal load"),
         ("PHY1 = 0", "PHY1 = 0.02", "lateral force without slip angle over load is -0.311"),
+        ("PHY1 = 0", "PHY1 = 0.007", "lateral force without slip angle over load is -0.1"),
+        ("PHY1 = 0", "PHY1 = -0.007", "lateral force without slip angle over load is 0.1"),
         ("PDX2 = -0.1", "PDX2 = -1.1", "friction along is -0.55 at 10000 N, camber -5.73 degrees, 1.5 bar"),
         ("PDX3 = 0", "PDX3 = 150", "friction along is -0.595 at 400 N, camber -5.73 degrees"),
         ("PDY2 = -0.1", "PDY2 = -1", "friction across is -0.5 at 10000 N"),

@@ -185,6 +185,8 @@ FOUR_WHEELS = {
 
 def test_a_car_on_four_wheels_out_of_a_cars_file():
     spec = CarSpecification(**SPECIFICATION, **FOUR_WHEELS)
+    assert vehicles.numbers_of(spec).name == "car"
+    assert vehicles.numbers_of(dataclasses.replace(spec, name="estate")).name == "estate"
     car = vehicles.build(vehicles.numbers_of(spec), vehicles.SevenDOF)
     for name in ("mass", "track_front", "track_rear", "cg_height", "wheel_radius", "wheel_inertia", "drag"):
         assert float(getattr(car, name)) == getattr(spec, name)

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh.filters.gaussian.rules import AbstractRule, times
+from jaxveh.filters.gaussian.rules import AbstractRule, spread_of, times
 from jaxveh.statespace import AbstractBelief
 
 
@@ -63,16 +63,10 @@ class GaussianBelief(AbstractBelief):
             return rows_of(report, rows)
 
         image = self.rule.image(shown, self.vector, self.factor)
-        spread = jnp.sum(product_diagonal(image), axis=-1)
+        spread = spread_of(image)
         kind = names[0]
         # A weight may be negative, so that rounding can leave a spread a little below zero.
         return kind(*image.mean), kind(*numerics.sqrt(jnp.maximum(spread, 0.0)))
-
-
-def product_diagonal(image):
-    """Squared deviations (m, k), with their signs."""
-    squared = jnp.square(image.deviations)
-    return squared if image.signs is None else squared * jnp.asarray(image.signs, squared.dtype)
 
 
 def rows_of(values, like):

@@ -102,6 +102,14 @@ def times(a: Any, b: Any) -> Any:
     return jnp.sum(a * b, axis=-1) if b.ndim == 1 else jnp.sum(a[:, None, :] * b.T[None], axis=-1)
 
 
+def spread_of(image: Image) -> Any:
+    """The variances (m,) of an image; weights of both signs can leave one a little below zero."""
+    squared = jnp.square(image.deviations)
+    if image.signs is not None:
+        squared = squared * jnp.asarray(image.signs, squared.dtype)
+    return jnp.sum(squared, axis=-1)
+
+
 def product(a: Any, b: Any, signs: np.ndarray | None) -> Any:
     """A W B^T (n, m) of deviations A (n, k) and B (m, k) and the signs W."""
     return times(a if signs is None else a * jnp.asarray(signs, a.dtype), b.T)

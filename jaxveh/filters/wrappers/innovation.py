@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
 from jaxveh.filters.gaussian.noises import covariance_in, law_at
-from jaxveh.filters.gaussian.rules import Image
+from jaxveh.filters.gaussian.rules import spread_of
 from jaxveh.statespace import Row, StateSpace, kit
 
 
@@ -32,11 +32,3 @@ def innovation(filter: AbstractGaussianFilter, model: StateSpace, belief: Any, r
     law = law_at(own, row, lambda: belief.mean)
     noise = jnp.diagonal(covariance_in(law, model.channels, error.dtype))
     return Innovation(wrapped_innovation(model, error, here), spread_of(image), noise, here)
-
-
-def spread_of(image: Image) -> Any:
-    """The variances (m,) of an image."""
-    squared = jnp.square(image.deviations)
-    if image.signs is not None:
-        squared = squared * jnp.asarray(image.signs, squared.dtype)
-    return jnp.sum(squared, axis=-1)

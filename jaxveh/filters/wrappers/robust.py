@@ -16,7 +16,7 @@ from jaxveh.filters.wrappers.base import (
     variances_of,
     with_variances,
 )
-from jaxveh.filters.wrappers.innovation import innovation, spread_of
+from jaxveh.filters.wrappers.innovation import innovation
 from jaxveh.statespace import Smoothing, kit
 
 
