@@ -10,6 +10,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import check_positive, check_whole
 from jaxveh.filters.gaussian.filter import AbstractGaussianFilter, wrapped_innovation
+from jaxveh.filters.gaussian.rules import spread_of
 from jaxveh.filters.gaussian.wrapper import AbstractStateless
 from jaxveh.filters.wrappers.base import (
     check_independent,
