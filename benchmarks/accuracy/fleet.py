@@ -148,7 +148,7 @@ def _draw(numbers: vehicles.CarNumbers, drive: Drive, rng: np.random.Generator, 
     curvature = drive.grip * grip * vehicles.GRAVITY / mean**2 / 2.5
     path = WindingRoad(curvature, *numerics.band_harmonics(way, 1.0 / 400.0, 1.0 / 60.0, 40))
     driver = manoeuvres.SpeedControl(
-        manoeuvres.PathDriver(path, wanted, duration, wheelbase=numbers.wheelbase),
+        manoeuvres.PathDriver(duration, path, wanted, wheelbase=numbers.wheelbase),
         car.mass,
         wheel_radius=numbers.wheel_radius,
     )

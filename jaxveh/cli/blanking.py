@@ -12,8 +12,11 @@ from jaxveh._core.errors import check_positive
 from jaxveh._core.names import check_names
 from jaxveh.estimators import sideslip
 
-SEEN = tuple(need.channel for need in sideslip.needs)
-"""Channels that the estimator sees."""
+SEEN = (*(need.channel for need in sideslip.needs), "steer")
+"""Channels that the estimator sees; of the steer a fit alone makes use, for the front axle."""
+
+NEEDED = tuple(need.channel for need in sideslip.needs if not need.optional)
+"""Those without which there is no estimate."""
 
 INPUTS = tuple(need.channel for need in sideslip.needs if need.throughout)
 """Those that must be known in every row."""
@@ -22,14 +25,14 @@ INPUTS = tuple(need.channel for need in sideslip.needs if need.throughout)
 def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
     """The inputs without gaps: filled along lines over at most `max_gap` seconds where that is given.
 
-    **Raises** `InputError` where a channel of `SEEN` is missing, or an input is still NaN, and the option for it.
+    **Raises** `InputError` where a channel of `NEEDED` is missing, or an input is still NaN, and the option for it.
     """
     if max_gap is not None:
         check_positive("--fill", max_gap, "s")
-    missing = [name for name in SEEN if name not in recording]
+    missing = [name for name in NEEDED if name not in recording]
     if missing:
         raise InputError(
-            f"the log has no {', '.join(missing)}; it must have {', '.join(SEEN)}. Say which columns they are with "
+            f"the log has no {', '.join(missing)}; it must have {', '.join(NEEDED)}. Say which columns they are with "
             "--channels (jaxveh schema channels)."
         )
     for name in INPUTS:

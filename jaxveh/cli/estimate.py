@@ -20,6 +20,7 @@ from jaxveh.cli.output import check_product, check_report, make_folder, write_nu
 class Filter(StrEnum):
     """Which filter."""
 
+    ekf = "ekf"
     ukf = "ukf"
     apf = "apf"
     pf = "pf"
@@ -33,7 +34,9 @@ TRUTH = typer.Option(
     metavar="CHANNEL",
     help="Score against this channel (v_y or sideslip), which no estimator gets to see (but see --calibrate-on).",
 )
-FILTER = typer.Option("--filter", help="Unscented Kalman, auxiliary particle or bootstrap particle filter.")
+FILTER = typer.Option(
+    "--filter", help="Extended or unscented Kalman (smoothed), auxiliary or bootstrap particle filter."
+)
 PARTICLES = typer.Option("--particles", help="Of a particle filter, at least 2.")
 
 
@@ -46,16 +49,16 @@ def estimate(
     calibrate_on: options.CalibrateOn = None,
     fill: options.Fill = None,
     truth: Annotated[str | None, TRUTH] = None,
-    filter: Annotated[Filter, FILTER] = Filter.ukf,
+    filter: Annotated[Filter, FILTER] = Filter.ekf,
     particles: Annotated[int, PARTICLES] = 1000,
     seed: options.Seed = 0,
     numbers: options.Numbers = None,
     out: options.Out = None,
     force: options.Force = False,
 ) -> None:
-    """Estimate sideslip and the other states of a car from steer, v_x, a_x, a_y and yaw_rate.
+    """Estimate sideslip, slip and forces of a car from v_x, a_x, a_y and yaw_rate.
 
-    With --calibrate the tyres, noises and steering offset are fitted on that span first, and the rows after it are
+    With --calibrate the rear axle, noises and sensor offsets are fitted on that span first, and the rows after it are
     estimated; without it, the car file is taken at its word and the whole log is estimated. The file has a column for
     each state and, beside it, <name>_std, its standard deviation: m/s, rad, rad/s.
 

@@ -29,10 +29,10 @@ def fit(
     out: options.Out = None,
     force: options.Force = False,
 ) -> None:
-    """Fit tyres, noises and steering offset to a log, or to a span of it, and write the car with what was found.
+    """Fit axles, noises and sensor offsets to a log, or to a span of it, and write the car with what was found.
 
-    What is fitted sees steer, v_x, a_x, a_y and yaw_rate, and the channels of --calibrate-on. The car file is TOML in SI
-    units: [bold]jaxveh schema car[/].
+    What is fitted sees v_x, a_x, a_y, yaw_rate and steer (for the front axle), and the channels of --calibrate-on. The car file
+    is TOML in SI units: [bold]jaxveh schema car[/].
 
     Example: [bold]jaxveh fit drive.csv --vehicle car.toml -o car_fitted.toml --calibrate 0:120[/]
     """
@@ -45,7 +45,7 @@ def fit(
     with progress("fit") as report:
         calibration = sideslip.calibrate(car, part, uses, report)
     where = f"{part.time[0]:g} to {part.time[-1]:g} s of {log.name}"
-    io.write_car(sideslip.fitted_car(calibration, car), product, note=f"Fitted to {where}.", overwrite=force)
+    io.write_car(sideslip.fitted_car(calibration, car, part), product, note=f"Fitted to {where}.", overwrite=force)
     print_fitted(calibration)
     results().print(f"{product}: fitted to {where}")
     if out is not None:

@@ -19,23 +19,23 @@ SCORED = ("v_y", "sideslip")
 
 def filter_of(name: str, particles: int) -> filters.AbstractFilter:
     """The filter of an option's name."""
-    if name == "ukf":
-        return filters.Unscented()
+    if name in ("ekf", "ukf"):
+        return filters.Extended() if name == "ekf" else filters.Unscented()
     return (filters.AuxiliaryParticleFilter if name == "apf" else filters.ParticleFilter)(particles)
 
 
 def calibrate(car: CarSpecification, part: Recording, uses: tuple[str, ...], progress: Progress) -> Calibration:
-    """Tyres, noises and steering offset fitted on a span."""
+    """The rear axle, noises and sensor offsets fitted on a span."""
     return sideslip.calibrate(car, part, uses=uses, progress=progress)
 
 
 def estimate(
     source: Calibration | CarSpecification,
     part: Recording,
-    kind: str = "ukf",
+    kind: str = "ekf",
     particles: int = 1000,
     seed: int = 0,
-) -> filters.Estimate:
+) -> filters.Estimate | filters.SmoothedEstimate:
     """The states along the rows of `part`, of a calibration or of a car's file taken at its word."""
     return sideslip.estimate(source, part, filter=filter_of(kind, particles), key=jax.random.key(seed))
 
@@ -48,7 +48,9 @@ def truth_of(seen: Recording, name: str) -> dict[str, np.ndarray]:
     return {"sideslip": values, "v_y": v_x * np.tan(values)}
 
 
-def score(car: CarSpecification, found: filters.Estimate, seen: Recording, name: str) -> dict[str, float]:
+def score(
+    car: CarSpecification, found: filters.Estimate | filters.SmoothedEstimate, seen: Recording, name: str
+) -> dict[str, float]:
     """RMSEs and the coverage of the 95 % band, next to the open-loop linear model's, by the names of the JSON file."""
     return sideslip.score(car, found, seen.replace(v_y=truth_of(seen, name)["v_y"]))
 
@@ -71,16 +73,18 @@ def fitted_parameters(calibration: Calibration | None) -> dict[str, Any]:
     }
 
 
-def fitted_car(calibration: Calibration, car: CarSpecification) -> CarSpecification:
-    """The specification with the fitted values in place."""
-    return sideslip.fitted_car(calibration, car)
+def fitted_car(calibration: Calibration, car: CarSpecification, part: Recording) -> CarSpecification:
+    """The specification with the values fitted to `part` in place."""
+    return sideslip.fitted_car(calibration, car, part)
 
 
 def curves(calibration: Calibration, car: CarSpecification, part: Recording) -> tuple[dict, dict]:
     """Cars before and after, and the slip angles that the span visited, for `plots.force_curves`."""
-    cars = {
-        "car file": vehicles.from_specification(car),
-        "fitted": vehicles.from_specification(fitted_car(calibration, car)),
-    }
+    fitted = fitted_car(calibration, car, part)
+    cars = {"car file": vehicles.from_specification(car), "fitted": vehicles.from_specification(fitted)}
     found = estimate(calibration, part)
-    return cars, {"front": found.mean.slip_angle_front, "rear": found.mean.slip_angle_rear}
+    v_x, yaw_rate = np.asarray(part["v_x"]), np.asarray(part["yaw_rate"])
+    turned = np.arctan2(np.asarray(found.mean.v_y) + car.front_axle_to_cg * yaw_rate, v_x)
+    front = np.asarray(part["steer"]) - (fitted.steer_offset or 0.0) - turned
+    fast = np.isfinite(front) & (v_x >= sideslip.least_speed_of(car))
+    return cars, {"front": front[fast], "rear": np.asarray(found.mean.slip_angle_rear)[fast]}

@@ -3,28 +3,28 @@
 from jaxveh.estimators import kit, mass_and_grade, sideslip
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.contract import Calibration
-from jaxveh.estimators.handling import Handling, handling_model
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.live import Live, LiveAnswer, LiveBelief
 from jaxveh.estimators.observability import observe, predict_measurements
+from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.state_space import PROCESS_NOISE, START_SPREAD, held_rows, state_space
 
 __all__ = [
     "PROCESS_NOISE",
     "START_SPREAD",
     "Calibration",
-    "Handling",
     "Live",
     "LiveAnswer",
     "LiveBelief",
+    "RearAxle",
     "clean",
-    "handling_model",
     "held_rows",
     "kit",
     "mass_and_grade",
     "observe",
     "open_loop",
     "predict_measurements",
+    "rear_axle_model",
     "sideslip",
     "state_space",
 ]

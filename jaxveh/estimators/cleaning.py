@@ -7,81 +7,197 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
+from jaxveh._core.errors import check_positive
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
 from jaxveh.estimators.live import AbstractCleaning, clean_recording
+from jaxveh.estimators.rear_axle import CHANNEL, USUAL_WHEELBASE, least_speed_of
 from jaxveh.sensors import LowPass
-
-STEER_RATE = 3.0
-"""rad/s at the road wheels: no driver steers faster, so that a sample beyond it is a spike and the last one is held."""
-
-LONGEST_SPIKE = 0.1
-"""s: what lasts longer is no spike."""
 
 A_X_CUTOFF = 1.6
 """Hz: the axle loads follow the longitudinal acceleration, not its vibration."""
 
+FORCE_CUTOFF = 1.0
+"""Hz, of a car of the usual wheelbase: the axle's force, whose curve is not straight, is seen without the body's vibration."""
+
+A_Y_STEP, A_Y_RANGE = 8.0, 40.0
+"""m/s^2: a sample further than the first from the last good one is a spike, and so is one larger than the second."""
+
+YAW_RATE_STEP, YAW_ACCELERATION = 0.15, 25.0
+"""rad/s, and rad/s^2, of a car of the usual wheelbase: a sample further from the last good one than noise and the quickest car
+can be is a spike."""
+
+OUTLYING = 8.0
+"""A spike is also further away than this many times the mean change from row to row: some channels are nothing but noise."""
+
+MEMORY = 1.0
+"""s."""
+
+LONGEST_SPIKE = 0.1
+"""s: what lasts longer is no spike."""
+
+LONGEST_STILL = 0.5
+"""s: a channel of a moving car that stays the same to the last digit for longer is stuck."""
+
+LONGEST_HOLD = 0.3
+"""s: for so long the last good acceleration and yaw rate stand for missing ones; later the lateral velocity is taken to stay."""
+
 BLIND = (
-    Need("steer", "rad", throughout=True),
     Need("v_x", "m/s", throughout=True),
-    Need("a_x", "m/s^2", throughout=True),
-    Need("a_y", "m/s^2"),
     Need("yaw_rate", "rad/s"),
+    Need("a_y", "m/s^2", optional=True),
+    Need("a_x", "m/s^2", optional=True),
 )
-"""What sideslip is estimated from, blind."""
+"""What sideslip is estimated from, blind. Without a_x the speed's changes take its place; without a_y the steady turn's v_x
+yaw_rate, and then no tyre can be calibrated."""
 
 
-class HandlingMemory(NamedTuple):
-    """The last steer (rad) that was no spike and its time (s); the row before as it came; and the low-pass' state."""
+class Watched(NamedTuple):
+    """Of a channel: the last good value and its time (s), the value of the row before as it came, since when (s) it has been the
+    same, and the mean size of its changes from row to row, over about `MEMORY`."""
 
-    steer: Any
-    steer_time: Any
+    value: Any
+    time: Any
+    raw: Any
+    since: Any
+    change: Any
+
+
+class RearAxleMemory(NamedTuple):
+    """The row before: time (s), speed, a_x; the low-passes' states; what is known of the measured channels; and the low-passes
+    of the integrals of a_y and v_x yaw_rate, less the integrals (m/s)."""
+
     t: Any
+    v_x: Any
     a_x: Any
-    a_y: Any
-    yaw_rate: Any
-    low_pass: Any
+    slow_a_x: Any
+    smooth_a_y: Any
+    smooth_yaw_rate: Any
+    a_y: Watched
+    yaw_rate: Watched
+    a_y_behind: Any
+    turning_behind: Any
+    felt: Any
 
 
-class HandlingCleaning(AbstractCleaning):
-    """Steer spikes held, a_x low-passed (first order, settled at the first row), and repeated measurements as missing.
+class RearAxleCleaning(AbstractCleaning):
+    """From the log's channels to the inputs of `rear_axle_model`, and its balance: nothing, missing where the force is not known.
 
-    Loggers repeat the last value where a sensor was slower than the log: a row in which neither `yaw_rate` nor `a_y` moved
-    holds no news, and counting it twice would make a filter too sure. `steer_rate` (rad/s) and `longest` (s) tell a spike.
+    Spikes and stuck channels are missing, and what is missing in both is held for a while. a_x is low-passed (first order); a_y
+    and yaw_rate are there as they came, for the integral, and low-passed (second order), for the force. What the integral
+    gained since the low-passed rows is added to the balance, so that the low-pass costs no delay. `wheelbase` (m).
     """
 
-    steer_rate: float = eqx.field(static=True, default=STEER_RATE)
-    longest: float = eqx.field(static=True, default=LONGEST_SPIKE)
-    cutoff: float = eqx.field(static=True, default=A_X_CUTOFF)
+    wheelbase: float = eqx.field(static=True, default=USUAL_WHEELBASE)
+
+    def __check_init__(self):
+        check_positive("RearAxleCleaning.wheelbase", self.wheelbase, "m")
 
     @property
     def channels(self):
         return tuple(need.channel for need in BLIND)
 
+    @property
+    def needed(self):
+        return tuple(need.channel for need in BLIND if need.throughout)
+
     def first(self, t, values):
-        state = self._low_pass(values["a_x"]).start(values["a_x"])
-        return HandlingMemory(values["steer"], t, t, values["a_x"], values["a_y"], values["yaw_rate"], state), values
+        v_x, raw = values["v_x"], values["yaw_rate"]
+        none = jnp.zeros_like(v_x)
+        known = lambda value: jnp.where(jnp.isnan(value), none, value)
+        yaw_rate = known(raw)
+        a_y, a_x = jnp.where(jnp.isnan(values["a_y"]), v_x * yaw_rate, values["a_y"]), known(values["a_x"])
+        slow = self._a_x_low_pass(v_x).start(a_x)
+        smooth = [self._low_pass(v_x).start(value) for value in (a_y, yaw_rate)]
+        watched = [Watched(value, t, values[name], t, none) for name, value in (("a_y", a_y), ("yaw_rate", yaw_rate))]
+        # As after a long time at this acceleration: the low-pass runs behind by its delay.
+        behind = lambda rate: (-rate * self._low_pass(v_x).delay, rate)
+        felt = (a_y, v_x * yaw_rate)
+        a_y_behind, turning_behind = (behind(rate) for rate in felt)
+        memory = RearAxleMemory(
+            t, v_x, values["a_x"], slow, smooth[0], smooth[1], watched[0], watched[1], a_y_behind, turning_behind, felt
+        )
+        return memory, self._row(memory, none, jnp.isnan(raw), v_x, a_y, yaw_rate)
 
     def next(self, memory, t, values):
-        steer, a_x, a_y, yaw_rate = (values[name] for name in ("steer", "a_x", "a_y", "yaw_rate"))
-        jumps = jnp.abs(steer - memory.steer) > self.steer_rate * (t - memory.t)
-        spike = jumps & (t - memory.steer_time < self.longest)
-        steer = jnp.where(spike, memory.steer, steer)
-        state = self._low_pass(a_x).step(memory.low_pass, memory.a_x, a_x, t - memory.t)
-        repeated = (yaw_rate == memory.yaw_rate) & (a_y == memory.a_y)
-        news = lambda value: jnp.where(repeated, jnp.nan, value)
-        after = HandlingMemory(steer, jnp.where(spike, memory.steer_time, t), t, a_x, a_y, yaw_rate, state)
-        found = {"steer": steer, "a_x": state[0], "a_y": news(a_y), "yaw_rate": news(yaw_rate)}
-        return after, values | found
+        dt, v_x = t - memory.t, values["v_x"]
+        quick, moves = USUAL_WHEELBASE / self.wheelbase, v_x > 1.0
+        # No accelerometer at all, or none so far.
+        none = jnp.isnan(values["a_y"]) & jnp.isnan(memory.a_y.raw)
+        turned, yaw_rate = _watch(
+            memory.yaw_rate, t, values["yaw_rate"], moves, YAW_RATE_STEP * quick**0.5, YAW_ACCELERATION * quick, 1e3
+        )
+        pushed, a_y = _watch(memory.a_y, t, values["a_y"], moves, A_Y_STEP, 0.0, A_Y_RANGE)
+        # Loggers repeat the last row where a sensor is slower than the log.
+        repeated = (values["yaw_rate"] == memory.yaw_rate.raw) & (values["a_y"] == memory.a_y.raw)
+        old = jnp.maximum(t - yaw_rate.time, jnp.where(none, 0.0, t - a_y.time)) > LONGEST_HOLD
+        rate = yaw_rate.value
+        push = jnp.where(none | old, v_x * rate, a_y.value)
+        lost = jnp.isnan(turned) | (jnp.isnan(pushed) & ~none) | repeated
+        told = jnp.where(jnp.isnan(values["a_x"]), (v_x - memory.v_x) / dt, values["a_x"])
+        before = jnp.where(jnp.isnan(memory.a_x), told, memory.a_x)
+        slow = self._a_x_low_pass(v_x).step(memory.slow_a_x, before, told, dt)
+        one, (a_y_before, turning_before) = self._low_pass(v_x), memory.felt
+        after = RearAxleMemory(
+            t, v_x, told, slow,
+            one.step(memory.smooth_a_y, a_y_before, push, dt), one.step(memory.smooth_yaw_rate, memory.yaw_rate.value, rate, dt),
+            a_y, yaw_rate,
+            _behind(one, memory.a_y_behind, a_y_before, dt), _behind(one, memory.turning_behind, turning_before, dt),
+            (push, v_x * rate),
+        )  # fmt: skip
+        return after, self._row(after, dt, lost, v_x, push, rate)
+
+    def _row(self, memory, dt, lost, v_x, a_y, yaw_rate):
+        low_pass = self._low_pass(v_x)
+        slow = (v_x < least_speed_of(self.wheelbase)) | (dt <= 0)
+        (smooth_a_y, _), (smooth, change) = memory.smooth_a_y, memory.smooth_yaw_rate
+        return {
+            "v_x": v_x, "a_x": memory.slow_a_x[0], "yaw_rate": yaw_rate, "turning": v_x * yaw_rate, "a_y": a_y,
+            "yaw_rate_smooth": smooth, "yaw_acceleration": change, "a_y_smooth": smooth_a_y,
+            "a_y_lead": -memory.a_y_behind[0], "turning_lead": -memory.turning_behind[0],
+            "lag": low_pass.delay, "step": jnp.maximum(dt, 1e-6),
+            CHANNEL: jnp.where(lost | slow, jnp.nan, jnp.zeros_like(v_x)),
+        }  # fmt: skip
+
+    def _a_x_low_pass(self, like) -> LowPass:
+        return LowPass(jnp.asarray(A_X_CUTOFF, like.dtype), 1)
 
     def _low_pass(self, like) -> LowPass:
-        return LowPass(jnp.asarray(self.cutoff, like.dtype), 1)
+        return LowPass(jnp.asarray(FORCE_CUTOFF * (USUAL_WHEELBASE / self.wheelbase) ** 0.5, like.dtype), 2)
 
 
-def clean(recording: Recording) -> Recording:
-    """The log with steer spikes held, a_x low-passed, and repeated measurements as missing: see `HandlingCleaning`.
+def _behind(low_pass: LowPass, state, rate, dt):
+    """The low-pass of an integral less the integral itself, after `dt` seconds in which it grows by `rate`."""
+    value, change = low_pass.step(state, 0.0 * rate, rate * dt, dt)
+    return value - rate * dt, change
 
-    **Raises** `InputError` where a channel is missing, or an input is NaN (fill it on request first).
+
+def _watch(before: Watched, t, value, moves, step: float, rate: float, most: float) -> tuple[Any, Watched]:
+    """A channel's value, NaN where it is a spike or has stood still for too long, and what is known of it after the row."""
+    missing = jnp.isnan(value)
+    size = jnp.abs(value - before.value)
+    jump = (size > step + rate * (t - before.time)) & (size > OUTLYING * before.change)
+    spike = (jump & (t - before.time < LONGEST_SPIKE)) | (jnp.abs(value) > most)
+    since = jnp.where(value == before.raw, before.since, t)
+    stuck = moves & (t - since > LONGEST_STILL)
+    good = ~(missing | spike | stuck)
+    kept = lambda new, old: jnp.where(good, new, old)
+    share = (t - before.time) / MEMORY
+    # An outlier counts for no more than the limit, so that a channel that becomes noisy is believed again.
+    change = jnp.where(
+        missing, before.change, before.change + jnp.minimum(share, 1.0) * (jnp.minimum(size, step) - before.change)
+    )
+    after = Watched(
+        kept(value, before.value), kept(t, before.time), jnp.where(missing, before.raw, value), since, change
+    )
+    return jnp.where(good, value, jnp.nan), after
+
+
+def clean(recording: Recording, cleaning: RearAxleCleaning | None = None) -> Recording:
+    """The log as the filter of sideslip reads it: see `RearAxleCleaning`.
+
+    **Raises** `InputError` where a channel is missing, or a speed is NaN (fill it on request first).
     """
     check_needs("sideslip", BLIND, recording)
-    return clean_recording(HandlingCleaning(), recording)
+    absent = {need.channel: jnp.full(len(recording), jnp.nan) for need in BLIND if need.channel not in recording}
+    return clean_recording(cleaning or RearAxleCleaning(), recording.replace(**absent))

@@ -11,10 +11,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
 from jaxveh.numerics import apart
-from jaxveh.statespace import AbstractFilter, Info, Row, StateSpace
+from jaxveh.statespace import AbstractFilter, Info, Row, StateSpace, kit
 
 
 class AbstractCleaning(eqx.Module):
@@ -27,7 +28,12 @@ class AbstractCleaning(eqx.Module):
     @property
     @abc.abstractmethod
     def channels(self) -> tuple[str, ...]:
-        """The channels that it reads."""
+        """The channels that it reads; none where it hands on those of the model."""
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Those of them that every row must have; by default the model's inputs."""
+        return ()
 
     @abc.abstractmethod
     def first(self, t: Any, values: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
@@ -121,29 +127,32 @@ class Live(eqx.Module):
         """The belief after the next row, and what it says. **Raises** `InputError` for an input that is not given."""
         return _live_step(self, belief, self._row(t, channels))
 
-    def _row(self, t, channels: Mapping[str, Any]) -> Row:
-        of = lambda names: {name: channels[name] for name in names if name in channels}
-        return self.model.row(t, of(self.model.inputs), of(self.model.channels))
+    def _row(self, t, channels: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
+        """Time and channels as scalars: those that the cleaning reads, else those of the model; NaN for what is not given."""
+        needed = self.cleaning.needed or self.model.inputs
+        missing = [name for name in needed if name not in channels]
+        if missing:
+            raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
+        names = self.cleaning.channels or (*self.model.inputs, *self.model.channels)
+        numbers = [channels.get(name, np.nan) for name in names]
+        t, *values = kit.scalar_row(t, numbers, self.model.prior.mean[0].dtype)
+        return t, dict(zip(names, values, strict=True))
 
 
 @eqx.filter_jit
-def _live_init(live: Live, row: Row) -> tuple[LiveBelief, LiveAnswer]:
-    memory, values = apart(live.cleaning.first, row.t, row.t, _values(row))
-    belief, info = live.filter.init(live.model, _with(row, values), live.key)
+def _live_init(live: Live, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
+    memory, values = apart(live.cleaning.first, row[0], *row)
+    belief, info = live.filter.init(live.model, _cleaned(live.model, row[0], values), live.key)
     return LiveBelief(belief, memory), LiveAnswer(*belief.moments(live.model), info)
 
 
 @eqx.filter_jit
-def _live_step(live: Live, before: LiveBelief, row: Row) -> tuple[LiveBelief, LiveAnswer]:
-    memory, values = apart(live.cleaning.next, row.t, before.memory, row.t, _values(row))
-    belief, info = live.filter.step(live.model, before.belief, _with(row, values))
+def _live_step(live: Live, before: LiveBelief, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
+    memory, values = apart(live.cleaning.next, row[0], before.memory, *row)
+    belief, info = live.filter.step(live.model, before.belief, _cleaned(live.model, row[0], values))
     return LiveBelief(belief, memory), LiveAnswer(*belief.moments(live.model), info)
 
 
-def _values(row: Row) -> dict[str, Any]:
-    return {**row.u._asdict(), **row.y._asdict()}
-
-
-def _with(row: Row, values: dict[str, Any]) -> Row:
-    of = lambda like: {name: values[name] for name in like._fields}
-    return row._replace(u=record("Inputs", of(row.u)), y=record("Measurements", of(row.y)))
+def _cleaned(model: StateSpace, t, values: dict[str, Any]) -> Row:
+    of = lambda kind, names: record(kind, {name: values[name] for name in names})
+    return Row(t, of("Inputs", model.inputs), of("Measurements", model.channels))

@@ -1,9 +1,12 @@
-"""Sideslip from an ordinary log: calibrate a car on a span, estimate the rest, score against a reference."""
+"""Sideslip of a real car: calibrated on a span of a log, then estimated on another, blind of any reference.
+
+What is measured is what every production car has: speed, yaw rate and accelerations. Lateral velocity is integrated from them,
+and held by the slip angle that the rear axle's force asks for: see `rear_axle`.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -14,38 +17,24 @@ from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Score, score_band
-from jaxveh.estimators.cleaning import BLIND, HandlingCleaning, clean
-from jaxveh.estimators.contract import Calibration, Need, check_needs, cut_pieces, model_of, span_of
-from jaxveh.estimators.handling import Handling, handling_model
+from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
+from jaxveh.estimators.coarse_log import coarse
+from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of, span_of
+from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.live import Live
-from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
-from jaxveh.fitting import Fit, Target, prediction_error
+from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
+from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
+from jaxveh.estimators.rear_axle_prior import rear_axle
+from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
 from jaxveh.io import AxleTyre, CarSpecification
-from jaxveh.statespace import StateSpace
-from jaxveh.tyres import MagicFormula, kit
+from jaxveh.statespace import Smoothing, StateSpace, kit
 from jaxveh.vehicles import from_specification
 
 NAME = "sideslip"
 
 needs = BLIND
-"""Steer, speed and longitudinal acceleration in every row; lateral acceleration and yaw rate where they were measured."""
-
-START = kit.GenericTyre(friction=1.1, E=0.0)
-"""Of axles that a car's file gives a cornering stiffness alone. More friction and a rounder peak than `kit.GENERIC_TYRE`, with
-which cars are drawn: at the file's word, on the second halves of two logs, 0.30 degrees instead of 0.42 (Ferrari) and 48 instead
-of 65 (F1TENTH)."""
-
-GENERIC_CG_HEIGHT = 0.45
-"""m above ground, where a car's file is silent."""
-
-PRIOR = {
-    "B": 0.3, "D": 0.15, "E": 0.25, "cg_height": 0.22, "yaw_inertia": 0.2, "steer_offset": 0.15, "steer_gain": 0.03,
-    "yaw_rate_offset": 1.0, "a_y_gain": 0.03, "brake_share": 1.0, "ellipse": 0.3, "force_offset": 1.0,
-    "front_asymmetry": 1.0, "rear_asymmetry": 1.0, "heading_offset": 1.0, "force_time": 0.7, "bias_time": 0.7,
-    "v_y": 0.7, "yaw_rate": 0.7, "front_error": 0.5, "rear_error": 0.5, "a_y_error": 0.7, "a_y": 0.5,
-}  # fmt: skip
-"""Relative prior spreads by name, on each parameter's own line (unbounded ones in units of their declared scale)."""
+"""Speed in every row; yaw rate and accelerations where they were measured."""
 
 SHORTEST = 20.0
 """s: a span shorter than this holds too few corners to calibrate a car on."""
@@ -53,134 +42,90 @@ SHORTEST = 20.0
 TARGET_WEIGHTS = (0.05, 0.02)
 """rad: how closely the estimate is asked to follow a sideslip reference; the choice is made inside the span."""
 
-TARGET_BEND = 0.0035
-"""rad: errors beyond it count less than by their square (INS alignment, tyres that warm up)."""
+WITHOUT_A_Y = 2.0
+"""m/s^1.5: noise of v_y where no accelerometer holds it, so that the axle's slip angle does."""
+
+CURVE = 1.35
+"""The Magic Formula's C in a fitted car's file."""
 
 
-def chosen_parameters(model: Any):
-    """The parameters and noise levels that a calibration fits."""
-    s, car = model.system, model.system.car
-    axles = [leaf for tyre in (car.front, car.rear) for leaf in (tyre.B, tyre.D, tyre.E)]
-    body = [car.cg_height, car.yaw_inertia, car.steer_offset]
-    sensors = [s.steer_gain, s.yaw_rate_offset, s.a_y_gain, s.heading_offset]
-    forces = [s.brake_share, s.ellipse, s.force_offset, s.front_asymmetry, s.rear_asymmetry, s.force_time, s.bias_time]
-    return (*axles, *body, *sensors, *forces, *model.process_noise.law.std, *model.measurement_noise.std)
-
-
-def fitted_car(calibration: Calibration, car: CarSpecification) -> CarSpecification:
-    """The car's file with the fitted values in place, as far as a car file can say them."""
-    fitted = calibration.model.system.car
-    offset = float(fitted.steer_offset) / float(calibration.model.system.steer_gain)
-    return dataclasses.replace(
-        car,
-        yaw_inertia=float(fitted.yaw_inertia),
-        cg_height=float(fitted.cg_height),
-        steer_offset=-offset,
-        front=_axle(fitted.front),
-        rear=_axle(fitted.rear),
-        front_cornering_stiffness=float(fitted.front.cornering_stiffness),
-        rear_cornering_stiffness=float(fitted.rear.cornering_stiffness),
-    )
-
-
-def _axle(tyre: MagicFormula) -> AxleTyre:
-    return AxleTyre(**{n: float(getattr(tyre, n)) for n in ("B", "C", "D", "E", "S_h", "S_v", "nominal_load")})
-
-
-def handling_car(car: CarSpecification) -> Handling:
-    """The handling model of a car file: its own tyres where it has them, generic ones of its cornering stiffness else."""
-    known = from_specification(dataclasses.replace(car, cg_height=car.cg_height or GENERIC_CG_HEIGHT))
-    loads = known.static_loads()
-    axles = [
-        tyre if given is not None and given.nominal_load is not None else _generic(tyre, load, given is not None)
-        for tyre, load, given in zip((known.front, known.rear), loads, (car.front, car.rear), strict=True)
-    ]
-    return Handling(eqx.tree_at(lambda c: (c.front, c.rear), known, axles))
-
-
-def _generic(tyre: MagicFormula, load, told: bool) -> MagicFormula:
-    """An axle that scales with load: as told, at its static load, or generic with the tyre's cornering stiffness."""
-    if told:
-        return MagicFormula(tyre.B, tyre.C, tyre.D, tyre.E, tyre.S_h, tyre.S_v, nominal_load=load)
-    return START.magic_formula(tyre.cornering_stiffness, load)
-
-
-def model(car: CarSpecification | Handling) -> StateSpace:
-    """The state space of a car's file taken at its word, or of a `Handling` car: see `handling_model`."""
-    return handling_model(car if isinstance(car, Handling) else handling_car(car))
+def model(car: CarSpecification | RearAxle) -> StateSpace:
+    """The state space of a car's file taken at its word, or of a `RearAxle`: see `rear_axle_model`."""
+    return rear_axle_model(car if isinstance(car, RearAxle) else rear_axle(car))
 
 
 def calibrate(
-    car: CarSpecification | Handling,
+    car: CarSpecification | RearAxle,
     recording: Recording,
     *,
     filter: AbstractFilter | None = None,
     progress: Progress = silent,
     uses: tuple[str, ...] = (),
 ) -> Calibration:
-    """Fit tyres, noise levels and sensor offsets of a car to a span of a log, by maximum posterior of a filter.
+    """Fit the rear axle, noise levels and sensor offsets of a car to a span of a log, by maximum posterior of a filter.
 
-    Blind (`uses=()`) it reads steer, v_x, a_x, a_y and yaw_rate alone. With `uses=("v_y",)` the span's v_y supervises the
+    Blind (`uses=()`) it reads v_x, a_x, a_y and yaw_rate alone. With `uses=("v_y",)` the span's v_y supervises the
     fit as a reference for sideslip; how strongly is chosen by fitting on the span's first half and looking at the second, where
     "not at all" is among the choices: a reference with slow errors of its own makes a car worse. Start values and priors
-    come from the car's file and `PRIOR`, and nothing outside the recording is looked at. `validation` of what is returned is the
-    sideslip RMSE in degrees on the span's second half by the reference's weight (rad), fitted on its first.
+    come from the car's file and `rear_axle_prior.SPREADS`, and nothing outside the recording is looked at. `validation` of what
+    is returned is the sideslip RMSE in degrees on the span's second half by the reference's weight (rad), fitted on its first.
 
-    **Raises** `InputError` for missing channels, or a span shorter than `SHORTEST`; `FilterError` where the fit fails.
+    **Raises** `InputError` for missing channels, a_y among them, or a span shorter than `SHORTEST`; `FilterError` where the fit
+    fails.
     """
     for name in uses:
         check_one_of("uses", name, ("v_y",))
     span = span_of(NAME, recording, SHORTEST, "corners")
     check_needs(NAME, (*needs, *(Need(name, "m/s") for name in uses)), recording)
-    filter, log = filter or Unscented(), clean(recording)
-    start = model(car)
+    if not _measured(recording, "a_y"):
+        raise InputError(
+            "sideslip: a_y (m/s^2) is missing from the log: without an accelerometer no tyre can be calibrated. Estimate "
+            "with the car's file at its word, or calibrate on another log of the car."
+        )
+    filter, start = filter or Extended(), model(car)
+    seen = recording.select([name for name in (*[need.channel for need in needs], *uses) if name in recording])
+    log = coarse(seen, _wheelbase(start))
+    if not np.isfinite(np.asarray(log[start.channels[0]])).any():
+        raise InputError(
+            f"sideslip: no row of the span {span[0]:g} to {span[1]:g} s is fast enough and measured: nothing to calibrate on."
+        )
     if not uses:
-        return Calibration(NAME, _fit(filter, start, log, None, progress), span)
+        return Calibration(NAME, fit_rear_axle(filter, start, log, None, progress), span)
     half = len(log) // 2
-    first = _blank(log, slice(half, len(log)))
-    parts = [_part(progress, i, 3 + len(TARGET_WEIGHTS)) for i in range(3 + len(TARGET_WEIGHTS))]
-    blind = _fit(filter, start, first, None, parts[0])
-    validation = [(None, _validate(filter, blind.model, log, half))]
-    for i, weight in enumerate(TARGET_WEIGHTS):
-        fit = _fit(filter, blind.model, first, weight, parts[1 + i], centre=start)
-        validation.append((weight, _validate(filter, fit.model, log, half)))
+    first = _blank(log, slice(half, len(log)), start.channels)
+    count = 2 + len(TARGET_WEIGHTS)
+    fits = [
+        fit_rear_axle(filter, start, first, _reference(first, weight), _part(progress, i, count))
+        for i, weight in enumerate((None, *TARGET_WEIGHTS))
+    ]
+    errors = [_validate(filter, fit.model, log, half) for fit in fits]
+    validation = tuple(zip((None, *TARGET_WEIGHTS), errors, strict=True))
     weight = min(validation, key=lambda one: one[1])[0]
-    fit = _fit(filter, blind.model, log, None, parts[-2], centre=start)
-    if weight is not None:
-        fit = _fit(filter, fit.model, log, weight, parts[-1], centre=start)
-    return Calibration(NAME, fit, span, weight, tuple(validation))
+    fit = fit_rear_axle(filter, start, log, _reference(log, weight), _part(progress, count - 1, count))
+    return Calibration(NAME, fit, span, weight, validation)
+
+
+def _measured(recording: Recording, name: str) -> bool:
+    return name in recording and bool(np.isfinite(np.asarray(recording[name])).any())
+
+
+def _wheelbase(model: StateSpace) -> float:
+    return float(model.system.wheelbase)
 
 
 def _part(progress: Progress, index: int, count: int) -> Progress:
     return lambda done, total, stage: progress(index + done / max(total, 1), count, stage)
 
 
-def _blank(log: Recording, rows: slice) -> Recording:
+def _blank(log: Recording, rows: slice, channels: tuple[str, ...]) -> Recording:
     """The log with nothing measured in some rows: the fit of a part is compiled once with that of the whole."""
     hidden = np.zeros(len(log), bool)
     hidden[rows] = True
-    return log.replace(
-        **{n: np.where(hidden, np.nan, np.asarray(log[n])) for n in ("yaw_rate", "a_y", "v_y") if n in log}
-    )
+    return log.replace(**{n: np.where(hidden, np.nan, np.asarray(log[n])) for n in (*channels, "v_y") if n in log})
 
 
-def _fit(filter, model, log, weight, progress, centre=None) -> Fit:
-    pieces, warm_up = cut_pieces(log)
-    # A blind fit has a reference without values: one compiled function serves all fits.
-    silent_one = lambda piece: jnp.full(len(piece), jnp.nan)
-    values = tuple(map(silent_one if weight is None else reference_sideslip, pieces))
-    target = Target("reference_sideslip", values, 1.0 if weight is None else weight, TARGET_BEND)
-    return prediction_error(
-        filter,
-        model,
-        pieces,
-        chosen_parameters,
-        prior=PRIOR,
-        centre=centre,
-        target=target,
-        warm_up=warm_up,
-        progress=progress,
-    )
+def _reference(log: Recording, weight: float | None) -> Reference | None:
+    return None if weight is None else Reference(reference_sideslip(log), weight)
 
 
 def reference_sideslip(recording: Recording) -> jax.Array:
@@ -190,30 +135,66 @@ def reference_sideslip(recording: Recording) -> jax.Array:
 
 def _validate(filter, model, log, start: int) -> float:
     """Sideslip RMSE in degrees over the rows from `start`, the filter having run from the first row."""
-    found = run(filter, model, log, throw=False)
+    found = run(filter, model, log.without("v_y"), throw=False)
     error = np.degrees(np.asarray(found.mean.reference_sideslip) - np.asarray(reference_sideslip(log)))[start:]
     return float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else float("inf")
 
 
+def fitted_car(calibration: Calibration, car: CarSpecification, recording: Recording | None = None) -> CarSpecification:
+    """The car's file with the fitted values in place, as far as a car file can say them.
+
+    With the `recording` that it was calibrated on, and where that has `steer`, the front axle's stiffness and the steer's
+    offset are fitted to it: see `front_axle`; else they are the file's.
+    """
+    fitted = calibration.model.system
+    load = float(fitted.mass) * 9.80665 * float(fitted.front_axle_to_cg) / _wheelbase(calibration.model)
+    stiffness, grip = float(fitted.stiffness) * load, float(fitted.grip) * load
+    rear = AxleTyre(B=stiffness / (CURVE * grip), C=CURVE, D=grip, E=0.0, nominal_load=load)
+    found = dataclasses.replace(
+        car,
+        yaw_inertia=float(fitted.yaw_inertia),
+        cg_height=float(fitted.cg_height),
+        rear=rear,
+        rear_cornering_stiffness=stiffness,
+    )
+    if recording is None or not _measured(recording, "steer") or not _measured(recording, "a_y"):
+        return found
+    told, new = car.front, front_axle(calibration.model, recording)
+    if told is not None:
+        told = dataclasses.replace(told, B=told.B * new.front_cornering_stiffness / (told.B * told.C * told.D), S_h=0.0)
+    return dataclasses.replace(found, front=told, **new._asdict())
+
+
 def estimate(
-    source: Calibration | StateSpace | CarSpecification | Handling,
+    source: Calibration | StateSpace | CarSpecification | RearAxle,
     recording: Recording,
     *,
     filter: AbstractFilter | None = None,
     key=None,
-) -> Estimate:
-    """States of the car along a log from steer, v_x, a_x, a_y and yaw_rate: see `handling.HandlingReport` for the names.
+    smoothed: bool = True,
+) -> Estimate | SmoothedEstimate:
+    """Sideslip of the car along a log from v_x, a_x, a_y and yaw_rate: see `rear_axle.RearAxleReport` for the names.
 
-    `source`: a `Calibration`, a model, or a car taken at its word. **Raises** as `run` and `clean` do.
+    `source`: a `Calibration`, a model, or a car taken at its word. Every row is estimated from all rows (a smoother), or, with
+    `smoothed=False` and for filters without a Gaussian smoother, from those up to it, as `live` does. **Raises** as `run` and
+    `clean` do.
     """
-    return run(filter or Unscented(), model_of(NAME, source, model), clean(recording), key=key)
+    one = model_of(NAME, source, model)
+    if not _measured(recording, "a_y"):
+        at = lambda m: m.process_noise.law.std.v_y
+        one = eqx.tree_at(at, one, jnp.full_like(at(one), WITHOUT_A_Y))
+    used, log = filter or Extended(), clean(recording, RearAxleCleaning(_wheelbase(one)))
+    if smoothed and kit.smoothing_of(used) is Smoothing.gaussian:
+        return smooth(used, one, log)
+    return run(used, one, log, key=key)
 
 
 def live(
-    source: Calibration | StateSpace | CarSpecification | Handling, *, filter: AbstractFilter | None = None, key=None
+    source: Calibration | StateSpace | CarSpecification | RearAxle, *, filter: AbstractFilter | None = None, key=None
 ) -> Live:
     """The same a row at a time, cleaning included."""
-    return Live(filter or Unscented(), model_of(NAME, source, model), HandlingCleaning(), key)
+    one = model_of(NAME, source, model)
+    return Live(filter or Extended(), one, RearAxleCleaning(_wheelbase(one)), key)
 
 
 def least_speed_of(car: CarSpecification) -> float:
@@ -223,7 +204,7 @@ def least_speed_of(car: CarSpecification) -> float:
 
 
 def score(
-    car: CarSpecification, found: Estimate, recording: Recording, *, least_speed: float | None = None
+    car: CarSpecification, found: Estimate | SmoothedEstimate, recording: Recording, *, least_speed: float | None = None
 ) -> dict[str, float]:
     """Errors of an estimate against a reference recording with `v_y`, next to the open-loop linear model's: the car's file with
     linear tyres, steered from rest, which is the do-nothing baseline.

@@ -21,6 +21,7 @@ from jaxveh.statespace.draw import draw_rows, schedule_rows
 from jaxveh.statespace.driver import raise_failure, scan_and_keep
 from jaxveh.statespace.independent import whiten
 from jaxveh.statespace.measurements import by_channel, input_result, presence
+from jaxveh.statespace.model import scalar_row
 from jaxveh.statespace.noise import LOG_2PI
 
 __all__ = [
@@ -43,6 +44,7 @@ __all__ = [
     "layers",
     "presence",
     "raise_failure",
+    "scalar_row",
     "scan_and_keep",
     "schedule_rows",
     "smoothing_of",

@@ -173,9 +173,8 @@ class StateSpace(eqx.Module):
         missing = [name for name in self.inputs if name not in u]
         if missing:
             raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")
-        _check_stamp(t, dtype)
-        numbers = [t, *(u[name] for name in self.inputs), *(y.get(name, np.nan) for name in self.channels)]
-        t, *others = _scalars(numbers, dtype)
+        numbers = [*(u[name] for name in self.inputs), *(y.get(name, np.nan) for name in self.channels)]
+        t, *others = scalar_row(t, numbers, dtype)
         inputs = record("Inputs", dict(zip(self.inputs, others, strict=False)))
         measured = record("Measurements", dict(zip(self.channels, others[len(self.inputs) :], strict=True)))
         return Row(t, inputs, measured)
@@ -216,6 +215,15 @@ def _describe(value: Any) -> str:
     """What a function of a model returned, in words."""
     fields = getattr(value, "_fields", None)
     return f"a {type(value).__name__}" if fields is None else f"a NamedTuple with {', '.join(fields)}"
+
+
+def scalar_row(t, numbers: list, dtype) -> tuple:
+    """A row's time (s) and numbers as scalars of a dtype, for a live loop.
+
+    **Raises** `InputError` for a time that the dtype resolves too coarsely.
+    """
+    _check_stamp(t, dtype)
+    return _scalars([t, *numbers], dtype)
 
 
 def _check_stamp(t, dtype) -> None:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from shared_data import shared
 
-from jaxveh import InputError, Recording, estimators, io, vehicles
+from jaxveh import InputError, Recording, estimators, io, sensors, vehicles
+from jaxveh.estimators.cleaning import FORCE_CUTOFF
 
 CAR = io.CarSpecification(
     mass=1420.0, yaw_inertia=2124.0, front_axle_to_cg=0.96, rear_axle_to_cg=1.59,
@@ -40,36 +41,75 @@ def drive():
     )  # fmt: skip
 
 
-def test_clean_holds_spikes_and_drops_repeats_and_looks_back_only():
+BALANCE = "slip_balance"
+
+
+def missing(cleaned):
+    return np.flatnonzero(np.isnan(np.asarray(cleaned[BALANCE]))).tolist()
+
+
+def test_clean_leaves_spikes_and_repeats_out_and_looks_back_only():
     recording = log(500)
-    steer, yaw_rate, a_y = (np.array(recording[name]) for name in ("steer", "yaw_rate", "a_y"))
-    steer[200] += 0.5
+    yaw_rate, a_y = (np.array(recording[name]) for name in ("yaw_rate", "a_y"))
+    a_y[200], yaw_rate[250] = a_y[200] + 20.0, yaw_rate[250] + 2.0
     yaw_rate[301], a_y[301] = yaw_rate[300], a_y[300]
     a_y[401] = a_y[400]
-    cleaned = estimators.clean(recording.replace(steer=steer, yaw_rate=yaw_rate, a_y=a_y))
-    assert float(cleaned["steer"][200]) == steer[199]
-    assert float(cleaned["steer"][201]) == steer[201]
-    assert np.flatnonzero(np.isnan(np.asarray(cleaned["yaw_rate"]))).tolist() == [301]
-    assert np.isfinite(float(cleaned["a_y"][401]))
+    cleaned = estimators.clean(recording.replace(yaw_rate=yaw_rate, a_y=a_y))
+    # The first row has no row before it.
+    assert missing(cleaned) == [0, 200, 250, 301]
+    assert float(cleaned["a_y"][200]) == a_y[199]
     longer = estimators.clean(recording)
     shorter = estimators.clean(recording.rows(slice(0, 100)))
-    for name in ("steer", "a_x", "yaw_rate", "a_y"):
+    for name in ("a_x", "yaw_rate_smooth", "a_y_smooth", "a_y_lead", "turning_lead"):
         np.testing.assert_array_equal(np.asarray(longer[name])[:100], np.asarray(shorter[name]))
 
 
-def test_a_step_of_steer_is_not_held_for_ever():
-    recording = log(100)
-    steer = np.where(np.arange(100) < 50, 0.0, 0.2)
-    cleaned = np.asarray(estimators.clean(recording.replace(steer=steer))["steer"])
-    assert cleaned[50] == 0.0
-    assert cleaned[-1] == 0.2
+def test_a_channel_that_is_nothing_but_noise_has_no_spikes():
+    recording, rng = log(1000), np.random.default_rng(1)
+    noisy = np.asarray(recording["a_y"]) + 6.0 * rng.normal(size=1000)
+    assert len(missing(estimators.clean(recording.replace(a_y=noisy)))) < 20
+
+
+def test_a_step_is_believed_after_a_while_and_a_stuck_channel_is_missing():
+    recording = log(1000)
+    stepped = np.asarray(recording["a_y"]) + np.where(np.arange(1000) < 500, 0.0, 12.0)
+    cleaned = estimators.clean(recording.replace(a_y=stepped))
+    assert np.asarray(cleaned["a_y"])[500] == stepped[499]
+    assert np.asarray(cleaned["a_y"])[-1] == stepped[-1]
+    assert set(missing(cleaned)) <= {0, *range(500, 512)}
+    stuck = np.asarray(recording["a_y"]).copy()
+    stuck[300:600] = stuck[300]
+    lost = missing(estimators.clean(recording.replace(a_y=stuck)))
+    assert set(range(355, 600)) <= set(lost) and max(lost) < 605
+
+
+def test_the_low_pass_costs_no_delay():
+    """What was felt since the low-passed rows is what v_y is ahead of its own low-pass."""
+    recording = log(1500)
+    v_y = np.asarray(recording["v_y"])
+    yaw_rate = estimators.open_loop(vehicles.from_specification(CAR), recording)["yaw_rate"]
+    exact = recording.replace(a_y=np.gradient(v_y, 0.01) + 20.0 * yaw_rate, yaw_rate=yaw_rate)
+    cleaned = estimators.clean(exact)
+    ahead = np.asarray(cleaned["a_y_lead"]) - np.asarray(cleaned["turning_lead"])
+    behind = np.asarray(sensors.low_pass(recording, ["v_y"], FORCE_CUTOFF)["v_y"])
+    np.testing.assert_allclose(ahead[500:], (v_y - behind)[500:], atol=0.03 * np.std(v_y))
 
 
 def test_missing_channels_and_gaps_are_named():
-    with pytest.raises(InputError, match="a_y"):
-        estimators.clean(log(100).without("a_y"))
-    with pytest.raises(InputError, match=r"steer is NaN in 1 rows.*fill"):
-        estimators.clean(log(100).replace(steer=np.append(np.zeros(99), np.nan)))
+    with pytest.raises(InputError, match="yaw_rate"):
+        estimators.clean(log(100).without("yaw_rate"))
+    with pytest.raises(InputError, match=r"v_x is NaN in 1 rows.*fill"):
+        estimators.clean(log(100).replace(v_x=np.append(np.full(99, 20.0), np.nan)))
+
+
+def test_without_an_accelerometer_it_estimates_and_calibrates_nothing():
+    recording = log()
+    told = estimators.sideslip.estimate(CAR, recording.select(["v_x", "yaw_rate"]))
+    numbers = estimators.sideslip.score(CAR, told, recording)
+    assert numbers["sideslip_rmse_deg"] < 0.3
+    for less in (recording.without("a_y"), recording.replace(a_y=np.full(ROWS, np.nan))):
+        with pytest.raises(InputError, match="a_y .* is missing from the log: without an accelerometer no tyre"):
+            estimators.sideslip.calibrate(CAR, less)
 
 
 def test_a_short_span_and_an_unknown_reference_are_refused():
@@ -124,56 +164,78 @@ def real_log():
 
 
 @pytest.mark.parametrize(("log", "begin", "measured", "open_loop"), [
-    ("ferrari_250lm", 13750, 0.1816, 0.3047), ("ferrari_250lm", 16750, 0.2364, 0.6899),
-    ("genesis", 16129, 0.4819, 0.4752),
+    ("ferrari_250lm", 13750, 0.329, 0.302), ("ferrari_250lm", 16750, 0.267, 0.675), ("genesis", 16129, 0.217, 0.328),
 ])  # fmt: skip
-def test_real_logs_as_near_as_they_were_measured(log, begin, measured, open_loop):
-    """Half a minute of each, the car taken at its file's word: sideslip RMSE, degrees, as measured, and 3 % for another rounding.
+def test_real_logs_at_the_files_word_as_near_as_they_were_measured(log, begin, measured, open_loop):
+    """Half a minute of each: sideslip RMSE without its constant part, degrees, as measured, and 3 % for another rounding.
 
-    On the Ferrari's log the estimate is better than the open loop; on the Genesis', whose accelerometer is 0.65 m/s^2 off and
-    whose v_y is of another point than the file's, it is not. A bound far above what was measured would hide either.
+    At its file's word an estimate can be worse than the open loop: the file's stiffness is a guess, and so are the sensors. A
+    bound far above what was measured would hide it.
     """
     recording, car = io.read_recording(shared(f"{log}_100hz.csv")), io.read_car(shared(f"{log}.toml"))
     span = recording.rows(slice(begin, begin + 3000))
-    found = estimators.sideslip.estimate(car, span.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]))
+    found = estimators.sideslip.estimate(car, span.without("v_y"))
     numbers = estimators.sideslip.score(car, found, span)
-    assert numbers["open_loop_sideslip_rmse_deg"] == pytest.approx(open_loop, rel=0.03)
-    assert numbers["sideslip_rmse_deg"] <= 1.03 * measured
+    assert numbers["open_loop_sideslip_rmse_without_constant_deg"] == pytest.approx(open_loop, rel=0.03)
+    assert numbers["sideslip_rmse_without_constant_deg"] <= 1.03 * measured
 
 
-@pytest.mark.full
-def test_real_log_taken_at_its_word():
-    _, rest, car = real_log()
-    numbers = estimators.sideslip.score(
-        car, estimators.sideslip.estimate(car, rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])), rest
-    )
-    assert numbers["open_loop_sideslip_rmse_deg"] == pytest.approx(0.605, abs=0.005)
-    assert numbers["sideslip_rmse_deg"] <= 0.305  # 0.296 measured
+CALIBRATED = {
+    ("ferrari_250lm", "forward"): (0.184, 0.605), ("ferrari_250lm", "reversed"): (0.272, 0.412),
+    ("genesis", "forward"): (0.119, 0.264), ("genesis", "reversed"): (0.203, 0.286),
+    ("f1tenth", "forward"): (4.54, 10.83), ("f1tenth", "reversed"): (3.90, 11.08),
+}  # fmt: skip
+"""By log and direction: RMSE of the half that was not calibrated on, and of the open loop, degrees; of the Genesis, whose
+reference is turned by half a degree, without the constant part."""
 
 
-@pytest.mark.full
-def test_real_log_calibrated_blind():
-    first, rest, car = real_log()
-    blind = ["steer", "v_x", "a_x", "a_y", "yaw_rate"]
-    calibration = estimators.sideslip.calibrate(car, first.select(blind))
-    numbers = estimators.sideslip.score(car, estimators.sideslip.estimate(calibration, rest.select(blind)), rest)
-    assert numbers["sideslip_rmse_deg"] <= 0.24  # 0.2312 measured
-    assert set(calibration.summary()) >= {
-        "front.B",
-        "rear.D",
-        "steer_gain",
-        "process noise.v_y",
-        "measurement noise.a_y",
-    }
-    fitted = estimators.sideslip.fitted_car(calibration, car)
-    assert fitted.front.nominal_load == pytest.approx(982 * 9.80665 * 1.07 / 2.40, rel=1e-6)
+@pytest.mark.studies
+@pytest.mark.parametrize(("log", "direction"), CALIBRATED)
+def test_real_logs_calibrated_blind_on_the_other_half(log, direction):
+    recording, car = io.read_recording(shared(f"{log}_100hz.csv")), io.read_car(shared(f"{log}.toml"))
+    middle = 0.5 * (float(recording.time[0]) + float(recording.time[-1]))
+    halves = [recording.between(recording.time[0], middle), recording.between(middle, recording.time[-1] + 1.0)]
+    fitted, rest = halves if direction == "forward" else halves[::-1]
+    calibration = estimators.sideslip.calibrate(car, fitted.without("v_y"))
+    found = estimators.sideslip.estimate(calibration, rest.without("v_y"))
+    numbers = estimators.sideslip.score(car, found, rest)
+    part = "_without_constant" if log == "genesis" else ""
+    measured, open_loop = CALIBRATED[log, direction]
+    assert numbers[f"open_loop_sideslip_rmse{part}_deg"] == pytest.approx(open_loop, rel=0.03)
+    assert numbers[f"sideslip_rmse{part}_deg"] <= 1.05 * measured
+    assert set(calibration.summary()) >= {"stiffness", "grip", "a_y_offset", "process noise.v_y"}
+    written = estimators.sideslip.fitted_car(calibration, car, fitted)
+    assert 0.4 < written.front_cornering_stiffness / car.front_cornering_stiffness < 2.5
+    assert written.rear_cornering_stiffness == pytest.approx(written.rear.B * written.rear.C * written.rear.D, rel=1e-6)
 
 
-@pytest.mark.full
-def test_real_log_calibrated_with_the_reference():
-    first, rest, car = real_log()
-    calibration = estimators.sideslip.calibrate(car, first, uses=("v_y",))
-    blind = rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])
-    numbers = estimators.sideslip.score(car, estimators.sideslip.estimate(calibration, blind), rest)
-    assert numbers["sideslip_rmse_deg"] <= 0.26
+@functools.cache
+def calibrated():
+    return estimators.sideslip.calibrate(CAR_TOLD, log().without("v_y"))
+
+
+CAR_TOLD = dataclasses.replace(CAR, rear_cornering_stiffness=0.7 * 127000.0, front_cornering_stiffness=60000.0)
+
+
+def test_a_calibration_finds_stiffnesses_that_the_file_does_not_know():
+    fitted = estimators.sideslip.fitted_car(calibrated(), CAR_TOLD, log())
+    assert fitted.rear_cornering_stiffness == pytest.approx(127000.0, rel=0.1)
+    assert fitted.front_cornering_stiffness == pytest.approx(88000.0, rel=0.1)
+    assert abs(fitted.steer_offset) < 1e-3
+    told, found = (estimators.sideslip.estimate(one, log().without("v_y")) for one in (CAR_TOLD, calibrated()))
+    errors = [estimators.sideslip.score(CAR, one, log())["sideslip_rmse_deg"] for one in (told, found)]
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_a_reference_is_used_only_where_it_helps_inside_the_span():
+    calibration = estimators.sideslip.calibrate(CAR_TOLD, log(), uses=("v_y",))
     assert [weight for weight, _ in calibration.validation] == [None, 0.05, 0.02]
+    assert calibration.weight == min(calibration.validation, key=lambda one: one[1])[0]
+
+
+def test_a_smoother_knows_more_than_a_filter():
+    recording = log().without("v_y")
+    both = [estimators.sideslip.estimate(calibrated(), recording, smoothed=how) for how in (True, False)]
+    smooth, causal = (estimators.sideslip.score(CAR, one, log())["sideslip_rmse_deg"] for one in both)
+    assert smooth < causal
+    assert (np.asarray(both[0].std.sideslip) <= np.asarray(both[1].std.sideslip) * (1 + 1e-6)).all()

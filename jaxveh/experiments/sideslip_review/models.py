@@ -8,8 +8,8 @@ import jax.numpy as jnp
 
 from jaxveh import estimators, sensors, vehicles
 from jaxveh._core.names import record_type
-from jaxveh.estimators import Handling, handling_model
 from jaxveh.experiments.sideslip_review.drives import Drive, numbers_of
+from jaxveh.experiments.sideslip_review.handling import Handling, handling_model
 from jaxveh.experiments.sideslip_review.settings import Noise
 from jaxveh.statespace import Continuous, Gaussian, Heun, Prior, Propagate, Row, StateSpace
 from jaxveh.vehicles import LinearSingleTrack, SingleTrack
@@ -21,7 +21,7 @@ KinematicState = record_type("KinematicState", ("v_x", "v_y"))
 
 
 class Cars(NamedTuple):
-    """What an engineer knows: the linear car, the one with nonlinear tyres, and the library's `Handling` around the latter."""
+    """What an engineer knows: the linear car, the one with nonlinear tyres, and the `Handling` around the latter."""
 
     linear: LinearSingleTrack
     nonlinear: SingleTrack
@@ -29,7 +29,7 @@ class Cars(NamedTuple):
 
 
 class Models(NamedTuple):
-    """The state spaces: single tracks, the kinematics, and the library's `handling_model`."""
+    """The state spaces: single tracks, the kinematics, and the `handling_model`."""
 
     linear: StateSpace
     nonlinear: StateSpace

@@ -18,6 +18,8 @@ from jaxveh.estimators import kit
 from jaxveh.experiments.sideslip_review.contestants import WHAT, groups, pseudo_integrated, switch, weighted_mean
 from jaxveh.experiments.sideslip_review.contestants import Found as Estimated
 from jaxveh.experiments.sideslip_review.drives import Drive
+from jaxveh.experiments.sideslip_review.handling_cleaning import clean
+from jaxveh.experiments.sideslip_review.handling_fit import fitted_model, handling_car
 from jaxveh.experiments.sideslip_review.models import Cars, Models, models_of
 from jaxveh.experiments.sideslip_review.settings import Noise, Study
 from jaxveh.fitting import prediction_error
@@ -25,13 +27,11 @@ from jaxveh.statespace import StateSpace
 from jaxveh.vehicles import LinearSingleTrack
 
 BEST = 0.2312
-"""Degrees: the least RMSE of the library's ready-made estimators of sideslip on the Ferrari log, rows 13750 on, v_y never seen:
-`estimators.sideslip.calibrate` on the rows before without v_y, then `estimators.sideslip.estimate` (0.296 with the car's file
-at its word, 0.2316 with v_y offered to the calibration, which declines it;
-`tests/estimators/test_sideslip.py` holds them near these). Its model was made while the score of these rows was looked at."""
+"""Degrees: the RMSE of the handling model, calibrated blind, on the Ferrari log, rows 13750 on, v_y never seen. It was made
+while the score of these rows was looked at."""
 
 READY = ("ready-made, as told", "ready-made, calibrated blind")
-"""The library's estimators, by what they know of the car."""
+"""The library's `estimators.sideslip`, looking back only, by what it knows of the car."""
 
 SMOOTHED = "handling, smoothed"
 """With hindsight: every row by all rows."""
@@ -94,21 +94,22 @@ def on_log(study: Study, log: Any, car: Any, progress: Progress = silent) -> Log
     half = len(recording) // 2
     blind = recording.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])
     first, rest = blind.rows(slice(0, half)), blind.rows(slice(half, None))
-    fit = estimators.sideslip.calibrate(told, first, progress=part(progress, 0.0, 0.6, "calibration"))
+    fit = estimators.sideslip.calibrate(told, first, progress=part(progress, 0.0, 0.1, "calibration"))
+    handling = fitted_model(told, first, part(progress, 0.1, 0.6, "handling model"))
     progress(0.6, 1.0, "noises")
-    cars, speed = log_cars(told, fit.model), float(np.mean(np.asarray(first["v_x"])))
-    noise = fitted_noise(cars, study.noise, estimators.clean(first), speed)
-    made = models_of(cars, noise, float(rest["v_x"][0]))._replace(handling=fit.model)
+    cars, speed = log_cars(told, handling), float(np.mean(np.asarray(first["v_x"])))
+    noise = fitted_noise(cars, study.noise, clean(first), speed)
+    made = models_of(cars, noise, float(rest["v_x"][0]))._replace(handling=handling)
     drive = drive_of(rest, recording.rows(slice(half, None)))
     progress(0.8, 1.0, "methods")
     found = _ready(rest, told, fit) | _run_estimators(dataclasses.replace(study, speed=speed), cars, made, drive)
-    found[SMOOTHED] = _smooth(fit.model, rest)
+    found[SMOOTHED] = _smooth(handling, rest)
     return _score(recording.source, found, drive, noise)
 
 
 def log_cars(told: io.CarSpecification, model: StateSpace) -> Cars:
     """The file's linear car, and the calibrated handling model with its single track."""
-    car = estimators.sideslip.handling_car(told).car
+    car = handling_car(told).car
     linear = LinearSingleTrack(
         mass=told.mass, yaw_inertia=told.yaw_inertia,
         front_axle_to_cg=told.front_axle_to_cg, rear_axle_to_cg=told.rear_axle_to_cg,
@@ -119,7 +120,7 @@ def log_cars(told: io.CarSpecification, model: StateSpace) -> Cars:
 
 def drive_of(blind: Recording, whole: Recording) -> Drive:
     """A log as the methods see it: cleaned, repeated measurements as old news; the truth from its v_y."""
-    cleaned = estimators.clean(blind)
+    cleaned = clean(blind)
     seen = {name: jnp.asarray(cleaned[name]) for name in ("steer", "v_x", "a_x")}
     sideslip = jnp.arctan2(jnp.asarray(whole["v_y"]), jnp.asarray(whole["v_x"]))
     # Integration takes what the logger holds, filters only what is new.
@@ -165,12 +166,12 @@ def _run_estimators(study: Study, cars: Cars, models: Models, drive: Drive) -> d
 
 
 def _ready(rest: Recording, told, fit) -> dict[str, Estimated]:
-    made = [estimators.sideslip.estimate(source, rest) for source in (told, fit)]
+    made = [estimators.sideslip.estimate(source, rest, smoothed=False) for source in (told, fit)]
     return {name: Estimated(e.mean.v_y, e.std.v_y, e.result) for name, e in zip(READY, made, strict=True)}
 
 
 def _smooth(model: StateSpace, rest: Recording) -> Estimated:
-    made = filters.smooth(filters.Unscented(), model, estimators.clean(rest))
+    made = filters.smooth(filters.Unscented(), model, clean(rest))
     return Estimated(made.mean.v_y, made.std.v_y, made.filtered.result)
 
 

@@ -1,0 +1,43 @@
+"""The front axle's stiffness and the steer's offset, once sideslip is known."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.coarse_log import coarse
+from jaxveh.filters import Extended, smooth
+from jaxveh.statespace import StateSpace
+
+LARGEST_SHARE = 0.6
+"""Of the rear axle's grip: forces up to this are told from a straight line."""
+
+
+class FrontAxle(NamedTuple):
+    """What a car's file says of it: N/rad; rad, what the steer channel shows when the car runs straight."""
+
+    front_cornering_stiffness: float
+    steer_offset: float
+
+
+def front_axle(model: StateSpace, recording: Recording) -> FrontAxle:
+    """Least squares of slip angles on forces: `steer - v_y / v_x - a yaw_rate / v_x = F / stiffness + offset`.
+
+    Forces and v_y are those that a calibrated `rear_axle_model` sees in the log; rows beyond `LARGEST_SHARE` do not count, nor
+    those that are slow.
+    """
+    s = model.system
+    log = coarse(recording, float(s.wheelbase))
+    found = smooth(Extended(), model, log.select([*model.inputs, *model.channels]))
+    rows = model.rows(log)
+    share, rear = (np.asarray(one) for one in s.shares(rows.u))
+    v_x, yaw_rate = np.asarray(rows.u.v_x), np.asarray(rows.u.yaw_rate) - float(s.yaw_rate_offset)
+    steer = np.interp(np.asarray(log.time), np.asarray(recording.time), np.asarray(recording["steer"]))
+    counted = np.isfinite(np.asarray(log[model.channels[0]])) & (np.abs(rear) < LARGEST_SHARE * float(s.grip))
+    slip = steer - np.arctan2(np.asarray(found.mean.v_y) + float(s.front_axle_to_cg) * yaw_rate, v_x)
+    force = share * np.asarray(s.loads(rows.u)[0])
+    design = np.stack([force, np.ones_like(force)], axis=1)[counted]
+    (softness, offset), *_ = np.linalg.lstsq(design, slip[counted], rcond=None)
+    return FrontAxle(1.0 / float(softness), float(offset))

@@ -1,0 +1,259 @@
+"""Sideslip from what the body feels: lateral velocity by integrated acceleration, held by the slip angle that the rear axle's
+force asks for."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.bijectors import Interval
+from jaxveh._core.names import record_type
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.statespace import Continuous, Gaussian, Prior, StateDependent, StateSpace
+from jaxveh.vehicles import GRAVITY
+
+USUAL_WHEELBASE = 2.6
+"""m: of the car that times and speeds are said for. Cars that differ in size alone do the same in times and at speeds that go
+with the square root of it, at the same accelerations (Froude's law)."""
+
+SLOWEST = 1.4
+"""m/s, of a car of `USUAL_WHEELBASE`: slower, a slip angle is the quotient of two small numbers."""
+
+STEEPEST = 0.04
+"""rad: roads' bank has at most this standard deviation, so that a car that slides is not taken for one on a banked road."""
+
+SATURATED = 0.95
+"""The share of the grip beyond which the curve's slip angle no longer grows: a force so large says that the axle slides, not how
+much."""
+
+BEND = 0.05
+"""The share of the grip over which that sets in."""
+
+LARGEST_SLIP = 1.2
+"""rad."""
+
+ASYMMETRY_BEND = 0.03
+"""Slip angle (rad) over which the difference between left and right turns fades in, so that straight running is smooth."""
+
+LEAST_GRIP = 0.05
+"""The square of the share of lateral grip that is left however large the longitudinal force."""
+
+
+class RearAxleState(NamedTuple):
+    """Lateral velocity `v_y` (m/s) of the centre of gravity; `bank` of the road and `slip_error` of the curve, in units of the
+    standard deviations that `RearAxle` has for them; `stiffening`, the logarithm of the axle's stiffness over the calibrated
+    one."""
+
+    v_y: Any
+    bank: Any
+    slip_error: Any
+    stiffening: Any
+
+
+class RearAxleReport(NamedTuple):
+    """What an Estimate shows: `v_y` (m/s), `sideslip`, `slip_angle_rear` (rad), lateral forces of the axles (N), `bank` of the
+    road (rad, positive where the left side is higher), `slip_error` (rad) of the curve, `stiffness_rear` (N/rad);
+    `reference_sideslip` (rad): what a reference turned by `heading_offset` would say."""
+
+    v_y: Any
+    sideslip: Any
+    slip_angle_rear: Any
+    F_yf: Any
+    F_yr: Any
+    bank: Any
+    slip_error: Any
+    stiffness_rear: Any
+    reference_sideslip: Any
+
+
+class RearAxle(eqx.Module):
+    """A car as far as its rear axle tells of sideslip; it needs no steer, and nothing of the front axle.
+
+    - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m).
+    - `stiffness` (1/rad): cornering stiffness over load; `grip` (-): largest lateral force over load; `shape` (-): how sharply
+      the curve bends, `F / load = stiffness a / (1 + |stiffness a / grip|^shape)^(1 / shape)`, whose inverse has a closed form.
+    - `asymmetry` (-): grip lost in left turns and gained in right ones.
+    - `yaw_rate_offset` (rad/s), `a_y_gain` (-; roll makes it larger than one), `a_y_offset` (m/s^2): of the sensors.
+    - `drag` (N/(m/s)^2), `front_drive`, `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`, driving and braking
+      by the front axle's shares, `ellipse` (-): how much of it counts, `sqrt(1 - (ellipse F_x / (grip load))^2)`.
+    - `heading_offset` (rad): by which a reference for sideslip (an INS) is turned against the car; moves no state.
+    - `bank` (rad), `slip_error` (rad): standard deviations of the states of these names, first-order Gauss-Markov with memories
+      `bank_time` and `slip_time` (s, fixed).
+    - `force_noise` (sqrt s), `slip_noise` (rad sqrt s): of the force over load and of the slip angle, white, as densities.
+
+    Inputs: see `cleaning`. Axes of ISO 8855; a positive slip angle gives a positive lateral force.
+    """
+
+    mass: jax.Array = positive("kg")
+    yaw_inertia: jax.Array = positive("kg m^2")
+    front_axle_to_cg: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    cg_height: jax.Array = positive("m")
+    stiffness: jax.Array = positive("1/rad")
+    grip: jax.Array = positive("-", default=1.0)
+    shape: jax.Array = positive("-", default=2.0)
+    asymmetry: jax.Array = parameter("-", scale=0.03, default=0.0)
+    yaw_rate_offset: jax.Array = parameter("rad/s", scale=0.005, default=0.0)
+    a_y_gain: jax.Array = positive("-", default=1.03)
+    a_y_offset: jax.Array = parameter("m/s^2", scale=0.2, default=0.0)
+    drag: jax.Array = positive("N s^2/m^2", default=0.45)
+    front_drive: jax.Array = parameter("-", scale=0.1, default=0.0)
+    brake_share: jax.Array = parameter("-", scale=0.1, default=0.6)
+    ellipse: jax.Array = positive("-", default=0.7)
+    heading_offset: jax.Array = parameter("rad", scale=0.003, default=0.0)
+    bank: jax.Array = parameter("rad", Interval(0.0, STEEPEST), default=0.02)
+    slip_error: jax.Array = positive("rad", default=0.006)
+    force_noise: jax.Array = positive("s^0.5", default=0.01)
+    slip_noise: jax.Array = positive("rad s^0.5", default=0.001)
+    bank_time: float = eqx.field(static=True, default=15.0)
+    slip_time: float = eqx.field(static=True, default=2.0)
+
+    @property
+    def wheelbase(self) -> Any:
+        """Distance of the axles, m."""
+        return self.front_axle_to_cg + self.rear_axle_to_cg
+
+    def shares(self, u) -> tuple[Any, Any]:
+        """Lateral force over load of the front axle and of the rear, as the sensors tell: ISO 8855 signs."""
+        a, b = self.front_axle_to_cg, self.rear_axle_to_cg
+        a_y, moment = self.specific_force(u.a_y_smooth), self.yaw_inertia * u.yaw_acceleration
+        front, rear = self.loads(u)
+        return (b * self.mass * a_y + moment) / (self.wheelbase * front), (a * self.mass * a_y - moment) / (
+            self.wheelbase * rear
+        )
+
+    def loads(self, u) -> tuple[Any, Any]:
+        """Loads of the axles, N."""
+        moved = u.a_x * self.cg_height
+        per_length = self.mass / self.wheelbase
+        return (
+            per_length * (GRAVITY * self.rear_axle_to_cg - moved),
+            per_length * (GRAVITY * self.front_axle_to_cg + moved),
+        )
+
+    def specific_force(self, a_y) -> Any:
+        """Lateral force over mass, m/s^2, of what the accelerometer says."""
+        return (a_y - self.a_y_offset) / self.a_y_gain
+
+    def left_for_turning(self, u) -> Any:
+        """The share of the rear axle's lateral grip that the longitudinal force leaves."""
+        F_x = self.mass * u.a_x + self.drag * u.v_x**2
+        driving, braking = jnp.maximum(F_x, 0.0), jnp.minimum(F_x, 0.0)
+        own = (1 - self.front_drive) * driving + (1 - self.brake_share) * braking
+        return numerics.sqrt(jnp.maximum(1 - (self.ellipse * own / (self.grip * self.loads(u)[1])) ** 2, LEAST_GRIP))
+
+    def slip_angle(self, x: RearAxleState, u) -> tuple[Any, Any]:
+        """The slip angle (rad) at which the curve has the axle's force, and its slope over the force's share of load."""
+        left = self.left_for_turning(u)
+        share = self.shares(u)[1] / left
+        # A little more than zero: a power of zero has no slope.
+        asked = numerics.sqrt(jnp.square(share) + 1e-16) / self.grip
+        knee = SATURATED - BEND
+        used = jnp.where(asked < knee, asked, knee + BEND * jnp.tanh(jnp.maximum(asked - knee, 0.0) / BEND))
+        rest = 1 - used**self.shape
+        angle = share / self.stiffness * (used / asked) * rest ** (-1 / self.shape)
+        slope = rest ** (-1 - 1 / self.shape) / self.stiffness
+        softer = jnp.exp(-x.stiffening) * (1 - self.asymmetry * jnp.tanh(angle / ASYMMETRY_BEND))
+        return jnp.clip(angle * softer, -LARGEST_SLIP, LARGEST_SLIP), slope * softer / left
+
+
+class SettledBelow(eqx.Module):
+    """The transition: integrated acceleration above a speed (m/s); below it the car rolls where its rear axle goes."""
+
+    least_speed: float = eqx.field(static=True)
+
+    def __call__(self, system: RearAxle, t0, t1, x: RearAxleState, u):
+        dt = t1 - t0
+        felt = system.specific_force(u.a_y) - (u.turning - u.v_x * system.yaw_rate_offset)
+        moving = x.v_y + dt * (felt - GRAVITY * system.bank * x.bank)
+        rolling = system.rear_axle_to_cg * (u.yaw_rate - system.yaw_rate_offset) + 0.0 * x.v_y
+        fade = lambda time: jnp.exp(-dt / time)
+        return RearAxleState(
+            v_y=jnp.where(u.v_x >= self.least_speed, moving, rolling),
+            bank=fade(system.bank_time) * x.bank,
+            slip_error=fade(system.slip_time) * x.slip_error,
+            stiffening=x.stiffening,
+        )
+
+
+CHANNEL = "slip_balance"
+"""m/s: what the curve's slip angle says of v_y less what the state says. It is measured to be nothing, in every row whose force
+is known."""
+
+
+def observation(system: RearAxle, t, x: RearAxleState, u):
+    """The balance of slip angles; behind the low-pass it is that of `u.lag` seconds ago, and what v_y did since is added."""
+    del t
+    angle, _ = system.slip_angle(x, u)
+    yaw_rate = u.yaw_rate_smooth - system.yaw_rate_offset
+    then = system.rear_axle_to_cg * yaw_rate - u.v_x * numerics.tan(angle)
+    steady = system.a_y_offset / system.a_y_gain - u.v_x * system.yaw_rate_offset + GRAVITY * system.bank * x.bank
+    since = u.a_y_lead / system.a_y_gain - u.turning_lead - u.lag * steady
+    return record_type("Measurements", (CHANNEL,))(then + since - x.v_y - u.v_x * system.slip_error * x.slip_error)
+
+
+def balance_noise(system: RearAxle, t, x: RearAxleState, u) -> dict[str, Any]:
+    """The balance's standard deviation, m/s: the axle's force is uncertain, and more so its slip angle where the curve is
+    flat."""
+    del t
+    angle, slope = system.slip_angle(x, u)
+    density = numerics.sqrt((system.force_noise * slope) ** 2 + system.slip_noise**2)
+    return {CHANNEL: u.v_x * (1 + numerics.tan(angle) ** 2) * density / numerics.sqrt(u.step)}
+
+
+def report(system: RearAxle, t, x: RearAxleState, u) -> RearAxleReport:
+    """The quantities that an Estimate shows."""
+    del t
+    like = jnp.zeros_like(x.v_y)
+    sideslip = numerics.arctan2(x.v_y, u.v_x + like)
+    front, rear = system.loads(u)
+    F_f, F_r = system.shares(u)
+    at_rear = x.v_y - system.rear_axle_to_cg * (u.yaw_rate - system.yaw_rate_offset)
+    return RearAxleReport(
+        v_y=x.v_y,
+        sideslip=sideslip,
+        slip_angle_rear=-numerics.arctan2(at_rear, u.v_x + like),
+        F_yf=F_f * front + like,
+        F_yr=F_r * rear + like,
+        bank=system.bank * x.bank,
+        slip_error=system.slip_error * x.slip_error,
+        stiffness_rear=system.stiffness * rear * jnp.exp(x.stiffening),
+        reference_sideslip=sideslip + system.heading_offset,
+    )
+
+
+INPUTS = (
+    "v_x", "a_x", "yaw_rate", "turning", "a_y", "yaw_rate_smooth", "yaw_acceleration", "a_y_smooth", "a_y_lead",
+    "turning_lead", "lag", "step",
+)  # fmt: skip
+
+
+def least_speed_of(wheelbase: float) -> float:
+    """m/s: below it a car of this wheelbase (m) is taken to roll where its rear axle goes."""
+    return SLOWEST * float((wheelbase / USUAL_WHEELBASE) ** 0.5)
+
+
+def rear_axle_model(system: RearAxle) -> StateSpace:
+    """The state space of a real log, with levels of noise that a fit starts from (stated in the code, unit by unit)."""
+    quick = float(system.wheelbase / USUAL_WHEELBASE) ** -0.5
+    unit = lambda time: (2.0 / time) ** 0.5
+    noise = {
+        "v_y": 0.02, "bank": unit(system.bank_time), "slip_error": unit(system.slip_time), "stiffening": 0.01 * quick**0.5,
+    }  # fmt: skip
+    return StateSpace(
+        system=system,
+        transition=SettledBelow(least_speed_of(float(system.wheelbase))),
+        observation=observation,
+        report=report,
+        process_noise=Continuous(Gaussian(noise)),
+        measurement_noise=StateDependent(balance_noise, CHANNEL),
+        prior=Prior(
+            RearAxleState(0.0, 0.0, 0.0, 0.0),
+            Gaussian({"v_y": 0.2, "bank": 1.0, "slip_error": 1.0, "stiffening": 0.001}),
+        ),
+        inputs=INPUTS,
+    )

@@ -1,0 +1,91 @@
+"""The fit of `RearAxle` to a log."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import FilterError
+from jaxveh._core.progress import Progress, silent
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.rear_axle_prior import SPREADS, chosen_parameters
+from jaxveh.filters import AbstractFilter
+from jaxveh.fitting import Fit, Target, pose_prediction_error, solve
+from jaxveh.statespace import StateSpace
+
+STEPS, TOLERANCE = 60, 0.02
+"""Of the search: how many at most, and the least gain of log-posterior in two steps."""
+
+SLIDING = ({"grip": 1.02, "slip_error": 3.0, "stiffening": 10.0}, {"grip": 0.77, "slip_error": 5.0, "stiffening": 30.0})
+"""Where further searches start: the grip over the largest force in use, and slow errors over their usual ones."""
+
+TARGET_BEND = 0.0035
+"""rad: errors beyond it count less than by their square (INS alignment, tyres that warm up)."""
+
+
+class Reference(NamedTuple):
+    """A reference for sideslip: `values` (T,) in rad, NaN for none, and how closely it is to be followed, `weight` (rad)."""
+
+    values: jax.Array
+    weight: float
+
+
+def fit_rear_axle(
+    filter: AbstractFilter,
+    model: StateSpace,
+    log: Recording,
+    reference: Reference | None,
+    progress: Progress = silent,
+) -> Fit:
+    """Maximise the posterior of the parameters that `chosen_parameters` picks, given a `coarse` log.
+
+    A log of a car that slides has two explanations: tyres that end at its largest forces, or a road that leans with it. The
+    search begins at both, and the better end is taken.
+
+    **Raises** `FilterError` where the likelihood cannot be had.
+    """
+    # A blind fit has a reference without values: one compiled function serves all fits.
+    values = jnp.full(len(log), jnp.nan) if reference is None else reference.values
+    target = Target("reference_sideslip", (values,), 1.0 if reference is None else reference.weight, TARGET_BEND)
+    problem = pose_prediction_error(filter, model, [log], chosen_parameters, prior=SPREADS, target=target)
+    starts = _starts(problem, model, log)
+    found = []
+    for i, start in enumerate(starts):
+        progress(
+            i, len(starts), "fit the rear axle (compiling first)" if i == 0 else "fit again, from a car that slides"
+        )
+        found.append(solve(problem, start, max_steps=STEPS, tolerance=TOLERANCE))
+    best = min(found, key=lambda fit: float(jnp.where(jnp.isfinite(fit.cost), fit.cost, jnp.inf)))
+    progress(len(starts), len(starts), "fitted")
+    if not np.isfinite(float(best.cost)):
+        raise FilterError(
+            "sideslip: the fit's likelihood is not finite: look at the span with `jaxveh check`, or take another."
+        )
+    return best
+
+
+def _starts(problem, model: StateSpace, log: Recording) -> list:
+    """Coordinates to search from: the prior's, and, where the log's forces are below the grip that is told, those of cars that
+    slide in it."""
+    told, in_use = problem.start(), _force_in_use(model, log)
+    names = [p.name.split(".")[-1] for p in problem.chosen]
+    starts = [told]
+    for factors in SLIDING:
+        if factors["grip"] * in_use < float(model.system.grip):
+            z = told.at[names.index("grip")].set(jnp.log(factors["grip"] * in_use))
+            for name in ("slip_error", "stiffening"):
+                z = z.at[names.index(name)].add(jnp.log(factors[name]))
+            starts.append(z)
+    return starts
+
+
+def _force_in_use(model: StateSpace, log: Recording) -> float:
+    """The largest lateral force over load of a log's rear axle that is no single peak."""
+    rows = model.rows(log)
+    share = np.abs(np.asarray(eqx.filter_jit(lambda s, u: s.shares(u)[1])(model.system, rows.u)))
+    counted = np.isfinite(np.asarray(log[model.channels[0]]))
+    return max(float(np.quantile(share[counted], 0.99)), 1e-3)

@@ -1,0 +1,62 @@
+"""What is known of any car before its log is read: where a fit of `RearAxle` starts, and how sure that is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh._core.errors import InputError
+from jaxveh.estimators.rear_axle import USUAL_WHEELBASE, RearAxle
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+CG_HEIGHT_SHARE = 0.19
+"""Of the wheelbase: the centre of gravity's height above ground, where a car's file is silent."""
+
+GRIP = 1.0
+"""The largest lateral force of an axle over its load, where a car's file is silent."""
+
+SPREADS = {
+    "stiffness": 0.3, "grip": 0.3, "shape": 0.25, "asymmetry": 1.0, "yaw_inertia": 0.15, "cg_height": 0.25,
+    "a_y_gain": 0.03, "a_y_offset": 1.0, "yaw_rate_offset": 1.0, "ellipse": 0.3, "brake_share": 1.0, "front_drive": 1.0,
+    "drag": 0.3, "heading_offset": 1.0, "bank": 0.7, "slip_error": 0.7, "force_noise": 0.7, "slip_noise": 0.7,
+    "process_noise.law.std.v_y": 0.3, "process_noise.law.std.stiffening": 0.5,
+}  # fmt: skip
+"""Relative standard deviations by name, on each parameter's own line (unbounded ones in units of their declared scale). Those of
+stiffness and inertia are what car files are worth; those of the noises say little."""
+
+
+def chosen_parameters(model: Any):
+    """The parameters and noise levels that a calibration fits."""
+    s, noise = model.system, model.process_noise.law.std
+    axle = [s.stiffness, s.grip, s.shape, s.asymmetry]
+    body = [s.yaw_inertia, s.cg_height, s.ellipse, s.brake_share, s.front_drive, s.drag]
+    sensors = [s.yaw_rate_offset, s.a_y_gain, s.a_y_offset, s.heading_offset]
+    levels = [s.bank, s.slip_error, s.force_noise, s.slip_noise, noise.v_y, noise.stiffening]
+    return (*axle, *body, *sensors, *levels)
+
+
+def rear_axle(car: CarSpecification) -> RearAxle:
+    """The rear axle of a car's file; what it leaves out goes with the car's size."""
+    a, b = car.front_axle_to_cg, car.rear_axle_to_cg
+    load = car.mass * GRAVITY * a / (a + b)
+    size = (a + b) / USUAL_WHEELBASE
+    time = size**0.5
+    tyre = car.rear
+    if tyre is not None:
+        scale = load / tyre.nominal_load if tyre.nominal_load is not None else 1.0
+        stiffness, grip = scale * tyre.B * tyre.C * tyre.D, scale * tyre.D
+    elif car.rear_cornering_stiffness is not None:
+        stiffness, grip = car.rear_cornering_stiffness, GRIP * load
+    else:
+        raise InputError(
+            "sideslip: the car's file has no rear_cornering_stiffness, and no rear coefficients: give one."
+        )
+    told = {"drag": car.drag, "front_drive": car.front_drive, "brake_share": car.front_brake}
+    usual = {"drag": 0.45 * size**2}
+    return RearAxle(
+        mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=a, rear_axle_to_cg=b,
+        cg_height=car.cg_height or CG_HEIGHT_SHARE * (a + b),
+        stiffness=stiffness / load, grip=grip / load,
+        force_noise=0.01 * time**0.5, slip_noise=0.001 * time**0.5, bank_time=15.0 * time, slip_time=2.0 * time,
+        **usual | {name: value for name, value in told.items() if value is not None},
+    )  # fmt: skip
