@@ -35,11 +35,11 @@ def fill_gaps(recording: Recording, max_gap: float | None) -> Recording:
             f"the log has no {', '.join(missing)}; it must have {', '.join(NEEDED)}. Say which columns they are with "
             "--channels (jaxveh schema channels)."
         )
-    for name in INPUTS:
+    for name in (*INPUTS, *(("steer",) if "steer" in recording else ())):
         if max_gap is not None and np.isfinite(np.asarray(recording[name])).any():
             recording = recording.fill(name, "linear", max_gap)
         gaps = np.isnan(np.asarray(recording[name]))
-        if gaps.any():
+        if name in INPUTS and gaps.any():
             first = np.asarray(recording.time)[np.argmax(gaps)]
             advice = "add --fill SECONDS" if max_gap is None else "raise --fill, or take a span without the gap"
             raise InputError(

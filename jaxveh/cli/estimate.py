@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from jaxveh import io
+from jaxveh import InputError, io
 from jaxveh._core.errors import check_at_least, check_one_of
 from jaxveh.cli import options, sideslip
 from jaxveh.cli.blanking import fill_gaps, split
@@ -37,6 +37,7 @@ TRUTH = typer.Option(
 FILTER = typer.Option(
     "--filter", help="Extended or unscented Kalman (smoothed), auxiliary or bootstrap particle filter."
 )
+AS_TOLD = typer.Option("--as-told", help="Take the car file at its word: nothing is fitted.")
 PARTICLES = typer.Option("--particles", help="Of a particle filter, at least 2.")
 
 
@@ -47,6 +48,7 @@ def estimate(
     channels: options.Channels = None,
     calibrate: options.Calibrate = None,
     calibrate_on: options.CalibrateOn = None,
+    as_told: Annotated[bool, AS_TOLD] = False,
     fill: options.Fill = None,
     truth: Annotated[str | None, TRUTH] = None,
     filter: Annotated[Filter, FILTER] = Filter.ekf,
@@ -59,7 +61,8 @@ def estimate(
     """Estimate sideslip, slip and forces of a car from v_x, a_x, a_y and yaw_rate.
 
     With --calibrate the rear axle, noises and sensor offsets are fitted on that span first, and the rows after it are
-    estimated; without it, the car file is taken at its word and the whole log is estimated. The file has a column for
+    estimated. Without it the log calibrates itself: they are fitted on all its rows, of which no reference is seen, and
+    all rows are estimated; --as-told takes the car file at its word instead. The file has a column for
     each state and, beside it, <name>_std, its standard deviation: m/s, rad, rad/s.
 
     The car file is TOML in SI units with mass, yaw_inertia, front_axle_to_cg, rear_axle_to_cg and, for each axle, its
@@ -80,23 +83,34 @@ def estimate(
     span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
     uses = tuple(calibrate_on or ())
     parts = split(recording, span, uses, truth)
+    part, reason = _calibrated_on(parts, span, as_told)
     with progress("estimate") as report:
-        calibration = None if span is None else sideslip.calibrate(car, parts.calibration, uses, report)
+        calibration = None if reason else sideslip.calibrate(car, part, uses, report)
         report(0, 1, "estimating (compiling first)")
         found = sideslip.estimate(calibration or car, parts.estimate, filter.value, particles, seed)
         report(1, 1, "scoring")
         score = None if truth is None else sideslip.score(car, found, parts.truth, truth)
     io.write_frame(io.to_frame(found), product, overwrite=force)
-    _print(product, found, calibration, score)
+    _print(product, found, calibration, score, span, reason)
     figures = [] if out is None else _draw(found, recording, parts.truth, truth, car, span, out)
     configuration = {
-        "log": log, "vehicle": vehicle, "channels": channels, "calibrate": calibrate, "calibrate_on": uses, "fill": fill,
-        "truth": truth, "filter": filter.value, "particles": particles,
+        "log": log, "vehicle": vehicle, "channels": channels, "calibrate": calibrate, "calibrate_on": uses,
+        "as_told": as_told, "fill": fill, "truth": truth, "filter": filter.value, "particles": particles,
     }  # fmt: skip
     shown = {
         "file": product, "rows": len(found.time), "start_s": found.time[0], "end_s": found.time[-1], "figures": figures
     }  # fmt: skip
     write_numbers(numbers, {**(score or {}), **sideslip.fitted_parameters(calibration), **shown}, configuration, seed)
+
+
+def _calibrated_on(parts: Any, span: Any, as_told: bool) -> tuple[Any, str | None]:
+    """The rows to calibrate on, and the reason why nothing is calibrated, None where it is."""
+    if as_told and span is not None:
+        raise InputError("--as-told fits nothing: leave --calibrate out, or --as-told.")
+    part = parts.estimate if span is None else parts.calibration
+    if as_told:
+        return part, "--as-told"
+    return part, None if span is not None else sideslip.why_not_calibrated(part)
 
 
 def print_fitted(calibration: Any) -> None:
@@ -108,7 +122,11 @@ def print_fitted(calibration: Any) -> None:
     table("Fitted on the calibration span", ("parameter", "value ± std", "unit"), rows)
 
 
-def _print(product: Path, found: Any, calibration: Any, score: dict | None) -> None:
+def _print(product: Path, found: Any, calibration: Any, score: dict | None, span: Any, reason: str | None) -> None:
+    if reason:
+        results().print(f"Nothing was calibrated, the car file is taken at its word: {reason}.")
+    elif span is None:
+        results().print("The log calibrated itself, on all its rows and without a reference.")
     if calibration is not None:
         print_fitted(calibration)
     if score is not None:

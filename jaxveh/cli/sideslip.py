@@ -29,6 +29,14 @@ def calibrate(car: CarSpecification, part: Recording, uses: tuple[str, ...], pro
     return sideslip.calibrate(car, part, uses=uses, progress=progress)
 
 
+def why_not_calibrated(part: Recording) -> str | None:
+    """Why a log cannot calibrate itself, None where it can."""
+    if "a_y" not in part or not np.isfinite(np.asarray(part["a_y"])).any():
+        return "the log has no a_y"
+    length = float(part.time[-1] - part.time[0])
+    return None if length >= sideslip.SHORTEST else f"{length:.3g} s are too few ({sideslip.SHORTEST:g} s needed)"
+
+
 def estimate(
     source: Calibration | CarSpecification,
     part: Recording,
@@ -75,7 +83,7 @@ def fitted_parameters(calibration: Calibration | None) -> dict[str, Any]:
 
 def fitted_car(calibration: Calibration, car: CarSpecification, part: Recording) -> CarSpecification:
     """The specification with the values fitted to `part` in place."""
-    return sideslip.fitted_car(calibration, car, part)
+    return sideslip.fitted_car(calibration, car, recording=part)
 
 
 def curves(calibration: Calibration, car: CarSpecification, part: Recording) -> tuple[dict, dict]:

@@ -98,7 +98,7 @@ class RearAxleCleaning(AbstractCleaning):
         return tuple(need.channel for need in BLIND)
 
     @property
-    def needed(self):
+    def inputs(self):
         return tuple(need.channel for need in BLIND if need.throughout)
 
     def first(self, t, values):

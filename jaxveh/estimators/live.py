@@ -31,7 +31,7 @@ class AbstractCleaning(eqx.Module):
         """The channels that it reads; none where it hands on those of the model."""
 
     @property
-    def needed(self) -> tuple[str, ...]:
+    def inputs(self) -> tuple[str, ...]:
         """Those of them that every row must have; by default the model's inputs."""
         return ()
 
@@ -129,7 +129,7 @@ class Live(eqx.Module):
 
     def _row(self, t, channels: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
         """Time and channels as scalars: those that the cleaning reads, else those of the model; NaN for what is not given."""
-        needed = self.cleaning.needed or self.model.inputs
+        needed = self.cleaning.inputs or self.model.inputs
         missing = [name for name in needed if name not in channels]
         if missing:
             raise InputError(f"row: no value for the input(s) {', '.join(missing)}.")

@@ -140,7 +140,9 @@ def _validate(filter, model, log, start: int) -> float:
     return float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else float("inf")
 
 
-def fitted_car(calibration: Calibration, car: CarSpecification, recording: Recording | None = None) -> CarSpecification:
+def fitted_car(
+    calibration: Calibration, car: CarSpecification, *, recording: Recording | None = None
+) -> CarSpecification:
     """The car's file with the fitted values in place, as far as a car file can say them.
 
     With the `recording` that it was calibrated on, and where that has `steer`, the front axle's stiffness and the steer's

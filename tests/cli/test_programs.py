@@ -110,11 +110,11 @@ def test_estimate_never_sees_the_truth(tmp_path, drive):
 
 
 def test_gaps_of_an_input_are_filled_on_request_only(tmp_path, drive):
-    table = {**drive, "steer": drive["steer"].copy()}
-    table["steer"][100:104] = np.nan
+    table = {**drive, "v_x": drive["v_x"].copy()}
+    table["v_x"][100:104] = np.nan
     result, product = estimate(tmp_path, table)
     line = error_line(result)
-    assert "steer is NaN in 4 rows, first at t = 1 s" in line
+    assert "v_x is NaN in 4 rows, first at t = 1 s" in line
     assert "--fill SECONDS" in line
     assert not product.exists()
     result, _ = estimate(tmp_path, table, "--fill", "0.02")
@@ -131,10 +131,31 @@ def test_a_span_too_short_to_calibrate_on(tmp_path, drive):
 
 
 def test_a_log_without_a_channel(tmp_path, drive):
-    table = {name: values for name, values in drive.items() if name != "a_x"}
-    result, product = estimate(tmp_path, table)
-    assert "the log has no a_x" in error_line(result)
+    without = lambda missing: {name: values for name, values in drive.items() if name != missing}
+    result, product = estimate(tmp_path, without("yaw_rate"))
+    assert "the log has no yaw_rate" in error_line(result)
     assert not product.exists()
+    # What can be done without is done without.
+    for missing in ("a_x", "a_y"):
+        folder = tmp_path / missing
+        folder.mkdir()
+        result, product = estimate(folder, without(missing))
+        assert result.exit_code == 0, result.output
+        assert "Nothing was calibrated" in result.output
+
+
+def test_a_log_calibrates_itself_unless_told_otherwise(tmp_path, drive):
+    result, _ = estimate(tmp_path, drive, "--as-told", "--calibrate", "0:2")
+    assert "--as-told fits nothing" in error_line(result)
+    result, _ = estimate(tmp_path, drive, "--as-told")
+    assert "the car file is taken at its word: --as-told." in result.output
+    folder = tmp_path / "long"
+    folder.mkdir()
+    often = {name: np.tile(values, 6) for name, values in drive.items()} | {"time": 0.01 * np.arange(2400)}
+    result, product = estimate(folder, often)
+    assert result.exit_code == 0, result.output
+    assert "The log calibrated itself" in result.output
+    assert product.exists()
 
 
 def test_truth_that_says_nothing_of_sideslip(tmp_path, drive):

@@ -102,7 +102,7 @@ def test_what_it_needs_is_what_its_model_reads(name):
     needs = {need.channel: need for need in estimator(name).needs}
     throughout = {channel for channel, need in needs.items() if need.throughout}
     if cleaning.channels:
-        assert (set(needs), throughout) == (set(cleaning.channels), set(cleaning.needed))
+        assert (set(needs), throughout) == (set(cleaning.channels), set(cleaning.inputs))
         return
     assert {need.channel for need in required(name)} == {*model.inputs, *model.channels}
     assert throughout == set(model.inputs)

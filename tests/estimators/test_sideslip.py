@@ -204,7 +204,7 @@ def test_real_logs_calibrated_blind_on_the_other_half(log, direction):
     assert numbers[f"open_loop_sideslip_rmse{part}_deg"] == pytest.approx(open_loop, rel=0.03)
     assert numbers[f"sideslip_rmse{part}_deg"] <= 1.05 * measured
     assert set(calibration.summary()) >= {"stiffness", "grip", "a_y_offset", "process noise.v_y"}
-    written = estimators.sideslip.fitted_car(calibration, car, fitted)
+    written = estimators.sideslip.fitted_car(calibration, car, recording=fitted)
     assert 0.4 < written.front_cornering_stiffness / car.front_cornering_stiffness < 2.5
     assert written.rear_cornering_stiffness == pytest.approx(written.rear.B * written.rear.C * written.rear.D, rel=1e-6)
 
@@ -218,7 +218,7 @@ CAR_TOLD = dataclasses.replace(CAR, rear_cornering_stiffness=0.7 * 127000.0, fro
 
 
 def test_a_calibration_finds_stiffnesses_that_the_file_does_not_know():
-    fitted = estimators.sideslip.fitted_car(calibrated(), CAR_TOLD, log())
+    fitted = estimators.sideslip.fitted_car(calibrated(), CAR_TOLD, recording=log())
     assert fitted.rear_cornering_stiffness == pytest.approx(127000.0, rel=0.1)
     assert fitted.front_cornering_stiffness == pytest.approx(88000.0, rel=0.1)
     assert abs(fitted.steer_offset) < 1e-3

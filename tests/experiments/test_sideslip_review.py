@@ -15,6 +15,7 @@ from jaxveh.experiments.sideslip_review import (
     contestants,
     criteria,
     figures,
+    handling_fit,
     models,
     printed,
     recorded,
@@ -270,7 +271,7 @@ def test_on_a_log_the_baseline_is_the_open_loop():
     blind = recording.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])
     drive = recorded.drive_of(blind, recording)
     assert 0.5 < np.mean(np.asarray(drive.fresh)) < 1.0
-    handling = models.Handling(estimators.sideslip.handling_car(car).car)
+    handling = models.Handling(handling_fit.handling_car(car).car)
     told = models.handling_model(handling)
     cars = recorded.log_cars(car, told)
     study = dataclasses.replace(experiment.Study(), speed=30.0)

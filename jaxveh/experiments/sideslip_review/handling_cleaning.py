@@ -8,7 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.kit import AbstractCleaning, Need, check_needs, clean_recording
+from jaxveh.estimators import kit
 from jaxveh.sensors import LowPass
 
 STEER_RATE = 3.0
@@ -21,11 +21,11 @@ A_X_CUTOFF = 1.6
 """Hz: the axle loads follow the longitudinal acceleration, not its vibration."""
 
 BLIND = (
-    Need("steer", "rad", throughout=True),
-    Need("v_x", "m/s", throughout=True),
-    Need("a_x", "m/s^2", throughout=True),
-    Need("a_y", "m/s^2"),
-    Need("yaw_rate", "rad/s"),
+    kit.Need("steer", "rad", throughout=True),
+    kit.Need("v_x", "m/s", throughout=True),
+    kit.Need("a_x", "m/s^2", throughout=True),
+    kit.Need("a_y", "m/s^2"),
+    kit.Need("yaw_rate", "rad/s"),
 )
 """What sideslip is estimated from, blind."""
 
@@ -42,7 +42,7 @@ class HandlingMemory(NamedTuple):
     low_pass: Any
 
 
-class HandlingCleaning(AbstractCleaning):
+class HandlingCleaning(kit.AbstractCleaning):
     """Steer spikes held, a_x low-passed (first order, settled at the first row), and repeated measurements as missing.
 
     Loggers repeat the last value where a sensor was slower than the log: a row in which neither `yaw_rate` nor `a_y` moved
@@ -82,5 +82,5 @@ def clean(recording: Recording) -> Recording:
 
     **Raises** `InputError` where a channel is missing, or an input is NaN (fill it on request first).
     """
-    check_needs("sideslip review", BLIND, recording)
-    return clean_recording(HandlingCleaning(), recording)
+    kit.check_needs("sideslip review", BLIND, recording)
+    return kit.clean_recording(HandlingCleaning(), recording)

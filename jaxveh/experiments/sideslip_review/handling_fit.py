@@ -7,9 +7,9 @@ from typing import Any
 
 import equinox as eqx
 
+from jaxveh import estimators
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.kit import cut_pieces
 from jaxveh.experiments.sideslip_review.handling import Handling, handling_model
 from jaxveh.experiments.sideslip_review.handling_cleaning import clean
 from jaxveh.filters import Unscented
@@ -66,7 +66,7 @@ def _generic(tyre: MagicFormula, load, told: bool) -> MagicFormula:
 
 def fitted_model(told: CarSpecification, log: Recording, progress: Progress = silent) -> StateSpace:
     """The handling model of the greatest posterior on pieces of a log, blind."""
-    pieces, warm_up = cut_pieces(clean(log))
+    pieces, warm_up = estimators.kit.cut_pieces(clean(log))
     start = handling_model(handling_car(told))
     fit = prediction_error(
         Unscented(), start, pieces, chosen_parameters, prior=PRIOR, warm_up=warm_up, progress=progress
