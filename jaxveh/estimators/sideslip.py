@@ -140,16 +140,14 @@ def _validate(filter, model, log, start: int) -> float:
     return float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else float("inf")
 
 
-def fitted_car(
-    calibration: Calibration, car: CarSpecification, *, recording: Recording | None = None
-) -> CarSpecification:
+def fitted_car(source: Calibration, car: CarSpecification, *, recording: Recording | None = None) -> CarSpecification:
     """The car's file with the fitted values in place, as far as a car file can say them.
 
     With the `recording` that it was calibrated on, and where that has `steer`, the front axle's stiffness and the steer's
     offset are fitted to it: see `front_axle`; else they are the file's.
     """
-    fitted = calibration.model.system
-    load = float(fitted.mass) * 9.80665 * float(fitted.front_axle_to_cg) / _wheelbase(calibration.model)
+    fitted = source.model.system
+    load = float(fitted.mass) * 9.80665 * float(fitted.front_axle_to_cg) / _wheelbase(source.model)
     stiffness, grip = float(fitted.stiffness) * load, float(fitted.grip) * load
     rear = AxleTyre(B=stiffness / (CURVE * grip), C=CURVE, D=grip, E=0.0, nominal_load=load)
     found = dataclasses.replace(
@@ -161,7 +159,7 @@ def fitted_car(
     )
     if recording is None or not _measured(recording, "steer") or not _measured(recording, "a_y"):
         return found
-    told, new = car.front, front_axle(calibration.model, recording)
+    told, new = car.front, front_axle(source.model, recording)
     if told is not None:
         told = dataclasses.replace(told, B=told.B * new.front_cornering_stiffness / (told.B * told.C * told.D), S_h=0.0)
     return dataclasses.replace(found, front=told, **new._asdict())
