@@ -23,10 +23,12 @@ from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of,
 from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.live import Live
+from jaxveh.estimators.parameter_bands import smoothed_with_members
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
 from jaxveh.estimators.rear_axle_prior import rear_axle
 from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
+from jaxveh.fitting import Fit
 from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.statespace import Smoothing, StateSpace, kit
 from jaxveh.vehicles import from_specification
@@ -176,8 +178,9 @@ def estimate(
     """Sideslip of the car along a log from v_x, a_x, a_y and yaw_rate: see `rear_axle.RearAxleReport` for the names.
 
     `source`: a `Calibration`, a model, or a car taken at its word. Every row is estimated from all rows (a smoother), or, with
-    `smoothed=False` and for filters without a Gaussian smoother, from those up to it, as `live` does. **Raises** as `run` and
-    `clean` do.
+    `smoothed=False` and for filters without a Gaussian smoother, from those up to it, as `live` does. The bands of a smoothed
+    estimate by a calibration allow for what the calibration does not know (`parameter_bands`); others do not. **Raises** as
+    `run` and `clean` do.
     """
     one = model_of(NAME, source, model)
     if not _measured(recording, "a_y"):
@@ -185,7 +188,8 @@ def estimate(
         one = eqx.tree_at(at, one, jnp.full_like(at(one), WITHOUT_A_Y))
     used, log = filter or Extended(), clean(recording, RearAxleCleaning(_wheelbase(one)))
     if smoothed and kit.smoothing_of(used) is Smoothing.gaussian:
-        return smooth(used, one, log)
+        known = isinstance(source, Calibration) and isinstance(source.fit, Fit) and one is source.model
+        return smoothed_with_members(used, source.fit, log) if known else smooth(used, one, log)
     return run(used, one, log, key=key)
 
 

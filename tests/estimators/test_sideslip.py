@@ -8,6 +8,8 @@ import pytest
 from shared_data import shared
 
 from jaxveh import InputError, Recording, estimators, io, sensors, vehicles
+from jaxveh._core.parameter import pick
+from jaxveh.estimators import parameter_bands
 from jaxveh.estimators.cleaning import FORCE_CUTOFF
 
 CAR = io.CarSpecification(
@@ -238,4 +240,20 @@ def test_a_smoother_knows_more_than_a_filter():
     both = [estimators.sideslip.estimate(calibrated(), recording, smoothed=how) for how in (True, False)]
     smooth, causal = (estimators.sideslip.score(CAR, one, log())["sideslip_rmse_deg"] for one in both)
     assert smooth < causal
-    assert (np.asarray(both[0].std.sideslip) <= np.asarray(both[1].std.sideslip) * (1 + 1e-6)).all()
+
+
+def test_bands_know_that_parameters_are_uncertain():
+    fit = calibrated().fit
+    models = parameter_bands.members(fit)
+    line = np.stack(
+        [np.asarray(p.domain.inverse(v)) for p, v in zip(fit.chosen, pick(models, fit.chosen), strict=True)], axis=1
+    )
+    np.testing.assert_allclose(line.mean(axis=0), fit.unconstrained, atol=1e-8)
+    np.testing.assert_allclose(
+        line.T @ line / len(line) - np.outer(fit.unconstrained, fit.unconstrained), fit.covariance, atol=1e-6
+    )
+    recording = log().without("v_y")
+    sure = estimators.sideslip.estimate(fit.model, recording)
+    found = estimators.sideslip.estimate(calibrated(), recording)
+    np.testing.assert_array_equal(found.mean.sideslip, sure.mean.sideslip)
+    assert np.mean(found.std.sideslip) > 1.2 * np.mean(sure.std.sideslip)
