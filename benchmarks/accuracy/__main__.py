@@ -75,7 +75,7 @@ def _fleet(only: str, runs: int, seed: int) -> dict:
         for one in logs:
             setting = next(setting for setting in settings(one.log) if setting.name == name)
             lines.append(measure(one.log, setting))
-            print(f"{len(lines)} of {runs}", end="\r", file=sys.stderr, flush=True)
+            print(f"{len(lines)} of {len(logs)}", end="\r", file=sys.stderr, flush=True)
         about = summary(lines)
         worst = sorted((line for line in lines if not line.failed), key=lambda line: -line.over_open_loop)[:10]
         show(worst, f"fleet of {runs}, {name}: the ten worst")

@@ -52,6 +52,13 @@ BIASES = {"a_y": 0.3, "a_x": 0.3, "yaw_rate": np.radians(0.3), "steer": np.radia
 """Standard deviations of constant sensor errors: m/s^2, rad/s, rad at the road wheels; of the speed's gain."""
 
 
+LOST = np.radians(30.0)
+"""Of sideslip: the car is lost, and its log ends a second before; shorter than `LEAST` there is none."""
+
+LEAST = 30.0
+"""s."""
+
+
 class WindingRoad(manoeuvres.AbstractGraph):
     """A road whose curvature is random along x: harmonics of equal energy between two wavelengths.
 
@@ -105,7 +112,10 @@ def cars() -> dict[str, vehicles.CarNumbers]:
 
 
 def fleet(runs: int, seed: int = 0, duration: float = 90.0) -> list[FleetLog]:
-    """`runs` logs of `duration` s, every car and every drive in turn; simulated by one program."""
+    """Logs of up to `runs` drives of `duration` s, every car and every drive in turn; simulated by one program.
+
+    A drive ends where its car is `LOST` or stands, and is left out where that is sooner than `LEAST`.
+    """
     rng, numbers = np.random.default_rng(seed), cars()
     names, drives = list(numbers), list(DRIVES)
     plans = [(names[i % len(names)], drives[(i // len(names)) % len(drives)]) for i in range(runs)]
@@ -120,11 +130,21 @@ def fleet(runs: int, seed: int = 0, duration: float = 90.0) -> list[FleetLog]:
         channels = _late({name: values[i] for name, values in said.items()}, int(rng.integers(-LATEST, LATEST + 1)))
         v_y = truth["v_y"][i] + told.cg_error * truth["yaw_rate"][i]
         recording = Recording(DT * np.arange(len(v_y)), {**channels, "v_y": v_y}, source=f"fleet {i}")
+        kept = _until_lost(recording)
+        if kept is None:
+            continue
         # The reference is the truth where the file says that the centre of gravity is.
         name = f"fleet {i}: {car}, {drive}"
         banked = bool(run.road.bank.std > 1e-6)
-        found.append(FleetLog(Log(name, told.file, recording), car, drive, float(run.road.friction), banked))
+        found.append(FleetLog(Log(name, told.file, kept), car, drive, float(run.road.friction), banked))
     return found
+
+
+def _until_lost(recording: Recording) -> Recording | None:
+    v_x, v_y = np.asarray(recording["v_x"]), np.asarray(recording["v_y"])
+    lost = np.flatnonzero((np.abs(np.arctan2(v_y, v_x)) > LOST) | (v_x < 2.0))
+    rows = len(recording) if lost.size == 0 else int(lost[0] - 1.0 / DT)
+    return recording.rows(slice(0, rows)) if rows * DT >= LEAST else None
 
 
 class Told(NamedTuple):

@@ -142,7 +142,7 @@ def _draw(found: Any, recording: Any, seen: Any, truth: str | None, car: Any, sp
     make_folder(out)
     names = ("sideslip", "v_y", "yaw_rate") if truth is None else ("sideslip", "v_y")
     true = None if truth is None else sideslip.truth_of(seen, truth)
-    others = {} if truth is None else {"open-loop linear model": sideslip.open_loop(car, seen)}
+    others = {} if truth is None or "steer" not in seen else {"open-loop linear model": sideslip.open_loop(car, seen)}
     spans = [] if span is None else [(max(span[0], float(recording.time[0])), span[1], "calibration")]
     paths = [
         plots.save(plots.recording(recording, spans=spans), out / "channels.png"),

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from jaxveh import io
+from jaxveh import InputError, io
 from jaxveh.cli import options, sideslip
 from jaxveh.cli.blanking import calibration_part, fill_gaps
 from jaxveh.cli.console import progress, results
@@ -41,6 +41,10 @@ def fit(
     car, recording = io.read_car(vehicle), fill_gaps(io.read_recording(log, channels), fill)
     span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
     uses = tuple(calibrate_on or ())
+    if out is not None and "steer" not in recording:
+        raise InputError(
+            "--out: the force curves need steer, which the log has not. Name its column, or leave --out away."
+        )
     part = calibration_part(recording, span, uses)
     with progress("fit") as report:
         calibration = sideslip.calibrate(car, part, uses, report)

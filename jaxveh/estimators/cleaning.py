@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from jaxveh._core.errors import check_positive
+from jaxveh._core.parameter import positive
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.contract import Need, check_needs
 from jaxveh.estimators.live import AbstractCleaning, clean_recording
-from jaxveh.estimators.rear_axle import CHANNEL, USUAL_WHEELBASE, least_speed_of
+from jaxveh.estimators.rear_axle import CHANNEL, USUAL_WHEELBASE, rolling_below
 from jaxveh.sensors import LowPass
 
 A_X_CUTOFF = 1.6
@@ -31,7 +32,7 @@ OUTLYING = 8.0
 """A spike is also further away than this many times the mean change from row to row: some channels are nothing but noise."""
 
 MEMORY = 1.0
-"""s."""
+"""s: over which that mean is taken."""
 
 LONGEST_SPIKE = 0.1
 """s: what lasts longer is no spike."""
@@ -88,7 +89,7 @@ class RearAxleCleaning(AbstractCleaning):
     gained since the low-passed rows is added to the balance, so that the low-pass costs no delay. `wheelbase` (m).
     """
 
-    wheelbase: float = eqx.field(static=True, default=USUAL_WHEELBASE)
+    wheelbase: jax.Array = positive("m", default=USUAL_WHEELBASE)
 
     def __check_init__(self):
         check_positive("RearAxleCleaning.wheelbase", self.wheelbase, "m")
@@ -121,7 +122,7 @@ class RearAxleCleaning(AbstractCleaning):
 
     def next(self, memory, t, values):
         dt, v_x = t - memory.t, values["v_x"]
-        quick, moves = USUAL_WHEELBASE / self.wheelbase, v_x > 1.0
+        quick, moves = (USUAL_WHEELBASE / self.wheelbase).astype(v_x.dtype), v_x > 1.0
         # No accelerometer at all, or none so far.
         none = jnp.isnan(values["a_y"]) & jnp.isnan(memory.a_y.raw)
         turned, yaw_rate = _watch(
@@ -149,7 +150,7 @@ class RearAxleCleaning(AbstractCleaning):
 
     def _row(self, memory, dt, lost, v_x, a_y, yaw_rate):
         low_pass = self._low_pass(v_x)
-        slow = (v_x < least_speed_of(self.wheelbase)) | (dt <= 0)
+        slow = (v_x < rolling_below(self.wheelbase)) | (dt <= 0)
         (smooth_a_y, _), (smooth, change) = memory.smooth_a_y, memory.smooth_yaw_rate
         return {
             "v_x": v_x, "a_x": memory.slow_a_x[0], "yaw_rate": yaw_rate, "turning": v_x * yaw_rate, "a_y": a_y,
@@ -163,7 +164,7 @@ class RearAxleCleaning(AbstractCleaning):
         return LowPass(jnp.asarray(A_X_CUTOFF, like.dtype), 1)
 
     def _low_pass(self, like) -> LowPass:
-        return LowPass(jnp.asarray(FORCE_CUTOFF * (USUAL_WHEELBASE / self.wheelbase) ** 0.5, like.dtype), 2)
+        return LowPass((FORCE_CUTOFF * (USUAL_WHEELBASE / self.wheelbase) ** 0.5).astype(like.dtype), 2)
 
 
 def _behind(low_pass: LowPass, state, rate, dt):

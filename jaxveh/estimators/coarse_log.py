@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.rear_axle import CHANNEL, INPUTS, USUAL_WHEELBASE, least_speed_of
+from jaxveh.estimators.rear_axle import CHANNEL, INPUTS, USUAL_WHEELBASE, rolling_below
 
 CUTOFF = 0.7
 """Hz, of a car of the usual wheelbase: -3 dB of the smoothing."""
@@ -40,7 +40,7 @@ def coarse(recording: Recording, wheelbase: float) -> Recording:
     stride = max(1, round(1 / (RATE * quick * step)))
     at = np.arange(0, len(time), stride)
     mean = lambda values: np.append(np.diff(_integral(values, step)[at]) / (stride * step), values[at[-1]])
-    counted = (slow["v_x"][at] >= least_speed_of(wheelbase)) & _near(recording, time[at])
+    counted = (slow["v_x"][at] >= rolling_below(wheelbase)) & _near(recording, time[at])
     none = np.zeros(len(at))
     rows = {
         "v_x": slow["v_x"][at], "a_x": slow["a_x"][at], "yaw_rate": slow["yaw_rate"][at], "turning": mean(turning),

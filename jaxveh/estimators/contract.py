@@ -7,11 +7,12 @@ An estimator is a module of `jaxveh.estimators`, named after what it estimates, 
   estimator is about. All other arguments have defaults and are given by name.
 - `calibrate(car, recording, *, filter=None, progress=silent, ...) -> Calibration`: what of the car and of the noises a span of a
   log tells.
-- `estimate(source, recording, *, filter=None, key=None) -> Estimate`: means and standard deviations of the quantity along a log;
-  `source` is a `Calibration`, a model, or a car taken at its word.
+- `estimate(source, recording, *, filter=None, key=None, ...) -> Estimate`: means and standard deviations of the quantity along a
+  log; `source` is a `Calibration`, a model, or a car taken at its word. One that smooths has `smoothed=`, which turns it off.
 - `live(source, *, filter=None, key=None) -> Live`: the same a row at a time.
 
-`AbstractCleaning` is what stands between the log and the filter. It looks back only, so that `live` says what `estimate` says.
+`AbstractCleaning` is what stands between the log and the filter. It looks back only, so that `live` says what `estimate` says
+without smoothing.
 """
 
 from __future__ import annotations

@@ -15,6 +15,10 @@ LARGEST_SHARE = 0.6
 """Of the rear axle's grip: forces up to this are told from a straight line."""
 
 
+FEWEST = 20
+"""Rows that a straight line is told from."""
+
+
 class FrontAxle(NamedTuple):
     """What a car's file says of it: N/rad; rad, what the steer channel shows when the car runs straight."""
 
@@ -22,11 +26,12 @@ class FrontAxle(NamedTuple):
     steer_offset: float
 
 
-def front_axle(model: StateSpace, recording: Recording) -> FrontAxle:
+def front_axle(model: StateSpace, recording: Recording) -> FrontAxle | None:
     """Least squares of slip angles on forces: `steer - v_y / v_x - a yaw_rate / v_x = F / stiffness + offset`.
 
     Forces and v_y are those that a calibrated `rear_axle_model` sees in the log; rows beyond `LARGEST_SHARE` do not count, nor
-    those that are slow.
+    those that are slow. None where too few are left, or where the slip angle does not grow with the force: a steer that is no
+    steer.
     """
     s = model.system
     log = coarse(recording, float(s.wheelbase))
@@ -40,6 +45,8 @@ def front_axle(model: StateSpace, recording: Recording) -> FrontAxle:
     counted = np.isfinite(np.asarray(log[model.channels[0]])) & (np.abs(rear) < LARGEST_SHARE * float(s.grip))
     slip = steer - np.arctan2(np.asarray(found.mean.v_y) + float(s.front_axle_to_cg) * yaw_rate, v_x)
     force = share * np.asarray(s.loads(rows.u)[0])
+    if counted.sum() < FEWEST:
+        return None
     design = np.stack([force, np.ones_like(force)], axis=1)[counted]
     (softness, offset), *_ = np.linalg.lstsq(design, slip[counted], rcond=None)
-    return FrontAxle(1.0 / float(softness), float(offset))
+    return FrontAxle(1.0 / float(softness), float(offset)) if softness > 0 else None

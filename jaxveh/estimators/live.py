@@ -99,10 +99,11 @@ class LiveAnswer(NamedTuple):
 
 
 class Live(eqx.Module):
-    """An estimator that is given one row at a time, cleaning included, and says what `estimate` says of the same rows.
+    """An estimator that is given one row at a time, cleaning included, and says what `estimate` says of the same rows
+    without smoothing.
 
         live = estimators.sideslip.live(calibration)
-        belief, answer = live.init(t, {"steer": ..., "v_x": ..., "a_x": ..., "a_y": ..., "yaw_rate": ...})
+        belief, answer = live.init(t, {"v_x": ..., "a_x": ..., "a_y": ..., "yaw_rate": ...})
         belief, answer = live.step(belief, t, {...})
         answer.mean.sideslip, answer.std.sideslip
 

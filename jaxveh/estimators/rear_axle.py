@@ -34,7 +34,7 @@ BEND = 0.05
 """The share of the grip over which that sets in."""
 
 LARGEST_SLIP = 1.2
-"""rad."""
+"""rad: no axle is taken to slide at more, where the tangent would run away."""
 
 ASYMMETRY_BEND = 0.03
 """Slip angle (rad) over which the difference between left and right turns fades in, so that straight running is smooth."""
@@ -82,10 +82,10 @@ class RearAxle(eqx.Module):
       by the front axle's shares, `ellipse` (-): how much of it counts, `sqrt(1 - (ellipse F_x / (grip load))^2)`.
     - `heading_offset` (rad): by which a reference for sideslip (an INS) is turned against the car; moves no state.
     - `bank` (rad), `slip_error` (rad): standard deviations of the states of these names, first-order Gauss-Markov with memories
-      `bank_time` and `slip_time` (s, fixed).
+      `bank_time` and `slip_time` (s).
     - `force_noise` (sqrt s), `slip_noise` (rad sqrt s): of the force over load and of the slip angle, white, as densities.
 
-    Inputs: see `cleaning`. Axes of ISO 8855; a positive slip angle gives a positive lateral force.
+    Inputs: see `INPUTS`. Axes of ISO 8855; a positive slip angle gives a positive lateral force.
     """
 
     mass: jax.Array = positive("kg")
@@ -109,8 +109,8 @@ class RearAxle(eqx.Module):
     slip_error: jax.Array = positive("rad", default=0.006)
     force_noise: jax.Array = positive("s^0.5", default=0.01)
     slip_noise: jax.Array = positive("rad s^0.5", default=0.001)
-    bank_time: float = eqx.field(static=True, default=15.0)
-    slip_time: float = eqx.field(static=True, default=2.0)
+    bank_time: jax.Array = positive("s", default=15.0)
+    slip_time: jax.Array = positive("s", default=2.0)
 
     @property
     def wheelbase(self) -> Any:
@@ -122,9 +122,8 @@ class RearAxle(eqx.Module):
         a, b = self.front_axle_to_cg, self.rear_axle_to_cg
         a_y, moment = self.specific_force(u.a_y_smooth), self.yaw_inertia * u.yaw_acceleration
         front, rear = self.loads(u)
-        return (b * self.mass * a_y + moment) / (self.wheelbase * front), (a * self.mass * a_y - moment) / (
-            self.wheelbase * rear
-        )
+        F_yf, F_yr = (b * self.mass * a_y + moment) / self.wheelbase, (a * self.mass * a_y - moment) / self.wheelbase
+        return F_yf / front, F_yr / rear
 
     def loads(self, u) -> tuple[Any, Any]:
         """Loads of the axles, N."""
@@ -161,23 +160,24 @@ class RearAxle(eqx.Module):
         return jnp.clip(angle * softer, -LARGEST_SLIP, LARGEST_SLIP), slope * softer / left
 
 
-class SettledBelow(eqx.Module):
-    """The transition: integrated acceleration above a speed (m/s); below it the car rolls where its rear axle goes."""
+def rolling_below(wheelbase) -> Any:
+    """m/s: below it a car of this wheelbase (m) is taken to roll where its rear axle goes."""
+    return SLOWEST * (wheelbase / USUAL_WHEELBASE) ** 0.5
 
-    least_speed: float = eqx.field(static=True)
 
-    def __call__(self, system: RearAxle, t0, t1, x: RearAxleState, u):
-        dt = t1 - t0
-        felt = system.specific_force(u.a_y) - (u.turning - u.v_x * system.yaw_rate_offset)
-        moving = x.v_y + dt * (felt - GRAVITY * system.bank * x.bank)
-        rolling = system.rear_axle_to_cg * (u.yaw_rate - system.yaw_rate_offset) + 0.0 * x.v_y
-        fade = lambda time: jnp.exp(-dt / time)
-        return RearAxleState(
-            v_y=jnp.where(u.v_x >= self.least_speed, moving, rolling),
-            bank=fade(system.bank_time) * x.bank,
-            slip_error=fade(system.slip_time) * x.slip_error,
-            stiffening=x.stiffening,
-        )
+def transition(system: RearAxle, t0, t1, x: RearAxleState, u) -> RearAxleState:
+    """Acceleration is integrated; below the speed of `rolling_below` the car rolls where its rear axle goes."""
+    dt = t1 - t0
+    felt = system.specific_force(u.a_y) - (u.turning - u.v_x * system.yaw_rate_offset)
+    moving = x.v_y + dt * (felt - GRAVITY * system.bank * x.bank)
+    rolling = system.rear_axle_to_cg * (u.yaw_rate - system.yaw_rate_offset) + 0.0 * x.v_y
+    fade = lambda time: jnp.exp(-dt / time)
+    return RearAxleState(
+        v_y=jnp.where(u.v_x >= rolling_below(system.wheelbase), moving, rolling),
+        bank=fade(system.bank_time) * x.bank,
+        slip_error=fade(system.slip_time) * x.slip_error,
+        stiffening=x.stiffening,
+    )
 
 
 CHANNEL = "slip_balance"
@@ -230,23 +230,27 @@ INPUTS = (
     "v_x", "a_x", "yaw_rate", "turning", "a_y", "yaw_rate_smooth", "yaw_acceleration", "a_y_smooth", "a_y_lead",
     "turning_lead", "lag", "step",
 )  # fmt: skip
+"""What `cleaning` and `coarse_log` make of a log.
 
-
-def least_speed_of(wheelbase: float) -> float:
-    """m/s: below it a car of this wheelbase (m) is taken to roll where its rear axle goes."""
-    return SLOWEST * float((wheelbase / USUAL_WHEELBASE) ** 0.5)
+- `v_x` (m/s), `a_x` (m/s^2, low-passed), `yaw_rate` (rad/s).
+- What v_y is integrated from until the next row: `a_y` (m/s^2) and `turning`, v_x yaw_rate (m/s^2).
+- What the axle's force is told from, low-passed: `yaw_rate_smooth` (rad/s), `yaw_acceleration` (rad/s^2), `a_y_smooth` (m/s^2).
+- How far the integrals of a_y and of v_x yaw_rate are ahead of their own low-pass, `a_y_lead` and `turning_lead` (m/s), and its
+  delay, `lag` (s).
+- The time that a row stands for, `step` (s).
+"""
 
 
 def rear_axle_model(system: RearAxle) -> StateSpace:
     """The state space of a real log, with levels of noise that a fit starts from (stated in the code, unit by unit)."""
     quick = float(system.wheelbase / USUAL_WHEELBASE) ** -0.5
-    unit = lambda time: (2.0 / time) ** 0.5
+    unit = lambda time: (2.0 / float(time)) ** 0.5
     noise = {
         "v_y": 0.02, "bank": unit(system.bank_time), "slip_error": unit(system.slip_time), "stiffening": 0.01 * quick**0.5,
     }  # fmt: skip
     return StateSpace(
         system=system,
-        transition=SettledBelow(least_speed_of(float(system.wheelbase))),
+        transition=transition,
         observation=observation,
         report=report,
         process_noise=Continuous(Gaussian(noise)),

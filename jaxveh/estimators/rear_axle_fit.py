@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from typing import NamedTuple
 
 import equinox as eqx
@@ -10,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import FilterError
+from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.rear_axle_prior import SPREADS, chosen_parameters
@@ -51,8 +52,14 @@ def fit_rear_axle(
     A log of a car that slides has two explanations: tyres that end at its largest forces, or a road that leans with it. The
     search begins at both, and the better end is taken.
 
-    **Raises** `FilterError` where the likelihood cannot be had.
+    Where the search runs out of steps a `JaxvehWarning` says so. **Raises** `InputError` for a log of which nothing is measured
+    at speed, `FilterError` where the likelihood cannot be had.
     """
+    if not np.isfinite(np.asarray(log[model.channels[0]])).any():
+        raise InputError(
+            f"sideslip: no row of the {float(log.time[-1] - log.time[0]):.3g} s is fast enough and measured: there is nothing to "
+            "calibrate on. Take a span in which the car drives."
+        )
     # A blind fit has a reference without values: one compiled function serves all fits.
     values = jnp.full(len(log), jnp.nan) if reference is None else reference.values
     target = Target("reference_sideslip", (values,), 1.0 if reference is None else reference.weight, TARGET_BEND)
@@ -69,6 +76,12 @@ def fit_rear_axle(
     if not np.isfinite(float(best.cost)):
         raise FilterError(
             "sideslip: the fit's likelihood is not finite: look at the span with `jaxveh check`, or take another."
+        )
+    if int(best.result) != 0:
+        warnings.warn(
+            f"sideslip: the fit ended after {int(best.steps)} steps ({best.reason}); what it found is used as it is.",
+            JaxvehWarning,
+            stacklevel=3,
         )
     return _widened(best, np.asarray(problem.spread))
 

@@ -7,13 +7,14 @@ and held by the slip angle that the rear axle's force asks for: see `rear_axle`.
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, JaxvehWarning, check_one_of
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Score, score_band
@@ -31,7 +32,7 @@ from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate,
 from jaxveh.fitting import Fit
 from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.statespace import Smoothing, StateSpace, kit
-from jaxveh.vehicles import from_specification
+from jaxveh.vehicles import GRAVITY, from_specification
 
 NAME = "sideslip"
 
@@ -79,6 +80,8 @@ def calibrate(
         check_one_of("uses", name, ("v_y",))
     span = span_of(NAME, recording, SHORTEST, "corners")
     check_needs(NAME, (*needs, *(Need(name, "m/s") for name in uses)), recording)
+    if not _measured(recording, "yaw_rate"):
+        raise InputError("sideslip: yaw_rate (rad/s) is NaN in every row: there is nothing to calibrate on.")
     if not _measured(recording, "a_y"):
         raise InputError(
             "sideslip: a_y (m/s^2) is missing from the log: without an accelerometer no tyre can be calibrated. Estimate "
@@ -87,10 +90,6 @@ def calibrate(
     filter, start = filter or Extended(), model(car)
     seen = recording.select([name for name in (*[need.channel for need in needs], *uses) if name in recording])
     log = coarse(seen, _wheelbase(start))
-    if not np.isfinite(np.asarray(log[start.channels[0]])).any():
-        raise InputError(
-            f"sideslip: no row of the span {span[0]:g} to {span[1]:g} s is fast enough and measured: nothing to calibrate on."
-        )
     if not uses:
         return Calibration(NAME, fit_rear_axle(filter, start, log, None, progress), span)
     half = len(log) // 2
@@ -149,7 +148,7 @@ def fitted_car(source: Calibration, car: CarSpecification, *, recording: Recordi
     offset are fitted to it: see `front_axle`; else they are the file's.
     """
     fitted = source.model.system
-    load = float(fitted.mass) * 9.80665 * float(fitted.front_axle_to_cg) / _wheelbase(source.model)
+    load = float(fitted.mass) * GRAVITY * float(fitted.front_axle_to_cg) / _wheelbase(source.model)
     stiffness, grip = float(fitted.stiffness) * load, float(fitted.grip) * load
     rear = AxleTyre(B=stiffness / (CURVE * grip), C=CURVE, D=grip, E=0.0, nominal_load=load)
     found = dataclasses.replace(
@@ -162,6 +161,11 @@ def fitted_car(source: Calibration, car: CarSpecification, *, recording: Recordi
     if recording is None or not _measured(recording, "steer") or not _measured(recording, "a_y"):
         return found
     told, new = car.front, front_axle(source.model, recording)
+    if new is None:
+        warnings.warn(
+            "fitted_car: steer says nothing of the front axle; the file's is kept.", JaxvehWarning, stacklevel=2
+        )
+        return found
     if told is not None:
         told = dataclasses.replace(told, B=told.B * new.front_cornering_stiffness / (told.B * told.C * told.D), S_h=0.0)
     return dataclasses.replace(found, front=told, **new._asdict())
@@ -216,8 +220,8 @@ def score(
     Over the rows where the reference is finite and `v_x` at least `least_speed` (m/s, default `least_speed_of`). **Returns** by
     name, for sideslip in degrees (`sideslip_rmse_deg`) and for v_y in m/s, what `diagnostics.Score` has: the
     error as measured, its constant part and the rest (an INS that is turned against the car by half a degree says so in every
-    row), the largest, coverage of the bands, CRPS; the errors of the baseline as `open_loop_sideslip_...`; `rows` and
-    `least_speed`.
+    row), the largest, coverage of the bands, CRPS; the errors of the baseline as `open_loop_sideslip_...`, where there is a
+    `steer`; `rows` and `least_speed`.
 
     **Raises** `InputError` where no row is left.
     """
@@ -229,16 +233,17 @@ def score(
             f"score: no row has both a reference v_y and a speed of at least {floor:g} m/s; there is nothing to score against."
         )
     truth = {"sideslip": np.degrees(np.arctan2(v_y, v_x)), "v_y": v_y}
-    baseline = np.degrees(open_loop(from_specification(car), recording)["sideslip"])
     units = {"sideslip": np.degrees(1.0), "v_y": 1.0}
     scores = {
         name: score_band(true, units[name] * found[name], units[name] * np.asarray(getattr(found.std, name)), fast)
         for name, true in truth.items()
     }
     named = _named("sideslip", "_deg", scores["sideslip"]) | _named("v_y", "", scores["v_y"])
-    plain = _named("open_loop_sideslip", "_deg", score_band(truth["sideslip"], baseline, which=fast))
-    without_bands = {name: value for name, value in plain.items() if not np.isnan(value)}
-    return named | without_bands | {"rows": scores["sideslip"].rows, "least_speed": floor}
+    if _measured(recording, "steer"):
+        baseline = np.degrees(open_loop(from_specification(car), recording)["sideslip"])
+        plain = _named("open_loop_sideslip", "_deg", score_band(truth["sideslip"], baseline, which=fast))
+        named |= {name: value for name, value in plain.items() if not np.isnan(value)}
+    return named | {"rows": scores["sideslip"].rows, "least_speed": floor}
 
 
 def _named(quantity: str, unit: str, found: Score) -> dict[str, float]:

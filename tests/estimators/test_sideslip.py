@@ -156,15 +156,6 @@ def test_the_reference_cannot_reach_a_blind_estimate():
     np.testing.assert_array_equal(np.asarray(found.mean.sideslip), np.asarray(blind.mean.sideslip))
 
 
-def real_log():
-    recording = io.read_recording(shared("ferrari_250lm_100hz.csv"))
-    return (
-        recording.rows(slice(0, 13750)),
-        recording.rows(slice(13750, None)),
-        io.read_car(shared("ferrari_250lm.toml")),
-    )
-
-
 @pytest.mark.parametrize(("log", "begin", "measured", "open_loop"), [
     ("ferrari_250lm", 13750, 0.329, 0.302), ("ferrari_250lm", 16750, 0.267, 0.675), ("genesis", 16129, 0.217, 0.328),
 ])  # fmt: skip
@@ -180,6 +171,53 @@ def test_real_logs_at_the_files_word_as_near_as_they_were_measured(log, begin, m
     numbers = estimators.sideslip.score(car, found, span)
     assert numbers["open_loop_sideslip_rmse_without_constant_deg"] == pytest.approx(open_loop, rel=0.03)
     assert numbers["sideslip_rmse_without_constant_deg"] <= 1.03 * measured
+
+
+@pytest.mark.xfail(
+    strict=True, reason="a model of the rear axle alone trusts a guessed stiffness more than a whole car does"
+)
+@pytest.mark.parametrize(("log", "begin", "measured", "open_loop"), [
+    ("ferrari_250lm", 13750, 0.1816, 0.3047), ("ferrari_250lm", 16750, 0.2364, 0.6899),
+    ("genesis", 16129, 0.4819, 0.4752),
+])  # fmt: skip
+def test_real_logs_at_the_files_word_are_as_near_as_the_handling_model_was(log, begin, measured, open_loop):
+    """The criterion of the model before this one: RMSE as measured, degrees. It stands until it holds."""
+    recording, car = io.read_recording(shared(f"{log}_100hz.csv")), io.read_car(shared(f"{log}.toml"))
+    span = recording.rows(slice(begin, begin + 3000))
+    found = estimators.sideslip.estimate(car, span.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]))
+    numbers = estimators.sideslip.score(car, found, span)
+    assert numbers["open_loop_sideslip_rmse_deg"] == pytest.approx(open_loop, rel=0.03)
+    assert numbers["sideslip_rmse_deg"] <= 1.03 * measured
+
+
+def real_log():
+    recording = io.read_recording(shared("ferrari_250lm_100hz.csv"))
+    return (
+        recording.rows(slice(0, 13750)),
+        recording.rows(slice(13750, None)),
+        io.read_car(shared("ferrari_250lm.toml")),
+    )
+
+
+@pytest.mark.full
+def test_real_log_taken_at_its_word():
+    _, rest, car = real_log()
+    found = estimators.sideslip.estimate(car, rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"]))
+    numbers = estimators.sideslip.score(car, found, rest)
+    assert numbers["open_loop_sideslip_rmse_deg"] == pytest.approx(0.605, abs=0.005)
+    assert numbers["sideslip_rmse_deg"] <= 0.305  # 0.296 measured
+
+
+@pytest.mark.full
+def test_real_log_calibrated_with_the_reference():
+    first, rest, car = real_log()
+    calibration = estimators.sideslip.calibrate(car, first, uses=("v_y",))
+    blind = rest.select(["steer", "v_x", "a_x", "a_y", "yaw_rate"])
+    numbers = estimators.sideslip.score(car, estimators.sideslip.estimate(calibration, blind), rest)
+    assert numbers["sideslip_rmse_deg"] <= 0.26  # 0.184 measured
+    assert [weight for weight, _ in calibration.validation] == [None, 0.05, 0.02]
+    fitted = estimators.sideslip.fitted_car(calibration, car, recording=first)
+    assert fitted.rear.nominal_load == pytest.approx(982 * 9.80665 * 1.33 / 2.40, rel=1e-6)
 
 
 CALIBRATED = {
