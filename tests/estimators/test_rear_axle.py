@@ -12,7 +12,7 @@ import test_sideslip
 
 from jaxveh import InputError, Recording, estimators, filters, io, vehicles
 from jaxveh._core.names import record
-from jaxveh.estimators import coarse_log, rear_axle
+from jaxveh.estimators import coarse_log, rear_axle, rear_axle_fit
 from jaxveh.vehicles import sets
 
 RNG = np.random.default_rng(7)
@@ -152,17 +152,23 @@ def test_a_coarse_log_keeps_integrals_and_counts_no_gap():
     a_y[1000:1200] = np.nan
     found = coarse_log.coarse(log.replace(a_y=a_y), test_sideslip.CAR.wheelbase)
     assert len(found) % coarse_log.ROWS == 0
-    time, step = np.asarray(found.time), np.asarray(found["step"])[0]
+    time = np.asarray(found.time)
     used = np.isfinite(np.asarray(found["slip_balance"]))
     assert not used[(time > 10.4) & (time < 11.6)].any()
     assert used[(time > 1.0) & (time < 9.5)].all()
-    # What is turned from the second second to the last but two is what the log says.
-    inside = (time >= 2.0) & (time < 38.0)
-    turned = np.sum(np.asarray(found["turning"])[inside]) * step
-    exact = np.asarray(log["v_x"]) * np.asarray(log["yaw_rate"])
-    first, last = time[inside][0], time[inside][-1] + step
-    rows = (np.asarray(log.time) >= first) & (np.asarray(log.time) < last)
-    np.testing.assert_allclose(turned, np.sum(exact[rows]) * 0.01, atol=0.02 * np.sum(np.abs(exact[rows])) * 0.01)
+
+
+def test_a_coarse_logs_steps_are_the_integral_of_what_is_slow():
+    time = np.arange(4000) * 0.01
+    yaw_rate = 0.2 * np.sin(2 * np.pi * 0.05 * time)
+    channels = {"v_x": np.full(4000, 20.0), "yaw_rate": yaw_rate, "a_y": 20.0 * yaw_rate, "a_x": np.zeros(4000)}
+    found = coarse_log.coarse(Recording(time, channels), test_sideslip.CAR.wheelbase)
+    whole = np.asarray(found.time) < 38.0
+    step = np.asarray(found["step"])[0]
+    for name in ("turning", "a_y"):
+        gained = np.append(0.0, np.cumsum(np.asarray(found[name])[whole] * step)[:-1])
+        exact = 20.0 * 0.2 / (2 * np.pi * 0.05) * (1 - np.cos(2 * np.pi * 0.05 * np.asarray(found.time)[whole]))
+        np.testing.assert_allclose(gained, exact, atol=0.02 * np.std(exact))
 
 
 def test_a_span_in_which_nothing_drives_or_is_measured_is_refused():
@@ -195,12 +201,21 @@ def test_a_log_without_steer_is_scored_without_the_baseline():
 
 
 def test_a_fit_that_runs_out_of_steps_says_so(monkeypatch):
-    from jaxveh.estimators import rear_axle_fit
-
     monkeypatch.setattr(rear_axle_fit, "STEPS", 1)
     log = drive_of(test_sideslip.CAR).without("v_y")
     with pytest.warns(UserWarning, match="the fit ended after"):
         estimators.sideslip.calibrate(test_sideslip.CAR, log)
+
+
+def test_the_likelihood_counts_for_less_than_it_says_and_the_prior_as_it_is(monkeypatch):
+    log = drive_of(test_sideslip.CAR).without("v_y")
+    calibrate = lambda: estimators.sideslip.calibrate(test_sideslip.CAR, log).fit.parameters_std
+    wide = calibrate()
+    monkeypatch.setattr(rear_axle_fit, "OVERCONFIDENCE", 1.0)
+    narrow = calibrate()
+    # Known by the log, and by the prior alone.
+    assert 1.5 < float(wide["stiffness"] / narrow["stiffness"]) < 2.01
+    assert float(wide["heading_offset"] / narrow["heading_offset"]) == pytest.approx(1.0, rel=1e-3)
 
 
 def test_the_likelihood_has_gradients_in_every_parameter():
