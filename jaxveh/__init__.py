@@ -22,10 +22,11 @@ from jaxveh._core.lazy import submodules
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
+from jaxveh._core.version import VERSION
 from jaxveh.simulation import simulate
 from jaxveh.statespace import Estimate, cast, run
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 __all__ = [
     "Estimate",

@@ -1,8 +1,9 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
 from jaxveh.estimators import kit, mass_and_grade, sideslip
+from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
-from jaxveh.estimators.contract import Calibration
+from jaxveh.estimators.contract import Calibration, Span
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.live import Live, LiveAnswer, LiveBelief
 from jaxveh.estimators.observability import observe, predict_measurements
@@ -17,6 +18,7 @@ __all__ = [
     "LiveAnswer",
     "LiveBelief",
     "RearAxle",
+    "Span",
     "clean",
     "held_rows",
     "kit",
@@ -24,7 +26,9 @@ __all__ = [
     "observe",
     "open_loop",
     "predict_measurements",
+    "read_calibration",
     "rear_axle_model",
     "sideslip",
     "state_space",
+    "write_calibration",
 ]

@@ -6,6 +6,8 @@ every car, above they do not (compliance, vibration, delays of channels). So a c
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from jaxveh._core.recording import Recording
@@ -22,6 +24,13 @@ LONGEST_GAP = 0.3
 
 ROWS = 128
 """Logs are filled up with empty rows to a multiple of this, so that calibrations of many lengths are one program."""
+
+
+def coarse_logs(recordings: Sequence[Recording], wheelbase: float) -> list[Recording]:
+    """Several logs as `coarse` has each, all with as many rows as the longest."""
+    logs = [coarse(one, wheelbase) for one in recordings]
+    longest = max(len(log) for log in logs)
+    return [_filled_up(log, longest) for log in logs]
 
 
 def coarse(recording: Recording, wheelbase: float) -> Recording:
@@ -51,7 +60,7 @@ def coarse(recording: Recording, wheelbase: float) -> Recording:
     }  # fmt: skip
     if "v_y" in recording:
         rows["v_y"] = _reference(recording, time, step, quick)[at]
-    return _filled_up(Recording(time[at], rows))
+    return _filled_up(Recording(time[at], rows), -(-len(at) // ROWS) * ROWS)
 
 
 def _even(time: np.ndarray) -> tuple[np.ndarray, float]:
@@ -98,8 +107,9 @@ def _reference(recording: Recording, time: np.ndarray, step: float, quick: float
     return np.where(seen > 0.5, _smoothed(_bridged(recording, "v_y", time), step, CUTOFF * quick), np.nan)
 
 
-def _filled_up(recording: Recording) -> Recording:
-    extra = -len(recording) % ROWS
+def _filled_up(recording: Recording, count: int) -> Recording:
+    """The recording with empty rows at its end, `count` in all."""
+    extra = count - len(recording)
     time, step = np.asarray(recording.time), float(recording.time[1] - recording.time[0])
     last = {name: np.asarray(recording[name]) for name in recording.names}
     rows = {

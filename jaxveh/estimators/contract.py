@@ -1,12 +1,13 @@
 """What an estimator of a quantity is, and what all of them share.
 
-An estimator is a module of `jaxveh.estimators`, named after what it estimates, with five names and these arguments first:
+An estimator is a module of `jaxveh.estimators`, named after what it estimates, with six names and these arguments first:
 
 - `needs`: a tuple of `Need`, the channels that it reads and their units.
 - `model(car, ...) -> StateSpace`: the state space that a filter sees. `car`: an `io.CarSpecification`, or the vehicle that the
   estimator is about. All other arguments have defaults and are given by name.
+- `chosen_parameters(model)`: the parameters and noise levels that a calibration fits.
 - `calibrate(car, recording, *, filter=None, progress=silent, ...) -> Calibration`: what of the car and of the noises a span of a
-  log tells.
+  log tells, or several logs of one car together.
 - `estimate(source, recording, *, filter=None, key=None, ...) -> Estimate`: means and standard deviations of the quantity along a
   log; `source` is a `Calibration`, a model, or a car taken at its word. One that smooths has `smoothed=`, which turns it off.
 - `live(source, *, filter=None, key=None) -> Live`: the same a row at a time.
@@ -17,7 +18,8 @@ without smoothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -26,6 +28,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.recording import Recording
 from jaxveh.fitting import Fit
+from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
 from jaxveh.statespace import StateSpace
 
@@ -74,24 +77,53 @@ def _check_known(who: str, name: str, recording: Recording) -> None:
         )
 
 
-class Calibration(eqx.Module):
-    """What a span of a log told an estimator of a car.
+class Span(NamedTuple):
+    """What a calibration saw of a log: from `start` to `end` (s, in the log's own time); `log`: its file's name, "" for none."""
 
-    `estimator`: its name; `fit`: the `fitting.Fit` (its `model` is the fitted StateSpace); `span`: start and end in the log's own
-    time, s. Where a reference was offered, `weight` is the one that it got in the fit, in the reference's unit, None for none, by
-    choice or because validation inside the span said so; `validation`: the error that each weight tried left there.
+    start: float
+    end: float
+    log: str = ""
+
+
+class Told(NamedTuple):
+    """What a calibration started from: a car's file, and the options of its `model` by name, plain values."""
+
+    car: CarSpecification
+    options: tuple[tuple[str, Any], ...] = ()
+
+
+def as_told(car: Any, options: Mapping[str, Any] | None = None) -> Told | None:
+    """What a calibration started from; None where that was no file, or an option is no plain value: it cannot be written then."""
+    options = options or {}
+    plain = all(value is None or isinstance(value, str | float | int) for value in options.values())
+    return Told(car, tuple(options.items())) if plain and isinstance(car, CarSpecification) else None
+
+
+class Calibration(eqx.Module):
+    """What logs told an estimator of a car; a file of it is written and read by `write_calibration` and `read_calibration`.
+
+    `estimator`: its name; `fit`: the `fitting.Fit` (its `model` is the fitted StateSpace); `spans`: what was seen, one a log.
+    Where a reference was offered, `weight` is the one that it got in the fit, in the reference's unit, None for none, by
+    choice or because validation inside the span said so; `validation`: the error that each weight tried left there. `told`: what
+    the fit started from, None where that was no car's file.
     """
 
     estimator: str = eqx.field(static=True)
     fit: Fit
-    span: tuple[float, float] = eqx.field(static=True)
+    spans: tuple[Span, ...] = eqx.field(static=True)
     weight: float | None = eqx.field(static=True, default=None)
     validation: tuple[tuple[float | None, float], ...] = eqx.field(static=True, default=())
+    told: Told | None = eqx.field(static=True, default=None)
 
     @property
     def model(self) -> StateSpace:
         """The fitted state space."""
         return self.fit.model
+
+    def named(self, *logs: str) -> Calibration:
+        """The same with the names of the logs' files."""
+        spans = tuple(span._replace(log=log) for span, log in zip(self.spans, logs, strict=True))
+        return dataclasses.replace(self, spans=spans)
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Fitted values by name: `{"value", "std", "unit"}`."""
@@ -119,18 +151,25 @@ def model_of(who: str, source: Any, model: Callable[[Any], StateSpace]) -> State
     return source.model
 
 
-def span_of(who: str, recording: Recording, shortest: float, what: str) -> tuple[float, float]:
-    """Start and end of a span to calibrate on, s.
+def spans_of(
+    who: str, recording: Recording | Sequence[Recording], shortest: float, what: str
+) -> tuple[list[Recording], tuple[Span, ...]]:
+    """The recordings to calibrate on, as a list, and their spans.
 
-    **Raises** `InputError` for one that is shorter than `shortest` (s), and cannot hold `what` is needed.
+    **Raises** `InputError` for one that is shorter than `shortest` (s), and cannot hold `what` is needed, or for none at all.
     """
-    span = (float(recording.time[0]), float(recording.time[-1]))
-    if span[1] - span[0] < shortest:
-        raise InputError(
-            f"{who}: calibration span of {span[1] - span[0]:.3g} s ({span[0]:g} to {span[1]:g} s): must be at least "
-            f"{shortest:g} s, with {what} in it."
-        )
-    return span
+    recordings = [recording] if isinstance(recording, Recording) else list(recording)
+    if not recordings:
+        raise InputError(f"{who}: no log to calibrate on: give a recording, or several of one car.")
+    spans = tuple(Span(float(one.time[0]), float(one.time[-1])) for one in recordings)
+    for i, span in enumerate(spans):
+        if span.end - span.start < shortest:
+            which = f" {i + 1}" if len(spans) > 1 else ""
+            raise InputError(
+                f"{who}: calibration span{which} of {span.end - span.start:.3g} s ({span.start:g} to {span.end:g} s): must be at "
+                f"least {shortest:g} s, with {what} in it."
+            )
+    return recordings, spans
 
 
 PIECE_LENGTH = 8.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,13 +27,24 @@ class FrontAxle(NamedTuple):
     steer_offset: float
 
 
-def front_axle(model: StateSpace, recording: Recording) -> FrontAxle | None:
+def front_axle(model: StateSpace, recordings: Sequence[Recording]) -> FrontAxle | None:
     """Least squares of slip angles on forces: `steer - v_y / v_x - a yaw_rate / v_x = F / stiffness + offset`.
 
-    Forces and v_y are those that a calibrated `rear_axle_model` sees in the log; rows beyond `LARGEST_SHARE` do not count, nor
+    Forces and v_y are those that a calibrated `rear_axle_model` sees in the logs; rows beyond `LARGEST_SHARE` do not count, nor
     those that are slow. None where too few are left, or where the slip angle does not grow with the force: a steer that is no
     steer.
     """
+    seen = [_seen(model, one) for one in recordings]
+    slip, force = (np.concatenate(values) for values in zip(*seen, strict=True))
+    if len(slip) < FEWEST:
+        return None
+    design = np.stack([force, np.ones_like(force)], axis=1)
+    (softness, offset), *_ = np.linalg.lstsq(design, slip, rcond=None)
+    return FrontAxle(1.0 / float(softness), float(offset)) if softness > 0 else None
+
+
+def _seen(model: StateSpace, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Slip angles (rad) and forces (N) of the front axle in the rows that count."""
     s = model.system
     log = coarse(recording, float(s.wheelbase))
     found = smooth(Extended(), model, log.select([*model.inputs, *model.channels]))
@@ -44,9 +56,4 @@ def front_axle(model: StateSpace, recording: Recording) -> FrontAxle | None:
     steer = np.interp(np.asarray(log.time), np.asarray(recording.time)[known], told[known])
     counted = np.isfinite(np.asarray(log[model.channels[0]])) & (np.abs(rear) < LARGEST_SHARE * float(s.grip))
     slip = steer - np.arctan2(np.asarray(found.mean.v_y) + float(s.front_axle_to_cg) * yaw_rate, v_x)
-    force = share * np.asarray(s.loads(rows.u)[0])
-    if counted.sum() < FEWEST:
-        return None
-    design = np.stack([force, np.ones_like(force)], axis=1)[counted]
-    (softness, offset), *_ = np.linalg.lstsq(design, slip[counted], rcond=None)
-    return FrontAxle(1.0 / float(softness), float(offset)) if softness > 0 else None
+    return slip[counted], (share * np.asarray(s.loads(rows.u)[0]))[counted]

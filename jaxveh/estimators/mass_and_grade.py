@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
@@ -11,7 +12,7 @@ from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import record_type
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of, span_of
+from jaxveh.estimators.contract import Calibration, Need, as_told, check_needs, model_of, spans_of
 from jaxveh.estimators.live import AsItIs, Live
 from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
 from jaxveh.fitting import prediction_error
@@ -124,7 +125,7 @@ def chosen_parameters(model: Any):
 
 def calibrate(
     car: CarSpecification | Longitudinal,
-    recording: Recording,
+    recording: Recording | Sequence[Recording],
     *,
     filter: AbstractFilter | None = None,
     progress: Progress = silent,
@@ -132,17 +133,18 @@ def calibrate(
 ) -> Calibration:
     """Fit drag and noise levels to a span of a log, by maximum posterior of a filter whose mass and grade stay states.
 
-    `options`: those of `model`, the start values among them. Rolling resistance is not fitted: a constant grade says the same.
+    Several logs must have the same number of rows. `options`: those of `model`, the start values among them. Rolling resistance is not fitted: a constant grade says the same.
 
     **Raises** `InputError` for missing channels, or a span shorter than `SHORTEST`; `FilterError` where the fit fails.
     """
     start = model(car, **options)
-    span = span_of(NAME, recording, SHORTEST, "pedals that move")
-    check_needs(NAME, needs, recording, start)
+    recordings, spans = spans_of(NAME, recording, SHORTEST, "pedals that move")
+    for one in recordings:
+        check_needs(NAME, needs, one, start)
     assert start.process_noise is not None  # `model` has given it
     prior = {"drag": DRAG_SPREAD} | dict.fromkeys((*start.process_noise.law.names, *start.channels), NOISE_SPREAD)
-    fit = prediction_error(filter or Unscented(), start, recording, chosen_parameters, prior=prior, progress=progress)
-    return Calibration(NAME, fit, span)
+    fit = prediction_error(filter or Unscented(), start, recordings, chosen_parameters, prior=prior, progress=progress)
+    return Calibration(NAME, fit, spans, told=as_told(car, options))
 
 
 def estimate(

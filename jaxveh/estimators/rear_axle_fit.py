@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -34,20 +35,21 @@ TARGET_BEND = 0.0035
 
 
 class Reference(NamedTuple):
-    """A reference for sideslip: `values` (T,) in rad, NaN for none, and how closely it is to be followed, `weight` (rad)."""
+    """A reference for sideslip: `values` in rad, (T,) for each log, NaN for none, and how closely it is to be followed, `weight`
+    (rad)."""
 
-    values: jax.Array
+    values: Sequence[jax.Array]
     weight: float
 
 
 def fit_rear_axle(
     filter: AbstractFilter,
     model: StateSpace,
-    log: Recording,
+    logs: Sequence[Recording],
     reference: Reference | None,
     progress: Progress = silent,
 ) -> Fit:
-    """Maximise the posterior of the parameters that `chosen_parameters` picks, given a `coarse` log.
+    """Maximise the posterior of the parameters that `chosen_parameters` picks, given `coarse_logs` of one car.
 
     A log of a car that slides has two explanations: tyres that end at its largest forces, or a road that leans with it. The
     search begins at both, and the better end is taken.
@@ -55,16 +57,20 @@ def fit_rear_axle(
     Where the search runs out of steps a `JaxvehWarning` says so. **Raises** `InputError` for a log of which nothing is measured
     at speed, `FilterError` where the likelihood cannot be had.
     """
-    if not np.isfinite(np.asarray(log[model.channels[0]])).any():
+    forces = np.concatenate([_forces(model, log) for log in logs])
+    if not len(forces):
+        length = sum(float(log.time[-1] - log.time[0]) for log in logs)
         raise InputError(
-            f"sideslip: no row of the {float(log.time[-1] - log.time[0]):.3g} s is fast enough and measured: there is nothing to "
-            "calibrate on. Take a span in which the car drives."
+            f"sideslip: no row of the {length:.3g} s is fast enough and measured: there is nothing to calibrate on. Take a span "
+            "in which the car drives."
         )
     # A blind fit has a reference without values: one compiled function serves all fits.
-    values = jnp.full(len(log), jnp.nan) if reference is None else reference.values
-    target = Target("reference_sideslip", (values,), 1.0 if reference is None else reference.weight, TARGET_BEND)
-    problem = pose_prediction_error(filter, model, [log], chosen_parameters, prior=SPREADS, target=target)
-    starts = _starts(problem, model, log)
+    nothing = [jnp.full(len(log), jnp.nan) for log in logs]
+    values, weight = (nothing, 1.0) if reference is None else reference
+    target = Target("reference_sideslip", values, weight, TARGET_BEND)
+    problem = pose_prediction_error(filter, model, logs, chosen_parameters, prior=SPREADS, target=target)
+    # The largest of them that is no single peak.
+    starts = _starts(problem, model, max(float(np.quantile(forces, 0.99)), 1e-3))
     found = []
     for i, start in enumerate(starts):
         progress(
@@ -97,10 +103,10 @@ def _widened(fit: Fit, spread: np.ndarray) -> Fit:
     return dataclasses.replace(fit, covariance=jnp.asarray(covariance, fit.covariance.dtype), parameters_std=std)
 
 
-def _starts(problem, model: StateSpace, log: Recording) -> list:
-    """Coordinates to search from: the prior's, and, where the log's forces are below the grip that is told, those of cars that
-    slide in it."""
-    told, in_use = problem.start(), _force_in_use(model, log)
+def _starts(problem, model: StateSpace, in_use: float) -> list:
+    """Coordinates to search from: the prior's, and, where the force `in_use` is below the grip that is told, those of cars that
+    slide with it."""
+    told = problem.start()
     names = [p.name.split(".")[-1] for p in problem.chosen]
     starts = [told]
     for factors in SLIDING:
@@ -112,9 +118,7 @@ def _starts(problem, model: StateSpace, log: Recording) -> list:
     return starts
 
 
-def _force_in_use(model: StateSpace, log: Recording) -> float:
-    """The largest lateral force over load of a log's rear axle that is no single peak."""
-    rows = model.rows(log)
-    share = np.abs(np.asarray(eqx.filter_jit(lambda s, u: s.shares(u)[1])(model.system, rows.u)))
-    counted = np.isfinite(np.asarray(log[model.channels[0]]))
-    return max(float(np.quantile(share[counted], 0.99)), 1e-3)
+def _forces(model: StateSpace, log: Recording) -> np.ndarray:
+    """Lateral forces over load of the rear axle in the rows that are measured at speed."""
+    share = np.abs(np.asarray(eqx.filter_jit(lambda s, u: s.shares(u)[1])(model.system, model.rows(log).u)))
+    return share[np.isfinite(np.asarray(log[model.channels[0]]))]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from collections.abc import Sequence
 
 import equinox as eqx
 import jax
@@ -19,14 +20,15 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Score, score_band
 from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
-from jaxveh.estimators.coarse_log import coarse
-from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of, span_of
+from jaxveh.estimators.coarse_log import coarse_logs
+from jaxveh.estimators.contract import Calibration, Need, as_told, check_needs, model_of, spans_of
 from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.live import Live
 from jaxveh.estimators.parameter_bands import smoothed_with_members
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
+from jaxveh.estimators.rear_axle_prior import chosen_parameters as chosen_parameters
 from jaxveh.estimators.rear_axle_prior import rear_axle
 from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
 from jaxveh.fitting import Fit
@@ -59,26 +61,48 @@ def model(car: CarSpecification | RearAxle) -> StateSpace:
 
 def calibrate(
     car: CarSpecification | RearAxle,
-    recording: Recording,
+    recording: Recording | Sequence[Recording],
     *,
     filter: AbstractFilter | None = None,
     progress: Progress = silent,
     uses: tuple[str, ...] = (),
 ) -> Calibration:
-    """Fit the rear axle, noise levels and sensor offsets of a car to a span of a log, by maximum posterior of a filter.
+    """Fit the rear axle, noise levels and sensor offsets of a car to a span of a log, or to several together, by maximum
+    posterior of a filter.
 
-    Blind (`uses=()`) it reads v_x, a_x, a_y and yaw_rate alone. With `uses=("v_y",)` the span's v_y supervises the
-    fit as a reference for sideslip; how strongly is chosen by fitting on the span's first half and looking at the second, where
-    "not at all" is among the choices: a reference with slow errors of its own makes a car worse. Start values and priors
-    come from the car's file and `rear_axle_prior.SPREADS`, and nothing outside the recording is looked at. `validation` of what
-    is returned is the sideslip RMSE in degrees on the span's second half by the reference's weight (rad), fitted on its first.
+    Blind (`uses=()`) it reads v_x, a_x, a_y and yaw_rate alone. With `uses=("v_y",)` v_y supervises the fit as a reference for
+    sideslip; how strongly is chosen by fitting on the first half of each span and looking at the second, where "not at all" is
+    among the choices: a reference with slow errors of its own makes a car worse. Start values and priors come from the car's
+    file and `rear_axle_prior.SPREADS`, and nothing outside the recordings is looked at. `validation` of what is returned is
+    the sideslip RMSE in degrees on the second halves by the reference's weight (rad), fitted on the first.
 
     **Raises** `InputError` for missing channels, a_y among them, or a span shorter than `SHORTEST`; `FilterError` where the fit
     fails.
     """
     for name in uses:
         check_one_of("uses", name, ("v_y",))
-    span = span_of(NAME, recording, SHORTEST, "corners")
+    recordings, spans = spans_of(NAME, recording, SHORTEST, "corners")
+    for one in recordings:
+        _check_measured(one, uses)
+    filter, start = filter or Extended(), model(car)
+    logs = coarse_logs([_seen(one, uses) for one in recordings], _wheelbase(start))
+    if not uses:
+        return Calibration(NAME, fit_rear_axle(filter, start, logs, None, progress), spans, told=as_told(car))
+    late = [np.asarray(log.time) >= (span.start + span.end) / 2 for log, span in zip(logs, spans, strict=True)]
+    early = [_blank(log, rows, start.channels) for log, rows in zip(logs, late, strict=True)]
+    count = 2 + len(TARGET_WEIGHTS)
+    fits = [
+        fit_rear_axle(filter, start, early, _reference(early, weight), _part(progress, i, count))
+        for i, weight in enumerate((None, *TARGET_WEIGHTS))
+    ]
+    errors = [_validate(filter, fit.model, logs, late) for fit in fits]
+    validation = tuple(zip((None, *TARGET_WEIGHTS), errors, strict=True))
+    weight = min(validation, key=lambda one: one[1])[0]
+    fit = fit_rear_axle(filter, start, logs, _reference(logs, weight), _part(progress, count - 1, count))
+    return Calibration(NAME, fit, spans, weight, validation, as_told(car))
+
+
+def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
     check_needs(NAME, (*needs, *(Need(name, "m/s") for name in uses)), recording)
     if not _measured(recording, "yaw_rate"):
         raise InputError("sideslip: yaw_rate (rad/s) is NaN in every row: there is nothing to calibrate on.")
@@ -87,23 +111,10 @@ def calibrate(
             "sideslip: a_y (m/s^2) is missing from the log: without an accelerometer no tyre can be calibrated. Estimate "
             "with the car's file at its word, or calibrate on another log of the car."
         )
-    filter, start = filter or Extended(), model(car)
-    seen = recording.select([name for name in (*[need.channel for need in needs], *uses) if name in recording])
-    log = coarse(seen, _wheelbase(start))
-    if not uses:
-        return Calibration(NAME, fit_rear_axle(filter, start, log, None, progress), span)
-    half = len(log) // 2
-    first = _blank(log, slice(half, len(log)), start.channels)
-    count = 2 + len(TARGET_WEIGHTS)
-    fits = [
-        fit_rear_axle(filter, start, first, _reference(first, weight), _part(progress, i, count))
-        for i, weight in enumerate((None, *TARGET_WEIGHTS))
-    ]
-    errors = [_validate(filter, fit.model, log, half) for fit in fits]
-    validation = tuple(zip((None, *TARGET_WEIGHTS), errors, strict=True))
-    weight = min(validation, key=lambda one: one[1])[0]
-    fit = fit_rear_axle(filter, start, log, _reference(log, weight), _part(progress, count - 1, count))
-    return Calibration(NAME, fit, span, weight, validation)
+
+
+def _seen(recording: Recording, uses: tuple[str, ...]) -> Recording:
+    return recording.select([name for name in (*[need.channel for need in needs], *uses) if name in recording])
 
 
 def _measured(recording: Recording, name: str) -> bool:
@@ -118,15 +129,13 @@ def _part(progress: Progress, index: int, count: int) -> Progress:
     return lambda done, total, stage: progress(index + done / max(total, 1), count, stage)
 
 
-def _blank(log: Recording, rows: slice, channels: tuple[str, ...]) -> Recording:
+def _blank(log: Recording, hidden: np.ndarray, channels: tuple[str, ...]) -> Recording:
     """The log with nothing measured in some rows: the fit of a part is compiled once with that of the whole."""
-    hidden = np.zeros(len(log), bool)
-    hidden[rows] = True
     return log.replace(**{n: np.where(hidden, np.nan, np.asarray(log[n])) for n in (*channels, "v_y") if n in log})
 
 
-def _reference(log: Recording, weight: float | None) -> Reference | None:
-    return None if weight is None else Reference(reference_sideslip(log), weight)
+def _reference(logs: Sequence[Recording], weight: float | None) -> Reference | None:
+    return None if weight is None else Reference([reference_sideslip(log) for log in logs], weight)
 
 
 def reference_sideslip(recording: Recording) -> jax.Array:
@@ -134,17 +143,21 @@ def reference_sideslip(recording: Recording) -> jax.Array:
     return jnp.arctan2(recording["v_y"], recording["v_x"])
 
 
-def _validate(filter, model, log, start: int) -> float:
-    """Sideslip RMSE in degrees over the rows from `start`, the filter having run from the first row."""
-    found = run(filter, model, log.without("v_y"), throw=False)
-    error = np.degrees(np.asarray(found.mean.reference_sideslip) - np.asarray(reference_sideslip(log)))[start:]
+def _validate(filter, model, logs: Sequence[Recording], counted: Sequence[np.ndarray]) -> float:
+    """Sideslip RMSE in degrees over the rows that are counted, the filter having run from the first of each log."""
+    errors = []
+    for log, rows in zip(logs, counted, strict=True):
+        found = run(filter, model, log.without("v_y"), throw=False)
+        error = np.asarray(found.mean.reference_sideslip) - np.asarray(reference_sideslip(log))
+        errors.append(np.degrees(error)[rows])
+    error = np.concatenate(errors)
     return float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else float("inf")
 
 
-def fitted_car(source: Calibration, car: CarSpecification, *, recording: Recording | None = None) -> CarSpecification:
+def fitted_car(source: Calibration, car: CarSpecification, *, recording: Recording | Sequence[Recording] = ()) -> CarSpecification:
     """The car's file with the fitted values in place, as far as a car file can say them.
 
-    With the `recording` that it was calibrated on, and where that has `steer`, the front axle's stiffness and the steer's
+    With the `recording` (or several) that it was calibrated on, and where one has `steer`, the front axle's stiffness and the steer's
     offset are fitted to it: see `front_axle`; else they are the file's.
     """
     fitted = source.model.system
@@ -158,9 +171,11 @@ def fitted_car(source: Calibration, car: CarSpecification, *, recording: Recordi
         rear=rear,
         rear_cornering_stiffness=stiffness,
     )
-    if recording is None or not _measured(recording, "steer") or not _measured(recording, "a_y"):
+    recordings = [recording] if isinstance(recording, Recording) else recording
+    steered = [one for one in recordings if _measured(one, "steer") and _measured(one, "a_y")]
+    if not steered:
         return found
-    told, new = car.front, front_axle(source.model, recording)
+    told, new = car.front, front_axle(source.model, steered)
     if new is None:
         warnings.warn(
             "fitted_car: steer says nothing of the front axle; the file's is kept.", JaxvehWarning, stacklevel=2

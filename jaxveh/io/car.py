@@ -148,13 +148,17 @@ def read_car(path: str | os.PathLike) -> CarSpecification:
     near ones), or a value with its allowed range.
     """
     path = Path(path)
-    content = read_toml(path)
-    check_keys(str(path), content, [entry.name for entry in fields(CarSpecification)])
+    return car_of_toml(read_toml(path), str(path), path.parent)
+
+
+def car_of_toml(content: Mapping[str, Any], where: str, folder: Path) -> CarSpecification:
+    """The car of a TOML table, files that it names being in `folder`; errors begin with `where` the table stands."""
+    check_keys(where, content, [entry.name for entry in fields(CarSpecification)])
     try:
-        values = {key: _value(key, value, path.parent) for key, value in content.items()}
+        values = {key: _value(key, value, folder) for key, value in content.items()}
         return _build(CarSpecification, values)
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise InputError(f"{where}: {error}") from error
 
 
 def write_car(car: CarSpecification, path: str | os.PathLike, *, note: str = "", overwrite: bool = False) -> None:
@@ -163,11 +167,17 @@ def write_car(car: CarSpecification, path: str | os.PathLike, *, note: str = "",
     The file appears as a whole or not at all. **Raises** `InputError` where it exists and `overwrite` is False.
     """
     lines = [f"# {line}".rstrip() for line in note.splitlines()]
+    write_text("\n".join(lines + car_lines(car)) + "\n", path, overwrite)
+
+
+def car_lines(car: CarSpecification, table: str = "") -> list[str]:
+    """The lines of a car in TOML, in a table of this name where one is given."""
+    lines = [f"[{table}]"] if table else []
     lines += _lines(car)
     for axle in ("front", "rear"):
         if getattr(car, axle) is not None:
-            lines += ["", f"[{axle}]", *_lines(getattr(car, axle))]
-    write_text("\n".join(lines) + "\n", path, overwrite)
+            lines += ["", f"[{table}.{axle}]" if table else f"[{axle}]", *_lines(getattr(car, axle))]
+    return lines
 
 
 def _lines(values: Any) -> list[str]:

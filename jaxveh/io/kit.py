@@ -1,6 +1,6 @@
 """What those who read and write further files build with."""
 
-from jaxveh.io.car import CAR_SCHEMA
+from jaxveh.io.car import CAR_SCHEMA, car_lines, car_of_toml
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
 from jaxveh.io.naming import check_known
 from jaxveh.io.optional import require
@@ -15,6 +15,8 @@ __all__ = [
     "PROPERTY_UNITS",
     "RIG_CHANNELS",
     "Entry",
+    "car_lines",
+    "car_of_toml",
     "check_keys",
     "check_known",
     "is_unit",
