@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxveh._core.errors import check_positive
 from jaxveh._core.parameter import positive
@@ -41,7 +43,7 @@ LONGEST_STILL = 0.5
 """s: a channel of a moving car that stays the same to the last digit for longer is stuck."""
 
 LONGEST_HOLD = 0.3
-"""s: for so long the last good acceleration and yaw rate stand for missing ones; later the lateral velocity is taken to stay."""
+"""s: for so long the last good acceleration and yaw rate stand for missing ones; later the car is taken to turn steadily."""
 
 BLIND = (
     Need("v_x", "m/s", throughout=True),
@@ -49,8 +51,8 @@ BLIND = (
     Need("a_y", "m/s^2", optional=True),
     Need("a_x", "m/s^2", optional=True),
 )
-"""What sideslip is estimated from, blind. Without a_x the speed's changes take its place; without a_y the steady turn's v_x
-yaw_rate, and then no tyre can be calibrated."""
+"""What sideslip is estimated from, blind. Without a_x the speed's changes take its place; without a_y every turn is taken to be
+a steady one, and then no tyre can be calibrated."""
 
 
 class Watched(NamedTuple):
@@ -118,23 +120,23 @@ class RearAxleCleaning(AbstractCleaning):
         memory = RearAxleMemory(
             t, v_x, values["a_x"], slow, smooth[0], smooth[1], watched[0], watched[1], a_y_behind, turning_behind, felt
         )
-        return memory, self._row(memory, none, jnp.isnan(raw), v_x, a_y, yaw_rate)
+        return memory, self._row(memory, none, jnp.isnan(raw), ~jnp.isnan(values["a_y"]), v_x, a_y, yaw_rate)
 
     def next(self, memory, t, values):
         dt, v_x = t - memory.t, values["v_x"]
         quick, moves = (USUAL_WHEELBASE / self.wheelbase).astype(v_x.dtype), v_x > 1.0
         # No accelerometer at all, or none so far.
         none = jnp.isnan(values["a_y"]) & jnp.isnan(memory.a_y.raw)
-        turned, yaw_rate = _watch(
-            memory.yaw_rate, t, values["yaw_rate"], moves, YAW_RATE_STEP * quick**0.5, YAW_ACCELERATION * quick, 1e3
-        )
-        pushed, a_y = _watch(memory.a_y, t, values["a_y"], moves, A_Y_STEP, 0.0, A_Y_RANGE)
+        turned, yaw_rate = _watch_yaw_rate(memory.yaw_rate, t, values["yaw_rate"], moves, quick)
+        pushed, a_y = _watch_a_y(memory.a_y, t, values["a_y"], moves)
         # Loggers repeat the last row where a sensor is slower than the log.
         repeated = (values["yaw_rate"] == memory.yaw_rate.raw) & (values["a_y"] == memory.a_y.raw)
-        old = jnp.maximum(t - yaw_rate.time, jnp.where(none, 0.0, t - a_y.time)) > LONGEST_HOLD
+        old = lambda one: t - one.time > LONGEST_HOLD
+        # Where nothing at all is known, lateral velocity is taken to stay.
+        felt = old(yaw_rate) | ~(none | old(a_y))
         rate = yaw_rate.value
-        push = jnp.where(none | old, v_x * rate, a_y.value)
-        lost = jnp.isnan(turned) | (jnp.isnan(pushed) & ~none) | repeated
+        push = jnp.where(none | old(a_y) | old(yaw_rate), v_x * rate, a_y.value)
+        lost = jnp.isnan(turned) | jnp.isnan(pushed) | repeated
         told = jnp.where(jnp.isnan(values["a_x"]), (v_x - memory.v_x) / dt, values["a_x"])
         before = jnp.where(jnp.isnan(memory.a_x), told, memory.a_x)
         slow = self._a_x_low_pass(v_x).step(memory.slow_a_x, before, told, dt)
@@ -146,18 +148,21 @@ class RearAxleCleaning(AbstractCleaning):
             _behind(one, memory.a_y_behind, a_y_before, dt), _behind(one, memory.turning_behind, turning_before, dt),
             (push, v_x * rate),
         )  # fmt: skip
-        return after, self._row(after, dt, lost, v_x, push, rate)
+        return after, self._row(after, dt, lost, felt, v_x, push, rate)
 
-    def _row(self, memory, dt, lost, v_x, a_y, yaw_rate):
+    def _row(self, memory, dt, lost, felt, v_x, a_y, yaw_rate):
         low_pass = self._low_pass(v_x)
         slow = (v_x < rolling_below(self.wheelbase)) | (dt <= 0)
         (smooth_a_y, _), (smooth, change) = memory.smooth_a_y, memory.smooth_yaw_rate
+        none = jnp.zeros_like(v_x)
+        # Where no acceleration is felt, nothing makes up for the low-pass' delay: the yaw rate is taken as it comes.
+        told = lambda usual, steady: jnp.where(felt, usual, steady)
         return {
             "v_x": v_x, "a_x": memory.slow_a_x[0], "yaw_rate": yaw_rate, "turning": v_x * yaw_rate, "a_y": a_y,
-            "yaw_rate_smooth": smooth, "yaw_acceleration": change, "a_y_smooth": smooth_a_y,
-            "a_y_lead": -memory.a_y_behind[0], "turning_lead": -memory.turning_behind[0],
-            "lag": low_pass.delay, "step": jnp.maximum(dt, 1e-6),
-            CHANNEL: jnp.where(lost | slow, jnp.nan, jnp.zeros_like(v_x)),
+            "yaw_rate_smooth": told(smooth, yaw_rate), "yaw_acceleration": change,
+            "a_y_smooth": told(smooth_a_y, v_x * yaw_rate), "a_y_lead": -memory.a_y_behind[0],
+            "turning_lead": -memory.turning_behind[0], "lag": low_pass.delay, "step": jnp.maximum(dt, 1e-6),
+            "felt": told(none + 1, none), CHANNEL: jnp.where(lost | slow | ~felt, jnp.nan, none),
         }  # fmt: skip
 
     def _a_x_low_pass(self, like) -> LowPass:
@@ -165,6 +170,41 @@ class RearAxleCleaning(AbstractCleaning):
 
     def _low_pass(self, like) -> LowPass:
         return LowPass((FORCE_CUTOFF * (USUAL_WHEELBASE / self.wheelbase) ** 0.5).astype(like.dtype), 2)
+
+
+def without_wild_values(recording: Recording, wheelbase: float) -> Recording:
+    """The recording with yaw rate and a_y missing where they are spikes, or stuck."""
+    time, v_x = (np.asarray(values, float) for values in (recording.time, recording["v_x"]))
+    channels = [np.asarray(recording[name], float) for name in ("yaw_rate", "a_y")]
+    rows = jax.tree.map(jnp.asarray, (time - time[0], v_x, *channels))
+    good = _good(rows, jnp.asarray(USUAL_WHEELBASE / wheelbase))
+    return recording.replace(yaw_rate=np.asarray(good[0]), a_y=np.asarray(good[1]))
+
+
+@eqx.filter_jit
+def _good(rows: tuple, quick) -> tuple[Any, Any]:
+    """The yaw rate and a_y of all rows, NaN where no good."""
+
+    def start(value):
+        there = jnp.isfinite(value)
+        first = value[jnp.argmax(there)]
+        return Watched(first, rows[0][jnp.argmax(there)], first, rows[0][0], 0.0 * first)
+
+    def body(before, row):
+        t, v_x, yaw_rate, a_y = row
+        turned, one = _watch_yaw_rate(before[0], t, yaw_rate, v_x > 1.0, quick)
+        pushed, other = _watch_a_y(before[1], t, a_y, v_x > 1.0)
+        return (one, other), (turned, pushed)
+
+    return jax.lax.scan(body, (start(rows[2]), start(rows[3])), rows)[1]
+
+
+def _watch_yaw_rate(before: Watched, t, value, moves, quick) -> tuple[Any, Watched]:
+    return _watch(before, t, value, moves, YAW_RATE_STEP * quick**0.5, YAW_ACCELERATION * quick, 1e3)
+
+
+def _watch_a_y(before: Watched, t, value, moves) -> tuple[Any, Watched]:
+    return _watch(before, t, value, moves, A_Y_STEP, 0.0, A_Y_RANGE)
 
 
 def _behind(low_pass: LowPass, state, rate, dt):

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.cleaning import without_wild_values
 from jaxveh.estimators.rear_axle import CHANNEL, INPUTS, USUAL_WHEELBASE, rolling_below
 
 CUTOFF = 0.7
@@ -40,22 +41,25 @@ def coarse(recording: Recording, wheelbase: float) -> Recording:
     every row but for gaps (NaN), which are bridged and not counted.
     """
     quick = (USUAL_WHEELBASE / wheelbase) ** 0.5
+    recording = without_wild_values(recording, wheelbase)
     time, step = _even(np.asarray(recording.time, float))
     v_x, yaw_rate, a_y = (_bridged(recording, name, time) for name in ("v_x", "yaw_rate", "a_y"))
     a_x = _bridged(recording, "a_x", time) if _known(recording, "a_x") else np.gradient(v_x, time)
     smooth = lambda values: _smoothed(values, step, CUTOFF * quick)
     slow = {"v_x": smooth(v_x), "yaw_rate": smooth(yaw_rate), "a_y": smooth(a_y), "a_x": smooth(a_x)}
+    near = _near(recording, time)
+    slow["a_y"] = np.where(near, slow["a_y"], slow["v_x"] * slow["yaw_rate"])
     turning = smooth(v_x * yaw_rate)
     stride = max(1, round(1 / (RATE * quick * step)))
     at = np.arange(0, len(time), stride)
     mean = lambda values: np.append(np.diff(_integral(values, step)[at]) / (stride * step), values[at[-1]])
-    counted = (slow["v_x"][at] >= rolling_below(wheelbase)) & _near(recording, time[at])
+    counted = (slow["v_x"][at] >= rolling_below(wheelbase)) & near[at]
     none = np.zeros(len(at))
     rows = {
         "v_x": slow["v_x"][at], "a_x": slow["a_x"][at], "yaw_rate": slow["yaw_rate"][at], "turning": mean(turning),
         "a_y": mean(slow["a_y"]), "yaw_rate_smooth": slow["yaw_rate"][at],
         "yaw_acceleration": np.gradient(slow["yaw_rate"], time)[at], "a_y_smooth": slow["a_y"][at],
-        "a_y_lead": none, "turning_lead": none, "lag": none, "step": none + stride * step,
+        "a_y_lead": none, "turning_lead": none, "lag": none, "step": none + stride * step, "felt": near[at] + none,
         CHANNEL: np.where(counted, 0.0, np.nan),
     }  # fmt: skip
     if "v_y" in recording:

@@ -43,6 +43,10 @@ LEAST_GRIP = 0.05
 """The square of the share of lateral grip that is left however large the longitudinal force."""
 
 
+LONGEST_STEP, LOST = 1.0, 3.0
+"""s, and m/s: a longer step is a gap between two drives, after which lateral velocity is uncertain by so much."""
+
+
 class RearAxleState(NamedTuple):
     """Lateral velocity `v_y` (m/s) of the centre of gravity; `bank` of the road and `slip_error` of the curve, in units of the
     standard deviations that `RearAxle` has for them; `stiffening`, the logarithm of the axle's stiffness over the calibrated
@@ -166,18 +170,30 @@ def rolling_below(wheelbase) -> Any:
 
 
 def transition(system: RearAxle, t0, t1, x: RearAxleState, u) -> RearAxleState:
-    """Acceleration is integrated; below the speed of `rolling_below` the car rolls where its rear axle goes."""
+    """Acceleration is integrated. Where it is not known, the car goes as a steady turn's force wants it, and below the speed of
+    `rolling_below` it rolls where its rear axle goes."""
     dt = t1 - t0
     felt = system.specific_force(u.a_y) - (u.turning - u.v_x * system.yaw_rate_offset)
     moving = x.v_y + dt * (felt - GRAVITY * system.bank * x.bank)
     rolling = system.rear_axle_to_cg * (u.yaw_rate - system.yaw_rate_offset) + 0.0 * x.v_y
+    steady = rolling - u.v_x * (numerics.tan(system.slip_angle(x, u)[0]) + system.slip_error * x.slip_error)
     fade = lambda time: jnp.exp(-dt / time)
+    v_y = jnp.where((u.felt > 0) & (dt < LONGEST_STEP), moving, steady)
     return RearAxleState(
-        v_y=jnp.where(u.v_x >= rolling_below(system.wheelbase), moving, rolling),
+        v_y=jnp.where(u.v_x >= rolling_below(system.wheelbase), v_y, rolling),
         bank=fade(system.bank_time) * x.bank,
         slip_error=fade(system.slip_time) * x.slip_error,
         stiffening=x.stiffening,
     )
+
+
+class BegunAnew(Continuous):
+    """White noise in continuous time, and nothing known of v_y after a step that is too long to integrate over."""
+
+    def over(self, dt):
+        law = super().over(dt)
+        lost = jnp.where(dt >= LONGEST_STEP, LOST, 0.0).astype(law.std.v_y.dtype)
+        return Gaussian(law.std._replace(v_y=law.std.v_y + lost))
 
 
 CHANNEL = "slip_balance"
@@ -228,7 +244,7 @@ def report(system: RearAxle, t, x: RearAxleState, u) -> RearAxleReport:
 
 INPUTS = (
     "v_x", "a_x", "yaw_rate", "turning", "a_y", "yaw_rate_smooth", "yaw_acceleration", "a_y_smooth", "a_y_lead",
-    "turning_lead", "lag", "step",
+    "turning_lead", "lag", "step", "felt",
 )  # fmt: skip
 """What `cleaning` and `coarse_log` make of a log.
 
@@ -237,7 +253,8 @@ INPUTS = (
 - What the axle's force is told from, low-passed: `yaw_rate_smooth` (rad/s), `yaw_acceleration` (rad/s^2), `a_y_smooth` (m/s^2).
 - How far the integrals of a_y and of v_x yaw_rate are ahead of their own low-pass, `a_y_lead` and `turning_lead` (m/s), and its
   delay, `lag` (s).
-- The time that a row stands for, `step` (s).
+- The time that a row stands for, `step` (s), and whether the acceleration of that time is known, `felt` (1 or 0); where it is not,
+  the others are those of a steady turn, a_y = v_x yaw_rate.
 """
 
 
@@ -253,7 +270,7 @@ def rear_axle_model(system: RearAxle) -> StateSpace:
         transition=transition,
         observation=observation,
         report=report,
-        process_noise=Continuous(Gaussian(noise)),
+        process_noise=BegunAnew(Gaussian(noise)),
         measurement_noise=StateDependent(balance_noise, CHANNEL),
         prior=Prior(
             RearAxleState(0.0, 0.0, 0.0, 0.0),

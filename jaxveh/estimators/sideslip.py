@@ -10,7 +10,6 @@ import dataclasses
 import warnings
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -46,9 +45,6 @@ SHORTEST = 20.0
 
 TARGET_WEIGHTS = (0.05, 0.02)
 """rad: how closely the estimate is asked to follow a sideslip reference; the choice is made inside the span."""
-
-WITHOUT_A_Y = 2.0
-"""m/s^1.5: noise of v_y where no accelerometer holds it, so that the axle's slip angle does."""
 
 CURVE = 1.35
 """The Magic Formula's C in a fitted car's file."""
@@ -202,9 +198,6 @@ def estimate(
     `run` and `clean` do.
     """
     one = model_of(NAME, source, model)
-    if not _measured(recording, "a_y"):
-        at = lambda m: m.process_noise.law.std.v_y
-        one = eqx.tree_at(at, one, jnp.full_like(at(one), WITHOUT_A_Y))
     used, log = filter or Extended(), clean(recording, RearAxleCleaning(_wheelbase(one)))
     if smoothed and kit.smoothing_of(used) is Smoothing.gaussian:
         known = isinstance(source, Calibration) and isinstance(source.fit, Fit) and one is source.model
