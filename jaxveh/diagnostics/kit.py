@@ -1,5 +1,6 @@
-"""Numbers that figures share with what they show."""
+"""Numbers that figures share with what they show, and what estimators of real logs build with."""
 
+from jaxveh.diagnostics.log_delays import a_y_delay
 from jaxveh.diagnostics.observability import UNOBSERVABLE
 from jaxveh.diagnostics.sine_with_dwell import DISPLACED_AFTER, DISPLACED_FROM, DISPLACEMENT, YAW_RATE_LIMITS
 from jaxveh.diagnostics.steady_state import LINEAR_A_Y
@@ -13,4 +14,5 @@ __all__ = [
     "RESPONSE_SHARE",
     "UNOBSERVABLE",
     "YAW_RATE_LIMITS",
+    "a_y_delay",
 ]

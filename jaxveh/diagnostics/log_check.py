@@ -8,11 +8,20 @@ from jaxveh.diagnostics.log_findings import LogFinding, LogView
 from jaxveh.diagnostics.log_plausibility import check_plausibility
 from jaxveh.diagnostics.log_samples import check_samples
 from jaxveh.diagnostics.log_sampling import check_sampling
-from jaxveh.diagnostics.log_signs import check_signs, check_units
+from jaxveh.diagnostics.log_signs import check_signs, check_units, check_wheel_speeds
 from jaxveh.diagnostics.log_steering import check_steering
 from jaxveh.io import CarSpecification
 
-CHECKS = (check_sampling, check_samples, check_units, check_signs, check_delays, check_steering, check_plausibility)
+CHECKS = (
+    check_sampling,
+    check_samples,
+    check_units,
+    check_wheel_speeds,
+    check_signs,
+    check_delays,
+    check_steering,
+    check_plausibility,
+)
 
 
 def check_log(recording: Recording, *, car: CarSpecification | None = None) -> list[LogFinding]:

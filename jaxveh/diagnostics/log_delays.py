@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxveh._core.recording import Recording
 from jaxveh.diagnostics.log_findings import LogFinding, LogView
 from jaxveh.diagnostics.log_single_track import a_y_from_yaw_rate, yaw_rate_from_steer
+from jaxveh.io import CarSpecification
 
 REACH = 0.5
 """Longest delay that is looked for, in seconds."""
@@ -90,12 +92,30 @@ def _lateral(log: LogView) -> LogFinding:
         reference = speed * yaw_rate + log.slope(log.even("v_y"))
         return _judge(log, "a_y", "v_x yaw_rate + dv_y/dt", reference, "", EXACT)
     if log.car is not None:
-        known = np.isfinite(speed) & np.isfinite(yaw_rate)
-        filled = [np.where(known, values, 0.0) for values in (speed, yaw_rate)]
-        reference = np.where(known, a_y_from_yaw_rate(log.car, filled[1], filled[0], log.step), np.nan)
+        reference = _a_y_expected(log, log.car)
         return _judge(log, "a_y", "what the car's linear model makes of yaw_rate", reference, "", MODELLED)
     caveat = " Without v_y or a car, the sideslip's own lag of up to 0.2 s at speed is part of it."
     return _judge(log, "a_y", "v_x yaw_rate", speed * yaw_rate, caveat, np.inf)
+
+
+def _a_y_expected(log: LogView, car: CarSpecification) -> np.ndarray:
+    """What the car's linear model makes of yaw_rate, on the grid."""
+    speed, yaw_rate = log.even("v_x"), log.even("yaw_rate")
+    known = np.isfinite(speed) & np.isfinite(yaw_rate)
+    filled = [np.where(known, values, 0.0) for values in (speed, yaw_rate)]
+    return np.where(known, a_y_from_yaw_rate(car, filled[1], filled[0], log.step), np.nan)
+
+
+def a_y_delay(recording: Recording, car: CarSpecification) -> Delay | None:
+    """By how much a_y comes after what a car's linear model makes of yaw_rate; None where one of them, or v_x, is missing.
+
+    A stiffness that is wrong by a factor of two makes it wrong by some 0.05 s, and so do tyres near their limit.
+    """
+    log = LogView.of(recording, car)
+    if not log.has("v_x", "yaw_rate", "a_y"):
+        return None
+    a_y = log.while_moving(log.even("a_y"))
+    return delay(log.smooth(_a_y_expected(log, car), SMOOTH), log.smooth(a_y, SMOOTH), log.step)
 
 
 def _steering(log: LogView) -> LogFinding:

@@ -18,8 +18,8 @@ GRAVITY = 9.81
 """m/s^2"""
 
 
-MOVING = 5.0
-"""m/s above which directions are compared."""
+MOVING, WHEELBASE = 5.0, 2.7
+"""m/s above which directions are compared, of a car of this wheelbase (m); of others by its square root."""
 
 
 class LogFinding(NamedTuple):
@@ -79,10 +79,15 @@ class LogView:
         on_grid[(self.grid < time[0] - hair) | (self.grid > time[-1] + hair)] = np.nan
         return on_grid
 
+    @property
+    def moving(self) -> float:
+        """Speed (m/s) above which directions are compared: `MOVING`, and less for small cars."""
+        return MOVING * min(1.0, ((self.car.wheelbase if self.car else WHEELBASE) / WHEELBASE) ** 0.5)
+
     def while_moving(self, values: np.ndarray) -> np.ndarray:
-        """Values (N,) on `grid`, NaN where the car is slower than `MOVING` or its speed is not known."""
+        """Values (N,) on `grid`, NaN where the car is slower than `moving` or its speed is not known."""
         with np.errstate(invalid="ignore"):
-            return np.where(self.even("v_x") > MOVING, values, np.nan)
+            return np.where(self.even("v_x") > self.moving, values, np.nan)
 
     def slope(self, values: np.ndarray) -> np.ndarray:
         """Time derivative (N,) on `grid`."""

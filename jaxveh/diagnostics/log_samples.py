@@ -12,6 +12,12 @@ HELD = 0.1
 FROZEN = 1.0
 """Seconds without any change, while the channel moves elsewhere, that look like a sensor that stopped."""
 
+NEVER_STILL = ("v_x", "v_y", "a_x", "a_y", "yaw_rate", "roll_rate", "sideslip")
+"""Channels that always change while a car moves. Others (pedals, a steer that is held) may stand still, and nothing is wrong."""
+
+JUMPY = ("throttle", "brake", "wheel_speed", "drive_torque", "gear")
+"""Beginnings of names of channels that may jump, and nothing is wrong."""
+
 SPIKE = 8.0
 """Robust deviations from the running median that make a spike, if also `SPIKE_RANGE` of the channel's range."""
 
@@ -32,8 +38,23 @@ def check_samples(log: LogView) -> list[LogFinding]:
             findings.append(LogFinding("note", name, message, {"value": float(samples[0])}))
             continue
         coarse = _resolution(samples)
-        findings += _repeats(name, time, samples, coarse) + _spikes(name, time, samples)
+        still = _repeats(name, time, samples, coarse, _resting(log, time))
+        findings += still if name in NEVER_STILL else _told(still)
+        findings += _told(_spikes(name, time, samples)) if name.startswith(JUMPY) else _spikes(name, time, samples)
     return findings
+
+
+def _told(findings: list[LogFinding]) -> list[LogFinding]:
+    """Findings that need no warning."""
+    return [one._replace(severity="note") if one.severity == "warning" else one for one in findings]
+
+
+def _resting(log: LogView, time: np.ndarray) -> np.ndarray:
+    """Whether the car stands, as far as is known, at these times."""
+    if not log.has("v_x"):
+        return np.zeros(time.shape, bool)
+    speed, known = log.channels["v_x"], np.isfinite(log.channels["v_x"])
+    return np.interp(time, log.time[known], np.abs(speed[known])) < 0.1 * log.moving
 
 
 def _resolution(samples: np.ndarray) -> float:
@@ -46,7 +67,7 @@ def _resolution(samples: np.ndarray) -> float:
     return float(step) if coarse and np.median(count) < 4 else 0.0
 
 
-def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float) -> list[LogFinding]:
+def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float, resting: np.ndarray) -> list[LogFinding]:
     starts = np.flatnonzero(np.r_[True, np.diff(samples) != 0])
     lengths = np.diff(np.r_[starts, samples.size])
     share = 1 - starts.size / samples.size
@@ -59,7 +80,7 @@ def _repeats(name: str, time: np.ndarray, samples: np.ndarray, coarse: float) ->
     findings = []
     ends = np.minimum(starts + lengths - 1, samples.size - 1)
     durations = time[ends] - time[starts]
-    frozen = durations > max(FROZEN, 5 * np.median(durations))
+    frozen = (durations > max(FROZEN, 5 * np.median(durations))) & ~(resting[starts] & resting[ends])
     if frozen.any():
         worst = int(np.argmax(durations))
         message = (

@@ -9,6 +9,9 @@ from jaxveh.diagnostics.log_findings import LogFinding, LogView
 GAP = 2.5
 """A step longer than this many usual steps is a gap."""
 
+LONG = 10.0
+"""s: a gap longer than this is hardly a sensor's."""
+
 JITTER = 0.05
 """Spread of the steps, as a share of the usual one, above which sampling is called irregular."""
 
@@ -55,6 +58,8 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
         f"{int(gaps.sum())} gap(s), the longest {steps[longest]:.4g} s at {time[longest]:.6g} s, together "
         f"{steps[gaps].sum():.4g} s. Filters predict across them; fill inputs with recording.fill."
     )
+    if steps[longest] > LONG:
+        message += " A clock that jumped, or two drives in one log? Estimates begin anew after it."
     return [
         regular,
         LogFinding(

@@ -44,6 +44,35 @@ def check_units(log: LogView) -> list[LogFinding]:
     return findings
 
 
+def check_wheel_speeds(log: LogView) -> list[LogFinding]:
+    """Whether v_x is what the wheels' circumferences say."""
+    ratio = _wheels_over_speed(log)
+    if ratio is None:
+        return []
+    values, story = {"ratio": ratio}, f"the wheels' speeds are {ratio:.3g} times v_x"
+    if _SAME[0] < ratio < _SAME[1]:
+        return [LogFinding("ok", "v_x", f"{story}.", values)]
+    for factor, unit in ((1 / 3.6, "km/h"), (0.44704, "mph")):
+        if abs(np.log(ratio / factor)) < np.log(1.15):
+            return [LogFinding("error", "v_x", f"{story}: v_x looks like {unit}. Say so in the channel map.", values)]
+    return [LogFinding("warning", "v_x", f"{story}, which should be 1: the wheels in rad/s or km/h?", values)]
+
+
+_SAME = (0.8, 1.25)
+
+
+def _wheels_over_speed(log: LogView) -> float | None:
+    """The median of all wheels' speeds over v_x in the rows that move; None where there are too few."""
+    wheels = [values for name, values in log.channels.items() if name.startswith("wheel_speed")]
+    if not wheels or not log.has("v_x"):
+        return None
+    speed = log.channels["v_x"]
+    with np.errstate(invalid="ignore"):
+        ratios = np.stack(wheels) / np.where(speed > log.moving, speed, np.nan)
+    known = ratios[np.isfinite(ratios)]
+    return float(np.median(known)) if known.size >= 100 else None
+
+
 def check_signs(log: LogView) -> list[LogFinding]:
     """Whether steer, yaw rate and lateral acceleration turn the same way, and the accelerations follow the speeds."""
     findings = []
@@ -57,6 +86,11 @@ def check_signs(log: LogView) -> list[LogFinding]:
         findings += _sideways(log)
     if log.has("v_x", "a_x"):
         findings.append(_slope("a_x", "dv_x/dt", _longitudinal(log), _LONGITUDINAL, "a_x"))
+    wheels = _wheels_over_speed(log)
+    if wheels is not None and _SAME[0] < wheels < _SAME[1]:
+        # Accelerations that were planned, not measured, must not make a speed that the wheels confirm wrong.
+        sure = lambda one: one.severity == "error" and one.channel == "v_x"
+        return [one._replace(severity="warning") if sure(one) else one for one in findings]
     return findings
 
 

@@ -22,7 +22,19 @@ from jaxveh.io import kit, write_text
 
 ESTIMATORS = {module.NAME: module for module in (sideslip, mass_and_grade)}
 
-KEYS = ("estimator", "version", "result", "steps", "cost", "reference", "logs", "car", "options", "parameters", "covariance")
+KEYS = (
+    "estimator",
+    "version",
+    "result",
+    "steps",
+    "cost",
+    "reference",
+    "logs",
+    "car",
+    "options",
+    "parameters",
+    "covariance",
+)
 
 NONE = "none"
 """An option that is None."""
@@ -65,7 +77,11 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike, *, over
     if told.options:
         lines += ["", "[options]", *(f"{name} = {_plain(value)}" for name, value in told.options)]
     for p, line in zip(fit.chosen, fit.unconstrained, strict=True):
-        lines += ["", f"[parameters.{kit.toml_string(p.name)}]", f"value = {_number(fit.parameters[p.name])}  # {p.unit}"]
+        lines += [
+            "",
+            f"[parameters.{kit.toml_string(p.name)}]",
+            f"value = {_number(fit.parameters[p.name])}  # {p.unit}",
+        ]
         lines += [f"std = {_number(fit.parameters_std[p.name])}", f"line = {_number(line)}"]
     rows = np.asarray(fit.covariance)
     lines += ["", "[covariance]  # of the lines, the rows' halves up to the diagonal"]

@@ -82,6 +82,7 @@ class RearAxle(eqx.Module):
       the curve bends, `F / load = stiffness a / (1 + |stiffness a / grip|^shape)^(1 / shape)`, whose inverse has a closed form.
     - `asymmetry` (-): grip lost in left turns and gained in right ones.
     - `yaw_rate_offset` (rad/s), `a_y_gain` (-; roll makes it larger than one), `a_y_offset` (m/s^2): of the sensors.
+    - `a_y_delay` (s): by which a log's accelerometer is late; moves no state, is taken out before.
     - `drag` (N/(m/s)^2), `front_drive`, `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`, driving and braking
       by the front axle's shares, `ellipse` (-): how much of it counts, `sqrt(1 - (ellipse F_x / (grip load))^2)`.
     - `heading_offset` (rad): by which a reference for sideslip (an INS) is turned against the car; moves no state.
@@ -104,6 +105,7 @@ class RearAxle(eqx.Module):
     yaw_rate_offset: jax.Array = parameter("rad/s", scale=0.005, default=0.0)
     a_y_gain: jax.Array = positive("-", default=1.03)
     a_y_offset: jax.Array = parameter("m/s^2", scale=0.2, default=0.0)
+    a_y_delay: jax.Array = parameter("s", default=0.0)
     drag: jax.Array = positive("N s^2/m^2", default=0.45)
     front_drive: jax.Array = parameter("-", scale=0.1, default=0.0)
     brake_share: jax.Array = parameter("-", scale=0.1, default=0.6)
@@ -253,8 +255,8 @@ INPUTS = (
 - What the axle's force is told from, low-passed: `yaw_rate_smooth` (rad/s), `yaw_acceleration` (rad/s^2), `a_y_smooth` (m/s^2).
 - How far the integrals of a_y and of v_x yaw_rate are ahead of their own low-pass, `a_y_lead` and `turning_lead` (m/s), and its
   delay, `lag` (s).
-- The time that a row stands for, `step` (s), and whether the acceleration of that time is known, `felt` (1 or 0); where it is not,
-  the others are those of a steady turn, a_y = v_x yaw_rate.
+- The time that a row stands for, `step` (s), and whether the acceleration of that time is known, `felt` (1 or 0); where it is
+  not, the others are those of a steady turn, a_y = v_x yaw_rate.
 """
 
 

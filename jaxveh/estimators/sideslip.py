@@ -18,6 +18,7 @@ from jaxveh._core.errors import InputError, JaxvehWarning, check_one_of
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Score, score_band
+from jaxveh.estimators.alignment import a_y_delay, shifted
 from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
 from jaxveh.estimators.coarse_log import coarse_logs
 from jaxveh.estimators.contract import Calibration, Need, as_told, check_needs, model_of, spans_of
@@ -50,9 +51,13 @@ CURVE = 1.35
 """The Magic Formula's C in a fitted car's file."""
 
 
-def model(car: CarSpecification | RearAxle) -> StateSpace:
-    """The state space of a car's file taken at its word, or of a `RearAxle`: see `rear_axle_model`."""
-    return rear_axle_model(car if isinstance(car, RearAxle) else rear_axle(car))
+def model(car: CarSpecification | RearAxle, *, a_y_delay: float | None = None) -> StateSpace:
+    """The state space of a car's file taken at its word, or of a `RearAxle`: see `rear_axle_model`. `a_y_delay` (s): by which its
+    logs' accelerometer is late, in place of the `RearAxle`'s."""
+    system = car if isinstance(car, RearAxle) else rear_axle(car)
+    if a_y_delay is not None:
+        system = dataclasses.replace(system, a_y_delay=a_y_delay)
+    return rear_axle_model(system)
 
 
 def calibrate(
@@ -80,10 +85,12 @@ def calibrate(
     recordings, spans = spans_of(NAME, recording, SHORTEST, "corners")
     for one in recordings:
         _check_measured(one, uses)
-    filter, start = filter or Extended(), model(car)
-    logs = coarse_logs([_seen(one, uses) for one in recordings], _wheelbase(start))
+    options = _late(car, recordings)
+    filter, start = filter or Extended(), model(car, **options)
+    seen = [shifted(_seen(one, uses), float(start.system.a_y_delay)) for one in recordings]
+    logs = coarse_logs(seen, _wheelbase(start))
     if not uses:
-        return Calibration(NAME, fit_rear_axle(filter, start, logs, None, progress), spans, told=as_told(car))
+        return Calibration(NAME, fit_rear_axle(filter, start, logs, None, progress), spans, told=as_told(car, options))
     late = [np.asarray(log.time) >= (span.start + span.end) / 2 for log, span in zip(logs, spans, strict=True)]
     early = [_blank(log, rows, start.channels) for log, rows in zip(logs, late, strict=True)]
     count = 2 + len(TARGET_WEIGHTS)
@@ -95,7 +102,13 @@ def calibrate(
     validation = tuple(zip((None, *TARGET_WEIGHTS), errors, strict=True))
     weight = min(validation, key=lambda one: one[1])[0]
     fit = fit_rear_axle(filter, start, logs, _reference(logs, weight), _part(progress, count - 1, count))
-    return Calibration(NAME, fit, spans, weight, validation, as_told(car))
+    return Calibration(NAME, fit, spans, weight, validation, as_told(car, options))
+
+
+def _late(car: CarSpecification | RearAxle, recordings: Sequence[Recording]) -> dict[str, float]:
+    """The option of `model` that a delay of a_y needs: of a car's file it is looked for, a `RearAxle` has its own."""
+    delay = a_y_delay(car, recordings) if isinstance(car, CarSpecification) else 0.0
+    return {"a_y_delay": delay} if delay else {}
 
 
 def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
@@ -150,11 +163,13 @@ def _validate(filter, model, logs: Sequence[Recording], counted: Sequence[np.nda
     return float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else float("inf")
 
 
-def fitted_car(source: Calibration, car: CarSpecification, *, recording: Recording | Sequence[Recording] = ()) -> CarSpecification:
+def fitted_car(
+    source: Calibration, car: CarSpecification, *, recording: Recording | Sequence[Recording] = ()
+) -> CarSpecification:
     """The car's file with the fitted values in place, as far as a car file can say them.
 
-    With the `recording` (or several) that it was calibrated on, and where one has `steer`, the front axle's stiffness and the steer's
-    offset are fitted to it: see `front_axle`; else they are the file's.
+    With the `recording` (or several) that it was calibrated on, and where one has `steer`, the front axle's stiffness and the
+    steer's offset are fitted to it: see `front_axle`; else they are the file's.
     """
     fitted = source.model.system
     load = float(fitted.mass) * GRAVITY * float(fitted.front_axle_to_cg) / _wheelbase(source.model)
@@ -196,8 +211,15 @@ def estimate(
     `smoothed=False` and for filters without a Gaussian smoother, from those up to it, as `live` does. The bands of a smoothed
     estimate by a calibration allow for what the calibration does not know (`parameter_bands`); others do not. **Raises** as
     `run` and `clean` do.
+
+    An accelerometer that is late by more than a wrong stiffness could explain is shifted, where every row is estimated from all;
+    what is said live must do with it.
     """
-    one = model_of(NAME, source, model)
+    check_needs(NAME, needs, recording)
+    late = _late(source, [recording]) if isinstance(source, CarSpecification) and smoothed else {}
+    one = model_of(NAME, source, lambda car: model(car, **late))
+    if smoothed:
+        recording = shifted(recording, float(one.system.a_y_delay))
     used, log = filter or Extended(), clean(recording, RearAxleCleaning(_wheelbase(one)))
     if smoothed and kit.smoothing_of(used) is Smoothing.gaussian:
         known = isinstance(source, Calibration) and isinstance(source.fit, Fit) and one is source.model
