@@ -84,10 +84,10 @@ def split(
     return LogParts(inside, _visible_channels(rest, (), truth), rest)
 
 
-def calibration_part(recording: Recording, span: tuple[float, float] | None, calibrate_on: Sequence[str]) -> Recording:
-    """The span (or the whole log) with the blind channels and `calibrate_on`."""
+def calibration_part(recording: Recording, calibrate_on: Sequence[str]) -> Recording:
+    """The log with the blind channels and `calibrate_on`."""
     check_names("--calibrate-on", calibrate_on, recording.names)
-    return _visible_channels(recording if span is None else recording.between(*span), tuple(calibrate_on), None)
+    return _visible_channels(recording, tuple(calibrate_on), None)
 
 
 def _visible_channels(recording: Recording, more: tuple[str, ...], truth: str | None) -> Recording:

@@ -13,9 +13,9 @@ from rich.text import Text
 from jaxveh import Recording, diagnostics, io
 from jaxveh.cli import options
 from jaxveh.cli.console import results
+from jaxveh.cli.drives import COLOURS
 from jaxveh.cli.output import check_report, make_folder, write_numbers
 
-COLOURS = {"error": "bold red", "warning": "yellow", "note": "cyan", "ok": "green"}
 ORDER = tuple(COLOURS)
 
 

@@ -1,10 +1,10 @@
-"""`jaxveh estimate`: states of a car along a log, with standard deviations, and a score where there is a truth."""
+"""`jaxveh estimate`: states of a car along its logs, with standard deviations, and a score where there is a truth."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
@@ -12,9 +12,10 @@ import typer
 from jaxveh import InputError, io
 from jaxveh._core.errors import check_at_least, check_one_of
 from jaxveh.cli import options, sideslip
-from jaxveh.cli.blanking import fill_gaps, split
+from jaxveh.cli.blanking import LogParts, split
 from jaxveh.cli.console import number, progress, results, spread, table
-from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
+from jaxveh.cli.drives import Drive, read_drives
+from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
 
 
 class Filter(StrEnum):
@@ -27,7 +28,22 @@ class Filter(StrEnum):
 
 
 PRODUCT = typer.Option(
-    "-o", metavar="FILE", show_default=False, help="Time series with standard deviations: .parquet, .csv, .mf4 or .mdf."
+    "-o",
+    metavar="FILE",
+    show_default=False,
+    help="Time series with standard deviations: .parquet, .csv, .mf4 or .mdf. Of several logs a folder, with a .parquet each.",
+)
+VEHICLE = typer.Option(
+    "--vehicle",
+    metavar="CAR.toml",
+    help="The car (jaxveh schema car); a --calibration brings its own.",
+    show_default=False,
+)
+CALIBRATION = typer.Option(
+    "--calibration",
+    metavar="FILE",
+    help="Estimate with this calibration, which `jaxveh fit` has written.",
+    show_default=False,
 )
 TRUTH = typer.Option(
     "--truth",
@@ -41,11 +57,23 @@ AS_TOLD = typer.Option("--as-told", help="Take the car file at its word: nothing
 PARTICLES = typer.Option("--particles", help="Of a particle filter, at least 2.")
 
 
+class Job(NamedTuple):
+    """One log: its parts, the span that it is calibrated on, where the estimate goes, and the folder of its figures."""
+
+    drive: Drive
+    parts: LogParts
+    span: tuple[float, float] | None
+    product: Path
+    out: Path | None
+
+
 def estimate(
-    log: options.Log,
-    vehicle: options.VehicleFile,
+    logs: options.Logs,
     product: Annotated[Path, PRODUCT],
+    vehicle: Annotated[Path | None, VEHICLE] = None,
+    calibration: Annotated[Path | None, CALIBRATION] = None,
     channels: options.Channels = None,
+    span: options.Span = None,
     calibrate: options.Calibrate = None,
     calibrate_on: options.CalibrateOn = None,
     as_told: Annotated[bool, AS_TOLD] = False,
@@ -57,60 +85,126 @@ def estimate(
     numbers: options.Numbers = None,
     out: options.Out = None,
     force: options.Force = False,
+    anyway: options.Anyway = False,
 ) -> None:
     """Estimate sideslip, slip and forces of a car from v_x, a_x, a_y and yaw_rate.
 
-    With --calibrate the rear axle, noises and sensor offsets are fitted on that span first, and the rows after it are
-    estimated. Without it the log calibrates itself: they are fitted on all its rows, of which no reference is seen, and
-    all rows are estimated; --as-told takes the car file at its word instead. The file has a column for
-    each state and, beside it, <name>_std, its standard deviation: m/s, rad, rad/s.
+    A log calibrates itself: the rear axle, noises and sensor offsets are fitted on all its rows, of which no reference is seen,
+    and all rows are estimated; several logs of a car calibrate themselves together. With --calibrate they are fitted on that span
+    first, and the rows after it are estimated; --calibration takes what jaxveh fit has written, --as-told the car file at its
+    word. The file has a column for each state and, beside it, <name>_std, its standard deviation: m/s, rad, rad/s.
+
+    Before all this the log is checked, as by jaxveh check; errors stop here (--anyway goes on).
 
     The car file is TOML in SI units with mass, yaw_inertia, front_axle_to_cg, rear_axle_to_cg and, for each axle, its
     cornering stiffness or Magic Formula coefficients: see [bold]jaxveh schema car[/].
 
     Examples:
 
-    [bold]jaxveh estimate drive.csv --vehicle car.toml -o estimate.parquet --calibrate 0:120[/]
+    [bold]jaxveh estimate drive.csv --vehicle car.toml -o estimate.parquet[/]
 
     [bold]jaxveh estimate drive.csv --vehicle car.toml -o estimate.csv --calibrate 0:120 --calibrate-on v_y --truth v_y[/]
+
+    [bold]jaxveh estimate monday.csv tuesday.csv --calibration calibration.toml -o estimates[/]
     """
-    check_product(product, io.SUFFIXES, force, (log, vehicle, channels))
+    choice = Choice(
+        logs, product, vehicle, calibration, channels, span, calibrate, tuple(calibrate_on or ()), as_told, fill, truth,
+        filter, particles, seed, out, force, anyway,
+    )  # fmt: skip
     check_report(out, numbers)
-    check_at_least("--particles", particles, 2)
-    if truth is not None:
-        check_one_of("--truth", truth, sideslip.SCORED)
-    car, recording = io.read_car(vehicle), fill_gaps(io.read_recording(log, channels), fill)
-    span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
-    uses = tuple(calibrate_on or ())
-    parts = split(recording, span, uses, truth)
-    part, reason = _calibrated_on(parts, span, as_told)
-    with progress("estimate") as report:
-        calibration = None if reason else sideslip.calibrate(car, part, uses, report)
-        report(0, 1, "estimating (compiling first)")
-        found = sideslip.estimate(calibration or car, parts.estimate, filter.value, particles, seed)
-        report(1, 1, "scoring")
-        score = None if truth is None else sideslip.score(car, found, parts.truth, truth)
-    io.write_frame(io.to_frame(found), product, overwrite=force)
-    _print(product, found, calibration, score, span, reason)
-    figures = [] if out is None else _draw(found, recording, parts.truth, truth, car, span, out)
+    fitted, estimates = _estimate(choice)
+    shown = estimates[logs[0].name] if len(logs) == 1 else {"logs": estimates}
     configuration = {
-        "log": log, "vehicle": vehicle, "channels": channels, "calibrate": calibrate, "calibrate_on": uses,
-        "as_told": as_told, "fill": fill, "truth": truth, "filter": filter.value, "particles": particles,
-    }  # fmt: skip
-    shown = {
-        "file": product, "rows": len(found.time), "start_s": found.time[0], "end_s": found.time[-1], "figures": figures
-    }  # fmt: skip
-    write_numbers(numbers, {**(score or {}), **sideslip.fitted_parameters(calibration), **shown}, configuration, seed)
+        name: value for name, value in choice._asdict().items() if name not in ("product", "seed", "out", "force")
+    }
+    write_numbers(numbers, {**sideslip.fitted_parameters(fitted), **shown}, configuration, seed)
 
 
-def _calibrated_on(parts: Any, span: Any, as_told: bool) -> tuple[Any, str | None]:
-    """The rows to calibrate on, and the reason why nothing is calibrated, None where it is."""
-    if as_told and span is not None:
+class Choice(NamedTuple):
+    """The options of `estimate`."""
+
+    logs: list[Path]
+    product: Path
+    vehicle: Path | None
+    calibration: Path | None
+    channels: Path | None
+    span: str | None
+    calibrate: str | None
+    calibrate_on: tuple[str, ...]
+    as_told: bool
+    fill: float | None
+    truth: str | None
+    filter: Filter
+    particles: int
+    seed: int
+    out: Path | None
+    force: bool
+    anyway: bool
+
+
+def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
+    """The calibration, None for a car at its word, and what became of each log, by its name."""
+    products = _check(choice)
+    told = None if choice.vehicle is None else io.read_car(choice.vehicle)
+    found = None if choice.calibration is None else sideslip.read_calibration(choice.calibration, told)
+    car = _car(told, found)
+    used = (choice.truth, *choice.calibrate_on)
+    drives = read_drives(choice.logs, car, choice.channels, choice.fill, choice.span, used, choice.anyway)
+    jobs = [_job(choice, drive, product) for drive, product in zip(drives, products, strict=True)]
+    fitted_on = [job.parts.estimate if job.parts.calibration is None else job.parts.calibration for job in jobs]
+    reason = "--as-told" if choice.as_told else None
+    if found is None and reason is None and choice.calibrate is None:
+        reason = next((why for part in fitted_on if (why := sideslip.why_not_calibrated(part))), None)
+    with progress("estimate") as report:
+        if found is None and reason is None:
+            found = sideslip.calibrate(car, fitted_on, choice.calibrate_on, report)
+            found = found.with_log_names(*(log.name for log in choice.logs))
+        report(0, 1, "estimating (compiling first)")
+        kind, particles, seed = choice.filter.value, choice.particles, choice.seed
+        estimates = [sideslip.estimate(found or car, job.parts.estimate, kind, particles, seed) for job in jobs]
+        report(1, 1, "scoring")
+    _say_source(choice, found, reason)
+    concluded = {job.drive.log.name: _conclude(choice, job, one, car) for job, one in zip(jobs, estimates, strict=True)}
+    return found, concluded
+
+
+def _check(choice: Choice) -> list[Path]:
+    """Raise where options contradict each other or a file could not be written; the files of the estimates."""
+    logs, product = choice.logs, choice.product
+    sources = (*logs, choice.vehicle, choice.channels, choice.calibration)
+    if len(logs) == 1:
+        products = [product]
+        check_product(product, io.SUFFIXES, choice.force, sources)
+    else:
+        products = [product / f"{log.stem}.parquet" for log in logs]
+        check_products(product, products, choice.force, sources)
+    check_at_least("--particles", choice.particles, 2)
+    if choice.truth is not None:
+        check_one_of("--truth", choice.truth, sideslip.SCORED)
+    if choice.as_told and choice.calibrate is not None:
         raise InputError("--as-told fits nothing: leave --calibrate out, or --as-told.")
-    part = parts.estimate if span is None else parts.calibration
-    if as_told:
-        return part, "--as-told"
-    return part, None if span is not None else sideslip.why_not_calibrated(part)
+    if choice.calibration is not None and (choice.as_told or choice.calibrate is not None):
+        other = "--as-told" if choice.as_told else "--calibrate"
+        raise InputError(f"--calibration says it all: leave {other} out, or --calibration.")
+    if choice.calibrate is not None and len(logs) > 1:
+        raise InputError("--calibrate is of one log: calibrate with `jaxveh fit`, and give its file as --calibration.")
+    return products
+
+
+def _job(choice: Choice, drive: Drive, product: Path) -> Job:
+    time = drive.recording.time
+    span = options.span_of(choice.calibrate, float(time[0]), float(time[-1]))
+    parts = split(drive.recording, span, choice.calibrate_on, choice.truth)
+    out = choice.out if choice.out is None or len(choice.logs) == 1 else choice.out / drive.log.stem
+    return Job(drive, parts, span, product, out)
+
+
+def _car(told: io.CarSpecification | None, calibration: Any) -> io.CarSpecification:
+    if calibration is not None:
+        return calibration.told.car
+    if told is None:
+        raise InputError("--vehicle is missing: give the car's file (jaxveh schema car), or a --calibration.")
+    return told
 
 
 def print_fitted(calibration: Any) -> None:
@@ -119,35 +213,56 @@ def print_fitted(calibration: Any) -> None:
         (name, spread(one["value"], one["std"]), one["unit"])
         for name, one in sideslip.fitted_parameters(calibration)["fitted"].items()
     ]
-    table("Fitted on the calibration span", ("parameter", "value ± std", "unit"), rows)
+    table("Fitted", ("parameter", "value ± std", "unit"), rows)
 
 
-def _print(product: Path, found: Any, calibration: Any, score: dict | None, span: Any, reason: str | None) -> None:
-    if reason:
+def _say_source(choice: Choice, calibration: Any, reason: str | None) -> None:
+    if calibration is None:
         results().print(f"Nothing was calibrated, the car file is taken at its word: {reason}.")
-    elif span is None:
-        results().print("The log calibrated itself, on all its rows and without a reference.")
-    if calibration is not None:
-        print_fitted(calibration)
+        return
+    if choice.calibration is not None:
+        spans = "; ".join(f"{span.log or 'a log'} {span.start:g} to {span.end:g} s" for span in calibration.spans)
+        results().print(f"Calibrated by {choice.calibration}, on {spans}.", markup=False)
+        return
+    if choice.calibrate is None:
+        one = "The log calibrated itself, on all its", "The logs calibrated themselves together, on all their"
+        results().print(f"{one[len(choice.logs) > 1]} rows and without a reference.")
+    print_fitted(calibration)
+    if (words := sideslip.reference_in_words(calibration, choice.calibrate_on)) is not None:
+        results().print(words)
+
+
+def _conclude(choice: Choice, job: Job, found: Any, car: io.CarSpecification) -> dict[str, Any]:
+    """Write one estimate, print its score, draw its figures: its numbers for the JSON file."""
+    score = None if choice.truth is None else sideslip.score(car, found, job.parts.truth, choice.truth)
+    io.write_frame(io.to_frame(found), job.product, overwrite=choice.force)
     if score is not None:
         rows = [(name, f"{value}" if isinstance(value, int) else number(value)) for name, value in score.items()]
-        table("Score over the rows estimated, by the names of the JSON file", ("what", "value"), rows)
+        title = f"Score over the rows estimated of {job.drive.log.name}, by the names of the JSON file"
+        table(title, ("what", "value"), rows)
     time = np.asarray(found.time)
-    results().print(f"{product}: {time.size} rows from {time[0]:g} to {time[-1]:g} s")
+    results().print(f"{job.product}: {time.size} rows from {time[0]:g} to {time[-1]:g} s", markup=False)
+    figures = [] if job.out is None else _draw(found, job, choice.truth, car)
+    shown = {"file": job.product, "rows": time.size, "start_s": time[0], "end_s": time[-1], "figures": figures}
+    return {**(score or {}), **shown}
 
 
-def _draw(found: Any, recording: Any, seen: Any, truth: str | None, car: Any, span: Any, out: Path) -> list[Path]:
+def _draw(found: Any, job: Job, truth: str | None, car: io.CarSpecification) -> list[Path]:
     from jaxveh import plots
 
-    make_folder(out)
-    names = ("sideslip", "v_y", "yaw_rate") if truth is None else ("sideslip", "v_y")
+    assert job.out is not None
+    make_folder(job.out)
+    recording, seen = job.drive.recording, job.parts.truth
+    names = ("sideslip", "v_y")
     true = None if truth is None else sideslip.truth_of(seen, truth)
     others = {} if truth is None or "steer" not in seen else {"open-loop linear model": sideslip.open_loop(car, seen)}
-    spans = [] if span is None else [(max(span[0], float(recording.time[0])), span[1], "calibration")]
+    spans = [] if job.span is None else [(max(job.span[0], float(recording.time[0])), job.span[1], "calibration")]
     paths = [
-        plots.save(plots.recording(recording, spans=spans), out / "channels.png"),
-        plots.save(plots.estimate(found, true, names, others=others, errors=true is not None), out / "estimate.png"),
+        plots.save(plots.recording(recording, spans=spans), job.out / "channels.png"),
+        plots.save(
+            plots.estimate(found, true, names, others=others, errors=true is not None), job.out / "estimate.png"
+        ),
     ]
     for path in paths:
-        results().print(f"figure: {path}")
+        results().print(f"figure: {path}", markup=False)
     return paths

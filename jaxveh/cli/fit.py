@@ -1,69 +1,107 @@
-"""`jaxveh fit`: a car file with tyres and steering offset fitted to a log."""
+"""`jaxveh fit`: a calibration of a car from its logs, to keep and to estimate with."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from jaxveh import InputError, io
+from jaxveh import InputError, estimators, io
 from jaxveh.cli import options, sideslip
-from jaxveh.cli.blanking import calibration_part, fill_gaps
+from jaxveh.cli.blanking import calibration_part
 from jaxveh.cli.console import progress, results
+from jaxveh.cli.drives import Drive, read_drives
 from jaxveh.cli.estimate import print_fitted
 from jaxveh.cli.output import check_product, check_report, make_folder, write_numbers
 
-PRODUCT = typer.Option("-o", metavar="FILE", show_default=False, help="The fitted car: .toml.")
+PRODUCT = typer.Option(
+    "-o", metavar="FILE", show_default=False, help="The calibration (.toml), for jaxveh estimate --calibration."
+)
+CAR_FILE = typer.Option(
+    "--car-file",
+    metavar="FILE",
+    show_default=False,
+    help="Write the car with what was fitted of it, too (.toml): tyres, inertia, steering offset.",
+)
 
 
 def fit(
-    log: options.Log,
+    logs: options.Logs,
     vehicle: options.VehicleFile,
     product: Annotated[Path, PRODUCT],
+    car_file: Annotated[Path | None, CAR_FILE] = None,
     channels: options.Channels = None,
-    calibrate: options.Calibrate = None,
+    span: options.Span = None,
     calibrate_on: options.CalibrateOn = None,
     fill: options.Fill = None,
     numbers: options.Numbers = None,
     out: options.Out = None,
     force: options.Force = False,
+    anyway: options.Anyway = False,
 ) -> None:
-    """Fit axles, noises and sensor offsets to a log, or to a span of it, and write the car with what was found.
+    """Fit the rear axle, noises and sensor offsets of a car to a log, or to several together, and write all that an estimate
+    needs.
 
-    What is fitted sees v_x, a_x, a_y, yaw_rate and steer (for the front axle), and the channels of --calibrate-on. The car file
-    is TOML in SI units: [bold]jaxveh schema car[/].
+    What is fitted sees v_x, a_x, a_y, yaw_rate and the channel of --calibrate-on; the front axle of --car-file sees steer,
+    too. The car file is TOML in SI units: [bold]jaxveh schema car[/].
 
-    Example: [bold]jaxveh fit drive.csv --vehicle car.toml -o car_fitted.toml --calibrate 0:120[/]
+    Examples:
+
+    [bold]jaxveh fit drive.csv --vehicle car.toml -o calibration.toml --span 0:120[/]
+
+    [bold]jaxveh fit monday.csv tuesday.csv --vehicle car.toml -o calibration.toml --car-file car_fitted.toml[/]
     """
-    check_product(product, (".toml",), force, (log, vehicle, channels))
+    sources = (*logs, vehicle, channels)
+    check_product(product, (".toml",), force, sources)
+    check_product(car_file, (".toml",), force, sources, "--car-file")
+    if car_file is not None and car_file.absolute() == product.absolute():
+        raise InputError(f"--car-file {car_file}: is the calibration, -o; name another file.")
     check_report(out, numbers)
-    car, recording = io.read_car(vehicle), fill_gaps(io.read_recording(log, channels), fill)
-    span = options.span_of(calibrate, float(recording.time[0]), float(recording.time[-1]))
-    uses = tuple(calibrate_on or ())
-    if out is not None and "steer" not in recording:
+    car, uses = io.read_car(vehicle), tuple(calibrate_on or ())
+    drives = read_drives(logs, car, channels, fill, span, uses, anyway)
+    if out is not None and any("steer" not in drive.recording for drive in drives):
         raise InputError(
             "--out: the force curves need steer, which the log has not. Name its column, or leave --out away."
         )
-    part = calibration_part(recording, span, uses)
+    parts = [calibration_part(drive.recording, uses) for drive in drives]
     with progress("fit") as report:
-        calibration = sideslip.calibrate(car, part, uses, report)
-    where = f"{part.time[0]:g} to {part.time[-1]:g} s of {log.name}"
-    io.write_car(sideslip.fitted_car(calibration, car, part), product, note=f"Fitted to {where}.", overwrite=force)
+        calibration = sideslip.calibrate(car, parts, uses, report).with_log_names(*(log.name for log in logs))
+    estimators.write_calibration(calibration, product, overwrite=force)
     print_fitted(calibration)
-    results().print(f"{product}: fitted to {where}")
-    if out is not None:
-        from jaxveh import plots
-
-        make_folder(out)
-        figure = plots.force_curves(*sideslip.curves(calibration, car, part))
-        results().print(f"figure: {plots.save(figure, out / 'force_curves.png')}")
+    if (words := sideslip.reference_in_words(calibration, uses)) is not None:
+        results().print(words)
+    where = ", ".join(f"{one.start:g} to {one.end:g} s of {one.log}" for one in calibration.spans)
+    results().print(f"{product}: fitted to {where}", markup=False)
+    figures = _write_car(calibration, car, drives, parts, where, car_file, out, force)
     configuration = {
-        "log": log,
-        "vehicle": vehicle,
-        "channels": channels,
-        "calibrate": calibrate,
-        "calibrate_on": uses,
-        "fill": fill,
-    }
-    write_numbers(numbers, {**sideslip.fitted_parameters(calibration), "file": product}, configuration, None)
+        "logs": logs, "vehicle": vehicle, "channels": channels, "span": span, "calibrate_on": uses, "fill": fill,
+        "anyway": anyway,
+    }  # fmt: skip
+    shown = {"file": product, "car_file": car_file, "figures": figures}
+    write_numbers(numbers, {**sideslip.fitted_parameters(calibration), **shown}, configuration, None)
+
+
+def _write_car(
+    calibration: Any, car: io.CarSpecification, drives: list[Drive], parts: list, where: str, file: Path | None, out: Path | None,
+    force: bool,
+) -> list[Path]:  # fmt: skip
+    """The fitted car as a file and as a figure, where they are wanted."""
+    if file is None and out is None:
+        return []
+    fitted = sideslip.fitted_car(calibration, car, parts)
+    if file is not None:
+        io.write_car(fitted, file, note=f"Fitted to {where}.", overwrite=force)
+        results().print(f"{file}: the car as it was fitted", markup=False)
+    if out is None:
+        return []
+    from jaxveh import plots
+
+    figures = []
+    for drive, part in zip(drives, parts, strict=True):
+        folder = out if len(drives) == 1 else out / drive.log.stem
+        make_folder(folder)
+        figure = plots.force_curves(*sideslip.curves(calibration, car, fitted, part))
+        figures.append(plots.save(figure, folder / "force_curves.png"))
+        results().print(f"figure: {figures[-1]}", markup=False)
+    return figures

@@ -13,6 +13,8 @@ LOG_HELP = "The log: .csv, .parquet, .mf4 or .mdf, with a time column and channe
 
 Log = Annotated[Path, typer.Argument(metavar="LOG", help=LOG_HELP, show_default=False)]
 
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help=LOG_HELP, show_default=False)]
+
 VehicleFile = Annotated[
     Path, typer.Option("--vehicle", metavar="CAR.toml", help="The car (jaxveh schema car).", show_default=False)
 ]
@@ -41,17 +43,28 @@ Calibrate = Annotated[
     typer.Option(
         "--calibrate",
         metavar="START:END",
-        help="Fit tyres, noises and steering offset on this span first, in seconds of the log's time; either end may be "
+        help="Fit the rear axle, noises and sensor offsets on this span first, in seconds of the log's time; either end may be "
         "left out (150: or :287.5).",
     ),
 ]
+
+Span = Annotated[
+    str | None,
+    typer.Option(
+        "--span",
+        metavar="START:END",
+        help="Take this part of each log alone, in seconds of its own time; either end may be left out (150: or :287.5).",
+    ),
+]
+
+Anyway = Annotated[bool, typer.Option("--anyway", help="Go on where the check of a log finds errors.")]
 
 CalibrateOn = Annotated[
     list[str] | None,
     typer.Option(
         "--calibrate-on",
         metavar="CHANNEL",
-        help="A channel that the calibration may use inside its span besides the blind ones, such as v_y; repeatable.",
+        help="A channel that the calibration may use inside its span besides the blind ones: v_y or sideslip.",
     ),
 ]
 
@@ -65,8 +78,8 @@ Fill = Annotated[
 ]
 
 
-def span_of(text: str | None, start: float, end: float) -> tuple[float, float] | None:
-    """START:END as seconds of a log that runs from `start` to `end`; None where there is none.
+def span_of(text: str | None, start: float, end: float, option: str = "--calibrate") -> tuple[float, float] | None:
+    """START:END, as an `option` gives it, as seconds of a log that runs from `start` to `end`; None where there is none.
 
     Raises `InputError` for what is no span, or lies outside the log.
     """
@@ -81,8 +94,8 @@ def span_of(text: str | None, start: float, end: float) -> tuple[float, float] |
         first = last = float("nan")
     if not colon or not first < last:
         raise InputError(
-            f"--calibrate {text}: must be START:END in seconds with START before END, such as {start:g}:{(start + end) / 2:g}."
+            f"{option} {text}: must be START:END in seconds with START before END, such as {start:g}:{(start + end) / 2:g}."
         )
     if first > end or last <= start:
-        raise InputError(f"--calibrate {text}: lies outside the log, which runs from {start:g} to {end:g} s.")
+        raise InputError(f"{option} {text}: lies outside the log, which runs from {start:g} to {end:g} s.")
     return first, last

@@ -18,21 +18,42 @@ from jaxveh import InputError, io
 
 
 def check_product(
-    path: Path | None, suffixes: tuple[str, ...], force: bool, sources: tuple[Path | None, ...] = ()
+    path: Path | None,
+    suffixes: tuple[str, ...],
+    force: bool,
+    sources: tuple[Path | None, ...] = (),
+    option: str = "-o",
 ) -> None:
-    """Raise before any work where `-o` could not be written in the end: suffix, folder, an existing file, an input."""
+    """Raise before any work where the file of an `option` could not be written in the end: suffix, folder, an existing file, an
+    input."""
     if path is None:
         return
     if path.suffix.lower() not in suffixes:
-        raise InputError(f"-o {path}: suffix {path.suffix!r}; it must end in one of {', '.join(suffixes)}.")
+        raise InputError(f"{option} {path}: suffix {path.suffix!r}; it must end in one of {', '.join(suffixes)}.")
     for source in sources:
         if source is not None and source.exists() and path.exists() and path.samefile(source):
-            raise InputError(f"-o {path}: is an input of this program; name another file.")
+            raise InputError(f"{option} {path}: is an input of this program; name another file.")
     if path.is_dir():
-        raise InputError(f"-o {path}: is a folder; name a file.")
+        raise InputError(f"{option} {path}: is a folder; name a file.")
     if path.exists() and not force:
-        raise InputError(f"-o {path}: exists already; name another file, or pass --force to replace it.")
-    _check_folder(path, "-o")
+        raise InputError(f"{option} {path}: exists already; name another file, or pass --force to replace it.")
+    _check_folder(path, option)
+
+
+def check_products(folder: Path, files: list[Path], force: bool, sources: tuple[Path | None, ...] = ()) -> None:
+    """The same for several files in a folder, which is made where it is not there."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"-o {folder}: is a file; several logs need a folder.")
+    names = [file.name for file in files]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(f"-o {folder}: two logs would be written to {twice[0]}; estimate them one by one.")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"-o {folder}: cannot be made ({error.strerror}).") from error
+    for file in files:
+        check_product(file, io.SUFFIXES, force, sources)
 
 
 def check_report(out: Path | None, numbers: Path | None) -> None:

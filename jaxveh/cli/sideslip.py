@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
-from jaxveh import Recording, filters, vehicles
+from jaxveh import InputError, Recording, estimators, filters, vehicles
 from jaxveh._core.progress import Progress
 from jaxveh.estimators import Calibration, sideslip
 from jaxveh.estimators import open_loop as drive_open_loop
@@ -24,9 +27,30 @@ def filter_of(name: str, particles: int) -> filters.AbstractFilter:
     return (filters.AuxiliaryParticleFilter if name == "apf" else filters.ParticleFilter)(particles)
 
 
-def calibrate(car: CarSpecification, part: Recording, uses: tuple[str, ...], progress: Progress) -> Calibration:
-    """The rear axle, noises and sensor offsets fitted on a span."""
-    return sideslip.calibrate(car, part, uses=uses, progress=progress)
+def calibrate(
+    car: CarSpecification, parts: Sequence[Recording], uses: tuple[str, ...], progress: Progress
+) -> Calibration:
+    """The rear axle, noises and sensor offsets fitted on spans of a car's logs."""
+    return sideslip.calibrate(car, parts, uses=uses, progress=progress)
+
+
+def read_calibration(path: Path, car: CarSpecification | None) -> Calibration:
+    """A calibration of sideslip from its file.
+
+    **Raises** `InputError` for one of another estimator, or where a `car` is given that is not the one that was calibrated.
+    """
+    found = estimators.read_calibration(path)
+    if found.estimator != sideslip.NAME:
+        raise InputError(f"--calibration {path}: is one of {found.estimator}: must be one of {sideslip.NAME}.")
+    assert found.told is not None  # a file has it
+    if car is not None and car != found.told.car:
+        names = [entry.name for entry in dataclasses.fields(car)]
+        name = next(name for name in names if getattr(car, name) != getattr(found.told.car, name))
+        raise InputError(
+            f"--calibration {path}: is of another car: its {name} is {getattr(found.told.car, name)}, that of --vehicle "
+            f"{getattr(car, name)}. Leave --vehicle out, or calibrate this car."
+        )
+    return found
 
 
 def why_not_calibrated(part: Recording) -> str | None:
@@ -75,20 +99,30 @@ def fitted_parameters(calibration: Calibration | None) -> dict[str, Any]:
     tried = [{"weight": weight, "sideslip_rmse_deg": rmse} for weight, rmse in calibration.validation]
     return {
         "fitted": calibration.summary(),
-        "calibration_span": calibration.span,
+        "calibrated_on": [span._asdict() for span in calibration.spans],
         "reference_weight": calibration.weight,
         "validation_inside_span": tried,
     }
 
 
-def fitted_car(calibration: Calibration, car: CarSpecification, part: Recording) -> CarSpecification:
-    """The specification with the values fitted to `part` in place."""
-    return sideslip.fitted_car(calibration, car, recording=part)
+def reference_in_words(calibration: Calibration, uses: tuple[str, ...]) -> str | None:
+    """What validation made of a reference that was offered; None where none was."""
+    if not uses:
+        return None
+    if calibration.weight is None:
+        return f"{uses[0]} was not used: the fit without it was the best on the second half of what was calibrated on."
+    return f"{uses[0]} was followed to within {np.degrees(calibration.weight):.1f} degrees, which was best on the second half."
 
 
-def curves(calibration: Calibration, car: CarSpecification, part: Recording) -> tuple[dict, dict]:
-    """Cars before and after, and the slip angles that the span visited, for `plots.force_curves`."""
-    fitted = fitted_car(calibration, car, part)
+def fitted_car(calibration: Calibration, car: CarSpecification, parts: Sequence[Recording]) -> CarSpecification:
+    """The specification with the values fitted to `parts` in place."""
+    return sideslip.fitted_car(calibration, car, recording=parts)
+
+
+def curves(
+    calibration: Calibration, car: CarSpecification, fitted: CarSpecification, part: Recording
+) -> tuple[dict, dict]:
+    """Cars before and after, and the slip angles that a log visited, for `plots.force_curves`."""
     cars = {"car file": vehicles.from_specification(car), "fitted": vehicles.from_specification(fitted)}
     found = estimate(calibration, part)
     v_x, yaw_rate = np.asarray(part["v_x"]), np.asarray(part["yaw_rate"])

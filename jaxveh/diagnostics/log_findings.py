@@ -80,14 +80,14 @@ class LogView:
         return on_grid
 
     @property
-    def moving(self) -> float:
+    def least_speed(self) -> float:
         """Speed (m/s) above which directions are compared: `MOVING`, and less for small cars."""
         return MOVING * min(1.0, ((self.car.wheelbase if self.car else WHEELBASE) / WHEELBASE) ** 0.5)
 
     def while_moving(self, values: np.ndarray) -> np.ndarray:
-        """Values (N,) on `grid`, NaN where the car is slower than `moving` or its speed is not known."""
+        """Values (N,) on `grid`, NaN where the car is slower than `least_speed` or its speed is not known."""
         with np.errstate(invalid="ignore"):
-            return np.where(self.even("v_x") > self.moving, values, np.nan)
+            return np.where(self.even("v_x") > self.least_speed, values, np.nan)
 
     def slope(self, values: np.ndarray) -> np.ndarray:
         """Time derivative (N,) on `grid`."""

@@ -54,7 +54,7 @@ def _resting(log: LogView, time: np.ndarray) -> np.ndarray:
     if not log.has("v_x"):
         return np.zeros(time.shape, bool)
     speed, known = log.channels["v_x"], np.isfinite(log.channels["v_x"])
-    return np.interp(time, log.time[known], np.abs(speed[known])) < 0.1 * log.moving
+    return np.interp(time, log.time[known], np.abs(speed[known])) < 0.1 * log.least_speed
 
 
 def _resolution(samples: np.ndarray) -> float:

@@ -68,7 +68,7 @@ def _wheels_over_speed(log: LogView) -> float | None:
         return None
     speed = log.channels["v_x"]
     with np.errstate(invalid="ignore"):
-        ratios = np.stack(wheels) / np.where(speed > log.moving, speed, np.nan)
+        ratios = np.stack(wheels) / np.where(speed > log.least_speed, speed, np.nan)
     known = ratios[np.isfinite(ratios)]
     return float(np.median(known)) if known.size >= 100 else None
 

@@ -44,7 +44,7 @@ def a_y_delay(car: CarSpecification, recordings: Sequence[Recording]) -> float:
     return seconds
 
 
-def shifted(recording: Recording, seconds: float) -> Recording:
+def shift_a_y(recording: Recording, seconds: float) -> Recording:
     """The recording with its a_y as it was said `seconds` later, sample by sample, so that what is stuck or missing stays so."""
     if seconds == 0 or "a_y" not in recording:
         return recording

@@ -92,7 +92,7 @@ class Told(NamedTuple):
     options: tuple[tuple[str, Any], ...] = ()
 
 
-def as_told(car: Any, options: Mapping[str, Any] | None = None) -> Told | None:
+def start_of(car: Any, options: Mapping[str, Any] | None = None) -> Told | None:
     """What a calibration started from; None where that was no file, or an option is no plain value: it cannot be written then."""
     options = options or {}
     plain = all(value is None or isinstance(value, str | float | int) for value in options.values())
@@ -120,7 +120,7 @@ class Calibration(eqx.Module):
         """The fitted state space."""
         return self.fit.model
 
-    def named(self, *logs: str) -> Calibration:
+    def with_log_names(self, *logs: str) -> Calibration:
         """The same with the names of the logs' files."""
         spans = tuple(span._replace(log=log) for span, log in zip(self.spans, logs, strict=True))
         return dataclasses.replace(self, spans=spans)

@@ -12,7 +12,7 @@ from jaxveh._core.errors import InputError, check, check_positive
 from jaxveh._core.names import record_type
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.contract import Calibration, Need, as_told, check_needs, model_of, spans_of
+from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of, spans_of, start_of
 from jaxveh.estimators.live import AsItIs, Live
 from jaxveh.filters import AbstractFilter, Estimate, Unscented, run
 from jaxveh.fitting import prediction_error
@@ -133,7 +133,8 @@ def calibrate(
 ) -> Calibration:
     """Fit drag and noise levels to a span of a log, by maximum posterior of a filter whose mass and grade stay states.
 
-    Several logs must have the same number of rows. `options`: those of `model`, the start values among them. Rolling resistance is not fitted: a constant grade says the same.
+    Several logs must have the same number of rows. `options`: those of `model`, the start values among them. Rolling resistance
+    is not fitted: a constant grade says the same.
 
     **Raises** `InputError` for missing channels, or a span shorter than `SHORTEST`; `FilterError` where the fit fails.
     """
@@ -144,7 +145,7 @@ def calibrate(
     assert start.process_noise is not None  # `model` has given it
     prior = {"drag": DRAG_SPREAD} | dict.fromkeys((*start.process_noise.law.names, *start.channels), NOISE_SPREAD)
     fit = prediction_error(filter or Unscented(), start, recordings, chosen_parameters, prior=prior, progress=progress)
-    return Calibration(NAME, fit, spans, told=as_told(car, options))
+    return Calibration(NAME, fit, spans, told=start_of(car, options))
 
 
 def estimate(

@@ -18,10 +18,10 @@ from jaxveh._core.errors import InputError, JaxvehWarning, check_one_of
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Score, score_band
-from jaxveh.estimators.alignment import a_y_delay, shifted
+from jaxveh.estimators.alignment import a_y_delay, shift_a_y
 from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
 from jaxveh.estimators.coarse_log import coarse_logs
-from jaxveh.estimators.contract import Calibration, Need, as_told, check_needs, model_of, spans_of
+from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of, spans_of, start_of
 from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.live import Live
@@ -40,6 +40,9 @@ NAME = "sideslip"
 
 needs = BLIND
 """Speed in every row; yaw rate and accelerations where they were measured."""
+
+REFERENCES = {"v_y": "m/s", "sideslip": "rad"}
+"""Channels that may supervise a calibration, and their units."""
 
 SHORTEST = 20.0
 """s: a span shorter than this holds too few corners to calibrate a car on."""
@@ -71,26 +74,28 @@ def calibrate(
     """Fit the rear axle, noise levels and sensor offsets of a car to a span of a log, or to several together, by maximum
     posterior of a filter.
 
-    Blind (`uses=()`) it reads v_x, a_x, a_y and yaw_rate alone. With `uses=("v_y",)` v_y supervises the fit as a reference for
-    sideslip; how strongly is chosen by fitting on the first half of each span and looking at the second, where "not at all" is
-    among the choices: a reference with slow errors of its own makes a car worse. Start values and priors come from the car's
-    file and `rear_axle_prior.SPREADS`, and nothing outside the recordings is looked at. `validation` of what is returned is
-    the sideslip RMSE in degrees on the second halves by the reference's weight (rad), fitted on the first.
+    Blind (`uses=()`) it reads v_x, a_x, a_y and yaw_rate alone. With `uses=("v_y",)`, or `("sideslip",)`, that channel
+    supervises the fit as a reference; how strongly is chosen by fitting on the first half of each span and looking at the
+    second, where "not at all" is among the choices: a reference with slow errors of its own makes a car worse. Start values and
+    priors come from the car's file and `rear_axle_prior.SPREADS`, and nothing outside the recordings is looked at. `validation`
+    of what is returned is the sideslip RMSE in degrees on the second halves by the reference's weight (rad), fitted on the first.
 
     **Raises** `InputError` for missing channels, a_y among them, or a span shorter than `SHORTEST`; `FilterError` where the fit
     fails.
     """
     for name in uses:
-        check_one_of("uses", name, ("v_y",))
+        check_one_of("uses", name, tuple(REFERENCES))
+    if len(uses) > 1:
+        raise InputError(f"sideslip: uses = {uses}: must be one reference; they say the same.")
     recordings, spans = spans_of(NAME, recording, SHORTEST, "corners")
     for one in recordings:
         _check_measured(one, uses)
     options = _late(car, recordings)
     filter, start = filter or Extended(), model(car, **options)
-    seen = [shifted(_seen(one, uses), float(start.system.a_y_delay)) for one in recordings]
+    seen = [shift_a_y(_seen(one, uses), float(start.system.a_y_delay)) for one in recordings]
     logs = coarse_logs(seen, _wheelbase(start))
     if not uses:
-        return Calibration(NAME, fit_rear_axle(filter, start, logs, None, progress), spans, told=as_told(car, options))
+        return Calibration(NAME, fit_rear_axle(filter, start, logs, None, progress), spans, told=start_of(car, options))
     late = [np.asarray(log.time) >= (span.start + span.end) / 2 for log, span in zip(logs, spans, strict=True)]
     early = [_blank(log, rows, start.channels) for log, rows in zip(logs, late, strict=True)]
     count = 2 + len(TARGET_WEIGHTS)
@@ -102,7 +107,7 @@ def calibrate(
     validation = tuple(zip((None, *TARGET_WEIGHTS), errors, strict=True))
     weight = min(validation, key=lambda one: one[1])[0]
     fit = fit_rear_axle(filter, start, logs, _reference(logs, weight), _part(progress, count - 1, count))
-    return Calibration(NAME, fit, spans, weight, validation, as_told(car, options))
+    return Calibration(NAME, fit, spans, weight, validation, start_of(car, options))
 
 
 def _late(car: CarSpecification | RearAxle, recordings: Sequence[Recording]) -> dict[str, float]:
@@ -112,7 +117,7 @@ def _late(car: CarSpecification | RearAxle, recordings: Sequence[Recording]) -> 
 
 
 def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
-    check_needs(NAME, (*needs, *(Need(name, "m/s") for name in uses)), recording)
+    check_needs(NAME, (*needs, *(Need(name, REFERENCES[name]) for name in uses)), recording)
     if not _measured(recording, "yaw_rate"):
         raise InputError("sideslip: yaw_rate (rad/s) is NaN in every row: there is nothing to calibrate on.")
     if not _measured(recording, "a_y"):
@@ -123,6 +128,9 @@ def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
 
 
 def _seen(recording: Recording, uses: tuple[str, ...]) -> Recording:
+    if "sideslip" in uses:
+        recording = recording.replace(v_y=np.asarray(recording["v_x"]) * np.tan(np.asarray(recording["sideslip"])))
+        uses = ("v_y",)
     return recording.select([name for name in (*[need.channel for need in needs], *uses) if name in recording])
 
 
@@ -219,7 +227,7 @@ def estimate(
     late = _late(source, [recording]) if isinstance(source, CarSpecification) and smoothed else {}
     one = model_of(NAME, source, lambda car: model(car, **late))
     if smoothed:
-        recording = shifted(recording, float(one.system.a_y_delay))
+        recording = shift_a_y(recording, float(one.system.a_y_delay))
     used, log = filter or Extended(), clean(recording, RearAxleCleaning(_wheelbase(one)))
     if smoothed and kit.smoothing_of(used) is Smoothing.gaussian:
         known = isinstance(source, Calibration) and isinstance(source.fit, Fit) and one is source.model

@@ -5,10 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from programs import columns, error_line, run, write_car, write_log
+from programs import CAR, columns, error_line, run, write_car, write_log
 
 from jaxveh import estimators, io
-from jaxveh.estimators import Calibration
 
 
 def read_json(path):
@@ -164,21 +163,138 @@ def test_truth_that_says_nothing_of_sideslip(tmp_path, drive):
     assert not product.exists()
 
 
-def test_fit_draws_the_force_curves(tmp_path, drive, monkeypatch):
-    """The fit itself stands aside: the car as told in its place."""
-    from jaxveh.cli import sideslip
+def with_steer(seconds=30.0):
+    """Weaving at 15 to 20 m/s of the car of `CAR` with the steer that its linear tyres ask for, so that both axles show."""
+    time = np.arange(0.0, seconds, 0.02)
+    v_x = 17.5 + 2.5 * np.sin(0.3 * time)
+    yaw_rate = 0.15 * np.sin(0.9 * time) + 0.1 * np.sin(2.1 * time)
+    m, I_z, a, b, C_f, C_r = 1420.0, 2124.0, 0.96, 1.59, 88e3, 127e3
+    turn = np.gradient(yaw_rate, time)
+    v_y, a_y = np.zeros_like(time), np.zeros_like(time)
+    for k in range(time.size):
+        # Moments about the front axle: L F_r = a m a_y - I dr/dt, and F_r = -C_r (v_y - b r) / v_x.
+        F_r = -C_r * (v_y[k] - b * yaw_rate[k]) / v_x[k]
+        a_y[k] = ((a + b) * F_r + I_z * turn[k]) / (a * m)
+        if k + 1 < time.size:
+            v_y[k + 1] = v_y[k] + 0.02 * (a_y[k] - v_x[k] * yaw_rate[k])
+    F_f = m * a_y - F_r_of(v_y, yaw_rate, v_x, b, C_r)
+    steer = F_f / C_f + (v_y + a * yaw_rate) / v_x
+    return {
+        "time": time, "steer": steer, "v_x": v_x, "a_x": np.gradient(v_x, time) - v_y * yaw_rate, "a_y": a_y, "yaw_rate": yaw_rate,
+        "v_y": v_y,
+    }  # fmt: skip
 
-    def calibrate(car, part, uses, progress):
-        return Calibration("sideslip", SimpleNamespace(model=estimators.sideslip.model(car)), (0.0, 4.0))
 
-    monkeypatch.setattr(sideslip, "calibrate", calibrate)
-    monkeypatch.setattr(sideslip, "fitted_parameters", lambda calibration: {"fitted": {}})
-    product, out = tmp_path / "fitted.toml", tmp_path / "figures"
-    arguments = ("fit", write_log(tmp_path, drive), "--vehicle", write_car(tmp_path), "-o", product, "--out", out)
-    result = run(*arguments)
+def F_r_of(v_y, yaw_rate, v_x, b, C_r):
+    return -C_r * (v_y - b * yaw_rate) / v_x
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A calibration of a log, the car beside it, its numbers and figures, made by one call of `fit`."""
+    folder = tmp_path_factory.mktemp("kept")
+    log, car = write_log(folder, with_steer()), write_car(folder)
+    more = ("--car-file", folder / "fitted.toml", "--json", folder / "fit.json", "--out", folder / "figures")
+    result = run("fit", log, "--vehicle", car, "-o", folder / "calibration.toml", *more)
     assert result.exit_code == 0, result.output
-    assert io.read_car(product).mass == 1420.0
-    assert (out / "force_curves.png").read_bytes().startswith(b"\x89PNG")
+    return folder
+
+
+def test_fit_writes_the_calibration_the_car_and_its_curves(kept):
+    found = estimators.read_calibration(kept / "calibration.toml")
+    assert found.spans == (estimators.Span(0.0, 29.98, "drive.csv"),)
+    assert read_json(kept / "fit.json")["calibrated_on"] == [{"start": 0.0, "end": 29.98, "log": "drive.csv"}]
+    fitted = io.read_car(kept / "fitted.toml")
+    assert fitted.mass == 1420.0
+    # The drive is the linear car's own.
+    np.testing.assert_allclose(fitted.rear_cornering_stiffness, 127e3, rtol=0.15)
+    np.testing.assert_allclose(fitted.front_cornering_stiffness, 88e3, rtol=0.15)
+    assert abs(fitted.steer_offset) < 1e-3
+    assert (kept / "figures" / "force_curves.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_calibration_that_was_kept_estimates_as_the_process_that_fitted_it(kept):
+    log, car = kept / "drive.csv", kept / "car.toml"
+    outputs = []
+    for name, more in (("a", ("--vehicle", car)), ("b", ("--calibration", kept / "calibration.toml"))):
+        outputs.append(kept / f"{name}.csv")
+        result = run("estimate", log, "-o", outputs[-1], "--truth", "v_y", *more)
+        assert result.exit_code == 0, result.output
+    assert "on drive.csv 0 to 29.98 s" in result.stdout
+    assert outputs[0].read_bytes() == outputs[1].read_bytes()
+
+
+def test_several_logs_go_into_a_folder_with_one_calibration(kept):
+    logs = [kept / "drive.csv", kept / "again.csv"]
+    logs[1].write_text(logs[0].read_text())
+    out = kept / "estimates"
+    result = run(
+        "estimate",
+        *logs,
+        "--calibration",
+        kept / "calibration.toml",
+        "-o",
+        out,
+        "--span",
+        "5:20",
+        "--json",
+        kept / "all.json",
+    )
+    assert result.exit_code == 0, result.output
+    first, second = (io.read_recording(out / name) for name in ("drive.parquet", "again.parquet"))
+    np.testing.assert_array_equal(first["sideslip"], second["sideslip"])
+    assert (float(first.time[0]), float(first.time[-1])) == (5.0, 19.98)
+    assert set(read_json(kept / "all.json")["logs"]) == {"drive.csv", "again.csv"}
+    again = run("estimate", *logs, "--calibration", kept / "calibration.toml", "-o", out)
+    assert "exists already" in error_line(again)
+    twice = run("estimate", logs[0], logs[0], "--calibration", kept / "calibration.toml", "-o", kept / "twice")
+    assert "two logs would be written to drive.parquet" in error_line(twice)
+
+
+def broken(kept, change):
+    path = kept / "broken.toml"
+    path.write_text(change((kept / "calibration.toml").read_text()))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text.replace('version = "0.1.0"', 'version = "7.2.0"'), "of another version than 0.1.0"),
+        (lambda text: text[: len(text) // 2], "broken.toml"),
+        (lambda text: text[: text.index("[covariance]")], "no covariance"),
+        (lambda text: text.replace('"sideslip"', '"mass_and_grade"', 1), "broken.toml"),
+        (lambda text: text.replace("grip", "gripp"), "broken.toml"),
+        (lambda text: text.replace("value = ", "value = 'x' #", 1), "must be a number"),
+    ],
+)
+def test_a_calibration_file_that_is_none_is_refused(kept, change, words):
+    result = run("estimate", kept / "drive.csv", "--calibration", broken(kept, change), "-o", kept / "never.csv")
+    assert words in error_line(result)
+    assert not (kept / "never.csv").exists()
+
+
+def test_a_calibration_of_another_car_and_options_that_contradict_it(kept, tmp_path):
+    other = write_car(tmp_path, CAR.replace("mass = 1420.0", "mass = 1421.0"))
+    start = ("estimate", kept / "drive.csv", "--calibration", kept / "calibration.toml", "-o", tmp_path / "e.csv")
+    line = error_line(run(*start, "--vehicle", other))
+    assert "is of another car: its mass is 1420.0, that of --vehicle 1421.0" in line
+    assert "leave --as-told out" in error_line(run(*start, "--as-told"))
+    assert "leave --calibrate out" in error_line(run(*start, "--calibrate", "0:25"))
+    assert "--vehicle is missing" in error_line(run("estimate", kept / "drive.csv", "-o", tmp_path / "e.csv"))
+    assert "lies outside the log" in error_line(run(*start, "--span", "100:200"))
+
+
+def test_a_log_that_check_finds_wrong_is_refused_unless_one_goes_on_anyway(kept, tmp_path):
+    table = with_steer()
+    table["a_y"] = -table["a_y"]
+    log = write_log(tmp_path, table)
+    start = ("estimate", log, "--calibration", kept / "calibration.toml", "-o", tmp_path / "e.csv")
+    result = run(*start)
+    line = error_line(result)
+    assert "wrong sign" in line and "--anyway" in line
+    assert not (tmp_path / "e.csv").exists()
+    assert run(*start, "--anyway").exit_code == 0
 
 
 @pytest.mark.studies

@@ -7,12 +7,14 @@ from types import ModuleType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import test_mass_and_grade
 import test_sideslip
 
-from jaxveh import InputError, Recording, estimators, filters, vehicles
+from jaxveh import InputError, Parameters, Recording, estimators, filters, fitting, vehicles
+from jaxveh._core.parameter import pick, put, resolve
 from jaxveh.estimators import kit
 from jaxveh.estimators.coarse_log import coarse
 
@@ -177,10 +179,10 @@ def test_a_file_a_vehicle_a_model_and_a_calibration_are_sources(name):
     one, case = estimator(name), case_of(name)
     log, model = case.log.rows(slice(0, SHORT)), one.model(case.car)
     expected = one.estimate(case.car, log)
-    told = estimators.Calibration(name, SimpleNamespace(model=model), (0.0, 1.0))
+    told = estimators.Calibration(name, SimpleNamespace(model=model), (estimators.Span(0.0, 1.0),))
     for source in (case.vehicle, model, told):
         same(one.estimate(source, log), expected)
-    other = estimators.Calibration("another", SimpleNamespace(model=model), (0.0, 1.0))
+    other = estimators.Calibration("another", SimpleNamespace(model=model), (estimators.Span(0.0, 1.0),))
     for call in (lambda: one.estimate(other, log), lambda: one.live(other)):
         with pytest.raises(InputError, match=f"{name}: the calibration is one of another: must be made by {name}"):
             call()
@@ -278,13 +280,63 @@ def test_a_span_that_is_too_short_is_refused(name):
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=FULL) if n in SLOW else n for n in CASES])
-def test_a_calibration_explains_its_span_better_and_says_what_it_fitted(name):
+def test_a_calibration_explains_its_span_better_says_what_it_fitted_and_can_be_kept(name, tmp_path):
     one, case, told = estimator(name), case_of(name), []
     found = one.calibrate(case.car, case.log, progress=lambda done, total, stage: told.append(done / total))
     assert isinstance(found, estimators.Calibration) and found.estimator == name
-    assert found.span == (float(case.log.time[0]), float(case.log.time[-1]))
+    assert found.spans == (estimators.Span(float(case.log.time[0]), float(case.log.time[-1])),)
     assert told and 0.0 <= min(told) <= max(told) <= 1.0
     for entry in found.summary().values():
         assert np.isfinite(entry["value"]) and entry["std"] > 0.0 and entry["unit"]
     likelihood = LIKELIHOODS.get(name, lambda source: one.estimate(source, case.log).log_likelihood)
     assert likelihood(found) > likelihood(case.car) + 1.0
+    path = tmp_path / "calibration.toml"
+    estimators.write_calibration(found.with_log_names('a "strange" name.csv'), path)
+    kept = estimators.read_calibration(path)
+    assert kept.spans == (found.spans[0]._replace(log='a "strange" name.csv'),)
+    assert kept.told == found.told
+    same(one.estimate(kept, case.log), one.estimate(found, case.log))
+    np.testing.assert_array_equal(np.tril(kept.fit.covariance), np.tril(found.fit.covariance))
+    np.testing.assert_array_equal(kept.fit.parameters_std.array(), found.fit.parameters_std.array())
+    assert (int(kept.fit.result), int(kept.fit.steps)) == (int(found.fit.result), int(found.fit.steps))
+    with pytest.raises(InputError, match="exists already"):
+        estimators.write_calibration(found, path)
+
+
+OPTIONS = {
+    "sideslip": {"a_y_delay": 0.21},
+    "mass_and_grade": {"a_x": 0.05, "grade_rate_walk": None, "input_path": "held"},
+}
+"""Of the models, other than their defaults."""
+
+
+@every
+def test_what_a_calibration_started_from_is_kept_options_included(name, tmp_path):
+    one, case = estimator(name), case_of(name)
+    start = one.model(case.car, **OPTIONS[name])
+    chosen = resolve(start, one.chosen_parameters)
+    values = [jnp.asarray(1.01 * value) for value in pick(start, chosen)]
+    z, by_name = jnp.stack(values), Parameters({p.name: v for p, v in zip(chosen, values, strict=True)})
+    spread = jnp.eye(len(z)) + 0.1
+    fit = fitting.Fit(by_name, by_name, z, spread, z[0], jnp.int32(3), jnp.int32(5), put(start, chosen, values), chosen)
+    told = kit.start_of(case.car, OPTIONS[name])
+    made = estimators.Calibration(name, fit, (estimators.Span(1.0, 2.0),), 0.05, ((None, 0.4), (0.05, 0.3)), told)
+    path = tmp_path / "calibration.toml"
+    estimators.write_calibration(made, path)
+    kept = estimators.read_calibration(path)
+    for a, b in zip(jax.tree.leaves(kept), jax.tree.leaves(made), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert (kept.told, kept.weight, kept.validation) == (made.told, made.weight, made.validation)
+    assert jax.tree.structure(kept.model) == jax.tree.structure(made.model)
+    for other in (kit.start_of(case.vehicle), kit.start_of(case.car, {"a_x": jnp.ones(())})):
+        with pytest.raises(InputError, match="did not start from a car's file"):
+            estimators.write_calibration(dataclasses.replace(made, told=other), tmp_path / "never.toml")
+
+
+@every
+def test_no_log_and_a_short_one_among_several_are_named(name):
+    one, case = estimator(name), case_of(name)
+    with pytest.raises(InputError, match="no log to calibrate on"):
+        one.calibrate(case.car, [])
+    with pytest.raises(InputError, match=f"{name}: calibration span 2 of"):
+        one.calibrate(case.car, [case.log, case.log.rows(slice(0, 50))])
