@@ -48,6 +48,12 @@ SPREADS = {"mass": 0.15, "yaw_inertia": 0.2, "cg": 0.1}
 STIFFNESS = (0.6, 1.6)
 """What a car's file says of an axle's cornering stiffness over the truth: even on the logarithm between these."""
 
+ROUGHNESS = (8e-6, 256e-6)
+"""m^3: the roads' unevenness is even on the logarithm between these: half of ISO 8608's class A, to class C."""
+
+SHORTEST_WAVE, WAVES = 1.0, 40
+"""m: of the unevenness, and how many waves make it; shorter ones shake wheels and tell an accelerometer nothing below 15 Hz."""
+
 BIASES = {"a_y": 0.3, "a_x": 0.3, "yaw_rate": np.radians(0.3), "steer": np.radians(0.5), "v_x": 0.005}
 """Standard deviations of constant sensor errors: m/s^2, rad/s, rad at the road wheels; of the speed's gain."""
 
@@ -91,13 +97,14 @@ class Run(NamedTuple):
 
 
 class FleetLog(NamedTuple):
-    """A `Log` of the fleet, and what nobody is told: the car's name, its drive, the road's friction and bank."""
+    """A `Log` of the fleet, and what nobody is told: the car's name, its drive, the road's friction, bank and roughness (m^3)."""
 
     log: Log
     car: str
     drive: str
     friction: float
     banked: bool
+    roughness: float
 
 
 def cars() -> dict[str, vehicles.CarNumbers]:
@@ -135,8 +142,9 @@ def fleet(runs: int, seed: int = 0, duration: float = 90.0) -> list[FleetLog]:
             continue
         # The reference is the truth where the file says that the centre of gravity is.
         name = f"fleet {i}: {car}, {drive}"
-        banked = bool(run.road.bank.std > 1e-6)
-        found.append(FleetLog(Log(name, told.file, kept), car, drive, float(run.road.friction), banked))
+        shape = run.road.grade
+        banked = bool(shape.bank.std > 1e-6)
+        found.append(FleetLog(Log(name, told.file, kept), car, drive, float(shape.friction), banked, told.roughness))
     return found
 
 
@@ -148,19 +156,22 @@ def _until_lost(recording: Recording) -> Recording | None:
 
 
 class Told(NamedTuple):
-    """A car's file, and by how much (m) its centre of gravity is ahead of the true one."""
+    """A car's file, by how much (m) its centre of gravity is ahead of the true one, and how rough its road is (m^3)."""
 
     file: io.CarSpecification
     cg_error: float
+    roughness: float
 
 
 def _draw(numbers: vehicles.CarNumbers, drive: Drive, rng: np.random.Generator, duration: float) -> tuple[Run, Told]:
     friction = rng.uniform(0.4, 1.0)
     key = jax.random.key(int(rng.integers(2**31)))
-    bank, speed, way, own = jax.random.split(key, 4)
+    bank, speed, way, own, uneven = jax.random.split(key, 5)
     car = vehicles.build(numbers, vehicles.FourteenDOF)
     bank_std = 0.04 if rng.random() < 0.5 else 1e-9
-    road = roads.RandomRoad(bank=roads.gauss_markov(bank_std, 60.0, bank), friction=friction)
+    shape = roads.RandomRoad(bank=roads.gauss_markov(bank_std, 60.0, bank), friction=friction)
+    roughness = float(np.exp(rng.uniform(*np.log(ROUGHNESS))))
+    road = roads.Combined(shape, shape, height=roads.rough(roughness, uneven, shortest=SHORTEST_WAVE, count=WAVES))
     grip = friction * min(numbers.front.friction, numbers.rear.friction)
     mean = drive.speed * np.sqrt(min(grip, 1.0)) * rng.uniform(0.85, 1.15)
     wanted = manoeuvres.wavering_speed(mean, 0.1 * mean, speed, time=15.0)
@@ -173,10 +184,10 @@ def _draw(numbers: vehicles.CarNumbers, drive: Drive, rng: np.random.Generator, 
         wheel_radius=numbers.wheel_radius,
     )
     biases = {name: std * rng.normal() for name, std in BIASES.items()}
-    return Run(car, road, driver, biases, own), _told(numbers, rng)
+    return Run(car, road, driver, biases, own), _told(numbers, rng, roughness)
 
 
-def _told(numbers: vehicles.CarNumbers, rng: np.random.Generator) -> Told:
+def _told(numbers: vehicles.CarNumbers, rng: np.random.Generator, roughness: float) -> Told:
     factor = lambda name: float(np.exp(SPREADS[name] * rng.normal()))
     stiffness = lambda tyre: 2.0 * tyre.cornering_stiffness * float(np.exp(rng.uniform(*np.log(STIFFNESS))))
     front_axle_to_cg = min(numbers.front_axle_to_cg * factor("cg"), 0.75 * numbers.wheelbase)
@@ -185,7 +196,7 @@ def _told(numbers: vehicles.CarNumbers, rng: np.random.Generator) -> Told:
         front_axle_to_cg=front_axle_to_cg, rear_axle_to_cg=numbers.wheelbase - front_axle_to_cg,
         front_cornering_stiffness=stiffness(numbers.front), rear_cornering_stiffness=stiffness(numbers.rear),
     )  # fmt: skip
-    return Told(file, numbers.front_axle_to_cg - front_axle_to_cg)
+    return Told(file, numbers.front_axle_to_cg - front_axle_to_cg, roughness)
 
 
 SEEN = ("v_x", "v_y", "yaw_rate", "a_x", "a_y", "a_z", "yaw_acceleration", "steer", "grade", "bank")

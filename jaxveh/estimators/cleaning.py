@@ -30,7 +30,7 @@ YAW_RATE_STEP, YAW_ACCELERATION = 0.15, 25.0
 """rad/s, and rad/s^2, of a car of the usual wheelbase: a sample further from the last good one than noise and the quickest car
 can be is a spike."""
 
-OUTLYING = 8.0
+OUTLYING = 20.0
 """A spike is also further away than this many times the mean change from row to row: some channels are nothing but noise."""
 
 MEMORY = 1.0
@@ -188,7 +188,9 @@ def _good(rows: tuple, quick) -> tuple[Any, Any]:
     def start(value):
         there = jnp.isfinite(value)
         first = value[jnp.argmax(there)]
-        return Watched(first, rows[0][jnp.argmax(there)], first, rows[0][0], 0.0 * first)
+        # Its usual change is known beforehand here.
+        usual = jnp.nan_to_num(jnp.nanmedian(jnp.abs(jnp.diff(value))))
+        return Watched(first, rows[0][jnp.argmax(there)], first, rows[0][0], usual)
 
     def body(before, row):
         t, v_x, yaw_rate, a_y = row

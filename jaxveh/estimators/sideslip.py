@@ -80,6 +80,8 @@ def calibrate(
     priors come from the car's file and `rear_axle_prior.SPREADS`, and nothing outside the recordings is looked at. `validation`
     of what is returned is the sideslip RMSE in degrees on the second halves by the reference's weight (rad), fitted on the first.
 
+    An a_y that comes late by what the fitted car makes of the yaw rate is shifted, and the car fitted again (`alignment`).
+
     **Raises** `InputError` for missing channels, a_y among them, or a span shorter than `SHORTEST`; `FilterError` where the fit
     fails.
     """
@@ -90,8 +92,15 @@ def calibrate(
     recordings, spans = spans_of(NAME, recording, SHORTEST, "corners")
     for one in recordings:
         _check_measured(one, uses)
-    options = _late(car, recordings)
-    filter, start = filter or Extended(), model(car, **options)
+    fit = lambda **options: _fit(car, recordings, spans, filter or Extended(), uses, progress, options)
+    found = fit()
+    late = a_y_delay(fitted_car(found, car), recordings) if isinstance(car, CarSpecification) else 0.0
+    return fit(a_y_delay=late) if late else found
+
+
+def _fit(car, recordings, spans, filter, uses, progress, options) -> Calibration:
+    """What `calibrate` returns, with options of `model`."""
+    start = model(car, **options)
     seen = [shift_a_y(_seen(one, uses), float(start.system.a_y_delay)) for one in recordings]
     logs = coarse_logs(seen, _wheelbase(start))
     if not uses:
@@ -108,12 +117,6 @@ def calibrate(
     weight = min(validation, key=lambda one: one[1])[0]
     fit = fit_rear_axle(filter, start, logs, _reference(logs, weight), _part(progress, count - 1, count))
     return Calibration(NAME, fit, spans, weight, validation, start_of(car, options))
-
-
-def _late(car: CarSpecification | RearAxle, recordings: Sequence[Recording]) -> dict[str, float]:
-    """The option of `model` that a delay of a_y needs: of a car's file it is looked for, a `RearAxle` has its own."""
-    delay = a_y_delay(car, recordings) if isinstance(car, CarSpecification) else 0.0
-    return {"a_y_delay": delay} if delay else {}
 
 
 def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
@@ -220,12 +223,11 @@ def estimate(
     estimate by a calibration allow for what the calibration does not know (`parameter_bands`); others do not. **Raises** as
     `run` and `clean` do.
 
-    An accelerometer that is late by more than a wrong stiffness could explain is shifted, where every row is estimated from all;
-    what is said live must do with it.
+    An accelerometer that a calibration found to be late is shifted, where every row is estimated from all; what is said live must
+    do with it.
     """
     check_needs(NAME, needs, recording)
-    late = _late(source, [recording]) if isinstance(source, CarSpecification) and smoothed else {}
-    one = model_of(NAME, source, lambda car: model(car, **late))
+    one = model_of(NAME, source, model)
     if smoothed:
         recording = shift_a_y(recording, float(one.system.a_y_delay))
     used, log = filter or Extended(), clean(recording, RearAxleCleaning(_wheelbase(one)))

@@ -7,12 +7,14 @@ from jaxveh.roads.ground import LEVEL, Ground, under
 from jaxveh.roads.named import ROADS, NamedRoad, from_specification, named_road
 from jaxveh.roads.profile import INTERPOLATIONS, Profile
 from jaxveh.roads.random_road import RandomRoad, Variation, band, gauss_markov
+from jaxveh.roads.rough import ROUGHNESS, Rough, rough
 from jaxveh.roads.slopes import Banked, Hill
 
 __all__ = [
     "INTERPOLATIONS",
     "LEVEL",
     "ROADS",
+    "ROUGHNESS",
     "AbstractRoad",
     "Banked",
     "Combined",
@@ -23,6 +25,7 @@ __all__ = [
     "NamedRoad",
     "Profile",
     "RandomRoad",
+    "Rough",
     "SplitMu",
     "Surface",
     "Variation",
@@ -30,5 +33,6 @@ __all__ = [
     "from_specification",
     "gauss_markov",
     "named_road",
+    "rough",
     "under",
 ]

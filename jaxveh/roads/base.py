@@ -18,11 +18,13 @@ class Surface(NamedTuple):
     - `friction` (-): over that of the road on which the tyres' parameters hold.
     - `grade` (rad): positive uphill along the road; its tangent is the slope dz/ds.
     - `bank` (rad): positive where the left side is higher; its tangent is the slope dz/dy.
+    - `height` (m): of the unevenness over the plane that grade and bank tilt; wheels on springs feel it, it tilts nothing.
     """
 
     friction: Any
     grade: Any
     bank: Any
+    height: Any = 0.0
 
 
 class AbstractRoad(eqx.Module):
@@ -51,9 +53,11 @@ def place(s: Any, y: Any, like: jax.Array) -> tuple[jax.Array, jax.Array]:
     return jnp.asarray(s, dtype), jnp.asarray(y, dtype)
 
 
-def surface(s: jax.Array, y: jax.Array, friction: Any, grade: Any = None, bank: Any = None) -> Surface:
-    """A surface whose fields all have one shape; a slope that is not given is zero."""
+def surface(
+    s: jax.Array, y: jax.Array, friction: Any, grade: Any = None, bank: Any = None, height: Any = None
+) -> Surface:
+    """A surface whose fields all have one shape; a slope or a height that is not given is zero."""
     zero = jnp.zeros_like(s)
-    values = [friction, zero if grade is None else grade, zero if bank is None else bank]
+    values = [friction, *[zero if value is None else value for value in (grade, bank, height)]]
     shape = jnp.broadcast_shapes(*[jnp.shape(value) for value in (s, y, *values)])
     return Surface(*[jnp.broadcast_to(value, shape) for value in values])

@@ -1,4 +1,4 @@
-"""The friction of one road on the shape of another."""
+"""The friction of one road on the shape of another, and the unevenness of a third."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from jaxveh.roads.base import AbstractRoad, Surface
 
 
 class Combined(AbstractRoad):
-    """A road with the `friction` of one road, the `grade` of another and the `bank` of a third (None: of the second).
+    """A road with the `friction` of one road, the `grade` of another, the `bank` of a third and the `height` of a fourth (None:
+    of the second).
 
     **Raises** `InputError` for a part that is no road.
     """
@@ -19,14 +20,16 @@ class Combined(AbstractRoad):
     friction: AbstractRoad
     grade: AbstractRoad
     bank: AbstractRoad | None = None
+    height: AbstractRoad | None = None
 
     def __check_init__(self):
-        for name in ("friction", "grade", "bank"):
+        for name in ("friction", "grade", "bank", "height"):
             road = getattr(self, name)
-            if not isinstance(road, AbstractRoad) and not (name == "bank" and road is None):
+            if not isinstance(road, AbstractRoad) and not (name in ("bank", "height") and road is None):
                 raise InputError(f"Combined.{name} = {type(road).__name__}: must be a road of jaxveh.roads.")
 
     def at(self, s: Any, y: Any = 0.0) -> Surface:
         friction, shape = self.friction.at(s, y).friction, self.grade.at(s, y)
         bank = shape.bank if self.bank is None else self.bank.at(s, y).bank
-        return Surface(*jnp.broadcast_arrays(friction, shape.grade, bank))
+        height = shape.height if self.height is None else self.height.at(s, y).height
+        return Surface(*jnp.broadcast_arrays(friction, shape.grade, bank, height))

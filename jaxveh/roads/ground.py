@@ -19,6 +19,8 @@ class Ground(NamedTuple):
       parameters hold; front left, front right, rear left, rear right.
     - `grade` (rad): positive uphill in the direction in which the car points.
     - `bank` (rad): positive where the car's left side is higher.
+    - `height_fl`, `height_fr`, `height_rl`, `height_rr` (m): of the road's unevenness under each wheel. Cars whose wheels are
+      not sprung know nothing of it.
     """
 
     friction_fl: Any = 1.0
@@ -27,6 +29,10 @@ class Ground(NamedTuple):
     friction_rr: Any = 1.0
     grade: Any = 0.0
     bank: Any = 0.0
+    height_fl: Any = 0.0
+    height_fr: Any = 0.0
+    height_rl: Any = 0.0
+    height_rr: Any = 0.0
 
 
 LEVEL = Ground()
@@ -37,7 +43,7 @@ def under(road: AbstractRoad, x: Any, y: Any, yaw: Any, wheels: Sequence[tuple[A
     """The ground under a car at the world's `x`, `y` (m) that points along `yaw` (rad, left of the road's direction).
 
     `wheels`: the wheels' positions in the body, (forward, left) of the centre of gravity in m, in the order front left,
-    front right, rear left, rear right. Friction is looked up under each wheel, slopes under the centre of gravity:
+    front right, rear left, rear right. Friction and height are looked up under each wheel, slopes under the centre of gravity:
 
         tan(grade_car) =  tan(grade) cos(yaw) + tan(bank) sin(yaw)
         tan(bank_car)  = -tan(grade) sin(yaw) + tan(bank) cos(yaw)
@@ -47,12 +53,12 @@ def under(road: AbstractRoad, x: Any, y: Any, yaw: Any, wheels: Sequence[tuple[A
     if len(wheels) != 4:
         raise InputError(f"wheels: {len(wheels)} positions; there must be 4 (front left, front right, rear left, ...).")
     cosine, sine = numerics.cos(yaw), numerics.sin(yaw)
-    friction = [
-        road.at(x + forward * cosine - left * sine, y + forward * sine + left * cosine).friction
-        for forward, left in wheels
+    stands = [
+        road.at(x + forward * cosine - left * sine, y + forward * sine + left * cosine) for forward, left in wheels
     ]
     here = road.at(x, y)
     along, across = numerics.tan(here.grade), numerics.tan(here.bank)
     grade = numerics.arctan(along * cosine + across * sine)
     bank = numerics.arctan(across * cosine - along * sine)
-    return Ground(*jnp.broadcast_arrays(*friction, grade, bank))
+    friction, height = [at.friction for at in stands], [at.height for at in stands]
+    return Ground(*jnp.broadcast_arrays(*friction, grade, bank, *height))

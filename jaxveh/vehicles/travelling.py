@@ -42,7 +42,8 @@ class Travelling(AbstractVehicle):
     @property
     def units(self):
         own = {**dict.fromkeys(PLACE, "m"), **dict.fromkeys(("grade", "bank"), "rad")}
-        return own | {f: "-" for f in Ground._fields if f.startswith("friction")} | self.vehicle.units
+        of_wheels = {f: "-" if f.startswith("friction") else "m" for f in Ground._fields if f not in own}
+        return own | of_wheels | self.vehicle.units
 
     @property
     def wheel_positions(self):

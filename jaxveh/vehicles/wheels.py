@@ -64,6 +64,11 @@ def frictions(ground: Ground) -> Wheels:
     return wheels_of(ground, "friction")
 
 
+def heights(ground: Ground) -> Wheels:
+    """The height of the road's unevenness under each wheel, m."""
+    return wheels_of(ground, "height")
+
+
 def gravity(ground: Ground) -> tuple[Any, Any, Any]:
     """Acceleration of free fall along the car's x, y and z in the road's plane, m/s^2: (0, 0, -g) on a level road.
 

@@ -180,8 +180,8 @@ def with_steer(seconds=30.0):
     F_f = m * a_y - F_r_of(v_y, yaw_rate, v_x, b, C_r)
     steer = F_f / C_f + (v_y + a * yaw_rate) / v_x
     return {
-        "time": time, "steer": steer, "v_x": v_x, "a_x": np.gradient(v_x, time) - v_y * yaw_rate, "a_y": a_y, "yaw_rate": yaw_rate,
-        "v_y": v_y,
+        "time": time, "steer": steer, "v_x": v_x, "a_x": np.gradient(v_x, time) - v_y * yaw_rate, "a_y": a_y,
+        "yaw_rate": yaw_rate, "v_y": v_y,
     }  # fmt: skip
 
 

@@ -45,6 +45,7 @@ ROADS = {
         along=True,
         smooth=2,
     ),
+    "Rough": Line(lambda: roads.rough("D", KEY, shortest=5.0, count=20), along=True, across=True, smooth=2),
     "SplitMu": Line(lambda: roads.SplitMu(1.0, 0.3, 0.4), across=True, smooth=2),
     **{f"named {name}": Line(entry.make, along=None, across=None) for name, entry in roads.ROADS.items()},
 }  # fmt: skip
@@ -99,8 +100,8 @@ def test_scalars_arrays_jit_and_vmap_agree(road):
     np.testing.assert_allclose(mapped, whole, rtol=1e-11, atol=1e-13)
     # As many as above, so that no operation is compiled anew.
     same = np.asarray(stacked(road, np.full(86, 30.0), np.full(86, 0.5)))
-    np.testing.assert_allclose(np.broadcast_to(stacked(road, 30.0, 0.5), (86, 3)).T, same, rtol=1e-12)
-    assert jax.eval_shape(stacked, road, S[:, None], Y[:3]).shape == (3, 86, 3)
+    np.testing.assert_allclose(np.broadcast_to(stacked(road, 30.0, 0.5), (86, 4)).T, same, rtol=1e-12)
+    assert jax.eval_shape(stacked, road, S[:, None], Y[:3]).shape == (4, 86, 3)
 
 
 def test_roads_in_a_batch(road):
@@ -132,7 +133,7 @@ def test_derivatives_are_finite_and_continuous_as_stated(line, road):
 def test_parameters_have_the_gradients_of_differences(road):
     leaves, rest = eqx.partition(road, eqx.is_inexact_array)
     leaves, treedef = jax.tree.flatten(leaves)
-    weights = np.array([1.0, 10.0, 7.0])
+    weights = np.array([1.0, 10.0, 7.0, 20.0])
 
     # Values and gradients by one program.
     @jax.jit

@@ -94,7 +94,7 @@ def test_roads_by_name_and_from_a_file(tmp_path):
     spec = io.RoadSpecification((0.0, 50.0), (1.0, 0.5), 0.05, interpolation="linear")
     io.write_road(spec, tmp_path / "r.toml")
     surface = roads.named_road(tmp_path / "r.toml").at(25.0)
-    np.testing.assert_allclose(np.stack(surface), [0.75, 0.05, 0.0])
+    np.testing.assert_allclose(np.stack(surface), [0.75, 0.05, 0.0, 0.0])
     np.testing.assert_allclose(roads.from_specification(io.RoadSpecification(friction=0.4)).at(-9.0).friction, 0.4)
 
 

@@ -32,6 +32,7 @@ from jaxveh.vehicles.wheels import (
     each_wheel,
     frictions,
     gravity,
+    heights,
     sum_of_wheels,
     travel_direction,
     wheel_names,
@@ -57,7 +58,9 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
       It rolls with the unloaded radius less a third of the compression, which is also the arm of its longitudinal force
       about the axle: with the smaller loaded radius tyres would make energy. M_x, M_y, M_z of the tyre count; that of
       rolling resistance reverses its sign with the direction of travel, and `rolling_resistance` comes on top.
-    - The road is the plane of x and y; slopes tilt gravity. The air's drag acts on the sprung mass' centre of gravity.
+    - The road is the plane of x and y, over which a road's `height` lifts each tyre's contact point as it is: it tilts no force,
+      and the tyre's damping does not feel how fast it changes. Slopes tilt gravity. The air's drag acts on the sprung mass'
+      centre of gravity.
 
     Speeds, place and accelerations are those of the *sprung mass'* centre of gravity, in the intermediate axes (x, y in the
     road's plane); `a_x`, `a_y`, `a_z` are what an ideal accelerometer there says in these axes (a_z = g at rest). Springs
@@ -169,8 +172,8 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         )  # fmt: skip
         turned = axles(self, u.steer)
         both = each_wheel(
-            lambda wheel, axis, omega, mu: touch(self, body, wheel, axis, omega, mu),
-            wheels, turned, wheels_of(x, "omega"), frictions(ground),
+            lambda wheel, axis, omega, mu, road: touch(self, body, wheel, axis, omega, mu, road),
+            wheels, turned, wheels_of(x, "omega"), frictions(ground), heights(ground),
         )  # fmt: skip
         return Stand(body, wheels, turned, Wheels(*[b[0] for b in both]), Wheels(*[b[1] for b in both]))
 

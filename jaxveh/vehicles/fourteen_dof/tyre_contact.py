@@ -58,15 +58,15 @@ class Touch(NamedTuple):
 
 
 def touch(
-    car: AbstractSuspendedTwoTrack, body: Body, wheel: Wheel, axis: Vector, omega: Any, friction: Any
+    car: AbstractSuspendedTwoTrack, body: Body, wheel: Wheel, axis: Vector, omega: Any, friction: Any, road: Any
 ) -> tuple[Contact, Touch]:
-    """The contact of a wheel that spins with `omega` (rad/s) about `axis` (body's axes).
+    """The contact of a wheel that spins with `omega` (rad/s) about `axis` (body's axes), where the road is `road` m high.
 
     The contact point lies below the centre in the wheel's plane (ISO 8855; H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed.,
     sec. 2.2), its speed is that of the wheel's material there. The tyre is compressed along the wheel's plane, so that the
     load, along the road's normal, is by 1 / cos(camber) larger: the potential of the compression then makes it.
     """
-    height = body.height + dot(body.axes.up, wheel.place)
+    height = body.height + dot(body.axes.up, wheel.place) - road
     speed, turns, axis = (to_road(body.axes, a) for a in (wheel.velocity, body.omega, axis))
     flat = numerics.hypot(axis.x, axis.y)  # the camber's cosine
     cosine, sine = axis.y / flat, -axis.x / flat
