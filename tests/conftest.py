@@ -91,6 +91,13 @@ def pytest_xdist_make_scheduler(config, log):
     return LoadPrograms(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config):
+    """A worker that has told its results ends at once: taking its programs apart one by one would take many seconds more."""
+    if hasattr(config, "workerinput"):
+        os._exit(0)
+
+
 def program_of(case):
     """`Kalman` of `test_some_property[Kalman-straight]`."""
     return case.partition("[")[2].rstrip("]").removesuffix("-straight").removesuffix("-swinging")

@@ -2,6 +2,7 @@
 
 import ast
 import builtins
+import functools
 import pathlib
 import re
 
@@ -41,8 +42,14 @@ def known(trees):
     return found
 
 
-TREES = {path: ast.parse(path.read_text()) for path in ROOT.rglob("*.py")}
-EVERYWHERE = known(TREES.values()) | {path.stem for path in TREES}
+@functools.cache
+def trees():
+    return {path: ast.parse(path.read_text()) for path in ROOT.rglob("*.py")}
+
+
+@functools.cache
+def everywhere():
+    return known(trees().values()) | {path.stem for path in trees()}
 
 
 def named(tree):
@@ -58,15 +65,15 @@ def exists(name, own):
     if name.startswith(("jax.", "diffrax.", "prefix_")) or name in FILES or re.search(r"_(fl|fr|rl|rr)?$", last):
         return True
     # A constant is looked for where a reader would: in the room, unless the name says of which module it is.
-    return last in (own if last.isupper() and len(last) > 3 and "." not in name else EVERYWHERE)
+    return last in (own if last.isupper() and len(last) > 3 and "." not in name else everywhere())
 
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_names_in_backticks_exist(room):
-    own = known(tree for path, tree in TREES.items() if path.relative_to(ROOT).parts[0] == room)
+    own = known(tree for path, tree in trees().items() if path.relative_to(ROOT).parts[0] == room)
     lost = [
         f"{path.relative_to(ROOT)}:{line}: {name}"
-        for path, tree in TREES.items()
+        for path, tree in trees().items()
         if path.relative_to(ROOT).parts[0] == room
         for line, name in named(tree)
         if not exists(name, own)

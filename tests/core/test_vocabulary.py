@@ -7,7 +7,7 @@ import json
 import re
 
 import pytest
-from test_names_in_docstrings import EVERYWHERE, ROOMS, ROOT, TREES, exists
+from test_names_in_docstrings import ROOMS, ROOT, everywhere, exists, trees
 
 TOP = ROOT.parent
 IRREGULAR = {
@@ -76,7 +76,7 @@ def test_no_function_is_named_by_a_bare_participle(room):
     public = {name for one in modules for name in getattr(one, "__all__", ()) if inspect.isroutine(getattr(one, name))}
     public |= {
         function.name
-        for path, tree in TREES.items()
+        for path, tree in trees().items()
         if path.relative_to(ROOT).parts[0] == room
         for function in functions(tree)
         if not function.name.startswith("_")
@@ -90,7 +90,7 @@ def cells(path):
 
 
 def texts():
-    for path in (*TREES, TOP / "README.md", TOP / "CONTRIBUTING.md", *(TOP / "notebooks").glob("*.md")):
+    for path in (*trees(), TOP / "README.md", TOP / "CONTRIBUTING.md", *(TOP / "notebooks").glob("*.md")):
         yield path, path.read_text()
     for path in (TOP / "notebooks").glob("*.ipynb"):
         yield path, cells(path)
@@ -118,4 +118,4 @@ def test_names_in_backticks_of_a_page_exist(page):
     prose = re.sub(r"```.*?```", "", (TOP / page).read_text(), flags=re.DOTALL)
     names = re.findall(r"`([A-Za-z_][\w.]+)(?:\(|`)", prose)
     files = {path.name for path in TOP.iterdir()} | set(ELSEWHERE)
-    assert not sorted({name for name in names if name not in files and not exists(name, EVERYWHERE)})
+    assert not sorted({name for name in names if name not in files and not exists(name, everywhere())})
