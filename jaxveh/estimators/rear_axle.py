@@ -48,9 +48,9 @@ LONGEST_STEP, LOST = 1.0, 3.0
 
 
 class RearAxleState(NamedTuple):
-    """Lateral velocity `v_y` (m/s) of the centre of gravity; `bank` of the road and `slip_error` of the curve, in units of the
-    standard deviations that `RearAxle` has for them; `stiffening`, the logarithm of the axle's stiffness over the calibrated
-    one."""
+    """Lateral velocity `v_y` (m/s) where the accelerometer sits; `bank` of the road and `slip_error` of the curve, in units of
+    the standard deviations that `RearAxle` has for them; `stiffening`, the logarithm of the axle's stiffness over the
+    calibrated one."""
 
     v_y: Any
     bank: Any
@@ -59,9 +59,9 @@ class RearAxleState(NamedTuple):
 
 
 class RearAxleReport(NamedTuple):
-    """What an Estimate shows: `v_y` (m/s), `sideslip`, `slip_angle_rear` (rad), lateral forces of the axles (N), `bank` of the
-    road (rad, positive where the left side is higher), `slip_error` (rad) of the curve, `stiffness_rear` (N/rad);
-    `reference_sideslip` (rad): what a reference turned by `heading_offset` would say."""
+    """What an Estimate shows: `v_y` (m/s) and `sideslip` (rad) of the centre of gravity, `slip_angle_rear` (rad), lateral
+    forces of the axles (N), `bank` of the road (rad, positive where the left side is higher), `slip_error` (rad) of the curve,
+    `stiffness_rear` (N/rad); `reference_sideslip` (rad): what a reference turned by `heading_offset` would say."""
 
     v_y: Any
     sideslip: Any
@@ -82,6 +82,7 @@ class RearAxle(eqx.Module):
       the curve bends, `F / load = stiffness a / (1 + |stiffness a / grip|^shape)^(1 / shape)`, whose inverse has a closed form.
     - `asymmetry` (-): grip lost in left turns and gained in right ones.
     - `yaw_rate_offset` (rad/s), `a_y_gain` (-; roll makes it larger than one), `a_y_offset` (m/s^2): of the sensors.
+    - `sensor_x`, `sensor_y` (m): where the accelerometer sits, forward and left of the centre of gravity.
     - `a_y_delay` (s): by which a log's accelerometer is late; moves no state, is taken out before.
     - `drag` (N/(m/s)^2), `front_drive`, `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`, driving and braking
       by the front axle's shares, `ellipse` (-): how much of it counts, `sqrt(1 - (ellipse F_x / (grip load))^2)`.
@@ -105,6 +106,8 @@ class RearAxle(eqx.Module):
     yaw_rate_offset: jax.Array = parameter("rad/s", scale=0.005, default=0.0)
     a_y_gain: jax.Array = positive("-", default=1.03)
     a_y_offset: jax.Array = parameter("m/s^2", scale=0.2, default=0.0)
+    sensor_x: jax.Array = parameter("m", default=0.0)
+    sensor_y: jax.Array = parameter("m", default=0.0)
     a_y_delay: jax.Array = parameter("s", default=0.0)
     drag: jax.Array = positive("N s^2/m^2", default=0.45)
     front_drive: jax.Array = parameter("-", scale=0.1, default=0.0)
@@ -126,7 +129,8 @@ class RearAxle(eqx.Module):
     def shares(self, u) -> tuple[Any, Any]:
         """Lateral force over load of the front axle and of the rear, as the sensors tell: ISO 8855 signs."""
         a, b = self.front_axle_to_cg, self.rear_axle_to_cg
-        a_y, moment = self.specific_force(u.a_y_smooth), self.yaw_inertia * u.yaw_acceleration
+        moment = self.yaw_inertia * u.yaw_acceleration
+        a_y = self.specific_force(u.a_y_smooth, u.yaw_rate_smooth) - self.sensor_x * u.yaw_acceleration
         front, rear = self.loads(u)
         F_yf, F_yr = (b * self.mass * a_y + moment) / self.wheelbase, (a * self.mass * a_y - moment) / self.wheelbase
         return F_yf / front, F_yr / rear
@@ -140,9 +144,13 @@ class RearAxle(eqx.Module):
             per_length * (GRAVITY * self.front_axle_to_cg + moved),
         )
 
-    def specific_force(self, a_y) -> Any:
-        """Lateral force over mass, m/s^2, of what the accelerometer says."""
-        return (a_y - self.a_y_offset) / self.a_y_gain
+    def specific_force(self, a_y, yaw_rate) -> Any:
+        """Lateral force over mass that there is below or beside the accelerometer, m/s^2, of what it says."""
+        return (a_y - self.a_y_offset) / self.a_y_gain + self.sensor_y * yaw_rate**2
+
+    def rolls(self, yaw_rate) -> Any:
+        """v_y of the accelerometer where the rear axle rolls where it points, m/s."""
+        return (self.rear_axle_to_cg + self.sensor_x) * (yaw_rate - self.yaw_rate_offset)
 
     def left_for_turning(self, u) -> Any:
         """The share of the rear axle's lateral grip that the longitudinal force leaves."""
@@ -175,9 +183,9 @@ def transition(system: RearAxle, t0, t1, x: RearAxleState, u) -> RearAxleState:
     """Acceleration is integrated. Where it is not known, the car goes as a steady turn's force wants it, and below the speed of
     `rolling_below` it rolls where its rear axle goes."""
     dt = t1 - t0
-    felt = system.specific_force(u.a_y) - (u.turning - u.v_x * system.yaw_rate_offset)
+    felt = system.specific_force(u.a_y, u.yaw_rate) - (u.turning - u.v_x * system.yaw_rate_offset)
     moving = x.v_y + dt * (felt - GRAVITY * system.bank * x.bank)
-    rolling = system.rear_axle_to_cg * (u.yaw_rate - system.yaw_rate_offset) + 0.0 * x.v_y
+    rolling = system.rolls(u.yaw_rate) + 0.0 * x.v_y
     steady = rolling - u.v_x * (numerics.tan(system.slip_angle(x, u)[0]) + system.slip_error * x.slip_error)
     fade = lambda time: jnp.exp(-dt / time)
     v_y = jnp.where((u.felt > 0) & (dt < LONGEST_STEP), moving, steady)
@@ -207,8 +215,7 @@ def observation(system: RearAxle, t, x: RearAxleState, u):
     """The balance of slip angles; behind the low-pass it is that of `u.lag` seconds ago, and what v_y did since is added."""
     del t
     angle, _ = system.slip_angle(x, u)
-    yaw_rate = u.yaw_rate_smooth - system.yaw_rate_offset
-    then = system.rear_axle_to_cg * yaw_rate - u.v_x * numerics.tan(angle)
+    then = system.rolls(u.yaw_rate_smooth) - u.v_x * numerics.tan(angle)
     steady = system.a_y_offset / system.a_y_gain - u.v_x * system.yaw_rate_offset + GRAVITY * system.bank * x.bank
     since = u.a_y_lead / system.a_y_gain - u.turning_lead - u.lag * steady
     return record_type("Measurements", (CHANNEL,))(then + since - x.v_y - u.v_x * system.slip_error * x.slip_error)
@@ -227,12 +234,14 @@ def report(system: RearAxle, t, x: RearAxleState, u) -> RearAxleReport:
     """The quantities that an Estimate shows."""
     del t
     like = jnp.zeros_like(x.v_y)
-    sideslip = numerics.arctan2(x.v_y, u.v_x + like)
+    yaw_rate = u.yaw_rate - system.yaw_rate_offset
+    v_y = x.v_y - system.sensor_x * yaw_rate
+    sideslip = numerics.arctan2(v_y, u.v_x + like)
     front, rear = system.loads(u)
     F_f, F_r = system.shares(u)
-    at_rear = x.v_y - system.rear_axle_to_cg * (u.yaw_rate - system.yaw_rate_offset)
+    at_rear = v_y - system.rear_axle_to_cg * yaw_rate
     return RearAxleReport(
-        v_y=x.v_y,
+        v_y=v_y,
         sideslip=sideslip,
         slip_angle_rear=-numerics.arctan2(at_rear, u.v_x + like),
         F_yf=F_f * front + like,

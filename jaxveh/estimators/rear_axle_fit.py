@@ -15,7 +15,8 @@ import numpy as np
 from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.rear_axle_prior import SPREADS, chosen_parameters
+from jaxveh.estimators.rear_axle_prior import SPREADS, STOOD, chosen_parameters
+from jaxveh.estimators.standing import Offsets
 from jaxveh.filters import AbstractFilter
 from jaxveh.fitting import Fit, Target, pose_prediction_error, solve
 from jaxveh.statespace import StateSpace
@@ -26,9 +27,9 @@ STEPS, TOLERANCE = 60, 0.02
 SLIDING = ({"grip": 1.02, "slip_error": 3.0, "stiffening": 10.0}, {"grip": 0.77, "slip_error": 5.0, "stiffening": 30.0})
 """Where further searches start: the grip over the largest force in use, and slow errors over their usual ones."""
 
-OVERCONFIDENCE = 4.0
-"""By this the likelihood's information is divided: balances of neighbouring rows are alike, and count as if each were news. On
-a road car's log the scores of pieces scattered 3.4 times as much as their information said."""
+OVERCONFIDENCE = 8.0
+"""By this the likelihood's information is divided: balances of neighbouring rows are alike, and count as if each were news.
+Chosen with `parameter_bands.WIDER`, see there."""
 
 TARGET_BEND = 0.0035
 """rad: errors beyond it count less than by their square (INS alignment, tyres that warm up)."""
@@ -48,11 +49,13 @@ def fit_rear_axle(
     logs: Sequence[Recording],
     reference: Reference | None,
     progress: Progress = silent,
+    offsets: Offsets | None = None,
 ) -> Fit:
     """Maximise the posterior of the parameters that `chosen_parameters` picks, given `coarse_logs` of one car.
 
     A log of a car that slides has two explanations: tyres that end at its largest forces, or a road that leans with it. The
-    search begins at both, and the better end is taken.
+    search begins at both, and the better end is taken. `offsets` of the sensors, told by a car that stood, take the place of
+    the prior's nothing.
 
     Where the search runs out of steps a `JaxvehWarning` says so. **Raises** `InputError` for a log of which nothing is measured
     at speed, `FilterError` where the likelihood cannot be had.
@@ -68,7 +71,12 @@ def fit_rear_axle(
     nothing = [jnp.full(len(log), jnp.nan) for log in logs]
     values, weight = (nothing, 1.0) if reference is None else reference
     target = Target("reference_sideslip", values, weight, TARGET_BEND)
-    problem = pose_prediction_error(filter, model, logs, chosen_parameters, prior=SPREADS, target=target)
+    if offsets is not None:
+        at = lambda m: (m.system.yaw_rate_offset, m.system.a_y_offset)
+        model = eqx.tree_at(at, model, [jnp.full_like(old, new) for old, new in zip(at(model), offsets, strict=True)])
+    problem = pose_prediction_error(
+        filter, model, logs, chosen_parameters, prior=SPREADS if offsets is None else SPREADS | STOOD, target=target
+    )
     # The largest of them that is no single peak.
     starts = _starts(problem, model, max(float(np.quantile(forces, 0.99)), 1e-3))
     found = []

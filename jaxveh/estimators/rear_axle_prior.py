@@ -24,6 +24,10 @@ SPREADS = {
 """Relative standard deviations by name, on each parameter's own line (unbounded ones in units of their declared scale). Those of
 stiffness and inertia are what car files are worth; those of the noises say little."""
 
+STOOD = {"yaw_rate_offset": 0.1, "a_y_offset": 0.7}
+"""The same of a car that stood (in units of the offsets' scales): gyroscopes hardly drift within a log; roads are banked
+where cars stand, by some 0.015 rad, which an accelerometer cannot tell from its offset."""
+
 
 def chosen_parameters(model: Any):
     """The parameters and noise levels that a calibration fits."""
@@ -53,8 +57,9 @@ def rear_axle(car: CarSpecification) -> RearAxle:
         )
     told = {"drag": car.drag, "front_drive": car.front_drive, "brake_share": car.front_brake}
     usual = {"drag": 0.45 * size**2}
+    sensor_x, sensor_y, _ = car.sensor_position or (0.0, 0.0, 0.0)
     return RearAxle(
-        mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=a, rear_axle_to_cg=b,
+        sensor_x=sensor_x, sensor_y=sensor_y, mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=a, rear_axle_to_cg=b,
         cg_height=car.cg_height or CG_HEIGHT_SHARE * (a + b),
         stiffness=stiffness / load, grip=grip / load,
         force_noise=0.01 * time**0.5, slip_noise=0.001 * time**0.5, bank_time=15.0 * time, slip_time=2.0 * time,

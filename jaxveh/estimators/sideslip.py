@@ -26,10 +26,11 @@ from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.live import Live
 from jaxveh.estimators.parameter_bands import smoothed_with_members
-from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
+from jaxveh.estimators.rear_axle import USUAL_WHEELBASE, RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
 from jaxveh.estimators.rear_axle_prior import chosen_parameters as chosen_parameters
 from jaxveh.estimators.rear_axle_prior import rear_axle
+from jaxveh.estimators.standing import offsets_at_standstill
 from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
 from jaxveh.fitting import Fit
 from jaxveh.io import AxleTyre, CarSpecification
@@ -103,19 +104,21 @@ def _fit(car, recordings, spans, filter, uses, progress, options) -> Calibration
     start = model(car, **options)
     seen = [shift_a_y(_seen(one, uses), float(start.system.a_y_delay)) for one in recordings]
     logs = coarse_logs(seen, _wheelbase(start))
+    stood = offsets_at_standstill(seen, _wheelbase(start), USUAL_WHEELBASE)
+    search = lambda logs, reference, progress: fit_rear_axle(filter, start, logs, reference, progress, stood)
     if not uses:
-        return Calibration(NAME, fit_rear_axle(filter, start, logs, None, progress), spans, told=start_of(car, options))
+        return Calibration(NAME, search(logs, None, progress), spans, told=start_of(car, options))
     late = [np.asarray(log.time) >= (span.start + span.end) / 2 for log, span in zip(logs, spans, strict=True)]
     early = [_blank(log, rows, start.channels) for log, rows in zip(logs, late, strict=True)]
     count = 2 + len(TARGET_WEIGHTS)
     fits = [
-        fit_rear_axle(filter, start, early, _reference(early, weight), _part(progress, i, count))
+        search(early, _reference(early, weight), _part(progress, i, count))
         for i, weight in enumerate((None, *TARGET_WEIGHTS))
     ]
     errors = [_validate(filter, fit.model, logs, late) for fit in fits]
     validation = tuple(zip((None, *TARGET_WEIGHTS), errors, strict=True))
     weight = min(validation, key=lambda one: one[1])[0]
-    fit = fit_rear_axle(filter, start, logs, _reference(logs, weight), _part(progress, count - 1, count))
+    fit = search(logs, _reference(logs, weight), _part(progress, count - 1, count))
     return Calibration(NAME, fit, spans, weight, validation, start_of(car, options))
 
 
@@ -255,7 +258,8 @@ def score(
     car: CarSpecification, found: Estimate | SmoothedEstimate, recording: Recording, *, least_speed: float | None = None
 ) -> dict[str, float]:
     """Errors of an estimate against a reference recording with `v_y`, next to the open-loop linear model's: the car's file with
-    linear tyres, steered from rest, which is the do-nothing baseline.
+    linear tyres, steered from rest, which is the do-nothing baseline. Both are compared where the file says that the reference is
+    measured (`reference_position`).
 
     Over the rows where the reference is finite and `v_x` at least `least_speed` (m/s, default `least_speed_of`). **Returns** by
     name, for sideslip in degrees (`sideslip_rmse_deg`) and for v_y in m/s, what `diagnostics.Score` has: the
@@ -267,23 +271,24 @@ def score(
     """
     v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
     floor = least_speed_of(car) if least_speed is None else least_speed
-    fast = v_x >= floor
+    ahead = (car.reference_position or (0.0, 0.0, 0.0))[0]
+    there = lambda v_y, turning: np.asarray(v_y) + (ahead * np.asarray(turning["yaw_rate"]) if ahead else 0.0)
+    mean = there(found["v_y"], recording)
+    fast = (v_x >= floor) & np.isfinite(mean)
     if not (fast & np.isfinite(v_y)).any():
         raise InputError(
             f"score: no row has both a reference v_y and a speed of at least {floor:g} m/s; there is nothing to score against."
         )
-    truth = {"sideslip": np.degrees(np.arctan2(v_y, v_x)), "v_y": v_y}
-    units = {"sideslip": np.degrees(1.0), "v_y": 1.0}
-    scores = {
-        name: score_band(true, units[name] * found[name], units[name] * np.asarray(getattr(found.std, name)), fast)
-        for name, true in truth.items()
-    }
-    named = _named("sideslip", "_deg", scores["sideslip"]) | _named("v_y", "", scores["v_y"])
+    degrees = lambda v_y: np.degrees(np.arctan2(v_y, v_x))
+    stds = np.degrees(np.asarray(found.std.sideslip)), np.asarray(found.std.v_y)
+    sideslip = score_band(degrees(v_y), degrees(mean), stds[0], fast)
+    named = _named("sideslip", "_deg", sideslip) | _named("v_y", "", score_band(v_y, mean, stds[1], fast))
     if _measured(recording, "steer"):
-        baseline = np.degrees(open_loop(from_specification(car), recording)["sideslip"])
-        plain = _named("open_loop_sideslip", "_deg", score_band(truth["sideslip"], baseline, which=fast))
-        named |= {name: value for name, value in plain.items() if not np.isnan(value)}
-    return named | {"rows": scores["sideslip"].rows, "least_speed": floor}
+        baseline = open_loop(from_specification(car), recording)
+        plain = score_band(degrees(v_y), degrees(there(baseline["v_y"], baseline)), which=fast)
+        told = _named("open_loop_sideslip", "_deg", plain)
+        named |= {name: value for name, value in told.items() if not np.isnan(value)}
+    return named | {"rows": sideslip.rows, "least_speed": floor}
 
 
 def _named(quantity: str, unit: str, found: Score) -> dict[str, float]:

@@ -31,6 +31,7 @@ track_rear = 1.56                    # m
 steering_ratio = 15.0                # steering wheel angle over road wheel angle
 steer_offset = 0.002                 # rad: what the steer channel shows (at the road wheels) when the car runs straight
 sensor_position = [0.1, 0.0, 0.3]    # m from the centre of gravity: forward, left, up
+reference_position = [0.0, 0.0, 0.0] # m from the centre of gravity: where a reference's v_y or sideslip is measured
 low_pass = 20.0                      # Hz, cutoff of the low-pass in the accelerometers and the gyroscope
 wheel_radius = 0.32                  # m; this and the following are of cars on four wheels
 wheel_inertia = 1.2                  # kg m^2, of one wheel about its axle
@@ -58,6 +59,10 @@ D = 6600.0
 E = 0.2
 """
 """The file's schema as a commented example that reads, for programs to print."""
+
+
+PLACES = ("sensor_position", "reference_position")
+"""Keys whose values are [x, y, z]."""
 
 
 def _number(low: float, high: float, unit: str = "", **default: Any) -> Any:
@@ -90,9 +95,10 @@ class CarSpecification:
     """What a car file says: plain floats in SI units, None where the file is silent. See `car.CAR_SCHEMA`.
 
     Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
-    `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`: x, y, z
-    in metres from the centre of gravity. `low_pass`: cutoff in hertz. `front_tyre`, `rear_tyre`: paths of the tyre property files
-    of a wheel, which nobody opens before a car on four wheels is built.
+    `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`,
+    `reference_position`: x, y, z in metres from the centre of gravity of the accelerometer and of a reference for sideslip.
+    `low_pass`: cutoff in hertz. `front_tyre`, `rear_tyre`: paths of the tyre property files of a wheel, which nobody opens before
+    a car on four wheels is built.
 
     **Raises** `InputError` with name, value and allowed range for what no car has, such as a negative mass.
     """
@@ -110,6 +116,7 @@ class CarSpecification:
     steering_ratio: float | None = _number(0.1, 200.0, default=None)
     steer_offset: float | None = _number(-0.5, 0.5, "rad", default=None)
     sensor_position: tuple[float, float, float] | None = _number(-30.0, 30.0, "m", default=None)
+    reference_position: tuple[float, float, float] | None = _number(-30.0, 30.0, "m", default=None)
     low_pass: float | None = _number(1e-3, 1e6, "Hz", default=None)
     wheel_radius: float | None = _number(1e-3, 5.0, "m", default=None)
     wheel_inertia: float | None = _number(1e-6, 1e4, "kg m^2", default=None)
@@ -123,10 +130,12 @@ class CarSpecification:
     rear: AxleTyre | None = None
 
     def __post_init__(self):
-        if self.sensor_position is not None:
-            object.__setattr__(self, "sensor_position", tuple(map(float, self.sensor_position)))
-            if len(self.sensor_position) != 3:
-                raise InputError(f"sensor_position = {list(self.sensor_position)}: must be [x, y, z].")
+        for name in PLACES:
+            place = getattr(self, name)
+            if place is not None:
+                object.__setattr__(self, name, tuple(map(float, place)))
+                if len(place) != 3:
+                    raise InputError(f"{name} = {list(place)}: must be [x, y, z].")
         _check_numbers(self)
         for axle in ("front", "rear"):
             key, tyre = f"{axle}_cornering_stiffness", getattr(self, axle)
@@ -205,7 +214,7 @@ def _value(key: str, value: Any, folder: Path) -> Any:
         return toml_text(key, value)
     if key in ("front_tyre", "rear_tyre"):
         return str(folder / toml_text(key, value))
-    if key == "sensor_position":
+    if key in PLACES:
         if not isinstance(value, list) or len(value) != 3:
             raise InputError(f"{key} = {value!r}: must be [x, y, z] in metres.")
         return tuple(toml_number(key, item) for item in value)

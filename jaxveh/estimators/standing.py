@@ -1,0 +1,41 @@
+"""What a car that stands tells of its sensors: they should say nothing, and do not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh._core.recording import Recording
+
+STANDING = 0.1
+"""m/s, of a car of the usual wheelbase: slower, it stands."""
+
+LEAST = 0.5
+"""s: of standing, without which nothing is told."""
+
+QUIET = 0.02
+"""rad/s: a yaw rate that scatters by more is that of a car that is carried, or turned by hand."""
+
+
+class Offsets(NamedTuple):
+    """What the yaw rate (rad/s) and a_y (m/s^2) say at standstill."""
+
+    yaw_rate: float
+    a_y: float
+
+
+def offsets_at_standstill(recordings: Sequence[Recording], wheelbase: float, usual: float) -> Offsets | None:
+    """Medians over the rows at which the car stands, None where it hardly does. `wheelbase` and the `usual` one in m."""
+    floor = STANDING * (wheelbase / usual) ** 0.5
+    rows, seconds = [], 0.0
+    for one in recordings:
+        v_x, yaw_rate, a_y = (np.asarray(one[name], float) for name in ("v_x", "yaw_rate", "a_y"))
+        still = (np.abs(v_x) < floor) & np.isfinite(yaw_rate) & np.isfinite(a_y)
+        rows.append(np.stack([yaw_rate[still], a_y[still]], axis=1))
+        seconds += still.sum() * float(np.median(np.diff(np.asarray(one.time, float))))
+    values = np.concatenate(rows)
+    if seconds < LEAST or 1.4826 * np.median(np.abs(values[:, 0] - np.median(values[:, 0]))) > QUIET:
+        return None
+    return Offsets(*(float(value) for value in np.median(values, axis=0)))
