@@ -15,6 +15,10 @@ from pathlib import Path
 from .. import machine
 
 
+FORGET = 20
+"""Logs of the fleet after which compiled programs are forgotten: each length has its own, and a process can hold so many."""
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Measure and report; returns the exit code (2 for bad arguments)."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=__doc__)
@@ -61,6 +65,8 @@ def _logs(only: str, names_alone: bool) -> list[dict]:
 
 
 def _fleet(only: str, runs: int, seed: int) -> dict:
+    import jax
+
     from .fleet import fleet
     from .logs import settings
     from .measure import measure
@@ -75,6 +81,8 @@ def _fleet(only: str, runs: int, seed: int) -> dict:
         for one in logs:
             setting = next(setting for setting in settings(one.log) if setting.name == name)
             lines.append(measure(one.log, setting))
+            if len(lines) % FORGET == 0:
+                jax.clear_caches()
             print(f"{len(lines)} of {len(logs)}", end="\r", file=sys.stderr, flush=True)
         about = summary(lines)
         worst = sorted((line for line in lines if not line.failed), key=lambda line: -line.over_open_loop)[:10]

@@ -19,9 +19,9 @@ from jaxveh.statespace import StateSpace
 
 WIDER = 1.75
 """Bands are so many times as wide as members and their filters say: none of them has other equations (a load that shifts within
-the axle, a curve that depends on it, a body that rolls). Chosen with `rear_axle_fit.OVERCONFIDENCE` on two fleets of simulated cars
-that calibrated themselves (`benchmarks.accuracy`): of 46 drives on smooth roads 95 % bands then hold 93 %, of 45 on uneven ones 99 %.
-The errors' tails are long: the 50 % bands hold 59 and 75 %."""
+the axle, a curve that depends on it, a body that rolls). Chosen with `rear_axle_fit.OVERCONFIDENCE` on two fleets of simulated
+cars that calibrated themselves (`benchmarks.accuracy`): of 46 drives on smooth roads 95 % bands then hold 93 %, of 45 on uneven
+ones 99 %. The errors' tails are long: the 50 % bands hold 59 and 75 %."""
 
 
 def members(fit: Fit) -> StateSpace:

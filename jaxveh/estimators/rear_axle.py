@@ -186,13 +186,14 @@ def transition(system: RearAxle, t0, t1, x: RearAxleState, u) -> RearAxleState:
     felt = system.specific_force(u.a_y, u.yaw_rate) - (u.turning - u.v_x * system.yaw_rate_offset)
     moving = x.v_y + dt * (felt - GRAVITY * system.bank * x.bank)
     rolling = system.rolls(u.yaw_rate) + 0.0 * x.v_y
-    steady = rolling - u.v_x * (numerics.tan(system.slip_angle(x, u)[0]) + system.slip_error * x.slip_error)
     fade = lambda time: jnp.exp(-dt / time)
+    slip_error = fade(system.slip_time) * x.slip_error
+    steady = rolling - u.v_x * (numerics.tan(system.slip_angle(x, u)[0]) + system.slip_error * slip_error)
     v_y = jnp.where((u.felt > 0) & (dt < LONGEST_STEP), moving, steady)
     return RearAxleState(
         v_y=jnp.where(u.v_x >= rolling_below(system.wheelbase), v_y, rolling),
         bank=fade(system.bank_time) * x.bank,
-        slip_error=fade(system.slip_time) * x.slip_error,
+        slip_error=slip_error,
         stiffening=x.stiffening,
     )
 

@@ -15,6 +15,7 @@ from jaxveh.roads.base import AbstractRoad
 from jaxveh.roads.friction import Level, MuJump, SplitMu
 from jaxveh.roads.profile import Profile
 from jaxveh.roads.random_road import RandomRoad, gauss_markov
+from jaxveh.roads.rough import Rough, rough
 from jaxveh.roads.slopes import Banked
 
 
@@ -30,6 +31,10 @@ def _hills(key: jax.Array | None = None) -> RandomRoad:
     return RandomRoad(grade=gauss_markov(0.03, 150.0, jax.random.key(0) if key is None else key))
 
 
+def _uneven(key: jax.Array | None = None) -> Rough:
+    return rough("C", jax.random.key(0) if key is None else key)
+
+
 ROADS: dict[str, NamedRoad] = {
     "level": NamedRoad(Level, "level, with the friction on which the tyres were measured"),
     "wet": NamedRoad(lambda: Level(0.7), "level, 0.7 of that friction"),
@@ -37,6 +42,7 @@ ROADS: dict[str, NamedRoad] = {
     "split-mu": NamedRoad(lambda: SplitMu(1.0, 0.3), "level, 0.3 of that friction right of the centre line"),
     "mu-jump": NamedRoad(lambda: MuJump(1.0, 0.4, 50.0), "level, 0.4 of that friction from 50 m on"),
     "hills": NamedRoad(_hills, "random grade: standard deviation 3 %, correlation length 150 m", random=True),
+    "uneven": NamedRoad(_uneven, "level but uneven: class C of ISO 8608, felt by cars on springs alone", random=True),
     "banked": NamedRoad(lambda: Banked(0.05), "tilts to 0.05 rad (left side higher) within 50 m"),
 }
 """Roads by name; their numbers are ours, of the size that is usual."""
@@ -54,7 +60,7 @@ def from_specification(spec: Any) -> AbstractRoad:
 def named_road(name: str | os.PathLike, key: jax.Array | None = None) -> AbstractRoad:
     """A road by its name in `ROADS`, or from a file ending in .toml (`jaxveh.io.road.ROAD_SCHEMA`).
 
-    `key` draws a random road ("hills"; default `jax.random.key(0)`).
+    `key` draws a random road ("hills", "uneven"; default `jax.random.key(0)`).
 
     **Raises** `InputError` for another name (listing those there are), or a file that is no road.
     """

@@ -35,7 +35,7 @@ def test_plain_car(toml):
     assert car.wheelbase == pytest.approx(2.7)
     assert (car.front_cornering_stiffness, car.rear_cornering_stiffness) == (9e4, 1.1e5)
     optional = [entry.name for entry in dataclasses.fields(car)][6:]
-    assert len(optional) == 18
+    assert len(optional) == 19
     assert all(getattr(car, name) is None for name in optional)
 
 
@@ -44,6 +44,7 @@ def test_the_schema_is_a_car(toml):
     assert car.front == io.AxleTyre(10.0, 1.3, 8000.0, 0.2, 0.0, 0.0, 8175.0)
     assert car.rear == io.AxleTyre(12.0, 1.3, 6600.0, 0.2)
     assert car.sensor_position == (0.1, 0.0, 0.3)
+    assert car.reference_position == (0.0, 0.0, 0.0)
     assert (car.low_pass, car.steer_offset, car.steering_ratio, car.name) == (20.0, 0.002, 15.0, "passenger car")
     keys = {entry.name for entry in dataclasses.fields(io.CarSpecification)} | {
         entry.name for entry in dataclasses.fields(io.AxleTyre)
