@@ -15,7 +15,8 @@ from jaxveh.cli import options, sideslip
 from jaxveh.cli.blanking import LogParts, split
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import Drive, read_drives
-from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
+from jaxveh.cli.estimate_figures import draw
+from jaxveh.cli.output import check_product, check_products, check_report, write_numbers
 
 
 class Filter(StrEnum):
@@ -164,8 +165,8 @@ def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
         estimates = [sideslip.estimate(found or car, job.parts.estimate, kind, particles, seed) for job in jobs]
         report(1, 1, "scoring")
     _say_source(choice, found, reason)
-    concluded = {job.drive.log.name: _conclude(choice, job, one, car) for job, one in zip(jobs, estimates, strict=True)}
-    return found, concluded
+    pairs = zip(jobs, estimates, strict=True)
+    return found, {job.drive.log.name: _conclude(choice, job, one, found, car) for job, one in pairs}
 
 
 def _check(choice: Choice) -> list[Path]:
@@ -232,7 +233,7 @@ def _say_source(choice: Choice, calibration: Any, reason: str | None) -> None:
         results().print(words)
 
 
-def _conclude(choice: Choice, job: Job, found: Any, car: io.CarSpecification) -> dict[str, Any]:
+def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.CarSpecification) -> dict[str, Any]:
     """Write one estimate, print its score, draw its figures: its numbers for the JSON file."""
     score = None if choice.truth is None else sideslip.score(car, found, job.parts.truth, choice.truth)
     io.write_frame(io.to_frame(found), job.product, overwrite=choice.force)
@@ -242,27 +243,8 @@ def _conclude(choice: Choice, job: Job, found: Any, car: io.CarSpecification) ->
         table(title, ("what", "value"), rows)
     time = np.asarray(found.time)
     results().print(f"{job.product}: {time.size} rows from {time[0]:g} to {time[-1]:g} s", markup=False)
-    figures = [] if job.out is None else _draw(found, job, choice.truth, car)
+    figures = []
+    if job.out is not None:
+        figures = draw(found, job.drive.recording, job.parts.truth, choice.truth, car, calibration, job.span, job.out)
     shown = {"file": job.product, "rows": time.size, "start_s": time[0], "end_s": time[-1], "figures": figures}
     return {**(score or {}), **shown}
-
-
-def _draw(found: Any, job: Job, truth: str | None, car: io.CarSpecification) -> list[Path]:
-    from jaxveh import plots
-
-    assert job.out is not None
-    make_folder(job.out)
-    recording, seen = job.drive.recording, job.parts.truth
-    names = ("sideslip", "v_y")
-    true = None if truth is None else sideslip.truth_of(seen, truth)
-    others = {} if truth is None or "steer" not in seen else {"open-loop linear model": sideslip.open_loop(car, seen)}
-    spans = [] if job.span is None else [(max(job.span[0], float(recording.time[0])), job.span[1], "calibration")]
-    paths = [
-        plots.save(plots.recording(recording, spans=spans), job.out / "channels.png"),
-        plots.save(
-            plots.estimate(found, true, names, others=others, errors=true is not None), job.out / "estimate.png"
-        ),
-    ]
-    for path in paths:
-        results().print(f"figure: {path}", markup=False)
-    return paths

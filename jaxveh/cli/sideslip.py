@@ -72,6 +72,11 @@ def estimate(
     return sideslip.estimate(source, part, filter=filter_of(kind, particles), key=jax.random.key(seed))
 
 
+def least_speed_of(car: CarSpecification) -> float:
+    """Speed (m/s) below which sideslip is not scored."""
+    return sideslip.least_speed_of(car)
+
+
 def truth_of(seen: Recording, name: str) -> dict[str, np.ndarray]:
     """What the truth channel, one of `SCORED`, says of the quantities that are shown, by name (T,)."""
     v_x, values = np.asarray(seen["v_x"]), np.asarray(seen[name])

@@ -1,5 +1,5 @@
-"""Figures of recordings, drives, estimates, tyre forces, parameters and rig fits, in one restrained style; matplotlib is the
-extra `plot`.
+"""Figures of recordings, drives, estimates, innovations, tyre forces, parameters and rig fits, in one restrained style;
+matplotlib is the extra `plot`.
 
 Every function returns a matplotlib `Figure` made without pyplot: no window, no global state, shown by notebooks as it
 is. Give `figure=` (a `Figure` or a `SubFigure`) to draw into one of your own. Angles are shown in degrees. Figures of drives
@@ -8,6 +8,7 @@ show a simulation's truth where the recording has it, else what was measured.
 
 from jaxveh.plots import kit
 from jaxveh.plots.braking_drives import braking
+from jaxveh.plots.closeup import closeup
 from jaxveh.plots.drives import drive
 from jaxveh.plots.dwell import sine_with_dwell
 from jaxveh.plots.estimates import estimate
@@ -16,8 +17,10 @@ from jaxveh.plots.frequency_responses import frequency_response
 from jaxveh.plots.friction_ellipse import friction_ellipse
 from jaxveh.plots.gradient_map import gradient_map
 from jaxveh.plots.handling import handling_diagram
+from jaxveh.plots.innovations import innovations
 from jaxveh.plots.panels import overview
 from jaxveh.plots.parameters import parameters
+from jaxveh.plots.rear_axles import AxlePoints, rear_axle, rear_axle_points
 from jaxveh.plots.recordings import recording
 from jaxveh.plots.rig_fit import rig_fit
 from jaxveh.plots.step_responses import step_response
@@ -28,7 +31,9 @@ from jaxveh.plots.wheel_loads import loads
 
 __all__ = [
     "COLOURS",
+    "AxlePoints",
     "braking",
+    "closeup",
     "drive",
     "estimate",
     "force_curves",
@@ -36,10 +41,13 @@ __all__ = [
     "friction_ellipse",
     "gradient_map",
     "handling_diagram",
+    "innovations",
     "kit",
     "loads",
     "overview",
     "parameters",
+    "rear_axle",
+    "rear_axle_points",
     "recording",
     "rig_fit",
     "save",

@@ -1,20 +1,39 @@
-"""Estimates over time: mean, the band that should hold the truth in 95 % of the rows, and the truth."""
+"""Estimates over time: mean, the bands that should hold the truth in 50 and 95 % of the rows, and the truth."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.names import as_mapping, check_names
 from jaxveh._core.recording import Recording
 from jaxveh.plots.quantities import quantity
 from jaxveh.plots.style import COLOURS, colour, label_above, legend, new_figure, style
 
-BAND = 1.959963984540054
-"""Standard deviations of a normal law's central 95 %."""
+BAND, HALF_BAND = 1.959963984540054, 0.6744897501960817
+"""Standard deviations of a normal law's central 95 and 50 %."""
+
+MOST_ROWS = 12
+"""Rows of a long log: a longer one has longer rows."""
+
+
+class Shown(NamedTuple):
+    """What the panels of a figure are drawn from."""
+
+    labelled: dict[str, Any]
+    time: np.ndarray
+    truth: Any
+    others: Mapping[str, Mapping[str, Any]]
+    fine: float
+    """Lines are thinner by this factor."""
+
+    def has_truth(self, name: str) -> bool:
+        """Whether there is a truth of a quantity."""
+        return self.truth is not None and name in self.truth
 
 
 def estimate(
@@ -24,17 +43,20 @@ def estimate(
     *,
     others: Mapping[str, Mapping[str, Any]] | None = None,
     errors: bool = False,
+    seconds: float = 60.0,
     figure: Any = None,
 ) -> Any:
-    """A panel a quantity: mean, 95 % band and, where given, the truth.
+    """A panel a quantity: mean, bands of 50 and 95 % and, where given, the truth; a long log in rows beneath each other.
 
     **Arguments**: `estimates`: an `Estimate` of `jaxveh.run` (or anything with `time`, `mean` and `std` by name), or a
-    mapping from labels to several. `truth`: a recording, or a mapping from names to (T,) arrays over the time of
-    the first estimate. `quantities`: names to show (default: all that the first reports). `others`: label to a mapping
-    from names to (T,) without spread, such as an open-loop model's, over the time of the first. `errors`: beside each
-    panel another with the estimates less the truth (over the same rows), and their bands. `figure`: where to draw.
+    mapping from labels to several, of which the 95 % band alone is shown. `truth`: a recording, or a mapping from names to (T,)
+    arrays over the time of the first estimate. `quantities`: names to show (default: all that the first reports). `others`:
+    label to a mapping from names to (T,) without spread, such as an open-loop model's, over the time of the first. `errors`:
+    beside each panel (beneath each row of a long log) another with the estimates less the truth (over the same rows), and their
+    bands. `seconds`: of a row, about; a log of more than one and a half has rows, at most `MOST_ROWS` a quantity. `figure`: where
+    to draw.
 
-    **Returns** the figure. **Raises** `InputError` for unknown quantities or a truth of another length.
+    **Returns** the figure. **Raises** `InputError` for unknown quantities, a truth of another length, or rows of no time.
     """
     labelled = dict(estimates) if isinstance(estimates, Mapping) else {"estimate": estimates}
     if not labelled:
@@ -43,45 +65,97 @@ def estimate(
     known = as_mapping(first.mean, "mean")
     names = list(known if quantities is None else quantities)
     check_names("plots.estimate", names, known)
-    time = np.asarray(first.time)
     if errors and truth is None:
         raise InputError("plots.estimate: errors need a truth; give `truth=`, or leave `errors` out.")
+    check_positive("seconds", seconds, "s")
+    time = np.asarray(first.time)
+    spans = rows_of(time, seconds)
+    # Rows hold more, and bands beside thick lines would not show.
+    shown = Shown(labelled, time, truth, others or {}, 1.0 if len(spans) == 1 else 0.65)
     with style():
-        figure = new_figure(0.75 + 1.25 * len(names)) if figure is None else figure
-        ratios = [3, 2] if errors else [1]
-        axes = figure.subplots(len(names), len(ratios), sharex=True, squeeze=False, width_ratios=ratios)
-        for row, name in zip(axes, names, strict=True):
-            shown = quantity(name)
-            _truth(row[0], time, truth, name)
-            for index, (label, values) in enumerate((others or {}).items()):
-                if name in values:
-                    _line(row[0], time, shown.show(values[name]), label, colour(label.partition(",")[0], index + 2))
-            for index, (label, one) in enumerate(labelled.items()):
-                _one(row[0], one, name, label, colour(label, index))
-                if errors and truth is not None and name in truth:
-                    _one(row[1], one, name, label, colour(label, index), shown.show(truth[name]))
-            _keep_truth_readable(row[0])
-            label_above(row[0], shown.label)
-            if errors and (truth is None or name not in truth):
-                row[1].set_visible(False)
-            elif errors:
-                row[1].axhline(0, color=COLOURS["truth"], linewidth=0.9, zorder=1.5)
-                label_above(row[1], f"error [{shown.unit}]" if shown.unit else "error")
-        for ax in axes[-1]:
-            ax.set_xlabel("time [s]")
+        draw = _beside if len(spans) == 1 else _in_rows
+        figure, axes = draw(shown, names, spans, errors, figure)
         legend(figure, axes)
     return figure
 
 
-def _truth(ax: Any, time: np.ndarray, truth: Any, name: str) -> None:
-    if truth is None or name not in truth:
+def rows_of(time: np.ndarray, seconds: float) -> list[tuple[float, float]]:
+    """Spans of equal length (s), about `seconds`, that a log of stamps (T,) falls into."""
+    start, end = float(time[0]), float(time[-1])
+    count = min(max(1, round((end - start) / seconds)), MOST_ROWS)
+    edges = np.linspace(start, end, count + 1)
+    return [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
+
+
+def _beside(shown: Shown, names: list[str], spans: Any, errors: bool, figure: Any) -> tuple[Any, Any]:
+    """A panel a quantity, its errors on the right."""
+    del spans
+    figure = new_figure(0.75 + 1.25 * len(names)) if figure is None else figure
+    ratios = [3, 2] if errors else [1]
+    axes = figure.subplots(len(names), len(ratios), sharex=True, squeeze=False, width_ratios=ratios)
+    for row, name in zip(axes, names, strict=True):
+        _values(row[0], shown, name)
+        if errors and not shown.has_truth(name):
+            row[1].set_visible(False)
+        elif errors:
+            _errors(row[1], shown, name)
+    for ax in axes[-1]:
+        ax.set_xlabel("time [s]")
+    return figure, axes
+
+
+def _in_rows(shown: Shown, names: list[str], spans: list, errors: bool, figure: Any) -> tuple[Any, Any]:
+    """Rows of a quantity over each other, each with its errors beneath, all to one scale: each panel has all rows, of which it
+    shows its own."""
+    kinds = [
+        (name, span, draw)
+        for name in names
+        for span in spans
+        for draw in ((_values, _errors) if errors and shown.has_truth(name) else (_values,))
+    ]
+    heights = [2.1 if draw is _values else 1.2 for _, _, draw in kinds]
+    figure = new_figure(0.6 + sum(heights)) if figure is None else figure
+    axes = figure.subplots(len(kinds), 1, squeeze=False, height_ratios=heights)[:, 0]
+    for ax, (name, span, draw) in zip(axes, kinds, strict=True):
+        draw(ax, shown, name)
+        ax.set_xlim(*span)
+        ax.xaxis.set_major_formatter(lambda value, _: f"{value:g} s")
+    return figure, axes
+
+
+def _values(ax: Any, shown: Shown, name: str) -> None:
+    """A quantity as it was estimated, and the truth."""
+    in_unit = quantity(name)
+    _truth(ax, shown, name)
+    for index, (label, values) in enumerate(shown.others.items()):
+        if name in values:
+            shade = colour(label.partition(",")[0], index + 2)
+            ax.plot(shown.time, in_unit.show(values[name]), color=shade, linewidth=1.1 * shown.fine, label=label)
+    for index, (label, one) in enumerate(shown.labelled.items()):
+        _one(ax, shown, one, name, label, colour(label, index))
+    _keep_truth_readable(ax)
+    label_above(ax, in_unit.label)
+
+
+def _errors(ax: Any, shown: Shown, name: str) -> None:
+    """What the estimates have more than the truth."""
+    in_unit = quantity(name)
+    for index, (label, one) in enumerate(shown.labelled.items()):
+        against = in_unit.show(shown.truth[name])
+        _one(ax, shown, one, name, label, colour(label, index), against)
+    ax.axhline(0, color=COLOURS["truth"], linewidth=0.9, zorder=1.5)
+    label_above(ax, f"error [{in_unit.unit}]" if in_unit.unit else "error")
+
+
+def _truth(ax: Any, shown: Shown, name: str) -> None:
+    if not shown.has_truth(name):
         return
-    at = np.asarray(truth.time) if isinstance(truth, Recording) else time
-    values = quantity(name).show(truth[name])
+    at = np.asarray(shown.truth.time) if isinstance(shown.truth, Recording) else shown.time
+    values = quantity(name).show(shown.truth[name])
     if values.shape != at.shape:
         raise InputError(f"plots.estimate: truth {name} has shape {values.shape}, time has {at.shape}; must agree.")
     # Thicker than the estimates, which lie on it when they are good.
-    ax.plot(at, values, color=COLOURS["truth"], linewidth=1.7, label="truth")
+    ax.plot(at, values, color=COLOURS["truth"], linewidth=1.7 * shown.fine, label="truth")
 
 
 def _keep_truth_readable(ax: Any) -> None:
@@ -96,22 +170,26 @@ def _keep_truth_readable(ax: Any) -> None:
         ax.set_ylim(max(bottom, low - room), min(top, high + room))
 
 
-def _one(ax: Any, one: Any, name: str, label: str, shade: str, against: Any = 0.0) -> None:
-    """Mean and band of one estimate, less the values that it is held against."""
+def _one(ax: Any, shown: Shown, one: Any, name: str, label: str, shade: str, against: Any = 0.0) -> None:
+    """Mean and bands of one estimate, less the values that it is held against."""
     mean, std = as_mapping(one.mean, "mean"), as_mapping(one.std, "std")
     if name not in mean:
         return
-    time, shown = np.asarray(one.time), quantity(name)
+    time, in_unit = np.asarray(one.time), quantity(name)
     if np.shape(against) not in ((), time.shape):
         raise InputError(
             f"plots.estimate: truth {name} has shape {np.shape(against)}, {label} {time.shape}; must agree."
         )
-    centre = shown.show(mean[name]) - against
+    centre = in_unit.show(mean[name]) - against
     if name in std:
-        reach = BAND * shown.show(std[name])
-        ax.fill_between(time, centre - reach, centre + reach, color=shade, alpha=0.2, lw=0, label=f"{label}, 95 % band")
-    _line(ax, time, centre, label, shade)
+        bands(ax, time, centre, in_unit.show(std[name]), label, shade, half=len(shown.labelled) == 1)
+    ax.plot(time, centre, color=shade, linewidth=1.1 * shown.fine, label=label)
 
 
-def _line(ax: Any, time: np.ndarray, values: np.ndarray, label: str, shade: str) -> None:
-    ax.plot(time, values, color=shade, linewidth=1.1, label=label)
+def bands(
+    ax: Any, time: np.ndarray, centre: np.ndarray, std: np.ndarray, label: str, shade: str, *, half: bool = True
+) -> None:
+    """The central 95 %, and `half` as well: of normal laws about `centre` (T,) with `std` (T,)."""
+    for share, width, alpha in ((95, BAND, 0.22), (50, HALF_BAND, 0.4))[: 1 + half]:
+        low, high = centre - width * std, centre + width * std
+        ax.fill_between(time, low, high, color=shade, alpha=alpha, lw=0, label=f"{label}, {share} % band")

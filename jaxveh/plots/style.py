@@ -32,6 +32,9 @@ PAGE_WIDTH = 7.2
 
 DPI = 150
 
+WORDS = 125
+"""Letters of a legend's line that fit on a page's width, the marks before them counted as 7."""
+
 SUFFIXES = (".png", ".svg", ".pdf")
 
 _RC = {
@@ -109,18 +112,24 @@ def colour(name: str, index: int = 0) -> str:
     return COLOURS.get(name, CYCLE[index % len(CYCLE)])
 
 
-def legend(figure: Any, axes: Any) -> None:
-    """One legend for the whole figure above the data, each label once, in the order of drawing."""
+def legend(figure: Any, axes: Any) -> Any:
+    """One legend for the whole figure above the data, each label once, in the order of drawing; None where there is no label."""
     entries: dict[str, Any] = {}
     for ax in _flat(axes):
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    if entries:
-        columns = min(len(entries), 8)
-        figure.legend(
-            entries.values(), entries.keys(), loc="outside upper left", ncols=columns, handlelength=1.6,
-            columnspacing=1.2, borderaxespad=0.2,
-        )  # fmt: skip
+    if not entries:
+        return None
+    # As many beside each other as the words leave room for.
+    columns = min(len(entries), 8)
+    while (
+        columns > 1 and len(entries) * (sum(map(len, entries)) / len(entries) + 7) / -(-len(entries) // columns) > WORDS
+    ):
+        columns -= 1
+    return figure.legend(
+        entries.values(), entries.keys(), loc="outside upper left", ncols=columns, handlelength=1.6,
+        columnspacing=1.2, borderaxespad=0.2,
+    )  # fmt: skip
 
 
 def label_above(ax: Any, label: str) -> None:

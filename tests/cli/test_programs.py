@@ -94,7 +94,9 @@ def test_estimate_without_calibration(tmp_path, drive):
     np.testing.assert_allclose(content["sideslip_rmse_deg"], np.degrees(np.sqrt(np.mean(error**2))), rtol=1e-6)
     assert content["open_loop_sideslip_rmse_deg"] > 0
     assert 0 <= content["sideslip_coverage_95"] <= 1
-    assert (tmp_path / "figures" / "estimate.png").exists()
+    drawn = ["channels", "estimate", "v_y", "worst", "innovations", "rear_axle"]
+    assert content["figures"] == [str(tmp_path / "figures" / f"{name}.png") for name in drawn]
+    assert all((tmp_path / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG") for name in drawn)
 
 
 def test_estimate_never_sees_the_truth(tmp_path, drive):

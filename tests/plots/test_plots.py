@@ -88,7 +88,8 @@ def test_estimate_shows_mean_band_and_truth():
     np.testing.assert_allclose(line(first, "estimate").get_ydata(), np.degrees(0.1 * WAVE))
     np.testing.assert_allclose(line(first, "truth").get_ydata(), np.degrees(truth["sideslip"]))
     np.testing.assert_allclose(line(first, "open-loop linear model").get_ydata(), np.degrees(0.2 * WAVE))
-    (band,) = first.collections
+    band, half = first.collections
+    assert half.get_label() == "estimate, 50 % band"
     assert band.get_label() == "estimate, 95 % band"
     corners = band.get_paths()[0].vertices[:, 1]
     np.testing.assert_allclose(corners.min(), np.degrees(np.min(0.1 * WAVE) - 1.959964 * 0.02), rtol=1e-6)
