@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,10 +18,11 @@ COLOURS = {"error": "bold red", "warning": "yellow", "note": "cyan", "ok": "gree
 
 
 class Drive(NamedTuple):
-    """A log's file, and what of it is taken."""
+    """A log's file, what of it is taken, and what `check` says of that."""
 
     log: Path
     recording: Recording
+    findings: Sequence[diagnostics.LogFinding] = ()
 
 
 def read_drives(
@@ -42,12 +44,14 @@ def read_drives(
         recording = io.read_recording(log, channels)
         wanted = options.span_of(span, float(recording.time[0]), float(recording.time[-1]), "--span")
         recording = fill_gaps(recording if wanted is None else recording.between(*wanted), fill)
-        _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)
-        drives.append(Drive(log, recording))
+        findings = _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)
+        drives.append(Drive(log, recording, findings))
     return drives
 
 
-def _look_at(log: Path, recording: Recording, car: CarSpecification, used: set[str], anyway: bool) -> None:
+def _look_at(
+    log: Path, recording: Recording, car: CarSpecification, used: set[str], anyway: bool
+) -> Sequence[diagnostics.LogFinding]:
     findings = diagnostics.check_log(recording, car=car)
     told = [finding for finding in findings if finding.severity in ("error", "warning")]
     for severity in ("error", "warning"):
@@ -62,3 +66,4 @@ def _look_at(log: Path, recording: Recording, car: CarSpecification, used: set[s
         raise InputError(
             f"{log}: {first.channel} {first.message}{more} `jaxveh check` tells all; --anyway goes on with the log as it is."
         )
+    return findings

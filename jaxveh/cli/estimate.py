@@ -16,6 +16,7 @@ from jaxveh.cli.blanking import LogParts, split
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import Drive, read_drives
 from jaxveh.cli.estimate_figures import draw
+from jaxveh.cli.estimate_report import check_report_page, reported_log, write_report
 from jaxveh.cli.output import check_product, check_products, check_report, write_numbers
 
 
@@ -51,6 +52,12 @@ TRUTH = typer.Option(
     metavar="CHANNEL",
     help="Score against this channel (v_y or sideslip), which no estimator gets to see (but see --calibrate-on).",
 )
+REPORT = typer.Option(
+    "--report",
+    metavar="FILE.html",
+    help="Write one page that opens without a network: check, fit, scores, and charts to zoom into. --force replaces it.",
+    show_default=False,
+)
 FILTER = typer.Option(
     "--filter", help="Extended or unscented Kalman (smoothed), auxiliary or bootstrap particle filter."
 )
@@ -85,6 +92,7 @@ def estimate(
     seed: options.Seed = 0,
     numbers: options.Numbers = None,
     out: options.Out = None,
+    report: Annotated[Path | None, REPORT] = None,
     force: options.Force = False,
     anyway: options.Anyway = False,
 ) -> None:
@@ -110,13 +118,15 @@ def estimate(
     """
     choice = Choice(
         logs, product, vehicle, calibration, channels, span, calibrate, tuple(calibrate_on or ()), as_told, fill, truth,
-        filter, particles, seed, out, force, anyway,
+        filter, particles, seed, out, report, force, anyway,
     )  # fmt: skip
     check_report(out, numbers)
     fitted, estimates = _estimate(choice)
     shown = estimates[logs[0].name] if len(logs) == 1 else {"logs": estimates}
     configuration = {
-        name: value for name, value in choice._asdict().items() if name not in ("product", "seed", "out", "force")
+        name: value
+        for name, value in choice._asdict().items()
+        if name not in ("product", "seed", "out", "report", "force")
     }
     write_numbers(numbers, {**sideslip.fitted_parameters(fitted), **shown}, configuration, seed)
 
@@ -139,6 +149,7 @@ class Choice(NamedTuple):
     particles: int
     seed: int
     out: Path | None
+    report: Path | None
     force: bool
     anyway: bool
 
@@ -165,8 +176,10 @@ def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
         estimates = [sideslip.estimate(found or car, job.parts.estimate, kind, particles, seed) for job in jobs]
         report(1, 1, "scoring")
     _say_source(choice, found, reason)
-    pairs = zip(jobs, estimates, strict=True)
-    return found, {job.drive.log.name: _conclude(choice, job, one, found, car) for job, one in pairs}
+    numbers = [_conclude(choice, job, one, found, car) for job, one in zip(jobs, estimates, strict=True)]
+    if choice.report is not None:
+        _report(choice, jobs, estimates, numbers, found, car, _source_in_words(choice, found, reason))
+    return found, {job.drive.log.name: one for job, one in zip(jobs, numbers, strict=True)}
 
 
 def _check(choice: Choice) -> list[Path]:
@@ -179,6 +192,7 @@ def _check(choice: Choice) -> list[Path]:
     else:
         products = [product / f"{log.stem}.parquet" for log in logs]
         check_products(product, products, choice.force, sources)
+    check_report_page(choice.report, choice.force, sources)
     check_at_least("--particles", choice.particles, 2)
     if choice.truth is not None:
         check_one_of("--truth", choice.truth, sideslip.SCORED)
@@ -218,19 +232,25 @@ def print_fitted(calibration: Any) -> None:
 
 
 def _say_source(choice: Choice, calibration: Any, reason: str | None) -> None:
-    if calibration is None:
-        results().print(f"Nothing was calibrated, the car file is taken at its word: {reason}.")
+    if calibration is None or choice.calibrate is None:
+        results().print(_source_in_words(choice, calibration, reason), markup=False)
+    if calibration is None or choice.calibration is not None:
         return
-    if choice.calibration is not None:
-        spans = "; ".join(f"{span.log or 'a log'} {span.start:g} to {span.end:g} s" for span in calibration.spans)
-        results().print(f"Calibrated by {choice.calibration}, on {spans}.", markup=False)
-        return
-    if choice.calibrate is None:
-        one = "The log calibrated itself, on all its", "The logs calibrated themselves together, on all their"
-        results().print(f"{one[len(choice.logs) > 1]} rows and without a reference.")
     print_fitted(calibration)
     if (words := sideslip.reference_in_words(calibration, choice.calibrate_on)) is not None:
         results().print(words)
+
+
+def _source_in_words(choice: Choice, calibration: Any, reason: str | None) -> str:
+    if calibration is None:
+        return f"Nothing was calibrated, the car file is taken at its word: {reason}."
+    spans = "; ".join(f"{span.log or 'a log'} {span.start:g} to {span.end:g} s" for span in calibration.spans)
+    if choice.calibration is not None:
+        return f"Calibrated by {choice.calibration}, on {spans}."
+    if choice.calibrate is not None:
+        return f"Calibrated on {spans}."
+    one = "The log calibrated itself, on all its", "The logs calibrated themselves together, on all their"
+    return f"{one[len(choice.logs) > 1]} rows and without a reference."
 
 
 def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.CarSpecification) -> dict[str, Any]:
@@ -248,3 +268,21 @@ def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.Ca
         figures = draw(found, job.drive.recording, job.parts.truth, choice.truth, car, calibration, job.span, job.out)
     shown = {"file": job.product, "rows": time.size, "start_s": time[0], "end_s": time[-1], "figures": figures}
     return {**(score or {}), **shown}
+
+
+def _report(
+    choice: Choice, jobs: list[Job], estimates: list, numbers: list[dict[str, Any]], calibration: Any,
+    car: io.CarSpecification, source: str,
+) -> None:  # fmt: skip
+    """Write the page of all logs."""
+    assert choice.report is not None
+    logs = [
+        reported_log(
+            job.drive, found, job.parts.truth, choice.truth, None if choice.truth is None else shown, car, calibration
+        )
+        for job, found, shown in zip(jobs, estimates, numbers, strict=True)
+    ]
+    facts = {"car file": choice.vehicle, "truth": choice.truth, "filter": choice.filter.value, "span": choice.span}
+    drives = [job.drive for job in jobs]
+    write_report(choice.report, logs, drives, car, calibration, source, facts, overwrite=choice.force)
+    results().print(f"report: {choice.report}", markup=False)

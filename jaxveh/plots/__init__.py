@@ -1,5 +1,5 @@
 """Figures of recordings, drives, estimates, innovations, tyre forces, parameters and rig fits, in one restrained style;
-matplotlib is the extra `plot`.
+matplotlib is the extra `plot`. A page to zoom into is `log_report`, with Bokeh, the extra `report`.
 
 Every function returns a matplotlib `Figure` made without pyplot: no window, no global state, shown by notebooks as it
 is. Give `figure=` (a `Figure` or a `SubFigure`) to draw into one of your own. Angles are shown in degrees. Figures of drives
@@ -18,10 +18,12 @@ from jaxveh.plots.friction_ellipse import friction_ellipse
 from jaxveh.plots.gradient_map import gradient_map
 from jaxveh.plots.handling import handling_diagram
 from jaxveh.plots.innovations import innovations
+from jaxveh.plots.log_report import ReportedLog, log_report
 from jaxveh.plots.panels import overview
 from jaxveh.plots.parameters import parameters
 from jaxveh.plots.rear_axles import AxlePoints, rear_axle, rear_axle_points
 from jaxveh.plots.recordings import recording
+from jaxveh.plots.report_page import ReportTable
 from jaxveh.plots.rig_fit import rig_fit
 from jaxveh.plots.step_responses import step_response
 from jaxveh.plots.style import COLOURS, save, style
@@ -32,6 +34,8 @@ from jaxveh.plots.wheel_loads import loads
 __all__ = [
     "COLOURS",
     "AxlePoints",
+    "ReportTable",
+    "ReportedLog",
     "braking",
     "closeup",
     "drive",
@@ -44,6 +48,7 @@ __all__ = [
     "innovations",
     "kit",
     "loads",
+    "log_report",
     "overview",
     "parameters",
     "rear_axle",

@@ -11,6 +11,7 @@ import textwrap
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax
 import numpy as np
@@ -19,9 +20,11 @@ import pytest
 from programs import run
 
 import jaxveh
-from jaxveh import InputError, Recording, filters, io, plots, statespace, tyres
+from jaxveh import InputError, Parameters, Recording, estimators, filters, fitting, io, plots, statespace, tyres
 from jaxveh._core.names import record_type
-from jaxveh.cli import all_papers, output
+from jaxveh._core.parameter import resolve
+from jaxveh.cli import all_papers, estimate_report, output
+from jaxveh.cli.drives import Drive
 from jaxveh.io import files
 
 resource = pytest.importorskip("resource")  # the size of files can be limited
@@ -54,6 +57,26 @@ def every_paper(path, monkeypatch):
     all_papers.all_papers({"tyre-apf": {}}, path)
 
 
+def report(path):
+    waves = {"sideslip": RECORDING["yaw_rate"], "v_y": RECORDING["yaw_rate"]}
+    log = plots.ReportedLog("a log", SimpleNamespace(time=RECORDING.time, mean=waves, std=waves), RECORDING)
+    drive = Drive(Path("drive.csv"), RECORDING)
+    estimate_report.write_report(path, [log], [drive], CAR, None, "in words", {}, overwrite=True)
+
+
+def calibration(path):
+    """Of one parameter, that nobody has fitted."""
+    model, number = estimators.sideslip.model(CAR), jax.numpy.zeros(())
+    chosen = resolve(model, lambda model: (model.system.stiffness,))
+    named = Parameters({chosen[0].name: model.system.stiffness})
+    fit = fitting.Fit(
+        parameters=named, parameters_std=named, unconstrained=number[None], covariance=number[None, None], cost=number,
+        steps=jax.numpy.zeros((), int), result=jax.numpy.zeros((), int), model=model, chosen=chosen,
+    )  # fmt: skip
+    spans, told = (estimators.Span(0.0, 1.0, "log " * 500),), estimators.kit.start_of(CAR)
+    estimators.write_calibration(estimators.Calibration("sideslip", fit, spans, told=told), path, overwrite=True)
+
+
 CAR = io.CarSpecification(1400.0, 2000.0, 1.0, 1.6, 9e4, 1e5, name="a car" * 50)
 SLOPE = io.RoadSpecification((0.0, 1.0, 2.0), (1.0, 1.0, 0.5), name="a road" * 50)
 OVER = {"overwrite": True}
@@ -71,6 +94,8 @@ WRITERS = {
         tyres.MagicFormula(B=10.0, C=1.3, D=4000.0, E=0.1), path, note="long " * 100, **OVER
     ),
     "write_text txt": lambda path: io.write_text("line\n" * 1000, path, **OVER),
+    "write_report html": report,
+    "write_calibration toml": calibration,
     "save png": lambda path: plots.save(plots.recording(RECORDING), path),
     "write_numbers json": lambda path: output.write_numbers(path, {"x": [0.5] * 1000}, {}, 0),
 }

@@ -1,6 +1,7 @@
 """Each program once from end to end, at smoke size: what it prints, what it writes, that the numbers agree."""
 
 import json
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -251,6 +252,55 @@ def test_several_logs_go_into_a_folder_with_one_calibration(kept):
     assert "exists already" in error_line(again)
     twice = run("estimate", logs[0], logs[0], "--calibration", kept / "calibration.toml", "-o", kept / "twice")
     assert "two logs would be written to drive.parquet" in error_line(twice)
+
+
+def test_a_report_of_one_log_and_of_several(kept):
+    pytest.importorskip("bokeh")
+    start = ("--calibration", kept / "calibration.toml", "--span", "5:20", "--truth", "v_y")
+    page, numbers = kept / "one.html", kept / "one.json"
+    result = run("estimate", kept / "drive.csv", *start, "-o", kept / "one.csv", "--report", page, "--json", numbers)
+    assert result.exit_code == 0, result.output
+    assert f"report: {page}" in result.stdout
+    text, content = page.read_text(), read_json(numbers)
+    text = text[text.index("<h1>") :]
+    words = ["drive.csv (750 rows, 5 to 19.98 s)", "1420 kg", "Calibrated by", "truth", "command", "Check of drive.csv"]
+    words += [
+        "Fitted parameters",
+        "standard error",
+        "Score against the truth",
+        "open-loop linear model",
+        "Estimate and channels",
+    ]
+    places = [text.index(one) for one in [*words, "Rear axle"]]
+    assert places == sorted(places)
+    stiffness = content["fitted"]["stiffness"]
+    assert re.search(rf">stiffness</td><td[^>]*>{stiffness['value']:.1f}.*</td><td[^>]*>{stiffness['std']:.1f}", text)
+    for name in ("sideslip_rmse_deg", "open_loop_sideslip_rmse_deg"):
+        assert f">{content[name]:.4g}</td>" in text
+    assert f">{100 * content['sideslip_coverage_95']:.1f} %</td>" in text
+    assert f'sideslip: largest error [°]</td><td class="number">{content["sideslip_worst_deg"]:.4g}</td>' in text
+
+    (kept / "tuesday.csv").write_text((kept / "drive.csv").read_text())
+    both, page = (kept / "drive.csv", kept / "tuesday.csv"), kept / "both.html"
+    result = run("estimate", *both, *start, "-o", kept / "with_report", "--report", page)
+    assert result.exit_code == 0, result.output
+    text = page.read_text()
+    assert 'href="#log-1">tuesday.csv<' in text and text.count("Score against the truth") == 2
+
+
+def test_a_report_is_refused_before_any_work(kept, tmp_path):
+    pytest.importorskip("bokeh")
+    start = ("estimate", kept / "drive.csv", "--calibration", kept / "calibration.toml", "-o", tmp_path / "e.csv")
+    assert "it must end in one of .html" in error_line(run(*start, "--report", tmp_path / "report.pdf"))
+    there = tmp_path / "there.html"
+    there.write_text("mine")
+    assert "pass --force to replace it" in error_line(run(*start, "--report", there))
+    assert "there is no folder" in error_line(run(*start, "--report", tmp_path / "none" / "report.html"))
+    assert there.read_text() == "mine" and not (tmp_path / "e.csv").exists()
+    assert run(*start, "--report", there, "--as-told").exit_code == 2
+    result = run(*start[:2], "--vehicle", kept / "car.toml", *start[4:], "--as-told", "--report", there, "--force")
+    assert result.exit_code == 0, result.output
+    assert "Nothing was fitted: the car file is taken at its word." in there.read_text()
 
 
 def broken(kept, change):
