@@ -14,7 +14,6 @@ from pathlib import Path
 
 from .. import machine
 
-
 FORGET = 20
 """Logs of the fleet after which compiled programs are forgotten: each length has its own, and a process can hold so many."""
 
