@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import typer
 
-from jaxveh import InputError, io
+from jaxveh import InputError, Recording, io
 from jaxveh._core.errors import check_at_least, check_one_of
 from jaxveh.cli import options, sideslip
 from jaxveh.cli.blanking import LogParts, split
@@ -18,6 +18,8 @@ from jaxveh.cli.drives import Drive, read_drives
 from jaxveh.cli.estimate_figures import draw
 from jaxveh.cli.estimate_report import check_report_page, reported_log, write_report
 from jaxveh.cli.output import check_product, check_products, check_report, write_numbers
+
+MCAP_SUFFIX = io.kit.MCAP_SUFFIX
 
 
 class Filter(StrEnum):
@@ -33,7 +35,8 @@ PRODUCT = typer.Option(
     "-o",
     metavar="FILE",
     show_default=False,
-    help="Time series with standard deviations: .parquet, .csv, .mf4 or .mdf. Of several logs a folder, with a .parquet each.",
+    help="Time series with standard deviations: .parquet, .csv, .mf4 or .mdf; or .mcap, with the log's channels and the truth as "
+    "topics of their own, for Foxglove and PlotJuggler. Of several logs a folder, with a .parquet each.",
 )
 VEHICLE = typer.Option(
     "--vehicle",
@@ -188,7 +191,9 @@ def _check(choice: Choice) -> list[Path]:
     sources = (*logs, choice.vehicle, choice.channels, choice.calibration)
     if len(logs) == 1:
         products = [product]
-        check_product(product, io.SUFFIXES, choice.force, sources)
+        check_product(product, (*io.SUFFIXES, MCAP_SUFFIX), choice.force, sources)
+        if product.suffix.lower() == MCAP_SUFFIX:
+            io.kit.require("mcap", "writing MCAP", "mcap")
     else:
         products = [product / f"{log.stem}.parquet" for log in logs]
         check_products(product, products, choice.force, sources)
@@ -208,6 +213,10 @@ def _check(choice: Choice) -> list[Path]:
 
 def _job(choice: Choice, drive: Drive, product: Path) -> Job:
     time = drive.recording.time
+    if product.suffix.lower() == MCAP_SUFFIX and time[0] < 0:
+        raise InputError(
+            f"-o {product}: stamps must be at least zero, the log begins at {time[0]:g} s: write another format."
+        )
     span = options.span_of(choice.calibrate, float(time[0]), float(time[-1]))
     parts = split(drive.recording, span, choice.calibrate_on, choice.truth)
     out = choice.out if choice.out is None or len(choice.logs) == 1 else choice.out / drive.log.stem
@@ -256,7 +265,7 @@ def _source_in_words(choice: Choice, calibration: Any, reason: str | None) -> st
 def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.CarSpecification) -> dict[str, Any]:
     """Write one estimate, print its score, draw its figures: its numbers for the JSON file."""
     score = None if choice.truth is None else sideslip.score(car, found, job.parts.truth, choice.truth)
-    io.write_frame(io.to_frame(found), job.product, overwrite=choice.force)
+    _write(choice, job, found)
     if score is not None:
         rows = [(name, f"{value}" if isinstance(value, int) else number(value)) for name, value in score.items()]
         title = f"Score over the rows estimated of {job.drive.log.name}, by the names of the JSON file"
@@ -268,6 +277,20 @@ def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.Ca
         figures = draw(found, job.drive.recording, job.parts.truth, choice.truth, car, calibration, job.span, job.out)
     shown = {"file": job.product, "rows": time.size, "start_s": time[0], "end_s": time[-1], "figures": figures}
     return {**(score or {}), **shown}
+
+
+def _write(choice: Choice, job: Job, found: Any) -> None:
+    """Write the estimate; into topics with what it was made of."""
+    if job.product.suffix.lower() != MCAP_SUFFIX:
+        io.write_frame(io.to_frame(found), job.product, overwrite=choice.force)
+        return
+    seen = job.parts.truth
+    topics = {"/estimate": io.to_frame(found), "/log": io.to_frame(seen)}
+    if choice.truth is not None:
+        true = sideslip.truth_of(seen, choice.truth)
+        units = {name: io.canonical_unit(name) or "" for name in true}
+        topics["/truth"] = io.to_frame(Recording(seen.time, true, units, f"{choice.truth} of the log"))
+    io.write_topics(topics, job.product, overwrite=choice.force)
 
 
 def _report(

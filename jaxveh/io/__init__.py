@@ -1,7 +1,7 @@
-"""Recordings in and out (CSV, Parquet, MDF4), channel maps, data frames, the files that describe a car and a road, tyre
-property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX, FSAE TTC).
+"""Recordings in and out (CSV, Parquet, MDF4; out to MCAP), channel maps, data frames, the files that describe a car and a road,
+tyre property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX, FSAE TTC).
 
-pandas, pyarrow, asammdf, pint, pyyaml and scipy are the extra `io`, imported where they are used.
+pandas, pyarrow, asammdf, pint, pyyaml and scipy are the extra `io`, imported where they are used; mcap is the extra `mcap`.
 """
 
 from jaxveh.io import kit
@@ -11,6 +11,7 @@ from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.commonroad import CommonRoadSpecification, read_commonroad
 from jaxveh.io.files import check_readable, making_folder, replacing_file, write_text
 from jaxveh.io.frames import to_frame, write_frame
+from jaxveh.io.mcap_log import write_topics
 from jaxveh.io.merge import resample
 from jaxveh.io.property_file import PropertyFile, read_property_file, write_property_file
 from jaxveh.io.recordings import SUFFIXES, read_recording, with_units_in_names, write_recording
@@ -53,4 +54,5 @@ __all__ = [
     "write_recording",
     "write_road",
     "write_text",
+    "write_topics",
 ]

@@ -2,6 +2,7 @@
 
 from jaxveh.io.car import CAR_SCHEMA, car_lines, car_of_toml
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
+from jaxveh.io.mcap_log import MCAP_SUFFIX
 from jaxveh.io.naming import check_known
 from jaxveh.io.optional import require
 from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
@@ -12,6 +13,7 @@ from jaxveh.io.units import is_unit, same_unit
 __all__ = [
     "CAR_SCHEMA",
     "CHANNEL_MAP_SCHEMA",
+    "MCAP_SUFFIX",
     "PROPERTY_UNITS",
     "RIG_CHANNELS",
     "Entry",

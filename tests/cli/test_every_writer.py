@@ -85,6 +85,7 @@ WRITERS = {
     "write_recording parquet": lambda path: io.write_recording(RECORDING, path, **OVER),
     "write_recording mf4": lambda path: io.write_recording(RECORDING, path, **OVER),
     "write_frame csv": lambda path: io.write_frame(io.to_frame(RECORDING), path, **OVER),
+    "write_topics mcap": lambda path: io.write_topics({"/log": io.to_frame(RECORDING)}, path, **OVER),
     "write_car toml": lambda path: io.write_car(CAR, path, **OVER),
     "write_road toml": lambda path: io.write_road(SLOPE, path, **OVER),
     "write_property_file tir": lambda path: io.write_property_file(

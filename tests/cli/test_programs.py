@@ -303,6 +303,57 @@ def test_a_report_is_refused_before_any_work(kept, tmp_path):
     assert "Nothing was fitted: the car file is taken at its word." in there.read_text()
 
 
+def topics_of(path):
+    """Messages by topic, (stamp in ns, numbers) each, of an MCAP file."""
+    reader = pytest.importorskip("mcap.reader")
+    found = {}
+    with path.open("rb") as stream:
+        for _, channel, message in reader.make_reader(stream).iter_messages():
+            found.setdefault(channel.topic, []).append((message.log_time, json.loads(message.data)))
+    return found
+
+
+def test_an_estimate_as_topics_is_that_of_the_table_with_the_log_beside_it(kept):
+    pytest.importorskip("mcap")
+    start = (
+        "estimate",
+        kept / "drive.csv",
+        "--calibration",
+        kept / "calibration.toml",
+        "--span",
+        "5:20",
+        "--truth",
+        "v_y",
+    )
+    for name in ("topics.mcap", "topics.csv"):
+        result = run(*start, "-o", kept / name)
+        assert result.exit_code == 0, result.output
+    found, table, log = (
+        topics_of(kept / "topics.mcap"),
+        *(io.read_recording(kept / f"{n}.csv") for n in ("topics", "drive")),
+    )
+    log = log.between(5.0, 20.0)
+    assert set(found) == {"/estimate", "/log", "/truth"}
+    truth = {"v_y": np.asarray(log["v_y"]), "sideslip": np.arctan2(log["v_y"], log["v_x"])}
+    for topic, told in (("/estimate", table.channels), ("/log", log.channels), ("/truth", truth)):
+        stamps, rows = zip(*found[topic], strict=True)
+        np.testing.assert_array_equal(stamps, np.round(1e9 * np.asarray(log.time)).astype(int))
+        assert set(rows[0]) == set(told)
+        for name, values in told.items():
+            np.testing.assert_allclose([row[name] for row in rows], values, rtol=1e-12)
+    without = run(*start[:-2], "-o", kept / "blind.mcap")
+    assert without.exit_code == 0 and set(topics_of(kept / "blind.mcap")) == {"/estimate", "/log"}
+
+
+def test_topics_have_no_stamps_below_zero(kept, tmp_path):
+    pytest.importorskip("mcap")
+    table = with_steer()
+    log = write_log(tmp_path, table | {"time": table["time"] - 1.0})
+    start = ("estimate", log, "--calibration", kept / "calibration.toml", "-o")
+    assert "stamps must be at least zero, the log begins at -1 s" in error_line(run(*start, tmp_path / "e.mcap"))
+    assert not (tmp_path / "e.mcap").exists()
+
+
 def broken(kept, change):
     path = kept / "broken.toml"
     path.write_text(change((kept / "calibration.toml").read_text()))
