@@ -106,7 +106,11 @@ def _curve(system: RearAxle) -> tuple[Any, Any]:
     load = system.loads(SimpleNamespace(a_x=zero))[1]
     felt = share * load * system.wheelbase / (system.front_axle_to_cg * system.mass)
     u = SimpleNamespace(
-        a_y_smooth=felt * system.a_y_gain + system.a_y_offset, yaw_acceleration=zero, a_x=zero, v_x=zero
+        a_y_smooth=felt * system.a_y_gain + system.a_y_offset,
+        yaw_rate_smooth=zero,
+        yaw_acceleration=zero,
+        a_x=zero,
+        v_x=zero,
     )
     state: Any = SimpleNamespace(stiffening=zero)
     return system.slip_angle(state, u)[0], share
