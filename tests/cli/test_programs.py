@@ -274,7 +274,10 @@ def test_a_report_of_one_log_and_of_several(kept):
     places = [text.index(one) for one in [*words, "Rear axle"]]
     assert places == sorted(places)
     stiffness = content["fitted"]["stiffness"]
-    assert re.search(rf">stiffness</td><td[^>]*>{stiffness['value']:.1f}.*</td><td[^>]*>{stiffness['std']:.1f}", text)
+    # As many decimals as the standard error has in two figures.
+    value, std = stiffness["value"], stiffness["std"]
+    places = max(0, 1 - int(np.floor(np.log10(std))))
+    assert re.search(rf">stiffness</td><td[^>]*>{value:.{places}f}.*</td><td[^>]*>{std:.{places}f}", text)
     for name in ("sideslip_rmse_deg", "open_loop_sideslip_rmse_deg"):
         assert f">{content[name]:.4g}</td>" in text
     assert f">{100 * content['sideslip_coverage_95']:.1f} %</td>" in text
