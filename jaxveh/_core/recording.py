@@ -55,7 +55,8 @@ class Recording(eqx.Module):
                 k = int(np.argmax(steps <= 0))
                 raise InputError(
                     f"recording: time[{k + 1}] = {time[k + 1]} after time[{k}] = {time[k]}: must be strictly "
-                    "increasing. Sort the rows and drop repeated stamps first."
+                    "increasing. Two drives in one file? Cut them apart where time steps back; else sort the rows and drop "
+                    "repeated stamps."
                 )
 
     def __getitem__(self, name: str) -> jax.Array:

@@ -9,6 +9,9 @@ from jaxveh.diagnostics.log_findings import LogFinding, LogView
 GAP = 2.5
 """A step longer than this many usual steps is a gap."""
 
+SLOWEST = 2.0
+"""s between rows: nothing that a car does can be seen at such steps."""
+
 LONG = 10.0
 """s: a gap longer than this is hardly a sensor's."""
 
@@ -41,6 +44,9 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
         return [LogFinding("error", label, f"holds only {time.size} sample(s).", {"count": time.size})]
     steps = np.diff(time)
     usual = float(np.median(steps))
+    if usual >= SLOWEST:
+        message = f"steps by {usual:.4g} s: too slow for a car; it looks like milliseconds. Give time its unit in the channel map."
+        return [LogFinding("error", label, message, {"step": usual})]
     gaps = steps > GAP * usual
     jitter = float(np.std(steps[~gaps]) / usual)
     values = {"rate": 1 / usual, "jitter": jitter, "missing": missing, "samples": float(time.size)}

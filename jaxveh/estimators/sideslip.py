@@ -95,7 +95,7 @@ def calibrate(
         _check_measured(one, uses)
     fit = lambda **options: _fit(car, recordings, spans, filter or Extended(), uses, progress, options)
     found = fit()
-    late = a_y_delay(fitted_car(found, car), recordings) if isinstance(car, CarSpecification) else 0.0
+    late = a_y_delay(fitted_car(found, car), car, recordings) if isinstance(car, CarSpecification) else 0.0
     return fit(a_y_delay=late) if late else found
 
 

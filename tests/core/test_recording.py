@@ -77,7 +77,10 @@ def test_fill(method, max_gap, values, filled):
             lambda: Recording([0.0, 2.0, 1.0], {}),
             r"time\[2\] = 1\.0 after time\[1\] = 2\.0: must be strictly increasing",
         ),
-        (lambda: Recording([0.0, 1.0, 1.0], {}), r"Sort the rows and drop repeated stamps"),
+        (
+            lambda: Recording([0.0, 1.0, 1.0], {}),
+            r"Cut them apart where time steps back; else sort the rows and drop repeated stamps",
+        ),
         (lambda: make()["b"], r"unknown name\(s\) b; there are: a, true\.a"),
         (lambda: make().select(["x"]), r"select: unknown name\(s\) x"),
         (lambda: make().without("x"), r"without: unknown name\(s\) x"),

@@ -339,3 +339,44 @@ def test_the_shared_log():
         "steer_left",
         "steer_right",
     }
+
+
+def test_wheel_speeds_say_what_unit_the_speed_has(sound):
+    time, channels = sound
+    wheels = {f"wheel_speed_{at}": channels["v_x"] * 1.01 for at in ("fl", "fr", "rl", "rr")}
+    assert matching(findings(time, {**channels, **wheels}), "ok", "v_x", r"the wheels' speeds are 1\.01 times v_x")
+    fast = {**channels, **wheels, "v_x": 3.6 * channels["v_x"]}
+    assert matching(
+        findings(time, fast), "error", "v_x", r"the wheels' speeds are 0\.281 times v_x: v_x looks like km/h"
+    )
+    spins = {name: values / 0.31 for name, values in wheels.items()}
+    assert matching(findings(time, {**channels, **spins}), "warning", "v_x", "the wheels in rad/s or km/h")
+    # What the wheels confirm is not made wrong by an acceleration of another scale.
+    odd = findings(time, {**channels, **wheels, "a_y": channels["a_y"] / 3.6})
+    assert matching(odd, "warning", "v_x", "looks like km/h") and not matching(odd, "error", "v_x", "")
+
+
+def test_a_small_car_is_compared_at_its_own_speeds(sound):
+    time, channels = sound
+    small = dataclasses.replace(CAR, front_axle_to_cg=0.12, rear_axle_to_cg=0.15)
+    slow = {**channels, "v_x": 0.15 * channels["v_x"], "a_y": -0.15 * channels["a_y"]}
+    assert matching(findings(time, slow, small), "error", "a_y", "wrong sign")
+    assert not matching(findings(time, slow), "error", "a_y", "wrong sign")
+
+
+def test_pedals_and_cars_that_stand_raise_no_alarm(sound):
+    time, channels = sound
+    pedal = np.where(np.sin(0.4 * time) > 0, np.abs(np.sin(3 * time)), 0.0)
+    found = findings(time, {**channels, "throttle": pedal, "wheel_speed_fl": channels["v_x"] * (time > 20)})
+    for channel in ("throttle", "wheel_speed_fl"):
+        assert matching(found, "note", channel, "stands still")
+        assert not matching(found, "warning", channel, "")
+    parked = {name: np.where(time < 5, 0.0, values) for name, values in channels.items()}
+    assert not matching(findings(time, parked), "warning", "yaw_rate", "stands still")
+    moving = {**channels, "yaw_rate": np.where(time < 5, 0.0, channels["yaw_rate"])}
+    assert matching(findings(time, moving), "warning", "yaw_rate", "stands still")
+
+
+def test_time_in_milliseconds_is_an_error(sound):
+    time, channels = sound
+    assert matching(findings(1e3 * time, channels), "error", "time", "looks like milliseconds")
