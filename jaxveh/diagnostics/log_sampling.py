@@ -45,7 +45,7 @@ def _raster(label: str, time: np.ndarray, missing: float) -> list[LogFinding]:
     steps = np.diff(time)
     usual = float(np.median(steps))
     if usual >= SLOWEST:
-        message = f"steps by {usual:.4g} s: too slow for a car; it looks like milliseconds. Give time its unit in the channel map."
+        message = f"steps by {usual:.4g} s: no car is so slow; it looks like milliseconds. Say so in the channel map."
         return [LogFinding("error", label, message, {"step": usual})]
     gaps = steps > GAP * usual
     jitter = float(np.std(steps[~gaps]) / usual)
