@@ -265,7 +265,7 @@ def _source_in_words(choice: Choice, calibration: Any, reason: str | None) -> st
 def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.CarSpecification) -> dict[str, Any]:
     """Write one estimate, print its score, draw its figures: its numbers for the JSON file."""
     score = None if choice.truth is None else sideslip.score(car, found, job.parts.truth, choice.truth)
-    _write(choice, job, found)
+    _write(choice, job, found, car)
     if score is not None:
         rows = [(name, f"{value}" if isinstance(value, int) else number(value)) for name, value in score.items()]
         title = f"Score over the rows estimated of {job.drive.log.name}, by the names of the JSON file"
@@ -279,7 +279,7 @@ def _conclude(choice: Choice, job: Job, found: Any, calibration: Any, car: io.Ca
     return {**(score or {}), **shown}
 
 
-def _write(choice: Choice, job: Job, found: Any) -> None:
+def _write(choice: Choice, job: Job, found: Any, car: io.CarSpecification) -> None:
     """Write the estimate; into topics with what it was made of."""
     if job.product.suffix.lower() != MCAP_SUFFIX:
         io.write_frame(io.to_frame(found), job.product, overwrite=choice.force)
@@ -287,7 +287,7 @@ def _write(choice: Choice, job: Job, found: Any) -> None:
     seen = job.parts.truth
     topics = {"/estimate": io.to_frame(found), "/log": io.to_frame(seen)}
     if choice.truth is not None:
-        true = sideslip.truth_of(seen, choice.truth)
+        true = sideslip.truth_of(car, seen, choice.truth)
         units = {name: io.canonical_unit(name) or "" for name in true}
         topics["/truth"] = io.to_frame(Recording(seen.time, true, units, f"{choice.truth} of the log"))
     io.write_topics(topics, job.product, overwrite=choice.force)

@@ -22,7 +22,7 @@ def beside(car: CarSpecification, seen: Recording, truth: str | None) -> tuple[A
     if truth is None:
         return None, {}
     steered = "steer" in seen and np.isfinite(np.asarray(seen["steer"])).any()
-    return sideslip.truth_of(seen, truth), {OPEN_LOOP: sideslip.open_loop(car, seen)} if steered else {}
+    return sideslip.truth_of(car, seen, truth), {OPEN_LOOP: sideslip.open_loop(car, seen)} if steered else {}
 
 
 def draw(

@@ -77,19 +77,22 @@ def least_speed_of(car: CarSpecification) -> float:
     return sideslip.least_speed_of(car)
 
 
-def truth_of(seen: Recording, name: str) -> dict[str, np.ndarray]:
-    """What the truth channel, one of `SCORED`, says of the quantities that are shown, by name (T,)."""
-    v_x, values = np.asarray(seen["v_x"]), np.asarray(seen[name])
-    if name == "v_y":
-        return {"v_y": values, "sideslip": np.arctan2(values, v_x)}
-    return {"sideslip": values, "v_y": v_x * np.tan(values)}
+def _reference(seen: Recording, name: str) -> Recording:
+    """The log with the truth channel, one of `SCORED`, as its v_y, where that is measured."""
+    return seen if name == "v_y" else seen.replace(v_y=np.asarray(seen["v_x"]) * np.tan(np.asarray(seen[name])))
+
+
+def truth_of(car: CarSpecification, seen: Recording, name: str) -> dict[str, np.ndarray]:
+    """What the truth channel says of the quantities that are shown, by name (T,), at the centre of gravity as they are."""
+    v_x, v_y = np.asarray(seen["v_x"]), np.asarray(sideslip.at_centre(car, _reference(seen, name))["v_y"])
+    return {"v_y": v_y, "sideslip": np.arctan2(v_y, v_x)}
 
 
 def score(
     car: CarSpecification, found: filters.Estimate | filters.SmoothedEstimate, seen: Recording, name: str
 ) -> dict[str, float]:
     """RMSEs and the coverage of the 95 % band, next to the open-loop linear model's, by the names of the JSON file."""
-    return sideslip.score(car, found, seen.replace(v_y=truth_of(seen, name)["v_y"]))
+    return sideslip.score(car, found, _reference(seen, name))
 
 
 def open_loop(car: CarSpecification, seen: Recording) -> dict[str, np.ndarray]:

@@ -27,6 +27,7 @@ def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequ
     It is told by the `fitted` car, and else, since a fit may take a delay for a soft axle, by the car as it was `told`, if it is
     more than that could be wrong. A `JaxvehWarning` says so where there is one.
     """
+    recordings = [without_wild_values(one, told.wheelbase) for one in recordings]
     for car, softer in ((fitted, 0.0), (told, SOFTER)):
         usual = USUAL + softer * max(_lag(car, one) for one in recordings)
         seconds, error = _found(car, recordings)
@@ -38,7 +39,7 @@ def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequ
 
 def _found(car: CarSpecification, recordings: Sequence[Recording]) -> tuple[float, float]:
     """The delay by what a car makes of the yaw rate, and its standard error, s; nothing where it cannot be timed."""
-    found = [diagnostics.a_y_delay(without_wild_values(one, car.wheelbase), car) for one in recordings]
+    found = [diagnostics.a_y_delay(one, car) for one in recordings]
     sure = [one for one in found if one is not None and one.correlation > ALIKE and np.isfinite(one.error)]
     if not sure:
         return 0.0, 0.0

@@ -43,7 +43,8 @@ LONGEST_STILL = 0.5
 """s: a channel of a moving car that stays the same to the last digit for longer is stuck."""
 
 LONGEST_HOLD = 0.3
-"""s: for so long the last good acceleration and yaw rate stand for missing ones; later the car is taken to turn steadily."""
+"""s: for so long the last good acceleration and yaw rate stand for missing ones; later the car is taken to turn steadily,
+and, where the yaw rate is missing, lateral velocity to stay."""
 
 BLIND = (
     Need("v_x", "m/s", throughout=True),

@@ -82,7 +82,8 @@ class RearAxle(eqx.Module):
       the curve bends, `F / load = stiffness a / (1 + |stiffness a / grip|^shape)^(1 / shape)`, whose inverse has a closed form.
     - `asymmetry` (-): grip lost in left turns and gained in right ones.
     - `yaw_rate_offset` (rad/s), `a_y_gain` (-; roll makes it larger than one), `a_y_offset` (m/s^2): of the sensors.
-    - `sensor_x`, `sensor_y` (m): where the accelerometer sits, forward and left of the centre of gravity.
+    - `sensor_x`, `sensor_y` (m): where the accelerometer sits, forward and left of the centre of gravity. Its height is not
+      looked at: what a body that rolls adds is part of `a_y_gain`.
     - `a_y_delay` (s): by which a log's accelerometer is late; moves no state, is taken out before.
     - `drag` (N/(m/s)^2), `front_drive`, `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`, driving and braking
       by the front axle's shares, `ellipse` (-): how much of it counts, `sqrt(1 - (ellipse F_x / (grip load))^2)`.
@@ -145,7 +146,7 @@ class RearAxle(eqx.Module):
         )
 
     def specific_force(self, a_y, yaw_rate) -> Any:
-        """Lateral force over mass that there is below or beside the accelerometer, m/s^2, of what it says."""
+        """Lateral acceleration less gravity's share, m/s^2, on the car's centre line abreast of the accelerometer."""
         return (a_y - self.a_y_offset) / self.a_y_gain + self.sensor_y * yaw_rate**2
 
     def rolls(self, yaw_rate) -> Any:

@@ -21,12 +21,12 @@ from jaxveh.diagnostics import Score, score_band
 from jaxveh.estimators.alignment import a_y_delay, shift_a_y
 from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
 from jaxveh.estimators.coarse_log import coarse_logs
-from jaxveh.estimators.contract import Calibration, Need, check_needs, model_of, spans_of, start_of
+from jaxveh.estimators.contract import Calibration, Need, Span, check_needs, model_of, spans_of, start_of
 from jaxveh.estimators.front_axle import front_axle
 from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.live import Live
 from jaxveh.estimators.parameter_bands import smoothed_with_members
-from jaxveh.estimators.rear_axle import USUAL_WHEELBASE, RearAxle, rear_axle_model
+from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
 from jaxveh.estimators.rear_axle_prior import chosen_parameters as chosen_parameters
 from jaxveh.estimators.rear_axle_prior import rear_axle
@@ -99,12 +99,16 @@ def calibrate(
     return fit(a_y_delay=late) if late else found
 
 
-def _fit(car, recordings, spans, filter, uses, progress, options) -> Calibration:
+def _fit(
+    car: CarSpecification | RearAxle, recordings: Sequence[Recording], spans: tuple[Span, ...], filter: AbstractFilter,
+    uses: tuple[str, ...], progress: Progress, options: dict[str, float],
+) -> Calibration:  # fmt: skip
     """What `calibrate` returns, with options of `model`."""
     start = model(car, **options)
-    seen = [shift_a_y(_seen(one, uses), float(start.system.a_y_delay)) for one in recordings]
+    moved = [at_centre(car, one) if uses else one for one in (_seen(one, uses) for one in recordings)]
+    seen = [shift_a_y(one, float(start.system.a_y_delay)) for one in moved]
     logs = coarse_logs(seen, _wheelbase(start))
-    stood = offsets_at_standstill(seen, _wheelbase(start), USUAL_WHEELBASE)
+    stood = offsets_at_standstill(seen, _wheelbase(start))
     search = lambda logs, reference, progress: fit_rear_axle(filter, start, logs, reference, progress, stood)
     if not uses:
         return Calibration(NAME, search(logs, None, progress), spans, told=start_of(car, options))
@@ -159,6 +163,20 @@ def _blank(log: Recording, hidden: np.ndarray, channels: tuple[str, ...]) -> Rec
 
 def _reference(logs: Sequence[Recording], weight: float | None) -> Reference | None:
     return None if weight is None else Reference([reference_sideslip(log) for log in logs], weight)
+
+
+def at_centre(car: CarSpecification | RearAxle, recording: Recording) -> Recording:
+    """The recording with the `v_y` of a reference, m/s, moved to the centre of gravity from where the car's file says that it is
+    measured (`reference_position`): less that place's distance ahead times the yaw rate."""
+    ahead = _reference_ahead(car)
+    if not ahead:
+        return recording
+    return recording.replace(v_y=np.asarray(recording["v_y"]) - ahead * np.asarray(recording["yaw_rate"]))
+
+
+def _reference_ahead(car: CarSpecification | RearAxle) -> float:
+    place = car.reference_position if isinstance(car, CarSpecification) else None
+    return 0.0 if place is None else place[0]
 
 
 def reference_sideslip(recording: Recording) -> jax.Array:
@@ -243,7 +261,7 @@ def estimate(
 def live(
     source: Calibration | StateSpace | CarSpecification | RearAxle, *, filter: AbstractFilter | None = None, key=None
 ) -> Live:
-    """The same a row at a time, cleaning included."""
+    """The same a row at a time, cleaning included; a late accelerometer stays late, for what comes cannot be shifted."""
     one = model_of(NAME, source, model)
     return Live(filter or Extended(), one, RearAxleCleaning(_wheelbase(one)), key)
 
@@ -271,7 +289,7 @@ def score(
     """
     v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
     floor = least_speed_of(car) if least_speed is None else least_speed
-    ahead = (car.reference_position or (0.0, 0.0, 0.0))[0]
+    ahead = _reference_ahead(car)
     there = lambda v_y, turning: np.asarray(v_y) + (ahead * np.asarray(turning["yaw_rate"]) if ahead else 0.0)
     mean = there(found["v_y"], recording)
     fast = (v_x >= floor) & np.isfinite(mean)

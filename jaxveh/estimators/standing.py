@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.rear_axle import USUAL_WHEELBASE
 
 STANDING = 0.1
 """m/s, of a car of the usual wheelbase: slower, it stands."""
@@ -26,9 +27,9 @@ class Offsets(NamedTuple):
     a_y: float
 
 
-def offsets_at_standstill(recordings: Sequence[Recording], wheelbase: float, usual: float) -> Offsets | None:
-    """Medians over the rows at which the car stands, None where it hardly does. `wheelbase` and the `usual` one in m."""
-    floor = STANDING * (wheelbase / usual) ** 0.5
+def offsets_at_standstill(recordings: Sequence[Recording], wheelbase: float) -> Offsets | None:
+    """Medians over the rows at which the car stands, None where it hardly does. `wheelbase` in m."""
+    floor = STANDING * (wheelbase / USUAL_WHEELBASE) ** 0.5
     rows, seconds = [], 0.0
     for one in recordings:
         v_x, yaw_rate, a_y = (np.asarray(one[name], float) for name in ("v_x", "yaw_rate", "a_y"))

@@ -70,8 +70,9 @@ def rough(
 
     Along the road the one-sided density of its height is `roughness (n / 0.1)^-2` from `LONGEST` down to the `shortest` wave
     (m; tyres smooth out what is shorter than their contact). The waves' slants are Cauchy's with the scale `slant`, which makes
-    the coherence of two tracks that are w apart `exp(-2 pi slant n w)`: 0.6 for exp(-3.8 n w), about what measured roads have
-    (K. Bogsjo, Vehicle System Dynamics 46 S1 (2008) 587). `count` waves, evenly drawn over the wavenumber's logarithm.
+    the coherence of two tracks that are w apart `exp(-2 pi slant n w)`, the exponential law that is usual for parallel tracks;
+    the scale's default is ours: tracks 1.5 m apart are alike to a half in waves of 8 m. `count` waves, evenly drawn over the
+    wavenumber's logarithm; slants beyond 19 times the scale are left out.
 
     **Raises** `InputError` for an unknown class, or values out of range.
     """

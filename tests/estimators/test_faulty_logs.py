@@ -112,11 +112,11 @@ def test_a_car_that_stands_tells_its_offsets(monkeypatch):
         yaw_rate=said("yaw_rate", 0.004, 0.001),
         a_y=said("a_y", -0.6, 0.05),
     )
-    found = offsets_at_standstill([log, parked], CAR.wheelbase, 2.6)
+    found = offsets_at_standstill([log, parked], CAR.wheelbase)
     np.testing.assert_allclose(found, (0.004, -0.6), atol=0.01)
-    assert offsets_at_standstill([log], CAR.wheelbase, 2.6) is None
+    assert offsets_at_standstill([log], CAR.wheelbase) is None
     carried = parked.replace(yaw_rate=said("yaw_rate", 0.004, 0.3))
-    assert offsets_at_standstill([carried], CAR.wheelbase, 2.6) is None
+    assert offsets_at_standstill([carried], CAR.wheelbase) is None
     offset = lambda: float(estimators.sideslip.calibrate(CAR, parked.without("v_y")).model.system.yaw_rate_offset)
     told = offset()
     monkeypatch.setattr(estimators.sideslip, "offsets_at_standstill", lambda *arguments: None)

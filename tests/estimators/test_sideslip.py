@@ -124,6 +124,28 @@ def test_a_short_span_and_an_unknown_reference_are_refused():
         estimators.sideslip.calibrate(CAR, log(), uses=("course",))
 
 
+def test_a_reference_is_compared_and_supervises_where_the_file_says_that_it_is_measured(monkeypatch):
+    recording, ahead = log(), 1.5
+    elsewhere = recording.replace(v_y=np.asarray(recording["v_y"]) + ahead * np.asarray(recording["yaw_rate"]))
+    told = dataclasses.replace(CAR, reference_position=(ahead, 0.0, 0.0))
+    found = estimators.sideslip.estimate(CAR, recording.without("v_y"))
+    here, there = estimators.sideslip.score(CAR, found, recording), estimators.sideslip.score(told, found, elsewhere)
+    for name in ("v_y_rmse", "v_y_worst", "v_y_coverage_95", "rows"):
+        np.testing.assert_allclose(there[name], here[name], rtol=1e-9)
+    # What is left is the noise of the yaw rate that the reference was moved by.
+    assert there["open_loop_sideslip_rmse_deg"] < 0.02
+    assert estimators.sideslip.score(CAR, found, elsewhere)["open_loop_sideslip_rmse_deg"] > 0.2
+    moved = estimators.sideslip.at_centre(told, elsewhere)
+    np.testing.assert_allclose(moved["v_y"], recording["v_y"], atol=1e-12)
+    seen = []
+    monkeypatch.setattr(estimators.sideslip, "coarse_logs", lambda logs, wheelbase: seen.extend(logs) or 1 / 0)
+    for name, uses in (("v_y", ("v_y",)), ("sideslip", ("sideslip",))):
+        reference = {"sideslip": np.arctan2(elsewhere["v_y"], elsewhere["v_x"])} if name == "sideslip" else {}
+        with pytest.raises(ZeroDivisionError):
+            estimators.sideslip.calibrate(told, elsewhere.replace(**reference), uses=uses)
+        np.testing.assert_allclose(seen.pop()["v_y"], recording["v_y"], atol=1e-9)
+
+
 def test_estimates_the_sideslip_of_a_car_as_told_and_scores_it():
     recording = log()
     found = estimators.sideslip.estimate(CAR, recording.without("v_y"))
