@@ -305,7 +305,7 @@ def test_a_smoother_knows_more_than_a_filter():
     assert smooth < causal
 
 
-def test_bands_know_that_parameters_are_uncertain():
+def test_bands_know_that_parameters_are_uncertain(monkeypatch):
     fit = calibrated().fit
     models = parameter_bands.members(fit)
     line = np.stack(
@@ -319,4 +319,7 @@ def test_bands_know_that_parameters_are_uncertain():
     sure = estimators.sideslip.estimate(fit.model, recording)
     found = estimators.sideslip.estimate(calibrated(), recording)
     np.testing.assert_array_equal(found.mean.sideslip, sure.mean.sideslip)
-    assert np.mean(found.std.sideslip) > 1.2 * np.mean(sure.std.sideslip)
+    assert np.mean(found.std.sideslip) > 1.2 * parameter_bands.WIDER * np.mean(sure.std.sideslip)
+    monkeypatch.setattr(parameter_bands, "WIDER", 1.0)
+    plain = estimators.sideslip.estimate(calibrated(), recording)
+    np.testing.assert_allclose(found.std.sideslip, 1.75 * plain.std.sideslip, rtol=1e-9)
