@@ -387,6 +387,16 @@ def test_a_calibration_of_another_car_and_options_that_contradict_it(kept, tmp_p
     assert "is of another car: its mass is 1420.0, that of --vehicle 1421.0" in line
     assert "leave --as-told out" in error_line(run(*start, "--as-told"))
     assert "leave --calibrate out" in error_line(run(*start, "--calibrate", "0:25"))
+    both = (
+        "estimate",
+        kept / "drive.csv",
+        kept / "calibration.toml",
+        "--vehicle",
+        kept / "car.toml",
+        "-o",
+        tmp_path / "both",
+    )
+    assert "--calibrate is of one log" in error_line(run(*both, "--calibrate", "0:25"))
     assert "--vehicle is missing" in error_line(run("estimate", kept / "drive.csv", "-o", tmp_path / "e.csv"))
     assert "lies outside the log" in error_line(run(*start, "--span", "100:200"))
 
