@@ -371,6 +371,11 @@ def test_pedals_and_cars_that_stand_raise_no_alarm(sound):
     for channel in ("throttle", "wheel_speed_fl"):
         assert matching(found, "note", channel, "stands still")
         assert not matching(found, "warning", channel, "")
+    dropped = np.abs(np.sin(3 * time))
+    dropped[1000] = 9.0
+    found = findings(time, {**channels, "throttle": dropped, "oil": dropped})
+    assert matching(found, "note", "throttle", "spike") and not matching(found, "warning", "throttle", "")
+    assert matching(found, "warning", "oil", "spike")
     parked = {name: np.where(time < 5, 0.0, values) for name, values in channels.items()}
     assert not matching(findings(time, parked), "warning", "yaw_rate", "stands still")
     moving = {**channels, "yaw_rate": np.where(time < 5, 0.0, channels["yaw_rate"])}

@@ -75,6 +75,10 @@ def test_a_bump_under_a_wheel_compresses_its_tyre_alone(wheel):
     np.testing.assert_allclose(raised, expected, rtol=1e-3, atol=1e-6)
 
 
+def test_heights_are_measured_from_the_origin_where_a_car_begins():
+    assert [float(roads.rough("E", key).at(0.0, 0.0).height) for key in KEYS[:3]] == [0.0, 0.0, 0.0]
+
+
 def test_each_wheel_stands_on_its_own_height():
     uneven = roads.rough("C", KEYS[0])
     ground = roads.under(uneven, 12.0, 0.3, 0.2, CAR.wheel_positions)
