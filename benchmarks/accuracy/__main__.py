@@ -45,12 +45,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _logs(only: str, names_alone: bool) -> list[dict]:
-    from .logs import LOGS, read, settings
+    from .logs import ELSEWHERE, LOGS, read, settings
     from .measure import measure
-    from .report import show
+    from .report import criteria, show
 
     found = []
-    for name in LOGS:
+    for name in (*LOGS, *ELSEWHERE):
         log = read(name)
         wanted = [setting for setting in settings(log) if only in f"{name}, {setting.name}"]
         if names_alone:
@@ -59,6 +59,7 @@ def _logs(only: str, names_alone: bool) -> list[dict]:
         lines = [measure(log, setting) for setting in wanted]
         if lines:
             show(lines, f"{name}: sideslip")
+            print("\n".join(criteria(lines)))
         found += [line.numbers() for line in lines]
     return found
 
@@ -69,7 +70,7 @@ def _fleet(only: str, runs: int, seed: int) -> dict:
     from .fleet import fleet
     from .logs import settings
     from .measure import measure
-    from .report import show, summary
+    from .report import fleet_criteria, show, summary
 
     logs = fleet(runs, seed)
     found = {}
@@ -87,6 +88,8 @@ def _fleet(only: str, runs: int, seed: int) -> dict:
         worst = sorted((line for line in lines if not line.failed), key=lambda line: -line.over_open_loop)[:10]
         show(worst, f"fleet of {runs}, {name}: the ten worst")
         print("\n".join(f"  {key}: {value:.3g}" for key, value in about.items()))
+        if name == "itself, blind":
+            print("\n".join(fleet_criteria(about)))
         found[name] = {"summary": about, "lines": [line.numbers() for line in lines]}
     return found
 

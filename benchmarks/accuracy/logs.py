@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +19,10 @@ LOGS = {
     "F1TENTH": ("f1tenth_100hz.csv", "f1tenth.toml"),
 }
 """By name: the log, and the file of its car, in the folder of the shared data."""
+
+ELSEWHERE = {"AV-21 at its reference's point": ("AV-21", (0.69, 0.0, 0.0))}
+"""The same logs with another `reference_position` (m) than their car's file says: the AV-21's v_y is that of a point 1.94 m ahead
+of a rear axle that hardly slips (least squares of v_y / v_x on yaw_rate / v_x), 0.69 m ahead of the file's centre of gravity."""
 
 REFERENCE = "v_y"
 """The channel that no estimate sees, but for the settings with it."""
@@ -47,7 +52,11 @@ def folder() -> Path:
 
 
 def read(name: str) -> Log:
-    """A log of `LOGS`."""
+    """A log of `LOGS`, or of `ELSEWHERE`."""
+    if name in ELSEWHERE:
+        same, place = ELSEWHERE[name]
+        log = read(same)
+        return Log(name, dataclasses.replace(log.car, reference_position=place), log.recording)
     log, car = LOGS[name]
     return Log(name, io.read_car(folder() / car), io.read_recording(folder() / log))
 

@@ -71,3 +71,50 @@ def summary(lines: Sequence[Line]) -> dict[str, float]:
         "coverage_95_lowest_tenth": float(np.quantile([line.coverage_95 for line in done], 0.1)),
         "crps_over_constant_band": statistics.median(line.crps / line.crps_constant for line in done),
     }
+
+
+AT_MOST = {
+    "Genesis": ("over_open_loop_without_constant", 0.75),
+    "F1TENTH": ("over_open_loop", 0.6),
+    "AV-21 at its reference's point": ("over_open_loop", 0.6),
+}
+"""Of the open loop's error, by log."""
+
+COVERAGE = (0.88, 0.99)
+"""Of 95 % bands, of logs that estimate without having seen their reference."""
+
+SHARE = 1.02
+"""Of the error of what is simpler, the open loop and the car's file at its word."""
+
+
+def criteria(lines: Sequence[Line]) -> list[str]:
+    """What was asked of each blind line of a log, in words: whether it holds, the value and the bound."""
+    found = []
+    for line in lines:
+        if line.failed or "with" in line.setting:
+            continue
+        ratio = line.rmse / min(line.open_loop, line.as_told)
+        asked = [("error over the best of what is simpler", ratio, 0.0, SHARE)]
+        if line.log in AT_MOST:
+            name, most = AT_MOST[line.log]
+            asked.append((name.replace("_", " "), getattr(line, name), 0.0, most))
+        asked.append(("95 % band covers", line.coverage_95, *COVERAGE))
+        found += [f"{line.log}, {line.setting}: {_verdict(*one)}" for one in asked]
+    return found
+
+
+def fleet_criteria(about: dict[str, float]) -> list[str]:
+    """The same of a fleet's summary."""
+    if "over_open_loop_median" not in about:
+        return []
+    asked = (
+        ("median over open loop", about["over_open_loop_median"], 0.0, 0.5),
+        ("share worse than open loop", about["worse_than_open_loop"], 0.0, 0.02),
+        ("95 % band covers", about["coverage_95"], 0.92, 0.98),
+    )
+    return [f"fleet: {_verdict(*one)}" for one in asked]
+
+
+def _verdict(what: str, value: float, low: float, high: float) -> str:
+    bounds = f"at most {high:g}" if low == 0 else f"{low:g} to {high:g}"
+    return f"{what} {value:.3g} ({bounds}): {'holds' if low <= value <= high else 'FAILS'}"

@@ -14,6 +14,7 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
+from jaxveh.estimators.parameter_bands import Members
 from jaxveh.numerics import apart
 from jaxveh.statespace import AbstractFilter, Info, Row, StateSpace, kit
 
@@ -83,10 +84,12 @@ def _clean_rows(cleaning: AbstractCleaning, time: Any, values: dict[str, Any]) -
 
 
 class LiveBelief(NamedTuple):
-    """What a live estimator carries from row to row: the filter's belief, and the cleaning's memory."""
+    """What a live estimator carries from row to row: the filter's belief, the cleaning's memory, and the beliefs of the members
+    that the bands know of, if any."""
 
     belief: Any
     memory: Any
+    members: Any = None
 
 
 class LiveAnswer(NamedTuple):
@@ -107,6 +110,8 @@ class Live(eqx.Module):
         belief, answer = live.step(belief, t, {...})
         answer.mean.sideslip, answer.std.sideslip
 
+    Its bands know of the parameters' uncertainty where `members` stand for it (`parameter_bands`).
+
     Compiled once each. Inputs must be given; of measurements those that are not given, or NaN, are missing. Channels that the
     model does not read are not looked at. Where float32 rules, count time from the first row.
     """
@@ -115,6 +120,7 @@ class Live(eqx.Module):
     model: StateSpace
     cleaning: AbstractCleaning
     key: Any = None
+    members: Members | None = None
 
     def init(self, t, channels: Mapping[str, Any]) -> tuple[LiveBelief, LiveAnswer]:
         """The belief after the first row, and what it says.
@@ -143,15 +149,29 @@ class Live(eqx.Module):
 @eqx.filter_jit
 def _live_init(live: Live, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
     memory, values = apart(live.cleaning.first, row[0], *row)
-    belief, info = live.filter.init(live.model, _cleaned(live.model, row[0], values), live.key)
-    return LiveBelief(belief, memory), LiveAnswer(*belief.moments(live.model), info)
+    cleaned = _cleaned(live.model, row[0], values)
+    belief, info = live.filter.init(live.model, cleaned, live.key)
+    begin = lambda model: live.filter.init(model, cleaned, live.key)[0]
+    others = None if live.members is None else eqx.filter_vmap(begin)(live.members.models)
+    return LiveBelief(belief, memory, others), _answer(live, belief, others, info)
 
 
 @eqx.filter_jit
 def _live_step(live: Live, before: LiveBelief, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
     memory, values = apart(live.cleaning.next, row[0], before.memory, *row)
-    belief, info = live.filter.step(live.model, before.belief, _cleaned(live.model, row[0], values))
-    return LiveBelief(belief, memory), LiveAnswer(*belief.moments(live.model), info)
+    cleaned = _cleaned(live.model, row[0], values)
+    belief, info = live.filter.step(live.model, before.belief, cleaned)
+    go_on = lambda model, belief: live.filter.step(model, belief, cleaned)[0]
+    others = None if live.members is None else eqx.filter_vmap(go_on)(live.members.models, before.members)
+    return LiveBelief(belief, memory, others), _answer(live, belief, others, info)
+
+
+def _answer(live: Live, belief, others, info: Info) -> LiveAnswer:
+    mean, std = belief.moments(live.model)
+    if live.members is not None:
+        means, stds = eqx.filter_vmap(lambda model, belief: belief.moments(model))(live.members.models, others)
+        std = live.members.about(mean, means, stds)
+    return LiveAnswer(mean, std, info)
 
 
 def _cleaned(model: StateSpace, t, values: dict[str, Any]) -> Row:

@@ -1,5 +1,6 @@
 """What programs over the fits ask for."""
 
+from jaxveh.fitting.problem import in_units, on_line, scalar_parameters
 from jaxveh.fitting.rig_data import LEAST_NOISE
 from jaxveh.fitting.rig_ranges import measured_ranges, widened_ranges
 from jaxveh.fitting.rig_robust import FAR_RESIDUAL
@@ -14,7 +15,10 @@ __all__ = [
     "RIG_STARTS",
     "RigFacts",
     "cut_rows",
+    "in_units",
     "measured_ranges",
+    "on_line",
+    "scalar_parameters",
     "varying_inputs",
     "widened_ranges",
 ]

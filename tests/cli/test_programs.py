@@ -128,7 +128,7 @@ def test_gaps_of_an_input_are_filled_on_request_only(tmp_path, drive):
 
 def test_a_span_too_short_to_calibrate_on(tmp_path, drive):
     result, product = estimate(tmp_path, drive, "--calibrate", "0:2")
-    assert "must be at least 20 s" in error_line(result)
+    assert "must be at least 5 s" in error_line(result)
     assert not product.exists()
 
 

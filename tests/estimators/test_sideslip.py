@@ -118,8 +118,8 @@ def test_without_an_accelerometer_it_estimates_and_calibrates_nothing():
 
 
 def test_a_short_span_and_an_unknown_reference_are_refused():
-    with pytest.raises(InputError, match="at least 20 s"):
-        estimators.sideslip.calibrate(CAR, log(1000))
+    with pytest.raises(InputError, match="at least 5 s"):
+        estimators.sideslip.calibrate(CAR, log(400))
     with pytest.raises(InputError, match="uses"):
         estimators.sideslip.calibrate(CAR, log(), uses=("course",))
 
@@ -307,7 +307,7 @@ def test_a_smoother_knows_more_than_a_filter():
 
 def test_bands_know_that_parameters_are_uncertain(monkeypatch):
     fit = calibrated().fit
-    models = parameter_bands.members(fit)
+    models = parameter_bands.members_of_fit(fit).models
     line = np.stack(
         [np.asarray(p.domain.inverse(v)) for p, v in zip(fit.chosen, pick(models, fit.chosen), strict=True)], axis=1
     )
@@ -320,6 +320,26 @@ def test_bands_know_that_parameters_are_uncertain(monkeypatch):
     found = estimators.sideslip.estimate(calibrated(), recording)
     np.testing.assert_array_equal(found.mean.sideslip, sure.mean.sideslip)
     assert np.mean(found.std.sideslip) > 1.2 * parameter_bands.WIDER * np.mean(sure.std.sideslip)
+    causal = estimators.sideslip.estimate(calibrated(), recording.rows(slice(0, 300)), smoothed=False)
+    sure = estimators.sideslip.estimate(fit.model, recording.rows(slice(0, 300)), smoothed=False)
+    assert np.mean(causal.std.sideslip) > 1.2 * parameter_bands.WIDER * np.mean(sure.std.sideslip)
     monkeypatch.setattr(parameter_bands, "WIDER", 1.0)
     plain = estimators.sideslip.estimate(calibrated(), recording)
     np.testing.assert_allclose(found.std.sideslip, 1.75 * plain.std.sideslip, rtol=1e-9)
+
+
+def test_bands_of_a_car_at_its_word_are_as_wide_as_its_file_is_worth(monkeypatch):
+    """Where only the stiffness is not known, they are those of the stiffest and the softest car that the file may mean."""
+    recording = log(1500).without("v_y")
+    monkeypatch.setattr(estimators.sideslip, "SPREADS", dict.fromkeys(estimators.sideslip.SPREADS, 1e-4))
+    sure = estimators.sideslip.estimate(estimators.sideslip.model(CAR), recording)
+    known = estimators.sideslip.estimate(CAR, recording)
+    np.testing.assert_allclose(known.std.sideslip, sure.std.sideslip, rtol=1e-2)
+    monkeypatch.setitem(estimators.sideslip.SPREADS, "stiffness", 0.6)
+    found = estimators.sideslip.estimate(CAR, recording)
+    factors = np.exp([0.6, -0.6])
+    cars = [dataclasses.replace(CAR, rear_cornering_stiffness=f * CAR.rear_cornering_stiffness) for f in factors]
+    others = [estimators.sideslip.estimate(estimators.sideslip.model(car), recording) for car in cars]
+    variances = [one.std.sideslip**2 + (one.mean.sideslip - sure.mean.sideslip) ** 2 for one in others]
+    np.testing.assert_allclose(found.std.sideslip, np.sqrt(np.mean(variances, axis=0)), rtol=1e-2)
+    assert np.max(found.std.sideslip / np.asarray(sure.std.sideslip)) > 1.1
