@@ -80,7 +80,7 @@ class RearAxle(eqx.Module):
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m).
     - `stiffness` (1/rad): cornering stiffness over load; `grip` (-): largest lateral force over load; `shape` (-): how sharply
       the curve bends, `F / load = stiffness a / (1 + |stiffness a / grip|^shape)^(1 / shape)`, whose inverse has a closed form.
-    - `asymmetry` (-): grip lost in left turns and gained in right ones.
+    - `asymmetry` (-): grip lost in left turns and gained in right ones; none unless one says so, for it is not fitted.
     - `yaw_rate_offset` (rad/s), `a_y_gain` (-; roll makes it larger than one), `a_y_offset` (m/s^2): of the sensors.
     - `sensor_x`, `sensor_y` (m): where the accelerometer sits, forward and left of the centre of gravity. Its height is not
       looked at: what a body that rolls adds is part of `a_y_gain`.
