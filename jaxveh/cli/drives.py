@@ -17,6 +17,11 @@ from jaxveh.io import CarSpecification
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "cyan", "ok": "green"}
 
 
+UNLIKE, SURE = 1.25, 0.8
+"""Steers that are so many times as large against what one car needs, each with this correlation, are not of one car. Quarters of
+one log differ by up to 1.17 (three real logs), logs of different cars by 1.1 to 1.5: not all of them are told apart."""
+
+
 class Drive(NamedTuple):
     """A log's file, what of it is taken, and what `check` says of that."""
 
@@ -46,7 +51,26 @@ def read_drives(
         recording = fill_gaps(recording if wanted is None else recording.between(*wanted), fill)
         findings = _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)
         drives.append(Drive(log, recording, findings))
+    if not anyway:
+        _check_one_car(drives)
     return drives
+
+
+def _check_one_car(drives: Sequence[Drive]) -> None:
+    """Raise `InputError` where logs look like those of different cars, by what each steer is of what the car needs."""
+    scales = {}
+    for drive in drives:
+        for finding in drive.findings:
+            if "scale" in finding.values and finding.values["correlation"] > SURE:
+                scales[drive.log] = finding.values["scale"]
+    if len(scales) < 2:
+        return
+    small, large = min(scales, key=lambda log: scales[log]), max(scales, key=lambda log: scales[log])
+    if scales[large] > UNLIKE * scales[small]:
+        raise InputError(
+            f"{large}: looks like a log of another car than {small}: in gentle turns its steer is {scales[large]:.2f} times what "
+            f"the car of the file needs, there {scales[small]:.2f}. Take logs of one car; --anyway goes on."
+        )
 
 
 def _look_at(

@@ -254,6 +254,27 @@ def test_several_logs_go_into_a_folder_with_one_calibration(kept):
     assert "two logs would be written to drive.parquet" in error_line(twice)
 
 
+def test_logs_of_different_cars_are_refused(kept, tmp_path):
+    """The other one steers more for the same turn, as a longer car does; less than a check of one log would call an error."""
+    table = with_steer()
+    for factor, refused in ((1.15, False), (1.4, True)):
+        other = tmp_path / f"other_{factor}"
+        other.mkdir()
+        log = write_log(other, {**table, "steer": factor * table["steer"]})
+        log = log.rename(log.with_name("longer.csv"))
+        logs, calibration, out = (kept / "drive.csv", log), kept / "calibration.toml", other / "estimates"
+        result = run("estimate", *logs, "--calibration", calibration, "-o", out)
+        if not refused:
+            assert result.exit_code == 0, result.output
+            continue
+        line = error_line(result)
+        assert "longer.csv: looks like a log of another car than" in line and "drive.csv" in line and "--anyway" in line
+        assert not any(out.iterdir())
+        fitted = run("fit", *logs, "--vehicle", kept / "car.toml", "-o", tmp_path / "both.toml")
+        assert "looks like a log of another car" in error_line(fitted) and not (tmp_path / "both.toml").exists()
+        assert run("estimate", *logs, "--calibration", calibration, "-o", out, "--anyway").exit_code == 0
+
+
 def test_a_report_of_one_log_and_of_several(kept):
     pytest.importorskip("bokeh")
     start = ("--calibration", kept / "calibration.toml", "--span", "5:20", "--truth", "v_y")
