@@ -238,6 +238,8 @@ def print_fitted(calibration: Any) -> None:
         for name, one in sideslip.fitted_parameters(calibration)["fitted"].items()
     ]
     table("Fitted", ("parameter", "value ± std", "unit"), rows)
+    if (words := sideslip.untold_in_words(calibration)) is not None:
+        results().print(words)
 
 
 def _say_source(choice: Choice, calibration: Any, reason: str | None) -> None:

@@ -107,6 +107,7 @@ def fitted_parameters(calibration: Calibration | None) -> dict[str, Any]:
     tried = [{"weight": weight, "sideslip_rmse_deg": rmse} for weight, rmse in calibration.validation]
     return {
         "fitted": calibration.summary(),
+        "little_told": sideslip.little_told(calibration),
         "calibrated_on": [span._asdict() for span in calibration.spans],
         "reference_weight": calibration.weight,
         "validation_inside_span": tried,
@@ -120,6 +121,15 @@ def reference_in_words(calibration: Calibration, uses: tuple[str, ...]) -> str |
     if calibration.weight is None:
         return f"{uses[0]} was not used: the fit without it was the best on the second half of what was calibrated on."
     return f"{uses[0]} was followed to within {np.degrees(calibration.weight):.1f} degrees, which was best on the second half."
+
+
+def untold_in_words(calibration: Calibration) -> str | None:
+    """Of what the logs say little; None where they tell all."""
+    names = sideslip.little_told(calibration)
+    if not names:
+        return None
+    verb = "is" if len(names) == 1 else "are"
+    return f"The log says little of {', '.join(names)}: {verb} near what was taken for likely beforehand; the bands allow for it."
 
 
 def fitted_car(calibration: Calibration, car: CarSpecification, parts: Sequence[Recording]) -> CarSpecification:

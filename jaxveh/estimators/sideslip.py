@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, JaxvehWarning, check_one_of
+from jaxveh._core.parameter import pick, prior_spread
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Score, score_band
@@ -50,6 +51,9 @@ at its word, in medians; of 6 s, 0.7 (Ferrari) and 0.76 (Genesis), and no piece 
 
 TARGET_WEIGHTS = (0.05, 0.02)
 """rad: how closely the estimate is asked to follow a sideslip reference; the choice is made inside the span."""
+
+LITTLE = 0.8
+"""Of its prior standard deviation: a parameter that still has so much is one that was not told."""
 
 CURVE = 1.35
 """The Magic Formula's C in a fitted car's file."""
@@ -193,6 +197,19 @@ def _validate(filter, model, logs: Sequence[Recording], counted: Sequence[np.nda
         errors.append(np.degrees(error)[rows])
     error = np.concatenate(errors)
     return float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else float("inf")
+
+
+def little_told(source: Calibration) -> tuple[str, ...]:
+    """Names of the parameters of which the calibration's logs say little: their standard deviation is still `LITTLE` of what it
+    was beforehand, or more. They are near what the car's file says, or what is usual, and the bands allow for it."""
+    chosen = source.fit.chosen
+    prior = np.stack([np.asarray(one) for one in prior_spread(chosen, pick(source.model, chosen), SPREADS)])
+    left = np.sqrt(np.diag(np.asarray(source.fit.covariance)))
+    # A blind fit can know nothing of how the reference is turned, and is not asked.
+    asked = lambda name: name != "heading_offset" or source.weight is not None
+    return tuple(
+        p.name for p, one, old in zip(chosen, left, prior, strict=True) if one > LITTLE * old and asked(p.name)
+    )
 
 
 def fitted_car(

@@ -207,6 +207,8 @@ def test_fit_writes_the_calibration_the_car_and_its_curves(kept):
     found = estimators.read_calibration(kept / "calibration.toml")
     assert found.spans == (estimators.Span(0.0, 29.98, "drive.csv"),)
     assert read_json(kept / "fit.json")["calibrated_on"] == [{"start": 0.0, "end": 29.98, "log": "drive.csv"}]
+    told = read_json(kept / "fit.json")["little_told"]
+    assert "grip" in told and "stiffness" not in told
     fitted = io.read_car(kept / "fitted.toml")
     assert fitted.mass == 1420.0
     # The drive is the linear car's own.

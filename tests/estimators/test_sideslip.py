@@ -292,6 +292,17 @@ def test_a_calibration_finds_stiffnesses_that_the_file_does_not_know():
     assert errors[1] < 0.5 * errors[0]
 
 
+def test_what_a_log_hardly_tells_is_named():
+    found = estimators.sideslip.little_told(calibrated())
+    # It corners at 3 m/s^2, half a minute long: of the grip, the inertia and the height that is nothing; of the stiffness much.
+    assert {"grip", "yaw_inertia", "cg_height"} <= set(found)
+    assert not {"stiffness", "heading_offset", "a_y_offset"} & set(found)
+    sharp = dataclasses.replace(calibrated().fit, covariance=1e-6 * calibrated().fit.covariance)
+    assert estimators.sideslip.little_told(dataclasses.replace(calibrated(), fit=sharp)) == ()
+    with_reference = dataclasses.replace(calibrated(), weight=0.05)
+    assert "heading_offset" in estimators.sideslip.little_told(with_reference)
+
+
 def test_a_reference_is_used_only_where_it_helps_inside_the_span():
     calibration = estimators.sideslip.calibrate(CAR_TOLD, log(), uses=("v_y",))
     assert [weight for weight, _ in calibration.validation] == [None, 0.05, 0.02]
