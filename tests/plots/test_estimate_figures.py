@@ -180,11 +180,12 @@ def test_the_band_of_a_calibrated_curve_is_what_its_covariance_says():
     from jaxveh import Parameters
     from jaxveh._core.parameter import resolve
     from jaxveh.estimators import Calibration, Span
+    from jaxveh.fitting import Fit
 
     model = sideslip.model(CAR)
     chosen = resolve(model, lambda m: (m.system.stiffness,))
     z = jnp.log(model.system.stiffness)[None]
-    fit = sideslip.Fit(
+    fit = Fit(
         parameters=Parameters({"stiffness": model.system.stiffness}), parameters_std=Parameters({"stiffness": 0.0}),
         unconstrained=z, covariance=jnp.array([[0.05**2]]), cost=jnp.zeros(()), steps=jnp.zeros(()), result=jnp.zeros((), int),
         model=model, chosen=chosen,
