@@ -128,8 +128,8 @@ def untold_in_words(calibration: Calibration) -> str | None:
     names = sideslip.little_told(calibration)
     if not names:
         return None
-    verb = "is" if len(names) == 1 else "are"
-    return f"The log says little of {', '.join(names)}: {verb} near what was taken for likely beforehand; the bands allow for it."
+    they = "it is" if len(names) == 1 else "they are"
+    return f"What was logged says little of {', '.join(names)}: {they} near what was likely beforehand; bands allow for it."
 
 
 def fitted_car(calibration: Calibration, car: CarSpecification, parts: Sequence[Recording]) -> CarSpecification:

@@ -36,9 +36,6 @@ BEND = 0.05
 LARGEST_SLIP = 1.2
 """rad: no axle is taken to slide at more, where the tangent would run away."""
 
-ASYMMETRY_BEND = 0.03
-"""Slip angle (rad) over which the difference between left and right turns fades in, so that straight running is smooth."""
-
 LEAST_GRIP = 0.05
 """The square of the share of lateral grip that is left however large the longitudinal force."""
 
@@ -80,7 +77,6 @@ class RearAxle(eqx.Module):
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m).
     - `stiffness` (1/rad): cornering stiffness over load; `grip` (-): largest lateral force over load; `shape` (-): how sharply
       the curve bends, `F / load = stiffness a / (1 + |stiffness a / grip|^shape)^(1 / shape)`, whose inverse has a closed form.
-    - `asymmetry` (-): grip lost in left turns and gained in right ones; none unless one says so, for it is not fitted.
     - `yaw_rate_offset` (rad/s), `a_y_gain` (-; roll makes it larger than one), `a_y_offset` (m/s^2): of the sensors.
     - `sensor_x`, `sensor_y` (m): where the accelerometer sits, forward and left of the centre of gravity. Its height is not
       looked at: what a body that rolls adds is part of `a_y_gain`.
@@ -103,7 +99,6 @@ class RearAxle(eqx.Module):
     stiffness: jax.Array = positive("1/rad")
     grip: jax.Array = positive("-", default=1.0)
     shape: jax.Array = positive("-", default=2.0)
-    asymmetry: jax.Array = parameter("-", scale=0.03, default=0.0)
     yaw_rate_offset: jax.Array = parameter("rad/s", scale=0.005, default=0.0)
     a_y_gain: jax.Array = positive("-", default=1.03)
     a_y_offset: jax.Array = parameter("m/s^2", scale=0.2, default=0.0)
@@ -171,7 +166,7 @@ class RearAxle(eqx.Module):
         rest = 1 - used**self.shape
         angle = share / self.stiffness * (used / asked) * rest ** (-1 / self.shape)
         slope = rest ** (-1 - 1 / self.shape) / self.stiffness
-        softer = jnp.exp(-x.stiffening) * (1 - self.asymmetry * jnp.tanh(angle / ASYMMETRY_BEND))
+        softer = jnp.exp(-x.stiffening)
         return jnp.clip(angle * softer, -LARGEST_SLIP, LARGEST_SLIP), slope * softer / left
 
 

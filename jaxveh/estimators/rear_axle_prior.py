@@ -32,9 +32,10 @@ where cars stand, by some 0.015 rad, which an accelerometer cannot tell from its
 def chosen_parameters(model: Any):
     """The parameters and noise levels that a calibration fits.
 
-    Asymmetry, the ellipse, shares and drag are not among them: fitted, they took what only one span had. On real logs the rest
-    then erred 0.33 and 0.37 degrees (Ferrari, first 30 and 60 s), 0.25 and 0.31 without them; 5.9 and 3.7 (F1TENTH, 60 s); 31
-    simulated drives, and the Genesis, are indifferent; pieces of 12 s of the Ferrari preferred them (0.20, 0.24).
+    The ellipse, shares and drag are not among them, and there is no asymmetry: fitted, they took what only one span had. On real
+    logs the rest then erred 0.33 and 0.37 degrees (Ferrari, first 30 and 60 s), 0.25 and 0.31 without them; 5.9 and 3.7 (F1TENTH,
+    60 s), but 3.4 and 4.2 (30 s); 31 simulated drives, and the Genesis, are indifferent; pieces of 12 s of the Ferrari preferred
+    them (0.20, 0.24).
     """
     s, noise = model.system, model.process_noise.law.std
     axle = [s.stiffness, s.grip, s.shape]

@@ -21,6 +21,22 @@ def test_each_criterion_is_said_with_value_bound_and_verdict():
         assert [one.endswith("FAILS") for one in criteria([line(coverage_95=covered)])] == [False, False, True]
 
 
+def test_a_bound_may_be_one_settings_own():
+    said = criteria(
+        [
+            line(log="Ferrari", rmse=0.25),
+            line("reversed, blind", log="Ferrari", rmse=0.25),
+            line("as told", log="Ferrari"),
+        ]
+    )
+    assert [one for one in said if ": rmse " in one] == [
+        "Ferrari, forward, blind: rmse 0.25 (at most 0.24): FAILS",
+        "Ferrari, reversed, blind: rmse 0.25 (at most 0.33): holds",
+    ]
+    # A log that is named like the beginning of another's.
+    assert not any("open loop" in one for one in criteria([line("as told", log="AV-21")]))
+
+
 def test_what_failed_and_what_saw_its_reference_is_not_judged():
     assert criteria([line("forward, with v_y"), line(failed="too short")]) == []
 
