@@ -51,8 +51,12 @@ def reported_log(
         axle = plots.rear_axle_points(calibration or car, found, seen, least_speed=sideslip.least_speed_of(car))
     except InputError:
         axle = None
+    try:
+        innovations = plots.innovation_points(found)
+    except InputError:  # a filter without, or nothing measured
+        innovations = ()
     tables = () if score is None else (score_table(score),)
-    return plots.ReportedLog(drive.log.name, found, seen, true, others, axle, tables)
+    return plots.ReportedLog(drive.log.name, found, seen, true, others, axle, innovations, tables)
 
 
 def write_report(

@@ -17,7 +17,7 @@ from jaxveh.plots.frequency_responses import frequency_response
 from jaxveh.plots.friction_ellipse import friction_ellipse
 from jaxveh.plots.gradient_map import gradient_map
 from jaxveh.plots.handling import handling_diagram
-from jaxveh.plots.innovations import innovations
+from jaxveh.plots.innovations import InnovationPoints, innovation_points, innovations
 from jaxveh.plots.log_report import ReportedLog, log_report
 from jaxveh.plots.panels import overview
 from jaxveh.plots.parameters import parameters
@@ -35,6 +35,7 @@ __all__ = [
     "COLOURS",
     "AxlePoints",
     "ReportTable",
+    "InnovationPoints",
     "ReportedLog",
     "braking",
     "closeup",
@@ -45,6 +46,7 @@ __all__ = [
     "friction_ellipse",
     "gradient_map",
     "handling_diagram",
+    "innovation_points",
     "innovations",
     "kit",
     "loads",

@@ -2,17 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_positive
-from jaxveh.diagnostics import Consistency, chi_squared_band, nis_by_channel, whiteness
+from jaxveh.diagnostics import chi_squared_band, nis_by_channel, whiteness
 from jaxveh.plots.style import COLOURS, CYCLE, label_above, legend, new_figure, style
 
 FAINT = "#9a9a9a"
 LOWEST, HIGHEST = 1e-3, 1e2
 """Between which normalised innovations squared are shown, at most."""
+
+
+class InnovationPoints(NamedTuple):
+    """Of one measured channel, `name`, of T rows: normalised innovations squared, and their correlation from row to row.
+
+    `time` (s) and `squared` (T,), NaN where nothing was measured; `mean` (T,), over `seconds` around a row, NaN where less than
+    half of them was measured, and `low`, `high`: between which 95 % of such means are, if the spreads are right; `by_row`,
+    `by_sums`: means of squares and of `slow_squares`; both 1 where all is right. `lag` (L,), s, `correlation` and `band` (L,): of
+    normalised innovations so much later, and what 95 % stay within, if they are white.
+    """
+
+    name: str
+    time: np.ndarray
+    squared: np.ndarray
+    seconds: float
+    mean: np.ndarray
+    low: float
+    high: float
+    by_row: float
+    by_sums: float
+    lag: np.ndarray
+    correlation: np.ndarray
+    band: np.ndarray
 
 
 def innovations(estimate: Any, *, seconds: float = 1.0, lags: int = 100, figure: Any = None) -> Any:
@@ -24,63 +47,85 @@ def innovations(estimate: Any, *, seconds: float = 1.0, lags: int = 100, figure:
     rows, as behind a low-pass, are modelled as white noise that is larger row by row, and show as small squares, correlated,
     whose sums are right.
 
-    **Arguments**: `estimate`: an `Estimate`, or a smoother's, whose filter is looked at. `lags`: rows, at most a quarter of the
-    log. `figure`: where to draw.
-
-    **Returns** the figure. **Raises** `InputError` where nothing was measured, or spreads are not finite.
+    **Arguments**: as `innovation_points`. `figure`: where to draw. **Returns** the figure.
     """
-    check_positive("seconds", seconds, "s")
-    filtered = getattr(estimate, "filtered", estimate)
-    time = np.asarray(filtered.time, np.float64)
-    if time.size < 8:
-        raise InputError(f"plots.innovations: {time.size} rows are too few.")
-    channels = nis_by_channel(filtered)
-    found = whiteness(filtered, lags=min(lags, time.size // 4))
-    width = max(1, round(seconds / float(np.median(np.diff(time)))))
+    channels = innovation_points(estimate, seconds=seconds, lags=lags)
     with style():
         figure = new_figure(0.75 + 2.2 * len(channels)) if figure is None else figure
         axes = figure.subplots(len(channels), 2, sharex="col", squeeze=False, width_ratios=[3, 2])
-        for row, (name, one) in zip(axes, channels.items(), strict=True):
-            white = getattr(filtered.info.innovation, name) / getattr(filtered.info.innovation_std, name)
-            slow = slow_squares(np.asarray(white, np.float64), width)
-            _squared(row[0], time, name, one, slow, width, seconds)
-            _correlation(row[1], found, found.channels.index(name), float(np.median(np.diff(time))))
+        for row, one in zip(axes, channels, strict=True):
+            _squared(row[0], one)
+            _correlation(row[1], one)
         axes[-1, 0].set_xlabel("time [s]")
         axes[-1, 1].set_xlabel("lag [s]")
         legend(figure, axes)
     return figure
 
 
-def _squared(ax: Any, time: np.ndarray, name: str, found: Consistency, slow: float, width: int, seconds: float) -> None:
-    """One channel's normalised innovations squared, on a scale of powers of ten."""
-    squared = np.asarray(found.by_row)
-    known = np.isfinite(squared)
-    ax.plot(time[known], np.clip(squared[known], LOWEST, HIGHEST), ".", color=FAINT, markersize=1.2, label="a row")
-    count = np.convolve(known, np.ones(width), "same")
-    total = np.convolve(np.where(known, squared, 0.0), np.ones(width), "same")
-    enough = count >= width / 2
-    mean = np.where(enough, total / np.maximum(count, 1), np.nan)
+def innovation_points(estimate: Any, *, seconds: float = 1.0, lags: int = 100) -> tuple[InnovationPoints, ...]:
+    """What `innovations` draws, a measured channel each.
+
+    **Arguments**: `estimate`: an `Estimate`, or a smoother's, whose filter is looked at. `lags`: rows, at most a quarter of the
+    log. **Raises** `InputError` where nothing was measured, or spreads are not finite.
+    """
+    check_positive("seconds", seconds, "s")
+    filtered = getattr(estimate, "filtered", estimate)
+    time = np.asarray(filtered.time, np.float64)
+    if time.size < 8:
+        raise InputError(f"plots.innovations: {time.size} rows are too few.")
+    found = whiteness(filtered, lags=min(lags, time.size // 4))
+    step = float(np.median(np.diff(time)))
+    width = max(1, round(seconds / step))
     low, high = (edge / width for edge in chi_squared_band(width))
-    ax.axhspan(low, high, color=CYCLE[2], alpha=0.2, linewidth=0, label="95 % of means, if the spreads are right")
-    ax.plot(time, np.clip(mean, LOWEST, HIGHEST), color=CYCLE[0], linewidth=1.2, label=f"mean over {seconds:g} s")
+    channels = []
+    for name, one in nis_by_channel(filtered).items():
+        white = getattr(filtered.info.innovation, name) / getattr(filtered.info.innovation_std, name)
+        squared, index = np.asarray(one.by_row), found.channels.index(name)
+        correlation, band = (values[:, index, index] for values in (found.correlations, found.band))
+        channels.append(
+            InnovationPoints(
+                name, time, squared, seconds, _running_mean(squared, width), low, high, one.mean,
+                slow_squares(np.asarray(white, np.float64), width), found.lags * step, correlation, band,
+            )  # fmt: skip
+        )
+    return tuple(channels)
+
+
+def _running_mean(values: np.ndarray, width: int) -> np.ndarray:
+    """Over `width` rows, NaN where less than half of them are known."""
+    known = np.isfinite(values)
+    count = np.convolve(known, np.ones(width), "same")
+    total = np.convolve(np.where(known, values, 0.0), np.ones(width), "same")
+    return np.where(count >= width / 2, total / np.maximum(count, 1), np.nan)
+
+
+def _squared(ax: Any, one: InnovationPoints) -> None:
+    """One channel's normalised innovations squared, on a scale of powers of ten."""
+    known = np.isfinite(one.squared)
+    ax.plot(
+        one.time[known], np.clip(one.squared[known], LOWEST, HIGHEST), ".", color=FAINT, markersize=1.2, label="a row"
+    )
+    ax.axhspan(
+        one.low, one.high, color=CYCLE[2], alpha=0.2, linewidth=0, label="95 % of means, if the spreads are right"
+    )
+    mean = np.clip(one.mean, LOWEST, HIGHEST)
+    ax.plot(one.time, mean, color=CYCLE[0], linewidth=1.2, label=f"mean over {one.seconds:g} s")
     ax.axhline(1.0, color=COLOURS["truth"], linewidth=0.8)
     ax.set_yscale("log")
     ax.set_ylim(LOWEST, HIGHEST)
-    label_above(ax, f"normalised innovation squared of {name.replace('_', ' ')} [1]")
-    _write(ax, f"expected 1; mean {found.mean:.2g} by row, {slow:.2g} by {seconds:g} s")
+    label_above(ax, f"normalised innovation squared of {one.name.replace('_', ' ')} [1]")
+    _write(ax, f"expected 1; mean {one.by_row:.2g} by row, {one.by_sums:.2g} by {one.seconds:g} s")
 
 
-def _correlation(ax: Any, found: Any, channel: int, step: float) -> None:
+def _correlation(ax: Any, one: InnovationPoints) -> None:
     """One channel's correlation with itself so many rows later."""
-    lags, values = found.lags * step, found.correlations[:, channel, channel]
-    band = found.band[:, channel, channel]
-    ax.fill_between(lags, -band, band, color=CYCLE[2], alpha=0.2, linewidth=0)
-    ax.vlines(lags, 0.0, values, color=CYCLE[0], linewidth=1.3)
+    ax.fill_between(one.lag, -one.band, one.band, color=CYCLE[2], alpha=0.2, linewidth=0)
+    ax.vlines(one.lag, 0.0, one.correlation, color=CYCLE[0], linewidth=1.3)
     ax.axhline(0.0, color=COLOURS["truth"], linewidth=0.8)
-    reach = max(0.1, 1.15 * float(np.nanmax(np.abs(values))), 1.5 * float(np.nanmax(band)))
+    reach = max(0.1, 1.15 * float(np.nanmax(np.abs(one.correlation))), 1.5 * float(np.nanmax(one.band)))
     ax.set_ylim(-reach, reach)
     label_above(ax, "correlation of innovations [1]")
-    _write(ax, f"{100 * np.mean(np.abs(values) <= band):.0f} % of lags in the band")
+    _write(ax, f"{100 * np.mean(np.abs(one.correlation) <= one.band):.0f} % of lags in the band")
 
 
 def slow_squares(white: np.ndarray, width: int) -> float:

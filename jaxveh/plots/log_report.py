@@ -8,15 +8,16 @@ from typing import Any, NamedTuple
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
 from jaxveh.plots import report_page as html
+from jaxveh.plots.innovations import InnovationPoints
 from jaxveh.plots.rear_axles import AxlePoints
-from jaxveh.plots.report_charts import axle_chart, require_bokeh, row_step, time_charts
+from jaxveh.plots.report_charts import axle_chart, innovation_charts, require_bokeh, row_step, time_charts
 from jaxveh.plots.report_page import ReportTable
 
 
 class ReportedLog(NamedTuple):
     """One log of a report: its `name`; `estimate`, of sideslip, and `recording` with the same T rows; `truth`: names to (T,),
-    None without; `others`: labels to such, as in `plots.estimate`; `axle`: of `plots.rear_axle_points`, None without; `tables`,
-    which stand before its charts."""
+    None without; `others`: labels to such, as in `plots.estimate`; `axle`: of `plots.rear_axle_points`, None without;
+    `innovations`: of `plots.innovation_points`; `tables`, which stand before its charts."""
 
     name: str
     estimate: Any
@@ -24,13 +25,14 @@ class ReportedLog(NamedTuple):
     truth: Mapping[str, Any] | None = None
     others: Mapping[str, Mapping[str, Any]] = {}
     axle: AxlePoints | None = None
+    innovations: Sequence[InnovationPoints] = ()
     tables: Sequence[ReportTable] = ()
 
 
 def log_report(logs: Sequence[ReportedLog], *, title: str = "Sideslip", tables: Sequence[ReportTable] = ()) -> str:
     """The text of a page of HTML that holds all that it needs, and opens without a network: `tables`, then for each log its own
-    tables and charts of the estimate with bands of 50 and 95 %, the error, the channels, all over one time, and the rear axle's
-    curve; Bokeh is the extra `report`.
+    tables and charts of the estimate with bands of 50 and 95 %, the error, the channels, all over one time, the rear axle's
+    curve, and the filter's innovations; Bokeh is the extra `report`.
 
     Charts of more than `report_charts.MOST_ROWS` rows show each so manieth, and say so. Values are held in single precision.
 
@@ -53,6 +55,8 @@ def log_report(logs: Sequence[ReportedLog], *, title: str = "Sideslip", tables: 
         charts[f"time-{i}"] = time_charts(log.estimate, log.recording, log.truth, log.others)
         if log.axle is not None:
             charts[f"axle-{i}"] = axle_chart(log.axle)
+        for k, one in enumerate(log.innovations):
+            charts[f"innovation-{i}-{k}"] = innovation_charts(one)
     script, places = components(charts)
     head = Resources(mode="inline", components=["bokeh"], minified=True).render()
     parts = [html.table(one) for one in tables]
@@ -79,4 +83,15 @@ def _section(log: ReportedLog, index: int, places: Mapping[str, str]) -> list[st
     ]
     if f"axle-{index}" in places:
         parts += ["<h3>Rear axle: the curve and the points visited</h3>", places[f"axle-{index}"]]
+    if log.innovations:
+        parts += [
+            "<h3>Innovations: whether the filter's spreads fit what it met</h3>",
+            html.note(
+                "What the measurements say less what the filter expected, over the spread that it expected. Squared it is 1 on "
+                "average where spreads are right: row by row, or, where errors last for many rows and the filter takes them for "
+                "white noise that is larger, by sums (rows then say less than 1, and are correlated). Times far above the band "
+                "are those to look at in the charts above."
+            ),
+            *[places[f"innovation-{index}-{k}"] for k in range(len(log.innovations))],
+        ]
     return parts

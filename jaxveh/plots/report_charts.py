@@ -1,4 +1,5 @@
-"""Charts of a log and its estimate that one can zoom into, made with Bokeh: over one time, and the rear axle's curve."""
+"""Charts of a log and its estimate that one can zoom into, made with Bokeh: over one time, the rear axle's curve, and the
+innovations."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ from jaxveh._core.recording import Recording
 from jaxveh.io import kit
 from jaxveh.plots.closeup import CHANNELS
 from jaxveh.plots.estimates import BAND, HALF_BAND
+from jaxveh.plots.innovations import HIGHEST, LOWEST, InnovationPoints
 from jaxveh.plots.quantities import quantity
 from jaxveh.plots.rear_axles import AxlePoints
 from jaxveh.plots.style import COLOURS, CYCLE
@@ -23,6 +25,8 @@ MOST_POINTS = 6_000
 SHOWN = ("sideslip", "v_y")
 TOOLS = "xbox_zoom,box_zoom,xwheel_zoom,xwheel_pan,undo,reset,save"
 """A drag zooms in time: with a pan among them, Bokeh would take that. The overview's window is there to move."""
+FREE_TOOLS = "box_zoom,pan,wheel_zoom,undo,reset,save"
+"""Of charts that stand alone."""
 BANDS = ((BAND, 0.22, "95 % band"), (HALF_BAND, 0.4, "50 % band"))
 CHANNEL = "#444444"
 
@@ -214,7 +218,7 @@ def axle_chart(points: AxlePoints) -> Any:
     from bokeh.plotting import figure
 
     chart = figure(
-        height=420, width=860, tools="box_zoom,pan,wheel_zoom,undo,reset,save", x_axis_label="slip angle of the rear axle [°]",
+        height=420, width=860, tools=FREE_TOOLS, x_axis_label="slip angle of the rear axle [°]",
         y_axis_label="lateral force over load [1]", min_border_left=60,
     )  # fmt: skip
     chart.toolbar.logo = None
@@ -240,4 +244,40 @@ def axle_chart(points: AxlePoints) -> Any:
 
     chart.add_tools(HoverTool(renderers=[drawn], tooltips=[("slip angle", "@x{0.00} °"), ("force", "@y{0.000}")]))
     _legend(chart)
+    return chart
+
+
+def innovation_charts(points: InnovationPoints) -> Any:
+    """Bokeh's layout of a channel's normalised innovations squared over time, meaned, and their correlation from row to row."""
+    require_bokeh()
+    from bokeh.layouts import column
+    from bokeh.models import BoxAnnotation
+
+    words = points.name.replace("_", " ")
+    numbers = f"mean {points.by_row:.2g} by row, {points.by_sums:.2g} by sums of {points.seconds:g} s"
+    over_time = _small_chart(
+        f"normalised innovation squared of {words}, mean over {points.seconds:g} s [1]: {numbers}", "time [s]",
+        y_axis_type="log", y_range=(LOWEST, HIGHEST),
+    )  # fmt: skip
+    over_time.add_layout(BoxAnnotation(bottom=points.low, top=points.high, fill_color=CYCLE[2], fill_alpha=0.2))
+    rows = slice(None, None, row_step(points.time.size))
+    mean = np.clip(points.mean, LOWEST, HIGHEST)[rows].astype(np.float32)
+    drawn = over_time.line(points.time[rows], mean, color=CYCLE[0])
+    _hover(over_time, drawn, [("time", "@x{0.00} s"), ("mean", "@y{0.00}")])
+    over_lag = _small_chart(f"correlation of innovations of {words} [1]", "lag [s]")
+    lag, band = (values.astype(np.float32) for values in (points.lag, points.band))
+    over_lag.varea(lag, -band, band, color=CYCLE[2], alpha=0.2)
+    over_lag.segment(lag, 0.0 * lag, lag, points.correlation.astype(np.float32), color=CYCLE[0])
+    return column(over_time, over_lag, sizing_mode="stretch_width")
+
+
+def _small_chart(title: str, below: str, **more: Any) -> Any:
+    from bokeh.plotting import figure
+
+    chart = figure(
+        height=220, tools=FREE_TOOLS, title=_title(title), x_axis_label=below,
+        min_border_left=60, sizing_mode="stretch_width", **more,
+    )  # fmt: skip
+    chart.toolbar.logo = None
+    chart.axis.axis_label_text_font_style = "normal"
     return chart

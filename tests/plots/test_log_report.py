@@ -43,6 +43,15 @@ def axle():
     return plots.AxlePoints(slip, share, share - 0.1, share + 0.1, visited, np.tanh(20 * visited), turning)
 
 
+def innovation(rows=400):
+    time, lag = 100.0 + 0.01 * np.arange(rows), 0.01 * np.arange(1, 21)
+    squared = 1.0 + 0.9 * np.sin(7 * time)
+    mean = np.where(np.arange(rows) < 20, np.nan, 1.0 + 0.5 * np.sin(time))
+    return plots.InnovationPoints(
+        "slip_balance", time, squared, 1.0, mean, 0.7, 1.3, 1.01, 0.98, lag, np.exp(-lag), 0.1 + lag**2
+    )
+
+
 TABLE = plots.ReportTable(
     "Findings", ("severity", "what"), [("error", "a <b> & c"), ("note", "12.5")], "Small print.", (1,)
 )
@@ -50,7 +59,7 @@ TABLE = plots.ReportTable(
 
 @pytest.fixture(scope="module")
 def page():
-    return plots.log_report([reported(axle=axle())], title="A <drive>", tables=[TABLE])
+    return plots.log_report([reported(axle=axle(), innovations=[innovation()])], title="A <drive>", tables=[TABLE])
 
 
 class Tags(HTMLParser):
@@ -122,6 +131,11 @@ def test_the_page_holds_the_numbers_in_the_units_shown(page):
     ):  # fmt: skip
         assert holds(page, values)
     assert holds(page, log.estimate.time, "<f8", 0.0)
+    shown = innovation()
+    assert holds(page, shown.correlation) and holds(page, -shown.band)
+    assert any(
+        np.array_equal(one, shown.mean.astype(np.float32), equal_nan=True) for one in arrays(page, "<f4")
+    )
     assert not holds(page, np.degrees(log.estimate.mean.sideslip) + 1e-4)
 
 
@@ -212,7 +226,7 @@ def test_a_browser_without_a_network_draws_it(page, tmp_path):
     found = json.loads(written.group(1).replace("&quot;", '"'))
     assert found["errors"] == [] and found["asked"] == 0
     assert found["rows"] == 400 and (found["start"], found["end"]) == (100.0, pytest.approx(103.99))
-    assert found["plots"] == 10 and found["canvases"] >= 10 and found["zooms"] == ["width"] * 8
+    assert found["plots"] == 12 and found["canvases"] >= 12 and found["zooms"] == ["width"] * 8
     # The lower edge of the band of 95 %, which the browser reckons itself.
     log = reported()
     low = np.degrees(log.estimate.mean.sideslip - 1.959964 * log.estimate.std.sideslip)
