@@ -46,7 +46,10 @@ def read_drives(
     """
     drives = []
     for log in logs:
-        recording = io.read_recording(log, channels)
+        recording = io.with_road_steer(io.read_recording(log, channels), car)
+        if "steering_wheel" in recording and "steer" not in recording:
+            words = "note: steering_wheel is not used: the car's file has no steering_ratio."
+            results().print(f"{log.name}: {words}", markup=False, soft_wrap=True)
         wanted = options.span_of(span, float(recording.time[0]), float(recording.time[-1]), "--span")
         recording = fill_gaps(recording if wanted is None else recording.between(*wanted), fill)
         findings = _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)

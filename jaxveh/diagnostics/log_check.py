@@ -10,7 +10,7 @@ from jaxveh.diagnostics.log_samples import check_samples
 from jaxveh.diagnostics.log_sampling import check_sampling
 from jaxveh.diagnostics.log_signs import check_signs, check_units, check_wheel_speeds
 from jaxveh.diagnostics.log_steering import check_steering
-from jaxveh.io import CarSpecification
+from jaxveh.io import CarSpecification, with_road_steer
 
 CHECKS = (
     check_sampling,
@@ -29,11 +29,12 @@ def check_log(recording: Recording, *, car: CarSpecification | None = None) -> l
 
     **Arguments**: `recording` with channels of the usual names (`v_x`, `v_y`, `yaw_rate`, `a_x`, `a_y`, `steer`) in SI; what
     is missing is not checked. `car`: as `io.read_car` gives it; with it, scale and offset of the steering, delays
-    and understeer are held against a linear single track, without it against what is usual.
+    and understeer are held against a linear single track, without it against what is usual, and `steer` may be told by
+    `steering_wheel` and the file's ratio.
 
     Rates, jitter, gaps and missing samples; repeated, frozen and coarse values and spikes; magnitudes; signs and units
     by what channels must agree on; delays by cross-correlation; steering scale and offset; grip and the car's own numbers.
     Host side, in NumPy; nothing is changed. Simulated truth (`true.` channels) is not looked at.
     """
-    log = LogView.of(recording, car)
+    log = LogView.of(recording if car is None else with_road_steer(recording, car), car)
     return [finding for check in CHECKS for finding in check(log)]

@@ -1,4 +1,5 @@
-"""Accelerometers that speak late: found against the yaw rate, and taken out."""
+"""Sensors that speak late: an accelerometer, found against the yaw rate, and all that the car's file has a low-pass in; both taken
+out."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from jaxveh._core.errors import JaxvehWarning
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import kit as diagnostics
 from jaxveh.estimators.cleaning import without_wild_values
+from jaxveh.estimators.rear_axle import RearAxle
 from jaxveh.io import CarSpecification
 
 USUAL, SOFTER = 0.12, 0.7
@@ -63,13 +65,23 @@ def _warn(seconds: float, error: float) -> None:
     )
 
 
-def shift_a_y(recording: Recording, seconds: float) -> Recording:
-    """The recording with its a_y as it was said `seconds` later, sample by sample, so that what is stuck or missing stays so."""
-    if seconds == 0 or "a_y" not in recording:
-        return recording
-    time, a_y = np.asarray(recording.time, float), np.asarray(recording["a_y"])
+FELT = ("a_x", "a_y", "yaw_rate")
+"""Channels behind the low-pass that a car's file may have (`low_pass`)."""
+
+
+def on_time(recording: Recording, system: RearAxle) -> Recording:
+    """The recording with what the sensors said late where it belongs: all of `FELT` by the delay of their low-pass, a_y by its
+    own beside."""
+    low_pass, a_y = float(system.sensor_delay), float(system.a_y_delay)
+    late = {name: low_pass + (a_y if name == "a_y" else 0.0) for name in FELT if name in recording}
+    return recording.replace(**{name: _earlier(recording, name, by) for name, by in late.items() if by})
+
+
+def _earlier(recording: Recording, name: str, seconds: float) -> np.ndarray:
+    """A channel as it was said `seconds` later, sample by sample, so that what is stuck or missing stays so."""
+    time, values = np.asarray(recording.time, float), np.asarray(recording[name])
     wanted = time + seconds
     after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
     nearest = np.where(wanted - time[after - 1] < time[after] - wanted, after - 1, after)
     far = np.abs(time[nearest] - wanted) > np.median(np.diff(time))
-    return recording.replace(a_y=np.where(far, np.nan, a_y[nearest]).astype(a_y.dtype))
+    return np.where(far, np.nan, values[nearest]).astype(values.dtype)

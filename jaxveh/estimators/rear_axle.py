@@ -80,7 +80,8 @@ class RearAxle(eqx.Module):
     - `yaw_rate_offset` (rad/s), `a_y_gain` (-; roll makes it larger than one), `a_y_offset` (m/s^2): of the sensors.
     - `sensor_x`, `sensor_y` (m): where the accelerometer sits, forward and left of the centre of gravity. Its height is not
       looked at: what a body that rolls adds is part of `a_y_gain`.
-    - `a_y_delay` (s): by which a log's accelerometer is late; moves no state, is taken out before.
+    - `a_y_delay` (s): by which a log's accelerometer is late, and `sensor_delay`: by which it, a_x and the yaw rate are behind a
+      low-pass; they move no state, and are taken out before.
     - `drag` (N/(m/s)^2), `front_drive`, `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`, driving and braking
       by the front axle's shares, `ellipse` (-): how much of it counts, `sqrt(1 - (ellipse F_x / (grip load))^2)`.
     - `heading_offset` (rad): by which a reference for sideslip (an INS) is turned against the car; moves no state.
@@ -105,6 +106,7 @@ class RearAxle(eqx.Module):
     sensor_x: jax.Array = parameter("m", default=0.0)
     sensor_y: jax.Array = parameter("m", default=0.0)
     a_y_delay: jax.Array = parameter("s", default=0.0)
+    sensor_delay: jax.Array = parameter("s", default=0.0)
     drag: jax.Array = positive("N s^2/m^2", default=0.45)
     front_drive: jax.Array = parameter("-", scale=0.1, default=0.0)
     brake_share: jax.Array = parameter("-", scale=0.1, default=0.6)

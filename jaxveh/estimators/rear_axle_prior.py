@@ -7,6 +7,7 @@ from typing import Any
 from jaxveh._core.errors import InputError
 from jaxveh.estimators.rear_axle import USUAL_WHEELBASE, RearAxle
 from jaxveh.io import CarSpecification
+from jaxveh.sensors import LowPass
 from jaxveh.vehicles import GRAVITY
 
 CG_HEIGHT_SHARE = 0.19
@@ -64,8 +65,9 @@ def rear_axle(car: CarSpecification) -> RearAxle:
     told = {"drag": car.drag, "front_drive": car.front_drive, "brake_share": car.front_brake}
     usual = {"drag": 0.45 * size**2}
     sensor_x, sensor_y, _ = car.sensor_position or (0.0, 0.0, 0.0)
+    late = 0.0 if car.low_pass is None else LowPass(car.low_pass).delay
     return RearAxle(
-        sensor_x=sensor_x, sensor_y=sensor_y, mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=a, rear_axle_to_cg=b,
+        sensor_delay=late, sensor_x=sensor_x, sensor_y=sensor_y, mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=a, rear_axle_to_cg=b,
         cg_height=car.cg_height or CG_HEIGHT_SHARE * (a + b),
         stiffness=stiffness / load, grip=grip / load,
         force_noise=0.01 * time**0.5, slip_noise=0.001 * time**0.5, bank_time=15.0 * time, slip_time=2.0 * time,

@@ -19,7 +19,7 @@ from jaxveh._core.parameter import pick, prior_spread
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Score, score_band
-from jaxveh.estimators.alignment import a_y_delay, shift_a_y
+from jaxveh.estimators.alignment import a_y_delay, on_time
 from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
 from jaxveh.estimators.coarse_log import coarse_logs
 from jaxveh.estimators.contract import Calibration, Need, Span, check_needs, model_of, spans_of, start_of
@@ -32,7 +32,7 @@ from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
 from jaxveh.estimators.rear_axle_prior import SPREADS, chosen_parameters, rear_axle
 from jaxveh.estimators.standing import offsets_at_standstill
 from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
-from jaxveh.io import AxleTyre, CarSpecification
+from jaxveh.io import AxleTyre, CarSpecification, with_road_steer
 from jaxveh.statespace import Smoothing, StateSpace, kit
 from jaxveh.vehicles import GRAVITY, from_specification
 
@@ -110,8 +110,8 @@ def _fit(
 ) -> Calibration:  # fmt: skip
     """What `calibrate` returns, with options of `model`."""
     start = model(car, **options)
-    moved = [at_centre(car, one) if uses else one for one in (_seen(one, uses) for one in recordings)]
-    seen = [shift_a_y(one, float(start.system.a_y_delay)) for one in moved]
+    seen = [on_time(_seen(one, uses), start.system) for one in recordings]
+    seen = [at_centre(car, one) for one in seen] if uses else seen
     logs = coarse_logs(seen, _wheelbase(start))
     stood = offsets_at_standstill(seen, _wheelbase(start))
     search = lambda logs, reference, progress: fit_rear_axle(filter, start, logs, reference, progress, stood)
@@ -233,6 +233,7 @@ def fitted_car(
         rear_cornering_stiffness=stiffness,
     )
     recordings = [recording] if isinstance(recording, Recording) else recording
+    recordings = [with_road_steer(one, car) for one in recordings]
     steered = [one for one in recordings if _measured(one, "steer") and _measured(one, "a_y")]
     if not steered:
         return found
@@ -262,13 +263,13 @@ def estimate(
     filters allow for what a calibration does not know of the parameters, or a car's file (`parameter_bands`); a model is taken
     to be known. **Raises** as `run` and `clean` do.
 
-    An accelerometer that a calibration found to be late is shifted, where every row is estimated from all; what is said live must
-    do with it.
+    An accelerometer that a calibration found to be late is shifted, and so is all that the car's file has a `low_pass` in, where
+    every row is estimated from all; what is said live must do with it.
     """
     check_needs(NAME, needs, recording)
     one = model_of(NAME, source, model)
     if smoothed:
-        recording = shift_a_y(recording, float(one.system.a_y_delay))
+        recording = on_time(recording, one.system)
     used, log = filter or Extended(), clean(recording, RearAxleCleaning(_wheelbase(one)))
     gaussian = kit.smoothing_of(used) is Smoothing.gaussian
     members = _members(source, one) if gaussian else None
@@ -315,6 +316,7 @@ def score(
 
     **Raises** `InputError` where no row is left.
     """
+    recording = with_road_steer(recording, car)
     v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
     floor = least_speed_of(car) if least_speed is None else least_speed
     ahead = _reference_ahead(car)

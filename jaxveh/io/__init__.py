@@ -17,6 +17,7 @@ from jaxveh.io.property_file import PropertyFile, read_property_file, write_prop
 from jaxveh.io.recordings import SUFFIXES, read_recording, with_units_in_names, write_recording
 from jaxveh.io.rig_table import RigTable, read_rig_table
 from jaxveh.io.road import RoadSpecification, read_road, write_road
+from jaxveh.io.steering import with_road_steer
 from jaxveh.io.tydex import TydexFile, read_tydex
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "replacing_file",
     "resample",
     "to_frame",
+    "with_road_steer",
     "with_units_in_names",
     "write_car",
     "write_frame",

@@ -1,5 +1,6 @@
 """A log that goes wrong in each of nine ways: `check` names it, and where a repair is possible the estimate hardly suffers."""
 
+import dataclasses
 import functools
 import warnings
 
@@ -9,8 +10,8 @@ import test_sideslip
 from test_rear_axle import drive_of
 
 from benchmarks.accuracy.faults import FAULTS
-from jaxveh import diagnostics, estimators
-from jaxveh.estimators.alignment import shift_a_y
+from jaxveh import diagnostics, estimators, sensors
+from jaxveh.estimators.alignment import on_time
 from jaxveh.estimators.cleaning import without_wild_values
 from jaxveh.estimators.standing import offsets_at_standstill
 
@@ -84,9 +85,26 @@ def test_shifting_takes_samples_as_they_are():
     log, _ = sound()
     a_y = np.asarray(log["a_y"]).copy()
     a_y[500:520] = np.nan
-    moved = np.asarray(shift_a_y(log.replace(a_y=a_y), 0.2)["a_y"])
-    np.testing.assert_array_equal(moved[:-20], a_y[20:])
-    assert np.isnan(moved[-18:]).all()
+    late = lambda **named: dataclasses.replace(estimators.sideslip.model(CAR).system, **named)
+    moved = on_time(log.replace(a_y=a_y), late(a_y_delay=0.2))
+    np.testing.assert_array_equal(np.asarray(moved["a_y"])[:-20], a_y[20:])
+    assert np.isnan(np.asarray(moved["a_y"])[-18:]).all()
+    np.testing.assert_array_equal(moved["yaw_rate"], log["yaw_rate"])
+    moved = on_time(log.replace(a_y=a_y), late(a_y_delay=0.2, sensor_delay=0.1))
+    np.testing.assert_array_equal(np.asarray(moved["a_y"])[:-30], a_y[30:])
+    for name in ("yaw_rate", "a_x"):
+        np.testing.assert_array_equal(np.asarray(moved[name])[:-10], np.asarray(log[name])[10:])
+    np.testing.assert_array_equal(moved["v_x"], log["v_x"])
+
+
+def test_a_low_pass_of_the_cars_file_is_made_up_for():
+    log, _ = sound()
+    slow = sensors.low_pass(log, ("a_x", "a_y", "yaw_rate"), 0.5)
+    told = dataclasses.replace(CAR, low_pass=0.5)
+    silent, knowing = (estimators.sideslip.estimate(car, slow.without("v_y")) for car in (CAR, told))
+    score = lambda found: estimators.sideslip.score(CAR, found, log)["sideslip_rmse_deg"]
+    at_best = score(estimators.sideslip.estimate(CAR, log.without("v_y")))
+    assert score(knowing) < 1.05 * at_best and score(silent) > 1.8 * at_best
 
 
 def test_wild_and_stuck_values_are_missing_and_others_are_not():

@@ -2,7 +2,10 @@
 
 import dataclasses
 import functools
+import types
+from typing import NamedTuple
 
+import jax
 import numpy as np
 import pytest
 from shared_data import shared
@@ -11,6 +14,7 @@ from jaxveh import InputError, Recording, estimators, io, sensors, vehicles
 from jaxveh._core.parameter import pick
 from jaxveh.estimators import parameter_bands
 from jaxveh.estimators.cleaning import FORCE_CUTOFF
+from jaxveh.estimators.rear_axle_prior import rear_axle
 
 CAR = io.CarSpecification(
     mass=1420.0, yaw_inertia=2124.0, front_axle_to_cg=0.96, rear_axle_to_cg=1.59,
@@ -354,3 +358,50 @@ def test_bands_of_a_car_at_its_word_are_as_wide_as_its_file_is_worth(monkeypatch
     variances = [one.std.sideslip**2 + (one.mean.sideslip - sure.mean.sideslip) ** 2 for one in others]
     np.testing.assert_allclose(found.std.sideslip, np.sqrt(np.mean(variances, axis=0)), rtol=1e-2)
     assert np.max(found.std.sideslip / np.asarray(sure.std.sideslip)) > 1.1
+
+
+USED = {
+    **dict.fromkeys(
+        ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "rear_cornering_stiffness", "cg_height", "sensor_position",
+         "low_pass", "drag", "front_drive", "front_brake", "rear"), "estimate"),
+    **dict.fromkeys(("front_cornering_stiffness", "steer_offset", "reference_position", "steering_ratio"), "score"),
+    "front": "a linear car's stiffness is its B C D where it has none of its own",
+    "name": "a word",
+    **dict.fromkeys(("track_front", "track_rear"), "one track"),
+    **dict.fromkeys(("wheel_radius", "wheel_inertia", "rolling_resistance"), "wheels do not turn here"),
+    **dict.fromkeys(("front_tyre", "rear_tyre"), "of a wheel: nobody opens them before a car on four wheels is built"),
+}  # fmt: skip
+"""What of a car's file moves the estimate, or the score alone; and why the rest does neither."""
+
+
+class Found(NamedTuple):
+    """As much of an estimate as a score looks at."""
+
+    v_y: np.ndarray
+    std: types.SimpleNamespace
+
+    def __getitem__(self, name):
+        return getattr(self, name)
+
+
+@pytest.mark.parametrize("entry", dataclasses.fields(io.CarSpecification), ids=lambda entry: entry.name)
+def test_what_a_cars_file_says_is_used_or_named(entry):
+    plain = dataclasses.replace(CAR, rear=None, front=None)
+    other = {
+        "name": "another", "sensor_position": (0.1, 0.1, 0.0), "reference_position": (0.3, 0.0, 0.0), "front_tyre": "a.tir",
+        "rear_tyre": "a.tir", "front": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0), "rear": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0),
+        "front_drive": 0.7, "front_brake": 0.7, "steer_offset": 0.02, "rolling_resistance": 0.02,
+    }.get(entry.name, 1.07 * (getattr(plain, entry.name) or 10.0))  # fmt: skip
+    changed = dataclasses.replace(plain, **{entry.name: other})
+    leaves = lambda car: [float(leaf) for leaf in jax.tree.leaves(rear_axle(car))]
+    kind = "estimate" if leaves(changed) != leaves(plain) else "neither"
+    if kind == "neither":
+        time = np.arange(0.0, 2.0, 0.01)
+        wave, ones = np.sin(time), np.ones_like(time)
+        std = {"v_y": 0.1 * ones, "sideslip": 0.01 * ones}
+        found = Found(0.1 * wave, types.SimpleNamespace(**std))
+        steer = "steering_wheel" if entry.name == "steering_ratio" else "steer"
+        log = Recording(time, {"v_x": 20 * ones, "v_y": 0.2 * wave, steer: 0.02 * wave, "yaw_rate": 0.1 * wave})
+        score = lambda car: repr(estimators.sideslip.score(car, found, log))
+        kind = "score" if score(changed) != score(plain) else "neither"
+    assert USED[entry.name] == kind if kind != "neither" else USED[entry.name] not in ("estimate", "score")
