@@ -1,5 +1,4 @@
-"""Sensors that speak late: an accelerometer, found against the yaw rate, and all that the car's file has a low-pass in; both taken
-out."""
+"""Sensors that speak late, and are put right: an accelerometer, found against the yaw rate, and all behind a low-pass."""
 
 from __future__ import annotations
 

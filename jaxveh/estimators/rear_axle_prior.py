@@ -67,7 +67,8 @@ def rear_axle(car: CarSpecification) -> RearAxle:
     sensor_x, sensor_y, _ = car.sensor_position or (0.0, 0.0, 0.0)
     late = 0.0 if car.low_pass is None else LowPass(car.low_pass).delay
     return RearAxle(
-        sensor_delay=late, sensor_x=sensor_x, sensor_y=sensor_y, mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=a, rear_axle_to_cg=b,
+        sensor_delay=late, sensor_x=sensor_x, sensor_y=sensor_y,
+        mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=a, rear_axle_to_cg=b,
         cg_height=car.cg_height or CG_HEIGHT_SHARE * (a + b),
         stiffness=stiffness / load, grip=grip / load,
         force_noise=0.01 * time**0.5, slip_noise=0.001 * time**0.5, bank_time=15.0 * time, slip_time=2.0 * time,

@@ -97,8 +97,8 @@ class CarSpecification:
     Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
     `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`,
     `reference_position`: x, y, z in metres from the centre of gravity of the accelerometer and of a reference for sideslip.
-    `low_pass`: cutoff in hertz, of second order. `front_tyre`, `rear_tyre`: paths of the tyre property files of a wheel, which nobody opens before
-    a car on four wheels is built.
+    `low_pass`: cutoff in hertz, of second order. `front_tyre`, `rear_tyre`: paths of the tyre property files of a wheel, which
+    nobody opens before a car on four wheels is built.
 
     **Raises** `InputError` with name, value and allowed range for what no car has, such as a negative mass.
     """

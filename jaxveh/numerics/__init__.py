@@ -6,6 +6,7 @@ All are safe to jit, batch and differentiate.
 from jaxveh.numerics import polynomials, sigma_points
 from jaxveh.numerics.angles import wrap_angle
 from jaxveh.numerics.blocks import sum_in_blocks
+from jaxveh.numerics.by_batch import by_batch
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
 from jaxveh.numerics.fences import apart, fence, fence_blocks, fence_results
 from jaxveh.numerics.harmonics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
@@ -29,6 +30,7 @@ from jaxveh.numerics.sums import total
 from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
 from jaxveh.numerics.tangents import derivative_alone
 from jaxveh.numerics.triangular import lower_factor
+from jaxveh.numerics.written_out import scan_written_out
 
 __all__ = [
     "apart",
@@ -36,6 +38,7 @@ __all__ = [
     "arctan2",
     "band_harmonics",
     "barriers_hold",
+    "by_batch",
     "cauchy",
     "cholesky",
     "cos",
@@ -61,6 +64,7 @@ __all__ = [
     "on_cpu",
     "polynomials",
     "residual",
+    "scan_written_out",
     "secant",
     "sigma_points",
     "sin",

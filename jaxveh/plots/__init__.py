@@ -34,8 +34,8 @@ from jaxveh.plots.wheel_loads import loads
 __all__ = [
     "COLOURS",
     "AxlePoints",
-    "ReportTable",
     "InnovationPoints",
+    "ReportTable",
     "ReportedLog",
     "braking",
     "closeup",

@@ -82,12 +82,10 @@ def innovation_points(estimate: Any, *, seconds: float = 1.0, lags: int = 100) -
         white = getattr(filtered.info.innovation, name) / getattr(filtered.info.innovation_std, name)
         squared, index = np.asarray(one.by_row), found.channels.index(name)
         correlation, band = (values[:, index, index] for values in (found.correlations, found.band))
-        channels.append(
-            InnovationPoints(
-                name, time, squared, seconds, _running_mean(squared, width), low, high, one.mean,
-                slow_squares(np.asarray(white, np.float64), width), found.lags * step, correlation, band,
-            )  # fmt: skip
-        )
+        slow = slow_squares(np.asarray(white, np.float64), width)
+        mean = _running_mean(squared, width)
+        found_here = (name, time, squared, seconds, mean, low, high, one.mean, slow)
+        channels.append(InnovationPoints(*found_here, found.lags * step, correlation, band))
     return tuple(channels)
 
 

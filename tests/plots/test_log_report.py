@@ -133,9 +133,7 @@ def test_the_page_holds_the_numbers_in_the_units_shown(page):
     assert holds(page, log.estimate.time, "<f8", 0.0)
     shown = innovation()
     assert holds(page, shown.correlation) and holds(page, -shown.band)
-    assert any(
-        np.array_equal(one, shown.mean.astype(np.float32), equal_nan=True) for one in arrays(page, "<f4")
-    )
+    assert any(np.array_equal(one, shown.mean.astype(np.float32), equal_nan=True) for one in arrays(page, "<f4"))
     assert not holds(page, np.degrees(log.estimate.mean.sideslip) + 1e-4)
 
 

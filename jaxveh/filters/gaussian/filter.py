@@ -95,6 +95,7 @@ class AbstractRuleFilter(AbstractGaussianFilter):
     # No postponed annotations in this file: they would make a field of it.
     noise_by_row: ClassVar[bool] = True
     rows_between: ClassVar[bool] = True
+    written_out: ClassVar[bool] = True
     form: eqx.AbstractVar[AbstractForm]
 
     @property

@@ -1,0 +1,114 @@
+"""Two forms of one function: the one for a single call, the other for a batch of calls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import lax
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
+
+LEAST, BLOCK = 64, 256
+"""Calls of a batch at a time, at least and at most: what so many carry stays in a processor's own cache."""
+
+LANES = 8
+"""A block is so many times a whole number wide: what is left beside whole vectors is reckoned one by one."""
+
+
+def by_batch(single: Callable, many: Callable, *operands: Any) -> Any:
+    """`single(*operands)`; under `jax.vmap`, `many(*operands)` for each of the batch, in blocks of at most `BLOCK`.
+
+    Both are pure functions of pytrees, close over nothing that is traced, and give the same but for rounding: only what is
+    quickest differs. Where a single call is differentiated, in a batch or not, it is `single`; a batch that is differentiated
+    as a whole (a sum of many log-likelihoods) is `many`.
+    """
+    arrays, rest = eqx.partition(operands, eqx.is_array)
+    leaves, structure = jax.tree.flatten(arrays)
+    given = lambda some: eqx.combine(jax.tree.unflatten(structure, some), rest)
+    shapes: list[Any] = []
+
+    def flat(function):
+        def called(*some):
+            found, other = eqx.partition(function(*given(some)), eqx.is_array)
+            found, form = jax.tree.flatten(found)
+            shapes[:] = [(form, other)]
+            return found
+
+        return called
+
+    out = jax.eval_shape(flat(single), *leaves)
+    found = _by_batch.bind(*leaves, single=flat(single), many=flat(many), out=tuple((o.shape, o.dtype) for o in out))
+    form, other = shapes[0]
+    return eqx.combine(jax.tree.unflatten(form, found), other)
+
+
+def _batched(leaves, axes, *, single, many, out):
+    """`many` in blocks, one after the other; a last block that is not full repeats its last call."""
+    del single, out
+    size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
+    leaves = [leaf if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in zip(leaves, axes, strict=True)]
+    whole = jax.vmap(many, in_axes=[None if axis is None else 0 for axis in axes])
+    blocks, width = blocks_of(size)
+    if blocks == 1:
+        found = whole(*leaves)
+        return found, [0] * len(found)
+    fill = blocks * width - size
+
+    def cut(leaf):
+        leaf = jnp.concatenate([leaf, jnp.repeat(leaf[-1:], fill, axis=0)]) if fill else leaf
+        return leaf.reshape(blocks, width, *leaf.shape[1:])
+
+    def block(some):
+        some = iter(some)
+        return whole(*(leaf if axis is None else next(some) for leaf, axis in zip(leaves, axes, strict=True)))
+
+    moving = [cut(leaf) for leaf, axis in zip(leaves, axes, strict=True) if axis is not None]
+    joined = [one.reshape(blocks * width, *one.shape[2:]) for one in lax.map(block, moving)]
+    return [one[:size] if fill else one for one in joined], [0] * len(joined)
+
+
+def blocks_of(size: int) -> tuple[int, int]:
+    """How many blocks of how many calls a batch is taken in: without a rest where that goes, for which results are copied."""
+    fewest = -(-size // BLOCK)
+    if fewest == 1:
+        return 1, size
+    for blocks in range(fewest, size // LEAST + 1):
+        if size % blocks == 0 and size // blocks % LANES == 0:
+            return blocks, size // blocks
+    return fewest, -(-size // (fewest * LANES)) * LANES
+
+
+def _jvp(primals, tangents, *, single, many, out):
+    """Of what moves, by the form for a single call."""
+    del many, out
+    moves = [i for i, tangent in enumerate(tangents) if not isinstance(tangent, ad.Zero)]
+
+    def function(*some):
+        leaves = list(primals)
+        for i, leaf in zip(moves, some, strict=True):
+            leaves[i] = leaf
+        return single(*leaves)
+
+    values, slopes = jax.jvp(function, tuple(primals[i] for i in moves), tuple(tangents[i] for i in moves))
+    float0 = jax.dtypes.float0
+    no_slope = lambda value, slope: (
+        ad.Zero(jax.core.ShapedArray(value.shape, float0)) if slope.dtype == float0 else slope
+    )
+    return values, [no_slope(value, slope) for value, slope in zip(values, slopes, strict=True)]
+
+
+_by_batch = Primitive("jaxveh_by_batch")
+_by_batch.multiple_results = True
+_by_batch.def_impl(lambda *leaves, single, many, out: single(*leaves))
+_by_batch.def_abstract_eval(
+    lambda *avals, single, many, out: [jax.core.ShapedArray(shape, dtype) for shape, dtype in out]
+)
+mlir.register_lowering(
+    _by_batch, mlir.lower_fun(lambda *leaves, single, many, out: single(*leaves), multiple_results=True)
+)
+batching.primitive_batchers[_by_batch] = _batched
+ad.primitive_jvps[_by_batch] = _jvp
