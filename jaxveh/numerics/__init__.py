@@ -30,12 +30,13 @@ from jaxveh.numerics.sums import total
 from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
 from jaxveh.numerics.tangents import derivative_alone
 from jaxveh.numerics.triangular import lower_factor
-from jaxveh.numerics.written_out import scan_written_out
+from jaxveh.numerics.written_out import as_whole, scan_written_out
 
 __all__ = [
     "apart",
     "arctan",
     "arctan2",
+    "as_whole",
     "band_harmonics",
     "barriers_hold",
     "by_batch",

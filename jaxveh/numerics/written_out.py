@@ -23,6 +23,32 @@ CALLS = ("pjit", "jit", "closed_call", "core_call", "remat", "remat2", "checkpoi
 
 FENCES = ("jaxveh_fence", "optimization_barrier")
 
+WHOLE = "jaxveh_whole"
+"""Name of functions `as_whole`."""
+
+LONG = 1500
+"""Scalars from which on a function `as_whole` is left as it is: written out, it would compile for longer than it saves."""
+
+
+def as_whole(function: Callable) -> Callable:
+    """The function, which `scan_written_out` takes on whole arrays where it would be more than `LONG` scalars."""
+
+    def jaxveh_whole(*operands):
+        return function(*operands)
+
+    return jax.jit(jaxveh_whole)
+
+
+def scalars_of(program: Any) -> int:
+    """About how many scalars a jaxpr is, written out."""
+    jaxpr = program.jaxpr if hasattr(program, "jaxpr") else program
+    count = 0
+    for equation in jaxpr.eqns:
+        inner = [value for value in equation.params.values() if hasattr(value, "eqns") or hasattr(value, "jaxpr")]
+        count += scalars_of(inner[0]) if inner else sum(int(np.prod(one.aval.shape)) for one in equation.outvars)
+    return count
+
+
 PyTree = Any
 
 
@@ -86,6 +112,8 @@ def _results(equation: Any, operands: list[Entries]) -> list[Entries]:
     if name == "dot_general":
         return [rules.inner_products(params, operands, out[0])]
     if name in CALLS:
+        if params.get("name") == WHOLE and scalars_of(params["jaxpr"]) > LONG:
+            return _whole(equation, operands)
         return evaluate(params["jaxpr"], operands)
     if name in FENCES:
         return _fenced(operands)
@@ -187,5 +215,6 @@ def _whole(equation: Any, operands: list[Entries]) -> list[Entries]:
         constvars=[], invars=variables, outvars=list(equation.outvars), eqns=[equation], effects=equation.effects,
         debug_info=empty.debug_info.with_unknown_names(),
     )  # fmt: skip
-    found = core.jaxpr_as_fun(core.ClosedJaxpr(alone, []))(*arrays)
+    # Else each entry would be computed from the beginning, with all that it is made of.
+    found = lax.optimization_barrier(core.jaxpr_as_fun(core.ClosedJaxpr(alone, []))(*lax.optimization_barrier(arrays)))
     return [entries(one) for one in found]

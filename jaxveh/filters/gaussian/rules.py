@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh.numerics import sigma_points
+from jaxveh.numerics import as_whole, fence, sigma_points
 
 
 class Image(NamedTuple):
@@ -88,9 +88,9 @@ class Points(AbstractRule):
         dtype, points = mean.dtype, self.points
         root = jnp.asarray(np.sqrt(np.abs(points.covariance_weights)), dtype)
         steps = times(factor, jnp.asarray(points.directions, dtype))
-        values = f(mean[:, None] + steps)
+        values = fence(as_whole(f)(fence(mean[:, None] + steps)))
         average = times(values, jnp.asarray(points.mean_weights, dtype))
-        return Image(average, (values - average[:, None]) * root, steps * root, self._signs)
+        return Image(average, *fence(((values - average[:, None]) * root, steps * root)), self._signs)
 
 
 def times(a: Any, b: Any) -> Any:
