@@ -46,7 +46,7 @@ def read_drives(
     """
     drives = []
     for log in logs:
-        recording = io.with_road_steer(io.read_recording(log, channels), car)
+        recording = io.with_road_steer(car, io.read_recording(log, channels))
         if "steering_wheel" in recording and "steer" not in recording:
             words = "note: steering_wheel is not used: the car's file has no steering_ratio."
             results().print(f"{log.name}: {words}", markup=False, soft_wrap=True)

@@ -36,5 +36,5 @@ def check_log(recording: Recording, *, car: CarSpecification | None = None) -> l
     by what channels must agree on; delays by cross-correlation; steering scale and offset; grip and the car's own numbers.
     Host side, in NumPy; nothing is changed. Simulated truth (`true.` channels) is not looked at.
     """
-    log = LogView.of(recording if car is None else with_road_steer(recording, car), car)
+    log = LogView.of(recording if car is None else with_road_steer(car, recording), car)
     return [finding for check in CHECKS for finding in check(log)]

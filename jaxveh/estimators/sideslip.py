@@ -233,7 +233,7 @@ def fitted_car(
         rear_cornering_stiffness=stiffness,
     )
     recordings = [recording] if isinstance(recording, Recording) else recording
-    recordings = [with_road_steer(one, car) for one in recordings]
+    recordings = [with_road_steer(car, one) for one in recordings]
     steered = [one for one in recordings if _measured(one, "steer") and _measured(one, "a_y")]
     if not steered:
         return found
@@ -316,7 +316,7 @@ def score(
 
     **Raises** `InputError` where no row is left.
     """
-    recording = with_road_steer(recording, car)
+    recording = with_road_steer(car, recording)
     v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
     floor = least_speed_of(car) if least_speed is None else least_speed
     ahead = _reference_ahead(car)

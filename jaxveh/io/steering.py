@@ -8,7 +8,7 @@ from jaxveh._core.recording import Recording
 from jaxveh.io.car import CarSpecification
 
 
-def with_road_steer(recording: Recording, car: CarSpecification) -> Recording:
+def with_road_steer(car: CarSpecification, recording: Recording) -> Recording:
     """The recording with `steer` (rad, at the road wheels): its own, else `steering_wheel` over the `steering_ratio` of the car's
     file; as it is where neither is known."""
     if "steer" in recording or "steering_wheel" not in recording or car.steering_ratio is None:

@@ -39,13 +39,13 @@ def of_list(items: Sequence[Any], shape: tuple[int, ...]) -> Entries:
     return found.reshape(shape)
 
 
-def listed(several: Iterable[Entries]) -> list[Any]:
+def entry_list(several: Iterable[Entries]) -> list[Any]:
     """The entries of several arrays, one after the other."""
     return [entry for one in several for entry in one.reshape(-1)]
 
 
 def split(items: Sequence[Any], shapes: Sequence[tuple[int, ...]]) -> list[Entries]:
-    """The inverse of `listed`."""
+    """The inverse of `entry_list`."""
     found, start = [], 0
     for shape in shapes:
         size = math.prod(shape)
@@ -54,7 +54,7 @@ def split(items: Sequence[Any], shapes: Sequence[tuple[int, ...]]) -> list[Entri
     return found
 
 
-def traced(entry: Any, dtype: Any) -> Array:
+def scalar_of(entry: Any, dtype: Any) -> Array:
     """An entry as a scalar of JAX."""
     return jnp.asarray(entry, dtype) if is_known(entry) else entry
 
@@ -62,7 +62,7 @@ def traced(entry: Any, dtype: Any) -> Array:
 def array_of(those: Entries, dtype: Any) -> Array:
     """The array of these entries."""
     if not those.shape:
-        return traced(those[()], dtype)
+        return scalar_of(those[()], dtype)
     if not those.size:
         return jnp.zeros(those.shape, dtype)
-    return jnp.stack([traced(entry, dtype) for entry in those.reshape(-1)]).reshape(those.shape)
+    return jnp.stack([scalar_of(entry, dtype) for entry in those.reshape(-1)]).reshape(those.shape)

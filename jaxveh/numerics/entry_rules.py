@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from jaxveh.numerics.entries import Entries, entries, is_known, of_list, traced
+from jaxveh.numerics.entries import Entries, entries, is_known, of_list, scalar_of
 
 ELEMENTWISE = frozenset((
     "abs", "acos", "add", "add_any", "and", "asin", "atan", "atan2", "bitcast_convert_type", "cbrt", "ceil", "clamp",
@@ -23,29 +25,33 @@ ELEMENTWISE = frozenset((
 """Primitives of one result whose entries depend on the operands' at the same place alone."""
 
 REDUCTIONS = {
-    "reduce_sum": lax.add_p, "reduce_max": lax.max_p, "reduce_min": lax.min_p, "reduce_prod": lax.mul_p, "reduce_and": lax.and_p,
-    "reduce_or": lax.or_p,
+    "reduce_sum": ("add", lax.add), "reduce_max": ("max", lax.max), "reduce_min": ("min", lax.min),
+    "reduce_prod": ("mul", lax.mul), "reduce_and": ("and", lax.bitwise_and), "reduce_or": ("or", lax.bitwise_or),
 }  # fmt: skip
+"""By name, what two entries are combined by, and how."""
 
 
 def elementwise(primitive: Any, params: dict[str, Any], operands: list[Entries], out: Any) -> Entries:
     """An elementwise primitive, entry by entry."""
     wide = [np.broadcast_to(one, out.shape) for one in operands]
-    found = [one_entry(primitive, params, [one[index] for one in wide], out.dtype) for index in np.ndindex(out.shape)]
+    bind = functools.partial(primitive.bind, **params)
+    found = [
+        one_entry(primitive.name, bind, [one[index] for one in wide], out.dtype) for index in np.ndindex(out.shape)
+    ]
     return of_list(found, out.shape)
 
 
-def one_entry(primitive: Any, params: dict[str, Any], operands: list[Any], dtype: Any) -> Any:
+def one_entry(name: str, bind: Callable, operands: list[Any], dtype: Any) -> Any:
     """One entry. What is known is reckoned here; sums with zero and products with one and zero are none.
 
     So a matrix that is triangular costs what its lower half costs. A product of zero and NaN is zero here.
     """
-    simple = _simplified(primitive.name, operands, dtype)
+    simple = _simplified(name, operands, dtype)
     if simple is not None:
         return simple
     like = next((one.dtype for one in operands if not is_known(one)), None)
     wanted = [getattr(one, "dtype", like) for one in operands]
-    return primitive.bind(*(traced(one, kind) for one, kind in zip(operands, wanted, strict=True)), **params)
+    return bind(*(scalar_of(one, kind) for one, kind in zip(operands, wanted, strict=True)))
 
 
 def _simplified(name: str, operands: list[Any], dtype: Any) -> Any:
@@ -77,17 +83,17 @@ _ON_NUMBERS: dict[str, Callable] = {
 }  # fmt: skip
 
 
-def reduction(combine: Any, axes: tuple[int, ...], operand: Entries, out: Any) -> Entries:
+def reduction(name: str, axes: tuple[int, ...], operand: Entries, out: Any) -> Entries:
     """A reduction, from the first entry to the last."""
     if not axes:
         return operand
     first = np.moveaxis(operand, axes, range(len(axes)))
-    columns = first.reshape(-1, *out.shape)
+    columns = first.reshape(math.prod(operand.shape[axis] for axis in axes), *out.shape)
     found = []
     for index in np.ndindex(out.shape):
         total, *rest = (columns[(k, *index)] for k in range(len(columns)))
         for entry in rest:
-            total = one_entry(combine, {}, [total, entry], out.dtype)
+            total = one_entry(*REDUCTIONS[name], [total, entry], out.dtype)
         found.append(total)
     return of_list(found, out.shape)
 
@@ -95,18 +101,17 @@ def reduction(combine: Any, axes: tuple[int, ...], operand: Entries, out: Any) -
 def inner_products(params: dict[str, Any], operands: list[Entries], out: Any) -> Entries:
     """A `dot_general`, term by term."""
     (contracted_a, contracted_b), (batch_a, batch_b) = params["dimension_numbers"]
-    first = lambda one, batch, last: _ordered(one, batch, last)
-    a, b = first(operands[0], batch_a, contracted_a), first(operands[1], batch_b, contracted_b)
+    a, b = _ordered(operands[0], batch_a, contracted_a), _ordered(operands[1], batch_b, contracted_b)
     found = []
     for batch in range(a.shape[0]):
         for i in range(a.shape[1]):
             for j in range(b.shape[1]):
                 terms = [
-                    one_entry(lax.mul_p, {}, [x, y], out.dtype) for x, y in zip(a[batch, i], b[batch, j], strict=True)
+                    one_entry("mul", lax.mul, [x, y], out.dtype) for x, y in zip(a[batch, i], b[batch, j], strict=True)
                 ]
                 total, *rest = terms
                 for term in rest:
-                    total = one_entry(lax.add_p, {}, [total, term], out.dtype)
+                    total = one_entry("add", lax.add, [total, term], out.dtype)
                 found.append(total)
     return of_list(found, out.shape)
 
@@ -114,7 +119,7 @@ def inner_products(params: dict[str, Any], operands: list[Entries], out: Any) ->
 def _ordered(one: Entries, batch: tuple[int, ...], last: tuple[int, ...]) -> Entries:
     """Axes of the batch, the others, and those that are summed over, each flattened to one."""
     others = [axis for axis in range(one.ndim) if axis not in batch and axis not in last]
-    size = lambda axes: int(np.prod([one.shape[axis] for axis in axes], dtype=int))
+    size = lambda axes: math.prod(one.shape[axis] for axis in axes)
     return one.transpose(*batch, *others, *last).reshape(size(batch), size(others), size(last))
 
 

@@ -6,6 +6,7 @@ matrices it takes one by one. 1000 unscented filters of three states then take a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -16,7 +17,8 @@ from jax import lax
 from jax.extend import core
 
 from jaxveh.numerics import entry_rules as rules
-from jaxveh.numerics.entries import Entries, array_of, entries, is_known, listed, split, traced
+from jaxveh.numerics.entries import Entries, array_of, entries, entry_list, is_known, scalar_of, split
+from jaxveh.numerics.fences import fence
 
 CALLS = ("pjit", "jit", "closed_call", "core_call", "remat", "remat2", "checkpoint")
 """Primitives that run a program of their own once."""
@@ -69,17 +71,21 @@ def scan_written_out(body: Callable, start: PyTree, rows: PyTree) -> tuple[PyTre
         after = zip(found[: len(inner)], inner, strict=True)
         shown = zip(found[len(inner) :], outer, strict=True)
         # What the next row reads is computed once.
-        after = _fenced([np.vectorize(lambda e, d=one.dtype: traced(e, d), otypes="O")(those) for those, one in after])
-        return listed(after), [traced(entry, one.dtype) for those, one in shown for entry in those.reshape(-1)]
+        after = _fenced(
+            [np.vectorize(lambda e, d=one.dtype: scalar_of(e, d), otypes="O")(those) for those, one in after]
+        )
+        return entry_list(after), [scalar_of(entry, one.dtype) for those, one in shown for entry in those.reshape(-1)]
 
-    first = [traced(entry, leaf.dtype) for leaf in carried for entry in entries(leaf).reshape(-1)]
+    first = [scalar_of(entry, leaf.dtype) for leaf in carried for entry in entries(leaf).reshape(-1)]
     last, columns = lax.scan(jax.checkpoint(scalars, prevent_cse=False), first, rows)
     end = [array_of(those, one.dtype) for those, one in zip(split(last, [o.shape for o in inner]), inner, strict=True)]
-    shown, at = [], 0
-    for one in outer:
-        some = columns[at : at + int(np.prod(one.shape, dtype=int))]
-        at += len(some)
-        shown.append(jnp.stack(some, axis=1).reshape(len(some[0]), *one.shape) if one.shape else some[0])
+    count = len(jax.tree.leaves(rows)[0])
+    shown = [
+        jnp.stack(some.tolist(), axis=1).reshape(count, *one.shape)
+        if some.size
+        else jnp.zeros((count, *one.shape), one.dtype)
+        for some, one in zip(split(columns, [(math.prod(o.shape),) for o in outer]), outer, strict=True)
+    ]
     carry, stacked = jax.tree.unflatten(jax.tree.structure(shapes), [*end, *shown])
     return jax.tree.unflatten(structure, jax.tree.leaves(carry)), stacked
 
@@ -107,8 +113,10 @@ def _results(equation: Any, operands: list[Entries]) -> list[Entries]:
         found = rules.MOVES[name](params, operands, out[0])
         if found is not None:
             return found if isinstance(found, list) else [found]
+    if name in (*rules.REDUCTIONS, "dot_general") and not all(one.size for one in operands):
+        return _whole(equation, operands)
     if name in rules.REDUCTIONS:
-        return [rules.reduction(rules.REDUCTIONS[name], tuple(params["axes"]), operands[0], out[0])]
+        return [rules.reduction(name, tuple(params["axes"]), operands[0], out[0])]
     if name == "dot_general":
         return [rules.inner_products(params, operands, out[0])]
     if name in CALLS:
@@ -126,16 +134,8 @@ def _results(equation: Any, operands: list[Entries]) -> list[Entries]:
 
 def _fenced(several: list[Entries]) -> list[Entries]:
     """All that is not known behind one barrier."""
-    return _of_unknown(lambda some: lax.optimization_barrier(some), several)
-
-
-def _of_unknown(through: Callable[[list], list], several: list[Entries]) -> list[Entries]:
-    items = listed(several)
-    places = [i for i, item in enumerate(items) if not is_known(item)]
-    if places:
-        for i, item in zip(places, through([items[i] for i in places]), strict=True):
-            items[i] = item
-    return split(items, [one.shape for one in several])
+    places, fill = _filled(items := entry_list(several))
+    return split(fill(fence([items[i] for i in places])), [one.shape for one in several])
 
 
 def _filled(items: list) -> tuple[list[int], Callable[[Any], list]]:
@@ -154,14 +154,16 @@ def _filled(items: list) -> tuple[list[int], Callable[[Any], list]]:
 def _branches(branches: Any, operands: list[Entries], out: list) -> list[Entries]:
     """A conditional of one predicate, with branches that are written out."""
     index, *rest = operands
-    items, shapes = listed(rest), [one.shape for one in rest]
+    items, shapes = entry_list(rest), [one.shape for one in rest]
     places, fill = _filled(items)
 
     def taken(branch):
         def run(*some):
             found = evaluate(branch, split(fill(some), shapes))
             return [
-                traced(entry, one.dtype) for those, one in zip(found, out, strict=True) for entry in those.reshape(-1)
+                scalar_of(entry, one.dtype)
+                for those, one in zip(found, out, strict=True)
+                for entry in those.reshape(-1)
             ]
 
         return run
@@ -172,14 +174,14 @@ def _branches(branches: Any, operands: list[Entries], out: list) -> list[Entries
 
 def _with_rule(params: dict[str, Any], operands: list[Entries], given: list, out: list) -> list[Entries]:
     """A function with a derivative of its own (`jax.custom_jvp`), both written out."""
-    items, shapes = listed(operands), [one.shape for one in operands]
+    items, shapes = entry_list(operands), [one.shape for one in operands]
     dtypes = [one.dtype for one in given for _ in range(int(np.prod(one.shape, dtype=int)))]
     places, fill = _filled(items)
     call = lambda some: evaluate(params["call_jaxpr"], split(fill(some), shapes))
     if not places:
         return call([])
     numbers = lambda found: [
-        traced(entry, one.dtype) for those, one in zip(found, out, strict=True) for entry in those.reshape(-1)
+        scalar_of(entry, one.dtype) for those, one in zip(found, out, strict=True) for entry in those.reshape(-1)
     ]
 
     @jax.custom_jvp
@@ -216,5 +218,5 @@ def _whole(equation: Any, operands: list[Entries]) -> list[Entries]:
         debug_info=empty.debug_info.with_unknown_names(),
     )  # fmt: skip
     # Else each entry would be computed from the beginning, with all that it is made of.
-    found = lax.optimization_barrier(core.jaxpr_as_fun(core.ClosedJaxpr(alone, []))(*lax.optimization_barrier(arrays)))
+    found = fence(core.jaxpr_as_fun(core.ClosedJaxpr(alone, []))(*fence(arrays)))
     return [entries(one) for one in found]

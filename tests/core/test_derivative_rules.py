@@ -40,6 +40,7 @@ SPECIAL = {
 EVERY = "tests/numerics/test_every_derivative.py"
 HESSIAN = "tests/filters/test_every_hessian.py"
 SCORES = "tests/filters/test_choosing.py"
+WRITTEN_OUT = "tests/numerics/test_written_out.py"
 FITS = "tests/fitting/test_fitted_derivatives.py"
 ROOMS = {"fitting": FITS}
 """Rooms of solvers, all of whose derivatives are those of an optimum."""
@@ -61,6 +62,7 @@ PLACES = {
     "filters/particle_belief.py": {"stop_gradient": "the base of moments, which cancels"},
     "filters/transport.py": {"stop_gradient": "the largest logarithm, which cancels in the sum of exponentials"},
     "numerics/blocks.py": {"filter_custom_jvp": EVERY},
+    "numerics/by_batch.py": {"Primitive": WRITTEN_OUT},
     "numerics/elementary.py": {"custom_jvp": EVERY, "stop_gradient": EVERY, "bitcast_convert_type": EVERY},
     "numerics/fences.py": {
         "Primitive": EVERY,
@@ -74,6 +76,7 @@ PLACES = {
     "numerics/tangents.py": {"Primitive": SCORES},
     "numerics/triangular.py": {"custom_jvp": EVERY},
     "numerics/words.py": {"bitcast_convert_type": "whole numbers of random words"},
+    "numerics/written_out.py": {"custom_jvp": WRITTEN_OUT},
     "simulation/meter.py": {"callback": "tells how far a run is; no number comes back"},
     "simulation/solve.py": {"diffeqsolve": "tests/simulation, by the adjoint that is asked for"},
 }

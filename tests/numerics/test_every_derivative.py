@@ -85,6 +85,11 @@ CASES: dict[str, Callable] = {
     "arctan": lambda x: numerics.arctan(2 * x),
     "arctan2": lambda x: numerics.arctan2(x, x + 0.7) + numerics.arctan2(1 + x, x - 0.2),
     "band_harmonics": lambda x: mixed(jnp.stack(numerics.band_harmonics(KEY, 1 + x * x, 3 + x, 4, x.dtype))) / 9,
+    "as_whole": lambda x: numerics.as_whole(lambda y: y * jnp.sin(y))(x),
+    "by_batch": lambda x: numerics.by_batch(*2 * (lambda y: y * jnp.sin(y),), x),
+    "scan_written_out": lambda x: mixed(
+        numerics.scan_written_out(lambda c, r: (jnp.sin(c.T * r) / 2, ()), factor(x), count(x, 0, 1, 2) * x / 2)[0]
+    ),
     "cholesky": lambda x: mixed(numerics.cholesky(matrix(x))),
     "cos": lambda x: numerics.cos(3 * x),
     "ess": lambda x: numerics.ess(jnp.exp(x * count(x, 0, 1, -1, 0.5))),
