@@ -87,13 +87,14 @@ def reduction(name: str, axes: tuple[int, ...], operand: Entries, out: Any) -> E
     """A reduction, from the first entry to the last."""
     if not axes:
         return operand
+    combined, combine = REDUCTIONS[name]
     first = np.moveaxis(operand, axes, range(len(axes)))
     columns = first.reshape(math.prod(operand.shape[axis] for axis in axes), *out.shape)
     found = []
     for index in np.ndindex(out.shape):
         total, *rest = (columns[(k, *index)] for k in range(len(columns)))
         for entry in rest:
-            total = one_entry(*REDUCTIONS[name], [total, entry], out.dtype)
+            total = one_entry(combined, combine, [total, entry], out.dtype)
         found.append(total)
     return of_list(found, out.shape)
 

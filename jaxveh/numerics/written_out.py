@@ -54,8 +54,8 @@ def scalars_of(program: Any) -> int:
 PyTree = Any
 
 
-def scan_written_out(body: Callable, start: PyTree, rows: PyTree) -> tuple[PyTree, PyTree]:
-    """What `jax.lax.scan(body, start, rows)` gives, with the body written out in scalars, and checkpointed.
+def scan_written_out(body: Callable, start: PyTree, rows: PyTree, *, reverse: bool = False) -> tuple[PyTree, PyTree]:
+    """What `jax.lax.scan(body, start, rows, reverse=reverse)` gives, with the body written out in scalars, and checkpointed.
 
     The carry is so many scalars, too. Differentiable, in both modes, as `body` is; a product of a known zero and NaN is zero.
     """
@@ -77,7 +77,7 @@ def scan_written_out(body: Callable, start: PyTree, rows: PyTree) -> tuple[PyTre
         return entry_list(after), [scalar_of(entry, one.dtype) for those, one in shown for entry in those.reshape(-1)]
 
     first = [scalar_of(entry, leaf.dtype) for leaf in carried for entry in entries(leaf).reshape(-1)]
-    last, columns = lax.scan(jax.checkpoint(scalars, prevent_cse=False), first, rows)
+    last, columns = lax.scan(jax.checkpoint(scalars, prevent_cse=False), first, rows, reverse=reverse)
     end = [array_of(those, one.dtype) for those, one in zip(split(last, [o.shape for o in inner]), inner, strict=True)]
     count = len(jax.tree.leaves(rows)[0])
     shown = [

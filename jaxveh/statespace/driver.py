@@ -102,9 +102,9 @@ def scan_and_keep(
     for name in keep:
         check_one_of("keep", name, (*SHOWN, *(f"info.{field}" for field in Info._fields)))
     if not is_written_out(filter, model):
-        return _scan_and_keep(filter, model, rows, key, of_belief, keep, whole=True)
+        return scan_in_form(filter, model, rows, key, of_belief, keep, whole=True)
     one, many = (
-        functools.partial(_scan_and_keep, of_belief=of_belief, keep=keep, whole=whole) for whole in (True, False)
+        functools.partial(scan_in_form, of_belief=of_belief, keep=keep, whole=whole) for whole in (True, False)
     )
     return numerics.by_batch(one, many, filter, model, rows, key)
 
@@ -114,10 +114,10 @@ def is_written_out(filter: AbstractFilter, model: StateSpace) -> bool:
     return len(model.states) <= FEW and who_lacks(filter, "written_out") is None
 
 
-def _scan_and_keep(
+def scan_in_form(
     filter: AbstractFilter, model: StateSpace, rows: Row, key, of_belief: Callable, keep: tuple[str, ...], whole: bool
 ) -> tuple[Estimate, Any]:
-    """The same by steps as a `whole`, as programs of their own, or written out."""
+    """What `scan_and_keep` gives, by steps on `whole` arrays, programs of their own, or written out in scalars."""
     first, rest = jax.tree.map(lambda leaf: leaf[0], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
 
     def shown(belief, info):

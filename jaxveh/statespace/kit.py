@@ -18,7 +18,7 @@ from jaxveh.statespace.contract import (
 from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.disturbances import DISTURBANCE_PREFIX
 from jaxveh.statespace.draw import draw_rows, schedule_rows
-from jaxveh.statespace.driver import raise_failure, scan_and_keep
+from jaxveh.statespace.driver import SHOWN, is_written_out, raise_failure, scan_and_keep, scan_in_form
 from jaxveh.statespace.independent import whiten
 from jaxveh.statespace.measurements import by_channel, input_result, presence
 from jaxveh.statespace.model import scalar_row
@@ -28,6 +28,7 @@ __all__ = [
     "DISTURBANCE_PREFIX",
     "KEPT",
     "LOG_2PI",
+    "SHOWN",
     "UNNAMED",
     "by_channel",
     "check_covariance",
@@ -40,12 +41,14 @@ __all__ = [
     "gradients_of",
     "innermost",
     "input_result",
+    "is_written_out",
     "key_for",
     "layers",
     "presence",
     "raise_failure",
     "scalar_row",
     "scan_and_keep",
+    "scan_in_form",
     "schedule_rows",
     "smoothing_of",
     "whiten",

@@ -13,6 +13,7 @@ class AbstractGaussianWrapper(AbstractGaussianFilter, AbstractWrapper):
 
     # No postponed annotations in this file: they would make fields of it and of class variables.
     inner: eqx.AbstractVar[AbstractGaussianFilter]
+    written_out: ClassVar[bool] = True
 
     def __check_init__(self):
         check_kind(type(self).__name__, self.inner, AbstractGaussianFilter)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import equinox as eqx
 import jax
 
+from jaxveh import numerics
 from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import transition_image, with_spread
@@ -19,7 +21,15 @@ from jaxveh.statespace import Row, StateSpace, kit
 @eqx.filter_jit
 def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows: Row) -> SmoothedEstimate:
     """The smoother of a Gaussian filter's kind over rows with (T,) leaves (Sarkka 2013, eqs 8.6, 9.17 and 10.1)."""
-    filtered, beliefs = kit.scan_and_keep(filter, model, rows, None, lambda belief: belief)
+    if not kit.is_written_out(filter, model):
+        return _smoothed_in_form(filter, model, rows, whole=True)
+    one, many = (functools.partial(_smoothed_in_form, whole=whole) for whole in (True, False))
+    return numerics.by_batch(one, many, filter, model, rows)
+
+
+def _smoothed_in_form(filter: AbstractGaussianFilter, model: StateSpace, rows: Row, whole: bool) -> SmoothedEstimate:
+    """The same by steps on `whole` arrays, or written out in scalars."""
+    filtered, beliefs = kit.scan_in_form(filter, model, rows, None, lambda belief: belief, kit.SHOWN, whole)
     last = jax.tree.map(lambda leaf: leaf[-1], beliefs)
     before = jax.tree.map(lambda leaf: leaf[:-1], beliefs)
     after = jax.tree.map(lambda leaf: leaf[1:], (rows.t, rows.u))
@@ -29,8 +39,9 @@ def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows:
         found = given_later(filter, model, belief, t, u, later)
         return found, found.moments(model)
 
-    back = jax.checkpoint(back, prevent_cse=False)
-    _, moments = jax.lax.scan(back, gaussian_of(last), (before, after), reverse=True)
+    scan = jax.lax.scan if whole else numerics.scan_written_out
+    back = jax.checkpoint(back, prevent_cse=False) if whole else back
+    _, moments = scan(back, gaussian_of(last), (before, after), reverse=True)
     return smoothed_estimate(model, filtered, with_last(moments, last.moments(model)))
 
 

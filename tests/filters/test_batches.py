@@ -1,0 +1,121 @@
+"""A batch of runs is those runs one by one, and what of it is written out in scalars: each of `FILTERS`, smoothed, too."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_every_filter import FILTERS, MODELS, recordings
+
+from jaxveh import InputError, filters
+from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
+from jaxveh.statespace import Info, Smoothing, kit
+from jaxveh.statespace.contract import who_lacks
+
+BATCHED = [name for name, line in FILTERS.items() if who_lacks(line.make(), "written_out") is None]
+SMOOTHED = [name for name in BATCHED if kit.smoothing_of(FILTERS[name].make()) is Smoothing.gaussian]
+
+
+def rows_and_model():
+    model = MODELS["linear"]()
+    rows = [model.rows(recording) for recording in recordings("linear")]
+    return model, jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *rows)
+
+
+def same(found, wanted, rtol=1e-9, atol=1e-10):
+    for a, b in zip(jax.tree.leaves(found), jax.tree.leaves(wanted), strict=True):
+        np.testing.assert_allclose(a, b, rtol, atol)
+
+
+@pytest.mark.parametrize("name", BATCHED)
+def test_a_batch_is_its_runs(name):
+    filter_, (model, rows) = FILTERS[name].make(), rows_and_model()
+    shifted = eqx.tree_at(lambda m: m.prior.mean, model, jax.tree.map(lambda x: x + 0.1, model.prior.mean))
+    models = jax.tree.map(lambda a, b: jnp.stack([a, b]) if eqx.is_array(a) else a, model, shifted)
+    batch = eqx.filter_vmap(lambda model, rows: filters.scan(filter_, model, rows))(models, rows)
+    for i, one in enumerate((model, shifted)):
+        alone = filters.scan(filter_, one, jax.tree.map(lambda leaf, i=i: leaf[i], rows))
+        same(jax.tree.map(lambda leaf, i=i: leaf[i], batch), alone)
+
+
+@pytest.mark.parametrize("name", SMOOTHED)
+def test_a_batch_is_smoothed_as_its_runs(name):
+    filter_, (model, rows) = FILTERS[name].make(), rows_and_model()
+    smooth = lambda rows: rauch_tung_striebel(filter_, model, rows)
+    batch = eqx.filter_vmap(smooth)(rows)
+    alone = smooth(jax.tree.map(lambda leaf: leaf[1], rows))
+    same(jax.tree.map(lambda leaf: leaf[1], batch), alone)
+
+
+def test_the_gradient_of_a_batch_is_that_of_its_runs():
+    model, rows = rows_and_model()
+    leaves, rest = eqx.partition(model, eqx.is_inexact_array)
+    value = lambda leaves, rows: (
+        filters.scan(filters.Unscented(), eqx.combine(leaves, rest), rows, None, ()).log_likelihood
+    )
+    together = jax.jit(jax.grad(lambda leaves: jnp.sum(jax.vmap(value, in_axes=(None, 0))(leaves, rows))))(leaves)
+    one_by_one = jax.jit(jax.vmap(jax.grad(value), in_axes=(None, 0)))(leaves, rows)
+    same(together, jax.tree.map(lambda leaf: leaf.sum(axis=0), one_by_one))
+
+
+def primitives(jaxpr):
+    """Names of the primitives of a jaxpr and those inside, with the shapes of their results."""
+    for equation in jaxpr.eqns:
+        yield equation.primitive.name, [one.aval.shape for one in equation.outvars]
+        for value in equation.params.values():
+            for inner in value if isinstance(value, tuple | list) else [value]:
+                inner = getattr(inner, "jaxpr", inner)
+                if hasattr(inner, "eqns"):
+                    yield from primitives(inner)
+
+
+def test_a_batch_of_few_states_is_written_out_and_no_other(monkeypatch):
+    model, rows = rows_and_model()
+
+    def matrices():
+        """How many batches of matrices are reckoned."""
+        scan = lambda rows: filters.scan(filters.Unscented(), model, rows)
+        found = primitives(jax.make_jaxpr(jax.vmap(scan))(rows).jaxpr)
+        return sum(len(shape) > 2 for _, shapes in found for shape in shapes)
+
+    # The first row is not: it is reckoned once.
+    few = matrices()
+    monkeypatch.setattr("jaxveh.statespace.driver.FEW", 1)
+    jax.clear_caches()
+    assert few < 0.7 * matrices()
+
+
+@pytest.mark.parametrize(
+    "keep", [(), ("mean",), ("std",), ("mean", "std"), ("info",), ("info.nis", "info.whitened", "std")]
+)
+def test_an_estimate_keeps_what_it_is_asked_to(keep):
+    model = MODELS["linear"]()
+    recording = recordings("linear")[0]
+    whole, part = (
+        filters.run(filters.Extended(), model, recording),
+        filters.run(filters.Extended(), model, recording, keep=keep),
+    )
+    assert (part.log_likelihood, part.result) == (whole.log_likelihood, whole.result)
+    for name in ("mean", "std"):
+        if name in keep:
+            same(getattr(part, name), getattr(whole, name), 0.0, 0.0)
+        assert (getattr(part, name) is None) == (name not in keep)
+    fields = Info._fields if "info" in keep else [name.removeprefix("info.") for name in keep if "." in name]
+    assert (part.info is None) == (not fields)
+    for name in fields:
+        same(getattr(part.info, name), getattr(whole.info, name), 0.0, 0.0)
+    if part.info is not None:
+        assert all(getattr(part.info, name) is None for name in set(Info._fields) - set(fields))
+
+
+def test_what_cannot_be_kept_is_named():
+    with pytest.raises(InputError, match="keep = 'means': must be one of 'mean', 'std', 'info', "):
+        filters.run(filters.Extended(), MODELS["linear"](), recordings("linear")[0], keep=("means",))
+
+
+def test_remarks_are_told_though_nothing_is_kept():
+    particles = filters.AuxiliaryParticleFilter(20)
+    found = filters.run(
+        particles, MODELS["linear"](), recordings("linear")[0], key=jax.random.key(0), keep=(), throw=False
+    )
+    assert found.info.remark.shape == (25,) and found.info.nis is None and found.mean is None
