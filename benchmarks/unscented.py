@@ -18,7 +18,17 @@ from .problems import SpeedAndMass, speed_and_mass
 
 __all__ = ["cases"]
 
-OURS, LIMIT = "jaxveh", "C++ limit"
+OURS, ALONE, LIMIT = "jaxveh", "jaxveh, log-likelihood alone", "C++ limit"
+
+MOST = {
+    ("float64", 1): 2.2,
+    ("float32", 1): 2.2,
+    ("float64", 64): 4,
+    ("float32", 64): 4,
+    ("float64", 1000): 2.5,
+    ("float32", 1000): 3,
+}
+"""Times of the limit, which keeps no row either."""
 
 
 def cases(smoke: bool) -> list[Case]:
@@ -34,17 +44,22 @@ def cases(smoke: bool) -> list[Case]:
                     unit="ns a run-step",
                     build=functools.partial(_build, np.dtype(dtype), runs, rows),
                     base=LIMIT,
-                    bounds=(Bound(OURS, ("dynamax", "smcx"), 0.8),) if runs in (1, 64) else (),
+                    bounds=_bounds(dtype, runs),
                 )
             )
     return made
+
+
+def _bounds(dtype: str, runs: int) -> tuple[Bound, ...]:
+    peers = (Bound(OURS, ("dynamax", "smcx"), 0.8),) if runs in (1, 64) else ()
+    return (*peers, Bound(ALONE, (LIMIT,), MOST[dtype, runs])) if (dtype, runs) in MOST else peers
 
 
 def _build(dtype: np.dtype, runs: int, rows: int) -> Sequence[Contestant | Skipped]:
     problem = speed_and_mass(rows, runs, dtype=dtype.type)
     short = speed_and_mass(min(rows, 200), runs, dtype=dtype.type)
     work, little = runs * (rows - 1), runs * (short.rows - 1)
-    made: list[Contestant | Skipped] = [_ours(problem, dtype, work)]
+    made: list[Contestant | Skipped] = [_ours(problem, dtype, work), _ours(problem, dtype, work, ALONE)]
     reason = limit.unavailable()
     if reason:
         made.append(Skipped(LIMIT, reason))
@@ -69,7 +84,8 @@ def _build(dtype: np.dtype, runs: int, rows: int) -> Sequence[Contestant | Skipp
     return made
 
 
-def _ours(problem: SpeedAndMass, dtype: np.dtype, work: float) -> Contestant:
+def _ours(problem: SpeedAndMass, dtype: np.dtype, work: float, name: str = OURS) -> Contestant:
+    keep = () if name == ALONE else ("mean", "std", "info")
     filter_ = filters.Unscented(problem.alpha, problem.beta, problem.kappa)
     with ours.precision(dtype):
         model, recording = ours.speed_model(problem, dtype), ours.speed_recording(problem)
@@ -77,15 +93,15 @@ def _ours(problem: SpeedAndMass, dtype: np.dtype, work: float) -> Contestant:
 
             def call(index: int) -> object:
                 with ours.precision(dtype):
-                    return filters.run(filter_, model, recording)
+                    return filters.run(filter_, model, recording, keep=keep)
 
-            return Contestant(OURS, ours.blocked(call), work)
+            return Contestant(name, ours.blocked(call), work)
         rows = model.rows(recording)
 
         def one(speed: jax.Array) -> filters.Estimate:
-            return filters.scan(filter_, model, rows._replace(y=rows.y._replace(v=speed)))
+            return filters.scan(filter_, model, rows._replace(y=rows.y._replace(v=speed)), None, keep)
 
-        return _jitted(OURS, jax.jit(jax.vmap(one)), problem, dtype, work)
+        return _jitted(name, jax.jit(jax.vmap(one)), problem, dtype, work)
 
 
 def _jitted(name: str, run: Callable, problem: SpeedAndMass, dtype: np.dtype, work: float) -> Contestant:
