@@ -36,9 +36,11 @@ def chosen_parameters(model: Any):
     The ellipse, shares and drag are not among them, and there is no asymmetry: fitted, they took what only one span had. On real
     logs the rest then erred 0.33 and 0.37 degrees (Ferrari, first 30 and 60 s), 0.25 and 0.31 without them; 5.9 and 3.7 (F1TENTH,
     60 s), but 3.4 and 4.2 (30 s); 31 simulated drives, and the Genesis, are indifferent; pieces of 12 s of the Ferrari preferred
-    them (0.20, 0.24). Nor does a log choose how many: by the likelihood of the half that a fit did not see, in 15 settings of those
-    logs (noises alone, sensors, stiffness, all of these), the F1TENTH's first 30 s would keep the file's tyres (17.7 degrees instead
-    of 4.2), the Genesis reversed the noises alone (0.62, 0.63), and the others all.
+    them (0.20, 0.24).
+
+    Nor does a log choose how many: by the likelihood of the half that a fit did not see, in 15 settings of those logs (noises
+    alone, sensors, stiffness, all of these), the F1TENTH's first 30 s would keep the file's tyres (17.7 instead of 4.2 degrees),
+    the Genesis reversed the noises alone (0.62, 0.63), and the others all.
     """
     s, noise = model.system, model.process_noise.law.std
     axle = [s.stiffness, s.grip, s.shape]

@@ -6,7 +6,7 @@ All are safe to jit, batch and differentiate.
 from jaxveh.numerics import polynomials, sigma_points
 from jaxveh.numerics.angles import wrap_angle
 from jaxveh.numerics.blocks import sum_in_blocks
-from jaxveh.numerics.by_batch import by_batch
+from jaxveh.numerics.by_batch import RUNS, by_batch
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
 from jaxveh.numerics.fences import apart, fence, fence_blocks, fence_results
 from jaxveh.numerics.harmonics import band_harmonics, gauss_markov_harmonics, sum_of_harmonics
@@ -30,9 +30,10 @@ from jaxveh.numerics.sums import total
 from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
 from jaxveh.numerics.tangents import derivative_alone
 from jaxveh.numerics.triangular import lower_factor
-from jaxveh.numerics.written_out import as_whole, scan_written_out
+from jaxveh.numerics.written_out import as_whole, scan_written_out, write_out
 
 __all__ = [
+    "RUNS",
     "apart",
     "arctan",
     "arctan2",
@@ -88,4 +89,5 @@ __all__ = [
     "total",
     "uniform",
     "wrap_angle",
+    "write_out",
 ]

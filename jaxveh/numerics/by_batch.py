@@ -15,6 +15,9 @@ from jax.interpreters import ad, batching, mlir
 LEAST, BLOCK = 64, 256
 """Calls of a batch at a time, at least and at most: what so many carry stays in a processor's own cache."""
 
+RUNS = "jaxveh_runs"
+"""Name of the batch's axis inside the form for many: `jax.lax.pmax(x, RUNS)` is the largest of a block's calls."""
+
 LANES = 8
 """A block is so many times a whole number wide: what is left beside whole vectors is reckoned one by one."""
 
@@ -51,7 +54,7 @@ def _batched(leaves, axes, *, single, many, out):
     del single, out
     size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
     leaves = [leaf if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in zip(leaves, axes, strict=True)]
-    whole = jax.vmap(many, in_axes=[None if axis is None else 0 for axis in axes])
+    whole = jax.vmap(many, in_axes=[None if axis is None else 0 for axis in axes], axis_name=RUNS)
     blocks, width = blocks_of(size)
     if blocks == 1:
         found = whole(*leaves)

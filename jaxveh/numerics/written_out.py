@@ -7,7 +7,7 @@ matrices it takes one by one. 1000 unscented filters of three states then take a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
@@ -54,10 +54,13 @@ def scalars_of(program: Any) -> int:
 PyTree = Any
 
 
-def scan_written_out(body: Callable, start: PyTree, rows: PyTree, *, reverse: bool = False) -> tuple[PyTree, PyTree]:
+def scan_written_out(
+    body: Callable, start: PyTree, rows: PyTree, *, reverse: bool = False, complete: bool = False
+) -> tuple[PyTree, PyTree]:
     """What `jax.lax.scan(body, start, rows, reverse=reverse)` gives, with the body written out in scalars, and checkpointed.
 
     The carry is so many scalars, too. Differentiable, in both modes, as `body` is; a product of a known zero and NaN is zero.
+    `complete`: every number of `rows` is finite, so that what only depends on what is missing is known when it is traced.
     """
     carried, structure = jax.tree.flatten(start)
     row = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(np.shape(leaf)[1:], leaf.dtype), rows)
@@ -66,8 +69,10 @@ def scan_written_out(body: Callable, start: PyTree, rows: PyTree, *, reverse: bo
     inner, outer = results[: len(carried)], results[len(carried) :]
 
     def scalars(carry: list, row: PyTree) -> tuple[list, list]:
-        operands = split(carry, [one.shape for one in inner]) + [entries(leaf) for leaf in jax.tree.leaves(row)]
-        found = evaluate(closed, operands)
+        given = [entries(leaf) for leaf in jax.tree.leaves(row)]
+        found = evaluate(
+            closed, split(carry, [one.shape for one in inner]) + given, entry_list(given) if complete else ()
+        )
         after = zip(found[: len(inner)], inner, strict=True)
         shown = zip(found[len(inner) :], outer, strict=True)
         # What the next row reads is computed once.
@@ -90,23 +95,34 @@ def scan_written_out(body: Callable, start: PyTree, rows: PyTree, *, reverse: bo
     return jax.tree.unflatten(structure, jax.tree.leaves(carry)), stacked
 
 
-def evaluate(program: Any, operands: list[Entries]) -> list[Entries]:
-    """The results of a closed jaxpr for operands that are written out."""
+def write_out(function: Callable, *operands: PyTree, complete: bool = False) -> PyTree:
+    """`function(*operands)`, written out in scalars; `complete`: every number of the operands is finite."""
+    closed, shapes = jax.make_jaxpr(function, return_shape=True)(*operands)
+    given = [entries(leaf) for leaf in jax.tree.leaves(operands)]
+    found = evaluate(closed, given, entry_list(given) if complete else ())
+    leaves, structure = jax.tree.flatten(shapes)
+    return jax.tree.unflatten(structure, [array_of(one, leaf.dtype) for one, leaf in zip(found, leaves, strict=True)])
+
+
+def evaluate(program: Any, operands: list[Entries], finite: Sequence[Any] = ()) -> list[Entries]:
+    """The results of a closed jaxpr for operands that are written out, of which some entries are known to be `finite`."""
     jaxpr = program.jaxpr if hasattr(program, "jaxpr") else program
     values: dict[Any, Entries] = {}
     read = lambda one: entries(np.asarray(one.val, one.aval.dtype)) if isinstance(one, core.Literal) else values[one]
     values.update(zip(jaxpr.constvars, (entries(constant) for constant in getattr(program, "consts", ())), strict=True))
     values.update(zip(jaxpr.invars, operands, strict=True))
     for equation in jaxpr.eqns:
-        found = _results(equation, [read(one) for one in equation.invars])
+        found = _results(equation, [read(one) for one in equation.invars], finite)
         values.update(zip(equation.outvars, found, strict=True))
     return [read(one) for one in jaxpr.outvars]
 
 
-def _results(equation: Any, operands: list[Entries]) -> list[Entries]:
+def _results(equation: Any, operands: list[Entries], finite: Sequence[Any]) -> list[Entries]:
     """The results of one equation."""
     name, params = equation.primitive.name, equation.params
     out = [one.aval for one in equation.outvars]
+    if name == "is_finite" and all(any(entry is one for one in finite) for entry in operands[0].reshape(-1)):
+        return [entries(np.ones(out[0].shape, bool))]
     if name in rules.ELEMENTWISE:
         return [rules.elementwise(equation.primitive, params, operands, out[0])]
     if name in rules.MOVES:
@@ -122,11 +138,11 @@ def _results(equation: Any, operands: list[Entries]) -> list[Entries]:
     if name in CALLS:
         if params.get("name") == WHOLE and scalars_of(params["jaxpr"]) > LONG:
             return _whole(equation, operands)
-        return evaluate(params["jaxpr"], operands)
+        return evaluate(params["jaxpr"], operands, finite)
     if name in FENCES:
         return _fenced(operands)
     if name == "cond":
-        return _branches(params["branches"], operands, out)
+        return _branches(params["branches"], operands, out, finite)
     if name == "custom_jvp_call" and params["num_consts"] == 0 and hasattr(params["jvp_jaxpr_fun"], "call_wrapped"):
         return _with_rule(params, operands, [one.aval for one in equation.invars], out)
     return _whole(equation, operands)
@@ -151,7 +167,7 @@ def _filled(items: list) -> tuple[list[int], Callable[[Any], list]]:
     return places, fill
 
 
-def _branches(branches: Any, operands: list[Entries], out: list) -> list[Entries]:
+def _branches(branches: Any, operands: list[Entries], out: list, finite: Sequence[Any]) -> list[Entries]:
     """A conditional of one predicate, with branches that are written out."""
     index, *rest = operands
     items, shapes = entry_list(rest), [one.shape for one in rest]
@@ -159,7 +175,7 @@ def _branches(branches: Any, operands: list[Entries], out: list) -> list[Entries
 
     def taken(branch):
         def run(*some):
-            found = evaluate(branch, split(fill(some), shapes))
+            found = evaluate(branch, split(fill(some), shapes), finite)
             return [
                 scalar_of(entry, one.dtype)
                 for those, one in zip(found, out, strict=True)

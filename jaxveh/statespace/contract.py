@@ -57,6 +57,7 @@ class AbstractFilter(eqx.Module):
     - `noise_by_row`: the model's measurement noise may be another in each row, and is taken as it is there. (Not where a filter
       learns a noise of its own.)
     - `written_out`: in a batch its steps are written out in scalars where the states are few (`numerics.scan_written_out`).
+    - `shares_covariances`: in a batch of runs with the same noises, of which no row is missing, it has one covariance for all.
     - `rows_between`: rows may be put between others, since what it does in a step depends on the time that passes alone. (Not
       where each step adds noise, or learns of one.)
 
@@ -69,6 +70,7 @@ class AbstractFilter(eqx.Module):
     noise_by_row: ClassVar[bool] = False
     rows_between: ClassVar[bool] = False
     written_out: ClassVar[bool] = False
+    shares_covariances: ClassVar[bool] = False
 
     def __init_subclass__(cls, **given):
         super().__init_subclass__(**given)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import functools
 import warnings
 from collections.abc import Callable, Sequence
@@ -101,23 +102,44 @@ def scan_and_keep(
     """The estimate, and `of_belief(belief)` of every row, with (T, ...) leaves."""
     for name in keep:
         check_one_of("keep", name, (*SHOWN, *(f"info.{field}" for field in Info._fields)))
-    if not is_written_out(filter, model):
-        return scan_in_form(filter, model, rows, key, of_belief, keep, whole=True)
-    one, many = (
-        functools.partial(scan_in_form, of_belief=of_belief, keep=keep, whole=whole) for whole in (True, False)
-    )
-    return numerics.by_batch(one, many, filter, model, rows, key)
+    form = functools.partial(scan_in_form, of_belief=of_belief, keep=keep)
+    return in_form_for_batches(form, filter, model, rows, key)
 
 
-def is_written_out(filter: AbstractFilter, model: StateSpace) -> bool:
-    """Whether a batch of runs takes its steps written out in scalars."""
-    return len(model.states) <= FEW and who_lacks(filter, "written_out") is None
+class Steps(enum.Enum):
+    """How steps are taken: on `whole` arrays, programs of their own; `written_out` in scalars; and so where it is known that each
+    row is `complete`."""
+
+    whole = "whole"
+    written_out = "written out"
+    complete = "complete"
+
+
+def in_form_for_batches(form: Callable, filter: AbstractFilter, model: StateSpace, rows: Row, *more: Any) -> Any:
+    """`form(filter, model, rows, *more, steps=...)`: on whole arrays, but in a batch written out where the states are few.
+
+    Where a filter shares covariances, and of a block of runs no row is missing, they are reckoned once.
+    """
+    whole = functools.partial(form, steps=Steps.whole)
+    if len(model.states) > FEW or who_lacks(filter, "written_out") is not None:
+        return whole(filter, model, rows, *more)
+
+    def many(filter, model, rows, *more):
+        of = lambda steps: lambda: form(filter, model, rows, *more, steps=steps)
+        if who_lacks(filter, "shares_covariances") is not None:
+            return of(Steps.written_out)()
+        missing = jnp.stack([~jnp.isfinite(values).all() for values in jax.tree.leaves(rows)]).any()
+        of_any = jax.lax.pmax(missing.astype(jnp.int32), numerics.RUNS)
+        return jax.lax.cond(of_any > 0, of(Steps.written_out), of(Steps.complete))
+
+    return numerics.by_batch(whole, many, filter, model, rows, *more)
 
 
 def scan_in_form(
-    filter: AbstractFilter, model: StateSpace, rows: Row, key, of_belief: Callable, keep: tuple[str, ...], whole: bool
+    filter: AbstractFilter, model: StateSpace, rows: Row, key, of_belief: Callable, keep: tuple[str, ...], steps: Steps
 ) -> tuple[Estimate, Any]:
-    """What `scan_and_keep` gives, by steps on `whole` arrays, programs of their own, or written out in scalars."""
+    """What `scan_and_keep` gives, by steps of a kind."""
+    whole, complete = steps is Steps.whole, steps is Steps.complete
     first, rest = jax.tree.map(lambda leaf: leaf[0], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
 
     def shown(belief, info):
@@ -129,14 +151,17 @@ def scan_in_form(
         belief, info = (filter.step if whole else filter._step)(model, belief, row)
         return belief, shown(belief, info)
 
-    belief, info = filter.init(model, first, key)
+    if complete:
+        belief, info = numerics.write_out(lambda row: filter._init(model, row, key), first, complete=True)
+    else:
+        belief, info = filter.init(model, first, key)
     start = shown(belief, info)
 
     if whole:
         body = jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(KEPT))
         belief, rest = jax.lax.scan(body, belief, rest)
     else:
-        belief, rest = numerics.scan_written_out(body, belief, rest)
+        belief, rest = numerics.scan_written_out(body, belief, rest, complete=complete)
     joined = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
     log_likelihood, results, (mean, std, info), kept = joined
     result, failed_at = first_failure(results)

@@ -18,7 +18,14 @@ from jaxveh.statespace.contract import (
 from jaxveh.statespace.dependent_noise import check_fixed
 from jaxveh.statespace.disturbances import DISTURBANCE_PREFIX
 from jaxveh.statespace.draw import draw_rows, schedule_rows
-from jaxveh.statespace.driver import SHOWN, is_written_out, raise_failure, scan_and_keep, scan_in_form
+from jaxveh.statespace.driver import (
+    SHOWN,
+    Steps,
+    in_form_for_batches,
+    raise_failure,
+    scan_and_keep,
+    scan_in_form,
+)
 from jaxveh.statespace.independent import whiten
 from jaxveh.statespace.measurements import by_channel, input_result, presence
 from jaxveh.statespace.model import scalar_row
@@ -30,6 +37,7 @@ __all__ = [
     "LOG_2PI",
     "SHOWN",
     "UNNAMED",
+    "Steps",
     "by_channel",
     "check_covariance",
     "check_fixed",
@@ -39,9 +47,9 @@ __all__ = [
     "check_smooths",
     "draw_rows",
     "gradients_of",
+    "in_form_for_batches",
     "innermost",
     "input_result",
-    "is_written_out",
     "key_for",
     "layers",
     "presence",

@@ -85,6 +85,52 @@ def test_a_batch_of_few_states_is_written_out_and_no_other(monkeypatch):
     assert few < 0.7 * matrices()
 
 
+SHARED = [name for name in BATCHED if who_lacks(FILTERS[name].make(), "shares_covariances") is None]
+
+
+def complete_rows(rows):
+    return jax.tree.map(lambda leaf: jnp.where(jnp.isnan(leaf), 0.1, leaf), rows)
+
+
+@pytest.mark.parametrize("missing", [False, True], ids=["complete", "one missing"])
+@pytest.mark.parametrize("name", SHARED)
+def test_runs_share_covariances_where_no_row_is_missing(name, missing):
+    filter_, (model, rows) = FILTERS[name].make(), rows_and_model()
+    rows = complete_rows(rows)
+    if missing:
+        rows = rows._replace(y=rows.y._replace(y1=rows.y.y1.at[1, 3].set(jnp.nan)))
+    for form in (filters.scan, rauch_tung_striebel):
+        batch = eqx.filter_vmap(lambda rows, form=form: form(filter_, model, rows), in_axes=(eqx.if_array(0),))(rows)
+        for i in range(len(rows.t)):
+            same(
+                jax.tree.map(lambda leaf, i=i: leaf[i], batch),
+                form(filter_, model, jax.tree.map(lambda leaf, i=i: leaf[i], rows)),
+            )
+
+
+def test_shared_covariances_are_reckoned_once_and_those_of_other_noises_are_not():
+    model, rows = rows_and_model()
+    rows = jax.tree.map(lambda leaf: leaf[0], complete_rows(rows))
+    y = jax.tree.map(lambda leaf: jnp.stack([leaf + 0.1 * k for k in range(7)]), rows.y)
+
+    def batched(filter_, noise):
+        """Of each branch (complete, not complete), how many results have the batch's axis."""
+        scan = lambda y, noise: filters.scan(
+            filter_, eqx.tree_at(lambda m: m.measurement_noise.std.y0, model, noise), rows._replace(y=y), None, ()
+        )
+        program = jax.make_jaxpr(jax.vmap(scan, in_axes=(0, 0 if noise.ndim else None)))(y, noise)
+        (branches,) = [
+            equation.params["branches"] for equation in program.jaxpr.eqns[0].params["jaxpr"].jaxpr.eqns
+            if equation.primitive.name == "cond"
+        ]  # fmt: skip
+        return [sum(7 in shape for _, shapes in primitives(one.jaxpr) for shape in shapes) for one in branches]
+
+    complete, other = batched(filters.Kalman(), jnp.asarray(0.5))
+    assert complete < 0.4 * other
+    complete, other = batched(filters.Kalman(), jnp.linspace(0.5, 0.6, 7))
+    assert complete > 0.8 * other
+
+
 @pytest.mark.parametrize(
     "keep", [(), ("mean",), ("std",), ("mean", "std"), ("info",), ("info.nis", "info.whitened", "std")]
 )

@@ -19,6 +19,7 @@ from jaxveh import numerics
 from jaxveh.numerics import elementary, triangular
 
 NONE = {
+    "RUNS": "a name",
     "derivative_alone": "a derivative without a value, which differences do not see: test_every_hessian, of particle filters",
     "polynomials": "a module: of the elementary functions, which are here",
     "sigma_points": "a module: of constant points and weights",
@@ -129,6 +130,7 @@ CASES: dict[str, Callable] = {
     "sum_of_harmonics": lambda x: mixed(numerics.sum_of_harmonics(sides(x), count(x, 0.3, 0.5), sides(x)[:2])),
     "symmetric": lambda x: mixed(numerics.symmetric(factor(x))),
     "tan": lambda x: numerics.tan(x),
+    "write_out": lambda x: mixed(numerics.write_out(lambda c: jnp.sin(c @ c.T), factor(x))),
     "wrap_angle": lambda x: numerics.wrap_angle(3 * x + 7.0) * x,
     "total": lambda x: numerics.total(jnp.sin(x * jnp.arange(90, dtype=x.dtype) / 50)) / 20,
 }

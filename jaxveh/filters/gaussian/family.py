@@ -22,6 +22,7 @@ class Kalman(AbstractRuleFilter):
     """
 
     smooths: ClassVar[Smoothing] = Smoothing.gaussian
+    shares_covariances: ClassVar[bool] = True
     form: AbstractForm = Covariance()
 
     def rule(self, n):

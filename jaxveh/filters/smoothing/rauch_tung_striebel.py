@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import equinox as eqx
@@ -21,15 +20,14 @@ from jaxveh.statespace import Row, StateSpace, kit
 @eqx.filter_jit
 def rauch_tung_striebel(filter: AbstractGaussianFilter, model: StateSpace, rows: Row) -> SmoothedEstimate:
     """The smoother of a Gaussian filter's kind over rows with (T,) leaves (Sarkka 2013, eqs 8.6, 9.17 and 10.1)."""
-    if not kit.is_written_out(filter, model):
-        return _smoothed_in_form(filter, model, rows, whole=True)
-    one, many = (functools.partial(_smoothed_in_form, whole=whole) for whole in (True, False))
-    return numerics.by_batch(one, many, filter, model, rows)
+    return kit.in_form_for_batches(_smoothed_in_form, filter, model, rows)
 
 
-def _smoothed_in_form(filter: AbstractGaussianFilter, model: StateSpace, rows: Row, whole: bool) -> SmoothedEstimate:
-    """The same by steps on `whole` arrays, or written out in scalars."""
-    filtered, beliefs = kit.scan_in_form(filter, model, rows, None, lambda belief: belief, kit.SHOWN, whole)
+def _smoothed_in_form(
+    filter: AbstractGaussianFilter, model: StateSpace, rows: Row, steps: kit.Steps
+) -> SmoothedEstimate:
+    """The same by steps of a kind."""
+    filtered, beliefs = kit.scan_in_form(filter, model, rows, None, lambda belief: belief, kit.SHOWN, steps)
     last = jax.tree.map(lambda leaf: leaf[-1], beliefs)
     before = jax.tree.map(lambda leaf: leaf[:-1], beliefs)
     after = jax.tree.map(lambda leaf: leaf[1:], (rows.t, rows.u))
@@ -39,9 +37,13 @@ def _smoothed_in_form(filter: AbstractGaussianFilter, model: StateSpace, rows: R
         found = given_later(filter, model, belief, t, u, later)
         return found, found.moments(model)
 
-    scan = jax.lax.scan if whole else numerics.scan_written_out
-    back = jax.checkpoint(back, prevent_cse=False) if whole else back
-    _, moments = scan(back, gaussian_of(last), (before, after), reverse=True)
+    if steps is kit.Steps.whole:
+        back = jax.checkpoint(back, prevent_cse=False)
+        _, moments = jax.lax.scan(back, gaussian_of(last), (before, after), reverse=True)
+    else:
+        complete = steps is kit.Steps.complete
+        start = gaussian_of(last)
+        _, moments = numerics.scan_written_out(back, start, (before, after), reverse=True, complete=complete)
     return smoothed_estimate(model, filtered, with_last(moments, last.moments(model)))
 
 
