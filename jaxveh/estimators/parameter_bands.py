@@ -16,7 +16,7 @@ from jaxveh._core.recording import Recording
 from jaxveh.filters import AbstractFilter, Estimate, SmoothedEstimate, run, smooth
 from jaxveh.fitting import Fit
 from jaxveh.fitting import kit as fitting
-from jaxveh.statespace import StateSpace
+from jaxveh.statespace import StateSpace, kit
 
 WIDER = 1.75
 """Bands are so many times as wide as members and their filters say: none of them has other equations (a load that shifts within
@@ -85,7 +85,12 @@ def estimate_with_members(
 @eqx.filter_jit
 def _of_each(filter: AbstractFilter, models: StateSpace, log: Recording, smoothed: bool) -> tuple[Any, Any]:
     def one(model):
-        found = (smooth if smoothed else run)(filter, model, log, throw=False)
+        if smoothed:
+            found = smooth(filter, model, log, throw=False)
+        else:
+            # To the last bit what a live loop says: a batch that is written out rounds otherwise.
+            shown, steps = ("mean", "std"), kit.Steps.whole
+            found, _ = kit.scan_in_form(filter, model, model.rows(log), None, lambda belief: None, shown, steps)
         return found.mean, found.std
 
     return eqx.filter_vmap(one, in_axes=(eqx.if_array(0),))(models)

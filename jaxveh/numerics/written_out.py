@@ -143,9 +143,15 @@ def _results(equation: Any, operands: list[Entries], finite: Sequence[Any]) -> l
         return _fenced(operands)
     if name == "cond":
         return _branches(params["branches"], operands, out, finite)
-    if name == "custom_jvp_call" and params["num_consts"] == 0 and hasattr(params["jvp_jaxpr_fun"], "call_wrapped"):
+    if name == "custom_jvp_call" and _is_ruled(params, equation):
         return _with_rule(params, operands, [one.aval for one in equation.invars], out)
     return _whole(equation, operands)
+
+
+def _is_ruled(params: dict[str, Any], equation: Any) -> bool:
+    """Whether a function with a derivative of its own can be taken apart: its rule is at hand, and it is of floating numbers."""
+    floating = all(jnp.issubdtype(one.aval.dtype, jnp.floating) for one in equation.invars)
+    return floating and params.get("num_consts") == 0 and hasattr(params.get("jvp_jaxpr_fun"), "call_wrapped")
 
 
 def _fenced(several: list[Entries]) -> list[Entries]:
@@ -170,6 +176,8 @@ def _filled(items: list) -> tuple[list[int], Callable[[Any], list]]:
 def _branches(branches: Any, operands: list[Entries], out: list, finite: Sequence[Any]) -> list[Entries]:
     """A conditional of one predicate, with branches that are written out."""
     index, *rest = operands
+    if is_known(index[()]):
+        return evaluate(branches[int(index[()])], rest, finite)
     items, shapes = entry_list(rest), [one.shape for one in rest]
     places, fill = _filled(items)
 

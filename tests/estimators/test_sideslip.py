@@ -364,8 +364,7 @@ USED = {
     **dict.fromkeys(
         ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg", "rear_cornering_stiffness", "cg_height", "sensor_position",
          "low_pass", "drag", "front_drive", "front_brake", "rear"), "estimate"),
-    **dict.fromkeys(("front_cornering_stiffness", "steer_offset", "reference_position", "steering_ratio"), "score"),
-    "front": "a linear car's stiffness is its B C D where it has none of its own",
+    **dict.fromkeys(("front_cornering_stiffness", "steer_offset", "reference_position", "steering_ratio", "front"), "score"),
     "name": "a word",
     **dict.fromkeys(("track_front", "track_rear"), "one track"),
     **dict.fromkeys(("wheel_radius", "wheel_inertia", "rolling_resistance"), "wheels do not turn here"),
@@ -391,6 +390,7 @@ def test_what_a_cars_file_says_is_used_or_named(entry):
         "name": "another", "sensor_position": (0.1, 0.1, 0.0), "reference_position": (0.3, 0.0, 0.0), "front_tyre": "a.tir",
         "rear_tyre": "a.tir", "front": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0), "rear": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0),
         "front_drive": 0.7, "front_brake": 0.7, "steer_offset": 0.02, "rolling_resistance": 0.02,
+        **dict.fromkeys(("track_front", "track_rear", "wheel_radius"), 1.0),
     }.get(entry.name, 1.07 * (getattr(plain, entry.name) or 10.0))  # fmt: skip
     changed = dataclasses.replace(plain, **{entry.name: other})
     leaves = lambda car: [float(leaf) for leaf in jax.tree.leaves(rear_axle(car))]
