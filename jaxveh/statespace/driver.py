@@ -43,7 +43,7 @@ class Estimate(eqx.Module):
     mean: Any
     std: Any
     log_likelihood: jax.Array
-    info: Info | None
+    info: Any
     result: jax.Array
     failed_at: jax.Array
     belief: Any
@@ -175,7 +175,7 @@ class Shown(NamedTuple):
 
     mean: Any
     std: Any
-    info: Info | None
+    info: Any
 
 
 def _kept_of(info: Info, keep: tuple[str, ...]) -> Info | None:

@@ -27,6 +27,8 @@ def same(found, wanted, rtol=1e-9, atol=1e-10):
         np.testing.assert_allclose(a, b, rtol, atol)
 
 
+# All of them stand in test_every_filter in a batch, against recorded and exact numbers.
+@pytest.mark.product
 @pytest.mark.parametrize("name", BATCHED)
 def test_a_batch_is_its_runs(name):
     filter_, (model, rows) = FILTERS[name].make(), rows_and_model()
@@ -38,6 +40,7 @@ def test_a_batch_is_its_runs(name):
         same(jax.tree.map(lambda leaf, i=i: leaf[i], batch), alone)
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", SMOOTHED)
 def test_a_batch_is_smoothed_as_its_runs(name):
     filter_, (model, rows) = FILTERS[name].make(), rows_and_model()
