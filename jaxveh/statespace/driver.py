@@ -85,9 +85,9 @@ def run(
 def scan(filter: AbstractFilter, model: StateSpace, rows: Row, key=None, keep: tuple[str, ...] = SHOWN) -> Estimate:
     """The compiled part of `run`, over rows with (T,) leaves.
 
-    Under `jax.vmap` a Gaussian filter of few states is another program, with a batch of runs in each of its scalars: twelve times
-    as fast for 1000 unscented filters of three states. Differentiate what is summed over the batch; the gradients of each run
-    by itself, batched, are three times as slow.
+    Under `jax.vmap` a Gaussian filter of few states is another program, with a batch of runs in each of its scalars: 14 times as
+    fast for the log-likelihoods of 1000 unscented filters of three states, five to seven times where all rows are kept.
+    Differentiate what is summed over the batch; the gradients of each run by itself, batched, are three times as slow.
     """
     return scan_and_keep(filter, model, rows, key, _nothing, keep)[0]
 

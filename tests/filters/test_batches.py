@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from test_every_filter import FILTERS, MODELS, recordings
 
-from jaxveh import InputError, filters
+from jaxveh import InputError, Result, filters
 from jaxveh.filters.smoothing.rauch_tung_striebel import rauch_tung_striebel
 from jaxveh.statespace import Info, Smoothing, kit
 from jaxveh.statespace.contract import who_lacks
@@ -38,6 +38,19 @@ def test_a_batch_is_its_runs(name):
     for i, one in enumerate((model, shifted)):
         alone = filters.scan(filter_, one, jax.tree.map(lambda leaf, i=i: leaf[i], rows))
         same(jax.tree.map(lambda leaf, i=i: leaf[i], batch), alone)
+
+
+@pytest.mark.product
+@pytest.mark.parametrize("name", BATCHED)
+def test_a_run_of_a_batch_fails_as_it_does_alone(name):
+    filter_, (model, rows) = FILTERS[name].make(), rows_and_model()
+    infinite = rows.y.y0.at[0, 7].set(jnp.inf)
+    unknown = rows.u.force.at[1, 4].set(jnp.nan)
+    rows = rows._replace(y=rows.y._replace(y0=infinite), u=rows.u._replace(force=unknown))
+    batch = eqx.filter_vmap(lambda rows: filters.scan(filter_, model, rows, None, ()))(rows)
+    alone = [filters.scan(filter_, model, jax.tree.map(lambda leaf, i=i: leaf[i], rows), None, ()) for i in (0, 1)]
+    assert batch.result.tolist() == [int(one.result) for one in alone] == [Result.non_finite_input] * 2
+    assert batch.failed_at.tolist() == [int(one.failed_at) for one in alone]
 
 
 @pytest.mark.product
