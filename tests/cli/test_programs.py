@@ -1,5 +1,6 @@
 """Each program once from end to end, at smoke size: what it prints, what it writes, that the numbers agree."""
 
+import dataclasses
 import json
 import re
 from types import SimpleNamespace
@@ -277,6 +278,24 @@ def test_logs_of_different_cars_are_refused(kept, tmp_path):
         assert run("estimate", *logs, "--calibration", calibration, "-o", out, "--anyway").exit_code == 0
 
 
+def test_a_steering_wheel_steers_by_the_cars_ratio(tmp_path):
+    table = with_steer()
+    table["steering_wheel"] = 16.0 * table.pop("steer")
+    log, told = write_log(tmp_path, table), write_car(tmp_path)
+    ratio = tmp_path / "ratio.toml"
+    io.write_car(dataclasses.replace(io.read_car(told), steering_ratio=16.0), ratio)
+    scores = {}
+    for car in (told, ratio):
+        numbers = tmp_path / "numbers.json"
+        start = ("estimate", log, "--vehicle", car, "-o", tmp_path / "e.csv", "--force", "--as-told")
+        result = run(*start, "--truth", "v_y", "--json", numbers)
+        assert result.exit_code == 0, result.output
+        assert ("steering_wheel is not used" in result.stdout) == (car == told)
+        scores[car] = read_json(numbers)
+        numbers.unlink()
+    assert "open_loop_sideslip_rmse_deg" not in scores[told] and scores[ratio]["open_loop_sideslip_rmse_deg"] > 0
+
+
 def test_a_report_of_one_log_and_of_several(kept):
     pytest.importorskip("bokeh")
     start = ("--calibration", kept / "calibration.toml", "--span", "5:20", "--truth", "v_y")
@@ -294,7 +313,7 @@ def test_a_report_of_one_log_and_of_several(kept):
         "open-loop linear model",
         "Estimate and channels",
     ]
-    places = [text.index(one) for one in [*words, "Rear axle"]]
+    places = [text.index(one) for one in [*words, "Rear axle: ", "Innovations: whether"]]
     assert places == sorted(places)
     stiffness = content["fitted"]["stiffness"]
     # As many decimals as the standard error has in two figures.

@@ -232,6 +232,16 @@ def test_without_a_car_and_without_v_y(sound):
     assert not [finding for finding in found if "runs straight" in finding.message]
 
 
+def test_a_steering_wheel_is_looked_at_by_the_cars_ratio(sound):
+    time, channels = sound
+    turned = {name: values for name, values in channels.items() if name != "steer"}
+    turned["steering_wheel"] = 16.0 * channels["steer"]
+    of_steer = lambda found: [(one.severity, one.channel, one.message) for one in found if "steer" in one.channel]
+    told = dataclasses.replace(CAR, steering_ratio=16.0)
+    assert set(of_steer(findings(*sound, told))) <= set(of_steer(findings(time, turned, told)))
+    assert of_steer(findings(*sound)) and not [one for one in of_steer(findings(time, turned)) if one[1] == "steer"]
+
+
 def test_an_offset_that_the_car_tells_of(sound):
     told = dataclasses.replace(CAR, steer_offset=np.deg2rad(0.5))
     shifted = plant(sound, steer=lambda values: values + np.deg2rad(0.5))

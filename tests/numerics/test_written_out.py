@@ -65,7 +65,7 @@ def of_nothing(c, r):
 
 def of_scalars(c, r):
     """Nothing of a row, and a number that is known."""
-    return {"x": c["x"] * jnp.asarray([1.0, 0.0, 2.0]), "P": jnp.zeros((3, 3)), "k": c["k"]}, ()
+    return {"x": jnp.zeros(3) - c["x"] * jnp.asarray([1.0, 0.0, 2.0]), "P": jnp.zeros((3, 3)), "k": c["k"]}, ()
 
 
 def as_a_whole(c, r):
@@ -124,6 +124,17 @@ def test_what_is_known_is_reckoned_when_it_is_traced():
     jaxpr = str(jax.make_jaxpr(lambda c: numerics.scan_written_out(body, c, jnp.zeros(4)))(jnp.ones((3, 3))))
     # Sums over a lower triangle of ones, of which the last column counts for nothing: in 3 rows 2 and 1.
     assert jaxpr.count(" add ") == 9 and " mul " not in jaxpr
+
+
+def test_a_long_function_as_a_whole_is_left_as_it_is_and_a_short_one_is_not():
+    def products(terms):
+        many = lambda x: sum(jnp.sin(k * x) * x for k in range(terms))
+        body = lambda c, _: (numerics.as_whole(many)(c), ())
+        program = str(jax.make_jaxpr(lambda c: numerics.scan_written_out(body, c, jnp.zeros(4))[0])(START["P"]))
+        return program.count("f64[3,3] = mul"), program.count("f64[] = mul")
+
+    (whole, _), (_, scalars) = products(900), products(3)
+    assert whole > 900 and products(3)[0] == 0 and scalars > 3 * 9
 
 
 def test_float32_stays_float32(float32):

@@ -142,6 +142,18 @@ def test_innovations_of_right_spreads_stay_in_their_bands_and_others_do_not():
         plots.innovations(filtered(np.full_like(TIME, np.nan)))
 
 
+def test_means_of_innovations_are_of_rows_of_which_half_are_measured():
+    step = float(np.median(np.diff(TIME)))
+    white = np.random.default_rng(3).normal(size=TIME.size)
+    gone = (np.arange(TIME.size) >= 400) & (np.arange(TIME.size) < 700)
+    (one,) = plots.innovation_points(filtered(2.0 * np.where(gone, np.nan, white)), seconds=100 * step, lags=20)
+    np.testing.assert_array_equal(np.isnan(one.squared), gone)
+    assert np.isnan(one.mean[455:645]).all() and np.isfinite(one.mean[:345]).all()
+    np.testing.assert_allclose(one.mean[200], np.mean(one.squared[150:250]), rtol=0.05)
+    np.testing.assert_allclose(one.lag, step * np.arange(1, 21), rtol=1e-9)
+    assert one.low < 1.0 < one.high and one.by_row == pytest.approx(1.0, abs=0.15)
+
+
 def test_sums_of_rows_are_judged_by_their_own_spread():
     draws = np.random.default_rng(3).normal(size=100_000)
     np.testing.assert_allclose(slow_squares(draws, 10), 1.0, atol=0.04)
