@@ -22,10 +22,10 @@ LANES = 8
 """A block is so many times a whole number wide: what is left beside whole vectors is reckoned one by one."""
 
 
-def by_batch(single: Callable, many: Callable, *operands: Any) -> Any:
+def by_batch(single: Callable, many: Callable, *operands: Any, least: int = 1) -> Any:
     """`single(*operands)`; under `jax.vmap`, `many(*operands)` for each of the batch, in blocks of at most `BLOCK`.
 
-    Both are pure functions of pytrees, close over nothing that is traced, and give the same but for rounding: only what is
+    A batch of fewer than `least` calls is `single`, too, unless further `jax.vmap`s around it make it large enough. Both are pure functions of pytrees, close over nothing that is traced, and give the same but for rounding: only what is
     quickest differs. Where a single call is differentiated, in a batch or not, it is `single`; a batch that is differentiated
     as a whole (a sum of many log-likelihoods) is `many`.
     """
@@ -44,17 +44,28 @@ def by_batch(single: Callable, many: Callable, *operands: Any) -> Any:
         return called
 
     out = jax.eval_shape(flat(single), *leaves)
-    found = _by_batch.bind(*leaves, single=flat(single), many=flat(many), out=tuple((o.shape, o.dtype) for o in out))
+    kinds = tuple((o.shape, o.dtype) for o in out)
+    found = _by_batch.bind(*leaves, single=flat(single), many=flat(many), out=kinds, least=least)
     form, other = shapes[0]
     return eqx.combine(jax.tree.unflatten(form, found), other)
 
 
-def _batched(leaves, axes, *, single, many, out):
-    """`many` in blocks, one after the other; a last block that is not full repeats its last call."""
-    del single, out
+def _batched(leaves, axes, *, single, many, out, least):
+    """The form for many; where there are too few, both forms in a batch of their own, of which a larger one may come."""
     size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
     leaves = [leaf if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in zip(leaves, axes, strict=True)]
-    whole = jax.vmap(many, in_axes=[None if axis is None else 0 for axis in axes], axis_name=RUNS)
+    along = [None if axis is None else 0 for axis in axes]
+    if size >= least:
+        return _in_blocks(leaves, along, size, many)
+    one, more = jax.vmap(single, in_axes=along), lambda *some: _in_blocks(some, along, size, many)[0]
+    kinds = tuple(((size, *shape), dtype) for shape, dtype in out)
+    found = _by_batch.bind(*leaves, single=one, many=more, out=kinds, least=-(-least // size))
+    return found, [0] * len(found)
+
+
+def _in_blocks(leaves, axes, size, many):
+    """`many` in blocks, one after the other; a last block that is not full repeats its last call."""
+    whole = jax.vmap(many, in_axes=axes, axis_name=RUNS)
     blocks, width = blocks_of(size)
     if blocks == 1:
         found = whole(*leaves)
@@ -85,9 +96,9 @@ def blocks_of(size: int) -> tuple[int, int]:
     return fewest, -(-size // (fewest * LANES)) * LANES
 
 
-def _jvp(primals, tangents, *, single, many, out):
+def _jvp(primals, tangents, *, single, many, out, least):
     """Of what moves, by the form for a single call."""
-    del many, out
+    del many, out, least
     moves = [i for i, tangent in enumerate(tangents) if not isinstance(tangent, ad.Zero)]
 
     def function(*some):
@@ -106,12 +117,10 @@ def _jvp(primals, tangents, *, single, many, out):
 
 _by_batch = Primitive("jaxveh_by_batch")
 _by_batch.multiple_results = True
-_by_batch.def_impl(lambda *leaves, single, many, out: single(*leaves))
-_by_batch.def_abstract_eval(
-    lambda *avals, single, many, out: [jax.core.ShapedArray(shape, dtype) for shape, dtype in out]
-)
+_by_batch.def_impl(lambda *leaves, single, **rest: single(*leaves))
+_by_batch.def_abstract_eval(lambda *avals, out, **rest: [jax.core.ShapedArray(shape, dtype) for shape, dtype in out])
 mlir.register_lowering(
-    _by_batch, mlir.lower_fun(lambda *leaves, single, many, out: single(*leaves), multiple_results=True)
+    _by_batch, mlir.lower_fun(lambda *leaves, single, **rest: single(*leaves), multiple_results=True)
 )
 batching.primitive_batchers[_by_batch] = _batched
 ad.primitive_jvps[_by_batch] = _jvp

@@ -25,6 +25,9 @@ from jaxveh.statespace.parameters import parameters_of
 FEW = 6
 """States up to which the steps of a batch are written out in scalars."""
 
+WORTH = 10_000
+"""Rows of all runs of a batch together from which on it is written out: fewer take less time than it takes to compile."""
+
 SHOWN = ("mean", "std", "info")
 """What an `Estimate` has row by row, where nobody says otherwise."""
 
@@ -132,7 +135,7 @@ def in_form_for_batches(form: Callable, filter: AbstractFilter, model: StateSpac
         of_any = jax.lax.pmax(missing.astype(jnp.int32), numerics.RUNS)
         return jax.lax.cond(of_any > 0, of(Steps.written_out), of(Steps.complete))
 
-    return numerics.by_batch(whole, many, filter, model, rows, *more)
+    return numerics.by_batch(whole, many, filter, model, rows, *more, least=-(-WORTH // len(rows.t)))
 
 
 def scan_in_form(

@@ -16,6 +16,16 @@ BATCHED = [name for name, line in FILTERS.items() if who_lacks(line.make(), "wri
 SMOOTHED = [name for name in BATCHED if kit.smoothing_of(FILTERS[name].make()) is Smoothing.gaussian]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def every_batch_is_worth_it():
+    """Batches of these few rows are written out, too."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("jaxveh.statespace.driver.WORTH", 1)
+        jax.clear_caches()
+        yield
+    jax.clear_caches()
+
+
 def rows_and_model():
     model = MODELS["linear"]()
     rows = [model.rows(recording) for recording in recordings("linear")]
@@ -99,6 +109,25 @@ def test_a_batch_of_few_states_is_written_out_and_no_other(monkeypatch):
     monkeypatch.setattr("jaxveh.statespace.driver.FEW", 1)
     jax.clear_caches()
     assert few < 0.7 * matrices()
+
+
+def test_a_batch_of_few_rows_is_left_whole(monkeypatch):
+    model, rows = rows_and_model()
+    scan = lambda rows: filters.scan(filters.Unscented(), model, rows)
+
+    def is_whole(*runs):
+        form = scan
+        for _ in runs:
+            form = jax.vmap(form)
+        many = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf[0], (*runs, *leaf[0].shape)), rows)
+        return any(name == "jaxveh_by_batch" for name, _ in primitives(jax.make_jaxpr(form)(many).jaxpr))
+
+    monkeypatch.setattr("jaxveh.statespace.driver.WORTH", 6 * len(rows.t[0]))
+    jax.clear_caches()
+    assert is_whole(5) and is_whole(5, 1) and is_whole(2, 2)
+    assert not is_whole(6) and not is_whole(2, 3) and not is_whole(3, 2)
+    batch = jax.vmap(jax.vmap(scan))(jax.tree.map(lambda leaf: jnp.stack(3 * [leaf]), rows))
+    same(jax.tree.map(lambda leaf: leaf[2, 1], batch), scan(jax.tree.map(lambda leaf: leaf[1], rows)))
 
 
 SHARED = [name for name in BATCHED if who_lacks(FILTERS[name].make(), "shares_covariances") is None]

@@ -167,6 +167,18 @@ def test_a_batch_takes_the_form_for_many_and_a_call_the_other():
     np.testing.assert_allclose(jax.vmap(jax.hessian(value))(x), -np.sin(x), rtol=1e-14, atol=1e-15)
 
 
+@pytest.mark.parametrize("least, many", [(15, True), (16, False)])
+def test_few_calls_take_the_form_for_one(least, many):
+    one, other = lambda x: jnp.sin(x) + 1.0, lambda x: jnp.sin(x) + 2.0
+    value = lambda x: numerics.by_batch(one, other, x, least=least)
+    x = jnp.linspace(0.0, 1.0, 15).reshape(3, 5)
+    np.testing.assert_allclose(jax.vmap(value)(x[0]), np.sin(x[0]) + 1, rtol=1e-15)
+    wanted = np.sin(x) + (2 if many else 1)
+    np.testing.assert_allclose(jax.jit(jax.vmap(jax.vmap(value)))(x), wanted, rtol=1e-15)
+    np.testing.assert_allclose(jax.vmap(jax.vmap(value), in_axes=1, out_axes=1)(x), wanted, rtol=1e-15)
+    np.testing.assert_allclose(jax.grad(lambda x: jnp.sum(jax.vmap(jax.vmap(value))(x)))(x), np.cos(x), rtol=1e-15)
+
+
 def test_integers_have_no_slope():
     both = lambda x, k: numerics.by_batch(*2 * (lambda x, k: (x * k.astype(float), k + 1),), x, k)
     value, slope = jax.jvp(lambda x: both(x, jnp.int32(3)), (2.0,), (1.0,))
