@@ -25,9 +25,10 @@ LANES = 8
 def by_batch(single: Callable, many: Callable, *operands: Any, least: int = 1) -> Any:
     """`single(*operands)`; under `jax.vmap`, `many(*operands)` for each of the batch, in blocks of at most `BLOCK`.
 
-    A batch of fewer than `least` calls is `single`, too, unless further `jax.vmap`s around it make it large enough. Both are pure functions of pytrees, close over nothing that is traced, and give the same but for rounding: only what is
-    quickest differs. Where a single call is differentiated, in a batch or not, it is `single`; a batch that is differentiated
-    as a whole (a sum of many log-likelihoods) is `many`.
+    A batch of fewer than `least` calls is `single`, too, unless further `jax.vmap`s around it make it large enough. Both are
+    pure functions of pytrees, close over nothing that is traced, and give the same but for rounding: only what is quickest
+    differs. Where a single call is differentiated, in a batch or not, it is `single`; a batch that is differentiated as a whole
+    (a sum of many log-likelihoods) is `many`.
     """
     arrays, rest = eqx.partition(operands, eqx.is_array)
     leaves, structure = jax.tree.flatten(arrays)

@@ -167,7 +167,7 @@ def test_a_batch_takes_the_form_for_many_and_a_call_the_other():
     np.testing.assert_allclose(jax.vmap(jax.hessian(value))(x), -np.sin(x), rtol=1e-14, atol=1e-15)
 
 
-@pytest.mark.parametrize("least, many", [(15, True), (16, False)])
+@pytest.mark.parametrize(("least", "many"), [(15, True), (16, False)])
 def test_few_calls_take_the_form_for_one(least, many):
     one, other = lambda x: jnp.sin(x) + 1.0, lambda x: jnp.sin(x) + 2.0
     value = lambda x: numerics.by_batch(one, other, x, least=least)
