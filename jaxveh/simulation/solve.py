@@ -24,6 +24,10 @@ from jaxveh.statespace import RK4, Heun, RolledRK4
 ADAPTIVE_STEPS_A_ROW = 64
 """Steps that a solver with steps of its own may take, times the rows and equal steps of the longest length."""
 
+TOLD_FROM = 50_000
+"""Equal steps from which on a simulation tells how far it is: fewer take a second at most, and jax keeps no compiled program that
+talks to its host."""
+
 
 class Solution(NamedTuple):
     """What a simulation gives by row, each leaf (T,): states, inputs, outputs, noise-free measurements; and as scalars the
@@ -98,6 +102,7 @@ def solve(
     plain = choice.controller is None and until is None and adjoint is None and isinstance(choice.solver, SCANNED)
     each = grid.steps_a_row if plain else None
     if each is not None:
+        meter = meter if len(steps) > TOLD_FROM else diffrax.NoProgressMeter()
         return _scan(driven, start, rows, steps, choice.solver, each, meter)
     adjoint = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
     return _solve(driven, start, rows, steps, choice.solver, choice.controller, until, adjoint, meter)

@@ -34,6 +34,7 @@ from jaxveh.experiments.tyre_apf.study import (
 )
 from jaxveh.fitting import cut, pose_shooting, solve
 from jaxveh.simulation import simulate
+from jaxveh.statespace import RolledRK4
 
 FILTERS = ("PF", "APF", "UKF")
 
@@ -115,7 +116,8 @@ def _filter(study: Study, name: str) -> Callable:
 
 def _fit(study: Study) -> Callable:
     def one(guess, segments):
-        model = model_of(study, guess, study.gaussian)
+        # As fast as with RK4, and compiled in two thirds of the time.
+        model = model_of(study, guess, study.gaussian, solver=RolledRK4())
         return solve(pose_shooting(model, segments), max_steps=100)
 
     return one

@@ -57,7 +57,7 @@ def guess_once(study: Study, key, where=tyres):
     return put(car, parameters, moved)
 
 
-def model_of(study: Study, car, noise: StudyNoise, where=tyres, input_path: str = "held"):
+def model_of(study: Study, car, noise: StudyNoise, where=tyres, input_path: str = "held", solver=None):
     """The state space that an estimator of the study sees, with its noise; it estimates `where`."""
     return estimators.state_space(
         car,
@@ -66,6 +66,7 @@ def model_of(study: Study, car, noise: StudyNoise, where=tyres, input_path: str 
         prior=study.prior,
         walk=noise.walk,
         input_path=input_path,
+        solver=solver,
         process_noise={"v_y": noise.v_y, "yaw_rate": noise.yaw_rate},
     )
 
