@@ -1,8 +1,8 @@
 """`python -m benchmarks.starts [--only NAME] [--rounds N] [--json FILE]`: how long programs take from their start to their end.
 
-Each is a process of its own, on all cores, by the wall clock: cold, with an empty folder of compiled programs, and warm, with what
-the cold start left there. Of it: importing; tracing and lowering, which every start does; compiling, or reading back what was
-compiled; and the rest, which is mostly the work itself. Where two threads do that at once, it counts once.
+Each is a process of its own, on all cores, by the wall clock: cold, with an empty folder of compiled programs, and warm, with
+what the cold start left there. Of it: importing; tracing and lowering, which every start does; compiling, or reading back what
+was compiled; and the rest, which is mostly the work itself. Where two threads do that at once, it counts once.
 """
 
 from __future__ import annotations
@@ -106,7 +106,9 @@ def _line(title: str, found: Sequence[Start]) -> str:
     whole = [one.whole for one in found]
     spread = f" ({min(whole):.1f}-{max(whole):.1f})" if len(found) > 1 else ""
     medians = [statistics.median(one.parts[part] for one in found) for part in (*PARTS, "rest")]
-    return f"{title:24}{f'{statistics.median(whole):.1f}{spread}':>16}" + "".join(f"{value:>14.1f}" for value in medians)
+    return f"{title:24}{f'{statistics.median(whole):.1f}{spread}':>16}" + "".join(
+        f"{value:>14.1f}" for value in medians
+    )
 
 
 def start(command: Sequence[str], kept: Path) -> Start:

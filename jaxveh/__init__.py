@@ -1,30 +1,37 @@
 """jaxveh: estimate what a car cannot measure, in JAX, differentiable end to end."""
 
-from jaxveh import (
-    diagnostics,
-    estimators,
-    filters,
-    fitting,
-    io,
-    kit,
-    manoeuvres,
-    numerics,
-    observers,
-    roads,
-    sensors,
-    simulation,
-    statespace,
-    tyres,
-    vehicles,
-)
+from typing import TYPE_CHECKING
+
 from jaxveh._core.errors import FilterError, InputError, JaxvehWarning
 from jaxveh._core.lazy import submodules
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
 from jaxveh._core.version import VERSION
-from jaxveh.simulation import simulate
-from jaxveh.statespace import Estimate, cast, run
+
+if TYPE_CHECKING:
+    from jaxveh import (
+        diagnostics,
+        estimators,
+        experiments,
+        filters,
+        fitting,
+        io,
+        kit,
+        manoeuvres,
+        numerics,
+        observers,
+        plots,
+        roads,
+        sensors,
+        simulation,
+        statespace,
+        sweeps,
+        tyres,
+        vehicles,
+    )
+    from jaxveh.simulation import simulate
+    from jaxveh.statespace import Estimate, cast, run
 
 __version__ = VERSION
 
@@ -60,5 +67,12 @@ __all__ = [
     "vehicles",
 ]
 
-# Imported when first asked for: they take longer, or need an extra.
-__getattr__ = submodules(__name__, ("experiments", "plots", "sweeps"))
+# Rooms are imported when first asked for: all of them take as long as jax itself.
+_INSIDE = {"Estimate": "statespace", "cast": "statespace", "run": "statespace", "simulate": "simulation"}
+_ROOMS = tuple(name for name in __all__ if name not in _INSIDE and name not in globals())
+
+__getattr__ = submodules(__name__, _ROOMS, _INSIDE)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

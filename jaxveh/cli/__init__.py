@@ -8,10 +8,12 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from jaxveh.cli.cache import keep_programs
+from jaxveh.cli.kept_programs import keep_programs
 from jaxveh.cli.family import end_with_parent
 
 __all__ = ["main"]
+
+CLI_LIBRARIES = ("typer", "rich", "platformdirs")
 
 VECTOR_WIDTH = "--xla_cpu_prefer_vector_width"
 
@@ -19,11 +21,11 @@ VECTOR_WIDTH = "--xla_cpu_prefer_vector_width"
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line (`sys.argv` by default) and end the process: 0 done, 1 a filter or a fit failed, 2 bad input."""
     end_with_parent()
-    prepare()
     try:
+        prepare()
         from jaxveh.cli.app import app
     except ModuleNotFoundError as error:
-        if error.name is None or error.name.partition(".")[0] not in ("typer", "rich"):
+        if error.name is None or error.name.partition(".")[0] not in CLI_LIBRARIES:
             raise
         print(f'error: {error.name} is not installed: run `pip install "jaxveh[cli,io,plot]"`.', file=sys.stderr)
         raise SystemExit(2) from None

@@ -7,6 +7,8 @@ from typing import Annotated
 import typer
 
 import jaxveh
+from jaxveh.cli.cache import clear
+from jaxveh.cli.cache import show as show_cache
 from jaxveh.cli.check import check
 from jaxveh.cli.console import results
 from jaxveh.cli.demo import demo
@@ -41,6 +43,8 @@ app = typer.Typer(
 
 tyre = typer.Typer(help="Tyres: property files (.tir), and fits to rig data.", no_args_is_help=True)
 
+cache = typer.Typer(help="Compiled programs, kept from one start to the next.", no_args_is_help=True)
+
 
 def _version(wanted: bool) -> None:
     if wanted:
@@ -65,3 +69,6 @@ tyre.command("show")(program(show))
 tyre.command("evaluate")(program(evaluate_table))
 tyre.command("fit")(program(fit_table))
 app.add_typer(tyre, name="tyre")
+cache.command("show")(program(show_cache))
+cache.command("clear")(program(clear))
+app.add_typer(cache, name="cache")

@@ -1,99 +1,44 @@
-"""Programs that were compiled once, kept for the next start: where, how many, and how they are forgotten."""
+"""`jaxveh cache`: what programs have kept compiled."""
 
 from __future__ import annotations
 
-import hashlib
-import os
-import platform
 import shutil
-import sys
-import time
 from pathlib import Path
 
-VARIABLE = "JAXVEH_CACHE"
-"""Of the environment: `off`, or another folder."""
+from jaxveh.cli import kept_programs
+from jaxveh.cli.console import results
 
-JAX_VARIABLE = "JAX_COMPILATION_CACHE_DIR"
-"""Of the environment: who has set it has a cache for jax, which stays."""
-
-OFF = "off"
-
-MOST = 1_000_000_000
-"""Bytes that the programs of one version and processor may take; those not used for longest go first."""
-
-FORGOTTEN_AFTER = 90 * 86400.0
-"""Seconds after which the folder of another version or processor is dropped."""
-
-WORTH_KEEPING = 0.0
-"""Seconds of compiling from which on a program is kept: reading one back takes a few milliseconds."""
+MEGABYTE = 1e6
 
 
-def root() -> Path | None:
-    """The folder with a folder for each version and processor; None where `JAXVEH_CACHE` is `off`."""
-    told = os.environ.get(VARIABLE, "")
-    if told.lower() == OFF:
-        return None
-    if told:
-        return Path(told).expanduser()
-    from platformdirs import user_cache_path
+def show() -> None:
+    """Print where compiled programs are kept, how many and how large.
 
-    return user_cache_path("jaxveh", appauthor=False) / "programs"
-
-
-def folder() -> Path | None:
-    """Where this version keeps what it compiles on this processor.
-
-    Code that was compiled for another processor's vectors ends the process, or is refused (jax, issue 38445).
+    A second start reads them instead of compiling. JAXVEH_CACHE=off in the environment keeps none, JAXVEH_CACHE=FOLDER keeps them
+    there; where JAX_COMPILATION_CACHE_DIR is set, jax keeps them there by its own rules.
     """
-    above = root()
+    for one in _folders():
+        results().print(f"{one}: {_said(one)}", markup=False, soft_wrap=True)
+
+
+def clear() -> None:
+    """Delete the compiled programs of all versions; the next start compiles anew."""
+    for one in _folders():
+        results().print(f"deleted {one}: {_said(one)}", markup=False, soft_wrap=True)
+        shutil.rmtree(one)
+
+
+def _folders() -> list[Path]:
+    above = kept_programs.root()
+    found = [] if above is None else kept_programs.folders(above)
     if above is None:
-        return None
-    import jaxlib
-
-    from jaxveh._core.version import VERSION
-
-    return above / f"jaxveh-{VERSION}-jaxlib-{jaxlib.__version__}-{processor()}"
+        results().print(f"{kept_programs.VARIABLE} is {kept_programs.OFF}: nothing is kept")
+    elif not found:
+        results().print(f"{above}: nothing is kept yet", markup=False, soft_wrap=True)
+    return found
 
 
-def processor() -> str:
-    """A short name of the kind of processor: machine, model and features, hashed."""
-    said = [sys.platform, platform.machine(), platform.processor(), os.environ.get("PROCESSOR_IDENTIFIER", "")]
-    described = Path("/proc/cpuinfo")
-    if described.exists():
-        first = described.read_text(errors="replace").split("\n\n")[0].splitlines()
-        wanted = ("vendor_id", "model name", "flags", "Features", "CPU implementer", "CPU part")
-        said += [line for line in first if line.startswith(wanted)]
-    return hashlib.sha256("\n".join(said).encode()).hexdigest()[:12]
-
-
-def keep_programs() -> None:
-    """Let jax keep what it compiles in `folder()`, unless somebody has told jax where to keep it, or `JAXVEH_CACHE` is `off`."""
-    if JAX_VARIABLE in os.environ:
-        return
-    try:
-        place = folder()
-        if place is None:
-            return
-        if not place.exists():
-            place.mkdir(parents=True, mode=0o700, exist_ok=True)
-            drop_old(place.parent)
-        os.utime(place)
-    except OSError as error:
-        print(
-            f"note: compiled programs are not kept ({error}); every start compiles anew. Set {VARIABLE} to a folder that can be "
-            f"written, or to {OFF}.",
-            file=sys.stderr,
-        )
-        return
-    import jax
-
-    jax.config.update("jax_compilation_cache_dir", str(place))
-    jax.config.update("jax_compilation_cache_max_size", MOST)
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", WORTH_KEEPING)
-
-
-def drop_old(above: Path) -> None:
-    """Remove folders of versions and processors that have not been used for long."""
-    for one in above.glob("jaxveh-*"):
-        if one.is_dir() and time.time() - one.stat().st_mtime > FORGOTTEN_AFTER:
-            shutil.rmtree(one, ignore_errors=True)
+def _said(folder: Path) -> str:
+    files = [file for file in folder.iterdir() if file.is_file()]
+    programs = sum(file.name.endswith(kept_programs.PROGRAM) for file in files)
+    return f"{programs} programs, {sum(file.stat().st_size for file in files) / MEGABYTE:.0f} MB"

@@ -14,6 +14,7 @@ import typer
 
 from jaxveh import FilterError, InputError, JaxvehWarning
 from jaxveh.cli.console import messages, printable
+from jaxveh.cli.kept_programs import is_of_damage
 
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
 
@@ -79,6 +80,12 @@ def _warnings_in_words() -> Iterator[None]:
         def show(message, category, *rest, **more):
             if issubclass(category, JaxvehWarning):
                 say("warning", "yellow", message)
+            elif is_of_damage(str(message)):
+                say(
+                    "note",
+                    "yellow",
+                    "a program kept from an earlier start is damaged: it is compiled anew, and the next start all",
+                )
             else:
                 usual(message, category, *rest, **more)
 

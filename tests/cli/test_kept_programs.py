@@ -1,0 +1,125 @@
+"""What programs keep compiled: where, for whom, what a second start compiles, and what a damaged folder does."""
+
+import os
+import re
+import stat
+import sys
+import time
+
+import pytest
+from programs import run
+from test_start import python
+
+from jaxveh.cli import kept_programs
+
+SIMULATE = ("simulate", "--rate", "20", "--force")
+
+COUNT = """
+import sys, jax, jaxveh.cli
+found = []
+jax.monitoring.register_event_listener(lambda event, **more: found.append(event.rpartition("/")[2]))
+jaxveh.cli.prepare()
+from jaxveh.cli.app import app
+try:
+    app(args=sys.argv[1:]) if sys.argv[1:] else jax.numpy.arange(3.0) + 1.0
+finally:
+    print({name: found.count(name) for name in ("compile_requests_use_cache", "cache_hits", "cache_misses")}, file=sys.stderr)
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """A folder of kept programs, for this process and those it starts."""
+    monkeypatch.delenv("JAX_COMPILATION_CACHE_DIR", raising=False)
+    monkeypatch.setenv("JAXVEH_CACHE", str(tmp_path / "kept"))
+    return tmp_path / "kept"
+
+
+def simulated(tmp_path):
+    """How many programs a simulation asked for, read back and wrote; and what was said."""
+    return counted(*SIMULATE, "-o", str(tmp_path / "drive.csv"))
+
+
+def counted(*arguments):
+    """The same of any program, or of a few operations."""
+    done = python("-c", COUNT, *arguments)
+    assert done.returncode == 0, done.stderr
+    *said, counts = done.stderr.splitlines()
+    return [int(number) for number in re.findall(r"\d+", counts)], "\n".join(said)
+
+
+def test_a_second_start_compiles_nothing_and_after_damage_all_is_compiled_anew(own, tmp_path):
+    (asked, read, written), _ = simulated(tmp_path)
+    assert asked > 5 and read < asked and written > 5
+    (asked, read, written), _ = simulated(tmp_path)
+    assert (read, written) == (asked, 0)
+    (folder,) = own.iterdir()
+    assert folder == kept_programs.folder()
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700 or sys.platform == "win32"
+    largest = max(folder.glob("*-cache"), key=lambda file: file.stat().st_size)
+    largest.write_bytes(largest.read_bytes()[:500])
+    (asked, read, _), said = simulated(tmp_path)
+    assert read == asked - 1
+    assert "note: a program kept from an earlier start is damaged" in said and "UserWarning" not in said
+    (asked, read, written), said = simulated(tmp_path)
+    assert written > 5 and "damaged" not in said
+
+
+def test_where_it_is_off_or_jax_is_told_nothing_is_ours(own, tmp_path, monkeypatch):
+    monkeypatch.setenv("JAXVEH_CACHE", "OFF")
+    assert counted()[0][1:] == [0, 0]
+    assert kept_programs.folder() is None
+    monkeypatch.setenv("JAXVEH_CACHE", str(own))
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path / "theirs"))
+    counted()
+    assert not own.exists() and (tmp_path / "theirs").exists()
+
+
+def test_a_folder_that_cannot_be_made_is_a_note(own, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("JAXVEH_CACHE", str(tmp_path / "file"))
+    counts, said = counted()
+    assert counts[1:] == [0, 0] and said.count("note: compiled programs are not kept") == 1
+    assert "Set JAXVEH_CACHE to a folder that can be written" in said
+
+
+def test_without_a_word_it_is_the_users_cache_folder(monkeypatch):
+    monkeypatch.delenv("JAXVEH_CACHE", raising=False)
+    assert kept_programs.root().parts[-2:] == ("jaxveh", "programs")
+    monkeypatch.setenv("JAXVEH_CACHE", "~/elsewhere")
+    assert kept_programs.root() == kept_programs.Path.home() / "elsewhere"
+
+
+def test_other_processors_have_folders_of_their_own(own, monkeypatch):
+    here = kept_programs.folder()
+    assert here == kept_programs.folder()
+    monkeypatch.setattr("platform.machine", lambda: "another")
+    assert kept_programs.folder() != here
+
+
+def test_what_nobody_has_used_for_long_is_dropped(own):
+    old, used, other = own / "jaxveh-0.0.1-jaxlib-0.10.0-abc", own / "jaxveh-0.0.2-jaxlib-0.10.0-abc", own / "holiday"
+    for one in (old, used, other):
+        one.mkdir(parents=True)
+    long_ago = time.time() - 2 * kept_programs.FORGOTTEN_AFTER
+    for one in (old, other):
+        os.utime(one, (long_ago, long_ago))
+    kept_programs.drop_old(own)
+    assert sorted(own.iterdir()) == [other, used]
+
+
+def test_show_and_clear(own):
+    assert run("cache", "show").stdout == f"{own}: nothing is kept yet\n"
+    folder = own / "jaxveh-0.1.0-jaxlib-0.10.0-abc"
+    folder.mkdir(parents=True)
+    (own / "mine.txt").write_text("kept")
+    (folder / "jit_f-123-cache").write_bytes(bytes(3_000_000))
+    (folder / "jit_f-123-atime").write_bytes(bytes(8))
+    assert run("cache", "show").stdout == f"{folder}: 1 programs, 3 MB\n"
+    assert run("cache", "clear").stdout == f"deleted {folder}: 1 programs, 3 MB\n"
+    assert [one.name for one in own.iterdir()] == ["mine.txt"]
+
+
+def test_show_says_that_it_is_off(monkeypatch):
+    monkeypatch.setenv("JAXVEH_CACHE", "off")
+    assert run("cache", "show").stdout == "JAXVEH_CACHE is off: nothing is kept\n"
