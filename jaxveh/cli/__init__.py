@@ -8,8 +8,8 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from jaxveh.cli.kept_programs import keep_programs
 from jaxveh.cli.family import end_with_parent
+from jaxveh.cli.kept_programs import keep_programs
 
 __all__ = ["main"]
 
