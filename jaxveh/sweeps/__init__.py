@@ -1,8 +1,9 @@
-"""Monte Carlo: one function over a design of settings and many seeds, in chunks that fit memory, on every core."""
+"""Monte Carlo: one function over a design of settings and many seeds, in chunks, on every core or on many machines."""
 
 from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.paired import Comparison, ConfidenceInterval, compare
 from jaxveh.sweeps.running import sweep
+from jaxveh.sweeps.stored import stored
 from jaxveh.sweeps.swept import Swept
 
-__all__ = ["Axis", "Comparison", "ConfidenceInterval", "Design", "Swept", "compare", "sweep"]
+__all__ = ["Axis", "Comparison", "ConfidenceInterval", "Design", "Swept", "compare", "stored", "sweep"]

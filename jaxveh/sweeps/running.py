@@ -6,9 +6,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh
 from jax.sharding import PartitionSpec as P
@@ -16,8 +14,10 @@ from jax.sharding import PartitionSpec as P
 from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh.sweeps.design import Design
+from jaxveh.sweeps.given import Given
 from jaxveh.sweeps.lateness import warn_when_late
-from jaxveh.sweeps.swept import Swept, named_leaves
+from jaxveh.sweeps.stored import sweep_into
+from jaxveh.sweeps.swept import Swept, arrays_of, named_leaves
 from jaxveh.sweeps.workers import fit_for
 
 SHARE_OF_MEMORY = 0.5
@@ -39,6 +39,10 @@ def sweep(
     devices: list | None = None,
     patience: float | None = PATIENCE,
     progress: Progress = silent,
+    store: str | os.PathLike | None = None,
+    client: Any = None,
+    processes: int | None = None,
+    part: tuple[int, int] | None = None,
 ) -> Swept:
     """`run` at every point of the design, each with the same seeds, so that points can be compared in pairs.
 
@@ -56,13 +60,30 @@ def sweep(
     each time that a chunk, or compiling, has taken so long, a `JaxvehWarning` names it and says what can be done (None:
     never); `progress(done, total, stage)` is called between chunks.
 
+    With `store`, a folder such as "sweep.zarr", each chunk is written as it is done, and nothing but a chunk is kept in memory:
+    `batch` runs (1000 unless given), in one Zarr array for each value, which xarray opens. The same call again goes on where it
+    was, whoever was killed, and gives the same to the last bit; another design, key, data, program, version, flag or processor in
+    the same store is refused by name. The chunks are done in this process, in `processes=N` of this machine, or by the workers of
+    a Dask scheduler, `client=` a `distributed.Client` or its address; each has one device. What a chunk needs is sent with it;
+    workers write to the store themselves, which they must see under the same path. A dead worker's chunk is done again, and so is
+    one that takes longer than `patience`; one that fails three times is recorded with its error. `part=(i, n)` does one share of
+    the chunks, i from 0, for an array of jobs without a scheduler. `sweeps.stored(store)` opens it again.
+
     Every choice is compiled once, whatever the number of chunks; and again for fewer devices where as many as were asked for
     could wait for each other for ever (large batches of LAPACK routines with jax before 0.12; see `sweeps/workers.py`).
 
-    **Raises** `InputError` for bad counts, neither a key nor data, data of another shape, and a `run` that returns nothing named.
+    **Raises** `InputError` for bad counts, neither a key nor data, data of another shape, a `run` that returns nothing named, and
+    a store that was begun with something else or that another sweep is writing.
     **Warns** where a program may never end even on one device, and what keeps it from that.
     """
     check_positive("patience", patience, "s")
+    if store is not None:
+        if memory is not None or devices is not None:
+            raise InputError("sweep: memory= and devices= are for sweeps without a store; give batch= and processes=.")
+        asked = {"batch": batch, "client": client, "processes": processes, "part": part, "patience": patience}
+        return sweep_into(store, run, design, Given(design, seeds, key, data), progress=progress, **asked)
+    if (client, processes, part) != (None, None, None):
+        raise InputError("sweep: client=, processes= and part= need a store= to write to.")
     devices = jax.devices() if devices is None else list(devices)
     given = Given(design, seeds, key, data)
     done, total = 0, given.runs * int(np.prod([len(axis.values) for axis in design.choices]))
@@ -74,48 +95,6 @@ def sweep(
         found.append(_all(one, given, batch, memory, devices, report, late))
         done += given.runs
     return Swept(design, given.seeds, _arrange(design, given.seeds, found))
-
-
-class Given:
-    """What the runs of one choice are given; they are ordered by point, then by seed."""
-
-    def __init__(self, design: Design, seeds: int | None, key: Any, data: Any):
-        points = tuple(len(axis.values) for axis in design.numbers)
-        parts = named_leaves(data)
-        if key is None and not parts:
-            raise InputError(
-                "sweep: give seeds and a key, from which each run draws, or data, of which each has its part."
-            )
-        if seeds is None:
-            seeds = next((np.shape(leaf)[len(points)] for leaf in parts.values() if np.ndim(leaf) > len(points)), None)
-        check_whole("seeds", seeds)
-        self.seeds, self.shape = int(seeds), (*points, int(seeds))
-        self.runs = int(np.prod(self.shape))
-        self.grid, self.data = design.grid(), data
-        self.keys = None if key is None else _on_the_host(jax.random.split(key, self.seeds))
-        for name, leaf in parts.items():
-            if np.shape(leaf)[: len(self.shape)] != self.shape:
-                names = ", ".join([axis.name for axis in design.numbers] + ["seeds"])
-                raise InputError(f"data {name} has shape {np.shape(leaf)}: must begin with {self.shape} ({names}).")
-
-    def chunk(self, first: int, batch: int) -> tuple:
-        """Arguments of the runs from `first` on; behind the last one it is repeated."""
-        which = np.minimum(np.arange(first, first + batch), self.runs - 1)
-        place = np.unravel_index(which, self.shape)
-        point = which // self.shape[-1]
-        numbers = {name: jnp.asarray(values[point]) for name, values in self.grid.items()}
-        keys = () if self.keys is None else (self.keys(place[-1]),)
-        own = () if self.data is None else (jax.tree.map(lambda leaf: jnp.asarray(leaf[place]), self.data),)
-        return numbers, *keys, *own
-
-
-def _on_the_host(keys: jax.Array) -> Callable[[np.ndarray], jax.Array]:
-    """What picks some of the keys by number: NumPy does, for which nothing is compiled."""
-    if not jnp.issubdtype(keys.dtype, jax.dtypes.prng_key):
-        raw = np.asarray(keys)
-        return lambda which: jnp.asarray(raw[which])
-    words, impl = np.asarray(jax.random.key_data(keys)), jax.random.key_impl(keys)
-    return lambda which: jax.random.wrap_key_data(jnp.asarray(words[which]), impl=impl)
 
 
 def _all(one, given: Given, batch, memory, devices, report, late) -> dict[str, np.ndarray]:
@@ -153,25 +132,11 @@ def _program(one, given: Given, batch, memory, devices):
 
 
 def _split_over(one, devices):
-    many = jax.vmap(lambda *one_run: _arrays(one(*one_run)))
+    many = jax.vmap(lambda *one_run: arrays_of(one(*one_run)))
     if len(devices) == 1:
         return jax.jit(many)
     mesh, along = Mesh(np.asarray(devices), ("runs",)), P("runs")
     return jax.jit(jax.shard_map(many, mesh=mesh, in_specs=along, out_specs=along, check_vma=False))
-
-
-def _arrays(result):
-    """The result's arrays, or an `InputError`."""
-    named = named_leaves(result)
-    if not named or any(not name for name in named):
-        raise InputError(
-            f"run returned {type(result).__name__}: must be a mapping or a NamedTuple of arrays, such as "
-            '{"rmse": ..., "result": ...}.'
-        )
-    bad = [name for name, leaf in named.items() if not eqx.is_array_like(leaf)]
-    if bad:
-        raise InputError(f"run: {', '.join(bad)} of its result are no arrays.")
-    return {name: jnp.asarray(leaf) for name, leaf in named.items()}
 
 
 def _bytes_needed(program) -> float:

@@ -6,7 +6,9 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
@@ -84,3 +86,17 @@ def _word(step: Any) -> str:
         if hasattr(step, attribute):
             return str(getattr(step, attribute))
     return str(step)
+
+
+def arrays_of(result):
+    """The result's arrays, or an `InputError`."""
+    named = named_leaves(result)
+    if not named or any(not name for name in named):
+        raise InputError(
+            f"run returned {type(result).__name__}: must be a mapping or a NamedTuple of arrays, such as "
+            '{"rmse": ..., "result": ...}.'
+        )
+    bad = [name for name, leaf in named.items() if not eqx.is_array_like(leaf)]
+    if bad:
+        raise InputError(f"run: {', '.join(bad)} of its result are no arrays.")
+    return {name: jnp.asarray(leaf) for name, leaf in named.items()}

@@ -1,0 +1,130 @@
+"""Who computes chunks beside this process: processes of this machine (loky), or workers of a Dask scheduler (distributed)."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from typing import Any
+
+import jax
+
+from jaxveh._core.errors import InputError, check_whole
+from jaxveh.io import kit
+from jaxveh.sweeps.chunks import do_chunk, settings_of_jax
+from jaxveh.sweeps.driving import Crew
+from jaxveh.sweeps.workers import POOL
+
+THREADS = "2"
+"""Worker threads of a process: one computes, one is free for what it waits for (see `sweeps/workers.py`)."""
+
+
+@contextlib.contextmanager
+def crew_for(client: Any, processes: int | None, packed: bytes, arguments: Callable[[int], tuple]) -> Iterator[Crew]:
+    """The workers that were asked for; `arguments` of a chunk by its number."""
+    if client is not None:
+        with _client(client) as connected:
+            yield Cluster(connected, packed, arguments)
+        return
+    check_whole("processes", processes)
+    with tempfile.TemporaryDirectory(prefix="jaxveh-programs-") as folder:
+        settings = settings_of_jax()
+        if settings["jax_compilation_cache_dir"] is None:
+            # One process compiles, the others read.
+            settings["jax_compilation_cache_dir"] = folder
+        crew = Processes(int(processes or 1), packed, arguments, settings)
+        try:
+            yield crew
+        finally:
+            crew.end()
+
+
+class Processes:
+    """Processes of this machine; when one dies, all are begun anew."""
+
+    def __init__(self, count: int, packed: bytes, arguments: Callable[[int], tuple], settings: dict[str, Any]):
+        self._loky = kit.require("loky", "a sweep in several processes", "sweep")
+        self.workers, self._packed, self._arguments, self._settings = count, packed, arguments, settings
+        self._pool = self._begin()
+
+    def _begin(self) -> Any:
+        flags = {name: os.environ[name] for name in ("XLA_FLAGS", "JAX_PLATFORMS") if name in os.environ}
+        return self._loky.ProcessPoolExecutor(self.workers, env={**flags, POOL: THREADS})
+
+    def submit(self, number: int) -> Future:
+        """Give out a chunk."""
+        try:
+            return self._pool.submit(do_chunk, self._packed, number, self._arguments(number), self._settings)
+        except (self._loky.process_executor.BrokenProcessPool, RuntimeError):
+            self._again()
+            return self._pool.submit(do_chunk, self._packed, number, self._arguments(number), self._settings)
+
+    def drop(self, future: Future) -> None:
+        """Processes cannot be told to stop one chunk: all are begun anew."""
+        self._again()
+
+    def died(self, error: BaseException) -> bool:
+        """Whether a process died."""
+        return isinstance(
+            error, self._loky.process_executor.BrokenProcessPool | self._loky.process_executor.ShutdownExecutorError
+        )
+
+    def _again(self) -> None:
+        self.end()
+        self._pool = self._begin()
+
+    def end(self) -> None:
+        """End all processes."""
+        self._pool.shutdown(wait=True, kill_workers=True)
+
+
+class Cluster:
+    """The workers of a Dask scheduler. Each chunk carries all that it needs: what is scattered is lost with its worker."""
+
+    def __init__(self, client: Any, packed: bytes, arguments: Callable[[int], tuple]):
+        self._client, self._packed, self._arguments = client, packed, arguments
+        self._distributed = kit.require("distributed", "a sweep on a cluster", "sweep")
+        self._executor = client.get_executor(pure=False, retries=0)
+        # Files of this machine need not be there on others.
+        self._settings = {**settings_of_jax(), "jax_compilation_cache_dir": jax.config.jax_compilation_cache_dir}
+
+    @property
+    def workers(self) -> int:
+        """How many threads all workers have."""
+        try:
+            return sum(self._client.ncores().values())
+        except Exception as error:
+            raise InputError(
+                f"sweep: the scheduler does not answer ({error}); what is done stays: start again."
+            ) from error
+
+    def submit(self, number: int) -> Future:
+        """Give out a chunk."""
+        return self._executor.submit(do_chunk, self._packed, number, self._arguments(number), self._settings)
+
+    def drop(self, future: Future) -> None:
+        """Give up a chunk that takes too long."""
+        future.cancel()
+
+    def died(self, error: BaseException) -> bool:
+        """Whether a worker died, as Dask says it."""
+        return isinstance(error, self._distributed.scheduler.KilledWorker) or type(error).__name__ in (
+            "KilledWorker", "FutureCancelledError", "CommClosedError",
+        )  # fmt: skip
+
+
+@contextlib.contextmanager
+def _client(client: Any) -> Iterator[Any]:
+    """A client of one's own, or one for a scheduler's address."""
+    if not isinstance(client, str):
+        if not hasattr(client, "get_executor"):
+            raise InputError(
+                f"client = {client!r}: must be a dask.distributed Client, or a scheduler's address, tcp://host:8786."
+            )
+        yield client
+        return
+    distributed = kit.require("distributed", "a sweep on a cluster", "sweep")
+    with distributed.Client(client, set_as_default=False) as made:
+        yield made

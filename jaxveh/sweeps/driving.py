@@ -1,0 +1,92 @@
+"""Chunks given out to other processes, until each is done or has failed three times."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from typing import Any, Protocol
+
+from jaxveh._core.errors import InputError
+from jaxveh.sweeps.chunks import Unfit
+
+TRIES = 3
+"""How often a chunk may fail."""
+
+LOSSES = 50
+"""How often workers may die under one chunk until it is left as failed: that need not be the chunk's fault."""
+
+AHEAD = 2
+"""Chunks that wait at each worker, so that none is idle between two."""
+
+POLL = 1.0
+"""Seconds after which time limits are looked at."""
+
+
+class Crew(Protocol):
+    """Workers that take chunks."""
+
+    @property
+    def workers(self) -> int:
+        """How many chunks are computed at once."""
+        ...
+
+    def submit(self, number: int) -> Future:
+        """Give out a chunk."""
+        ...
+
+    def drop(self, future: Future) -> None:
+        """Give up a chunk that takes too long."""
+        ...
+
+    def died(self, error: BaseException) -> bool:
+        """Whether an error says that a worker died, and not what it worked on; workers are there again afterwards."""
+        ...
+
+
+def drive(
+    crew: Crew,
+    numbers: Iterable[int],
+    limit: float,
+    on_done: Callable[[int], Any],
+    on_failure: Callable[[int, str], Any],
+) -> None:
+    """Have all chunks done by the crew, each within `limit` seconds of its start at most."""
+    waiting = list(reversed(list(numbers)))
+    failed: dict[int, int] = {}
+    lost: dict[int, int] = {}
+    out: dict[Future, tuple[int, float]] = {}
+
+    def again(number: int, count: dict[int, int], most: int, error: object) -> None:
+        count[number] = count.get(number, 0) + 1
+        if count[number] < most:
+            waiting.append(number)
+        else:
+            on_failure(number, str(error) or type(error).__name__)
+
+    while waiting or out:
+        while waiting and len(out) < AHEAD * max(1, crew.workers):
+            number = waiting.pop()
+            # A chunk that waits behind others has their time, too.
+            out[crew.submit(number)] = (number, time.monotonic() + AHEAD * limit)
+        ready, _ = wait(out, timeout=POLL, return_when=FIRST_COMPLETED)
+        for future in ready:
+            number, _ = out.pop(future)
+            error = CancelledError() if future.cancelled() else future.exception()
+            if error is None:
+                on_done(number)
+            elif isinstance(error, Unfit):
+                raise InputError(f"sweep: a worker does not fit: {error}.")
+            elif isinstance(error, OSError) and not crew.died(error):
+                raise InputError(
+                    f"sweep: a chunk cannot be written: {error}. What is done stays: start again."
+                ) from error
+            elif isinstance(error, CancelledError) or crew.died(error):
+                again(number, lost, LOSSES, error)
+            else:
+                again(number, failed, TRIES, error)
+        now = time.monotonic()
+        for future in [f for f, (_, end) in out.items() if now > end]:
+            number, _ = out.pop(future)
+            crew.drop(future)
+            again(number, failed, TRIES, f"took longer than {limit:g} s")

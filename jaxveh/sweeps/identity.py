@@ -1,0 +1,109 @@
+"""What decides a stored sweep's numbers to the last bit, in words that can be compared and stored."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import re
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.version import VERSION
+from jaxveh.sweeps.design import Design
+from jaxveh.sweeps.given import Given
+from jaxveh.sweeps.plan import Plan
+from jaxveh.sweeps.swept import named_leaves
+
+CONFIGURED = ("jax_enable_x64", "jax_default_matmul_precision", "jax_threefry_partitionable")
+"""Settings of jax on which results depend."""
+
+OF_PROCESS = ("jaxveh", "jax", "jaxlib", "XLA_FLAGS", *CONFIGURED, "processor")
+"""What belongs to a process that computes chunks; the rest is what was asked for."""
+
+
+def identity(design: Design, given: Given, plan: Plan, programs: Mapping[str, str]) -> dict[str, Any]:
+    """All that a sweep's numbers follow from. `programs`: a description of each combination of choices, and the hash of what it
+    computes."""
+    axes = [
+        {"name": a.name, "choice": a.choice, "labels": [str(label) if a.choice else label for label in a.labels]}
+        for a in design.axes
+    ]
+    return {
+        "design": axes,
+        "seeds": given.seeds,
+        "key": None if given.key is None else _of_key(given.key),
+        "data": {name: _hashed(np.asarray(leaf)) for name, leaf in named_leaves(given.data).items()},
+        "batch": list(plan.block),
+        "programs": dict(programs),
+        **of_process(),
+    }
+
+
+def of_process() -> dict[str, Any]:
+    """What this process would compute with."""
+    settings = {name: str(getattr(jax.config, name)) for name in CONFIGURED}
+    flags = " ".join(sorted(os.environ.get("XLA_FLAGS", "").split()))
+    versions = {"jaxveh": VERSION, "jax": version("jax"), "jaxlib": version("jaxlib")}
+    return {**versions, "XLA_FLAGS": flags, **settings, "processor": processor()}
+
+
+def processor() -> str:
+    """The processor's model and the hash of its features: other vectors round otherwise."""
+    said = [platform.machine(), platform.processor()]
+    described = Path("/proc/cpuinfo")
+    if described.exists():
+        lines = described.read_text(errors="replace").split("\n\n")[0].splitlines()
+        said += [
+            line.partition(":")[2].strip() for line in lines if line.startswith(("model name", "flags", "Features"))
+        ]
+    return f"{platform.machine()} {hashlib.sha256(' '.join(said).encode()).hexdigest()[:12]}"
+
+
+_ADDRESS = re.compile(r"0x[0-9a-f]{6,}|\b\d{12,}\b")
+
+
+def of_program(lowered: Any) -> str:
+    """The hash of what a lowered program computes; addresses of this process do not count."""
+    return hashlib.sha256(_ADDRESS.sub("", lowered.as_text()).encode()).hexdigest()[:16]
+
+
+def check_same(path: Any, stored: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
+    """Raise where a store was begun with something else, naming the first such thing."""
+    was, here = _flat(stored), _flat(asked)
+    for name in [*here, *(name for name in was if name not in here)]:
+        if was.get(name) != here.get(name):
+            raise InputError(
+                f"{path}: it was begun with {name} = {_short(was.get(name))}, here it is {_short(here.get(name))}: these are not "
+                "numbers of one sweep. Take another store, or what it was begun with."
+            )
+
+
+def _flat(identity: Mapping[str, Any]) -> dict[str, Any]:
+    """An identity whose axes, data and programs have names of their own."""
+    axes = {f"axis {axis['name']}": axis["labels"] for axis in identity["design"]}
+    data = {f"data {name or 'array'}": said for name, said in identity["data"].items()}
+    programs = {f"the hash of the program of {said or 'run'}": found for said, found in identity["programs"].items()}
+    rest = {name: value for name, value in identity.items() if name not in ("design", "data", "programs", "values")}
+    return {**axes, "order of axes": [axis["name"] for axis in identity["design"]], **data, **rest, **programs}
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 300 else f"{text[:300]}..."
+
+
+def _of_key(key: Any) -> str:
+    if not jax.numpy.issubdtype(key.dtype, jax.dtypes.prng_key):
+        return str(np.asarray(key).tolist())
+    return f"{jax.random.key_impl(key)} {np.asarray(jax.random.key_data(key)).ravel().tolist()}"
+
+
+def _hashed(array: np.ndarray) -> str:
+    return f"{array.dtype}{array.shape} {hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()[:16]}"

@@ -1,0 +1,168 @@
+"""A sweep's Zarr store: one array for each value, with the design's names, that xarray opens as it is.
+
+A chunk's values are written first, its mark in `chunk_status` last; each file is written beside its place and moved there. So
+what is marked is whole, whenever a process was killed, and what is not marked is computed again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh.io import kit
+from jaxveh.sweeps.design import Axis, Design
+from jaxveh.sweeps.plan import Chunk, Plan
+
+MANIFEST = "jaxveh_sweep"
+"""The attribute with the sweep's identity."""
+
+STATUS, ERROR = "chunk_status", "chunk_error"
+NOT_DONE, DONE, FAILED = 0, 1, 2
+
+LONGEST_ERROR = 1000
+"""Bytes of UTF-8 that are kept of a chunk's error."""
+
+SEED = "seed"
+OWN = "_of_"
+
+
+class Store:
+    """A sweep's store at `path`, opened for reading and writing chunks."""
+
+    def __init__(self, path: str | os.PathLike):
+        zarr = kit.require("zarr", "storing a sweep", "sweep")
+        self.path = Path(path)
+        if not (self.path / "zarr.json").exists():
+            raise InputError(f"{self.path}: no such store; it has no zarr.json.")
+        self.group = zarr.open_group(self.path, mode="r+")
+        told = self.group.attrs.get(MANIFEST)
+        if told is None:
+            raise InputError(f"{self.path}: a Zarr store, but no sweep's: it lacks the attribute {MANIFEST}.")
+        self.identity: dict[str, Any] = json.loads(told)
+        axes = self.identity["design"]
+        self.labels = {axis["name"]: tuple(axis["labels"]) for axis in axes}
+        self.is_choice = {axis["name"]: bool(axis["choice"]) for axis in axes}
+        numbers = [len(axis["labels"]) for axis in axes if not axis["choice"]]
+        choices = [len(axis["labels"]) for axis in axes if axis["choice"]]
+        shape = (*numbers, self.identity["seeds"])
+        self.plan = Plan(int(np.prod(choices, dtype=int)), shape, tuple(self.identity["batch"]))
+        self._choices = tuple(choices)
+        self._chosen = tuple(i for i, is_choice in enumerate(self.is_choice.values()) if is_choice)
+
+    def design(self) -> Design:
+        """The design, with labels instead of the objects that were chosen from."""
+        design = Design()
+        design.axes = tuple(Axis(name, labels, labels, self.is_choice[name]) for name, labels in self.labels.items())
+        return design
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The values' names."""
+        return tuple(self.identity["values"])
+
+    def read(self, name: str) -> np.ndarray:
+        """All of one value: (axes..., seeds, ...)."""
+        return np.asarray(self.group[name][...])
+
+    def status(self) -> np.ndarray:
+        """Of each chunk: 0 not done, 1 done, 2 failed."""
+        return np.asarray(self.group[STATUS][:])
+
+    def is_done(self, number: int) -> bool:
+        """Whether a chunk is there, whoever has written it."""
+        return int(self.group[STATUS][number]) == DONE
+
+    def error(self, number: int) -> str:
+        """Why a chunk failed."""
+        return bytes(self.group[ERROR][number]).rstrip(b"\0").decode(errors="replace")
+
+    def write(self, chunk: Chunk, values: Mapping[str, np.ndarray]) -> None:
+        """Write a chunk's values (*size, ...) by name, then its mark."""
+        where = self._region(chunk)
+        for name, array in values.items():
+            self.group[name][where] = np.expand_dims(array, self._chosen)
+        self.group[STATUS][chunk.number : chunk.number + 1] = np.asarray([DONE], np.int8)
+
+    def write_failure(self, number: int, error: str) -> None:
+        """Mark a chunk as failed, and say why."""
+        text = np.frombuffer(error.encode()[:LONGEST_ERROR].ljust(LONGEST_ERROR, b"\0"), np.uint8)
+        self.group[ERROR][number] = text
+        self.group[STATUS][number : number + 1] = np.asarray([FAILED], np.int8)
+
+    def _region(self, chunk: Chunk) -> tuple[slice, ...]:
+        """Where a chunk's values stand, along the design's axes and the seeds."""
+        choice = iter(np.unravel_index(chunk.choice, self._choices) if self._choices else ())
+        block = iter(zip(chunk.start, chunk.size, strict=True))
+        along = []
+        for is_choice in self.is_choice.values():
+            start, size = (int(next(choice)), 1) if is_choice else next(block)
+            along.append(slice(start, start + size))
+        start, size = next(block)
+        return (*along, slice(start, start + size))
+
+
+def create(path: Path, identity: Mapping[str, Any], design: Design, plan: Plan, values: Mapping[str, Any]) -> Store:
+    """Make a store for values of these shapes and dtypes (of one run) by name; it is complete, or not there."""
+    zarr = kit.require("zarr", "storing a sweep", "sweep")
+    if path.exists():
+        raise InputError(f"{path}: exists and is no sweep's store; take another name.")
+    taken = {SEED, STATUS, ERROR, *(axis.name for axis in design.axes)} & {*values}
+    if taken:
+        raise InputError(
+            f"run: {', '.join(sorted(taken))} of its result has the name of an axis or of a store's own array."
+        )
+    part = path.with_name(f"{path.name}.part")
+    group = zarr.open_group(part, mode="w", zarr_format=3)
+    for axis in design.axes:
+        if axis.choice:
+            labels = group.create_array(axis.name, shape=(len(axis.labels),), dtype="str", dimension_names=(axis.name,))
+            labels[:] = np.asarray([str(label) for label in axis.labels])
+        else:
+            group.create_array(axis.name, data=np.asarray(axis.labels, float), dimension_names=(axis.name,))
+    names = [axis.name for axis in design.axes]
+    for name, one in values.items():
+        group.create_array(
+            name,
+            shape=(*(len(axis.values) for axis in design.axes), plan.shape[-1], *one.shape),
+            chunks=(*_block(design, plan), *(max(1, n) for n in one.shape)),
+            dtype=one.dtype,
+            fill_value=missing(one.dtype),
+            dimension_names=(*names, SEED, *(f"{name}{OWN}{i}" for i in range(len(one.shape)))),
+        )
+    group.create_array(
+        STATUS, shape=(plan.chunks,), chunks=(1,), dtype="int8", fill_value=NOT_DONE, dimension_names=("chunk",)
+    )
+    group.create_array(
+        ERROR, shape=(plan.chunks, LONGEST_ERROR), chunks=(1, LONGEST_ERROR), dtype="uint8", fill_value=0,
+        dimension_names=("chunk", "letter"),
+    )  # fmt: skip
+    # As text: what is compared later must come back as it was.
+    group.attrs[MANIFEST] = json.dumps({**identity, "values": list(values)})
+    with warnings.catch_warnings():
+        # xarray opens it faster, and says so where it is missing; others do not look at it.
+        warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
+        zarr.consolidate_metadata(part)
+    part.rename(path)
+    return Store(path)
+
+
+def missing(dtype: Any) -> Any:
+    """What stands where nothing was computed: NaN, the least integer, or False."""
+    dtype = np.dtype(dtype)
+    if dtype.kind in "fc":
+        return dtype.type(np.nan)
+    return np.iinfo(dtype).min if dtype.kind == "i" else dtype.type(0)
+
+
+def _block(design: Design, plan: Plan) -> Iterator[int]:
+    block = iter(plan.block)
+    for axis in design.axes:
+        yield 1 if axis.choice else next(block)
+    yield next(block)

@@ -1,0 +1,212 @@
+"""A sweep into a store: what is done stays done, whoever is killed, and a second call goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from jaxveh._core.errors import InputError, JaxvehWarning, check_whole
+from jaxveh._core.progress import Progress
+from jaxveh.io import kit
+from jaxveh.sweeps import identity
+from jaxveh.sweeps.chunks import Computing, Job, lowered_for, packed_arguments
+from jaxveh.sweeps.crews import crew_for
+from jaxveh.sweeps.design import Design
+from jaxveh.sweeps.driving import TRIES, drive
+from jaxveh.sweeps.given import Given
+from jaxveh.sweeps.lateness import warn_when_late
+from jaxveh.sweeps.plan import plan_for
+from jaxveh.sweeps.store import DONE, FAILED, Store, create
+from jaxveh.sweeps.swept import Swept
+
+BATCH = 1000
+"""Runs of a chunk, where nobody says otherwise: not by this machine's memory, for the numbers must not depend on it."""
+
+PROBED = 1.0
+"""s: how long to wait for a lock, which another sweep may hold for a moment to see whether it is held."""
+
+
+def sweep_into(
+    path: str | os.PathLike,
+    run: Callable[..., Any],
+    design: Design,
+    given: Given,
+    *,
+    batch: int | None,
+    client: Any,
+    processes: int | None,
+    part: tuple[int, int] | None,
+    patience: float | None,
+    progress: Progress,
+) -> Swept:
+    """`sweep` with a store; arguments as there."""
+    check_whole("batch", BATCH if batch is None else batch)
+    if client is not None and processes is not None:
+        raise InputError("sweep: give client= or processes=, not both.")
+    path = Path(path)
+    with only_one(path, part) as is_mine:
+        job = Job(run, design, str(path.resolve()))
+        with _beginning(path):
+            lowered, store = _begin(path, run, design, given, batch)
+        status = store.status()
+        mine = [int(i) for i in np.flatnonzero(status != DONE) if is_mine(int(i))]
+        total = sum(is_mine(i) for i in range(store.plan.chunks))
+        done = total - len(mine)
+        arguments = lambda number: given.of_runs(store.plan.runs(store.plan.chunk(number)))
+
+        def told(number: int) -> None:
+            nonlocal done
+            done += 1
+            progress(done, total, f"chunks of {store.plan.batch} runs")
+
+        progress(done, total, f"chunks of {store.plan.batch} runs")
+        if client is None and processes is None:
+            _alone(Computing(job, lowered), mine, arguments, patience, told)
+        elif mine:
+            packed = job.packed()
+            with crew_for(client, processes, packed, lambda number: packed_arguments(arguments(number))) as crew:
+                limit = float("inf") if patience is None else patience
+                drive(crew, mine, limit, told, store.write_failure)
+    return stored(path)
+
+
+def _alone(computing: Computing, numbers: list[int], arguments, patience: float | None, told) -> None:
+    """All chunks in this process; what a chunk raises thrice is recorded, what the disk says ends the sweep."""
+    for number in numbers:
+        given = arguments(number)
+        with warn_when_late(f"chunk {number}", patience):
+            for attempt in range(1, TRIES + 1):
+                try:
+                    computing.do(number, given)
+                except (OSError, InputError):
+                    raise
+                except Exception as error:
+                    if attempt == TRIES:
+                        computing.store.write_failure(number, f"{type(error).__name__}: {error}")
+                else:
+                    break
+        told(number)
+
+
+def _begin(path: Path, run, design: Design, given: Given, batch: int | None) -> tuple[dict[int, Any], Store]:
+    """The store, begun or found with the same identity; and the programs, lowered, by the combination's number."""
+    if path.exists():
+        store = Store(path)
+        plan = store.plan
+        if batch is not None:
+            plan = plan_for(plan.choices, given.shape, min(batch, given.runs))
+    else:
+        choices = int(np.prod([len(axis.values) for axis in design.choices], dtype=int))
+        store, plan = None, plan_for(choices, given.shape, min(BATCH if batch is None else batch, given.runs))
+    lowered, programs, values = {}, {}, None
+    for i, (_, said, objects) in enumerate(design.combinations()):
+        # As many runs as the plan says, whatever they are: their shapes are what counts.
+        lowered[i] = lowered_for(run, design, objects, given.chunk(0, plan.batch))
+        programs[said] = identity.of_program(lowered[i])
+        shapes = {name: (leaf.shape[1:], leaf.dtype) for name, leaf in lowered[i].out_info.items()}
+        if values is not None and shapes != values:
+            raise InputError(f"run returns other names, shapes or dtypes with {said} than with the first choice.")
+        values = shapes
+    asked = identity.identity(design, given, plan, programs)
+    if store is not None:
+        identity.check_same(path, store.identity, asked)
+        return lowered, store
+    shaped = {name: jax.ShapeDtypeStruct(*one) for name, one in (values or {}).items()}
+    shutil.rmtree(path.with_name(f"{path.name}.part"), ignore_errors=True)
+    return lowered, create(path, asked, design, plan, shaped)
+
+
+@contextlib.contextmanager
+def _beginning(path: Path) -> Iterator[None]:
+    """Parts that start at once begin the store one after the other."""
+    filelock = kit.require("filelock", "storing a sweep", "sweep")
+    with filelock.FileLock(path.with_name(f".{path.name}.begin"), timeout=600):
+        yield
+
+
+@contextlib.contextmanager
+def only_one(path: Path, part: tuple[int, int] | None) -> Iterator[Callable[[int], bool]]:
+    """Hold the store, or one of its parts, against other sweeps while the block runs; gives which chunks are one's own.
+
+    The locks are files beside the store. The system lets go of them when their process ends, however it ends.
+    """
+    filelock = kit.require("filelock", "storing a sweep", "sweep")
+    if part is not None and not (len(part) == 2 and 0 <= part[0] < part[1]):
+        raise InputError(f"part = {part!r}: must be (i, n) with 0 <= i < n.")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    name = "lock" if part is None else f"part-{part[0]}-of-{part[1]}.lock"
+    lock = filelock.FileLock(path.with_name(f".{path.name}.{name}"), timeout=PROBED)
+    try:
+        lock.acquire()
+    except filelock.Timeout:
+        raise InputError(f"{path}: another sweep is writing it; wait, or give each its own part=(i, n).") from None
+    try:
+        with _others(path, part, filelock):
+            yield (lambda number: True) if part is None else (lambda number: number % part[1] == part[0])
+    finally:
+        lock.release()
+
+
+@contextlib.contextmanager
+def _others(path: Path, part: tuple[int, int] | None, filelock: Any) -> Iterator[None]:
+    """Refuse what would share chunks: the whole beside a part, parts of another number."""
+    own = "" if part is None else f"-of-{part[1]}.lock"
+    for other in path.parent.glob(f".{path.name}.*lock"):
+        if other.name.endswith(own) and part is not None and ".part-" in other.name:
+            continue
+        if part is None and other.name == f".{path.name}.lock":
+            continue
+        probe = filelock.FileLock(other, timeout=0)
+        try:
+            probe.acquire()
+        except filelock.Timeout:
+            raise InputError(
+                f"{path}: another sweep ({other.name}) is writing some of the same chunks; wait for it."
+            ) from None
+        probe.release()
+    yield
+
+
+class Values(Mapping):
+    """A store's values by name, read when they are asked for."""
+
+    def __init__(self, store: Store):
+        self._store = store
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._store.names:
+            raise KeyError(name)
+        return self._store.read(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._store.names)
+
+    def __len__(self) -> int:
+        return len(self._store.names)
+
+
+def stored(path: str | os.PathLike) -> Swept:
+    """What is in a sweep's store, read value by value when asked for; choices by their labels.
+
+    **Warns** (`JaxvehWarning`) of chunks that are not done, whose values are NaN (the least integer, False), and of those that
+    failed, with the first error.
+    """
+    store = Store(path)
+    status = store.status()
+    missing, failed = int((status != DONE).sum()), np.flatnonzero(status == FAILED)
+    if missing:
+        why = f"; {len(failed)} of them failed: {store.error(int(failed[0]))}" if len(failed) else ""
+        warnings.warn(
+            f"{path}: {missing} of {store.plan.chunks} chunks are not done{why}. The same sweep again goes on with them.",
+            JaxvehWarning,
+            stacklevel=2,
+        )
+    return Swept(store.design(), store.plan.shape[-1], Values(store))

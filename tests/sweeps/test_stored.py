@@ -1,0 +1,297 @@
+"""A sweep with a store: the numbers of one without, in Zarr arrays; resumed, shared and refused as it says."""
+
+import errno
+import itertools
+import json
+import threading
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import stored_study
+import xarray
+import zarr
+from stored_study import BATCH, DESIGN, KEY, SEEDS
+
+from jaxveh import InputError, JaxvehWarning, sweeps
+
+plans = __import__("jaxveh.sweeps.plan", fromlist=["plan"])
+stores = __import__("jaxveh.sweeps.store", fromlist=["store"])
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """The same without a store."""
+    return sweeps.sweep(stored_study.run, DESIGN, SEEDS, KEY, batch=BATCH, devices=jax.devices()[:1])
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A store that nobody has disturbed."""
+    path = tmp_path_factory.mktemp("whole") / "sweep.zarr"
+    stored_study.sweep(path)
+    return path
+
+
+def files(path):
+    """Every file of a store, locks and scraps apart, by its name."""
+    return {str(f.relative_to(path)): f.read_bytes() for f in path.rglob("*") if f.is_file() and f.suffix != ".partial"}
+
+
+def same_store(a, b):
+    assert files(a) == files(b)
+
+
+def test_it_is_the_sweep_without_a_store(plain, whole):
+    found = sweeps.stored(whole)
+    assert set(found.values) == set(plain.values) and len(found.values) == 4
+    for name in plain.values:
+        assert found.values[name].dtype == plain.values[name].dtype
+        np.testing.assert_array_equal(found[name], plain[name])
+    np.testing.assert_array_equal(found.at("total", law="sine"), plain.at("total", law="sine"))
+    np.testing.assert_array_equal(found.median("deep")["corner"], plain.median("deep")["corner"])
+    np.testing.assert_array_equal(
+        found.compare("count", "law", "tanh", "sine").wins, plain.compare("count", "law", "tanh", "sine").wins
+    )
+    with pytest.raises(InputError, match="value"):
+        found["none"]
+
+
+def test_xarray_opens_it_with_names_and_coordinates(whole, plain, recwarn):
+    data = xarray.open_zarr(whole)
+    assert data["total"].dims == ("decay", "law", "seed")
+    assert data["law"].values.tolist() == ["tanh", "sine"] and data["decay"].values.tolist() == [0.1, 0.5, 0.9]
+    np.testing.assert_array_equal(data["total"].sel(law="sine", decay=0.5), plain.at("total", law="sine", decay=0.5))
+    assert data["chunk_status"].values.tolist() == [1] * 42
+    told = json.loads(data.attrs["jaxveh_sweep"])
+    assert told["seeds"] == SEEDS and told["jax"] == jax.__version__ and told["processor"]
+    assert not [str(one.message) for one in recwarn if "onsolidated" in str(one.message)]
+
+
+def test_interrupted_again_and_again_it_is_the_same_to_the_last_bit(tmp_path, whole):
+    path, done = tmp_path / "sweep.zarr", []
+
+    def interrupt(after):
+        def progress(count, total, stage):
+            done.append(count)
+            if count >= after:
+                raise KeyboardInterrupt
+
+        return progress
+
+    for after in (3, 4, 17):
+        with pytest.raises(KeyboardInterrupt):
+            stored_study.sweep(path, progress=interrupt(after))
+        with pytest.warns(JaxvehWarning, match=f"{42 - after} of 42 chunks are not done. The same sweep again goes on"):
+            sweeps.stored(path)
+    stored_study.sweep(path, progress=interrupt(1000))
+    # Each call begins where the last one ended: nothing was computed twice.
+    assert done == [0, 1, 2, 3, 3, 4, *range(4, 18), *range(17, 43)]
+    same_store(path, whole)
+
+
+def test_what_is_marked_is_whole_wherever_writing_is_cut_off(tmp_path, whole, monkeypatch):
+    path, written = tmp_path / "sweep.zarr", zarr.storage._local._put
+    for cut in (1, 2, 3, 4, 5, 6, 9):
+        count = itertools.count(1)
+
+        def put(place, value, exclusive=False, count=count, cut=cut):
+            if "/c/" in str(place) and next(count) == cut:
+                raise KeyboardInterrupt
+            return written(place, value, exclusive)
+
+        monkeypatch.setattr(zarr.storage._local, "_put", put)
+        with pytest.raises(KeyboardInterrupt):
+            stored_study.sweep(path)
+        monkeypatch.undo()
+        with pytest.warns(JaxvehWarning):
+            found = sweeps.stored(path)
+        status = stores.Store(path).status()
+        for i in np.flatnonzero(status):
+            chunk = stores.Store(path).plan.chunk(int(i))
+            where = stores.Store(path)._region(chunk)
+            for name in found.values:
+                np.testing.assert_array_equal(found.values[name][where], sweeps.stored(whole).values[name][where])
+    stored_study.sweep(path)
+    same_store(path, whole)
+
+
+def test_shares_of_an_array_job_make_the_whole(tmp_path, whole):
+    path = tmp_path / "sweep.zarr"
+    for i in (2, 0, 1):
+        counts = []
+        options = {"part": (i, 3), "progress": lambda done, total, stage, counts=counts: counts.append((done, total))}
+        if i != 1:
+            with pytest.warns(JaxvehWarning, match="chunks are not done"):
+                stored_study.sweep(path, **options)
+        else:
+            stored_study.sweep(path, **options)
+        assert counts == [(k, 14) for k in range(15)]
+    same_store(path, whole)
+
+
+def changed_axis():
+    return sweeps.Design(decay=[0.1, 0.5, 0.8], law={"tanh": jnp.tanh, "sine": jnp.sin})
+
+
+OTHER = {
+    "key": (lambda: {"key": jax.random.key(4)}, r"key = .* \[0, 3\], here it is .* \[0, 4\]"),
+    "seeds": (lambda: {"seeds": 51}, "seeds = 50, here it is 51"),
+    "axis": (lambda: {"design": changed_axis()}, r"axis decay = \[0.1, 0.5, 0.9\], here it is \[0.1, 0.5, 0.8\]"),
+    "batch": (lambda: {"batch": 9}, r"batch = \[1, 8\], here it is \[1, 9\]"),
+    "program": (
+        lambda: {"run": lambda point, key: jax.tree.map(lambda x: 1 * x, stored_study.run(point, key))},
+        "the hash of the program of law tanh = ",
+    ),
+}
+
+
+@pytest.mark.parametrize("other", OTHER)
+def test_another_sweep_in_the_same_store_is_refused_by_name(other, whole):
+    made, message = OTHER[other]
+    given = {"run": stored_study.run, "design": DESIGN, "seeds": SEEDS, "key": KEY, "batch": BATCH, **made()}
+    before = files(whole)
+    with pytest.raises(InputError, match=f"sweep.zarr: it was begun with {message}"):
+        sweeps.sweep(given.pop("run"), given.pop("design"), store=whole, **given)
+    assert files(whole) == before
+
+
+@pytest.mark.parametrize("name", ["jaxveh", "jax", "jaxlib", "XLA_FLAGS", "jax_enable_x64", "processor"])
+def test_another_process_is_refused_by_name(name, whole, monkeypatch):
+    identity = __import__("jaxveh.sweeps.identity", fromlist=["identity"])
+    usual = identity.of_process()
+    monkeypatch.setattr(identity, "of_process", lambda: {**usual, name: "another"})
+    with pytest.raises(InputError, match=f"begun with {name} = .*, here it is another"):
+        stored_study.sweep(whole)
+
+
+def test_other_data_are_refused(tmp_path):
+    drives = {"speed": np.arange(6.0).reshape(2, 3)}
+    run = lambda point, drive: {"twice": point.gain * drive["speed"]}
+    once = lambda data: sweeps.sweep(run, sweeps.Design(gain=[1.0, 2.0]), data=data, store=tmp_path / "s.zarr", batch=2)
+    np.testing.assert_array_equal(once(drives)["twice"], [[0.0, 1.0, 2.0], [6.0, 8.0, 10.0]])
+    with pytest.raises(InputError, match="begun with data speed = "):
+        once({"speed": drives["speed"] + 1})
+
+
+def test_a_second_sweep_at_the_same_time_is_refused(tmp_path, whole):
+    path = tmp_path / "sweep.zarr"
+    begun, go_on = threading.Event(), threading.Event()
+
+    def wait(count, total, stage):
+        begun.set()
+        go_on.wait(60)
+
+    def first(**options):
+        begun.clear()
+        go_on.clear()
+        thread = threading.Thread(target=lambda: stored_study.sweep(path, progress=wait, **options))
+        thread.start()
+        begun.wait(60)
+        return thread
+
+    thread = first()
+    for options in ({}, {"part": (0, 2)}):
+        with pytest.raises(InputError, match="another sweep"):
+            stored_study.sweep(path, **options)
+    go_on.set()
+    thread.join()
+    same_store(path, whole)
+    thread = first(part=(0, 2))
+    for options in ({}, {"part": (0, 2)}, {"part": (1, 3)}):
+        with pytest.raises(InputError, match="another sweep"):
+            stored_study.sweep(path, **options)
+    stored_study.sweep(path, part=(1, 2))
+    go_on.set()
+    thread.join()
+
+
+def test_a_full_disk_ends_it_and_nothing_is_lost(tmp_path, whole, monkeypatch):
+    path, usual, left = tmp_path / "sweep.zarr", stores.Store.write, itertools.count()
+
+    def write(store, chunk, values):
+        if next(left) == 5:
+            raise OSError(errno.ENOSPC, "No space left on device", "c/0/1")
+        usual(store, chunk, values)
+
+    monkeypatch.setattr(stores.Store, "write", write)
+    with pytest.raises(OSError, match="No space left"):
+        stored_study.sweep(path)
+    monkeypatch.undo()
+    assert stores.Store(path).status().sum() == 5
+    stored_study.sweep(path)
+    same_store(path, whole)
+
+
+def test_a_chunk_that_fails_three_times_is_told_and_the_others_go_on(tmp_path):
+    tries = []
+
+    def bad(x):
+        tries.append(x.tolist())
+        if 5.0 in x:
+            raise ValueError("five is right out")
+        return x
+
+    def run(point, key):
+        like = jax.ShapeDtypeStruct((), jnp.float64)
+        return {"x": jax.pure_callback(bad, like, point.x, vmap_method="broadcast_all"), "n": jnp.int32(1), "ok": point.x > 0}
+
+    once = lambda: sweeps.sweep(run, sweeps.Design(x=np.arange(1.0, 9.0)), 1, KEY, store=tmp_path / "s.zarr", batch=2)
+    with pytest.warns(JaxvehWarning, match="1 of 4 chunks are not done; 1 of them failed: .*five is right out"):
+        found = once()
+    assert tries == [[1.0, 2.0], *3 * [[5.0, 6.0]], [7.0, 8.0]][:1] + [[3.0, 4.0]] + 3 * [[5.0, 6.0]] + [[7.0, 8.0]]
+    np.testing.assert_array_equal(found["x"][:, 0], [1, 2, 3, 4, np.nan, np.nan, 7, 8])
+    assert found["n"][:, 0].tolist() == [1, 1, 1, 1, *2 * [np.iinfo(np.int32).min], 1, 1]
+    assert found["ok"][:, 0].tolist() == [True] * 4 + [False] * 2 + [True] * 2
+    tries.clear()
+    with pytest.warns(JaxvehWarning, match="failed"):
+        once()
+    assert tries == 3 * [[5.0, 6.0]]
+
+
+MISTAKES = {
+    "parts": ({"part": (3, 3)}, r"part = \(3, 3\): must be \(i, n\) with 0 <= i < n"),
+    "both": ({"client": "tcp://here:1", "processes": 2}, "client= or processes=, not both"),
+    "memory": ({"memory": 1e9}, "memory= and devices= are for sweeps without a store"),
+    "client": ({"client": 3}, "client = 3: must be a dask.distributed Client, or a scheduler's address"),
+    "none": ({"processes": 0}, "processes = 0"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes_are_named(mistake, tmp_path):
+    options, message = MISTAKES[mistake]
+    with pytest.raises(InputError, match=message):
+        stored_study.sweep(tmp_path / "sweep.zarr", **options)
+
+
+def test_without_a_store_there_is_no_client():
+    with pytest.raises(InputError, match="need a store="):
+        sweeps.sweep(stored_study.run, DESIGN, SEEDS, KEY, processes=2)
+
+
+def test_a_folder_of_somebody_elses_is_left_alone(tmp_path):
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(InputError, match="no such store"):
+        stored_study.sweep(tmp_path / "mine")
+    zarr.open_group(tmp_path / "other.zarr", mode="w")
+    with pytest.raises(InputError, match="but no sweep's"):
+        stored_study.sweep(tmp_path / "other.zarr")
+    with pytest.raises(InputError, match="has the name of an axis"):
+        sweeps.sweep(lambda point, key: {"x": point.x}, sweeps.Design(x=[1.0]), 1, KEY, store=tmp_path / "s.zarr")
+
+
+def test_blocks_hold_each_run_once():
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        shape = tuple(int(n) for n in rng.integers(1, 9, rng.integers(1, 4)))
+        plan = plans.plan_for(int(rng.integers(1, 4)), shape, int(rng.integers(1, 40)))
+        seen = np.zeros((plan.choices, *shape), int)
+        for chunk in map(plan.chunk, range(plan.chunks)):
+            runs = plan.runs(chunk)
+            assert len(runs) == plan.batch
+            inside = plan.inside(chunk, runs)
+            np.add.at(seen[chunk.choice].reshape(-1), inside.ravel(), 1)
+            assert inside.shape == chunk.size
+        assert (seen == 1).all()
