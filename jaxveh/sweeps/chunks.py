@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import jax
@@ -39,8 +41,22 @@ class Job(NamedTuple):
     path: str
 
     def packed(self) -> bytes:
-        """The job as bytes, functions of a script or notebook by value."""
-        return kit.require("cloudpickle", "sending a sweep to other processes", "sweep").dumps(self)
+        """The job as bytes; functions of a script, a notebook or a module of one's own by value, for workers need not have it."""
+        cloudpickle = kit.require("cloudpickle", "sending a sweep to other processes", "sweep")
+        module = inspect.getmodule(self.run)
+        if module is None or not _is_ones_own(module):
+            return cloudpickle.dumps(self)
+        cloudpickle.register_pickle_by_value(module)
+        try:
+            return cloudpickle.dumps(self)
+        finally:
+            cloudpickle.unregister_pickle_by_value(module)
+
+
+def _is_ones_own(module: ModuleType) -> bool:
+    """Whether a module is a file that nobody has installed."""
+    file, name = getattr(module, "__file__", None), module.__name__
+    return file is not None and name != "__main__" and name.partition(".")[0] != "jaxveh" and "-packages" not in file
 
 
 class Computing:
@@ -94,7 +110,11 @@ def do_chunk(packed: bytes, number: int, arguments: tuple, settings: dict[str, A
         for name, value in settings.items():
             jax.config.update(name, value)
         _jobs.clear()
-        _jobs[which] = Computing(kit.require("cloudpickle", "a sweep's worker", "sweep").loads(packed))
+        try:
+            job = kit.require("cloudpickle", "a sweep's worker", "sweep").loads(packed)
+        except Exception as error:
+            raise Unfit(f"it cannot read what is to be done ({type(error).__name__}: {error})") from None
+        _jobs[which] = Computing(job)
     try:
         _jobs[which].do(number, unpacked_arguments(arguments))
     except OSError:

@@ -92,7 +92,8 @@ class Store:
 
     def write_failure(self, number: int, error: str) -> None:
         """Mark a chunk as failed, and say why."""
-        text = np.frombuffer(error.encode()[:LONGEST_ERROR].ljust(LONGEST_ERROR, b"\0"), np.uint8)
+        # Tracebacks say at their end what went wrong.
+        text = np.frombuffer(error.encode()[-LONGEST_ERROR:].ljust(LONGEST_ERROR, b"\0"), np.uint8)
         self.group[ERROR][number] = text
         self.group[STATUS][number : number + 1] = np.asarray([FAILED], np.int8)
 

@@ -203,10 +203,16 @@ def stored(path: str | os.PathLike) -> Swept:
     status = store.status()
     missing, failed = int((status != DONE).sum()), np.flatnonzero(status == FAILED)
     if missing:
-        why = f"; {len(failed)} of them failed: {store.error(int(failed[0]))}" if len(failed) else ""
+        why = f"; {len(failed)} of them failed: {_last_line(store.error(int(failed[0])))}" if len(failed) else ""
         warnings.warn(
             f"{path}: {missing} of {store.plan.chunks} chunks are not done{why}. The same sweep again goes on with them.",
             JaxvehWarning,
             stacklevel=2,
         )
     return Swept(store.design(), store.plan.shape[-1], Values(store))
+
+
+def _last_line(error: str) -> str:
+    """Of an error's words the last line, which says what went wrong where there are many."""
+    lines = [line.strip() for line in error.splitlines() if line.strip()]
+    return lines[-1] if lines else "no reason was given"

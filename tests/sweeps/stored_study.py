@@ -19,7 +19,12 @@ def run(point, key):
     start = jax.random.normal(key, (6, 6))
     move = lambda x, _: (point.law(x @ x.T * 0.1 + point.decay * x), None)
     end, _ = jax.lax.scan(move, start, None, length=40)
-    return {"total": jnp.sum(end), "deep": {"corner": end[:2, 0]}, "count": jnp.sum(end > 0), "finite": jnp.isfinite(end).all()}
+    return {
+        "total": jnp.sum(end),
+        "deep": {"corner": end[:2, 0]},
+        "count": jnp.sum(end > 0),
+        "finite": jnp.isfinite(end).all(),
+    }
 
 
 def slowly(point, key):
