@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -29,6 +30,9 @@ from jaxveh.sweeps.swept import Swept
 
 BATCH = 1000
 """Runs of a chunk, where nobody says otherwise: not by this machine's memory, for the numbers must not depend on it."""
+
+SCRAPPED_AFTER = 3600.0
+"""s: age from which on half-written files are removed."""
 
 PROBED = 1.0
 """s: how long to wait for a lock, which another sweep may hold for a moment to see whether it is held."""
@@ -100,6 +104,7 @@ def _begin(path: Path, run, design: Design, given: Given, batch: int | None) -> 
     """The store, begun or found with the same identity; and the programs, lowered, by the combination's number."""
     if path.exists():
         store = Store(path)
+        _remove_scraps(path)
         plan = store.plan
         if batch is not None:
             plan = plan_for(plan.choices, given.shape, min(batch, given.runs))
@@ -122,6 +127,14 @@ def _begin(path: Path, run, design: Design, given: Given, batch: int | None) -> 
     shaped = {name: jax.ShapeDtypeStruct(*one) for name, one in (values or {}).items()}
     shutil.rmtree(path.with_name(f"{path.name}.part"), ignore_errors=True)
     return lowered, create(path, asked, design, plan, shaped)
+
+
+def _remove_scraps(path: Path) -> None:
+    """Files that a killed process had begun to write, long enough ago that nobody writes them any more."""
+    for scrap in path.rglob("*.partial"):
+        with contextlib.suppress(OSError):
+            if time.time() - scrap.stat().st_mtime > SCRAPPED_AFTER:
+                scrap.unlink()
 
 
 @contextlib.contextmanager

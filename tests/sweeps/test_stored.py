@@ -3,6 +3,8 @@
 import errno
 import itertools
 import json
+import os
+import shutil
 import threading
 
 import jax
@@ -15,9 +17,9 @@ import zarr
 from stored_study import BATCH, DESIGN, KEY, SEEDS
 
 from jaxveh import InputError, JaxvehWarning, sweeps
-
-plans = __import__("jaxveh.sweeps.plan", fromlist=["plan"])
-stores = __import__("jaxveh.sweeps.store", fromlist=["store"])
+from jaxveh.sweeps import identity
+from jaxveh.sweeps import plan as plans
+from jaxveh.sweeps import store as stores
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +169,6 @@ def test_another_sweep_in_the_same_store_is_refused_by_name(other, whole):
 
 @pytest.mark.parametrize("name", ["jaxveh", "jax", "jaxlib", "XLA_FLAGS", "jax_enable_x64", "processor"])
 def test_another_process_is_refused_by_name(name, whole, monkeypatch):
-    identity = __import__("jaxveh.sweeps.identity", fromlist=["identity"])
     usual = identity.of_process()
     monkeypatch.setattr(identity, "of_process", lambda: {**usual, name: "another"})
     with pytest.raises(InputError, match=f"begun with {name} = .*, here it is another"):
@@ -292,6 +293,18 @@ def test_a_folder_of_somebody_elses_is_left_alone(tmp_path):
         stored_study.sweep(tmp_path / "other.zarr")
     with pytest.raises(InputError, match="has the name of an axis"):
         sweeps.sweep(lambda point, key: {"x": point.x}, sweeps.Design(x=[1.0]), 1, KEY, store=tmp_path / "s.zarr")
+
+
+def test_old_scraps_are_removed(tmp_path, whole):
+    path = tmp_path / "sweep.zarr"
+    shutil.copytree(whole, path)
+    old, new = path / "total" / "c" / "0.abc.partial", path / "total" / "0.def.partial"
+    for one in (old, new):
+        one.write_text("half")
+    os.utime(old, (1.0, 1.0))
+    stored_study.sweep(path)
+    assert not old.exists() and new.exists()
+    same_store(path, whole)
 
 
 def test_blocks_hold_each_run_once():
