@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from typing import Any
@@ -16,6 +18,9 @@ from jaxveh.io import kit
 from jaxveh.sweeps.chunks import do_chunk, settings_of_jax
 from jaxveh.sweeps.driving import Crew
 from jaxveh.sweeps.workers import POOL
+
+LOOK = 0.5
+"""s between two looks for the parent."""
 
 THREADS = "2"
 """Worker threads of a process: one computes, one is free for what it waits for (see `sweeps/workers.py`)."""
@@ -41,6 +46,17 @@ def crew_for(client: Any, processes: int | None, packed: bytes, arguments: Calla
             crew.end()
 
 
+def end_with(parent: int) -> None:
+    """In a process of the crew: leave when the parent has gone, killed or not; loky's processes wait for ever."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(LOOK)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 class Processes:
     """Processes of this machine; when one dies, all are begun anew."""
 
@@ -51,7 +67,9 @@ class Processes:
 
     def _begin(self) -> Any:
         flags = {name: os.environ[name] for name in ("XLA_FLAGS", "JAX_PLATFORMS") if name in os.environ}
-        return self._loky.ProcessPoolExecutor(self.workers, env={**flags, POOL: THREADS})
+        return self._loky.ProcessPoolExecutor(
+            self.workers, env={**flags, POOL: THREADS}, initializer=end_with, initargs=(os.getpid(),)
+        )
 
     def submit(self, number: int) -> Future:
         """Give out a chunk."""
