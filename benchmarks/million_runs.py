@@ -45,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     ):
         for count in (runs // 10, runs):
             print(_line(f"{title}, {count:,} runs", run, count, min(batch, count), options.processes), flush=True)
-    print(_overhead(car_once, max(options.cars // 5, 10), max(options.cars // 20, 1)))
+    print(_overhead(car_once, options.cars, max(options.cars // 5, 1)))
     return 0
 
 

@@ -3,7 +3,7 @@
 from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.paired import Comparison, ConfidenceInterval, compare
 from jaxveh.sweeps.running import sweep
-from jaxveh.sweeps.stored import stored
+from jaxveh.sweeps.stored import read_sweep
 from jaxveh.sweeps.swept import Swept
 
-__all__ = ["Axis", "Comparison", "ConfidenceInterval", "Design", "Swept", "compare", "stored", "sweep"]
+__all__ = ["Axis", "Comparison", "ConfidenceInterval", "Design", "Swept", "compare", "read_sweep", "sweep"]

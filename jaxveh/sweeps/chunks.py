@@ -23,7 +23,7 @@ class Unfit(Exception):
     """A process that would compute other numbers than the sweep was begun with."""
 
 
-def lowered_for(run: Callable[..., Any], design: Design, choices: dict[str, Any], arguments: tuple) -> Any:
+def lower(run: Callable[..., Any], design: Design, choices: dict[str, Any], arguments: tuple) -> Any:
     """The program of a chunk with these choices, lowered for its arguments."""
     one = lambda numbers, *rest: arrays_of(run(design.point(numbers, choices), *rest))
     return jax.jit(jax.vmap(one)).lower(*arguments)
@@ -40,7 +40,7 @@ class Job(NamedTuple):
     design: Design
     path: str
 
-    def packed(self) -> bytes:
+    def to_bytes(self) -> bytes:
         """The job as bytes; functions of a script, a notebook or a module of one's own by value, for workers need not have it."""
         cloudpickle = kit.require("cloudpickle", "sending a sweep to other processes", "sweep")
         module = inspect.getmodule(self.run)
@@ -87,7 +87,7 @@ class Computing:
             said, objects = self._choices[choice]
             lowered = self._lowered.pop(choice, None)
             if lowered is None:
-                lowered = lowered_for(self.job.run, self.job.design, objects, arguments)
+                lowered = lower(self.job.run, self.job.design, objects, arguments)
             wanted = self.store.identity["programs"][said]
             if identity.of_program(lowered) != wanted:
                 raise Unfit(

@@ -83,7 +83,7 @@ class Processes:
         """Processes cannot be told to stop one chunk: all are begun anew."""
         self._again()
 
-    def died(self, error: BaseException) -> bool:
+    def is_death(self, error: BaseException) -> bool:
         """Whether a process died."""
         return isinstance(
             error, self._loky.process_executor.BrokenProcessPool | self._loky.process_executor.ShutdownExecutorError
@@ -126,7 +126,7 @@ class Cluster:
         """Give up a chunk that takes too long."""
         future.cancel()
 
-    def died(self, error: BaseException) -> bool:
+    def is_death(self, error: BaseException) -> bool:
         """Whether a worker died, as Dask says it."""
         return isinstance(error, self._distributed.scheduler.KilledWorker) or type(error).__name__ in (
             "KilledWorker", "FutureCancelledError", "CommClosedError",

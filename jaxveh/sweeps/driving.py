@@ -39,7 +39,7 @@ class Crew(Protocol):
         """Give up a chunk that takes too long."""
         ...
 
-    def died(self, error: BaseException) -> bool:
+    def is_death(self, error: BaseException) -> bool:
         """Whether an error says that a worker died, and not what it worked on; workers are there again afterwards."""
         ...
 
@@ -77,11 +77,11 @@ def drive(
                 on_done(number)
             elif isinstance(error, Unfit):
                 raise InputError(f"sweep: a worker does not fit: {error}.")
-            elif isinstance(error, OSError) and not crew.died(error):
+            elif isinstance(error, OSError) and not crew.is_death(error):
                 raise InputError(
                     f"sweep: a chunk cannot be written: {error}. What is done stays: start again."
                 ) from error
-            elif isinstance(error, CancelledError) or crew.died(error):
+            elif isinstance(error, CancelledError) or crew.is_death(error):
                 again(number, lost, LOSSES, error)
             else:
                 again(number, failed, TRIES, error)

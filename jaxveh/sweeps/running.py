@@ -60,14 +60,9 @@ def sweep(
     each time that a chunk, or compiling, has taken so long, a `JaxvehWarning` names it and says what can be done (None:
     never); `progress(done, total, stage)` is called between chunks.
 
-    With `store`, a folder such as "sweep.zarr", each chunk is written as it is done, and nothing but a chunk is kept in memory:
-    `batch` runs (1000 unless given), in one Zarr array for each value, which xarray opens. The same call again goes on where it
-    was, whoever was killed, and gives the same to the last bit; another design, key, data, program, version, flag or processor in
-    the same store is refused by name. The chunks are done in this process, in `processes=N` of this machine, or by the workers of
-    a Dask scheduler, `client=` a `distributed.Client` or its address; each has one device. What a chunk needs is sent with it;
-    workers write to the store themselves, which they must see under the same path. A dead worker's chunk is done again, and so is
-    one that takes longer than `patience`; one that fails three times is recorded with its error. `part=(i, n)` does one share of
-    the chunks, i from 0, for an array of jobs without a scheduler. `sweeps.stored(store)` opens it again.
+    With `store`, a folder such as "sweep.zarr", each chunk of `batch` runs (1000) is written as it is done, and the same call
+    goes on there (see `sweeps/stored.py`): in this process, in `processes=N`, with a Dask `client=` (or a scheduler's address),
+    or one share `part=(i, n)` of an array of jobs; each with one device. `sweeps.read_sweep(store)` opens it again.
 
     Every choice is compiled once, whatever the number of chunks; and again for fewer devices where as many as were asked for
     could wait for each other for ever (large batches of LAPACK routines with jax before 0.12; see `sweeps/workers.py`).
@@ -77,15 +72,19 @@ def sweep(
     **Warns** where a program may never end even on one device, and what keeps it from that.
     """
     check_positive("patience", patience, "s")
-    if store is not None:
-        if memory is not None or devices is not None:
-            raise InputError("sweep: memory= and devices= are for sweeps without a store; give batch= and processes=.")
+    if store is not None or (client, processes, part) != (None, None, None):
+        if store is None or (memory, devices) != (None, None):
+            raise InputError(
+                "sweep: client=, processes= and part= need a store=; memory= and devices= are for sweeps without one."
+            )
         asked = {"batch": batch, "client": client, "processes": processes, "part": part, "patience": patience}
         return sweep_into(store, run, design, Given(design, seeds, key, data), progress=progress, **asked)
-    if (client, processes, part) != (None, None, None):
-        raise InputError("sweep: client=, processes= and part= need a store= to write to.")
     devices = jax.devices() if devices is None else list(devices)
-    given = Given(design, seeds, key, data)
+    return _in_memory(run, design, Given(design, seeds, key, data), batch, memory, devices, patience, progress)
+
+
+def _in_memory(run, design: Design, given: Given, batch, memory, devices, patience, progress) -> Swept:
+    """All choices one after the other, each with all its runs."""
     done, total = 0, given.runs * int(np.prod([len(axis.values) for axis in design.choices]))
     found = []
     for _, said, choices in design.combinations():

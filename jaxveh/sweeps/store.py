@@ -134,7 +134,7 @@ def create(path: Path, identity: Mapping[str, Any], design: Design, plan: Plan, 
             shape=(*(len(axis.values) for axis in design.axes), plan.shape[-1], *one.shape),
             chunks=(*_block(design, plan), *(max(1, n) for n in one.shape)),
             dtype=one.dtype,
-            fill_value=missing(one.dtype),
+            fill_value=fill_value_of(one.dtype),
             dimension_names=(*names, SEED, *(f"{name}{OWN}{i}" for i in range(len(one.shape)))),
         )
     group.create_array(
@@ -154,7 +154,7 @@ def create(path: Path, identity: Mapping[str, Any], design: Design, plan: Plan, 
     return Store(path)
 
 
-def missing(dtype: Any) -> Any:
+def fill_value_of(dtype: Any) -> Any:
     """What stands where nothing was computed: NaN, the least integer, or False."""
     dtype = np.dtype(dtype)
     if dtype.kind in "fc":

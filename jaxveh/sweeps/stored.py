@@ -1,4 +1,11 @@
-"""A sweep into a store: what is done stays done, whoever is killed, and a second call goes on."""
+"""A sweep into a store: what is done stays done, whoever is killed, and a second call goes on.
+
+Nothing but a chunk is kept in memory; the store has one Zarr array for each value, which xarray opens. It gives the same to the
+last bit however often it was interrupted and whoever did which chunk; another design, key, data, program, version, flag or
+processor in the same store is refused by name, and so is a second sweep at the same time. What a chunk needs is sent with it;
+workers write to the store themselves, which they must see under the same path. A dead worker's chunk is done again, and so is
+one that takes longer than `patience`; one that fails three times is recorded with its error, and tried again by the next call.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +25,7 @@ from jaxveh._core.errors import InputError, JaxvehWarning, check_whole
 from jaxveh._core.progress import Progress
 from jaxveh.io import kit
 from jaxveh.sweeps import identity
-from jaxveh.sweeps.chunks import Computing, Job, lowered_for, packed_arguments
+from jaxveh.sweeps.chunks import Computing, Job, lower, packed_arguments
 from jaxveh.sweeps.crews import crew_for
 from jaxveh.sweeps.design import Design
 from jaxveh.sweeps.driving import TRIES, drive
@@ -75,11 +82,11 @@ def sweep_into(
         if client is None and processes is None:
             _alone(Computing(job, lowered), mine, arguments, patience, told)
         elif mine:
-            packed = job.packed()
+            packed = job.to_bytes()
             with crew_for(client, processes, packed, lambda number: packed_arguments(arguments(number))) as crew:
                 limit = float("inf") if patience is None else patience
                 drive(crew, mine, limit, told, store.write_failure)
-    return stored(path)
+    return read_sweep(path)
 
 
 def _alone(computing: Computing, numbers: list[int], arguments, patience: float | None, told) -> None:
@@ -114,7 +121,7 @@ def _begin(path: Path, run, design: Design, given: Given, batch: int | None) -> 
     lowered, programs, values = {}, {}, None
     for i, (_, said, objects) in enumerate(design.combinations()):
         # As many runs as the plan says, whatever they are: their shapes are what counts.
-        lowered[i] = lowered_for(run, design, objects, given.chunk(0, plan.batch))
+        lowered[i] = lower(run, design, objects, given.chunk(0, plan.batch))
         programs[said] = identity.of_program(lowered[i])
         shapes = {name: (leaf.shape[1:], leaf.dtype) for name, leaf in lowered[i].out_info.items()}
         if values is not None and shapes != values:
@@ -206,7 +213,7 @@ class Values(Mapping):
         return len(self._store.names)
 
 
-def stored(path: str | os.PathLike) -> Swept:
+def read_sweep(path: str | os.PathLike) -> Swept:
     """What is in a sweep's store, read value by value when asked for; choices by their labels.
 
     **Warns** (`JaxvehWarning`) of chunks that are not done, whose values are NaN (the least integer, False), and of those that

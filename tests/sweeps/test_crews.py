@@ -17,9 +17,8 @@ from test_stored import files
 
 from jaxveh import InputError, JaxvehWarning, sweeps
 
-pytestmark = pytest.mark.studies
-
-KILLS = [3, pytest.param(20, marks=pytest.mark.full)]
+KILLS = [pytest.param(3, marks=pytest.mark.studies), pytest.param(20, marks=pytest.mark.full)]
+"""How many workers are killed: three in `.ci/run`, twenty in the full run."""
 
 LIMIT = 60.0
 """s: a chunk that takes longer is given out again."""
@@ -122,6 +121,7 @@ def wait_for_chunks(program, count):
     raise AssertionError(f"the program ended with {program.wait()}")
 
 
+@pytest.mark.studies
 def test_a_client_that_is_killed_and_begun_again(tmp_path, whole):
     path = tmp_path / "sweep.zarr"
     for count in (3, 11):
@@ -161,6 +161,7 @@ def scheduler(port):
     return address, kept, worker
 
 
+@pytest.mark.studies
 def test_a_scheduler_that_is_killed(tmp_path, whole):
     path = tmp_path / "sweep.zarr"
     address, first, worker = scheduler(18786)
@@ -180,7 +181,7 @@ def test_a_scheduler_that_is_killed(tmp_path, whole):
         first.kill()
         worker.kill()
     with pytest.warns(JaxvehWarning, match="of 42 chunks are not done"):
-        sweeps.stored(path)
+        sweeps.read_sweep(path)
     address, second, worker = scheduler(18787)
     try:
         stored_study.sweep(path, stored_study.slowly, client=address, patience=LIMIT)

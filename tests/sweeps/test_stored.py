@@ -46,7 +46,7 @@ def same_store(a, b):
 
 
 def test_it_is_the_sweep_without_a_store(plain, whole):
-    found = sweeps.stored(whole)
+    found = sweeps.read_sweep(whole)
     assert set(found.values) == set(plain.values) and len(found.values) == 4
     for name in plain.values:
         assert found.values[name].dtype == plain.values[name].dtype
@@ -86,7 +86,7 @@ def test_interrupted_again_and_again_it_is_the_same_to_the_last_bit(tmp_path, wh
         with pytest.raises(KeyboardInterrupt):
             stored_study.sweep(path, progress=interrupt(after))
         with pytest.warns(JaxvehWarning, match=f"{42 - after} of 42 chunks are not done. The same sweep again goes on"):
-            sweeps.stored(path)
+            sweeps.read_sweep(path)
     stored_study.sweep(path, progress=interrupt(1000))
     # Each call begins where the last one ended: nothing was computed twice.
     assert done == [0, 1, 2, 3, 3, 4, *range(4, 18), *range(17, 43)]
@@ -110,13 +110,13 @@ def test_what_is_marked_is_whole_wherever_writing_is_cut_off(tmp_path, whole, mo
         if not path.exists():
             continue  # cut off while it was made: it is there as a whole, or not at all
         with pytest.warns(JaxvehWarning):
-            found = sweeps.stored(path)
+            found = sweeps.read_sweep(path)
         status = stores.Store(path).status()
         for i in np.flatnonzero(status):
             chunk = stores.Store(path).plan.chunk(int(i))
             where = stores.Store(path)._region(chunk)
             for name in found.values:
-                np.testing.assert_array_equal(found.values[name][where], sweeps.stored(whole).values[name][where])
+                np.testing.assert_array_equal(found.values[name][where], sweeps.read_sweep(whole).values[name][where])
         marked.append(int(status.sum()))
     assert min(marked) == 0 and max(marked) > 2
     stored_study.sweep(path)
@@ -266,7 +266,7 @@ def test_a_chunk_that_fails_three_times_is_told_and_the_others_go_on(tmp_path):
 MISTAKES = {
     "parts": ({"part": (3, 3)}, r"part = \(3, 3\): must be \(i, n\) with 0 <= i < n"),
     "both": ({"client": "tcp://here:1", "processes": 2}, "client= or processes=, not both"),
-    "memory": ({"memory": 1e9}, "memory= and devices= are for sweeps without a store"),
+    "memory": ({"memory": 1e9}, "memory= and devices= are for sweeps without"),
     "client": ({"client": 3}, "client = 3: must be a dask.distributed Client, or a scheduler's address"),
     "none": ({"processes": 0}, "processes = 0"),
 }
@@ -280,7 +280,7 @@ def test_mistakes_are_named(mistake, tmp_path):
 
 
 def test_without_a_store_there_is_no_client():
-    with pytest.raises(InputError, match="need a store="):
+    with pytest.raises(InputError, match="client=, processes= and part= need a store="):
         sweeps.sweep(stored_study.run, DESIGN, SEEDS, KEY, processes=2)
 
 
