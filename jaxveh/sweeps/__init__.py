@@ -3,7 +3,20 @@
 from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.paired import Comparison, ConfidenceInterval, compare
 from jaxveh.sweeps.running import sweep
+from jaxveh.sweeps.sampling import Samples, latin_hypercube, sobol
 from jaxveh.sweeps.stored import read_sweep
 from jaxveh.sweeps.swept import Swept
 
-__all__ = ["Axis", "Comparison", "ConfidenceInterval", "Design", "Swept", "compare", "read_sweep", "sweep"]
+__all__ = [
+    "Axis",
+    "Comparison",
+    "ConfidenceInterval",
+    "Design",
+    "Samples",
+    "Swept",
+    "compare",
+    "latin_hypercube",
+    "read_sweep",
+    "sobol",
+    "sweep",
+]

@@ -10,18 +10,27 @@ import numpy as np
 
 from jaxveh._core.errors import InputError, check_finite
 from jaxveh._core.names import record
+from jaxveh.sweeps.sampling import Samples
 
 
 class Axis(NamedTuple):
     """One name of a design: the `labels` that its results carry, the `values` that `run` gets, and whether it is a choice.
 
     A choice (a filter, a manoeuvre, a function) is known when compiling: one program each. Numbers are one program for all.
+    Samples are numbered; `columns` has their numbers by name, (n,) each, and `run` gets those of its own.
     """
 
     name: str
     labels: tuple[Any, ...]
     values: tuple[Any, ...]
     choice: bool
+    columns: dict[str, np.ndarray] | None = None
+
+    def at(self, which: np.ndarray) -> Any:
+        """The numbers of values of these places; of samples by name."""
+        if self.columns is None:
+            return np.asarray(self.values, float)[which]
+        return {name: np.asarray(column, float)[which] for name, column in self.columns.items()}
 
 
 class Design:
@@ -30,14 +39,15 @@ class Design:
         Design(noise=[0.001, 0.005, 0.02], filter={"PF": filters.ParticleFilter(1000), "UKF": filters.Unscented()})
 
     A sequence of numbers is an axis of numbers, which `run` gets as arrays of the default precision; a mapping from labels to
-    objects is an axis of choices. Without axes there is one point.
+    objects is an axis of choices. `latin_hypercube` and `sobol` make an axis of samples, each with several numbers. Without axes
+    there is one point.
 
     **Raises** `InputError` for an empty axis, numbers that are not finite, or a sequence of something else.
     """
 
     axes: tuple[Axis, ...]
 
-    def __init__(self, **axes: Sequence[float] | Mapping[str, Any]):
+    def __init__(self, **axes: Sequence[float] | Mapping[str, Any] | Samples):
         self.axes = tuple(_axis(name, values) for name, values in axes.items())
 
     @property
@@ -70,20 +80,26 @@ class Design:
             said = ", ".join(f"{axis.name} {axis.labels[i]}" for axis, i in pairs)
             yield place, said, {axis.name: axis.values[i] for axis, i in pairs}
 
-    def grid(self) -> dict[str, np.ndarray]:
-        """Each axis of numbers at all their combinations, (P,); the last axis runs fastest."""
+    def grid(self) -> dict[str, Any]:
+        """Each axis of numbers at all their combinations, (P,), of samples by name; the last axis runs fastest."""
         axes = self.numbers
-        meshes = np.meshgrid(*(np.asarray(axis.values, float) for axis in axes), indexing="ij") if axes else []
-        return {axis.name: mesh.ravel() for axis, mesh in zip(axes, meshes, strict=True)}
+        meshes = np.meshgrid(*(np.arange(len(axis.values)) for axis in axes), indexing="ij") if axes else []
+        return {axis.name: axis.at(mesh.ravel()) for axis, mesh in zip(axes, meshes, strict=True)}
 
     def point(self, numbers: Mapping[str, Any], choices: Mapping[str, Any]) -> Any:
         """What `run` gets: a NamedTuple with the axes' names, in their order."""
         both = {**numbers, **choices}
+        for axis in self.axes:
+            if axis.columns is not None:
+                both[axis.name] = record("Sample", dict(both[axis.name]))
         return record("Point", {axis.name: both[axis.name] for axis in self.axes})
 
 
 def _axis(name: str, values: Any) -> Axis:
-    if isinstance(values, Mapping):
+    if isinstance(values, Samples):
+        labels = tuple(range(len(next(iter(values.columns.values())))))
+        axis = Axis(name, labels, labels, choice=False, columns=values.columns)
+    elif isinstance(values, Mapping):
         axis = Axis(name, tuple(values), tuple(values.values()), choice=True)
     else:
         numbers = _numbers(name, values)

@@ -44,7 +44,7 @@ class Given:
         """Arguments of the runs of these numbers, each with (len(which), ...)."""
         place = np.unravel_index(which, self.shape)
         point = which // self.shape[-1]
-        numbers = {name: jnp.asarray(values[point]) for name, values in self.grid.items()}
+        numbers = jax.tree.map(lambda values: jnp.asarray(values[point]), self.grid)
         keys = () if self.keys is None else (self.keys(place[-1]),)
         own = () if self.data is None else (jax.tree.map(lambda leaf: jnp.asarray(leaf[place]), self.data),)
         return numbers, *keys, *own

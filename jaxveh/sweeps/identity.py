@@ -16,7 +16,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.version import VERSION
-from jaxveh.sweeps.design import Design
+from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.given import Given
 from jaxveh.sweeps.plan import Plan
 from jaxveh.sweeps.swept import named_leaves
@@ -31,10 +31,7 @@ OF_PROCESS = ("jaxveh", "jax", "jaxlib", "XLA_FLAGS", *CONFIGURED, "processor")
 def identity(design: Design, given: Given, plan: Plan, programs: Mapping[str, str]) -> dict[str, Any]:
     """All that a sweep's numbers follow from. `programs`: a description of each combination of choices, and the hash of what it
     computes."""
-    axes = [
-        {"name": a.name, "choice": a.choice, "labels": [str(label) if a.choice else label for label in a.labels]}
-        for a in design.axes
-    ]
+    axes = [_of_axis(axis) for axis in design.axes]
     return {
         "design": axes,
         "seeds": given.seeds,
@@ -44,6 +41,12 @@ def identity(design: Design, given: Given, plan: Plan, programs: Mapping[str, st
         "programs": dict(programs),
         **of_process(),
     }
+
+
+def _of_axis(axis: Axis) -> dict[str, Any]:
+    labels = [str(label) if axis.choice else label for label in axis.labels]
+    columns = {name: [float(x) for x in column] for name, column in (axis.columns or {}).items()}
+    return {"name": axis.name, "choice": axis.choice, "labels": labels, **({"columns": columns} if columns else {})}
 
 
 def of_process() -> dict[str, Any]:
@@ -87,7 +90,7 @@ def check_same(path: Any, stored: Mapping[str, Any], asked: Mapping[str, Any]) -
 
 def _flat(identity: Mapping[str, Any]) -> dict[str, Any]:
     """An identity whose axes, data and programs have names of their own."""
-    axes = {f"axis {axis['name']}": axis["labels"] for axis in identity["design"]}
+    axes = {f"axis {axis['name']}": axis.get("columns", axis["labels"]) for axis in identity["design"]}
     data = {f"data {name or 'array'}": said for name, said in identity["data"].items()}
     programs = {f"the hash of the program of {said or 'run'}": found for said, found in identity["programs"].items()}
     rest = {name: value for name, value in identity.items() if name not in ("design", "data", "programs", "values")}

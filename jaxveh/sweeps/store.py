@@ -48,6 +48,7 @@ class Store:
         self.identity: dict[str, Any] = json.loads(told)
         axes = self.identity["design"]
         self.labels = {axis["name"]: tuple(axis["labels"]) for axis in axes}
+        self.columns = {axis["name"]: axis.get("columns") for axis in axes}
         self.is_choice = {axis["name"]: bool(axis["choice"]) for axis in axes}
         numbers = [len(axis["labels"]) for axis in axes if not axis["choice"]]
         choices = [len(axis["labels"]) for axis in axes if axis["choice"]]
@@ -59,7 +60,11 @@ class Store:
     def design(self) -> Design:
         """The design, with labels instead of the objects that were chosen from."""
         design = Design()
-        design.axes = tuple(Axis(name, labels, labels, self.is_choice[name]) for name, labels in self.labels.items())
+        arrays = lambda columns: None if columns is None else {name: np.asarray(one) for name, one in columns.items()}
+        design.axes = tuple(
+            Axis(name, labels, labels, self.is_choice[name], arrays(self.columns[name]))
+            for name, labels in self.labels.items()
+        )
         return design
 
     @property
@@ -126,7 +131,10 @@ def create(path: Path, identity: Mapping[str, Any], design: Design, plan: Plan, 
             labels = group.create_array(axis.name, shape=(len(axis.labels),), dtype="str", dimension_names=(axis.name,))
             labels[:] = np.asarray([str(label) for label in axis.labels])
         else:
-            group.create_array(axis.name, data=np.asarray(axis.labels, float), dimension_names=(axis.name,))
+            dtype = float if axis.columns is None else np.int64
+            group.create_array(axis.name, data=np.asarray(axis.labels, dtype), dimension_names=(axis.name,))
+            for name, column in (axis.columns or {}).items():
+                group.create_array(f"{axis.name}.{name}", data=column, dimension_names=(axis.name,))
     names = [axis.name for axis in design.axes]
     for name, one in values.items():
         group.create_array(

@@ -1,0 +1,65 @@
+"""Points that fill a box: where a grid of every combination would take too many runs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_whole
+
+
+class Samples(NamedTuple):
+    """Points drawn together, as one axis of a design: (n,) numbers by name."""
+
+    columns: dict[str, np.ndarray]
+
+
+def latin_hypercube(count: int, *, seed: int = 0, **ranges: tuple[float, float]) -> Samples:
+    """`count` points, of which each name has one in each of `count` equal parts of its range (M. D. McKay et al. 1979).
+
+        Design(car=latin_hypercube(500, mass=(1200.0, 1800.0), friction=(0.3, 1.1)))     run sees point.car.mass
+
+    `ranges`: (low, high) by name. The same `seed`, the same points.
+
+    **Raises** `InputError` for no range, one that is not finite and rising, or a count below one.
+    """
+    from scipy.stats import qmc
+
+    return _scaled(qmc.LatinHypercube(len(ranges) or 1, rng=seed), count, ranges)
+
+
+def sobol(count: int, *, seed: int = 0, **ranges: tuple[float, float]) -> Samples:
+    """`count` points, a power of two, of a scrambled Sobol sequence (I. M. Sobol 1967, A. B. Owen 1998); otherwise as
+    `latin_hypercube`. Averages over them err by about 1 / `count`, over random ones by 1 / sqrt(`count`)."""
+    from scipy.stats import qmc
+
+    check_whole("count", count)
+    if count & (count - 1):
+        below = 1 << (int(count).bit_length() - 1)
+        raise InputError(
+            f"count = {count}: Sobol points are balanced in powers of two only; take {below} or {2 * below}."
+        )
+    return _scaled(qmc.Sobol(len(ranges) or 1, rng=seed), count, ranges)
+
+
+def _scaled(sampler, count: int, ranges: dict[str, tuple[float, float]]) -> Samples:
+    check_whole("count", count)
+    if not ranges:
+        raise InputError("samples: give a range, (low, high), for at least one name.")
+    unit = sampler.random(int(count))
+    columns = {}
+    for i, (name, ends) in enumerate(ranges.items()):
+        low, high = _ends(name, ends)
+        columns[name] = low + (high - low) * unit[:, i]
+    return Samples(columns)
+
+
+def _ends(name: str, ends: tuple[float, float]) -> tuple[float, float]:
+    try:
+        low, high = (float(end) for end in ends)
+    except (TypeError, ValueError):
+        low, high = np.nan, np.nan
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise InputError(f"{name} = {ends!r}: must be (low, high), two finite numbers, the first the smaller.")
+    return low, high
