@@ -294,6 +294,10 @@ HANDED = {
     ("plots/figure.py", "savefig"): "into memory",
     ("plots/style.py", "savefig"): "into memory",
     ("cli/output.py", "mkdir"): "the report's folder, which files are written into",
+    ("cli/kept_programs.py", "mkdir"): "the user's cache folder, which jax writes into",
+    ("cli/kept_programs.py", "touch"): "in the cache folder: what is there is damaged",
+    ("sweeps/stored.py", "mkdir"): "the folder of a store, whose files Zarr writes beside their places",
+    ("sweeps/store.py", "rename"): "a store that is complete, to its place, where nothing is",
     ("experiments/mass_grade_aukf/observed.py", "move"): "a state, to the next row",
     ("vehicles/fourteen_dof/car.py", "touch"): "of tyres and the road",
 }
