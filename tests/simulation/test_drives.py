@@ -156,7 +156,7 @@ def test_unknown_solvers_and_roads_are_refused():
 
 @pytest.mark.parametrize("long", [True, False], ids=["long", "short"])
 def test_progress_is_told_while_it_runs_where_that_is_long(long, monkeypatch):
-    monkeypatch.setattr(sys.modules["jaxveh.simulation.solve"], "TOLD_FROM", 400 if long else 10_000)
+    monkeypatch.setattr(sys.modules["jaxveh.simulation.solve"], "TOLD_FROM", 20 if long else 10_000)
     heard = []
     simulate(lightest(), straight(duration=0.5), progress=lambda done, total, stage: heard.append(done / total))
     assert heard[0] == 0.0 and heard[-1] == 1.0 and heard == sorted(heard)
