@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-import platform
 import shutil
 import sys
 import time
@@ -59,20 +57,10 @@ def folder() -> Path | None:
         return None
     from importlib.metadata import version
 
+    from jaxveh._core.processor import processor
     from jaxveh._core.version import VERSION
 
     return above / f"jaxveh-{VERSION}-jaxlib-{version('jaxlib')}-{processor()}"
-
-
-def processor() -> str:
-    """A short name of the kind of processor: machine, model and features, hashed."""
-    said = [sys.platform, platform.machine(), platform.processor(), os.environ.get("PROCESSOR_IDENTIFIER", "")]
-    described = Path("/proc/cpuinfo")
-    if described.exists():
-        first = described.read_text(errors="replace").split("\n\n")[0].splitlines()
-        wanted = ("vendor_id", "model name", "flags", "Features", "CPU implementer", "CPU part")
-        said += [line for line in first if line.startswith(wanted)]
-    return hashlib.sha256("\n".join(said).encode()).hexdigest()[:12]
 
 
 def keep_programs() -> None:

@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from typing import Any
 
-import jax
-
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh.io import kit
 from jaxveh.sweeps.chunks import do_chunk, settings_of_jax
@@ -31,7 +29,11 @@ def crew_for(client: Any, processes: int | None, packed: bytes, arguments: Calla
     """The workers that were asked for; `arguments` of a chunk by its number."""
     if client is not None:
         with _client(client) as connected:
-            yield Cluster(connected, packed, arguments)
+            crew = Cluster(connected, packed, arguments)
+            try:
+                yield crew
+            finally:
+                crew.end()
         return
     check_whole("processes", processes)
     with tempfile.TemporaryDirectory(prefix="jaxveh-programs-") as folder:
@@ -105,8 +107,8 @@ class Cluster:
         self._client, self._packed, self._arguments = client, packed, arguments
         self._distributed = kit.require("distributed", "a sweep on a cluster", "sweep")
         self._executor = client.get_executor(pure=False, retries=0)
-        # Files of this machine need not be there on others.
-        self._settings = {**settings_of_jax(), "jax_compilation_cache_dir": jax.config.jax_compilation_cache_dir}
+        # Where compiled programs are kept is said here, if it is, and is a folder that the workers see.
+        self._settings = settings_of_jax()
 
     @property
     def workers(self) -> int:
@@ -125,6 +127,11 @@ class Cluster:
     def drop(self, future: Future) -> None:
         """Give up a chunk that takes too long."""
         future.cancel()
+
+    def end(self) -> None:
+        """Give up what is still out, as far as the scheduler hears it."""
+        with contextlib.suppress(Exception):
+            self._executor.shutdown(wait=False)
 
     def is_death(self, error: BaseException) -> bool:
         """Whether a worker died, as Dask says it."""

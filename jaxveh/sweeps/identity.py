@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
-import platform
 import re
 from collections.abc import Mapping
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
 from jaxveh._core.errors import InputError
+from jaxveh._core.processor import processor
 from jaxveh._core.version import VERSION
 from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.given import Given
@@ -55,18 +54,6 @@ def of_process() -> dict[str, Any]:
     flags = " ".join(sorted(os.environ.get("XLA_FLAGS", "").split()))
     versions = {"jaxveh": VERSION, "jax": version("jax"), "jaxlib": version("jaxlib")}
     return {**versions, "XLA_FLAGS": flags, **settings, "processor": processor()}
-
-
-def processor() -> str:
-    """The processor's model and the hash of its features: other vectors round otherwise."""
-    said = [platform.machine(), platform.processor()]
-    described = Path("/proc/cpuinfo")
-    if described.exists():
-        lines = described.read_text(errors="replace").split("\n\n")[0].splitlines()
-        said += [
-            line.partition(":")[2].strip() for line in lines if line.startswith(("model name", "flags", "Features"))
-        ]
-    return f"{platform.machine()} {hashlib.sha256(' '.join(said).encode()).hexdigest()[:12]}"
 
 
 _ADDRESS = re.compile(r"0x[0-9a-f]{6,}|\b\d{12,}\b")
