@@ -17,7 +17,7 @@ import zarr
 from stored_study import BATCH, DESIGN, KEY, SEEDS
 
 from jaxveh import InputError, JaxvehWarning, sweeps
-from jaxveh.sweeps import identity
+from jaxveh.sweeps import chunks, identity
 from jaxveh.sweeps import plan as plans
 from jaxveh.sweeps import store as stores
 
@@ -293,6 +293,23 @@ def test_a_folder_of_somebody_elses_is_left_alone(tmp_path):
         stored_study.sweep(tmp_path / "other.zarr")
     with pytest.raises(InputError, match="has the name of an axis"):
         sweeps.sweep(lambda point, key: {"x": point.x}, sweeps.Design(x=[1.0]), 1, KEY, store=tmp_path / "s.zarr")
+
+
+def test_a_worker_that_would_compute_something_else_says_so(whole, monkeypatch):
+    before, job = files(whole), chunks.Job(stored_study.run, DESIGN, str(whole))
+    usual = identity.of_process()
+    monkeypatch.setattr(identity, "of_process", lambda: {**usual, "XLA_FLAGS": "others"})
+    with pytest.raises(chunks.Unfit, match="XLA_FLAGS is 'others' here"):
+        chunks.Computing(job)
+    monkeypatch.undo()
+    other = chunks.Computing(
+        job._replace(run=lambda point, key: {**stored_study.run(point, key), "total": key_sum(key)})
+    )
+    monkeypatch.setattr(other.store, "is_done", lambda number: False)
+    arguments = ({"decay": jnp.full(BATCH, 0.1)}, jax.random.split(KEY, BATCH))
+    with pytest.raises(chunks.Unfit, match="run computes something else here"):
+        other.do(0, arguments)
+    assert files(whole) == before
 
 
 def test_old_scraps_are_removed(tmp_path, whole):
