@@ -312,6 +312,10 @@ def test_a_worker_that_would_compute_something_else_says_so(whole, monkeypatch):
     assert files(whole) == before
 
 
+def test_what_is_done_is_not_done_again_by_whoever_is_asked(whole):
+    chunks.Computing(chunks.Job(stored_study.run, DESIGN, str(whole))).do(0, ("no arguments of runs",))
+
+
 def test_old_scraps_are_removed(tmp_path, whole):
     path = tmp_path / "sweep.zarr"
     shutil.copytree(whole, path)
