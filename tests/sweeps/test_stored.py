@@ -167,6 +167,22 @@ def test_another_sweep_in_the_same_store_is_refused_by_name(other, whole):
     assert files(whole) == before
 
 
+@pytest.mark.parametrize("kind", ["one number", "floats", "integers", "flags", "large"])
+def test_numbers_that_a_run_has_closed_over_are_part_of_its_program(kind):
+    first = {
+        "one number": np.float64(0.25), "floats": np.linspace(0, 1, 50), "integers": np.arange(1, 10),
+        "flags": np.arange(20) < 7, "large": 10**12 + np.arange(3),
+    }[kind]  # fmt: skip
+
+    def hashed(held):
+        run = lambda point, key: {"y": jnp.sum(jnp.asarray(held).astype(float) * jax.random.normal(key))}
+        return identity.of_program(chunks.lower(run, sweeps.Design(), {}, ({}, jax.random.split(KEY, 3))))
+
+    other = np.array(first)
+    other.flat[-1] = not other.flat[-1] if kind == "flags" else other.flat[-1] + 1
+    assert hashed(first) == hashed(np.array(first)) != hashed(other)
+
+
 @pytest.mark.parametrize("name", ["jaxveh", "jax", "jaxlib", "XLA_FLAGS", "jax_enable_x64", "processor"])
 def test_another_process_is_refused_by_name(name, whole, monkeypatch):
     usual = identity.of_process()
