@@ -1,4 +1,7 @@
-"""From Python functions to machine code: tracing, lowering and compiling, without running."""
+"""From Python functions to machine code: tracing, lowering and compiling, without running.
+
+Whole programs, cold and warm, are in `python -m benchmarks.starts`: they take all cores, and processes of their own.
+"""
 
 from __future__ import annotations
 

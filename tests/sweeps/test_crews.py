@@ -11,6 +11,9 @@ import time
 from pathlib import Path
 
 import distributed
+import jax
+import jax.numpy as jnp
+import numpy as np
 import pytest
 import stored_study
 from test_stored import files
@@ -102,6 +105,28 @@ def test_workers_of_a_cluster_that_are_killed(times, tmp_path, whole):
         workers = lambda: [one.process.pid for one in cluster.workers.values() if one.process and one.process.pid]
         sweep = lambda path: stored_study.sweep(path, stored_study.slowly, client=client, patience=LIMIT)
         until_done(tmp_path, sweep, whole, workers, times)
+
+
+@pytest.mark.studies
+def test_a_chunk_that_hangs_is_given_out_again(tmp_path):
+    mark = tmp_path / "has hung"
+
+    def hang(word):
+        if not os.path.exists(mark):
+            open(mark, "w").close()
+            time.sleep(600)
+        return word
+
+    def run(point, key):
+        like = jax.ShapeDtypeStruct((), jnp.float64)
+        return {"y": point.x + jax.pure_callback(hang, like, 0.0 * point.x, vmap_method="broadcast_all")}
+
+    design = sweeps.Design(x=np.arange(6.0))
+    found = sweeps.sweep(
+        run, design, 1, stored_study.KEY, store=tmp_path / "s.zarr", batch=2, processes=1, patience=4.0
+    )
+    np.testing.assert_array_equal(found["y"][:, 0], np.arange(6.0))
+    assert os.path.exists(mark)
 
 
 def begin(path, *how):

@@ -94,7 +94,10 @@ def test_a_chunk_that(case):
 
 @pytest.mark.parametrize(
     ("end", "message"),
-    [(OSError(28, "No space left on device"), "cannot be written: .*No space left"), (Unfit("jax is '1' here"), "does not fit: jax")],
+    [
+        (OSError(28, "No space left on device"), "cannot be written: .*No space left"),
+        (Unfit("jax is '1' here"), "does not fit: jax"),
+    ],
 )
 def test_what_no_other_try_mends_ends_it(end, message):
     with pytest.raises(InputError, match=message):
