@@ -120,6 +120,13 @@ def resolve(model, where: Where | None) -> tuple[Parameter, ...]:
     return tuple(_tell_apart(found))
 
 
+def every_parameter(model) -> dict[str, Parameter]:
+    """All floating leaves of a model by name (`front.B`); those that would share one by their whole paths."""
+    leaves = jtu.tree_flatten_with_path(model)[0]
+    numbers = [path for path, leaf in leaves if eqx.is_inexact_array(leaf) or isinstance(leaf, float)]
+    return {p.name: p for p in _tell_apart([_describe(model, path) for path in numbers])}
+
+
 def _tell_apart(found: list[Parameter]) -> list[Parameter]:
     """The parameters, those that would share a name by their whole paths."""
     names = [p.name for p in found]

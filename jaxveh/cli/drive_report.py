@@ -10,10 +10,10 @@ import numpy as np
 from jaxveh import InputError, Recording, diagnostics
 from jaxveh.cli.console import number, results
 from jaxveh.cli.failure import say
-from jaxveh.cli.manoeuvre import AskedManoeuvre, course_of, understeer_of, width_of
+from jaxveh.cli.manoeuvre import AskedManoeuvre, course_of, width_of
 from jaxveh.cli.output import make_folder
 from jaxveh.diagnostics import drive_channels
-from jaxveh.manoeuvres import clearance
+from jaxveh.manoeuvres import clearance, understeer_of
 from jaxveh.vehicles import GRAVITY
 
 BODY = 4.5

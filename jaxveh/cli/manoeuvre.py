@@ -8,29 +8,9 @@ from typing import Any, NamedTuple
 
 import jax
 
-from jaxveh import InputError, manoeuvres, vehicles
+from jaxveh import InputError, manoeuvres
 from jaxveh._core.errors import check_one_of
-from jaxveh.manoeuvres import MANOEUVRES, Course, manoeuvre_options
-
-KMH = 1 / 3.6
-
-USUAL: dict[str, tuple[float, float]] = {
-    "double-lane-change": (25.0, 7.0),
-    "step-steer": (25.0, 2.0),
-    "swept-sine": (25.0, 1.0),
-    "sine-with-dwell": (80 * KMH, 6.0),
-    "ramp-steer": (25.0, 3.0),
-    "slalom": (16.0, 3.0),
-    "random-steering": (25.0, 0.7),
-    "braking-in-a-turn": (25.0, 2.0),
-    "mu-jump-braking": (25.0, 0.0),
-    "cruise": (25.0, 0.0),
-    "iso-lane-change": (80 * KMH, 0.0),
-    "iso-obstacle-avoidance": (45 * KMH, 0.0),
-    "slalom-course": (14.0, 0.0),
-    "steady-circle": (16.0, 0.0),
-}
-"""Speed (m/s) and steer (degrees at the road wheels) of a manoeuvre unless told."""
+from jaxveh.manoeuvres import MANOEUVRES, USUAL, Course, manoeuvre_options, options_of_car
 
 NOT_SET = {"speed": "--speed", "to_speed": "--speed", "steer": "--steer-deg", "duration": "--duration", "key": "--seed"}
 """What has an option of its own."""
@@ -54,7 +34,7 @@ def parse_manoeuvre(
     """
     check_one_of("--manoeuvre", name, MANOEUVRES)
     usual_speed, usual_steer = USUAL[name]
-    options = {**_of_car(name, car), **_settings(name, settings)}
+    options = {**options_of_car(name, car), **_settings(name, settings)}
     if duration is not None:
         options["duration"] = duration
     return AskedManoeuvre(
@@ -81,25 +61,6 @@ def course_of(one: AskedManoeuvre) -> Course | None:
 def width_of(one: AskedManoeuvre) -> float:
     """The width of the car that the course is made for, m; where it has none of its own, that of the ISO lane change."""
     return {**manoeuvre_options("iso-lane-change"), **manoeuvre_options(one.name), **one.options}["width"]
-
-
-def _of_car(name: str, car: Any) -> dict[str, float]:
-    """What the manoeuvre would have to be told of the car: its mass and wheels where it brakes, its axles and how much it
-    understeers where a driver follows a path."""
-    known = manoeuvre_options(name)
-    found = {part: getattr(car, part, None) for part in ("mass", "wheel_radius")}
-    if hasattr(car, "front_axle_to_cg") and hasattr(car, "rear_axle_to_cg"):
-        found["wheelbase"] = car.front_axle_to_cg + car.rear_axle_to_cg
-    if "understeer_gradient" in known:
-        found["understeer_gradient"] = understeer_of(car)
-    return {part: float(value) for part, value in found.items() if part in known and value is not None}
-
-
-def understeer_of(car: Any) -> Any:
-    """Understeer gradient of the car on its tyres' slopes, rad s^2/m; None for a car without tyres."""
-    if isinstance(car, vehicles.LinearSingleTrack):
-        return car.understeer_gradient
-    return vehicles.linear_single_track(car).understeer_gradient if hasattr(car, "front") else None
 
 
 def _settings(name: str, settings: Sequence[str]) -> dict[str, float | int]:

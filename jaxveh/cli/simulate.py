@@ -13,11 +13,11 @@ from jaxveh._core.errors import check_one_of, check_positive
 from jaxveh.cli import manoeuvre as driving
 from jaxveh.cli import options
 from jaxveh.cli.console import progress, results, table
-from jaxveh.cli.devices import DEVICES, NoiseOption, devices_of
 from jaxveh.cli.drive_report import draw, numbers_of, print_numbers
 from jaxveh.cli.output import check_product, check_report, write_numbers
 from jaxveh.cli.vehicle import BUILT_IN, first_line, vehicle_of
-from jaxveh.manoeuvres import MANOEUVRES, manoeuvre_options
+from jaxveh.manoeuvres import MANOEUVRES, USUAL, manoeuvre_options
+from jaxveh.sensors import DEVICES, named_devices
 
 EVENTS = {"standstill": simulation.standstill, "wheel-lift": simulation.wheel_lift}
 
@@ -81,14 +81,14 @@ def simulate(
     """
     if listed:
         return _list()
-    _check(product, vehicle, road, force, out, numbers, solver, until, rate)
+    _check(product, vehicle, road, devices, force, out, numbers, solver, until, rate)
     car = vehicle_of(vehicle, fidelity)
     asked = driving.parse_manoeuvre(manoeuvre, speed, steer_deg, duration, settings or (), car)
     # The devices fold their numbers into a key: it must not be one of which the driver's or the road's is made.
     drive_key, road_key, sensor_key = jax.random.split(jax.random.key(seed), 3)
     driver = driving.make(asked, drive_key)
     ground = None if road == "level" else roads.named_road(road, road_key)
-    fitted = devices_of(devices, car, NoiseOption(yaw_rate_std, a_y_std))
+    fitted = named_devices(devices, car, {"yaw_rate": yaw_rate_std, "a_y": a_y_std})
     with progress("simulate") as report:
         report(0, 1, f"{manoeuvre} (compiling)")
         recording = simulation.simulate(
@@ -113,7 +113,7 @@ def _summary(recording: Recording, product: Path | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _check(product, vehicle, road, force, out, numbers, solver, until, rate) -> None:
+def _check(product, vehicle, road, devices, force, out, numbers, solver, until, rate) -> None:
     """Raise before any work for what could not be done or written in the end."""
     if product is None and out is None and numbers is None:
         raise InputError(
@@ -121,6 +121,7 @@ def _check(product, vehicle, road, force, out, numbers, solver, until, rate) -> 
         )
     check_product(product, io.SUFFIXES, force, (Path(vehicle), Path(road)))
     check_report(out, numbers)
+    check_one_of("--devices", devices, DEVICES)
     check_one_of("--solver", solver, simulation.kit.SOLVERS)
     if until is not None:
         check_one_of("--until", until, EVENTS)
@@ -154,7 +155,7 @@ def _list() -> None:
             for key, value in manoeuvre_options(name).items()
             if key != "duration" and value is not None
         ]
-        speed, steer = driving.USUAL[name]
+        speed, steer = USUAL[name]
         usual = f"{speed:.3g} m/s" + (f", {steer:g}°" if steer else "")
         rows.append((name, one.help, usual, " ".join(settings)))
     heads = ("name", "what", "usual", "options")

@@ -30,10 +30,7 @@ def vehicle_of(name: str, fidelity: str = "single-track") -> vehicles.AbstractVe
         return vehicles.passenger_car_as_printed()
     if not Path(name).suffix:
         raise InputError(f"--vehicle {name}: must be the path of a .toml file, or one of {', '.join(BUILT_IN)}.")
-    specification = io.read_car(name)
-    if fidelity == "single-track":
-        return vehicles.from_specification(specification)
-    return vehicles.build(vehicles.numbers_of(specification), kit.FIDELITIES[fidelity])
+    return vehicles.specified_car(io.read_car(name), fidelity)
 
 
 def first_line(of: Any) -> str:

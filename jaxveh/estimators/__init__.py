@@ -4,7 +4,7 @@ from jaxveh.estimators import kit, mass_and_grade, sideslip
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.contract import Calibration, Span
-from jaxveh.estimators.linear_baseline import open_loop
+from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
 from jaxveh.estimators.live import Live, LiveAnswer, LiveBelief
 from jaxveh.estimators.observability import observe, predict_measurements
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
@@ -25,6 +25,7 @@ __all__ = [
     "mass_and_grade",
     "observe",
     "open_loop",
+    "open_loop_of",
     "predict_measurements",
     "read_calibration",
     "rear_axle_model",

@@ -1,8 +1,9 @@
 """What an estimator of a quantity is, and what all of them share.
 
-An estimator is a module of `jaxveh.estimators`, named after what it estimates, with six names and these arguments first:
+An estimator is a module of `jaxveh.estimators`, named after what it estimates, with seven names and these arguments first:
 
 - `needs`: a tuple of `Need`, the channels that it reads and their units.
+- `car_of(car)`: the vehicle that the estimator is about, of a car's file taken at its word.
 - `model(car, ...) -> StateSpace`: the state space that a filter sees. `car`: an `io.CarSpecification`, or the vehicle that the
   estimator is about. All other arguments have defaults and are given by name.
 - `chosen_parameters(model)`: the parameters and noise levels that a calibration fits.

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxveh import numerics
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
 from jaxveh.statespace import Propagate, Row
@@ -26,14 +27,21 @@ def open_loop(car: SingleTrack, recording: Recording) -> dict[str, np.ndarray]:
     The car's own cornering stiffnesses at its static loads, without load transfer. **Returns** by name, (T,) each: `v_y`
     (m/s), `yaw_rate` (rad/s), `sideslip` (rad). **Raises** `InputError` for missing channels.
     """
-    plain = linear(eqx.tree_at(lambda c: c.cg_height, car, None, is_leaf=lambda leaf: leaf is None))
-    inputs = {name: jnp.asarray(recording[name]) for name in ("steer", "v_x")}
-    states = _drive(plain, Row(jnp.asarray(recording.time), record("Inputs", inputs), ()))
-    v_y, yaw_rate = np.asarray(states.v_y), np.asarray(states.yaw_rate)
-    return {"v_y": v_y, "yaw_rate": yaw_rate, "sideslip": np.arctan2(v_y, np.asarray(recording["v_x"]))}
+    found = open_loop_of(car, recording.time, recording["steer"], recording["v_x"])
+    return {name: np.asarray(values) for name, values in found.items()}
 
 
 @eqx.filter_jit
+def open_loop_of(car: SingleTrack, time, steer, v_x) -> dict[str, jax.Array]:
+    """The same of (T,) arrays alone, which may be traced."""
+    plain = linear(eqx.tree_at(lambda c: c.cg_height, car, None, is_leaf=lambda leaf: leaf is None))
+    inputs = {"steer": jnp.asarray(steer), "v_x": jnp.asarray(v_x)}
+    states = _drive(plain, Row(jnp.asarray(time), record("Inputs", inputs), ()))
+    return {
+        "v_y": states.v_y, "yaw_rate": states.yaw_rate, "sideslip": numerics.arctan2(states.v_y, inputs["v_x"])
+    }  # fmt: skip
+
+
 def _drive(car: SingleTrack, rows: Row):
     start = jax.tree.map(lambda _: jnp.zeros((), rows.t.dtype), car.state_type(0, 0, 0))
 

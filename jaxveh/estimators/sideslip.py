@@ -60,10 +60,15 @@ CURVE = 1.35
 """The Magic Formula's C in a fitted car's file."""
 
 
+def car_of(car: CarSpecification | RearAxle) -> RearAxle:
+    """The rear axle of a car's file taken at its word."""
+    return car if isinstance(car, RearAxle) else rear_axle(car)
+
+
 def model(car: CarSpecification | RearAxle, *, a_y_delay: float | None = None) -> StateSpace:
     """The state space of a car's file taken at its word, or of a `RearAxle`: see `rear_axle_model`. `a_y_delay` (s): by which its
     logs' accelerometer is late, in place of the `RearAxle`'s."""
-    system = car if isinstance(car, RearAxle) else rear_axle(car)
+    system = car_of(car)
     if a_y_delay is not None:
         system = dataclasses.replace(system, a_y_delay=a_y_delay)
     return rear_axle_model(system)

@@ -41,10 +41,12 @@ from jaxveh.manoeuvres.steering import (
     step_steer,
     swept_sine,
 )
+from jaxveh.manoeuvres.usual import USUAL, UsualDrive, options_of_car, understeer_of
 from jaxveh.numerics import smooth_step
 
 __all__ = [
     "MANOEUVRES",
+    "USUAL",
     "AbstractDriver",
     "AbstractGraph",
     "AbstractManoeuvre",
@@ -77,6 +79,7 @@ __all__ = [
     "StepSteer",
     "Straight",
     "SweptSine",
+    "UsualDrive",
     "WaveringSpeed",
     "as_driver",
     "braking_in_a_turn",
@@ -93,6 +96,7 @@ __all__ = [
     "manoeuvre_options",
     "mu_jump_braking",
     "named_manoeuvre",
+    "options_of_car",
     "passes",
     "ramp_steer",
     "random_steering",
@@ -105,5 +109,6 @@ __all__ = [
     "steady_circle",
     "step_steer",
     "swept_sine",
+    "understeer_of",
     "wavering_speed",
 ]  # fmt: skip

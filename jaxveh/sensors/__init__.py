@@ -6,6 +6,7 @@ from jaxveh.sensors.gnss import GNSS
 from jaxveh.sensors.imu import IMU, Alignment
 from jaxveh.sensors.instrumented import Instrumented
 from jaxveh.sensors.low_pass import LowPass, low_pass
+from jaxveh.sensors.named import DEVICES, NamedDevices, named_devices
 from jaxveh.sensors.optical import OpticalSideslip
 from jaxveh.sensors.sensor_set import Position, SensorSet, esc
 from jaxveh.sensors.signal import Signal
@@ -17,6 +18,7 @@ from jaxveh.sensors.wheel_speeds import WheelSpeeds
 from jaxveh.sensors.wrapper import AbstractDeviceWrapper, Renamed
 
 __all__ = [
+    "DEVICES",
     "GNSS",
     "IMU",
     "AbstractDevice",
@@ -31,6 +33,7 @@ __all__ = [
     "LowPass",
     "Measured",
     "MotorTorque",
+    "NamedDevices",
     "OpticalSideslip",
     "Position",
     "Renamed",
@@ -43,6 +46,7 @@ __all__ = [
     "WheelSpeeds",
     "esc",
     "low_pass",
+    "named_devices",
     "production_car",
     "proving_ground_car",
 ]

@@ -38,6 +38,8 @@ from jaxveh.vehicles.sets import (
     from_commonroad,
     named_car,
     numbers_of,
+    specification_of,
+    specified_car,
 )
 from jaxveh.vehicles.seven_dof import SevenDOF
 from jaxveh.vehicles.single_track import SingleTrack, SingleTrackOutputs, SingleTrackState
@@ -107,4 +109,6 @@ __all__ = [
     "regularised_speed",
     "sets",
     "slip_angle",
+    "specification_of",
+    "specified_car",
 ]

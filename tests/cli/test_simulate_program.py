@@ -9,11 +9,11 @@ import pytest
 from programs import error_line, run, write_car
 
 from jaxveh import InputError, Recording, io, roads, simulation, vehicles
-from jaxveh.cli.devices import DEVICES, NoiseOption, devices_of
 from jaxveh.cli.drive_report import numbers_of, print_numbers, steer_at_03g
-from jaxveh.cli.manoeuvre import USUAL, course_of, make, parse_manoeuvre
+from jaxveh.cli.manoeuvre import course_of, make, parse_manoeuvre
 from jaxveh.cli.vehicle import AS_PRINTED, BUILT_IN, vehicle_of
-from jaxveh.manoeuvres import MANOEUVRES
+from jaxveh.manoeuvres import MANOEUVRES, USUAL
+from jaxveh.sensors import DEVICES, named_devices
 from jaxveh.vehicles import kit
 
 QUICK = ("--duration", "1", "--rate", "50", "--manoeuvre", "step-steer", "--set", "start=0.1")
@@ -165,7 +165,7 @@ def test_a_drive_too_short_for_its_standard_says_so_and_is_written(tmp_path):
 @pytest.mark.parametrize("name", ["production", "proving-ground"])
 def test_wheel_speeds_are_measured_where_wheels_spin(name):
     measured = {
-        f: devices_of(name, vehicle_of("sedan", f), NoiseOption(0.01, 0.1))
+        f: named_devices(name, vehicle_of("sedan", f), {"yaw_rate": 0.01, "a_y": 0.1})
         for f in kit.FIDELITIES
         if "trailer" not in f
     }

@@ -8,11 +8,11 @@ from jaxveh.vehicles.sets.commonroad_cars import compact_car, sedan, semi_traile
 from jaxveh.vehicles.sets.estimate import estimated_suspension
 from jaxveh.vehicles.sets.from_commonroad import commonroad_limits, from_commonroad
 from jaxveh.vehicles.sets.heavy_cars import suv, truck
-from jaxveh.vehicles.sets.named import CARS, FIDELITIES, named_car
+from jaxveh.vehicles.sets.named import CARS, FIDELITIES, named_car, specified_car
 from jaxveh.vehicles.sets.numbers import CarNumbers, SuspensionNumbers, TyreNumbers
 from jaxveh.vehicles.sets.passenger_cars import ev, passenger_car
 from jaxveh.vehicles.sets.race_cars import ferrari_250lm, race_car
-from jaxveh.vehicles.sets.specification import numbers_of
+from jaxveh.vehicles.sets.specification import numbers_of, specification_of
 from jaxveh.vehicles.sets.tyres import axle_tyre, wheel_tyre
 
 __all__ = [
@@ -35,6 +35,8 @@ __all__ = [
     "race_car",
     "sedan",
     "semi_trailer",
+    "specification_of",
+    "specified_car",
     "suv",
     "truck",
     "van",

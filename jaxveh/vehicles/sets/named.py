@@ -12,11 +12,13 @@ from jaxveh.vehicles.kinematic import Kinematic
 from jaxveh.vehicles.kinematic_trailer import KinematicTrailer
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
 from jaxveh.vehicles.longitudinal import Longitudinal
+from jaxveh.vehicles.parameter_sets import from_specification
 from jaxveh.vehicles.roll_3dof import Roll3DOF
 from jaxveh.vehicles.roll_4dof import Roll4DOF
 from jaxveh.vehicles.sets import commonroad_cars, heavy_cars, passenger_cars, race_cars
 from jaxveh.vehicles.sets.build import build
 from jaxveh.vehicles.sets.numbers import CarNumbers
+from jaxveh.vehicles.sets.specification import numbers_of
 from jaxveh.vehicles.seven_dof import SevenDOF
 from jaxveh.vehicles.single_track import SingleTrack
 from jaxveh.vehicles.single_track_3dof import SingleTrack3DOF
@@ -62,3 +64,14 @@ def named_car(name: str, fidelity: str = "single-track", **options: Any) -> Abst
     kit.check_known("vehicles", "car", name, CARS)
     kit.check_known("vehicles", "fidelity", fidelity, FIDELITIES)
     return build(CARS[name](), FIDELITIES[fidelity], **options)
+
+
+def specified_car(specification: Any, fidelity: str = "single-track") -> AbstractVehicle:
+    """The car of a file (`jaxveh.io.CarSpecification`) as the vehicle `fidelity` of `FIDELITIES`.
+
+    **Raises** `InputError` for another fidelity, and where the file's numbers do not reach.
+    """
+    kit.check_known("vehicles", "fidelity", fidelity, FIDELITIES)
+    if fidelity == "single-track":
+        return from_specification(specification)
+    return build(numbers_of(specification), FIDELITIES[fidelity])

@@ -1,12 +1,14 @@
-"""A car's numbers out of the file that describes it."""
+"""A car's numbers out of the file that describes it, and what a file would say of numbers."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from jaxveh._core.errors import InputError
+from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.vehicles.base import GRAVITY
-from jaxveh.vehicles.sets.numbers import CarNumbers, TyreNumbers, named_alike
+from jaxveh.vehicles.sets.numbers import NAMED_ALIKE, SHARES, CarNumbers, TyreNumbers, named_alike
+from jaxveh.vehicles.sets.tyres import axle_tyre
 
 
 def numbers_of(specification: Any) -> CarNumbers:
@@ -41,3 +43,24 @@ def _tyre(s: Any, axle: str, load: float) -> TyreNumbers:
         raise InputError(f"{axle} axle: the specification has neither coefficients nor {axle}_cornering_stiffness.")
     friction = 1.0 if formula is None else formula.D / (load if formula.nominal_load is None else formula.nominal_load)
     return TyreNumbers(cornering_stiffness=0.5 * stiffness, friction=friction, property_file=getattr(s, f"{axle}_tyre"))
+
+
+def specification_of(numbers: CarNumbers) -> CarSpecification:
+    """What a car's file would say of these numbers: the inverse of `numbers_of`, with each axle's tyres as a Magic Formula.
+
+    A file knows nothing of suspensions and trailers, and of four motors no more than the front axle's share.
+
+    **Raises** `InputError` for a car without mass, yaw inertia or tyres, which no file can leave out.
+    """
+    missing = [name for name in ("mass", "yaw_inertia", "front", "rear") if getattr(numbers, name) is None]
+    if missing:
+        raise InputError(f"{numbers.name}: {', '.join(missing)} must be known for a car's file, and is not.")
+    loads = {axle: 2.0 * load for axle, load in zip(("front", "rear"), numbers.wheel_loads(), strict=True)}
+    tyres = {axle: axle_tyre(getattr(numbers, axle), load) for axle, load in loads.items()}
+    optional = ("cg_height", "drag", "rolling_resistance")
+    return CarSpecification(
+        name=numbers.name,
+        **{name: getattr(numbers, name) for name in (*NAMED_ALIKE, *SHARES, *optional)},
+        **{axle: AxleTyre(*map(float, (t.B, t.C, t.D, t.E)), nominal_load=loads[axle]) for axle, t in tyres.items()},
+        steer_offset=-numbers.steer_offset or None,
+    )

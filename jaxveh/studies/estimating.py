@@ -1,0 +1,121 @@
+"""Estimators by name: the state space of any vehicle of the package, and what is ready-made of `jaxveh.estimators`."""
+
+from __future__ import annotations
+
+import inspect
+import operator
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from jaxveh import estimators, sensors
+from jaxveh._core.errors import InputError
+from jaxveh.io import kit
+from jaxveh.statespace import Gaussian, StateSpace
+from jaxveh.studies.drives import Drive, car_of, specification_of
+from jaxveh.studies.numbers import flat, with_numbers
+from jaxveh.studies.settings import speed_and_steer
+
+
+class NamedEstimator(NamedTuple):
+    """How to make the estimator's own car out of the study's tables, and a state space of that car; which keys it has."""
+
+    car: Callable[[Mapping[str, Any]], Any]
+    model: Callable[[Any, Mapping[str, Any], Drive], StateSpace]
+    options: tuple[str, ...]
+    help: str
+
+
+def estimator_of(settings: Mapping[str, Any]) -> NamedEstimator:
+    """The estimator that the tables name."""
+    told = settings["estimator"]
+    if not isinstance(told.get("name"), str):
+        raise InputError(f"estimator: name is missing; it is one of {', '.join(ESTIMATORS)}.")
+    kit.check_known("estimator", "estimator", told["name"], ESTIMATORS)
+    found = ESTIMATORS[told["name"]]
+    for key in told:
+        kit.check_known(f"estimator {told['name']}", "key", key, ("name", *found.options))
+    return found
+
+
+def told_car(settings: Mapping[str, Any]) -> Any:
+    """The estimator's own car: the file's, with the numbers of `told`."""
+    return with_numbers("told", estimator_of(settings).car(settings), flat(settings["told"]))
+
+
+def model_of(settings: Mapping[str, Any], drive: Drive) -> StateSpace:
+    """The state space that the filter sees: it knows nothing of `car`, and of the drive the sensors' noise and the first speed."""
+    return estimator_of(settings).model(told_car(settings), settings, drive)
+
+
+def _track_car(settings: Mapping[str, Any]) -> Any:
+    return car_of(settings["drive"]["vehicle"], settings["estimator"].get("fidelity", "single-track"))
+
+
+def _track_model(car: Any, settings: Mapping[str, Any], drive: Drive) -> StateSpace:
+    options = {name: value for name, value in settings["estimator"].items() if name not in ("name", "fidelity")}
+    if "report" in options:
+        options["report"] = tuple(options["report"])
+    if "estimate" in options:
+        options["estimate"] = where_of(options["estimate"])
+    if "v_x" in car.state_type._fields and "v_x" not in car.inputs:
+        options["start"] = {"v_x": speed_and_steer(settings["drive"])[0], **options.get("start", {})}
+    return estimators.state_space(
+        car, _as_told(settings, car, drive.sensors), process_noise=settings["process_noise"] or None, **options
+    )
+
+
+def _as_told(settings: Mapping[str, Any], car: Any, devices: Any) -> sensors.SensorSet:
+    """The sensors as the filter takes them: with their own noise, or that of `measurement_noise`; without the inputs of its car,
+    which it takes as they are measured."""
+    told = dict(settings["measurement_noise"])
+    if not isinstance(devices, sensors.SensorSet):
+        if not told:
+            raise InputError(
+                f"measurement_noise: devices = {settings['sensors']['devices']!r} do not say how noisy a filter shall take them: "
+                "give standard deviations by channel, [measurement_noise] yaw_rate = 0.005, a_y = 0.1."
+            )
+        return sensors.SensorSet(Gaussian(told))
+    noise = {name: std for name, std in {**devices.noise.std._asdict(), **told}.items() if name not in car.inputs}
+    if not noise:
+        raise InputError(f"sensors: measure nothing but inputs of {type(car).__name__} ({', '.join(car.inputs)}).")
+    return sensors.SensorSet(Gaussian(noise), devices.position, devices.low_pass)
+
+
+def where_of(names: Any) -> Callable[[Any], list]:
+    """What picks the parameters of these dotted names."""
+    names = [names] if isinstance(names, str) else list(names)
+    return lambda car: [operator.attrgetter(name)(car) for name in names]
+
+
+def _ready_made(module: Any) -> NamedEstimator:
+    """An estimator of `jaxveh.estimators` (`estimators/contract.py`), at its word: neither calibrated nor smoothed."""
+    import inspect
+
+    options = [p.name for p in inspect.signature(module.model).parameters.values() if p.kind is p.KEYWORD_ONLY]
+
+    def model(car: Any, settings: Mapping[str, Any], drive: Drive) -> StateSpace:
+        for table in ("process_noise", "measurement_noise"):
+            if settings[table]:
+                raise InputError(
+                    f"{table}: {module.NAME} has noises of its own; give {', '.join(options)} under [estimator], or its car's "
+                    "numbers under [told]."
+                )
+        return module.model(car, **{name: value for name, value in settings["estimator"].items() if name != "name"})
+
+    of_file = lambda settings: module.car_of(specification_of(settings["drive"]["vehicle"]))
+    return NamedEstimator(of_file, model, tuple(options), (module.__doc__ or "").partition("\n")[0])
+
+
+OF_STATE_SPACE = ("fidelity", "estimate", "prior", "walk", "start", "start_spread", "minimum_speed", "report", "steps", "input_path")
+
+ESTIMATORS: dict[str, NamedEstimator] = {
+    "state-space": NamedEstimator(
+        _track_car, _track_model, OF_STATE_SPACE, "a vehicle of the package with its sensors (estimators.state_space)"
+    ),
+    **{
+        name.replace("_", "-"): _ready_made(getattr(estimators, name))
+        for name in estimators.__all__
+        if hasattr(getattr(estimators, name), "calibrate")
+    },
+}
+"""Estimators by name."""

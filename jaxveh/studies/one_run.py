@@ -1,0 +1,73 @@
+"""One run of a study: a drive is simulated, estimated by a filter, and measured against its truth."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import estimators, filters, vehicles
+from jaxveh._core.parameter import every_parameter, pick
+from jaxveh.io import kit
+from jaxveh.studies.drives import Drive, car_of, drive_of, simulate
+from jaxveh.studies.estimating import model_of, told_car
+from jaxveh.studies.metrics import METRICS, AskedMetric, Errors, Run, asked_metrics, truth_of
+from jaxveh.studies.named_filters import filter_of
+from jaxveh.studies.numbers import with_numbers
+from jaxveh.studies.settings import speed_and_steer
+
+OPEN_LOOP = ("v_y", "yaw_rate", "sideslip")
+"""Of which a linear single track without sensors says something."""
+
+SHARED = ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg")
+"""Numbers of an estimator's own car that its single track takes over."""
+
+
+def run_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None = None) -> dict[str, Any]:
+    """Simulate and estimate as the settings say: the metrics by name. The estimator sees what the devices say, never the truth."""
+    drive_key, sensor_key, filter_key = jax.random.split(key, 3)
+    drive = drive_of(settings, drive_key, duration)
+    recording = simulate(drive, sensor_key)
+    model = model_of(settings, drive)
+    asked = asked_metrics(settings["metrics"]["names"])
+    keep = ("mean", "std", *(("info.nis",) if AskedMetric("nis", "") in asked else ()))
+    found = filters.run(filter_of(settings["filter"]), model, recording, key=filter_key, keep=keep, throw=False)
+    counts = jnp.asarray(recording.time) >= settings["metrics"]["after"]
+    finite = jnp.stack([jnp.isfinite(leaf).all() for leaf in jax.tree.leaves((found.mean, found.std))]).all()
+    failed = jnp.where((found.result == 0) & finite, 0.0, 1.0)
+    errors = functools.cache(lambda quantity: _errors(quantity, settings, drive, model, recording, found, counts))
+    seen = lambda one: errors(one.quantity) if one.quantity else Run(found, counts, failed)
+    return {one.name: METRICS[one.metric].compute(seen(one)) for one in asked}
+
+
+def _errors(quantity: str, settings, drive: Drive, model: Any, recording: Any, found: Any, counts: Any) -> Errors:
+    """The errors of a quantity, and those of doing nothing."""
+    known = every_parameter(drive.car)
+    numbers = dict(zip(known, pick(drive.car, tuple(known.values())), strict=True))
+    truth = truth_of(recording, drive.car, quantity, numbers)
+    field = quantity.replace(".", "_")
+    kit.check_known("metrics.names", "estimated quantity", field, found.mean._fields)
+    estimate, std = getattr(found.mean, field), getattr(found.std, field)
+    nothing = _nothing(quantity, settings, model, recording)
+    return Errors(estimate - truth, std, counts, jnp.broadcast_to(nothing, estimate.shape) - truth)
+
+
+def _nothing(quantity: str, settings, model: Any, recording: Any) -> Any:
+    """What one knows of a quantity without any sensor but the steering and the speed: (T,), or one number."""
+    if quantity in OPEN_LOOP and "steer" in recording:
+        told = told_car(settings)
+        car = told if isinstance(told, vehicles.SingleTrack) else _single_track(settings, told)
+        speed = speed_and_steer(settings["drive"])[0]
+        v_x = recording["v_x"] if "v_x" in recording else jnp.full((len(recording),), speed)
+        return estimators.open_loop_of(car, recording.time, recording["steer"], v_x)[quantity]
+    first = jax.tree.map(lambda leaf: leaf[0], model.rows(recording))
+    return getattr(model.report(first.t, model.prior.mean, first.u), quantity.replace(".", "_"))
+
+
+def _single_track(settings: Mapping[str, Any], told: Any) -> vehicles.SingleTrack:
+    """The car's file as a single track, with what it shares with the told car."""
+    car = car_of(settings["drive"]["vehicle"], "single-track")
+    return with_numbers("told", car, {name: getattr(told, name) for name in SHARED if hasattr(told, name)})

@@ -1,0 +1,141 @@
+"""A study's file: TOML, checked key by key, with the cars' files that it names."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from jaxveh import vehicles
+from jaxveh._core.errors import InputError, check_whole
+from jaxveh.io import kit, read_car
+from jaxveh.manoeuvres import MANOEUVRES
+from jaxveh.studies.axes import STILL, TRACED, axes_of, sampled_paths
+from jaxveh.studies.settings import DEFAULTS, WHOLE, number_options, with_defaults
+from jaxveh.studies.study import Study
+
+SEEDS = 20
+"""Runs at every point, where the file is silent."""
+
+STUDY_SCHEMA = """\
+# A study: how well an estimator does over many simulated drives. Angles are rad and units SI unless the key says otherwise.
+seeds = 20                      # runs at every point of what varies; each point has the same seeds
+seed = 0
+
+[drive]                         # what is simulated: the truth
+vehicle = "passenger_car"       # a car of the package (jaxveh simulate --list), or a car's file (jaxveh schema car)
+fidelity = "two-track-3dof"
+manoeuvre = "double-lane-change"
+speed = 20.0                    # m/s
+steer_deg = 3.0                 # amplitude at the road wheels, degrees
+road = "level"
+rate = 50.0                     # rows a second, Hz
+# duration = 8.0                # s; and the manoeuvre's own options
+
+[car]                           # numbers of the true car that are not as in its file, which the estimator is not told
+mass = 1550.0                   # kg
+
+[sensors]
+devices = "esc"                 # or "production", "proving-ground"; of esc standard deviations by channel:
+yaw_rate = 0.005                # rad/s
+a_y = 0.1                       # m/s^2
+v_x = 0.1                       # m/s: an input of the estimator's single track, which this car does not say otherwise
+
+[estimator]                     # the model that the filter sees
+name = "state-space"            # or "sideslip", "mass-and-grade"
+fidelity = "single-track"
+# estimate = ["front.D"]        # parameters among the states
+
+[told]                          # numbers of the estimator's own car that are not as in its file
+yaw_inertia = 2300.0            # kg m^2
+
+[process_noise]                 # of state-space, by state, in unit per root second
+v_y = 0.05
+yaw_rate = 0.02
+
+[filter]
+name = "extended"               # every filter of jaxveh.filters; options are keys beside the name
+
+[metrics]
+names = ["rmse.sideslip", "coverage_95.sideslip", "nis"]
+after = 0.5                     # s: rows before it do not count
+
+[vary]                          # every combination of these; numbers of car, told, sensors and noises are one program
+"sensors.yaw_rate" = [0.002, 0.02]
+"drive.speed" = {from = 15.0, to = 25.0, count = 3}   # scale = "log" for equal ratios
+
+[vary.filter]                   # by labels of your own
+EKF = "extended"
+UKF = "unscented"
+
+[vary.samples]                  # points that fill a box, as one axis more
+method = "sobol"                # a power of two; or "latin-hypercube"
+count = 8
+ranges = {"car.mass" = [1400.0, 1700.0], "told.front.D" = [7000.0, 8500.0]}
+"""
+"""The file's schema as a commented example that reads, for programs to print."""
+
+
+def read_study(path: str | os.PathLike) -> Study:
+    """Read a study from TOML (`STUDY_SCHEMA`).
+
+    **Raises** `InputError` naming the file and what is not there, or out of range (with what is), before anything runs.
+    """
+    path = Path(path)
+    try:
+        study = study_of(kit.read_toml(path), path.parent)
+        study.check()
+    except InputError as error:
+        raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
+    return study
+
+
+def study_of(told: Mapping[str, Any], folder: Path = Path()) -> Study:
+    """A study from what a file says; cars' files are looked for from `folder`. It is not yet checked (`Study.check`)."""
+    for key in told:
+        kit.check_known("study", "table", key, (*WHOLE, *DEFAULTS))
+    seeds, seed = told.get("seeds", SEEDS), told.get("seed", 0)
+    check_whole("seeds", seeds)
+    check_whole("seed", seed, 0)
+    settings, vary = with_defaults(told), told.get("vary", {})
+    kit.check_keys("vary", vary, vary)
+    settings["drive"]["vehicle"] = _car(settings["drive"]["vehicle"], folder)
+    kit.check_keys("metrics", settings["metrics"], DEFAULTS["metrics"])
+    manoeuvres = _manoeuvres(settings, vary)
+    axes = axes_of(vary, lambda path: is_traced(path, manoeuvres))
+    axes = tuple(
+        axis._replace(values={label: _car(value, folder) for label, value in axis.values.items()})
+        if axis.path == "drive.vehicle"
+        else axis
+        for axis in axes
+    )
+    return Study(settings, axes, sampled_paths(vary), seeds, seed)
+
+
+def is_traced(path: str, manoeuvres: list[str]) -> bool:
+    """Whether what stands at a path varies within one program."""
+    table, _, name = path.partition(".")
+    if table == "drive":
+        return name in ("speed", "steer_deg") or any(name in number_options(one) for one in manoeuvres)
+    return path.startswith(TRACED) and path not in STILL
+
+
+def _manoeuvres(settings: Mapping[str, Any], vary: Mapping[str, Any]) -> list[str]:
+    """The manoeuvres that the study drives."""
+    nested = vary.get("drive", {})
+    listed = vary.get("drive.manoeuvre", nested.get("manoeuvre") if isinstance(nested, Mapping) else None)
+    found = listed if isinstance(listed, list) else [settings["drive"]["manoeuvre"]]
+    for one in found:
+        kit.check_known("drive", "manoeuvre", one, MANOEUVRES)
+    return found
+
+
+def _car(name: Any, folder: Path) -> Any:
+    """A car's name as it is, or its file read."""
+    if not isinstance(name, str):
+        raise InputError(f"drive.vehicle = {name!r}: must be the name of a car, or of its file.")
+    if not Path(name).suffix:
+        kit.check_known("drive.vehicle", "car", name, vehicles.kit.CARS, "Or give the path of a car's file (.toml).")
+        return name
+    return read_car(folder / name)

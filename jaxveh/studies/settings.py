@@ -1,0 +1,78 @@
+"""What a study says: nested tables with defaults, checked key by key; and one of its points."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+from jaxveh._core.errors import InputError
+from jaxveh.io import kit
+from jaxveh.manoeuvres import MANOEUVRES, USUAL, manoeuvre_options
+
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "drive": {
+        "vehicle": "passenger_car", "fidelity": "single-track", "manoeuvre": "double-lane-change", "road": "level", "rate": 100.0,
+    },
+    "car": {},
+    "sensors": {"devices": "esc"},
+    "estimator": {"name": "state-space"},
+    "told": {},
+    "process_noise": {},
+    "measurement_noise": {},
+    "filter": {"name": "extended"},
+    "metrics": {"names": ["rmse.sideslip", "coverage_95.sideslip", "failed"], "after": 0.0},
+}  # fmt: skip
+"""Every table of a study but `vary`, with what holds where the file is silent."""
+
+WHOLE = ("seeds", "seed", "vary")
+"""Keys beside these tables."""
+
+OF_DRIVE = ("vehicle", "fidelity", "manoeuvre", "road", "rate", "speed", "steer_deg", "duration")
+"""Keys of `drive` beside the manoeuvre's own options."""
+
+
+def with_defaults(told: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The study's tables, each with its defaults; `filter` and `estimator` may be a name alone."""
+    found: dict[str, dict[str, Any]] = {}
+    for table, usual in DEFAULTS.items():
+        own = told.get(table, {})
+        if table in ("filter", "estimator") and isinstance(own, str):
+            own = {"name": own}
+        if not isinstance(own, Mapping):
+            raise InputError(f"{table} = {own!r}: must be a table of keys.")
+        # A filter or an estimator of another name has other options.
+        found[table] = dict(own) if table in ("filter", "estimator") and "name" in own else {**usual, **own}
+    return found
+
+
+def put_at(settings: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """A copy of nested tables with a value at a dotted path."""
+    found = copy.copy(dict(settings))
+    name, _, rest = path.partition(".")
+    if not rest:
+        found[name] = value
+        return found
+    inner = found.get(name, {})
+    found[name] = put_at(inner if isinstance(inner, Mapping) else {"name": inner}, rest, value)
+    return found
+
+
+def number_options(manoeuvre: str) -> list[str]:
+    """The options of a manoeuvre that may vary within one program: its numbers, but not how long it takes."""
+    options = manoeuvre_options(manoeuvre)
+    return [name for name, value in options.items() if isinstance(value, float) and name != "duration"]
+
+
+def check_drive(drive: Mapping[str, Any]) -> None:
+    """Raise `InputError` for a key of `drive` that is neither its own nor an option of its manoeuvre."""
+    kit.check_known("drive", "manoeuvre", drive["manoeuvre"], MANOEUVRES)
+    known = [*OF_DRIVE, *(name for name in manoeuvre_options(drive["manoeuvre"]) if name not in OF_DRIVE)]
+    for key in drive:
+        kit.check_known(f"drive ({drive['manoeuvre']})", "key", key, known)
+
+
+def speed_and_steer(drive: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Speed (m/s) and steer (degrees) of a drive; usual ones where it does not say."""
+    usual = USUAL[drive["manoeuvre"]]
+    return drive.get("speed", usual.speed), drive.get("steer_deg", usual.steer_deg)

@@ -1,0 +1,123 @@
+"""A study: what is simulated, estimated and measured, and what of it varies."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import jax
+
+from jaxveh.studies.axes import SAMPLES, Varied, design_of
+from jaxveh.studies.drives import Drive, drive_of
+from jaxveh.studies.estimating import model_of, told_car
+from jaxveh.studies.metrics import asked_metrics, unit_of_metric
+from jaxveh.studies.named_filters import filter_of
+from jaxveh.studies.numbers import unit_of
+from jaxveh.studies.one_run import run_of
+from jaxveh.studies.settings import put_at
+from jaxveh.sweeps import Design
+from jaxveh.sweeps.design import Axis
+
+UNITS = {"drive.speed": "m/s", "drive.steer_deg": "°", "drive.duration": "s", "drive.rate": "Hz"}
+"""Of what is no number of an object."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Study:
+    """`settings`: nested tables as in a study's file, cars' files read; `axes`: what varies; `sampled`: the paths of the samples'
+    numbers by their names; `seeds` runs at every point, drawn from `seed`. Called, it is the `run` of a sweep."""
+
+    settings: Mapping[str, Any]
+    axes: tuple[Varied, ...]
+    sampled: Mapping[str, str]
+    seeds: int
+    seed: int
+
+    @property
+    def design(self) -> Design:
+        """Every combination of what varies."""
+        return design_of(self.axes)
+
+    @property
+    def key(self) -> jax.Array:
+        """Of which every run's key is split."""
+        return jax.random.key(self.seed)
+
+    def __call__(self, point: Any, key: jax.Array) -> dict[str, Any]:
+        """One run: the metrics by name."""
+        return run_of(self.at(point), key, self._duration(point))
+
+    def at(self, point: Any) -> dict[str, Any]:
+        """The settings at a point of the design."""
+        settings = dict(self.settings)
+        for axis in self.axes:
+            value = getattr(point, axis.name)
+            paths = {axis.path: value} if axis.path is not None else {p: getattr(value, n) for n, p in self.sampled.items()}
+            for path, number in paths.items():
+                settings = put_at(settings, path, number)
+        return settings
+
+    def check(self) -> None:
+        """Build, without running it, what every combination of choices asks for, at both ends of everything that varies.
+
+        **Raises** `InputError` for what is not there, or out of range.
+        """
+        for _, _, objects in self.design.combinations():
+            for point in self._ends(objects, lambda path: True):
+                settings = self.at(point)
+                drive = drive_of(settings, self.key, self._duration(point))
+                filter_of(settings["filter"]).check(model_of(settings, drive))
+                asked_metrics(settings["metrics"]["names"])
+
+    def units(self) -> dict[str, str]:
+        """The unit of every axis of numbers and of every metric, by name."""
+        _, _, objects = next(self.design.combinations())
+        settings = self.at(next(self._ends(objects, lambda path: False)))
+        drive = drive_of(settings, self.key)
+        found = {axis.name: _unit_at(axis.path, settings, drive) for axis in self.axes if axis.path is not None}
+        found |= {f"{SAMPLES}.{name}": _unit_at(path, settings, drive) for name, path in self.sampled.items()}
+        for one in asked_metrics(settings["metrics"]["names"]):
+            found[one.name] = unit_of_metric(one, drive.car.units.get(one.quantity, unit_of(drive.car, one.quantity)))
+        return found
+
+    def _duration(self, point: Any) -> float | None:
+        """How long the drives of a point's choices take, s, None where the file says it: the longest of those that one program
+        has, for its rows are as many in each run."""
+        if "duration" in self.at(point)["drive"]:
+            return None
+        objects = {axis.name: getattr(point, axis.name) for axis in self.design.choices}
+        with jax.ensure_compile_time_eval():
+            ends = self._ends(objects, lambda path: path.startswith("drive."))
+            return max(float(drive_of(self.at(one), jax.random.key(0)).driver.duration) for one in ends)
+
+    def _ends(self, objects: Mapping[str, Any], moves: Callable[[str], bool]) -> Iterator[Any]:
+        """Points of these choices: every number at its first value, and each that `moves` (by its path) at its least and its
+        largest."""
+        design, paths = self.design, {axis.name: axis.path for axis in self.axes}
+        first = {axis.name: axis.at(0) for axis in design.numbers}
+        yield design.point(first, objects)
+        for axis in design.numbers:
+            for end in (min, max):
+                for part in (None,) if axis.columns is None else axis.columns:
+                    if moves(self.sampled[part] if part is not None else paths[axis.name] or ""):
+                        yield design.point({**first, axis.name: _end(axis, part, end)}, objects)
+
+
+def _end(axis: Axis, part: str | None, end: Callable[[Any], Any]) -> Any:
+    """An end of an axis of numbers; of one `part` of its samples, of which the others are as in the first."""
+    return end(axis.values) if part is None else {**axis.at(0), part: end(axis.columns[part])}
+
+
+def _unit_at(path: str, settings: Mapping[str, Any], drive: Drive) -> str:
+    """The unit of a varied number."""
+    table, _, name = path.partition(".")
+    if table == "car":
+        return unit_of(drive.car, name)
+    if table == "told":
+        return unit_of(told_car(settings), name)
+    if table in ("measurement_noise", "sensors"):
+        return drive.car.units.get(name, unit_of(drive.sensors, name))
+    if table == "process_noise":
+        return f"{drive.car.units.get(name, '-')}/sqrt(s)"
+    return UNITS.get(path, "-")
