@@ -18,6 +18,9 @@ from jaxveh.cli.fit import fit
 from jaxveh.cli.reproduce import reproduce
 from jaxveh.cli.schema import schema
 from jaxveh.cli.simulate import simulate
+from jaxveh.cli.sweep import RUN, RunUnlessNamed
+from jaxveh.cli.sweep import run as run_sweep
+from jaxveh.cli.sweep import show as show_sweep
 from jaxveh.cli.tyre import evaluate_table, show
 from jaxveh.cli.tyre_fit import fit_table
 
@@ -44,6 +47,11 @@ app = typer.Typer(
 tyre = typer.Typer(help="Tyres: property files (.tir), and fits to rig data.", no_args_is_help=True)
 
 cache = typer.Typer(help="Compiled programs, kept from one start to the next.", no_args_is_help=True)
+
+sweep = typer.Typer(
+    cls=RunUnlessNamed, no_args_is_help=True,
+    help="Studies over many runs: STUDY.toml -o STORE.zarr (or run STUDY.toml ...) computes them, show STORE.zarr tells them.",
+)  # fmt: skip
 
 
 def _version(wanted: bool) -> None:
@@ -72,3 +80,6 @@ app.add_typer(tyre, name="tyre")
 cache.command("show")(program(show_cache))
 cache.command("clear")(program(clear))
 app.add_typer(cache, name="cache")
+sweep.command(RUN)(program(run_sweep))
+sweep.command("show")(program(show_sweep))
+app.add_typer(sweep, name="sweep")

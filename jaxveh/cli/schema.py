@@ -15,15 +15,23 @@ class File(StrEnum):
 
     car = "car"
     channels = "channels"
+    study = "study"
 
 
-def schema(file: Annotated[File, typer.Argument(help="The car, or the channel map.")] = File.car) -> None:
-    """Print a commented example of the file that describes a car, or of a channel map.
+def schema(
+    file: Annotated[File, typer.Argument(help="The car, the channel map, or the study of a sweep.")] = File.car,
+) -> None:
+    """Print a commented example of the file that describes a car, of a channel map, or of a study (jaxveh sweep).
 
-    Both examples can be read as they are: [bold]jaxveh schema car > car.toml[/] is a start.
+    All examples can be read as they are: [bold]jaxveh schema car > car.toml[/] is a start.
     """
     if file is File.car:
         typer.echo(kit.CAR_SCHEMA, nl=False)
+        return
+    if file is File.study:
+        from jaxveh.studies import STUDY_SCHEMA
+
+        typer.echo(STUDY_SCHEMA, nl=False)
         return
     typer.echo(kit.CHANNEL_MAP_SCHEMA)
     typer.echo("# Channels that jaxveh knows by name, and their units:")

@@ -62,14 +62,6 @@ class Tally(NamedTuple):
         return f"{self.met} of {self.of}" + (f" ({', '.join(rest)})" if rest else "")
 
 
-class Table(NamedTuple):
-    """A table for people: a title that says what the numbers are, column heads, rows of cells."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: list[tuple]
-
-
 def at_most(name: str, value, bound: float) -> Check:
     """A criterion that holds at or below the bound; what is not a number does not hold."""
     return _make_check(name, value, bound, value <= bound)

@@ -1,10 +1,22 @@
-"""Studies as files: cars, manoeuvres, sensors, estimators, filters and metrics by name, swept over what varies."""
+"""Studies as files: cars, manoeuvres, sensors, estimators, filters and metrics by name, swept over what varies.
 
+`figures` is imported when it is asked for: it needs matplotlib, the extra `plot`.
+"""
+
+from typing import TYPE_CHECKING
+
+from jaxveh._core.lazy import submodules
 from jaxveh.studies.estimating import ESTIMATORS, NamedEstimator
 from jaxveh.studies.metrics import METRICS, Metric
-from jaxveh.studies.named_filters import FILTERS, filter_of
+from jaxveh.studies.named_filters import FILTERS, filter_of, filter_options
 from jaxveh.studies.reading import STUDY_SCHEMA, read_study, study_of
 from jaxveh.studies.study import Study
+from jaxveh.studies.tables import tables
+
+if TYPE_CHECKING:
+    from jaxveh.studies import figures
+
+__getattr__ = submodules("jaxveh.studies", ("figures",))
 
 __all__ = [
     "ESTIMATORS",
@@ -14,7 +26,10 @@ __all__ = [
     "Metric",
     "NamedEstimator",
     "Study",
+    "figures",
     "filter_of",
+    "filter_options",
     "read_study",
     "study_of",
+    "tables",
 ]

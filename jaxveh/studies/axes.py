@@ -132,8 +132,12 @@ def _samples(told: Any, is_traced: Any) -> Samples:
     ranges = flat(told.get("ranges", {}))
     for path in ranges:
         if not is_traced(path):
-            raise InputError(f"{where}.ranges: {path} cannot vary within one program; give it a list of its own in [vary].")
-    return METHODS[method](told.get("count", 64), seed=seed, **{field_of(path): tuple(ends) for path, ends in ranges.items()})
+            raise InputError(
+                f"{where}.ranges: {path} cannot vary within one program; give it a list of its own in [vary]."
+            )
+    return METHODS[method](
+        told.get("count", 64), seed=seed, **{field_of(path): tuple(ends) for path, ends in ranges.items()}
+    )
 
 
 def sampled_paths(vary: Mapping[str, Any]) -> dict[str, str]:

@@ -57,9 +57,7 @@ def drive_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None
         options["duration"] = length
     speed, steer_deg = speed_and_steer(drive)
     options = {**manoeuvres.options_of_car(drive["manoeuvre"], nominal), **options}
-    driver = manoeuvres.named_manoeuvre(
-        drive["manoeuvre"], speed, steer_deg * (math.pi / 180), driver_key, **options
-    )
+    driver = manoeuvres.named_manoeuvre(drive["manoeuvre"], speed, steer_deg * (math.pi / 180), driver_key, **options)
     check_positive("drive.rate", drive["rate"], "Hz")
     return Drive(
         with_numbers("car", nominal, flat(settings["car"])),
@@ -78,7 +76,7 @@ def sensors_of(told: Mapping[str, Any], car: Any) -> Any:
         return sensors.named_devices(told["devices"], car, numbers)
     found = sensors.named_devices(told["devices"], car)
     if found is None and numbers:
-        raise InputError(f"sensors: {', '.join(numbers)} of devices that measure nothing; take devices = \"esc\".")
+        raise InputError(f'sensors: {", ".join(numbers)} of devices that measure nothing; take devices = "esc".')
     return with_numbers("sensors", found, flat(numbers))
 
 

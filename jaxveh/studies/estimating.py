@@ -43,7 +43,7 @@ def told_car(settings: Mapping[str, Any]) -> Any:
 
 
 def model_of(settings: Mapping[str, Any], drive: Drive) -> StateSpace:
-    """The state space that the filter sees: it knows nothing of `car`, and of the drive the sensors' noise and the first speed."""
+    """The state space that the filter sees: it knows nothing of `car`, of the drive the sensors' noise and the first speed."""
     return estimator_of(settings).model(told_car(settings), settings, drive)
 
 
@@ -89,7 +89,6 @@ def where_of(names: Any) -> Callable[[Any], list]:
 
 def _ready_made(module: Any) -> NamedEstimator:
     """An estimator of `jaxveh.estimators` (`estimators/contract.py`), at its word: neither calibrated nor smoothed."""
-    import inspect
 
     options = [p.name for p in inspect.signature(module.model).parameters.values() if p.kind is p.KEYWORD_ONLY]
 
@@ -106,7 +105,18 @@ def _ready_made(module: Any) -> NamedEstimator:
     return NamedEstimator(of_file, model, tuple(options), (module.__doc__ or "").partition("\n")[0])
 
 
-OF_STATE_SPACE = ("fidelity", "estimate", "prior", "walk", "start", "start_spread", "minimum_speed", "report", "steps", "input_path")
+OF_STATE_SPACE = (
+    "fidelity",
+    "estimate",
+    "prior",
+    "walk",
+    "start",
+    "start_spread",
+    "minimum_speed",
+    "report",
+    "steps",
+    "input_path",
+)
 
 ESTIMATORS: dict[str, NamedEstimator] = {
     "state-space": NamedEstimator(

@@ -67,7 +67,7 @@ METRICS: dict[str, Metric] = {
     "rmse": Metric(lambda e: _rms(e.error, e.counts), "=", "root mean square error"),
     "baseline": Metric(
         lambda e: _rms(e.baseline, e.counts), "=",
-        "the same of doing nothing: the told car on linear tyres without sensors (v_y, yaw_rate, sideslip), else the prior's mean",
+        "the same of doing nothing: the told car on linear tyres, no sensor (v_y, yaw_rate, sideslip); else the prior's mean",
     ),
     "bias": Metric(lambda e: _mean(e.error, e.counts), "=", "mean of the error"),
     "worst": Metric(lambda e: jnp.max(jnp.where(e.counts, jnp.abs(e.error), 0.0)), "=", "largest absolute error"),
@@ -114,7 +114,11 @@ def asked_metrics(names: Any) -> tuple[AskedMetric, ...]:
         if METRICS[metric].of_quantity != bool(quantity):
             raise InputError(
                 f"metrics.names: {name}: {metric} is "
-                + (f"of a quantity: {metric}.sideslip." if METRICS[metric].of_quantity else f"of the whole run: {metric}.")
+                + (
+                    f"of a quantity: {metric}.sideslip."
+                    if METRICS[metric].of_quantity
+                    else f"of the whole run: {metric}."
+                )
             )
         found[AskedMetric(metric, quantity)] = None
         if metric == "rmse":

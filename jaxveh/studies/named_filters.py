@@ -31,6 +31,11 @@ FORMS = {kebab(kind.__name__): kind for kind in (filters.Covariance, filters.Squ
 """The forms of a Gaussian filter's covariance, by name."""
 
 
+def filter_options(name: str) -> list[str]:
+    """The options of a filter by its name in `FILTERS`."""
+    return list(inspect.signature(FILTERS[name]).parameters)
+
+
 def filter_of(told: str | Mapping[str, Any], where: str = "filter") -> AbstractFilter:
     """The filter of a name, or of a table with `name` and its options: plain values, `form` by its name, `inner` a filter again.
 

@@ -27,7 +27,7 @@ SHARED = ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg")
 
 
 def run_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None = None) -> dict[str, Any]:
-    """Simulate and estimate as the settings say: the metrics by name. The estimator sees what the devices say, never the truth."""
+    """Simulate and estimate as the settings say: the metrics by name. No estimator sees the truth."""
     drive_key, sensor_key, filter_key = jax.random.split(key, 3)
     drive = drive_of(settings, drive_key, duration)
     recording = simulate(drive, sensor_key)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -13,7 +14,7 @@ from jaxveh.studies.drives import Drive, drive_of
 from jaxveh.studies.estimating import model_of, told_car
 from jaxveh.studies.metrics import asked_metrics, unit_of_metric
 from jaxveh.studies.named_filters import filter_of
-from jaxveh.studies.numbers import unit_of
+from jaxveh.studies.numbers import flat, unit_of
 from jaxveh.studies.one_run import run_of
 from jaxveh.studies.settings import put_at
 from jaxveh.sweeps import Design
@@ -44,6 +45,28 @@ class Study:
         """Of which every run's key is split."""
         return jax.random.key(self.seed)
 
+    @property
+    def size(self) -> int:
+        """How many runs there are."""
+        return self.seeds * math.prod(self.design.shape)
+
+    def words(self) -> str:
+        """What is simulated and estimated, and who is told what, in a few sentences."""
+        s, paths = self.settings, [*(axis.path for axis in self.axes if axis.path is not None), *self.sampled.values()]
+        of = lambda table: ", ".join(
+            sorted({f"{table}.{name}" for name in flat(s[table])} | {p for p in paths if p.startswith(f"{table}.")})
+        )
+        drive = s["drive"]
+        car = drive["vehicle"] if isinstance(drive["vehicle"], str) else drive["vehicle"].name or "the car's file"
+        noise = "as measurement_noise says" if s["measurement_noise"] else "as it is"
+        varied = ", ".join(paths) or "nothing"
+        return (
+            f"{car} as {drive['fidelity']}, {drive['manoeuvre']} on {drive['road']}, seen by {s['sensors']['devices']}, "
+            f"estimated by {s['estimator']['name']} and {s['filter']['name']}, of which is varied: {varied}. "
+            f"The estimator is told the car's numbers{' but for ' + of('car') if of('car') else ''}"
+            f"{', with its own ' + of('told') if of('told') else ''}, the sensors' noise {noise}, and the speed at the start."
+        )
+
     def __call__(self, point: Any, key: jax.Array) -> dict[str, Any]:
         """One run: the metrics by name."""
         return run_of(self.at(point), key, self._duration(point))
@@ -53,7 +76,9 @@ class Study:
         settings = dict(self.settings)
         for axis in self.axes:
             value = getattr(point, axis.name)
-            paths = {axis.path: value} if axis.path is not None else {p: getattr(value, n) for n, p in self.sampled.items()}
+            paths = (
+                {axis.path: value} if axis.path is not None else {p: getattr(value, n) for n, p in self.sampled.items()}
+            )
             for path, number in paths.items():
                 settings = put_at(settings, path, number)
         return settings

@@ -6,6 +6,7 @@ from jaxveh.sweeps.running import sweep
 from jaxveh.sweeps.sampling import Samples, latin_hypercube, sobol
 from jaxveh.sweeps.stored import read_sweep
 from jaxveh.sweeps.swept import Swept
+from jaxveh.sweeps.table import Table
 
 __all__ = [
     "Axis",
@@ -14,6 +15,7 @@ __all__ = [
     "Design",
     "Samples",
     "Swept",
+    "Table",
     "compare",
     "latin_hypercube",
     "read_sweep",

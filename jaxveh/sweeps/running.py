@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax
@@ -43,6 +44,8 @@ def sweep(
     client: Any = None,
     processes: int | None = None,
     part: tuple[int, int] | None = None,
+    units: Mapping[str, str] | None = None,
+    note: str = "",
 ) -> Swept:
     """`run` at every point of the design, each with the same seeds, so that points can be compared in pairs.
 
@@ -62,7 +65,8 @@ def sweep(
 
     With `store`, a folder such as "sweep.zarr", each chunk of `batch` runs (1000) is written as it is done, and the same call
     goes on there (see `sweeps/stored.py`): in this process, in `processes=N`, with a Dask `client=` (or a scheduler's address),
-    or one share `part=(i, n)` of an array of jobs; each with one device. `sweeps.read_sweep(store)` opens it again.
+    or one share `part=(i, n)` of an array of jobs; each with one device. `sweeps.read_sweep(store)` opens it again. `units` of
+    values and of axes by name, and a `note`, are shown and stored beside the numbers.
 
     Every choice is compiled once, whatever the number of chunks; and again for fewer devices where as many as were asked for
     could wait for each other for ever (large batches of LAPACK routines with jax before 0.12; see `sweeps/workers.py`).
@@ -78,9 +82,11 @@ def sweep(
                 "sweep: client=, processes= and part= need a store=; memory= and devices= are for sweeps without one."
             )
         asked = {"batch": batch, "client": client, "processes": processes, "part": part, "patience": patience}
+        asked |= {"units": units or {}, "note": note}
         return sweep_into(store, run, design, Given(design, seeds, key, data), progress=progress, **asked)
     devices = jax.devices() if devices is None else list(devices)
-    return _in_memory(run, design, Given(design, seeds, key, data), batch, memory, devices, patience, progress)
+    found = _in_memory(run, design, Given(design, seeds, key, data), batch, memory, devices, patience, progress)
+    return dataclasses.replace(found, units=units or {}, note=note)
 
 
 def _in_memory(run, design: Design, given: Given, batch, memory, devices, patience, progress) -> Swept:

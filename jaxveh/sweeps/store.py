@@ -23,6 +23,9 @@ from jaxveh.sweeps.plan import Chunk, Plan
 MANIFEST = "jaxveh_sweep"
 """The attribute with the sweep's identity."""
 
+ABOUT = "jaxveh_about"
+"""The attribute with what is shown beside the numbers."""
+
 STATUS, ERROR = "chunk_status", "chunk_error"
 NOT_DONE, DONE, FAILED = 0, 1, 2
 
@@ -46,6 +49,7 @@ class Store:
         if told is None:
             raise InputError(f"{self.path}: a Zarr store, but no sweep's: it lacks the attribute {MANIFEST}.")
         self.identity: dict[str, Any] = json.loads(told)
+        self.about: dict[str, Any] = json.loads(self.group.attrs[ABOUT])
         axes = self.identity["design"]
         self.labels = {axis["name"]: tuple(axis["labels"]) for axis in axes}
         self.columns = {axis["name"]: axis.get("columns") for axis in axes}
@@ -71,6 +75,14 @@ class Store:
     def names(self) -> tuple[str, ...]:
         """The values' names."""
         return tuple(self.identity["values"])
+
+    def check_units(self, units: Mapping[str, str]) -> None:
+        """Raise for other units than the store was begun with: they would go unseen."""
+        if units != self.about["units"]:
+            raise InputError(
+                f"{self.path}: it was begun with units = {self.about['units']}, here they are {units}. Take another store, or "
+                "what it was begun with."
+            )
 
     def read(self, name: str) -> np.ndarray:
         """All of one value: (axes..., seeds, ...)."""
@@ -114,8 +126,16 @@ class Store:
         return (*along, slice(start, start + size))
 
 
-def create(path: Path, identity: Mapping[str, Any], design: Design, plan: Plan, values: Mapping[str, Any]) -> Store:
-    """Make a store for values of these shapes and dtypes (of one run) by name; it is complete, or not there."""
+def create(
+    path: Path,
+    identity: Mapping[str, Any],
+    design: Design,
+    plan: Plan,
+    values: Mapping[str, Any],
+    about: Mapping[str, Any],
+) -> Store:
+    """Make a store for values of these shapes and dtypes (of one run) by name; it is complete, or not there. `about`: `units` by
+    name and a `note`."""
     zarr = kit.require("zarr", "storing a sweep", "sweep")
     if path.exists():
         raise InputError(f"{path}: exists and is no sweep's store; take another name.")
@@ -152,6 +172,11 @@ def create(path: Path, identity: Mapping[str, Any], design: Design, plan: Plan, 
         ERROR, shape=(plan.chunks, LONGEST_ERROR), chunks=(1, LONGEST_ERROR), dtype="uint8", fill_value=0,
         dimension_names=("chunk", "letter"),
     )  # fmt: skip
+    for name, unit in about["units"].items():
+        if name not in group:
+            raise InputError(f"units: {name} is neither a value nor an axis; there are: {', '.join(sorted(group))}.")
+        group[name].attrs["units"] = unit
+    group.attrs[ABOUT] = json.dumps(about)
     # As text: what is compared later must come back as it was.
     group.attrs[MANIFEST] = json.dumps({**identity, "values": list(values)})
     with warnings.catch_warnings():

@@ -57,6 +57,8 @@ def sweep_into(
     part: tuple[int, int] | None,
     patience: float | None,
     progress: Progress,
+    units: Mapping[str, str],
+    note: str,
 ) -> Swept:
     """`sweep` with a store; arguments as there."""
     check_whole("batch", BATCH if batch is None else batch)
@@ -66,7 +68,7 @@ def sweep_into(
     with only_one(path, part) as is_mine:
         job = Job(run, design, str(path.resolve()))
         with _beginning(path):
-            lowered, store = _begin(path, run, design, given, batch)
+            lowered, store = _begin(path, run, design, given, batch, {"units": dict(units), "note": note})
         status = store.status()
         mine = [int(i) for i in np.flatnonzero(status != DONE) if is_mine(int(i))]
         total = sum(is_mine(i) for i in range(store.plan.chunks))
@@ -107,7 +109,9 @@ def _alone(computing: Computing, numbers: list[int], arguments, patience: float 
         told(number)
 
 
-def _begin(path: Path, run, design: Design, given: Given, batch: int | None) -> tuple[dict[int, Any], Store]:
+def _begin(
+    path: Path, run, design: Design, given: Given, batch: int | None, about: dict[str, Any]
+) -> tuple[dict[int, Any], Store]:
     """The store, begun or found with the same identity; and the programs, lowered, by the combination's number."""
     if path.exists():
         store = Store(path)
@@ -130,10 +134,11 @@ def _begin(path: Path, run, design: Design, given: Given, batch: int | None) -> 
     asked = identity.identity(design, given, plan, programs)
     if store is not None:
         identity.check_same(path, store.identity, asked)
+        store.check_units(about["units"])
         return lowered, store
     shaped = {name: jax.ShapeDtypeStruct(*one) for name, one in (values or {}).items()}
     shutil.rmtree(path.with_name(f"{path.name}.part"), ignore_errors=True)
-    return lowered, create(path, asked, design, plan, shaped)
+    return lowered, create(path, asked, design, plan, shaped, about)
 
 
 def _remove_scraps(path: Path) -> None:
@@ -229,7 +234,7 @@ def read_sweep(path: str | os.PathLike) -> Swept:
             JaxvehWarning,
             stacklevel=2,
         )
-    return Swept(store.design(), store.plan.shape[-1], Values(store))
+    return Swept(store.design(), store.plan.shape[-1], Values(store), **store.about)
 
 
 def _last_line(error: str) -> str:

@@ -23,12 +23,19 @@ class Swept:
     """`values` by name, each with the design's axes, then the `seeds`, then what a run's own value has.
 
     Where runs return trees, such as an estimate's `parameters`, `found["parameters"]` is all of them, `Parameters` again, and
-    `found["parameters.front.B"]` one; so it is in `at`, `quantile` and what follows from it.
+    `found["parameters.front.B"]` one; so it is in `at`, `quantile` and what follows from it. `units` by the
+    names of values and axes, and a `note` on what it is, are those that the sweep was given.
     """
 
     design: Design
     seeds: int
     values: Mapping[str, np.ndarray]
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    note: str = ""
+
+    def unit(self, name: str) -> str:
+        """The unit of a value or an axis, `-` where none was given."""
+        return self.units.get(name, "-")
 
     def __getitem__(self, name: str) -> Any:
         """All values of this name, (axes..., seeds, ...), or `Parameters` of those that begin with it and a dot."""

@@ -19,8 +19,9 @@ from jaxveh.experiments.federated_ckf.model import noise_levels, planar, rows_of
 from jaxveh.experiments.federated_ckf.printed import as_printed as printed_filters
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, PRINTED_START, Start, Study
 from jaxveh.experiments.federated_ckf.study import drives_of, truth
-from jaxveh.experiments.report import Table, spread
+from jaxveh.experiments.report import spread
 from jaxveh.statespace import Gaussian, kit
+from jaxveh.sweeps import Table
 
 SHOWN = ("first guess", "three federated, shared sensors", "joint")
 """What stands beside the printed settings."""

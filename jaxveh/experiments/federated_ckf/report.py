@@ -27,8 +27,8 @@ from jaxveh.experiments.federated_ckf.drives import Drive
 from jaxveh.experiments.federated_ckf.observed import observability_of_drives
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
 from jaxveh.experiments.federated_ckf.study import Raced, cases, drives_by_case, drives_of, race, race_over, truth
-from jaxveh.experiments.report import Check, Table, above, at_most, interval, spread, with_terms
-from jaxveh.sweeps import Swept, compare
+from jaxveh.experiments.report import Check, above, at_most, interval, spread, with_terms
+from jaxveh.sweeps import Swept, Table, compare
 
 STEERS, SPREADS = (3.0, 4.0, 5.0, 8.0), (0.0, 0.1, 0.3)
 """Steer amplitudes (degrees) and spreads of the speed (m/s) whose drives are looked at for what they can tell."""

@@ -18,7 +18,8 @@ from jaxveh.experiments.mass_grade_aukf.drives import Drive, disturb, drive_once
 from jaxveh.experiments.mass_grade_aukf.observed import Known, bound_of_mass, known_of_mass
 from jaxveh.experiments.mass_grade_aukf.settings import CAR, COMPARED, GRADE_RMSE, TABLE_1, Study, car, truck
 from jaxveh.experiments.mass_grade_aukf.study import Raced, drives_of, race
-from jaxveh.experiments.report import Check, Table, above, at_most, spread, with_terms
+from jaxveh.experiments.report import Check, above, at_most, spread, with_terms
+from jaxveh.sweeps import Table
 
 GENTLE, LIVELY = (0.0, 0.03), 0.1
 """Pedal activities, m/s^2; the checks are of the lively one, whose mean acceleration is the paper's."""

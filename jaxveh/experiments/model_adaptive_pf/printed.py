@@ -33,9 +33,10 @@ from jaxveh.experiments.model_adaptive_pf.settings import (
     Study,
 )
 from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
-from jaxveh.experiments.report import Table, interval, spread
+from jaxveh.experiments.report import interval, spread
 from jaxveh.filters import kit
 from jaxveh.statespace import AbstractWrapper
+from jaxveh.sweeps import Table
 from jaxveh.tyres import Contact
 
 SHOWN = {"constant": CASES["constant"], "both": CASES["both"], "both, 5 degrees of steer": LIMIT["right tyre"]}

@@ -21,8 +21,8 @@ from jaxveh.experiments.model_adaptive_pf.criteria import ASKED, CRITERIA, NOTHI
 from jaxveh.experiments.model_adaptive_pf.drives import Drive
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, PROCESS, WRONG_LENGTHS, Study
 from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
-from jaxveh.experiments.report import Check, Table, at_most, interval, spread, with_terms
-from jaxveh.sweeps import Comparison, compare
+from jaxveh.experiments.report import Check, at_most, interval, spread, with_terms
+from jaxveh.sweeps import Comparison, Table, compare
 
 ERRORS = {"sideslip": "sideslip, degrees", "v_y": "v_y, m/s", "yaw_rate": "yaw rate, degrees/s"}
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from jaxveh import tyres, vehicles
 from jaxveh._core.names import record
-from jaxveh.experiments.report import Table
 from jaxveh.experiments.sideslip_review.drives import numbers_of
+from jaxveh.sweeps import Table
 from jaxveh.vehicles import LinearSingleTrack
 
 SPEED, STEER = 20.0, 0.02

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import jax
 
 from jaxveh._core.progress import Progress, part, silent
-from jaxveh.experiments.report import Check, Table, at_most, interval, leave_open, spread, with_terms
+from jaxveh.experiments.report import Check, at_most, interval, leave_open, spread, with_terms
 from jaxveh.experiments.sideslip_review.contestants import WHAT
 from jaxveh.experiments.sideslip_review.criteria import (
     CELLS,
@@ -36,7 +36,7 @@ from jaxveh.experiments.sideslip_review.verdicts import (
     number,
     verdicts,
 )
-from jaxveh.sweeps import compare
+from jaxveh.sweeps import Table, compare
 
 FIRST = next(iter(WHAT))
 """The baseline."""

@@ -14,7 +14,7 @@ from jaxveh._core.errors import check_at_least
 from jaxveh._core.parameter import pick, resolve
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.diagnostics import Observability, kit
-from jaxveh.experiments.report import Check, Table, above, at_least, at_most, with_terms
+from jaxveh.experiments.report import Check, above, at_least, at_most, with_terms
 from jaxveh.experiments.tyre_apf.criteria import AHEAD, CRITERIA, WHERE
 from jaxveh.experiments.tyre_apf.printed import Printed, closest_share, run_printed
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
@@ -31,6 +31,7 @@ from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
 from jaxveh.experiments.tyre_apf.study import FIELDS
 from jaxveh.experiments.tyre_apf.tables import tables_as_printed
 from jaxveh.simulation import simulate
+from jaxveh.sweeps import Table
 
 
 def run(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh.experiments.report import Table, interval, spread
+from jaxveh.experiments.report import interval, spread
 from jaxveh.experiments.tyre_apf.printed import Printed, PrintedOutcome
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.saturated import over_bound
 from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER, TABLE_2, TABLE_3
 from jaxveh.experiments.tyre_apf.sharpness import Sharpness, likelihood_ratio, pairs
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS
-from jaxveh.sweeps import ConfidenceInterval, Swept
+from jaxveh.sweeps import ConfidenceInterval, Swept, Table
 
 
 def tables(result: Reproduction) -> list[Table]:

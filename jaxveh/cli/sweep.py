@@ -1,0 +1,175 @@
+"""`jaxveh sweep STUDY.toml`: a study over all that it varies, into a store; `jaxveh sweep show`: its tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from jaxveh import InputError
+from jaxveh.cli import options
+from jaxveh.cli.console import progress, results, table
+from jaxveh.cli.output import check_report, make_folder, write_numbers
+
+if TYPE_CHECKING:
+    from jaxveh.sweeps import Swept
+
+SUFFIX = ".zarr"
+RUN = "run"
+
+STUDY = typer.Argument(metavar="STUDY.toml", help="What to vary (jaxveh schema study).", show_default=False)
+STORE = typer.Option(
+    "-o", metavar="STORE.zarr", help="Where the numbers go; one that is begun goes on.", show_default=False
+)
+PROCESSES = typer.Option("--processes", metavar="N", help="Processes of this machine.", min=1, show_default=False)
+SCHEDULER = typer.Option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="A Dask scheduler, tcp://host:8786, whose workers compute.",
+    show_default=False,
+)
+PART = typer.Option(
+    "--part", metavar="I/N", help="One share of the chunks, 0/8 to 7/8, for an array of jobs.", show_default=False
+)
+BATCH = typer.Option("--batch", metavar="RUNS", help="Runs of a chunk, computed at a time.", min=1, show_default=False)
+VALUES = typer.Option("--value", metavar="NAME", help="Show this value alone; repeatable.", show_default=False)
+LIST = typer.Option("--list", help="Show estimators, filters and metrics, and stop.")
+
+
+class RunUnlessNamed(TyperGroup):
+    """A group whose first word may be left out: what is no command is what `run` takes."""
+
+    def parse_args(self, ctx, args):
+        if args and args[0] not in self.commands and args[0] not in ctx.help_option_names:
+            args = [RUN, *args]
+        return super().parse_args(ctx, args)
+
+
+def run(
+    study: Annotated[Path | None, STUDY] = None,
+    store: Annotated[Path | None, STORE] = None,
+    processes: Annotated[int | None, PROCESSES] = None,
+    scheduler: Annotated[str | None, SCHEDULER] = None,
+    part: Annotated[str | None, PART] = None,
+    batch: Annotated[int | None, BATCH] = None,
+    out: options.Out = None,
+    numbers: options.Numbers = None,
+    listed: Annotated[bool, LIST] = False,
+) -> None:
+    """Simulate, estimate and measure every combination of what a study varies, each with the same seeds.
+
+    The store is Zarr, which xarray opens. What is in it is never computed again: a sweep that was killed goes on where it was
+    when it is started again, and another study in the same store is refused by name. Tables are printed at the end; --out
+    draws figures; [bold]jaxveh sweep show STORE.zarr[/] does both again.
+
+    Begin with: [bold]jaxveh schema study > study.toml; jaxveh sweep study.toml -o study.zarr --processes 2 --out figures[/]
+    """
+    if listed:
+        return _list()
+    study, store = _check(study, store)
+    check_report(out, numbers)
+    from jaxveh import studies, sweeps
+
+    told = studies.read_study(study)
+    results().print(f"{told.size} runs: {told.words()}", markup=False)
+    with progress("sweep") as report:
+        report(0, 1, "compiling")
+        found = sweeps.sweep(
+            told, told.design, told.seeds, told.key, store=store, processes=processes, client=scheduler, part=_part(part),
+            batch=batch, units=told.units(), note=f"{told.words()}\n\n{study.read_text(encoding='utf-8-sig')}", progress=report,
+        )  # fmt: skip
+    _tell(found, store, (), out, numbers, {"study": study, "store": store})
+
+
+def show(
+    store: Annotated[Path, typer.Argument(metavar="STORE.zarr", help="A sweep's store.", show_default=False)],
+    values: Annotated[list[str] | None, VALUES] = None,
+    out: options.Out = None,
+    numbers: options.Numbers = None,
+) -> None:
+    """Print the tables of a sweep's store, and draw its figures with --out: of whatever was swept, by a study or from Python.
+
+    Medians and quartiles by each axis; errors (rmse, worst, final, crps) against doing nothing, of each choice against the
+    first on the same drives, and ranked.
+
+    Example: [bold]jaxveh sweep show study.zarr --out figures --value rmse.sideslip[/]
+    """
+    check_report(out, numbers)
+    from jaxveh import sweeps
+
+    found = sweeps.read_sweep(store)
+    if found.note:
+        results().print(found.note.partition("\n\n")[0], markup=False)
+    _tell(found, store, values or (), out, numbers, {"store": store, "values": values})
+
+
+def _check(study: Path | None, store: Path | None) -> tuple[Path, Path]:
+    """Both files, or an error before any work."""
+    if study is None:
+        raise InputError("sweep: STUDY.toml is missing (jaxveh schema study prints one).")
+    if store is None:
+        raise InputError(
+            "sweep: -o STORE.zarr is missing: where the numbers go, and from where a killed sweep goes on."
+        )
+    if store.suffix.lower() != SUFFIX:
+        raise InputError(f"-o {store}: suffix {store.suffix!r}; it must end in {SUFFIX}.")
+    return study, store
+
+
+def _part(text: str | None) -> tuple[int, int] | None:
+    """I/N as numbers."""
+    if text is None:
+        return None
+    share, slash, of = text.partition("/")
+    if not (slash and share.isdecimal() and of.isdecimal() and int(share) < int(of)):
+        raise InputError(f"--part {text}: must be I/N with I from 0 to N - 1, such as 0/8.")
+    return int(share), int(of)
+
+
+def _tell(
+    found: Swept,
+    store: Path,
+    values: Iterable[str],
+    out: Path | None,
+    numbers: Path | None,
+    configuration: dict[str, Any],
+) -> None:
+    """Print the tables, draw the figures, write the numbers."""
+    from jaxveh import studies
+
+    made = studies.tables(found, values)
+    for one in made:
+        table(one.title, one.columns, one.rows, left=one.left)
+    results().print(f"{store}: {', '.join(found.values)}", markup=False)
+    drawn = []
+    if out is not None:
+        from jaxveh import plots
+
+        make_folder(out)
+        for stem, figure in studies.figures.figures(found, values):
+            drawn.append(plots.save(figure, out / f"{stem}.png"))
+            results().print(f"figure: {drawn[-1]}", markup=False)
+    shown = {
+        "note": found.note,
+        "units": dict(found.units),
+        "tables": [one._asdict() for one in made],
+        "figures": drawn,
+    }
+    write_numbers(numbers, shown, configuration, None)
+
+
+def _list() -> None:
+    """What a study can name beside what `jaxveh simulate --list` shows."""
+    from jaxveh import studies
+    from jaxveh.cli.vehicle import first_line
+
+    rows = [(name, one.help, " ".join(one.options)) for name, one in studies.ESTIMATORS.items()]
+    table("Estimators ([estimator] name)", ("name", "what", "further keys"), rows, left=3)
+    rows = [(name, first_line(kind), " ".join(studies.filter_options(name))) for name, kind in studies.FILTERS.items()]
+    table("Filters ([filter] name)", ("name", "what", "further keys"), rows, left=3)
+    rows = [(f"{name}.QUANTITY" if one.of_quantity else name, one.help) for name, one in studies.METRICS.items()]
+    table("Metrics ([metrics] names)", ("name", "what"), rows, left=2)
+    results().print("Vehicles, fidelities, manoeuvres with their options, roads and devices: jaxveh simulate --list")

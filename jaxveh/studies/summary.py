@@ -1,0 +1,98 @@
+"""What is told of a sweep: which values and points, in which unit, and who came first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxveh.io import kit
+from jaxveh.sweeps import Swept
+from jaxveh.sweeps.design import Axis
+
+ERRORS = ("rmse", "worst", "crps", "final", "error")
+"""Values that begin so are errors, the smaller the better: they are compared in pairs and ranked."""
+
+SHOWN = {"rad": ("°", 180 / math.pi), "rad/s": ("°/s", 180 / math.pi)}
+"""Units that a reader thinks otherwise in, and by what to multiply."""
+
+
+class Shown(NamedTuple):
+    """How a value or an axis is shown: its `label` with the unit, and by what to multiply its numbers."""
+
+    label: str
+    factor: float
+
+
+def shown(found: Swept, name: str) -> Shown:
+    """How a value or an axis is shown."""
+    unit, factor = SHOWN.get(found.unit(name), (found.unit(name), 1.0))
+    return Shown(name if unit == "-" else f"{name} [{unit}]", factor)
+
+
+def plain_values(found: Swept, names: Iterable[str] = ()) -> list[str]:
+    """The values that are one number a run; of these `names` alone where some are given.
+
+    **Raises** `InputError` for a name that is not there.
+    """
+    dims = len(found.design.axes) + 1
+    there = [name for name in found.values if np.ndim(found.values[name]) == dims]
+    for name in names:
+        kit.check_known("--values", "value", name, there)
+    return list(names) or there
+
+
+def errors_of(found: Swept, names: Iterable[str]) -> list[str]:
+    """Those that are errors."""
+    return [name for name in names if name.split(".")[0] in ERRORS]
+
+
+def baseline_of(found: Swept, name: str) -> str | None:
+    """The name of the error of doing nothing beside an rmse; None where there is none."""
+    kind, _, quantity = name.partition(".")
+    nothing = f"baseline.{quantity}"
+    return nothing if kind == "rmse" and nothing in found.values else None
+
+
+def at_front(found: Swept, name: str, axes: Iterable[Axis]) -> np.ndarray:
+    """A value's numbers (shown unit) with these axes in front, everything else in one axis behind: (axes..., runs)."""
+    order = [found.design.axes.index(axis) for axis in axes]
+    values = np.asarray(found[name], float) * shown(found, name).factor
+    front = np.moveaxis(values, order, range(len(order)))
+    return front.reshape(*front.shape[: len(order)], -1)
+
+
+def quartiles(values: np.ndarray) -> np.ndarray:
+    """(3, ...): lower quartile, median and upper quartile along the last axis; what is not finite counts as the largest."""
+    values = np.where(np.isfinite(values), values, np.inf)
+    return np.quantile(values, [0.25, 0.5, 0.75], axis=-1, method="nearest")
+
+
+class Ranks(NamedTuple):
+    """Of each label of an axis, over all pairs of runs: the `mean` rank (1 is best), and the `shares` (labels, places) of coming
+    first, second, ...; equal ones share their places."""
+
+    labels: tuple[str, ...]
+    mean: np.ndarray
+    shares: np.ndarray
+
+
+def ranks(found: Swept, name: str, axis: Axis) -> Ranks:
+    """How the labels of an axis rank by an error on the same runs; a run that is not finite comes last."""
+    values = at_front(found, name, [axis])
+    values = np.where(np.isfinite(values), values, np.inf)
+    count = len(values)
+    below = np.stack([(values < one).sum(axis=0) for one in values])
+    same = np.stack([(values == one).sum(axis=0) for one in values])
+    mean = (below + 0.5 * (same + 1)).mean(axis=-1)
+    place = np.arange(count)[:, None, None]
+    inside = (place >= below) & (place < below + same)
+    shares = np.moveaxis((inside / same).mean(axis=-1), 0, 1)
+    return Ranks(tuple(map(str, axis.labels)), mean, shares)
+
+
+def label(value: Any) -> str:
+    """A label of an axis in words."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
