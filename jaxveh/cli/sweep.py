@@ -70,6 +70,13 @@ def run(
     if listed:
         return _list()
     study, store = _check(study, store)
+    share = _part(part)
+    if processes is not None and scheduler is not None:
+        raise InputError("--processes and --scheduler: one computes, not both; leave one away.")
+    if share is not None and (out, numbers) != (None, None):
+        raise InputError(
+            "--part: a share has no tables of its own; use --out and --json with jaxveh sweep show at the end."
+        )
     check_report(out, numbers)
     from jaxveh import studies, sweeps
 
@@ -78,9 +85,14 @@ def run(
     with progress("sweep") as report:
         report(0, 1, "compiling")
         found = sweeps.sweep(
-            told, told.design, told.seeds, told.key, store=store, processes=processes, client=scheduler, part=_part(part),
+            told, told.design, told.seeds, told.key, store=store, processes=processes, client=scheduler, part=share,
             batch=batch, units=told.units(), note=f"{told.words()}\n\n{study.read_text(encoding='utf-8-sig')}", progress=report,
         )  # fmt: skip
+    if share is not None:
+        results().print(
+            f"{store}: the share {part} is done; jaxveh sweep show tells all when every share is", markup=False
+        )
+        return
     _tell(found, store, (), out, numbers, {"study": study, "store": store})
 
 

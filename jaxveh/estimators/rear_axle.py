@@ -270,8 +270,8 @@ INPUTS = (
 
 def rear_axle_model(system: RearAxle) -> StateSpace:
     """The state space of a real log, with levels of noise that a fit starts from (stated in the code, unit by unit)."""
-    quick = float(system.wheelbase / USUAL_WHEELBASE) ** -0.5
-    unit = lambda time: (2.0 / float(time)) ** 0.5
+    quick = (system.wheelbase / USUAL_WHEELBASE) ** -0.5
+    unit = lambda time: (2.0 / time) ** 0.5
     noise = {
         "v_y": 0.02, "bank": unit(system.bank_time), "slip_error": unit(system.slip_time), "stiffening": 0.01 * quick**0.5,
     }  # fmt: skip

@@ -50,8 +50,10 @@ def chosen_parameters(model: Any):
     return (*axle, *body, *sensors, *levels)
 
 
-def rear_axle(car: CarSpecification) -> RearAxle:
-    """The rear axle of a car's file; what it leaves out goes with the car's size."""
+def car_of(car: CarSpecification | RearAxle) -> RearAxle:
+    """The rear axle of a car's file taken at its word; what it leaves out goes with the car's size."""
+    if isinstance(car, RearAxle):
+        return car
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     load = car.mass * GRAVITY * a / (a + b)
     size = (a + b) / USUAL_WHEELBASE

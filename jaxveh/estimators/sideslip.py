@@ -9,12 +9,13 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, JaxvehWarning, check_one_of
+from jaxveh._core.errors import InputError, JaxvehWarning, check_one_of, is_concrete
 from jaxveh._core.parameter import pick, prior_spread
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
@@ -29,7 +30,7 @@ from jaxveh.estimators.live import Live
 from jaxveh.estimators.parameter_bands import Members, estimate_with_members, members_of_fit, members_of_prior
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
-from jaxveh.estimators.rear_axle_prior import SPREADS, chosen_parameters, rear_axle
+from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters
 from jaxveh.estimators.standing import offsets_at_standstill
 from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
 from jaxveh.io import AxleTyre, CarSpecification, with_road_steer
@@ -58,11 +59,6 @@ LITTLE = 0.8
 
 CURVE = 1.35
 """The Magic Formula's C in a fitted car's file."""
-
-
-def car_of(car: CarSpecification | RearAxle) -> RearAxle:
-    """The rear axle of a car's file taken at its word."""
-    return car if isinstance(car, RearAxle) else rear_axle(car)
 
 
 def model(car: CarSpecification | RearAxle, *, a_y_delay: float | None = None) -> StateSpace:
@@ -158,8 +154,10 @@ def _measured(recording: Recording, name: str) -> bool:
     return name in recording and bool(np.isfinite(np.asarray(recording[name])).any())
 
 
-def _wheelbase(model: StateSpace) -> float:
-    return float(model.system.wheelbase)
+def _wheelbase(model: StateSpace) -> Any:
+    """m; a number, unless it is traced."""
+    wheelbase = model.system.wheelbase
+    return float(wheelbase) if is_concrete(wheelbase) else wheelbase
 
 
 def _part(progress: Progress, index: int, count: int) -> Progress:

@@ -19,10 +19,11 @@ RANGE = ("from", "to", "count", "scale")
 METHODS = {"latin-hypercube": latin_hypercube, "sobol": sobol}
 SCALES = ("linear", "log")
 
-TRACED = ("car.", "told.", "sensors.", "process_noise.", "measurement_noise.")
-"""Tables whose numbers vary within one program; of everything else each value is a program of its own."""
+TRACED = ("car.", "told.", "sensors.", "process_noise.", "measurement_noise.", "drive.speed", "drive.steer_deg")
+"""What varies within one program; of everything else each value is a program of its own."""
 
-STILL = ("sensors.devices",)
+STILL = "sensors.devices"
+"""What does not, though it begins so."""
 
 
 class Varied(NamedTuple):
@@ -34,19 +35,24 @@ class Varied(NamedTuple):
 
 
 def field_of(path: str) -> str:
-    """The name of a path in results: `told.front.B` is `told_front_B`."""
+    """The name of a path in results: dots become underscores."""
     return path.replace(".", "_").replace("-", "_")
 
 
-def axes_of(vary: Mapping[str, Any], is_traced: Any) -> tuple[Varied, ...]:
-    """The axes of a study's table `vary`; `is_traced(path)` says of what numbers vary within one program.
+def is_traced(path: str) -> bool:
+    """Whether what stands at a path varies within one program."""
+    return path.startswith(TRACED) and path != STILL
+
+
+def axes_of(vary: Mapping[str, Any]) -> tuple[Varied, ...]:
+    """The axes of a study's table `vary`.
 
     **Raises** `InputError` for what is neither a list, a range, a table of labels nor samples.
     """
     found = []
     for path, told in _paths(vary):
         if path == SAMPLES:
-            found.append(Varied(SAMPLES, None, _samples(told, is_traced)))
+            found.append(Varied(SAMPLES, None, _samples(told)))
         else:
             found.append(Varied(field_of(path), path, _values(path, told, is_traced(path))))
     names = [one.name for one in found]
@@ -120,7 +126,7 @@ def _range(where: str, told: Mapping[str, Any]) -> list[float]:
     return [float(one) for one in (np.geomspace if scale == "log" else np.linspace)(low, high, count)]
 
 
-def _samples(told: Any, is_traced: Any) -> Samples:
+def _samples(told: Any) -> Samples:
     where = f"vary.{SAMPLES}"
     if not isinstance(told, Mapping):
         raise InputError(f"{where} = {told!r}: must be a table with method, count and ranges.")

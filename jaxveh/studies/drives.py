@@ -39,7 +39,8 @@ def specification_of(vehicle: str | CarSpecification) -> CarSpecification:
     if isinstance(vehicle, CarSpecification):
         return vehicle
     kit.check_known("vehicle", "car", vehicle, vehicles.kit.CARS)
-    return vehicles.specification_of(vehicles.kit.CARS[vehicle]())
+    with jax.ensure_compile_time_eval():
+        return vehicles.specification_of(vehicles.kit.CARS[vehicle]())
 
 
 def drive_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None = None) -> Drive:
@@ -50,13 +51,14 @@ def drive_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None
     """
     drive = settings["drive"]
     check_drive(drive)
-    nominal = car_of(drive["vehicle"], drive["fidelity"])
+    with jax.ensure_compile_time_eval():
+        nominal = car_of(drive["vehicle"], drive["fidelity"])
+        of_car = manoeuvres.options_of_car(drive["manoeuvre"], nominal)
     driver_key, road_key = jax.random.split(key)
-    options = {name: value for name, value in drive.items() if name not in OF_DRIVE}
+    options = {**of_car, **{name: value for name, value in drive.items() if name not in OF_DRIVE}}
     if (length := drive.get("duration", duration)) is not None:
         options["duration"] = length
     speed, steer_deg = speed_and_steer(drive)
-    options = {**manoeuvres.options_of_car(drive["manoeuvre"], nominal), **options}
     driver = manoeuvres.named_manoeuvre(drive["manoeuvre"], speed, steer_deg * (math.pi / 180), driver_key, **options)
     check_positive("drive.rate", drive["rate"], "Hz")
     return Drive(

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 from jaxveh import estimators, sensors
 from jaxveh._core.errors import InputError
+from jaxveh._core.parameter import every_parameter
+from jaxveh._core.recording import Recording
 from jaxveh.io import kit
 from jaxveh.statespace import Gaussian, StateSpace
 from jaxveh.studies.drives import Drive, car_of, specification_of
@@ -17,10 +19,12 @@ from jaxveh.studies.settings import speed_and_steer
 
 
 class NamedEstimator(NamedTuple):
-    """How to make the estimator's own car out of the study's tables, and a state space of that car; which keys it has."""
+    """How to make the estimator's own car out of the study's tables, and a state space of that car; what a recording goes through
+    before its filter; which keys it has."""
 
     car: Callable[[Mapping[str, Any]], Any]
     model: Callable[[Any, Mapping[str, Any], Drive], StateSpace]
+    clean: Callable[[StateSpace, Recording], Recording]
     options: tuple[str, ...]
     help: str
 
@@ -56,7 +60,7 @@ def _track_model(car: Any, settings: Mapping[str, Any], drive: Drive) -> StateSp
     if "report" in options:
         options["report"] = tuple(options["report"])
     if "estimate" in options:
-        options["estimate"] = where_of(options["estimate"])
+        options["estimate"] = where_of(options["estimate"], car)
     if "v_x" in car.state_type._fields and "v_x" not in car.inputs:
         options["start"] = {"v_x": speed_and_steer(settings["drive"])[0], **options.get("start", {})}
     return estimators.state_space(
@@ -81,9 +85,11 @@ def _as_told(settings: Mapping[str, Any], car: Any, devices: Any) -> sensors.Sen
     return sensors.SensorSet(Gaussian(noise), devices.position, devices.low_pass)
 
 
-def where_of(names: Any) -> Callable[[Any], list]:
-    """What picks the parameters of these dotted names."""
+def where_of(names: Any, car: Any) -> Callable[[Any], list]:
+    """What picks the parameters of these dotted names of a car."""
     names = [names] if isinstance(names, str) else list(names)
+    for name in names:
+        kit.check_known("estimator.estimate", f"number of {type(car).__name__}", name, every_parameter(car))
     return lambda car: [operator.attrgetter(name)(car) for name in names]
 
 
@@ -102,7 +108,8 @@ def _ready_made(module: Any) -> NamedEstimator:
         return module.model(car, **{name: value for name, value in settings["estimator"].items() if name != "name"})
 
     of_file = lambda settings: module.car_of(specification_of(settings["drive"]["vehicle"]))
-    return NamedEstimator(of_file, model, tuple(options), (module.__doc__ or "").partition("\n")[0])
+    clean = lambda model, recording: estimators.kit.clean_recording(module.live(model).cleaning, recording)
+    return NamedEstimator(of_file, model, clean, tuple(options), (module.__doc__ or "").partition("\n")[0])
 
 
 OF_STATE_SPACE = (
@@ -120,7 +127,11 @@ OF_STATE_SPACE = (
 
 ESTIMATORS: dict[str, NamedEstimator] = {
     "state-space": NamedEstimator(
-        _track_car, _track_model, OF_STATE_SPACE, "a vehicle of the package with its sensors (estimators.state_space)"
+        _track_car,
+        _track_model,
+        lambda model, recording: recording,
+        OF_STATE_SPACE,
+        "a vehicle of the package with its sensors (estimators.state_space)",
     ),
     **{
         name.replace("_", "-"): _ready_made(getattr(estimators, name))

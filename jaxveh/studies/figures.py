@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from jaxveh import plots
-from jaxveh.studies.summary import at_front, baseline_of, errors_of, label, plain_values, quartiles, ranks, shown
-from jaxveh.sweeps import Swept
-from jaxveh.sweeps.design import Axis
+from jaxveh.studies.summary import at_front, baseline_of, display_of, errors_of, label, plain_values, quartiles, ranks
+from jaxveh.sweeps import Axis, Swept
 
 MOST_PANELS = 6
 MOST_LINES = 6
@@ -52,7 +51,7 @@ def _of_value(found: Swept, name: str) -> Iterator[tuple[str, Any]]:
 
 def lines(found: Swept, name: str, axis: Axis, by: Axis | None = None) -> Any:
     """A value over an axis of numbers: median and quartiles over everything else, a line for each label of `by`."""
-    x = np.asarray(axis.labels, float) * shown(found, axis.name).factor
+    x = np.asarray(axis.labels, float) * display_of(found, axis.name).factor
     figure = plots.kit.Figure(figsize=(plots.kit.PAGE_WIDTH, 3.0), layout="constrained")
     with plots.style():
         ax = figure.subplots()
@@ -66,7 +65,7 @@ def lines(found: Swept, name: str, axis: Axis, by: Axis | None = None) -> Any:
                 linestyle="--",
                 label="doing nothing",
             )
-        ax.set(xlabel=shown(found, axis.name).label, ylabel=shown(found, name).label)
+        ax.set(xlabel=display_of(found, axis.name).label, ylabel=display_of(found, name).label)
         if _is_wide(x):
             ax.set_xscale("log")
         _scale(ax, at_front(found, name, []), "y")
@@ -90,15 +89,15 @@ def heat_map(found: Swept, name: str, x: Axis, y: Axis, by: Axis | None = None) 
             ax.set_title(who, fontweight="normal")
             ax.grid(visible=False)
             for way, axis in (("x", x), ("y", y)):
-                ticks = [f"{value * shown(found, axis.name).factor:.4g}" for value in axis.labels]
+                ticks = [f"{value * display_of(found, axis.name).factor:.4g}" for value in axis.labels]
                 ax.set(**{f"{way}ticks": np.arange(len(ticks)) + 0.5, f"{way}ticklabels": ticks})
         for ax in axes.flat[len(panels) :]:
             ax.set_visible(False)
         for ax in axes[-1]:
-            ax.set_xlabel(shown(found, x.name).label)
+            ax.set_xlabel(display_of(found, x.name).label)
         for ax in axes[:, 0]:
-            ax.set_ylabel(shown(found, y.name).label)
-        figure.colorbar(mesh, ax=axes, label=f"median {shown(found, name).label}")
+            ax.set_ylabel(display_of(found, y.name).label)
+        figure.colorbar(mesh, ax=axes, label=f"median {display_of(found, name).label}")
     return figure
 
 
@@ -113,7 +112,8 @@ def violins(found: Swept, name: str, axis: Axis) -> Any:
         ax = figure.subplots()
         for i, one in enumerate(drawn):
             if one.size > 1 and np.ptp(one) > 0:
-                for body in ax.violinplot(one, [i], widths=0.8, showextrema=False)["bodies"]:
+                bodies: Any = ax.violinplot(one, [i], widths=0.8, showextrema=False)["bodies"]
+                for body in bodies:
                     body.set(facecolor=plots.kit.CYCLE[i % len(plots.kit.CYCLE)], alpha=0.35)
             if one.size:
                 low, median, high = np.quantile(one, [0.25, 0.5, 0.75])
@@ -122,7 +122,10 @@ def violins(found: Swept, name: str, axis: Axis) -> Any:
         lost = [values.shape[1] - one.size for one in whole]
         ticks = [f"{label(w)}\n{n} not finite" if n else label(w) for w, n in zip(axis.labels, lost, strict=True)]
         ax.set(
-            xticks=range(len(ticks)), xticklabels=ticks, ylabel=shown(found, name).label, xlim=(-0.6, len(ticks) - 0.4)
+            xticks=range(len(ticks)),
+            xticklabels=ticks,
+            ylabel=display_of(found, name).label,
+            xlim=(-0.6, len(ticks) - 0.4),
         )
         if log:
             ax.yaxis.set_major_formatter(lambda power, _: f"{10.0**power:.3g}")
@@ -157,7 +160,7 @@ def over_samples(found: Swept, name: str, axis: Axis, by: Axis | None = None) ->
     with plots.style():
         axes = figure.subplots(-(-len(columns) // 2), min(2, len(columns)), squeeze=False, sharey=True)
         for ax, (part, numbers) in zip(axes.flat, columns.items(), strict=False):
-            said = shown(found, f"{axis.name}.{part}")
+            said = display_of(found, f"{axis.name}.{part}")
             groups = np.array_split(np.argsort(numbers), min(BINS, len(numbers)))
             middle = np.array([np.median(numbers[group]) for group in groups]) * said.factor
             for i, (who, values) in enumerate(_series(found, name, by, axis)):
@@ -177,7 +180,7 @@ def over_samples(found: Swept, name: str, axis: Axis, by: Axis | None = None) ->
         for ax in axes.flat[len(columns) :]:
             ax.set_visible(False)
         _scale(axes[0, 0], at_front(found, name, []), "y")
-        axes[0, 0].set_ylabel(shown(found, name).label)
+        axes[0, 0].set_ylabel(display_of(found, name).label)
         _told(axes[0, 0], "median and quartiles", by)
     return figure
 

@@ -45,7 +45,7 @@ class Metric(NamedTuple):
 
 
 def _mean(values, counts):
-    return jnp.sum(jnp.where(counts, values, 0.0)) / jnp.sum(counts)
+    return jnp.sum(jnp.where(counts, values, 0.0)) / jnp.sum(counts, dtype=values.dtype)
 
 
 def _rms(error, counts):

@@ -11,9 +11,10 @@ import jax.numpy as jnp
 
 from jaxveh import estimators, filters, vehicles
 from jaxveh._core.parameter import every_parameter, pick
+from jaxveh._core.recording import TRUTH
 from jaxveh.io import kit
 from jaxveh.studies.drives import Drive, car_of, drive_of, simulate
-from jaxveh.studies.estimating import model_of, told_car
+from jaxveh.studies.estimating import estimator_of, model_of, told_car
 from jaxveh.studies.metrics import METRICS, AskedMetric, Errors, Run, asked_metrics, truth_of
 from jaxveh.studies.named_filters import filter_of
 from jaxveh.studies.numbers import with_numbers
@@ -34,28 +35,32 @@ def run_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None =
     model = model_of(settings, drive)
     asked = asked_metrics(settings["metrics"]["names"])
     keep = ("mean", "std", *(("info.nis",) if AskedMetric("nis", "") in asked else ()))
-    found = filters.run(filter_of(settings["filter"]), model, recording, key=filter_key, keep=keep, throw=False)
+    log = estimator_of(settings).clean(model, recording)
+    found = filters.run(filter_of(settings["filter"]), model, log, key=filter_key, keep=keep, throw=False)
     counts = jnp.asarray(recording.time) >= settings["metrics"]["after"]
-    finite = jnp.stack([jnp.isfinite(leaf).all() for leaf in jax.tree.leaves((found.mean, found.std))]).all()
+    truth = [recording[f"{TRUTH}{name}"] for name in drive.car.state_type._fields if f"{TRUTH}{name}" in recording]
+    finite = jnp.stack([jnp.isfinite(leaf).all() for leaf in jax.tree.leaves((truth, found.mean, found.std))]).all()
     failed = jnp.where((found.result == 0) & finite, 0.0, 1.0)
-    errors = functools.cache(lambda quantity: _errors(quantity, settings, drive, model, recording, found, counts))
+    errors = functools.cache(lambda quantity: _errors(quantity, settings, drive, model, recording, log, found, counts))
     seen = lambda one: errors(one.quantity) if one.quantity else Run(found, counts, failed)
     return {one.name: METRICS[one.metric].compute(seen(one)) for one in asked}
 
 
-def _errors(quantity: str, settings, drive: Drive, model: Any, recording: Any, found: Any, counts: Any) -> Errors:
-    """The errors of a quantity, and those of doing nothing."""
+def _errors(
+    quantity: str, settings, drive: Drive, model: Any, recording: Any, log: Any, found: Any, counts: Any
+) -> Errors:
+    """The errors of a quantity, and those of doing nothing; `log`: the recording as the filter read it."""
     known = every_parameter(drive.car)
     numbers = dict(zip(known, pick(drive.car, tuple(known.values())), strict=True))
     truth = truth_of(recording, drive.car, quantity, numbers)
     field = quantity.replace(".", "_")
     kit.check_known("metrics.names", "estimated quantity", field, found.mean._fields)
     estimate, std = getattr(found.mean, field), getattr(found.std, field)
-    nothing = _nothing(quantity, settings, model, recording)
+    nothing = _nothing(quantity, settings, model, recording, log)
     return Errors(estimate - truth, std, counts, jnp.broadcast_to(nothing, estimate.shape) - truth)
 
 
-def _nothing(quantity: str, settings, model: Any, recording: Any) -> Any:
+def _nothing(quantity: str, settings, model: Any, recording: Any, log: Any) -> Any:
     """What one knows of a quantity without any sensor but the steering and the speed: (T,), or one number."""
     if quantity in OPEN_LOOP and "steer" in recording:
         told = told_car(settings)
@@ -63,7 +68,7 @@ def _nothing(quantity: str, settings, model: Any, recording: Any) -> Any:
         speed = speed_and_steer(settings["drive"])[0]
         v_x = recording["v_x"] if "v_x" in recording else jnp.full((len(recording),), speed)
         return estimators.open_loop_of(car, recording.time, recording["steer"], v_x)[quantity]
-    first = jax.tree.map(lambda leaf: leaf[0], model.rows(recording))
+    first = jax.tree.map(lambda leaf: leaf[0], model.rows(log))
     return getattr(model.report(first.t, model.prior.mean, first.u), quantity.replace(".", "_"))
 
 

@@ -10,9 +10,8 @@ from typing import Any
 from jaxveh import vehicles
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh.io import kit, read_car
-from jaxveh.manoeuvres import MANOEUVRES
-from jaxveh.studies.axes import STILL, TRACED, axes_of, sampled_paths
-from jaxveh.studies.settings import DEFAULTS, WHOLE, number_options, with_defaults
+from jaxveh.studies.axes import axes_of, sampled_paths
+from jaxveh.studies.settings import DEFAULTS, WHOLE, with_defaults
 from jaxveh.studies.study import Study
 
 SEEDS = 20
@@ -61,7 +60,9 @@ name = "extended"               # every filter of jaxveh.filters; options are ke
 names = ["rmse.sideslip", "coverage_95.sideslip", "nis"]
 after = 0.5                     # s: rows before it do not count
 
-[vary]                          # every combination of these; numbers of car, told, sensors and noises are one program
+[vary]                          # every combination of these
+# Speed, steer_deg, and the numbers of car, told, sensors and noises vary within one compiled program; of all else (names,
+# the manoeuvre's options, a filter's) each value is a program of its own.
 "sensors.yaw_rate" = [0.002, 0.02]
 "drive.speed" = {from = 15.0, to = 25.0, count = 3}   # scale = "log" for equal ratios
 
@@ -102,8 +103,7 @@ def study_of(told: Mapping[str, Any], folder: Path = Path()) -> Study:
     kit.check_keys("vary", vary, vary)
     settings["drive"]["vehicle"] = _car(settings["drive"]["vehicle"], folder)
     kit.check_keys("metrics", settings["metrics"], DEFAULTS["metrics"])
-    manoeuvres = _manoeuvres(settings, vary)
-    axes = axes_of(vary, lambda path: is_traced(path, manoeuvres))
+    axes = axes_of(vary)
     axes = tuple(
         axis._replace(values={label: _car(value, folder) for label, value in axis.values.items()})
         if axis.path == "drive.vehicle"
@@ -111,24 +111,6 @@ def study_of(told: Mapping[str, Any], folder: Path = Path()) -> Study:
         for axis in axes
     )
     return Study(settings, axes, sampled_paths(vary), seeds, seed)
-
-
-def is_traced(path: str, manoeuvres: list[str]) -> bool:
-    """Whether what stands at a path varies within one program."""
-    table, _, name = path.partition(".")
-    if table == "drive":
-        return name in ("speed", "steer_deg") or any(name in number_options(one) for one in manoeuvres)
-    return path.startswith(TRACED) and path not in STILL
-
-
-def _manoeuvres(settings: Mapping[str, Any], vary: Mapping[str, Any]) -> list[str]:
-    """The manoeuvres that the study drives."""
-    nested = vary.get("drive", {})
-    listed = vary.get("drive.manoeuvre", nested.get("manoeuvre") if isinstance(nested, Mapping) else None)
-    found = listed if isinstance(listed, list) else [settings["drive"]["manoeuvre"]]
-    for one in found:
-        kit.check_known("drive", "manoeuvre", one, MANOEUVRES)
-    return found
 
 
 def _car(name: Any, folder: Path) -> Any:

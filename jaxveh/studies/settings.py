@@ -58,12 +58,6 @@ def put_at(settings: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]
     return found
 
 
-def number_options(manoeuvre: str) -> list[str]:
-    """The options of a manoeuvre that may vary within one program: its numbers, but not how long it takes."""
-    options = manoeuvre_options(manoeuvre)
-    return [name for name, value in options.items() if isinstance(value, float) and name != "duration"]
-
-
 def check_drive(drive: Mapping[str, Any]) -> None:
     """Raise `InputError` for a key of `drive` that is neither its own nor an option of its manoeuvre."""
     kit.check_known("drive", "manoeuvre", drive["manoeuvre"], MANOEUVRES)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import jax
+import numpy as np
 
 from jaxveh.studies.axes import SAMPLES, Varied, design_of
 from jaxveh.studies.drives import Drive, drive_of
@@ -17,14 +18,13 @@ from jaxveh.studies.named_filters import filter_of
 from jaxveh.studies.numbers import flat, unit_of
 from jaxveh.studies.one_run import run_of
 from jaxveh.studies.settings import put_at
-from jaxveh.sweeps import Design
-from jaxveh.sweeps.design import Axis
+from jaxveh.sweeps import Axis, Design
 
 UNITS = {"drive.speed": "m/s", "drive.steer_deg": "°", "drive.duration": "s", "drive.rate": "Hz"}
 """Of what is no number of an object."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Study:
     """`settings`: nested tables as in a study's file, cars' files read; `axes`: what varies; `sampled`: the paths of the samples'
     numbers by their names; `seeds` runs at every point, drawn from `seed`. Called, it is the `run` of a sweep."""
@@ -120,7 +120,7 @@ class Study:
         """Points of these choices: every number at its first value, and each that `moves` (by its path) at its least and its
         largest."""
         design, paths = self.design, {axis.name: axis.path for axis in self.axes}
-        first = {axis.name: axis.at(0) for axis in design.numbers}
+        first = {axis.name: axis.at(np.asarray(0)) for axis in design.numbers}
         yield design.point(first, objects)
         for axis in design.numbers:
             for end in (min, max):
@@ -131,7 +131,8 @@ class Study:
 
 def _end(axis: Axis, part: str | None, end: Callable[[Any], Any]) -> Any:
     """An end of an axis of numbers; of one `part` of its samples, of which the others are as in the first."""
-    return end(axis.values) if part is None else {**axis.at(0), part: end(axis.columns[part])}
+    columns = axis.columns or {}
+    return end(axis.values) if part is None else {**axis.at(np.asarray(0)), part: end(columns[part])}
 
 
 def _unit_at(path: str, settings: Mapping[str, Any], drive: Drive) -> str:

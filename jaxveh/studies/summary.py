@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxveh.io import kit
-from jaxveh.sweeps import Swept
-from jaxveh.sweeps.design import Axis
+from jaxveh.sweeps import Axis, Swept
 
 ERRORS = ("rmse", "worst", "crps", "final", "error")
 """Values that begin so are errors, the smaller the better: they are compared in pairs and ranked."""
@@ -26,7 +25,7 @@ class Shown(NamedTuple):
     factor: float
 
 
-def shown(found: Swept, name: str) -> Shown:
+def display_of(found: Swept, name: str) -> Shown:
     """How a value or an axis is shown."""
     unit, factor = SHOWN.get(found.unit(name), (found.unit(name), 1.0))
     return Shown(name if unit == "-" else f"{name} [{unit}]", factor)
@@ -59,7 +58,7 @@ def baseline_of(found: Swept, name: str) -> str | None:
 def at_front(found: Swept, name: str, axes: Iterable[Axis]) -> np.ndarray:
     """A value's numbers (shown unit) with these axes in front, everything else in one axis behind: (axes..., runs)."""
     order = [found.design.axes.index(axis) for axis in axes]
-    values = np.asarray(found[name], float) * shown(found, name).factor
+    values = np.asarray(found[name], float) * display_of(found, name).factor
     front = np.moveaxis(values, order, range(len(order)))
     return front.reshape(*front.shape[: len(order)], -1)
 

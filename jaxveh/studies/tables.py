@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh.studies.summary import at_front, baseline_of, errors_of, label, plain_values, quartiles, ranks, shown
-from jaxveh.sweeps import Comparison, Swept, Table, compare
-from jaxveh.sweeps.design import Axis
+from jaxveh.studies.summary import at_front, baseline_of, display_of, errors_of, label, plain_values, quartiles, ranks
+from jaxveh.sweeps import Axis, Comparison, Swept, Table, compare
 
 MOST_POINTS = 40
 """Rows of the table of every point: larger designs are told by one axis at a time alone."""
@@ -34,10 +33,10 @@ def by_axis(found: Swept, names: list[str]) -> Table:
     """Medians and quartiles at each label of each axis, over everything else; samples are told in figures."""
     rows = [("all", "", *(_cell(at_front(found, name, [])) for name in names))]
     for axis in _listed(found):
-        factor = shown(found, axis.name).factor
+        factor = display_of(found, axis.name).factor
         for i, value in enumerate(axis.labels):
             cells = (_cell(at_front(found, name, [axis])[i]) for name in names)
-            rows.append((shown(found, axis.name).label if i == 0 else "", _label(value, factor), *cells))
+            rows.append((display_of(found, axis.name).label if i == 0 else "", _label(value, factor), *cells))
     return Table("Median (lower to upper quartile) over everything else", ("axis", "", *_heads(found, names)), rows, 2)
 
 
@@ -47,13 +46,15 @@ def by_point(found: Swept, names: list[str]) -> Table:
     columns = [at_front(found, name, axes) for name in names]
     rows = []
     for place in itertools.product(*(range(len(axis.labels)) for axis in axes)):
-        where = [_label(axis.labels[i], shown(found, axis.name).factor) for axis, i in zip(axes, place, strict=True)]
+        where = [
+            _label(axis.labels[i], display_of(found, axis.name).factor) for axis, i in zip(axes, place, strict=True)
+        ]
         rows.append((*where, *(_cell(column[place]) for column in columns)))
-    heads = (*(shown(found, axis.name).label for axis in axes), *_heads(found, names))
+    heads = (*(display_of(found, axis.name).label for axis in axes), *_heads(found, names))
     return Table("Median (lower to upper quartile) over seeds at every point", heads, rows, len(axes))
 
 
-def paired(a: np.ndarray, b: np.ndarray) -> Comparison:
+def compare_by_seed(a: np.ndarray, b: np.ndarray) -> Comparison:
     """Errors a against b (points..., seeds): each seed counts with its geometric mean over all points, so that intervals are
     those of seeds; `wins` are counted run by run. A run that is not finite has lost."""
     a, b = (np.where(np.isfinite(values), values, np.inf).reshape(-1, values.shape[-1]) for values in (a, b))
@@ -67,7 +68,7 @@ def _against_nothing(found: Swept, errors: list[str]) -> Table:
     for name in errors:
         nothing = baseline_of(found, name)
         if nothing is not None and found.seeds > 1:
-            rows.append((name, *_comparison(paired(np.asarray(found[name]), np.asarray(found[nothing])))))
+            rows.append((name, *_comparison(compare_by_seed(np.asarray(found[name]), np.asarray(found[nothing])))))
     return Table("Against doing nothing (baseline), on the same drives", ("error", *COMPARED), rows)
 
 
@@ -81,7 +82,7 @@ def _pairs(found: Swept, errors: list[str], axis: Axis) -> Table:
     for name in errors if found.seeds > 1 else ():
         values = np.moveaxis(np.asarray(found[name], float), place, 0)
         for i in range(1, len(axis.labels)):
-            rows.append((name, str(axis.labels[i]), *_comparison(paired(values[i], values[0]))))
+            rows.append((name, str(axis.labels[i]), *_comparison(compare_by_seed(values[i], values[0]))))
     title = f"{axis.name} against {axis.labels[0]}, on the same drives (a seed counts with its geometric mean over all points)"
     return Table(title, ("error", axis.name, *COMPARED), rows, 2)
 
@@ -106,7 +107,7 @@ def _listed(found: Swept) -> list[Axis]:
 
 
 def _heads(found: Swept, names: list[str]) -> list[str]:
-    return [shown(found, name).label for name in names]
+    return [display_of(found, name).label for name in names]
 
 
 def _label(value: Any, factor: float) -> str:

@@ -88,7 +88,8 @@ def sweep_into(
             with crew_for(client, processes, packed, lambda number: packed_arguments(arguments(number))) as crew:
                 limit = float("inf") if patience is None else patience
                 drive(crew, mine, limit, told, store.write_failure)
-    return read_sweep(path)
+    _warn_of_missing(store, is_mine, stacklevel=4)
+    return _found(store)
 
 
 def _alone(computing: Computing, numbers: list[int], arguments, patience: float | None, told) -> None:
@@ -225,16 +226,27 @@ def read_sweep(path: str | os.PathLike) -> Swept:
     failed, with the first error.
     """
     store = Store(path)
-    status = store.status()
-    missing, failed = int((status != DONE).sum()), np.flatnonzero(status == FAILED)
-    if missing:
-        why = f"; {len(failed)} of them failed: {_last_line(store.error(int(failed[0])))}" if len(failed) else ""
-        warnings.warn(
-            f"{path}: {missing} of {store.plan.chunks} chunks are not done{why}. The same sweep again goes on with them.",
-            JaxvehWarning,
-            stacklevel=2,
-        )
+    _warn_of_missing(store, lambda number: True, stacklevel=3)
+    return _found(store)
+
+
+def _found(store: Store) -> Swept:
     return Swept(store.design(), store.plan.shape[-1], Values(store), **store.about)
+
+
+def _warn_of_missing(store: Store, is_asked: Callable[[int], bool], stacklevel: int) -> None:
+    """Warn of chunks that were asked for and are not done."""
+    status = store.status()
+    missing = [int(i) for i in np.flatnonzero(status != DONE) if is_asked(int(i))]
+    if not missing:
+        return
+    failed = [i for i in missing if status[i] == FAILED]
+    why = f"; {len(failed)} of them failed: {_last_line(store.error(failed[0]))}" if failed else ""
+    warnings.warn(
+        f"{store.path}: {len(missing)} of {store.plan.chunks} chunks are not done{why}. The same sweep again goes on with them.",
+        JaxvehWarning,
+        stacklevel=stacklevel,
+    )
 
 
 def _last_line(error: str) -> str:

@@ -478,7 +478,8 @@ def test_demo(tmp_path):
 def papers(monkeypatch):
     """Two papers of which only the report is real; what they were asked. The studies have tests of their own."""
     from jaxveh.cli import reproduce
-    from jaxveh.experiments.report import Check, Table
+    from jaxveh.experiments.report import Check
+    from jaxveh.sweeps import Table
 
     asked = []
 

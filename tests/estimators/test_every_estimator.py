@@ -31,7 +31,7 @@ class Case(NamedTuple):
 
 def of_sideslip():
     file = test_sideslip.CAR
-    return Case(test_sideslip.log(2100), file, estimators.sideslip.rear_axle(file))
+    return Case(test_sideslip.log(2100), file, estimators.sideslip.car_of(file))
 
 
 def of_mass_and_grade():

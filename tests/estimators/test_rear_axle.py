@@ -105,7 +105,7 @@ def test_an_accelerometer_elsewhere_is_felt_there_and_the_centre_of_gravity_is_t
     at_centre = inputs(a_y_smooth=3.0, yaw_acceleration=spin, yaw_rate_smooth=turns)
     np.testing.assert_allclose(there.shares(at_sensor)[1], here.shares(at_centre)[1], rtol=1e-12)
     told = dataclasses.replace(test_sideslip.CAR, sensor_position=(ahead, aside, 0.2))
-    system = estimators.sideslip.rear_axle(told)
+    system = estimators.sideslip.car_of(told)
     np.testing.assert_allclose((system.sensor_x, system.sensor_y), (ahead, aside))
     state, u = at_rest()._replace(v_y=jnp.asarray(0.9)), inputs(yaw_rate=turns)
     told = rear_axle.report(there, 0.0, state, u)

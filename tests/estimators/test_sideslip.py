@@ -14,7 +14,7 @@ from jaxveh import InputError, Recording, estimators, io, sensors, vehicles
 from jaxveh._core.parameter import pick
 from jaxveh.estimators import parameter_bands
 from jaxveh.estimators.cleaning import FORCE_CUTOFF
-from jaxveh.estimators.rear_axle_prior import rear_axle
+from jaxveh.estimators.rear_axle_prior import car_of
 
 CAR = io.CarSpecification(
     mass=1420.0, yaw_inertia=2124.0, front_axle_to_cg=0.96, rear_axle_to_cg=1.59,
@@ -393,7 +393,7 @@ def test_what_a_cars_file_says_is_used_or_named(entry):
         **dict.fromkeys(("track_front", "track_rear", "wheel_radius"), 1.0),
     }.get(entry.name, 1.07 * (getattr(plain, entry.name) or 10.0))  # fmt: skip
     changed = dataclasses.replace(plain, **{entry.name: other})
-    leaves = lambda car: [float(leaf) for leaf in jax.tree.leaves(rear_axle(car))]
+    leaves = lambda car: [float(leaf) for leaf in jax.tree.leaves(car_of(car))]
     kind = "estimate" if leaves(changed) != leaves(plain) else "neither"
     if kind == "neither":
         time = np.arange(0.0, 2.0, 0.01)

@@ -294,3 +294,31 @@ def test_a_cars_rolling_resistance_counts_once(kind):
     rate = eqx.filter_jit(lambda car, x, u: car.derivatives(0.0, x, u).omega_fl)(car, x, u)
     asked = numbers.rolling_resistance * numbers.wheel_loads()[0] * numbers.wheel_radius
     np.testing.assert_allclose(-rate * numbers.wheel_inertia, asked, rtol=0.05)
+
+
+@pytest.mark.parametrize("name", WITH_MASS)
+def test_a_file_would_say_the_same_of_a_car_on_one_track(name):
+    numbers = sets.CARS[name]()
+    told = vehicles.specification_of(numbers)
+    again = vehicles.numbers_of(told)
+    for field in (
+        "mass",
+        "yaw_inertia",
+        "front_axle_to_cg",
+        "rear_axle_to_cg",
+        "cg_height",
+        "drag",
+        "wheel_radius",
+        "front_drive",
+    ):
+        assert getattr(again, field) == getattr(numbers, field), field
+    of_file, of_numbers = vehicles.specified_car(told), vehicles.named_car(name)
+    for axle in ("front", "rear"):
+        for part in "BCDE":
+            pair = getattr(getattr(of_file, axle), part), getattr(getattr(of_numbers, axle), part)
+            np.testing.assert_allclose(*pair, rtol=1e-6)
+
+
+def test_what_has_no_mass_has_no_file():
+    with pytest.raises(InputError, match="semi_trailer: mass, yaw_inertia, front, rear must be known"):
+        vehicles.specification_of(sets.CARS["semi_trailer"]())
