@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from typing import Any, Protocol
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, JaxvehWarning
 from jaxveh.sweeps.chunks import Unfit
 
 TRIES = 3
@@ -18,6 +19,8 @@ LOSSES = 50
 
 AHEAD = 2
 """Chunks that wait at each worker, so that none is idle between two."""
+
+NOBODY = "sweep: the cluster has no worker; its chunks wait until one comes. What is done stays, if you end it here."
 
 POLL = 1.0
 """Seconds after which time limits are looked at."""
@@ -51,11 +54,15 @@ def drive(
     on_done: Callable[[int], Any],
     on_failure: Callable[[int, str], Any],
 ) -> None:
-    """Have all chunks done by the crew, each within `limit` seconds of its start at most."""
+    """Have all chunks done by the crew, each within `limit` seconds of its start at most.
+
+    Where there is no worker, as on a cluster that is still to start them, it is waited for one, and a warning says so.
+    """
     waiting = list(reversed(list(numbers)))
     failed: dict[int, int] = {}
     lost: dict[int, int] = {}
     out: dict[Future, tuple[int, float]] = {}
+    is_told = False
 
     def again(number: int, count: dict[int, int], most: int, error: object) -> None:
         count[number] = count.get(number, 0) + 1
@@ -65,6 +72,7 @@ def drive(
             on_failure(number, str(error) or type(error).__name__)
 
     while waiting or out:
+        before = time.monotonic()
         while waiting and len(out) < AHEAD * max(1, crew.workers):
             number = waiting.pop()
             # A chunk that waits behind others has their time, too.
@@ -86,6 +94,12 @@ def drive(
             else:
                 again(number, failed, TRIES, error)
         now = time.monotonic()
+        if crew.workers == 0:
+            # Nobody computes: what is out keeps its time.
+            out = {future: (number, end + now - before) for future, (number, end) in out.items()}
+            if not is_told:
+                warnings.warn(NOBODY, JaxvehWarning, stacklevel=4)
+        is_told = crew.workers == 0
         for future in [f for f, (_, end) in out.items() if now > end]:
             number, _ = out.pop(future)
             crew.drop(future)

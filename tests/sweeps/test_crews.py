@@ -108,6 +108,21 @@ def test_workers_of_a_cluster_that_are_killed(times, tmp_path, whole):
 
 
 @pytest.mark.studies
+def test_a_cluster_whose_workers_come_late(tmp_path):
+    with (
+        distributed.LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        late = threading.Timer(8.0, cluster.scale, [1])
+        late.start()
+        with pytest.warns(JaxvehWarning, match="the cluster has no worker"):
+            stored_study.sweep(tmp_path / "s.zarr", client=client, patience=30.0)
+        late.join()
+    stored_study.sweep(tmp_path / "alone.zarr")
+    same_store(tmp_path / "s.zarr", tmp_path / "alone.zarr")
+
+
+@pytest.mark.studies
 def test_a_chunk_that_hangs_is_given_out_again(tmp_path):
     mark = tmp_path / "has hung"
 

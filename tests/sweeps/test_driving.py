@@ -5,7 +5,7 @@ from concurrent.futures import Future
 
 import pytest
 
-from jaxveh import InputError
+from jaxveh import InputError, JaxvehWarning
 from jaxveh.sweeps import driving
 from jaxveh.sweeps.chunks import ChunkError, Unfit
 
@@ -102,6 +102,27 @@ def test_a_chunk_that(case):
 def test_what_no_other_try_mends_ends_it(end, message):
     with pytest.raises(InputError, match=message):
         driven({2: [end]})
+
+
+def test_without_workers_it_waits_and_says_so_once():
+    class Late(Crew):
+        """Nobody is there until the 30th look."""
+
+        looks = 0
+
+        @property
+        def workers(self):
+            self.looks += 1
+            if self.looks == 30:
+                for future in [*self.hanging]:
+                    self.hanging.remove(future)
+                    future.set_result(future.number)
+            return 0 if self.looks < 30 else 2
+
+    crew, done, failed = Late({i: [HANG] for i in range(2)}), [], {}
+    with pytest.warns(JaxvehWarning, match="no worker") as told:
+        driving.drive(crew, range(4), 0.004, done.append, failed.__setitem__)
+    assert len(told) == 1 and sorted(done) == [0, 1, 2, 3] and not failed and not crew.dropped
 
 
 def test_whatever_happens_each_chunk_is_done_or_told():

@@ -5,7 +5,10 @@ import itertools
 import json
 import os
 import shutil
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -373,3 +376,14 @@ def test_units_are_kept_and_others_are_refused(tmp_path):
         stored_study.sweep(path, units={"total": "km", "decay": "1/s"})
     with pytest.raises(InputError, match="units: weight is neither a value nor an axis; there are: .*count"):
         stored_study.sweep(tmp_path / "t.zarr", units={"weight": "kg"})
+
+
+def test_a_full_disk_ends_a_sweep_that_goes_on_when_there_is_room(tmp_path):
+    program = Path(__file__).with_name("full_disk.py")
+    mount = f"mount -t tmpfs -o size=3m tmpfs {tmp_path} && exec {sys.executable} {program} {tmp_path}"
+    if shutil.which("unshare") is None or subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode:
+        pytest.skip("no disk of one's own can be mounted here")
+    done = subprocess.run(["unshare", "-rm", "sh", "-c", mount], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    # With little room some chunks are done, with none not one: each time it went on to the same bytes.
+    assert done.stdout.split()[0] == "full" and done.stdout.split().count("full") >= 3
