@@ -31,6 +31,7 @@ from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
 from jaxveh.experiments.tyre_apf.study import FIELDS
 from jaxveh.experiments.tyre_apf.tables import tables_as_printed
 from jaxveh.simulation import simulate
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 
 def run(
@@ -40,6 +41,7 @@ def run(
     seeds: int = 20,
     seed: int = 0,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Reproduction:
     """Run the honest study, the saturated drives, the sharpness of sensors and the printed settings over `seeds` seeds."""
     check_at_least("seeds", seeds, 2)
@@ -50,11 +52,13 @@ def run(
     lane_change = lane_change_observability(study)
     # Drives of their own, beside the study's.
     saturated_key, sharp_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 2))
-    saturated = run_saturated(study, seeds, saturated_key, progress=part(progress, 0.42, 0.65, "saturated"))
-    sharpness = run_sharpness(study, seeds, sharp_key, progress=part(progress, 0.65, 0.84, "sharpness"))
+    told = part(progress, 0.42, 0.65, "saturated")
+    saturated = run_saturated(study, seeds, saturated_key, progress=told, stores=stores.under("saturated"))
+    told = part(progress, 0.65, 0.84, "sharpness")
+    sharpness = run_sharpness(study, seeds, sharp_key, progress=told, stores=stores.under("sharpness"))
     ahead = run_sharpness(
         study, seeds, sharp_key, counts=(PAPERS_PARTICLES,), kinds=PREDICTIVE, levels=LOOKING_AHEAD,
-        progress=part(progress, 0.84, 0.92, "looking ahead with the noise"),
+        progress=part(progress, 0.84, 0.92, "looking ahead with the noise"), stores=stores.under("ahead"),
     )  # fmt: skip
     progress(0.92, 1.0, "printed settings")
     found = jax.block_until_ready(run_printed(printed, seeds, printed_key))
@@ -75,8 +79,11 @@ def looked_at_the_truth(staged: Staged, printed: Printed) -> dict[str, np.ndarra
     return found
 
 
-def as_printed(*, seeds: int = 20, seed: int = 0, progress: Progress = silent) -> list[Table]:
-    """The printed settings alone, errata included."""
+def as_printed(
+    *, seeds: int = 20, seed: int = 0, progress: Progress = silent, stores: Stores = IN_MEMORY
+) -> list[Table]:
+    """The printed settings alone, errata included; they are no sweep, and nothing is stored."""
+    del stores
     progress(0.0, 1.0, "printed settings")
     printed = Printed()
     _, key = jax.random.split(jax.random.key(seed))
