@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_whole
@@ -15,7 +16,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh.sweeps.design import Design
 from jaxveh.sweeps.running import sweep
 from jaxveh.sweeps.store import DONE, Store
-from jaxveh.sweeps.swept import Swept
+from jaxveh.sweeps.swept import Swept, named_leaves
 
 RUNS = 100
 """Runs of a chunk, unless a study says otherwise. Its runs are whole drives, and filters over them that keep rows: some megabytes
@@ -81,6 +82,34 @@ class Stores:
             )
         # The choices themselves, of which a store has the labels.
         return Swept(design, found.seeds, dict(found.values))
+
+    def each(self, name: str, function: Callable[..., Any], *arguments: Any, progress: Progress = silent) -> Any:
+        """`jax.vmap(function)(*arguments)`, trees of arrays alike in their first axis, by a sweep of this `name` over its rows.
+
+        **Raises** `InputError` as `sweep` does.
+        """
+        many = jax.vmap(function)
+        if self.folder is None:
+            return jax.jit(many)(*arguments)
+        leaves, structure = jax.tree.flatten(arguments)
+        # Data are numbers: keys go as their words.
+        kinds = [str(jax.random.key_impl(leaf)) if _is_key(leaf) else "" for leaf in leaves]
+        data = [jax.random.key_data(leaf) if kind else leaf for leaf, kind in zip(leaves, kinds, strict=True)]
+
+        def run(point: Any, given: Any) -> dict[str, Any]:
+            del point
+            own, same = jax.tree.flatten(given)
+            keyed = [jax.random.wrap_key_data(x, impl=kind) if kind else x for x, kind in zip(own, kinds, strict=True)]
+            return {"found": function(*jax.tree.unflatten(same, keyed))}
+
+        found = self.sweep(name, run, Design(), data=jax.tree.unflatten(structure, data), progress=progress)
+        shapes = jax.eval_shape(many, *arguments)
+        names = named_leaves({"found": shapes})
+        return jax.tree.unflatten(jax.tree.structure(shapes), [jax.numpy.asarray(found.values[one]) for one in names])
+
+
+def _is_key(leaf: Any) -> bool:
+    return isinstance(leaf, jax.Array) and jax.numpy.issubdtype(leaf.dtype, jax.dtypes.prng_key)
 
 
 IN_MEMORY = Stores()

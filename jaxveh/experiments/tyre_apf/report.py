@@ -47,7 +47,8 @@ def run(
     check_at_least("seeds", seeds, 2)
     study, printed = study or Study(), printed or Printed()
     honest_key, printed_key = jax.random.split(jax.random.key(seed))
-    staged = run_staged(study, seeds, honest_key, progress=part(progress, 0.0, 0.4, "lane change"))
+    told = part(progress, 0.0, 0.4, "lane change")
+    staged = run_staged(study, seeds, honest_key, progress=told, stores=stores.under("lane-change"))
     progress(0.4, 1.0, "observability in the lane change")
     lane_change = lane_change_observability(study)
     # Drives of their own, beside the study's.
@@ -61,7 +62,7 @@ def run(
         progress=part(progress, 0.84, 0.92, "looking ahead with the noise"), stores=stores.under("ahead"),
     )  # fmt: skip
     progress(0.92, 1.0, "printed settings")
-    found = jax.block_until_ready(run_printed(printed, seeds, printed_key))
+    found = jax.block_until_ready(run_printed(printed, seeds, printed_key, stores=stores))
     progress(1.0, 1.0, "done")
     return Reproduction(
         study, seeds, staged.outcome, staged.steps, lane_change, saturated, sharpness, ahead, found, printed,
@@ -82,12 +83,11 @@ def looked_at_the_truth(staged: Staged, printed: Printed) -> dict[str, np.ndarra
 def as_printed(
     *, seeds: int = 20, seed: int = 0, progress: Progress = silent, stores: Stores = IN_MEMORY
 ) -> list[Table]:
-    """The printed settings alone, errata included; they are no sweep, and nothing is stored."""
-    del stores
+    """The printed settings alone, errata included."""
     progress(0.0, 1.0, "printed settings")
     printed = Printed()
     _, key = jax.random.split(jax.random.key(seed))
-    found = jax.block_until_ready(run_printed(printed, seeds, key))
+    found = jax.block_until_ready(run_printed(printed, seeds, key, stores=stores.under("as-printed")))
     progress(1.0, 1.0, "done")
     return tables_as_printed(found, printed)
 
