@@ -19,8 +19,8 @@ from jaxveh.sweeps.store import DONE, Store
 from jaxveh.sweeps.swept import Swept, named_leaves
 
 RUNS = 100
-"""Runs of a chunk, unless a study says otherwise. Its runs are whole drives, and filters over them that keep rows: some megabytes
-each, and a hundred take seconds to minutes. Round numbers of seeds are cut without a rest."""
+"""Runs of a chunk, unless a study says otherwise. A run is a whole drive, or a filter over one that keeps rows: one or two
+megabytes, so that a chunk fits every machine. Round numbers of seeds are cut without a rest."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -75,7 +75,7 @@ def test_workers_need_a_folder(tmp_path, computed):
     assert "--processes" in error_line(run("reproduce", "first", "--processes", 2))
     assert "--scheduler" in error_line(run("reproduce", "first", "--scheduler", "tcp://here:8786"))
     both = ("--processes", 2, "--scheduler", "tcp://here:8786")
-    assert "not both" in error_line(run("reproduce", "first", "--store", tmp_path, *both))
+    assert "--processes and --scheduler" in error_line(run("reproduce", "first", "--store", tmp_path, *both))
     (tmp_path / "file").write_text("")
     for folder in (tmp_path / "file", tmp_path / "file" / "below"):
         assert "a file; name a folder" in error_line(run("reproduce", "first", "--store", folder))
