@@ -88,28 +88,49 @@ class Stores:
 
         **Raises** `InputError` as `sweep` does.
         """
-        many = jax.vmap(function)
         if self.folder is None:
-            return jax.jit(many)(*arguments)
-        leaves, structure = jax.tree.flatten(arguments)
-        # Data are numbers: keys go as their words.
-        kinds = [str(jax.random.key_impl(leaf)) if _is_key(leaf) else "" for leaf in leaves]
-        data = [jax.random.key_data(leaf) if kind else leaf for leaf, kind in zip(leaves, kinds, strict=True)]
+            return jax.jit(jax.vmap(function))(*arguments)
+        kinds, kinds_found = _kinds(arguments), []
 
         def run(point: Any, given: Any) -> dict[str, Any]:
             del point
-            own, same = jax.tree.flatten(given)
-            keyed = [jax.random.wrap_key_data(x, impl=kind) if kind else x for x, kind in zip(own, kinds, strict=True)]
-            return {"found": function(*jax.tree.unflatten(same, keyed))}
+            return {"found": _words(function(*_keyed(given, kinds)))}
 
-        found = self.sweep(name, run, Design(), data=jax.tree.unflatten(structure, data), progress=progress)
-        shapes = jax.eval_shape(many, *arguments)
-        names = named_leaves({"found": shapes})
-        return jax.tree.unflatten(jax.tree.structure(shapes), [jax.numpy.asarray(found.values[one]) for one in names])
+        found = self.sweep(name, run, Design(), data=_words(arguments), progress=progress)
+
+        def noted(*given: Any) -> Any:
+            result = function(*given)
+            # A shape does not say what kind of key it is of.
+            kinds_found[:] = _kinds(result)
+            return result
+
+        shapes = jax.eval_shape(jax.vmap(noted), *arguments)
+        names, structure = named_leaves({"found": shapes}), jax.tree.structure(shapes)
+        values = [jax.numpy.asarray(found.values[one]) for one in names]
+        return _keyed(jax.tree.unflatten(structure, values), kinds_found)
 
 
-def _is_key(leaf: Any) -> bool:
-    return isinstance(leaf, jax.Array) and jax.numpy.issubdtype(leaf.dtype, jax.dtypes.prng_key)
+def _kinds(tree: Any) -> list[str]:
+    """Of each leaf what kind of key it is; empty where it is none."""
+    is_key = lambda leaf: jax.numpy.issubdtype(jax.numpy.asarray(leaf).dtype, jax.dtypes.prng_key)
+    return [str(jax.random.key_impl(leaf)) if is_key(leaf) else "" for leaf in jax.tree.leaves(tree)]
+
+
+def _words(tree: Any) -> Any:
+    """The tree with keys as their words: neither data nor a store have keys."""
+    leaves, structure = jax.tree.flatten(tree)
+    leaves = [jax.numpy.asarray(leaf) for leaf in leaves]
+    keys = zip(leaves, _kinds(leaves), strict=True)
+    return jax.tree.unflatten(structure, [jax.random.key_data(leaf) if kind else leaf for leaf, kind in keys])
+
+
+def _keyed(tree: Any, kinds: list[str]) -> Any:
+    """What `_words` was given, of these kinds."""
+    leaves, structure = jax.tree.flatten(tree)
+    words = zip(leaves, kinds, strict=True)
+    return jax.tree.unflatten(
+        structure, [jax.random.wrap_key_data(leaf, impl=kind) if kind else leaf for leaf, kind in words]
+    )
 
 
 IN_MEMORY = Stores()

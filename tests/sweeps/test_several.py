@@ -20,11 +20,16 @@ class Spring(eqx.Module):
 
 
 def pull(spring, key, start):
-    """A tree of all that a study's results have: numbers, whole numbers, truth values, nothing, and a module."""
+    """A tree of all that a study's results have: numbers, whole numbers, truth values, nothing, a module and a key."""
     x = start + jax.random.normal(key, (3,))
     force = jnp.sin(x) if spring.law == "sine" else x
     moved = eqx.tree_at(lambda s: s.stiffness, spring, spring.stiffness * jnp.sum(force))
-    return record("Pulled", {"x": force, "count": jnp.sum(x > 0), "lost": jnp.any(x > 9)}), moved, None
+    return (
+        record("Pulled", {"x": force, "count": jnp.sum(x > 0), "lost": jnp.any(x > 9)}),
+        moved,
+        None,
+        jax.random.fold_in(key, 1),
+    )
 
 
 @pytest.fixture
@@ -39,6 +44,8 @@ def assert_same(found, plain):
     assert jax.tree.structure(found) == jax.tree.structure(plain)
     for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(plain), strict=True):
         assert one.dtype == other.dtype and one.shape == other.shape
+        if jnp.issubdtype(one.dtype, jax.dtypes.prng_key):
+            one, other = jax.random.key_data(one), jax.random.key_data(other)
         np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
