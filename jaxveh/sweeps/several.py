@@ -19,7 +19,7 @@ from jaxveh.sweeps.store import DONE, Store
 from jaxveh.sweeps.swept import Swept, named_leaves
 
 RUNS = 100
-"""Runs of a chunk, unless a study says otherwise. A run is a whole drive, or a filter over one that keeps rows: one or two
+"""Runs of a chunk, unless a study says otherwise. A run is a whole drive, or a filter over one that keeps rows: up to four
 megabytes, so that a chunk fits every machine. Round numbers of seeds are cut without a rest."""
 
 
