@@ -12,7 +12,18 @@ from jaxveh._core.errors import InputError
 
 @functools.cache
 def _record_type(name: str, fields: tuple[str, ...]):
-    return namedtuple(name, fields)
+    made = namedtuple(name, fields)
+    # By this name pickle finds it (`__getattr__`): sent to another process, it is the class that is made there.
+    made.__qualname__ = f"{name}:{','.join(fields)}"
+    return made
+
+
+def __getattr__(name: str) -> Any:
+    """The class that `record_type` makes of `Name:field,field`."""
+    kind, colon, fields = name.partition(":")
+    if not colon:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return _record_type(kind, tuple(fields.split(",")) if fields else ())
 
 
 def record_type(name: str, fields: Iterable[str]):

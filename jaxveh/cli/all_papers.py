@@ -35,9 +35,13 @@ class Done(NamedTuple):
     took: float
 
 
-def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None) -> None:
-    """Run each paper with the options `asked` of it, show what they print in the mapping's order, and write all numbers as one
-    file. Exits with 1 where one of them failed, after the others."""
+OF_EACH = ("--out", "--store")
+"""Options whose folder has one of its name for each paper."""
+
+
+def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None, *, at_once: int | None = None) -> None:
+    """Run each paper with the options `asked` of it, so many `at_once` (None: as there are cores), show what they print in the
+    mapping's order, and write all numbers as one file. Exits with 1 where one of them failed, after the others."""
     order = sorted(asked, key=lambda name: SLOWEST.index(name) if name in SLOWEST else -1)
     with ends_in_order(), progress("reproduce") as report, tempfile.TemporaryDirectory() as folder:
         finished: list[str] = []
@@ -49,7 +53,7 @@ def all_papers(asked: Mapping[str, Mapping[str, Any]], numbers: Path | None) -> 
             finished.append(name)
             return done
 
-        with ThreadPoolExecutor(min(os.cpu_count() or 1, len(order))) as pool:
+        with ThreadPoolExecutor(min(at_once or os.cpu_count() or 1, len(order))) as pool:
             try:
                 done = dict(zip(order, pool.map(go, order), strict=True))
             except BaseException:
@@ -85,11 +89,12 @@ def _tally(done: Done) -> str:
 
 
 def run_program(name: str, asked: Mapping[str, Any], folder: Path, tell: Callable[[str], None], family: Family) -> Done:
-    """Run `jaxveh reproduce NAME` to its end; each line of its progress is told. Figures go to a folder of the paper's name."""
+    """Run `jaxveh reproduce NAME` to its end; each line of its progress is told. Figures and stores go to a folder of the paper's
+    name."""
     start, file = time.perf_counter(), folder / f"{name}.json"
     arguments = [sys.executable, "-m", "jaxveh", "reproduce", name, "--json", str(file)]
     for option, value in asked.items():
-        value = value / name if option == "--out" and value is not None else value
+        value = value / name if option in OF_EACH and value is not None else value
         if value is not None:
             arguments += [option] if value is True else [option, str(value)]
     with tempfile.TemporaryFile("w+") as printed:

@@ -17,9 +17,11 @@ from jaxveh.cli import options
 from jaxveh.cli.all_papers import all_papers
 from jaxveh.cli.console import number, progress, results, table
 from jaxveh.cli.output import check_report, make_folder, write_numbers
+from jaxveh.cli.stores import Processes, Scheduler, Store, stores_of
 
 if TYPE_CHECKING:
     from jaxveh import experiments
+    from jaxveh.sweeps import Stores
 
 PAPERS = {
     "tyre-apf": "Magic Formula parameters by auxiliary particle filter (Bao, Sabbioni et al. 2015)",
@@ -56,6 +58,9 @@ def reproduce(
     ] = False,
     log: Annotated[Path | None, LOG] = None,
     car: Annotated[Path | None, CAR] = None,
+    store: Store = None,
+    processes: Processes = None,
+    scheduler: Scheduler = None,
     numbers: options.Numbers = None,
     out: options.Out = None,
 ) -> None:
@@ -63,42 +68,59 @@ def reproduce(
 
     Every table has the do-nothing baseline, medians and quartiles over seeds; each criterion says who was told what of the
     truth. Counted are criteria as they were asked; what took the place of one stands beside it. Some minutes each on two cores.
-    With --out each paper's figures are drawn, with --json every number and each check is written.
+    With --out each paper's figures are drawn, with --json every number and each check is written. With --store thousands of
+    seeds survive being killed; of [bold]all[/] each paper has a folder of its name in it, as it has in --out.
 
     Example: [bold]jaxveh reproduce mass-grade-aukf --json mass_grade.json --out report/[/]
+
+    Example: [bold]jaxveh reproduce federated-ckf --seeds 1000 --store federated/ --processes 8[/]
     """
     check_one_of("NAME", name, (*PAPERS, ALL))
     check_report(out, numbers)
-    if (log is None) != (car is None):
-        raise InputError("--log and --vehicle belong together: give both, or neither.")
-    if log is not None and name not in (LOGGED, ALL):
-        raise InputError(f"--log: only {LOGGED} looks at a log; leave it out, or reproduce that paper.")
-    if log is not None and as_printed:
-        raise InputError("--log: nothing is printed of it; leave it out, or --as-printed.")
+    _check_log(name, log, car, as_printed)
+    stores = stores_of(store, processes, scheduler)
     if name == ALL:
-        asked = {"--seeds": seeds, "--seed": seed, "--as-printed": as_printed or None, "--out": out}
+        asked = {"--seeds": seeds, "--seed": seed, "--as-printed": as_printed or None, "--out": out, "--store": store}
+        asked |= {"--processes": processes, "--scheduler": scheduler}
+        more = {"--log": log, "--vehicle": car}
         all_papers(
-            {name: asked | ({"--log": log, "--vehicle": car} if name == LOGGED else {}) for name in PAPERS}, numbers
+            {name: asked | (more if name == LOGGED else {}) for name in PAPERS},
+            numbers,
+            # Each has the processes to itself.
+            at_once=None if processes is None else 1,
         )
         return
     asked = (
         {"seed": seed} | ({} if seeds is None else {"seeds": seeds}) | ({} if log is None else {"log": log, "car": car})
     )
     with progress("reproduce") as report:
-        found = _one(name, asked, as_printed, report, out)
+        found = _one(name, asked, as_printed, report, out, stores)
     write_numbers(numbers, found, found.pop("settings"), seed)
 
 
-def _one(name: str, asked: dict[str, Any], as_printed: bool, report: Progress, out: Path | None) -> dict[str, Any]:
+def _check_log(name: str, log: Path | None, car: Path | None, as_printed: bool) -> None:
+    """Raise where a log is given without its car, or to a paper that does not look at it."""
+    if (log is None) != (car is None):
+        raise InputError("--log and --vehicle belong together: give both, or neither.")
+    if log is not None and name not in (LOGGED, ALL):
+        raise InputError(f"--log: only {LOGGED} looks at a log; leave it out, or reproduce that paper.")
+    if log is not None and as_printed:
+        raise InputError("--log: nothing is printed of it; leave it out, or --as-printed.")
+
+
+def _one(
+    name: str, asked: dict[str, Any], as_printed: bool, report: Progress, out: Path | None, stores: Stores | None
+) -> dict[str, Any]:
     """Run one paper as `asked` and show it; what it found, for JSON."""
     from jaxveh import experiments
 
     _every_core()
     experiment = _experiment(name)
+    where = {} if stores is None else {"stores": stores}
     if as_printed:
-        tables, checks, settings = experiment.as_printed(**asked, progress=report), [], asked
+        tables, checks, settings = experiment.as_printed(**asked, **where, progress=report), [], asked
     else:
-        found = experiment.run(**asked, progress=report)
+        found = experiment.run(**asked, **where, progress=report)
         tables, checks = experiment.tables(found), experiment.check(found)
         settings = {"seeds": found.seeds, **experiment.settings(found)}
     for one in tables:

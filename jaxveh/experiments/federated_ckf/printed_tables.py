@@ -21,24 +21,29 @@ from jaxveh.experiments.federated_ckf.settings import PARAMETERS, PRINTED_START,
 from jaxveh.experiments.federated_ckf.study import drives_of, truth
 from jaxveh.experiments.report import spread
 from jaxveh.statespace import Gaussian, kit
-from jaxveh.sweeps import Table
+from jaxveh.sweeps import IN_MEMORY, Stores, Table
 
 SHOWN = ("first guess", "three federated, shared sensors", "joint")
 """What stands beside the printed settings."""
 
 
 def as_printed(
-    study: Study | None = None, *, seeds: int = 20, seed: int = 0, progress: Progress = silent
+    study: Study | None = None,
+    *,
+    seeds: int = 20,
+    seed: int = 0,
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> list[Table]:
     """The paper's test (constant speed, printed start) with its printed numbers and with ours, and what counting sensors twice
     does to the covariance."""
-    study = study or Study()
+    study, stores = study or Study(), stores.under("as-printed")
     key = jax.random.fold_in(jax.random.key(seed), 3)
     told = part(progress, 0.0, 0.1, "drives")
-    drives = drives_of(study, (study.steer,), (0.0,), seeds, key, progress=told)
+    drives = drives_of(study, (study.steer,), (0.0,), seeds, key, progress=told, stores=stores)
     drives = jax.tree.map(lambda leaf: leaf[0, 0], drives)
-    found = _race(study, drives, part(progress, 0.1, 0.8, "estimators"))
-    twice = _twice(study, drives, part(progress, 0.8, 1.0, "shared sensors"))
+    found = _race(study, drives, part(progress, 0.1, 0.8, "estimators"), stores)
+    twice = _twice(study, drives, part(progress, 0.8, 1.0, "shared sensors"), stores)
     progress(1.0, 1.0, "done")
     return [_table(found, seeds), _traces(twice, seeds)]
 
@@ -52,7 +57,7 @@ def _runs(study: Study) -> dict[str, tuple[Any, str]]:
     return {**first, "as printed": (printed_filters, what), **own, "federated, disjoint sensors": shares[:2]}
 
 
-def _race(study: Study, drives: Drive, progress: Progress) -> sweeps.Swept:
+def _race(study: Study, drives: Drive, progress: Progress, stores: Stores) -> sweeps.Swept:
     start, right = Start(*map(jnp.asarray, dataclasses.astuple(PRINTED_START))), truth(study)
     names = (*[f"{name}_error" for name in PARAMETERS], "sideslip_rmse", "v_x_rmse", "parameters")
 
@@ -65,7 +70,7 @@ def _race(study: Study, drives: Drive, progress: Progress) -> sweeps.Swept:
 
     design = sweeps.Design(estimator={name: of(estimate) for name, (estimate, _) in _runs(study).items()})
     run = lambda point, drive: point.estimator(drive)
-    return sweeps.sweep(run, design, data=drives, progress=progress)
+    return stores.sweep("race", run, design, data=drives, progress=progress)
 
 
 def _table(found: sweeps.Swept, seeds: int) -> Table:
@@ -97,7 +102,7 @@ Z_1, Z_2 = ("a_x", "a_y", "yaw_rate"), ("a_y", "yaw_rate")
 """What the paper's two locals measure."""
 
 
-def _twice(study: Study, drives: Drive, progress: Progress) -> sweeps.Swept:
+def _twice(study: Study, drives: Drive, progress: Progress, stores: Stores) -> sweeps.Swept:
     """Final traces of the states' covariance over the prior's variances, the paper's sensors alone, all parameters known."""
     cubature, right = filters.Cubature(), truth(study)
     chosen = {
@@ -121,7 +126,7 @@ def _twice(study: Study, drives: Drive, progress: Progress) -> sweeps.Swept:
 
     design = sweeps.Design(filter={name: of(filter_) for name, filter_ in chosen.items()})
     run = lambda point, drive: point.filter(drive)
-    return sweeps.sweep(run, design, data=drives, progress=progress)
+    return stores.sweep("shared-sensors", run, design, data=drives, progress=progress)
 
 
 def _traces(found: sweeps.Swept, seeds: int) -> Table:

@@ -28,7 +28,7 @@ from jaxveh.experiments.federated_ckf.observed import observability_of_drives
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
 from jaxveh.experiments.federated_ckf.study import Raced, cases, drives_by_case, drives_of, race, race_over, truth
 from jaxveh.experiments.report import Check, above, at_most, interval, spread, with_terms
-from jaxveh.sweeps import Swept, Table, compare
+from jaxveh.sweeps import IN_MEMORY, Stores, Swept, Table, compare
 
 STEERS, SPREADS = (3.0, 4.0, 5.0, 8.0), (0.0, 0.1, 0.3)
 """Steer amplitudes (degrees) and spreads of the speed (m/s) whose drives are looked at for what they can tell."""
@@ -52,22 +52,30 @@ class Reproduction(NamedTuple):
     seen: dict[str, list[list[Observability]]]
 
 
-def run(study: Study | None = None, *, seeds: int = 20, seed: int = 0, progress: Progress = silent) -> Reproduction:
+def run(
+    study: Study | None = None,
+    *,
+    seeds: int = 20,
+    seed: int = 0,
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
+) -> Reproduction:
     """All drives and estimators over `seeds` seeds (at least two)."""
     study = study or Study()
     # Other drives than those on which the noises were chosen.
     key = jax.random.fold_in(jax.random.key(seed), 2)
     steers = tuple(sorted({*np.radians(STEERS).tolist(), study.steer}))
     speeds = tuple(sorted({*SPREADS, study.speed_std}))
-    grid = drives_of(study, steers, speeds, seeds, key, progress=part(progress, 0.0, 0.08, "drives"))
+    grid = drives_of(study, steers, speeds, seeds, key, progress=part(progress, 0.0, 0.08, "drives"), stores=stores)
     names = tuple(cases(study))
     # The paper's slalom is one of the grid's.
     own = steers.index(study.steer), speeds.index(study.speed_std)
     known = Drive(*(leaf[own] for leaf in grid))
-    drives = drives_by_case(study, names, seeds, key, known=known, progress=part(progress, 0.08, 0.15, "other tyres"))
-    raced = race(study, drives, names, progress=part(progress, 0.15, 0.9, "estimators"))
+    told = part(progress, 0.08, 0.15, "other tyres")
+    drives = drives_by_case(study, names, seeds, key, known=known, progress=told, stores=stores)
+    raced = race(study, drives, names, progress=part(progress, 0.15, 0.9, "estimators"), stores=stores)
     told = part(progress, 0.9, 0.96, "steer and speed")
-    over = race_over(study, grid, steers, speeds, progress=told)
+    over = race_over(study, grid, steers, speeds, progress=told, stores=stores)
     progress(0.96, 1.0, "observability")
     seen = observability_of_drives(study, Start(*truth(study)), Drive(*(leaf[:, :, 0] for leaf in grid)))
     progress(1.0, 1.0, "done")

@@ -15,6 +15,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh.experiments.federated_ckf.contestants import contestants, metrics
 from jaxveh.experiments.federated_ckf.drives import Drive, drive_once, times
 from jaxveh.experiments.federated_ckf.settings import OTHER_START, PARAMETERS, PRINTED_START, Start, Study
+from jaxveh.sweeps import IN_MEMORY, Stores
 from jaxveh.vehicles import sets
 
 
@@ -63,24 +64,43 @@ def truth(study: Study) -> np.ndarray:
 
 
 def drives_of(
-    study: Study, steer, speed_std, seeds: int, key, *, magic_formula: bool = False, progress: Progress = silent
+    study: Study,
+    steer,
+    speed_std,
+    seeds: int,
+    key,
+    *,
+    magic_formula: bool = False,
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Drive:
     """Drives with each steer amplitude (rad) and spread of the speed (m/s), one a seed: (steers, spreads, seeds, T, ...)."""
     check_whole("seeds", seeds, 2)
-    run = lambda point, key: drive_once(study, point.steer, point.speed_std, key, magic_formula=magic_formula)
-    design = sweeps.Design(steer=steer, speed_std=speed_std)
-    found = sweeps.sweep(run, design, seeds, key, progress=progress)
+    run = lambda point, key: drive_once(study, point.amplitude, point.speed_std, key, magic_formula=magic_formula)
+    # A drive has a steer of its own.
+    design = sweeps.Design(amplitude=steer, speed_std=speed_std)
+    found = stores.sweep("drives", run, design, seeds, key, progress=progress)
     return Drive(**{name: found[name] for name in Drive._fields})
 
 
 def drives_by_case(
-    study: Study, names: tuple[str, ...], seeds: int, key, *, known: Drive | None = None, progress: Progress = silent
+    study: Study,
+    names: tuple[str, ...],
+    seeds: int,
+    key,
+    *,
+    known: Drive | None = None,
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Drive:
     """The drives of the cases, (cases, seeds, T, ...): the same seeds for all, and the fault on top. `known`, (seeds, T, ...):
     those on Dugoff's tyres of the same key, where they are made already."""
     wanted, made = cases(study), {} if known is None else {False: known}
     for magic in {wanted[name].magic_formula for name in names} - set(made):
-        found = drives_of(study, (study.steer,), (study.speed_std,), seeds, key, magic_formula=magic, progress=progress)
+        found = drives_of(
+            study, (study.steer,), (study.speed_std,), seeds, key, magic_formula=magic, progress=progress,
+            stores=stores.under("other-tyres" if magic else "own-tyres"),
+        )  # fmt: skip
         made[magic] = jax.tree.map(lambda leaf: leaf[0, 0], found)
     t = np.asarray(times(study))
     wrong = (t >= study.fault_at) & (t < study.fault_at + study.fault_time)
@@ -98,6 +118,7 @@ def race(
     *,
     only: tuple[str, ...] | None = None,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Raced:
     """Every estimator (or `only` these) on the drives of the cases."""
     every = contestants(study)
@@ -120,11 +141,19 @@ def race(
         estimator={name: runs(contestant) for name, contestant in chosen.items()}, case=range(len(names))
     )
     run = lambda point, drive: point.estimator(point, drive)
-    found = sweeps.sweep(run, design, data=drives, progress=progress)
+    found = stores.sweep("race", run, design, data=drives, progress=progress)
     return Raced(study, tuple(names), drives, found)
 
 
-def race_over(study: Study, drives: Drive, steers, spreads, estimator: str = "joint", progress: Progress = silent):
+def race_over(
+    study: Study,
+    drives: Drive,
+    steers,
+    spreads,
+    estimator: str = "joint",
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
+) -> sweeps.Swept:
     """One estimator from the nearer start on drives (steers, spreads, seeds, T, ...): a sweep with the axes steer, speed_std."""
     contestant, right = contestants(study)[estimator], truth(study)
 
@@ -135,4 +164,4 @@ def race_over(study: Study, drives: Drive, steers, spreads, estimator: str = "jo
         return {name: found[name] for name in (*[f"{name}_error" for name in PARAMETERS], "spread", "sideslip_rmse")}
 
     design = sweeps.Design(steer=steers, speed_std=spreads)
-    return sweeps.sweep(run, design, data=drives, progress=progress)
+    return stores.sweep("race-over", run, design, data=drives, progress=progress)

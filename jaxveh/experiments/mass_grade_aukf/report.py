@@ -19,7 +19,7 @@ from jaxveh.experiments.mass_grade_aukf.observed import Known, bound_of_mass, kn
 from jaxveh.experiments.mass_grade_aukf.settings import CAR, COMPARED, GRADE_RMSE, TABLE_1, Study, car, truck
 from jaxveh.experiments.mass_grade_aukf.study import Raced, drives_of, race
 from jaxveh.experiments.report import Check, above, at_most, spread, with_terms
-from jaxveh.sweeps import Table
+from jaxveh.sweeps import IN_MEMORY, Stores, Table
 
 GENTLE, LIVELY = (0.0, 0.03), 0.1
 """Pedal activities, m/s^2; the checks are of the lively one, whose mean acceleration is the paper's."""
@@ -59,6 +59,7 @@ def run(
     seeds: int = 20,
     seed: int = 0,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Reproduction:
     """All drives and estimators over `seeds` seeds (at least two)."""
     truck_study, car_study = truck_study or truck(), car_study or car()
@@ -66,18 +67,24 @@ def run(
     key = jax.random.fold_in(jax.random.key(seed), 1)
     truck_key, car_key = jax.random.split(key)
     few = min(seeds, FEW)
-    drive = lambda study, pedals, seeds, key, start, end, what: drives_of(
-        study, pedals, seeds, key, progress=part(progress, start, end, what)
+    told = lambda start, end, what: part(progress, start, end, what)
+    lively = drives_of(
+        truck_study, (LIVELY,), seeds, truck_key, progress=told(0.0, 0.2, "truck drives"), stores=stores.under("truck")
     )
-    lively = drive(truck_study, (LIVELY,), seeds, truck_key, 0.0, 0.2, "truck drives")
-    calm = drive(truck_study, GENTLE, few, truck_key, 0.2, 0.4, "truck drives with gentle pedals")
-    own = drive(car_study, (LIVELY,), seeds, car_key, 0.4, 0.6, "car drives")
-    trucks = race(truck_study, (LIVELY,), lively, progress=part(progress, 0.6, 0.7, "truck"))
-    gentle = race(truck_study, GENTLE, calm, progress=part(progress, 0.7, 0.8, "truck with gentle pedals"))
-    cars = race(car_study, (LIVELY,), own, progress=part(progress, 0.8, 0.87, "car"))
-    raced = _disturbance_races(
-        truck_study, jax.tree.map(lambda leaf: leaf[:, :few], lively), part(progress, 0.87, 0.97, "")
+    calm = drives_of(
+        truck_study, GENTLE, few, truck_key,
+        progress=told(0.2, 0.4, "truck drives with gentle pedals"), stores=stores.under("gentle"),
+    )  # fmt: skip
+    own = drives_of(
+        car_study, (LIVELY,), seeds, car_key, progress=told(0.4, 0.6, "car drives"), stores=stores.under("car")
     )
+    trucks = race(truck_study, (LIVELY,), lively, progress=told(0.6, 0.7, "truck"), stores=stores.under("truck"))
+    gentle = race(
+        truck_study, GENTLE, calm, progress=told(0.7, 0.8, "truck with gentle pedals"), stores=stores.under("gentle")
+    )
+    cars = race(car_study, (LIVELY,), own, progress=told(0.8, 0.87, "car"), stores=stores.under("car"))
+    some = jax.tree.map(lambda leaf: leaf[:, :few], lively)
+    raced = _disturbance_races(truck_study, some, told(0.87, 0.97, ""), stores.under("disturbed"))
     progress(0.97, 1.0, "observability")
     seen = _example_drive(truck_study, calm, lively, truck_key)
     observed = {
@@ -89,7 +96,7 @@ def run(
     return Reproduction(seeds, trucks, cars, gentle, raced, observed, bounds)
 
 
-def _disturbance_races(study: Study, drives: Drive, progress: Progress) -> dict[str, Raced]:
+def _disturbance_races(study: Study, drives: Drive, progress: Progress, stores: Stores) -> dict[str, Raced]:
     changes = {
         f"torque {LATE:g} s late": dict(late=round(LATE / study.dt)),
         "torque 2 % too large": dict(scale=1.02),
@@ -98,7 +105,10 @@ def _disturbance_races(study: Study, drives: Drive, progress: Progress) -> dict[
     found = {}
     for i, (name, change) in enumerate(changes.items()):
         told = part(progress, i / len(changes), (i + 1) / len(changes), name)
-        found[name] = race(study, (LIVELY,), disturb(drives, **change), only=DISTURBED, progress=told)
+        found[name] = race(
+            study, (LIVELY,), disturb(drives, **change), only=DISTURBED, progress=told,
+            stores=stores.under(next(iter(change))),
+        )  # fmt: skip
     return found
 
 
@@ -112,14 +122,17 @@ def _example_drive(study: Study, gentle: Drive, lively: Drive, key) -> dict[str,
     return seen
 
 
-def as_printed(*, seeds: int = 20, seed: int = 0, progress: Progress = silent) -> list[Table]:
+def as_printed(
+    *, seeds: int = 20, seed: int = 0, progress: Progress = silent, stores: Stores = IN_MEMORY
+) -> list[Table]:
     """The paper's own filters alone, truck and car: additive mass, eq 25 as it stands and left out, a walking grade."""
     own = ("first guess", "UKF", "UKF, timid", "AUKF as printed", "AUKF")
     found, studies = [], (truck(guesses=(4000.0,)), car())
     for i, (study, key) in enumerate(zip(studies, jax.random.split(jax.random.key(seed)), strict=True)):
         told = lambda start, end, what, i=i: part(progress, (i + start) / 2, (i + end) / 2, what)
-        drives = drives_of(study, (LIVELY,), seeds, key, progress=told(0.0, 0.8, f"{study.name} drives"))
-        raced = race(study, (LIVELY,), drives, only=own, progress=told(0.8, 1.0, study.name))
+        at = stores.under("as-printed").under(study.name)
+        drives = drives_of(study, (LIVELY,), seeds, key, progress=told(0.0, 0.8, f"{study.name} drives"), stores=at)
+        raced = race(study, (LIVELY,), drives, only=own, progress=told(0.8, 1.0, study.name), stores=at)
         found.append(_printed_table(raced, own))
     return found
 

@@ -13,6 +13,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh.experiments.mass_grade_aukf.contestants import contestants, of_a_point
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, drive_once
 from jaxveh.experiments.mass_grade_aukf.settings import Study
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 
 class Raced(NamedTuple):
@@ -26,12 +27,19 @@ class Raced(NamedTuple):
 
 
 def drives_of(
-    study: Study, pedals: tuple[float, ...], seeds: int, key, *, batch: int | None = None, progress: Progress = silent
+    study: Study,
+    pedals: tuple[float, ...],
+    seeds: int,
+    key,
+    *,
+    batch: int | None = None,
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Drive:
     """Drives of the study with each pedal activity (m/s^2), one a seed: (pedals, seeds, T)."""
     check_whole("seeds", seeds, 2)
     run = lambda point, key: drive_once(study, point.pedals, key)
-    found = sweeps.sweep(run, sweeps.Design(pedals=pedals), seeds, key, batch=batch, progress=progress)
+    found = stores.sweep("drives", run, sweeps.Design(pedals=pedals), seeds, key, batch=batch, progress=progress)
     return Drive(**{name: found[name] for name in Drive._fields})
 
 
@@ -42,6 +50,7 @@ def race(
     *,
     only: tuple[str, ...] | None = None,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Raced:
     """Every estimator (or `only` these) on the same drives, (pedals, seeds, T), from every first guess."""
     every = contestants(study)
@@ -53,5 +62,5 @@ def race(
         lambda leaf: np.broadcast_to(leaf[:, None], (len(pedals), len(study.guesses), *leaf.shape[1:])), drives
     )
     run = lambda point, drive: point.estimator(point, drive)
-    found = sweeps.sweep(run, design, data=shared, progress=progress)
+    found = stores.sweep("race", run, design, data=shared, progress=progress)
     return Raced(study, tuple(pedals), drives, found)

@@ -29,6 +29,7 @@ from jaxveh.experiments.model_adaptive_pf.contestants import (
 from jaxveh.experiments.model_adaptive_pf.drives import fiala, model_car
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, Study
 from jaxveh.experiments.model_adaptive_pf.study import drives_of
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 WINDOWS = (8, 16, 32, 64)
 """Rows,"""
@@ -56,6 +57,7 @@ def robust_likelihoods(
     drives: int = 20,
     seed: int = 1000,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> np.ndarray:
     """Log-likelihoods (windows, starts, shares, factors, drives) of the robust cubature filter under the noise of 'both'."""
 
@@ -75,7 +77,8 @@ def robust_likelihoods(
         return run
 
     choices = {f"{w} rows, {start}": of(w, start) for w, start in itertools.product(windows, starts)}
-    found = _likelihoods(study, choices, {"share": shares, "factor": factors}, drives, seed, progress)
+    numbers = {"share": shares, "factor": factors}
+    found = _likelihoods(study, choices, numbers, drives, seed, progress, stores.under("robust"))
     return found.reshape(len(windows), len(starts), len(shares), len(factors), drives)
 
 
@@ -87,6 +90,7 @@ def redesigned_likelihoods(
     drives: int = 20,
     seed: int = 1000,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> np.ndarray:
     """Log-likelihoods (windows, alphas, drives) of the redesigned particle filter under the noise of 'both'."""
 
@@ -98,14 +102,20 @@ def redesigned_likelihoods(
         return run
 
     choices = {f"{window} rows": of(window) for window in windows}
-    return _likelihoods(study, choices, {"alpha": alphas}, drives, seed, progress)
+    return _likelihoods(study, choices, {"alpha": alphas}, drives, seed, progress, stores.under("redesigned"))
 
 
 def _likelihoods(
-    study: Study, choices: dict[str, Callable], numbers: dict[str, Any], drives: int, seed: int, progress: Progress
+    study: Study,
+    choices: dict[str, Callable],
+    numbers: dict[str, Any],
+    drives: int,
+    seed: int,
+    progress: Progress,
+    stores: Stores,
 ) -> np.ndarray:
     """(choices, *numbers, drives): of drives whose seed differs from the report's."""
-    seen = drives_of(study, {"both": CASES["both"]}, drives, jax.random.key(seed))
+    seen = drives_of(study, {"both": CASES["both"]}, drives, jax.random.key(seed), stores=stores)
     car = model_car(study, fiala(study))
 
     def run(point, key, drive):
@@ -117,7 +127,8 @@ def _likelihoods(
     data = jax.tree.map(
         lambda leaf: np.broadcast_to(leaf.reshape(*[1] * len(shape), *leaf.shape[1:]), (*shape, *leaf.shape[1:])), seen
     )
-    return sweeps.sweep(run, design, drives, jax.random.key(seed + 1), data=data, progress=progress)["log_likelihood"]
+    key = jax.random.key(seed + 1)
+    return stores.sweep("likelihoods", run, design, drives, key, data=data, progress=progress)["log_likelihood"]
 
 
 def main() -> None:

@@ -36,7 +36,7 @@ from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
 from jaxveh.experiments.report import interval, spread
 from jaxveh.filters import kit
 from jaxveh.statespace import AbstractWrapper
-from jaxveh.sweeps import Table
+from jaxveh.sweeps import IN_MEMORY, Stores, Table
 from jaxveh.tyres import Contact
 
 SHOWN = {"constant": CASES["constant"], "both": CASES["both"], "both, 5 degrees of steer": LIMIT["right tyre"]}
@@ -86,18 +86,21 @@ class PrintedNoise(AbstractWrapper):
         return eqx.tree_at(lambda m: m.measurement_noise.std, model, kind(*stds))
 
 
-def as_printed(*, seeds: int = 20, seed: int = 0, progress: Progress = silent) -> list[Table]:
+def as_printed(
+    *, seeds: int = 20, seed: int = 0, progress: Progress = silent, stores: Stores = IN_MEMORY
+) -> list[Table]:
     """The printed settings: noise and transition of eqs 12 to 25, and the tyre of eqs 9 to 11, to the letter."""
-    study = Study()
+    study, stores = Study(), stores.under("as-printed")
     drive_key, filter_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 1))
-    drives = drives_of(study, SHOWN, seeds, drive_key, progress=part(progress, 0.0, 0.2, "drives"))
+    drives = drives_of(study, SHOWN, seeds, drive_key, progress=part(progress, 0.0, 0.2, "drives"), stores=stores)
     raced = race(
-        study, SHOWN, drives, filter_key, entrants=entrants(study), progress=part(progress, 0.2, 0.7, "filters")
-    )
+        study, SHOWN, drives, filter_key, entrants=entrants(study),
+        progress=part(progress, 0.2, 0.7, "filters"), stores=stores,
+    )  # fmt: skip
     few = {name: one for name, one in entrants(study).items() if name in (PLAIN, ADAPTIVE)}
     own = race(
         study, SHOWN, drives, filter_key, entrants=few, tyre=printed_tyre,
-        progress=part(progress, 0.7, 1.0, "printed tyre"),
+        progress=part(progress, 0.7, 1.0, "printed tyre"), stores=stores.under("printed-tyre"),
     )  # fmt: skip
     progress(1.0, 1.0, "done")
     return [_noise_table(raced), _tyre_race(raced, own), tyre_table(study)]

@@ -22,7 +22,7 @@ from jaxveh.experiments.model_adaptive_pf.drives import Drive
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, PROCESS, WRONG_LENGTHS, Study
 from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
 from jaxveh.experiments.report import Check, at_most, interval, spread, with_terms
-from jaxveh.sweeps import Comparison, Table, compare
+from jaxveh.sweeps import IN_MEMORY, Comparison, Stores, Table, compare
 
 ERRORS = {"sideslip": "sideslip, degrees", "v_y": "v_y, m/s", "yaw_rate": "yaw rate, degrees/s"}
 
@@ -45,25 +45,34 @@ class Reproduction(NamedTuple):
     misled: Raced
 
 
-def run(study: Study | None = None, *, seeds: int = 20, seed: int = 0, progress: Progress = silent) -> Reproduction:
+def run(
+    study: Study | None = None,
+    *,
+    seeds: int = 20,
+    seed: int = 0,
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
+) -> Reproduction:
     """All drives and estimators over `seeds` seeds (at least two)."""
     study = study or Study()
     # Other drives than those on which the noises were chosen, whose key was another.
     drive_key, filter_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 1))
     cases = {**CASES, **LIMIT}
-    drives = drives_of(study, cases, seeds, drive_key, progress=part(progress, 0.0, 0.15, "drives"))
-    raced = race(study, cases, drives, filter_key, progress=part(progress, 0.15, 0.7, "filters"))
+    drives = drives_of(study, cases, seeds, drive_key, progress=part(progress, 0.0, 0.15, "drives"), stores=stores)
+    raced = race(study, cases, drives, filter_key, progress=part(progress, 0.15, 0.7, "filters"), stores=stores)
     on = lambda *names: _drives_on(drives, cases, names)
-    told = part(progress, 0.7, 0.8, "process noise")
-    pressed = race(study, PROCESS, on(*["both"] * len(PROCESS)), filter_key, only=PRESSED, progress=told)
+    pressed = race(
+        study, PROCESS, on(*["both"] * len(PROCESS)), filter_key, only=PRESSED,
+        progress=part(progress, 0.7, 0.8, "process noise"), stores=stores.under("process-noise"),
+    )  # fmt: skip
     same = {name: CASES[name] for name in ("constant", "both")}
     unaware = race(
         study, same, on(*same), filter_key, only=JUDGED, entrants=contestants(study, lags=False),
-        progress=part(progress, 0.8, 0.9, "no relaxation known"),
+        progress=part(progress, 0.8, 0.9, "no relaxation known"), stores=stores.under("no-relaxation"),
     )  # fmt: skip
     misled = race(
         study, WRONG_LENGTHS, on(*[name.split(",")[0] for name in WRONG_LENGTHS]), filter_key, only=JUDGED,
-        progress=part(progress, 0.9, 1.0, "wrong relaxation lengths"),
+        progress=part(progress, 0.9, 1.0, "wrong relaxation lengths"), stores=stores.under("wrong-lengths"),
     )  # fmt: skip
     progress(1.0, 1.0, "done")
     return Reproduction(seeds, raced, pressed, unaware, misled)

@@ -15,6 +15,7 @@ from jaxveh._core.progress import Progress, silent
 from jaxveh.experiments.model_adaptive_pf.contestants import Contestant, contestants, of_a_point
 from jaxveh.experiments.model_adaptive_pf.drives import Drive, drive_once, fiala
 from jaxveh.experiments.model_adaptive_pf.settings import Case, Study
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 
 class Raced(NamedTuple):
@@ -31,7 +32,15 @@ class Raced(NamedTuple):
         return self.found.at(name, estimator=estimator, case=float(list(self.cases).index(case)))
 
 
-def drives_of(study: Study, cases: Mapping[str, Case], seeds: int, key, *, progress: Progress = silent) -> Drive:
+def drives_of(
+    study: Study,
+    cases: Mapping[str, Case],
+    seeds: int,
+    key,
+    *,
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
+) -> Drive:
     """Drives of each case, one a seed: (cases, seeds, T)."""
     check_whole("seeds", seeds, 2)
     columns = Case(*(jnp.asarray(np.array(values, float)) for values in zip(*cases.values(), strict=True)))
@@ -40,7 +49,7 @@ def drives_of(study: Study, cases: Mapping[str, Case], seeds: int, key, *, progr
         case = jax.tree.map(lambda column: column[point.case.astype(int)], columns)
         return drive_once(study, case, key)
 
-    found = sweeps.sweep(run, _design(cases), seeds, key, progress=progress)
+    found = stores.sweep("drives", run, _design(cases), seeds, key, progress=progress)
     return Drive(**{name: found[name] for name in Drive._fields})
 
 
@@ -54,6 +63,7 @@ def race(
     entrants: Mapping[str, Contestant] | None = None,
     tyre: Callable[..., Any] = fiala,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Raced:
     """Every estimator (or `only` these, or others: `entrants`) on the same drives, (cases, seeds, T); filters draw from `key`."""
     every = contestants(study) if entrants is None else entrants
@@ -63,7 +73,7 @@ def race(
     runs = {name: of_a_point(study, contestant, tyre) for name, contestant in chosen.items()}
     design = sweeps.Design(estimator=runs, **{axis.name: axis.values for axis in _design(cases).axes})
     run = lambda point, key, data: point.estimator(point, key, data)
-    found = sweeps.sweep(run, design, seeds, key, data=(own, drives), progress=progress)
+    found = stores.sweep("race", run, design, seeds, key, data=(own, drives), progress=progress)
     return Raced(study, dict(cases), drives, found)
 
 

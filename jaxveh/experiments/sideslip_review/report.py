@@ -36,7 +36,7 @@ from jaxveh.experiments.sideslip_review.verdicts import (
     number,
     verdicts,
 )
-from jaxveh.sweeps import Table, compare
+from jaxveh.sweeps import IN_MEMORY, Stores, Table, compare
 
 FIRST = next(iter(WHAT))
 """The baseline."""
@@ -58,6 +58,7 @@ def run(
     log: Any = None,
     car: Any = None,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Reproduction:
     """All drives and methods over `seeds` seeds (at least two).
 
@@ -68,8 +69,9 @@ def run(
     share = 1.0 if log is None else 0.6
     # Other drives than those on which the noises were chosen.
     key = jax.random.fold_in(jax.random.key(seed), 1)
-    drives = drives_of(study, seeds, key, progress=part(progress, 0.0, 0.25 * share, "drives"))
-    raced = race(study, drives, jax.random.key(seed), progress=part(progress, 0.25 * share, share, "methods"))
+    drives = drives_of(study, seeds, key, progress=part(progress, 0.0, 0.25 * share, "drives"), stores=stores)
+    told = part(progress, 0.25 * share, share, "methods")
+    raced = race(study, drives, jax.random.key(seed), progress=told, stores=stores)
     logged = None if log is None else on_log(study, log, car, progress=part(progress, share, 1.0, "log"))
     progress(1.0, 1.0, "done")
     return Reproduction(seeds, raced, logged)
@@ -117,9 +119,11 @@ def tables(result: Reproduction) -> list[Table]:
     ]
 
 
-def as_printed(*, seeds: int = 20, seed: int = 0, progress: Progress = silent) -> list[Table]:
+def as_printed(
+    *, seeds: int = 20, seed: int = 0, progress: Progress = silent, stores: Stores = IN_MEMORY
+) -> list[Table]:
     """The review's own equations as printed and as they should be; nothing in them is random."""
-    del seeds, seed
+    del seeds, seed, stores
     progress(1.0, 1.0, "done")
     return [equations()]
 

@@ -15,6 +15,7 @@ from jaxveh.experiments.sideslip_review.contestants import WHAT, Found, Group, g
 from jaxveh.experiments.sideslip_review.drives import Drive, drive_once, scenario_at
 from jaxveh.experiments.sideslip_review.models import models_of, sheet_cars
 from jaxveh.experiments.sideslip_review.settings import SCENARIOS, Study
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 EVERY = 10
 """Rows between those of the courses that are kept."""
@@ -38,12 +39,18 @@ class Raced(NamedTuple):
 
 
 def drives_of(
-    study: Study, seeds: int, key, *, scenarios: tuple[str, ...] = tuple(SCENARIOS), progress: Progress = silent
+    study: Study,
+    seeds: int,
+    key,
+    *,
+    scenarios: tuple[str, ...] = tuple(SCENARIOS),
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Drive:
     """Drives of the scenarios, one a seed: (scenarios, seeds, T). A seed steers alike in all of one pace, with one car."""
     check_whole("seeds", seeds, 2)
     run = lambda point, key: drive_once(study, scenario_at(point.scenario), key)
-    found = sweeps.sweep(run, _design(scenarios), seeds, key, progress=progress)
+    found = stores.sweep("drives", run, _design(scenarios), seeds, key, progress=progress)
     return Drive(**{name: found[name] for name in Drive._fields})
 
 
@@ -60,6 +67,7 @@ def race(
     scenarios: tuple[str, ...] = tuple(SCENARIOS),
     only: tuple[str, ...] | None = None,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Raced:
     """Every method (or `only` these) on the same drives, (scenarios, seeds, T); filters draw from `key`."""
     wanted = tuple(WHAT) if only is None else only
@@ -71,7 +79,9 @@ def race(
     for i, group in enumerate(chosen):
         told = part(progress, i / len(chosen), (i + 1) / len(chosen), ", ".join(group.names))
         run = _score(study, group)
-        swept = sweeps.sweep(run, _design(scenarios), seeds, key, data=drives, progress=told)
+        swept = stores.under(group.names[0].replace(" ", "-")).sweep(
+            "race", run, _design(scenarios), seeds, key, data=drives, progress=told
+        )
         for path, values in swept.values.items():
             name, metric = path.rsplit(".", 1)
             found.setdefault(name, {})[metric] = values

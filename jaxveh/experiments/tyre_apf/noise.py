@@ -25,6 +25,7 @@ from jaxveh._core.recording import Recording
 from jaxveh.experiments.tyre_apf.settings import LEVELS, NoiseLevel, Study, StudyNoise
 from jaxveh.experiments.tyre_apf.sharpness import KINDS, PAPERS_PARTICLES, Kinds, drive_at, several_passes
 from jaxveh.experiments.tyre_apf.study import drive_once, filter_of, guess_once, model_of
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 V_Y = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 """Candidates: m/s,"""
@@ -92,6 +93,7 @@ def choose_level(
     seed: int = 2000,
     kinds: Kinds | None = None,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Choice:
     """Choose what both particle filters assume at a level of the sensors' noise, resampling as the paper does: the candidate with
     the largest mean of their log-likelihoods, over every pass of each drive. One with which a filter fails is out.
@@ -108,7 +110,8 @@ def choose_level(
     both = [kind(particles, numerics.multinomial) for kind in (KINDS if kinds is None else kinds).values()]
     for i, (drives, again) in enumerate(rounds):
         told = part(progress, i / len(rounds), (i + 1) / len(rounds), f"round {i + 1}")
-        log_likelihood = _of_level(study, level, both, candidates, again, (drives, seed + i), told)
+        own = stores.under(f"round-{i + 1}")
+        log_likelihood = _of_level(study, level, both, candidates, again, (drives, seed + i), told, own)
         found = _best(candidates, log_likelihood)
         # In the order of the grid.
         candidates = candidates[np.sort(np.argsort(-log_likelihood.mean(axis=1), kind="stable")[:keep])]
@@ -132,8 +135,15 @@ def _best(candidates: np.ndarray, log_likelihood: np.ndarray) -> Choice:
 
 
 def _of_level(
-    study: Study, level: NoiseLevel, both, candidates, again: int, drives: tuple[int, int], progress: Progress
-):
+    study: Study,
+    level: NoiseLevel,
+    both,
+    candidates,
+    again: int,
+    drives: tuple[int, int],
+    progress: Progress,
+    stores: Stores,
+) -> np.ndarray:
     """Log-likelihoods (candidates, drives): both filters' means over passes, summed. `drives`: how many, from which seed."""
     values = jnp.asarray(candidates)
 
@@ -146,7 +156,8 @@ def _of_level(
 
     design = sweeps.Design(candidate=range(len(candidates)))
     count, seed = drives
-    return sweeps.sweep(run, design, count, jax.random.key(seed), progress=progress)["log_likelihood"]
+    found = stores.sweep("likelihoods", run, design, count, jax.random.key(seed), progress=progress)
+    return found["log_likelihood"]
 
 
 def _drives(study: Study, name: str, keys):

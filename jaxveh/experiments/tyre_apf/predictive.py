@@ -25,6 +25,7 @@ from jaxveh.experiments.tyre_apf.sharpness import (
     likelihood_ratio,
     run_sharpness,
 )
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 
 def race(
@@ -39,6 +40,7 @@ def race(
     particles: int = PAPERS_PARTICLES,
     again: int = AGAIN,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> tuple[list[NoiseLevel], Sharpness]:
     """The levels with the noise that is chosen, and both filters at them over `seeds` drives."""
     chosen, share = [], 0.8 / len(levels)
@@ -53,11 +55,20 @@ def race(
             keep=keep,
             kinds=PREDICTIVE,
             progress=told,
+            stores=stores.under(f"level-{i + 1}"),
         )
         chosen.append(level._replace(noise=choice.noise))
     told = part(progress, 0.8, 1.0, "race")
     raced = run_sharpness(
-        study, seeds, key, counts=(particles,), again=again, kinds=PREDICTIVE, levels=chosen, progress=told
+        study,
+        seeds,
+        key,
+        counts=(particles,),
+        again=again,
+        kinds=PREDICTIVE,
+        levels=chosen,
+        progress=told,
+        stores=stores,
     )
     return chosen, raced
 

@@ -17,6 +17,7 @@ from jaxveh.experiments.tyre_apf.settings import tyres
 from jaxveh.experiments.tyre_apf.study import auxiliary
 from jaxveh.simulation import simulate
 from jaxveh.statespace import Continuous, Gaussian
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,8 +61,10 @@ def closest_share(series, truth, share: float):
     return jnp.mean(jnp.take_along_axis(series, order, axis=-1), axis=-1)
 
 
-def run_printed(printed: Printed, seeds: int, key) -> PrintedOutcome:
-    """The printed experiment over `seeds` seeds, in one batch."""
+def run_printed(printed: Printed, seeds: int, key, *, stores: Stores = IN_MEMORY) -> PrintedOutcome:
+    """The printed experiment over `seeds` seeds, in one batch; with stores, in chunks of seeds."""
+    if stores.folder is not None:
+        return stores.each("printed", lambda key: one_printed_run(printed, key), jax.random.split(key, seeds))
     return _every_seed(printed, jax.random.split(key, seeds))
 
 

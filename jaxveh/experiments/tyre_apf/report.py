@@ -31,7 +31,7 @@ from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
 from jaxveh.experiments.tyre_apf.study import FIELDS
 from jaxveh.experiments.tyre_apf.tables import tables_as_printed
 from jaxveh.simulation import simulate
-from jaxveh.sweeps import Table
+from jaxveh.sweeps import IN_MEMORY, Stores, Table
 
 
 def run(
@@ -41,24 +41,28 @@ def run(
     seeds: int = 20,
     seed: int = 0,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Reproduction:
     """Run the honest study, the saturated drives, the sharpness of sensors and the printed settings over `seeds` seeds."""
     check_at_least("seeds", seeds, 2)
     study, printed = study or Study(), printed or Printed()
     honest_key, printed_key = jax.random.split(jax.random.key(seed))
-    staged = run_staged(study, seeds, honest_key, progress=part(progress, 0.0, 0.4, "lane change"))
+    told = part(progress, 0.0, 0.4, "lane change")
+    staged = run_staged(study, seeds, honest_key, progress=told, stores=stores.under("lane-change"))
     progress(0.4, 1.0, "observability in the lane change")
     lane_change = lane_change_observability(study)
     # Drives of their own, beside the study's.
     saturated_key, sharp_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 2))
-    saturated = run_saturated(study, seeds, saturated_key, progress=part(progress, 0.42, 0.65, "saturated"))
-    sharpness = run_sharpness(study, seeds, sharp_key, progress=part(progress, 0.65, 0.84, "sharpness"))
+    told = part(progress, 0.42, 0.65, "saturated")
+    saturated = run_saturated(study, seeds, saturated_key, progress=told, stores=stores.under("saturated"))
+    told = part(progress, 0.65, 0.84, "sharpness")
+    sharpness = run_sharpness(study, seeds, sharp_key, progress=told, stores=stores.under("sharpness"))
     ahead = run_sharpness(
         study, seeds, sharp_key, counts=(PAPERS_PARTICLES,), kinds=PREDICTIVE, levels=LOOKING_AHEAD,
-        progress=part(progress, 0.84, 0.92, "looking ahead with the noise"),
+        progress=part(progress, 0.84, 0.92, "looking ahead with the noise"), stores=stores.under("ahead"),
     )  # fmt: skip
     progress(0.92, 1.0, "printed settings")
-    found = jax.block_until_ready(run_printed(printed, seeds, printed_key))
+    found = jax.block_until_ready(run_printed(printed, seeds, printed_key, stores=stores))
     progress(1.0, 1.0, "done")
     return Reproduction(
         study, seeds, staged.outcome, staged.steps, lane_change, saturated, sharpness, ahead, found, printed,
@@ -76,12 +80,14 @@ def looked_at_the_truth(staged: Staged, printed: Printed) -> dict[str, np.ndarra
     return found
 
 
-def as_printed(*, seeds: int = 20, seed: int = 0, progress: Progress = silent) -> list[Table]:
+def as_printed(
+    *, seeds: int = 20, seed: int = 0, progress: Progress = silent, stores: Stores = IN_MEMORY
+) -> list[Table]:
     """The printed settings alone, errata included."""
     progress(0.0, 1.0, "printed settings")
     printed = Printed()
     _, key = jax.random.split(jax.random.key(seed))
-    found = jax.block_until_ready(run_printed(printed, seeds, key))
+    found = jax.block_until_ready(run_printed(printed, seeds, key, stores=stores.under("as-printed")))
     progress(1.0, 1.0, "done")
     return tables_as_printed(found, printed)
 

@@ -29,6 +29,7 @@ from jaxveh.fitting import pose_shooting, solve
 from jaxveh.simulation import simulate
 from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace import kit as statespace_kit
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 SWEEP = "sweep of 15 degrees"
 
@@ -73,12 +74,15 @@ def run_saturated(
     unknown: tuple[str, ...] = tuple(UNKNOWN),
     only: tuple[str, ...] | None = None,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Saturated:
     """UKF and MAP (or `only` these) on both drives, with D and B `unknown`; with all eight the UKF alone, since a
     fit takes long to say that they cannot be told apart."""
     cases = cases_of(study)
     progress(0.0, 1.0, "drives")
-    drives = [_drives(study, manoeuvre, seeds, key) for manoeuvre in cases.values()]
+    drives = [
+        _drives(study, manoeuvre, seeds, key, stores.under(f"case-{i}")) for i, manoeuvre in enumerate(cases.values())
+    ]
     data = jax.tree.map(lambda *leaves: np.stack(leaves), *drives)
     found, bounds = {}, {}
     for i, name in enumerate(unknown):
@@ -90,7 +94,9 @@ def run_saturated(
         run = lambda point, key, drive: point.estimator(key, drive)
         told = part(progress, i / len(unknown), (i + 1) / len(unknown), name)
         # Optimistix' linear solves cannot be split over devices.
-        found[name] = sweeps.sweep(run, design, seeds, key, data=data, devices=jax.devices()[:1], progress=told)
+        found[name] = stores.under(name.replace(" ", "-")).sweep(
+            "estimates", run, design, seeds, key, data=data, devices=jax.devices()[:1], progress=told
+        )
     return Saturated(tuple(cases), found, bounds)
 
 
@@ -99,14 +105,14 @@ def _record(study: Study, manoeuvre, key, throw: bool = False) -> Recording:
     return simulate(vehicles.passenger_car(), manoeuvre, devices, key=key, dt=1 / study.rate, throw=throw)
 
 
-def _drives(study: Study, manoeuvre, seeds: int, key) -> dict[str, np.ndarray]:
+def _drives(study: Study, manoeuvre, seeds: int, key, stores: Stores) -> dict[str, np.ndarray]:
     """The channels that filters see, (seeds, T)."""
 
     def run(point, key):
         drive = _record(study, manoeuvre, jax.random.fold_in(key, 1))
         return {"time": drive.time} | {name: drive[name] for name in ("yaw_rate", "a_y", "steer", "v_x")}
 
-    return dict(sweeps.sweep(run, sweeps.Design(), seeds, key).values)
+    return dict(stores.sweep("drives", run, sweeps.Design(), seeds, key).values)
 
 
 def _bounds(study: Study, manoeuvre, where) -> Observability:

@@ -20,6 +20,7 @@ from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
 from jaxveh.experiments.tyre_apf.settings import LEVELS, NoiseLevel, Study, StudyNoise, tyres
 from jaxveh.experiments.tyre_apf.study import auxiliary, drive_once, guess_once, model_of
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 PAPERS_PARTICLES = 300
 """As printed."""
@@ -59,6 +60,7 @@ def run_sharpness(
     kinds: Kinds | None = None,
     levels: Sequence[NoiseLevel] = LEVELS,
     progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Sharpness:
     """Both filters (`kinds`, by default `KINDS`) with every number of particles at each of the `levels` of noise.
 
@@ -70,7 +72,7 @@ def run_sharpness(
         design = sweeps.Design(filter={"prior": _prior(study), **runs}, level=range(len(levels)))
         told = part(progress, i / len(counts), (i + 1) / len(counts), f"{count} particles")
         run = lambda point, key: point.filter(point.level, key)
-        found[count] = sweeps.sweep(run, design, seeds, key, progress=told)
+        found[count] = stores.under(f"{count}-particles").sweep("passes", run, design, seeds, key, progress=told)
     return Sharpness(found)
 
 

@@ -35,6 +35,7 @@ from jaxveh.experiments.tyre_apf.study import (
 from jaxveh.fitting import cut, pose_shooting, solve
 from jaxveh.simulation import simulate
 from jaxveh.statespace import RolledRK4
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 FILTERS = ("PF", "APF", "UKF")
 
@@ -63,9 +64,9 @@ class Staged(NamedTuple):
     seconds: dict[str, Seconds]
 
 
-def run_staged(study: Study, seeds: int, key, *, progress: Progress = silent) -> Staged:
-    """The study over `seeds` seeds, compiled and run in stages, all seeds together."""
-    clock = _Clock(seeds, progress)
+def run_staged(study: Study, seeds: int, key, *, progress: Progress = silent, stores: Stores = IN_MEMORY) -> Staged:
+    """The study over `seeds` seeds, compiled and run in stages, all seeds together; with stores, in chunks of seeds."""
+    clock = _Clock(seeds, progress, stores)
     parts = jax.vmap(lambda key: jax.random.split(key, 4))(jax.random.split(key, seeds))
     drive, guess = clock.one(
         "simulation", lambda a, b: (drive_once(study, a), guess_once(study, b)), parts[:, 0], parts[:, 1]
@@ -189,8 +190,8 @@ def _parameters(study: Study, guess, estimates: dict, fit) -> tuple[dict, dict]:
 class _Clock:
     """Compiles stages, two at a time, runs them one at a time, and keeps what each took."""
 
-    def __init__(self, count: int, progress: Progress):
-        self.count, self.progress = count, progress
+    def __init__(self, count: int, progress: Progress, stores: Stores):
+        self.count, self.progress, self.stores = count, progress, stores
         self.seconds: dict[str, Seconds] = {}
         self.compiled: dict[str, Any] = {}
         self.done, self.total = 0.0, 13.0
@@ -232,7 +233,13 @@ class _Clock:
 
     def _compile(self, name: str, function: Callable, *args):
         start = time.perf_counter()
-        self.compiled[name] = eqx.filter_jit(self._over_batch(function)).lower(*args).compile()
+        if self.stores.folder is None:
+            self.compiled[name] = eqx.filter_jit(self._over_batch(function)).lower(*args).compile()
+        else:
+            # Compiled when a chunk is missing.
+            told = lambda done, total, stage: self.progress(self.done + done / total, self.total, f"{name}: {stage}")
+            own = self.stores.under(name.replace(" ", "-"))
+            self.compiled[name] = lambda *args: own.each("runs", function, *args, progress=told)
         self.seconds[name] = Seconds(time.perf_counter() - start, float("nan"))
         self.done += 1
 

@@ -1,0 +1,70 @@
+"""Options of programs whose sweeps can be stored: where, and who computes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from jaxveh._core.errors import InputError
+from jaxveh.io import kit
+
+if TYPE_CHECKING:
+    from jaxveh.sweeps import Stores
+
+Store = Annotated[
+    Path | None,
+    typer.Option(
+        "--store",
+        metavar="FOLDER",
+        help="Write the sweeps into Zarr stores here, chunk by chunk; the same call goes on where it was, and computes nothing "
+        "twice that is there.",
+    ),
+]
+
+Processes = Annotated[
+    int | None, typer.Option("--processes", help="With --store: in so many processes of this machine.", min=1)
+]
+
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="With --store: by the workers of a Dask scheduler (tcp://host:8786), which see FOLDER under the same path and have "
+        "the same versions and XLA_FLAGS.",
+    ),
+]
+
+
+def stores_of(folder: Path | None, processes: int | None, scheduler: str | None) -> Stores | None:
+    """The stores that the options ask for; None where there are none.
+
+    Raises `InputError` before any work: for workers without a store, for both kinds of them, for a folder that is a file, and
+    where the extra `sweep` is missing.
+    """
+    asked = [name for name, value in (("--processes", processes), ("--scheduler", scheduler)) if value is not None]
+    if folder is None:
+        if asked:
+            raise InputError(f"{asked[0]}: is for sweeps that are stored; name a folder with --store, or leave it out.")
+        return None
+    if len(asked) == 2:
+        raise InputError("--processes and --scheduler: give one of them, not both.")
+    # The nearest that is there is what the folder will be made in.
+    there = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise InputError(
+            f"--store {folder}: {'is' if there == folder.absolute() else f'{there} is'} a file; name a folder."
+        )
+    libraries = (
+        "zarr",
+        "filelock",
+        *(("cloudpickle", "loky") if processes else ()),
+        *(("distributed",) if scheduler else ()),
+    )
+    for library in libraries:
+        kit.require(library, "storing a sweep", "sweep")
+    from jaxveh.sweeps import Stores
+
+    return Stores(folder, processes=processes, client=scheduler)

@@ -1,0 +1,137 @@
+"""The stores of a study that has several sweeps: one each, in one folder."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.progress import Progress, silent
+from jaxveh.sweeps.design import Design
+from jaxveh.sweeps.running import sweep
+from jaxveh.sweeps.store import DONE, Store
+from jaxveh.sweeps.swept import Swept, named_leaves
+
+RUNS = 100
+"""Runs of a chunk, unless a study says otherwise. A run is a whole drive, or a filter over one that keeps rows: up to four
+megabytes, so that a chunk fits every machine. Round numbers of seeds are cut without a rest."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Stores:
+    """Where the sweeps of a study go: NAME.zarr in the `folder`; without one they stay in memory.
+
+    They are computed in this process, in so many `processes`, or by a Dask `client` (or a scheduler's address).
+
+    **Raises** `InputError` for processes or a client without a folder, and for both of them.
+    """
+
+    folder: str | os.PathLike | None = None
+    processes: int | None = None
+    client: Any = None
+
+    def __post_init__(self):
+        if self.folder is None and (self.processes, self.client) != (None, None):
+            raise InputError("stores: processes= and client= need a folder=; without one this process computes.")
+        if self.processes is not None and self.client is not None:
+            raise InputError("stores: give client= or processes=, not both.")
+        if self.processes is not None:
+            check_whole("processes", self.processes)
+
+    def under(self, name: str) -> Stores:
+        """The stores of a part of the study: those in the folder's folder of this name."""
+        return self if self.folder is None else dataclasses.replace(self, folder=Path(self.folder) / name)
+
+    def sweep(
+        self,
+        name: str,
+        run: Callable[..., Any],
+        design: Design,
+        seeds: int | None = None,
+        key: Any = None,
+        *,
+        data: Any = None,
+        batch: int | None = None,
+        devices: list | None = None,
+        progress: Progress = silent,
+    ) -> Swept:
+        """`sweeps.sweep`, in the store of this `name` if there are stores: what is there already is read and not computed.
+
+        Arguments are those of `sweeps.sweep`; `devices` are for a sweep without a store. Chunks of a store have `batch` or `RUNS`
+        runs. What it returns is in memory: the tables of a study read each value many times.
+
+        **Raises** `InputError` as `sweeps.sweep` does, and where chunks have failed: what follows would lack them.
+        """
+        if self.folder is None:
+            return sweep(run, design, seeds, key, data=data, batch=batch, devices=devices, progress=progress)
+        path = Path(self.folder) / f"{name}.zarr"
+        found = sweep(
+            run, design, seeds, key, data=data, batch=RUNS if batch is None else batch, progress=progress,
+            store=path, processes=self.processes, client=self.client,
+        )  # fmt: skip
+        missing = int(np.sum(Store(path).status() != DONE))
+        if missing:
+            raise InputError(
+                f"{path}: what follows needs the {missing} chunks that are not done. Start again to try them."
+            )
+        # The choices themselves, of which a store has the labels.
+        return Swept(design, found.seeds, dict(found.values))
+
+    def each(self, name: str, function: Callable[..., Any], *arguments: Any, progress: Progress = silent) -> Any:
+        """`jax.vmap(function)(*arguments)`, trees of arrays alike in their first axis, by a sweep of this `name` over its rows.
+
+        **Raises** `InputError` as `sweep` does.
+        """
+        if self.folder is None:
+            return jax.jit(jax.vmap(function))(*arguments)
+        kinds, kinds_found = _kinds(arguments), []
+
+        def run(point: Any, given: Any) -> dict[str, Any]:
+            del point
+            return {"found": _words(function(*_keyed(given, kinds)))}
+
+        found = self.sweep(name, run, Design(), data=_words(arguments), progress=progress)
+
+        def noted(*given: Any) -> Any:
+            result = function(*given)
+            # A shape does not say what kind of key it is of.
+            kinds_found[:] = _kinds(result)
+            return result
+
+        shapes = jax.eval_shape(jax.vmap(noted), *arguments)
+        names, structure = named_leaves({"found": shapes}), jax.tree.structure(shapes)
+        values = [jax.numpy.asarray(found.values[one]) for one in names]
+        return _keyed(jax.tree.unflatten(structure, values), kinds_found)
+
+
+def _kinds(tree: Any) -> list[str]:
+    """Of each leaf what kind of key it is; empty where it is none."""
+    is_key = lambda leaf: jax.numpy.issubdtype(jax.numpy.asarray(leaf).dtype, jax.dtypes.prng_key)
+    return [str(jax.random.key_impl(leaf)) if is_key(leaf) else "" for leaf in jax.tree.leaves(tree)]
+
+
+def _words(tree: Any) -> Any:
+    """The tree with keys as their words: neither data nor a store have keys."""
+    leaves, structure = jax.tree.flatten(tree)
+    leaves = [jax.numpy.asarray(leaf) for leaf in leaves]
+    keys = zip(leaves, _kinds(leaves), strict=True)
+    return jax.tree.unflatten(structure, [jax.random.key_data(leaf) if kind else leaf for leaf, kind in keys])
+
+
+def _keyed(tree: Any, kinds: list[str]) -> Any:
+    """What `_words` was given, of these kinds."""
+    leaves, structure = jax.tree.flatten(tree)
+    words = zip(leaves, kinds, strict=True)
+    return jax.tree.unflatten(
+        structure, [jax.random.wrap_key_data(leaf, impl=kind) if kind else leaf for leaf, kind in words]
+    )
+
+
+IN_MEMORY = Stores()
+"""The default: nothing is stored."""
