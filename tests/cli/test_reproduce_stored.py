@@ -12,8 +12,8 @@ from programs import error_line, run
 
 from jaxveh.cli import all_papers, reproduce
 from jaxveh.cli.family import Family
-from jaxveh.experiments.report import Table, spread
-from jaxveh.sweeps import IN_MEMORY, Design, Swept, several
+from jaxveh.experiments.report import spread
+from jaxveh.sweeps import IN_MEMORY, Design, Swept, Table, several
 
 
 class Found(NamedTuple):
