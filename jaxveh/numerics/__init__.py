@@ -6,6 +6,7 @@ All are safe to jit, batch and differentiate.
 from jaxveh.numerics import polynomials, sigma_points
 from jaxveh.numerics.angles import wrap_angle
 from jaxveh.numerics.blocks import sum_in_blocks
+from jaxveh.numerics.batch_last import scan_batch_last
 from jaxveh.numerics.by_batch import RUNS, by_batch
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
 from jaxveh.numerics.fences import apart, fence, fence_blocks, fence_results
@@ -66,6 +67,7 @@ __all__ = [
     "on_cpu",
     "polynomials",
     "residual",
+    "scan_batch_last",
     "scan_written_out",
     "secant",
     "sigma_points",

@@ -140,12 +140,12 @@ def _results(equation: Any, operands: list[Entries], finite: Sequence[Any]) -> l
         return _fenced(operands)
     if name == "cond":
         return _branches(params["branches"], operands, out, finite)
-    if name == "custom_jvp_call" and _is_ruled(params, equation):
+    if name == "custom_jvp_call" and is_ruled(params, equation):
         return _with_rule(params, operands, [one.aval for one in equation.invars], out)
     return _whole(equation, operands)
 
 
-def _is_ruled(params: dict[str, Any], equation: Any) -> bool:
+def is_ruled(params: dict[str, Any], equation: Any) -> bool:
     """Whether a function with a derivative of its own can be taken apart: its rule is at hand, and it is of floating numbers."""
     floating = all(jnp.issubdtype(one.aval.dtype, jnp.floating) for one in equation.invars)
     return floating and params.get("num_consts") == 0 and hasattr(params.get("jvp_jaxpr_fun"), "call_wrapped")
@@ -229,11 +229,16 @@ def _whole(equation: Any, operands: list[Entries]) -> list[Entries]:
         if not isinstance(one, core.Literal) and one not in variables:
             variables.append(one)
             arrays.append(array_of(those, one.aval.dtype))
+    # Else each entry would be computed from the beginning, with all that it is made of.
+    found = fence(core.jaxpr_as_fun(alone(equation, variables))(*fence(arrays)))
+    return [entries(one) for one in found]
+
+
+def alone(equation: Any, variables: list) -> core.ClosedJaxpr:
+    """One equation as a program of these variables, which are all that it reads."""
     empty = jax.make_jaxpr(lambda: ())().jaxpr
-    alone = empty.replace(
+    jaxpr = empty.replace(
         constvars=[], invars=variables, outvars=list(equation.outvars), eqns=[equation], effects=equation.effects,
         debug_info=empty.debug_info.with_unknown_names(),
     )  # fmt: skip
-    # Else each entry would be computed from the beginning, with all that it is made of.
-    found = fence(core.jaxpr_as_fun(core.ClosedJaxpr(alone, []))(*fence(arrays)))
-    return [entries(one) for one in found]
+    return core.ClosedJaxpr(jaxpr, [])

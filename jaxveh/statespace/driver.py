@@ -25,6 +25,9 @@ from jaxveh.statespace.parameters import parameters_of
 FEW = 6
 """States up to which the steps of a batch are written out in scalars."""
 
+SOME = 14
+"""States up to which a batch's axis is the last one in its steps."""
+
 WORTH = 10_000
 """Rows of all runs of a batch together from which on it is written out: fewer take some milliseconds either way, and compile in
 less time as they are. A small batch that is run thousands of times would gain nonetheless."""
@@ -112,10 +115,11 @@ def scan_and_keep(
 
 
 class Steps(enum.Enum):
-    """How steps are taken: on `whole` arrays, programs of their own; `written_out` in scalars; and so where it is known that each
-    row is `complete`."""
+    """How steps are taken: on `whole` arrays, programs of their own; so, but in a batch with its axis last (`batch_last`);
+    `written_out` in scalars; and so where it is known that each row is `complete`."""
 
     whole = "whole"
+    batch_last = "batch last"
     written_out = "written out"
     complete = "complete"
 
@@ -126,11 +130,13 @@ def in_form_for_batches(form: Callable, filter: AbstractFilter, model: StateSpac
     Where a filter shares covariances, and of a block of runs no row is missing, they are reckoned once.
     """
     whole = functools.partial(form, steps=Steps.whole)
-    if len(model.states) > FEW or who_lacks(filter, "written_out") is not None:
+    if len(model.states) > SOME or who_lacks(filter, "written_out") is not None:
         return whole(filter, model, rows, *more)
 
     def many(filter, model, rows, *more):
         of = lambda steps: lambda: form(filter, model, rows, *more, steps=steps)
+        if len(model.states) > FEW:
+            return of(Steps.batch_last)()
         if who_lacks(filter, "shares_covariances") is not None:
             return of(Steps.written_out)()
         missing = jnp.stack([~jnp.isfinite(values).all() for values in jax.tree.leaves(rows)]).any()
@@ -162,17 +168,23 @@ def scan_in_form(
         belief, info = filter.init(model, first, key)
     start = shown(belief, info)
 
-    if whole:
-        body = jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(KEPT))
-        belief, rest = jax.lax.scan(body, belief, rest)
-    else:
-        belief, rest = numerics.scan_written_out(body, belief, rest, complete=complete)
+    belief, rest = scan_by(steps, body, belief, rest)
     joined = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
     log_likelihood, results, (mean, std, info), kept = joined
     result, failed_at = first_failure(results)
     show = lambda report: None if report is None else parameters_of(model, report)
     total = jnp.sum(log_likelihood)
     return Estimate(rows.t, mean, std, total, info, result, failed_at, belief, show(mean), show(std)), kept
+
+
+def scan_by(steps: Steps, body: Callable, start: Any, rows: Any, *, reverse: bool = False) -> tuple[Any, Any]:
+    """`jax.lax.scan(body, start, rows, reverse=reverse)`, its steps taken so, and checkpointed."""
+    if steps is Steps.whole:
+        body = jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(KEPT))
+        return jax.lax.scan(body, start, rows, reverse=reverse)
+    if steps is Steps.batch_last:
+        return numerics.scan_batch_last(body, start, rows, reverse=reverse)
+    return numerics.scan_written_out(body, start, rows, reverse=reverse, complete=steps is Steps.complete)
 
 
 class Shown(NamedTuple):
