@@ -162,6 +162,7 @@ def _results(equation: Any, operands: list, size: int) -> list:
     if rule is not None:
         arrays = [wide(one, var.aval.shape, size) for one, var in zip(operands, equation.invars, strict=True)]
         found = rule(params, arrays, out)
+        if name == "dot_general" and found is not None: found = fence(found, firm=True)
         if found is not None:
             return [Last(one) for one in (found if isinstance(found, list) else [found])]
     return _by_vmap(equation, operands)
@@ -174,7 +175,7 @@ def _reduced(equation: Any, operand: Any) -> Any:
         return array
     found = last_axis.reduction(entry_rules.REDUCTIONS[equation.primitive.name][1], axes, array)
     if found is not None:
-        return found
+        return fence(found, firm=True)
     if isinstance(array, Product):
         array = array.factors[0] * array.factors[1]
     return equation.primitive.bind(array, **equation.params)
