@@ -6,7 +6,6 @@ All are safe to jit, batch and differentiate.
 from jaxveh.numerics import polynomials, sigma_points
 from jaxveh.numerics.angles import wrap_angle
 from jaxveh.numerics.blocks import sum_in_blocks
-from jaxveh.numerics.batch_last import scan_batch_last
 from jaxveh.numerics.by_batch import RUNS, by_batch
 from jaxveh.numerics.elementary import arctan, arctan2, cos, hypot, log, sin, sqrt, tan
 from jaxveh.numerics.fences import apart, fence, fence_blocks, fence_results
@@ -25,6 +24,7 @@ from jaxveh.numerics.platform import barriers_hold, on_cpu
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 from jaxveh.numerics.roots import secant
+from jaxveh.numerics.scan_last import scan_batch_last
 from jaxveh.numerics.small_systems import solve_scalars
 from jaxveh.numerics.smooth import smooth_bump, smooth_clip, smooth_ramp, smooth_step
 from jaxveh.numerics.sums import total

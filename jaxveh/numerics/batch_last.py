@@ -1,14 +1,13 @@
-"""Scans in batches whose axis is the last one of every array, along which XLA's loops then run.
+"""The results of a program for a batch whose axis is the last one of every array, along which XLA's loops then run.
 
 Under `jax.vmap` a batch stands first, and XLA on the CPU takes its small matrices one by one: sums over 11 numbers are short
-loops, and each Cholesky factor is a call of LAPACK. What `written_out` does for a few states in scalars would take too long to
+loops, and each Cholesky factor is a call of LAPACK. What `written_out` does for few states in scalars would take too long to
 compile for more.
 """
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -16,93 +15,16 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 from jax.extend import core
-from jax.interpreters import ad, batching, mlir
 
 from jaxveh.numerics import entry_rules, last_axis
 from jaxveh.numerics.fences import fence
 from jaxveh.numerics.last_axis import Last, Product, wide
 from jaxveh.numerics.platform import on_cpu
-from jaxveh.numerics.written_out import CALLS, FENCES, alone, is_ruled
-
-PyTree = Any
+from jaxveh.numerics.written_out import CALLS, FENCES, alone
 
 
-def scan_batch_last(body: Callable, start: PyTree, rows: PyTree, *, reverse: bool = False) -> tuple[PyTree, PyTree]:
-    """What `jax.lax.scan(body, start, rows, reverse=reverse)` gives, checkpointed; under `jax.vmap` with the batch's axis last.
-
-    `rows` has at least one array. Differentiable, in both modes, as `body` is.
-    """
-    carry, structure = jax.tree.flatten(start)
-    leaves = jax.tree.leaves(rows)
-    row = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(np.shape(leaf)[1:], leaf.dtype), rows)
-    closed, shapes = jax.make_jaxpr(body, return_shape=True)(start, row)
-    carry = [jnp.asarray(leaf, one.dtype) for leaf, one in zip(carry, closed.out_avals, strict=False)]
-    program = core.ClosedJaxpr(closed.jaxpr.replace(
-        constvars=[], invars=[*closed.jaxpr.constvars, *closed.jaxpr.invars], debug_info=closed.jaxpr.debug_info.with_unknown_names()
-    ), [])
-    found = _scan.bind(
-        *closed.consts, *carry, *leaves, program=program, fixed=len(closed.consts), carried=len(carry), reverse=reverse
-    )
-    end, stacked = jax.tree.unflatten(jax.tree.structure(shapes), found)
-    return jax.tree.unflatten(structure, jax.tree.leaves(end)), stacked
-
-
-def _plain(*operands: Any, program: Any, fixed: int, carried: int, reverse: bool) -> list:
-    """The scan as it is."""
-    fixed_ones, carry, rows = operands[:fixed], operands[fixed : fixed + carried], operands[fixed + carried :]
-
-    def body(carry, row):
-        found = core.jaxpr_as_fun(program)(*fixed_ones, *carry, *row)
-        return found[:carried], found[carried:]
-
-    end, shown = lax.scan(jax.checkpoint(body, prevent_cse=False), list(carry), list(rows), reverse=reverse)
-    return [*end, *shown]
-
-
-def _batched(operands: Sequence[Any], axes: Sequence[Any], **how: Any) -> tuple[list, list]:
-    """The scan of a batch."""
-    program, fixed, carried, reverse = (how[name] for name in ("program", "fixed", "carried", "reverse"))
-    size = next(one.shape[axis] for one, axis in zip(operands, axes, strict=True) if axis is not None)
-    moved = [
-        one if axis is None else Last(jnp.moveaxis(one, axis, -1)) for one, axis in zip(operands, axes, strict=True)
-    ]
-    fixed_ones, carry, rows = moved[:fixed], moved[fixed : fixed + carried], moved[fixed + carried :]
-    of_rows = [isinstance(one, Last) for one in rows]
-    shapes = [one.shape for one in program.out_avals]
-
-    def body(of_carry, seen, carry, row):
-        given = [*fixed_ones, *_boxed(carry, of_carry), *_boxed(row, of_rows)]
-        found = evaluate(program, given, size)
-        seen[:] = [isinstance(one, Last) for one in found]
-        kinds = [*(a or b for a, b in zip(of_carry, seen, strict=False)), *seen[carried:]]
-        found = [
-            wide(one, shape, size) if last else jnp.asarray(one)
-            for one, shape, last in zip(found, shapes, kinds, strict=True)
-        ]
-        # What the next row reads is computed once.
-        return fence(found[:carried]), found[carried:]
-
-    # What of the carry is the same for the whole batch, after however many steps.
-    of_carry, seen = [isinstance(one, Last) for one in carry], []
-    plain = lambda some: [one.array if isinstance(one, Last) else one for one in some]
-    while True:
-        start = [
-            wide(one, shape, size) if last else one for one, shape, last in zip(carry, shapes, of_carry, strict=False)
-        ]
-        first = [one[0] for one in plain(rows)]
-        jax.eval_shape(functools.partial(body, of_carry, seen), start, first)
-        more = [a or b for a, b in zip(of_carry, seen, strict=False)]
-        if more == of_carry:
-            break
-        of_carry = more
-    steps = jax.checkpoint(functools.partial(body, of_carry, seen), prevent_cse=False)
-    end, shown = lax.scan(steps, start, plain(rows), reverse=reverse)
-    found = [*end, *shown]
-    kinds = [*of_carry, *seen[carried:]]
-    return found, [one.ndim - 1 if last else None for one, last in zip(found, kinds, strict=True)]
-
-
-def _boxed(arrays: Sequence[Any], of_batch: Sequence[bool]) -> list:
+def boxed(arrays: Sequence[Any], of_batch: Sequence[bool]) -> list:
+    """The arrays, those `of_batch` as `Last`."""
     return [Last(one) if last else one for one, last in zip(arrays, of_batch, strict=True)]
 
 
@@ -151,13 +73,16 @@ def _results(equation: Any, operands: list, size: int) -> list:
         return evaluate(params["jaxpr"], operands, size)
     if name in FENCES:
         arrays = [one.array if isinstance(one, Last) else jnp.asarray(one) for one in operands]
-        return _boxed(equation.primitive.bind(*arrays, **params), [isinstance(one, Last) for one in operands])
+        return boxed(equation.primitive.bind(*arrays, **params), [isinstance(one, Last) for one in operands])
     if name == "cond" and not isinstance(operands[0], Last):
         return _branches(params, operands, out, size)
-    if name == "custom_jvp_call" and is_ruled(params, equation):
-        return _with_rule(params, operands, out, size)
+    if name == "custom_jvp_call":
+        return evaluate(params["call_jaxpr"], operands, size)
     if name == "gather" and not isinstance(operands[1], Last):
         return [Last(last_axis.gather(params, operands[0].array, operands[1], out[0].shape))]
+    if name == "pad" and not isinstance(operands[1], Last):
+        config = (*params["padding_config"], (0, 0, 0))
+        return [Last(lax.pad(operands[0].array, jnp.asarray(operands[1]), config))]
     rule = last_axis.MOVES.get(name) or last_axis.ALGEBRA.get(name)
     if rule is not None:
         arrays = [wide(one, var.aval.shape, size) for one, var in zip(operands, equation.invars, strict=True)]
@@ -215,7 +140,7 @@ def _branches(params: dict[str, Any], operands: list, out: list, size: int) -> l
 
     def taken(branch):
         def run(*some):
-            found = evaluate(branch, _boxed(some, of_batch), size)
+            found = evaluate(branch, boxed(some, of_batch), size)
             return [wide(one, like.shape, size) for one, like in zip(found, out, strict=True)]
 
         return run
@@ -226,44 +151,3 @@ def _branches(params: dict[str, Any], operands: list, out: list, size: int) -> l
         some = [branch for branch, names in zip(params["branches"], platforms, strict=True) if names is None or here in names]
         return [Last(one) for one in taken(some[0])(*arrays)]
     return [Last(one) for one in lax.switch(index, [taken(branch) for branch in params["branches"]], *arrays)]
-
-
-def _with_rule(params: dict[str, Any], operands: list, out: list, size: int) -> list:
-    """A function with a derivative of its own (`jax.custom_jvp`), both with the batch last."""
-    of_batch = [isinstance(one, Last) for one in operands]
-    widened = lambda found: [wide(one, like.shape, size) for one, like in zip(found, out, strict=True)]
-
-    @jax.custom_jvp
-    def function(*some):
-        return widened(evaluate(params["call_jaxpr"], _boxed(some, of_batch), size))
-
-    @function.defjvp
-    def _(primals, tangents):
-        jaxpr, constants, zero = params["jvp_jaxpr_fun"].call_wrapped(*[False] * len(operands))
-        closed = core.ClosedJaxpr(jaxpr, constants)
-        found = evaluate(closed, [*_boxed(primals, of_batch), *_boxed(tangents, of_batch)], size)
-        slopes = iter(found[len(out) :])
-        none = lambda one: jnp.zeros(one.shape, one.dtype)
-        moving = [none(one) if nothing else next(slopes) for one, nothing in zip(out, zero, strict=True)]
-        return widened(found[: len(out)]), widened(moving)
-
-    return [Last(one) for one in function(*(one.array if isinstance(one, Last) else one for one in operands))]
-
-
-def _jvp(primals: Sequence[Any], tangents: Sequence[Any], **how: Any) -> tuple[list, list]:
-    """Of a single scan."""
-    tangents = [ad.instantiate_zeros(tangent) for tangent in tangents]
-    return jax.jvp(functools.partial(_plain, **how), list(primals), tangents)
-
-
-_scan = core.Primitive("jaxveh_scan_batch_last")
-_scan.multiple_results = True
-_scan.def_impl(_plain)
-_scan.def_abstract_eval(
-    lambda *avals, **how: [
-        jax.core.ShapedArray(one.shape, one.dtype) for one in jax.eval_shape(functools.partial(_plain, **how), *avals)
-    ]
-)
-mlir.register_lowering(_scan, mlir.lower_fun(_plain, multiple_results=True))
-batching.primitive_batchers[_scan] = _batched
-ad.primitive_jvps[_scan] = _jvp

@@ -73,17 +73,21 @@ def inner_products(params: dict[str, Any], a: Array, b: Array) -> Array | None:
 
 
 def cholesky(matrix: Array) -> Array:
-    """The lower factors (n, n, size), column by column; NaN from the first pivot on that is not positive."""
-    n = len(matrix)
-    columns: list[Array] = []
-    for j in range(n):
-        column = matrix[j:, j]
-        for k, before in enumerate(columns):
-            column = column - before[j - k :] * before[j - k]
-        root = jnp.sqrt(jnp.where(column[0] > 0, column[0], jnp.nan))
-        columns.append(fence(jnp.concatenate([root[None], column[1:] / root]), firm=True))
-    full = [jnp.concatenate([jnp.zeros_like(matrix[:j, j]), column]) for j, column in enumerate(columns)]
-    return jnp.stack(full, axis=1)
+    """The lower factors (n, n, size) of matrices of which the lower triangle is read; NaN from a pivot on that is not positive.
+
+    A loop: written out, the factors of 11 states take 30 instead of 110 ns, but half a second to compile each time.
+    """
+    rows = jnp.arange(len(matrix))[:, None]
+
+    def step(j, carry):
+        rest, factor = carry
+        column = lax.dynamic_index_in_dim(rest, j, 1, keepdims=False)
+        pivot = lax.dynamic_index_in_dim(column, j, 0)
+        inverse = fence(1 / jnp.sqrt(jnp.where(pivot > 0, pivot, jnp.nan)), firm=True)
+        column = fence(jnp.where(rows >= j, column * inverse, 0), firm=True)
+        return rest - column[:, None] * column[None], lax.dynamic_update_index_in_dim(factor, column, j, 1)
+
+    return lax.fori_loop(0, len(matrix), step, (matrix, jnp.zeros_like(matrix)))[1]
 
 
 def triangular_solve(params: dict[str, Any], factor: Array, b: Array) -> Array:
