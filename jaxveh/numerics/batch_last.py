@@ -123,7 +123,6 @@ def _for_all(equation: Any, operands: list) -> list:
 
 def _by_vmap(equation: Any, operands: list) -> list:
     """An equation that nothing is known of here."""
-    print("BY VMAP", equation.primitive.name)
     values = _variables(equation, operands)
     axes = [-1 if isinstance(one, Last) else None for one in values.values()]
     arrays = [one.array if isinstance(one, Last) else one for one in values.values()]

@@ -26,7 +26,11 @@ FEW = 6
 """States up to which the steps of a batch are written out in scalars."""
 
 SOME = 14
-"""States up to which a batch's axis is the last one in its steps."""
+"""States up to which the steps of a batch are taken with its axis last: of 7 to 14 all kinds of filters gain. Of more it is not
+measured."""
+
+TOGETHER = 64
+"""Runs of a block of these: their matrices stay in a processor's own cache."""
 
 WORTH = 10_000
 """Rows of all runs of a batch together from which on it is written out: fewer take some milliseconds either way, and compile in
@@ -125,25 +129,29 @@ class Steps(enum.Enum):
 
 
 def in_form_for_batches(form: Callable, filter: AbstractFilter, model: StateSpace, rows: Row, *more: Any) -> Any:
-    """`form(filter, model, rows, *more, steps=...)`: on whole arrays, but in a batch written out where the states are few.
+    """`form(filter, model, rows, *more, steps=...)`: on whole arrays, but in a batch written out where the states are few, and
+    with the batch's axis last where they are some.
 
-    Where a filter shares covariances, and of a block of runs no row is missing, they are reckoned once.
+    Where a filter is written out and shares covariances, and of a block of runs no row is missing, they are reckoned once.
     """
     whole = functools.partial(form, steps=Steps.whole)
     if len(model.states) > SOME or who_lacks(filter, "written_out") is not None:
         return whole(filter, model, rows, *more)
 
+    least = -(-WORTH // len(rows.t))
+    if len(model.states) > FEW:
+        last = functools.partial(form, steps=Steps.batch_last)
+        return numerics.by_batch(whole, last, filter, model, rows, *more, least=least, most=TOGETHER)
+
     def many(filter, model, rows, *more):
         of = lambda steps: lambda: form(filter, model, rows, *more, steps=steps)
-        if len(model.states) > FEW:
-            return of(Steps.batch_last)()
         if who_lacks(filter, "shares_covariances") is not None:
             return of(Steps.written_out)()
         missing = jnp.stack([~jnp.isfinite(values).all() for values in jax.tree.leaves(rows)]).any()
         of_any = jax.lax.pmax(missing.astype(jnp.int32), numerics.RUNS)
         return jax.lax.cond(of_any > 0, of(Steps.written_out), of(Steps.complete))
 
-    return numerics.by_batch(whole, many, filter, model, rows, *more, least=-(-WORTH // len(rows.t)))
+    return numerics.by_batch(whole, many, filter, model, rows, *more, least=least)
 
 
 def scan_in_form(
