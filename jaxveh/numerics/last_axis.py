@@ -9,6 +9,7 @@ import operator
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
@@ -156,9 +157,18 @@ MOVES: dict[str, Callable] = {
 }
 """Primitives that put numbers elsewhere, and reckon nothing."""
 
+def _of_matrices(function: Callable, operands: Sequence[Array]) -> Array:
+    """The function of matrices (n, k, size), for each of those that lie along further axes before them."""
+    for _ in range(operands[0].ndim - 3):
+        function = jax.vmap(function)
+    return function(*operands)
+
+
 ALGEBRA: dict[str, Callable] = {
-    "cholesky": lambda params, operands, out: cholesky(*operands),
+    "cholesky": lambda params, operands, out: _of_matrices(cholesky, operands),
     "dot_general": lambda params, operands, out: inner_products(params, *operands),
-    "triangular_solve": lambda params, operands, out: triangular_solve(params, *operands),
+    "triangular_solve": lambda params, operands, out: _of_matrices(
+        functools.partial(triangular_solve, params), operands
+    ),
 }
 """Primitives of matrices; what is None is left to `jax.vmap`."""

@@ -161,8 +161,10 @@ def _back(cotangents, *operands, program, of_batch: tuple, results: tuple, size:
     linear = [i for i, one in enumerate(operands) if ad.is_undefined_primal(one)]
     known = [i for i in range(len(operands)) if i not in linear]
     given = [i for i, one in enumerate(cotangents) if not isinstance(one, ad.Zero)]
+    # What is the same for all is of each run its share: the runs' cotangents are added up below.
+    shares = [cotangents[i] if results[i] else cotangents[i] / size for i in given]
     found = _steps.bind(
-        *(operands[i] for i in known), *(cotangents[i] for i in given),
+        *(operands[i] for i in known), *shares,
         program=_pullback(program, tuple(linear), tuple(given)),
         of_batch=(*(of_batch[i] for i in known), *(results[i] for i in given)), results=(True,) * len(linear), size=size,
     )  # fmt: skip
@@ -219,12 +221,9 @@ def _batch_of_steps(operands, axes, *, program, of_batch: tuple, results: tuple,
     outer = next(one.shape[axis] for one, axis in zip(operands, axes, strict=True) if axis is not None)
     merged = []
     for one, axis, last, like in zip(operands, axes, of_batch, program.in_avals, strict=True):
-        one = one[..., None, :] if last and axis is None else one if last else one[..., None]
-        if axis is not None:
-            one = jnp.moveaxis(one, axis, -2)
-        elif not last:
-            one = one[..., None]
-        merged.append(jnp.broadcast_to(one, (*like.shape, outer, size)).reshape(*like.shape, outer * size))
+        first = one[None] if axis is None else jnp.moveaxis(one, axis, 0)
+        both = jnp.moveaxis(first, 0, -2) if last else jnp.moveaxis(first, 0, -1)[..., None]
+        merged.append(jnp.broadcast_to(both, (*like.shape, outer, size)).reshape(*like.shape, outer * size))
     found = _steps.bind(
         *merged, program=program, of_batch=(True,) * len(merged), results=(True,) * len(results), size=outer * size
     )
