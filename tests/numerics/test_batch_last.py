@@ -43,7 +43,10 @@ def sums(c, r):
 
 def contractions(c, r):
     three = c["P"].reshape(3, 3, 9)
-    x = jnp.einsum("iak,ka->i", three, c["P"][:, :3]) @ jnp.ones((3, N)) + jnp.tensordot(c["P"], three, ((0,), (2,)))[:, 0, 1]
+    x = (
+        jnp.einsum("iak,ka->i", three, c["P"][:, :3]) @ jnp.ones((3, N))
+        + jnp.tensordot(c["P"], three, ((0,), (2,)))[:, 0, 1]
+    )
     with_batch = jnp.einsum("ijk,ijl->ikl", three, three)
     wide = jnp.broadcast_to(c["x"], (8, N)).reshape(-1)
     return c | {"x": jnp.sin(x), "P": jnp.tanh(with_batch[0] + r["a"])}, (wide @ (wide + 1), jnp.outer(c["x"], c["x"]))
@@ -66,7 +69,12 @@ def choices(c, r):
     pair = lax.switch(r["n"] % 2, [lambda x: (2 * x, r["a"]), lambda x: (jnp.cos(x), x[0])], c["x"])
     x = lax.cond(c["x"][0] > 0, lambda x: x[::-1], lambda x: -x, pair[0])
     slow = lax.while_loop(lambda y: y[1] < 3, lambda y: (0.5 * y[0], y[1] + 1), (lax.stop_gradient(x), 0))[0]
-    return c | {"x": 0.3 * x + 0.1 * slow, "k": c["k"] + r["n"]}, (pair[1], jnp.argmax(x), jnp.cumsum(x), c["x"][c["k"]])
+    return c | {"x": 0.3 * x + 0.1 * slow, "k": c["k"] + r["n"]}, (
+        pair[1],
+        jnp.argmax(x),
+        jnp.cumsum(x),
+        c["x"][c["k"]],
+    )
 
 
 def rules(c, r):
@@ -87,7 +95,9 @@ def is_float(leaf):
 
 
 def batch(tree):
-    return jax.tree.map(lambda leaf: jnp.stack([leaf * (1 - 0.1 * k) if is_float(leaf) else leaf for k in range(RUNS)]), tree)
+    return jax.tree.map(
+        lambda leaf: jnp.stack([leaf * (1 - 0.1 * k) if is_float(leaf) else leaf for k in range(RUNS)]), tree
+    )
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -99,7 +109,11 @@ def test_it_is_the_scan(name):
     partly = {key: many[key] if moving[key] == 0 else start[key] for key in start}
 
     def every(scan):
-        return scan(start, rows), jax.vmap(scan)(many, batch(rows)), jax.vmap(scan, in_axes=(moving, None))(partly, rows)
+        return (
+            scan(start, rows),
+            jax.vmap(scan)(many, batch(rows)),
+            jax.vmap(scan, in_axes=(moving, None))(partly, rows),
+        )
 
     close(jax.jit(lambda: every(last))(), jax.jit(lambda: every(whole))())
 
@@ -131,7 +145,11 @@ def test_batches_of_batches_and_second_derivatives():
 
     def value(scan, c, r):
         inner = jax.vmap(lambda c, r: jnp.sum(scan(twice, c, r)[0]) + jnp.sum(scan(twice, c, r)[1]), in_axes=(0, None))
-        outer = jax.vmap(inner)(c, r) + jax.vmap(inner, in_axes=(None, 0))(c[0], r) + jax.vmap(inner, in_axes=(0, None))(c, r[0])
+        outer = (
+            jax.vmap(inner)(c, r)
+            + jax.vmap(inner, in_axes=(None, 0))(c[0], r)
+            + jax.vmap(inner, in_axes=(0, None))(c, r[0])
+        )
         return jnp.sum(outer * jnp.asarray([1.0, 2.0, 3.0]))
 
     every = lambda f: (f(c, r), jax.grad(f, (0, 1))(c, r), jax.hessian(f)(c, r), jax.jacfwd(jax.grad(f, 1), 0)(c, r))
@@ -165,7 +183,12 @@ def test_sums_of_few_terms_are_written_out_and_products_that_one_sum_reads_are_n
         given = Last(jnp.ones((4, 5, 6)))
         program = jax.make_jaxpr(lambda x: f(x))(given.array[..., 0])
         traced = jax.make_jaxpr(lambda x: evaluate(program, [Last(x)], 6)[0].array)(given.array)
-        return [one.aval.shape for equation in traced.jaxpr.eqns for one in equation.outvars if equation.primitive.name == "mul"]
+        return [
+            one.aval.shape
+            for equation in traced.jaxpr.eqns
+            for one in equation.outvars
+            if equation.primitive.name == "mul"
+        ]
 
     assert set(shapes(lambda x: jnp.sum(x[:, None] * x[None], axis=2))) == {(4, 4, 6)}
     assert set(shapes(lambda x: (x * x)[0] + jnp.sum(x * x, axis=0))) == {(4, 5, 6), (5, 6)}
