@@ -98,8 +98,8 @@ def scan(filter: AbstractFilter, model: StateSpace, rows: Row, key=None, keep: t
 
     Under `jax.vmap` a Gaussian filter of up to 14 states is another program, from `WORTH` rows of all runs together on. Up to six
     states a batch of runs is in each of its scalars: 14 times as fast for the log-likelihoods of 1000 unscented filters of three
-    states, five to seven times where all rows are kept. Of more the batch is the last axis of its matrices: six times as fast with
-    11 states.
+    states, five to seven times where all rows are kept. Of more the batch is the last axis of its matrices: six times as fast
+    with 11 states.
     Differentiate what is summed over the batch; the gradients of each run by itself, batched, are three times as slow.
     """
     return scan_and_keep(filter, model, rows, key, _nothing, keep)[0]
