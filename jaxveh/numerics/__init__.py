@@ -24,6 +24,7 @@ from jaxveh.numerics.platform import barriers_hold, on_cpu
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 from jaxveh.numerics.roots import secant
+from jaxveh.numerics.scan_last import scan_batch_last
 from jaxveh.numerics.small_systems import solve_scalars
 from jaxveh.numerics.smooth import smooth_bump, smooth_clip, smooth_ramp, smooth_step
 from jaxveh.numerics.sums import total
@@ -66,6 +67,7 @@ __all__ = [
     "on_cpu",
     "polynomials",
     "residual",
+    "scan_batch_last",
     "scan_written_out",
     "secant",
     "sigma_points",

@@ -22,8 +22,8 @@ LANES = 8
 """A block is so many times a whole number wide: what is left beside whole vectors is reckoned one by one."""
 
 
-def by_batch(single: Callable, many: Callable, *operands: Any, least: int = 1) -> Any:
-    """`single(*operands)`; under `jax.vmap`, `many(*operands)` for each of the batch, in blocks of at most `BLOCK`.
+def by_batch(single: Callable, many: Callable, *operands: Any, least: int = 1, most: int = BLOCK) -> Any:
+    """`single(*operands)`; under `jax.vmap`, `many(*operands)` for each of the batch, in blocks of at most `most`.
 
     A batch of fewer than `least` calls is `single`, too, unless further `jax.vmap`s around it make it large enough. Both are
     pure functions of pytrees, close over nothing that is traced, and give the same but for rounding: only what is quickest
@@ -46,28 +46,28 @@ def by_batch(single: Callable, many: Callable, *operands: Any, least: int = 1) -
 
     out = jax.eval_shape(flat(single), *leaves)
     kinds = tuple((o.shape, o.dtype) for o in out)
-    found = _by_batch.bind(*leaves, single=flat(single), many=flat(many), out=kinds, least=least)
+    found = _by_batch.bind(*leaves, single=flat(single), many=flat(many), out=kinds, least=least, most=most)
     form, other = shapes[0]
     return eqx.combine(jax.tree.unflatten(form, found), other)
 
 
-def _batched(leaves, axes, *, single, many, out, least):
+def _batched(leaves, axes, *, single, many, out, least, most):
     """The form for many; where there are too few, both forms in a batch of their own, of which a larger one may come."""
     size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
     leaves = [leaf if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in zip(leaves, axes, strict=True)]
     along = [None if axis is None else 0 for axis in axes]
     if size >= least:
-        return _in_blocks(leaves, along, size, many)
-    one, more = jax.vmap(single, in_axes=along), lambda *some: _in_blocks(some, along, size, many)[0]
+        return _in_blocks(leaves, along, size, many, most)
+    one, more = jax.vmap(single, in_axes=along), lambda *some: _in_blocks(some, along, size, many, most)[0]
     kinds = tuple(((size, *shape), dtype) for shape, dtype in out)
-    found = _by_batch.bind(*leaves, single=one, many=more, out=kinds, least=-(-least // size))
+    found = _by_batch.bind(*leaves, single=one, many=more, out=kinds, least=-(-least // size), most=most)
     return found, [0] * len(found)
 
 
-def _in_blocks(leaves, axes, size, many):
+def _in_blocks(leaves, axes, size, many, most):
     """`many` in blocks, one after the other; a last block that is not full repeats its last call."""
     whole = jax.vmap(many, in_axes=axes, axis_name=RUNS)
-    blocks, width = blocks_of(size)
+    blocks, width = blocks_of(size, most)
     if blocks == 1:
         found = whole(*leaves)
         return found, [0] * len(found)
@@ -86,20 +86,20 @@ def _in_blocks(leaves, axes, size, many):
     return [one[:size] if fill else one for one in joined], [0] * len(joined)
 
 
-def blocks_of(size: int) -> tuple[int, int]:
+def blocks_of(size: int, most: int = BLOCK) -> tuple[int, int]:
     """How many blocks of how many calls a batch is taken in: without a rest where that goes, for which results are copied."""
-    fewest = -(-size // BLOCK)
+    fewest = -(-size // most)
     if fewest == 1:
         return 1, size
-    for blocks in range(fewest, size // LEAST + 1):
+    for blocks in range(fewest, size // min(LEAST, most) + 1):
         if size % blocks == 0 and size // blocks % LANES == 0:
             return blocks, size // blocks
     return fewest, -(-size // (fewest * LANES)) * LANES
 
 
-def _jvp(primals, tangents, *, single, many, out, least):
+def _jvp(primals, tangents, *, single, many, out, least, most):
     """Of what moves, by the form for a single call."""
-    del many, out, least
+    del many, out, least, most
     moves = [i for i, tangent in enumerate(tangents) if not isinstance(tangent, ad.Zero)]
 
     def function(*some):

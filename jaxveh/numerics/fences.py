@@ -93,7 +93,9 @@ def _firmly(worth: bool) -> Callable:
 
 def _lowered(*leaves, worth, barrier):
     found = list(leaves)
-    some = [i for i, leaf in enumerate(found) if not worth or _worth_storing(leaf, 1 if barrier else MANY)]
+    some = [
+        i for i, leaf in enumerate(found) if leaf.size and (not worth or _worth_storing(leaf, 1 if barrier else MANY))
+    ]
     if some:
         through = lax.optimization_barrier if barrier else _through_branch
         for i, leaf in zip(some, through([found[i] for i in some]), strict=True):

@@ -229,11 +229,16 @@ def _whole(equation: Any, operands: list[Entries]) -> list[Entries]:
         if not isinstance(one, core.Literal) and one not in variables:
             variables.append(one)
             arrays.append(array_of(those, one.aval.dtype))
+    # Else each entry would be computed from the beginning, with all that it is made of.
+    found = fence(core.jaxpr_as_fun(alone(equation, variables))(*fence(arrays)))
+    return [entries(one) for one in found]
+
+
+def alone(equation: Any, variables: list) -> core.ClosedJaxpr:
+    """One equation as a program of these variables, which are all that it reads."""
     empty = jax.make_jaxpr(lambda: ())().jaxpr
-    alone = empty.replace(
+    jaxpr = empty.replace(
         constvars=[], invars=variables, outvars=list(equation.outvars), eqns=[equation], effects=equation.effects,
         debug_info=empty.debug_info.with_unknown_names(),
     )  # fmt: skip
-    # Else each entry would be computed from the beginning, with all that it is made of.
-    found = fence(core.jaxpr_as_fun(core.ClosedJaxpr(alone, []))(*fence(arrays)))
-    return [entries(one) for one in found]
+    return core.ClosedJaxpr(jaxpr, [])

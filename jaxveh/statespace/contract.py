@@ -56,7 +56,8 @@ class AbstractFilter(eqx.Module):
       would be smoothed wrongly without a word, so that this is not inherited (`smoothing_of`).
     - `noise_by_row`: the model's measurement noise may be another in each row, and is taken as it is there. (Not where a filter
       learns a noise of its own.)
-    - `written_out`: in a batch its steps are written out in scalars where the states are few (`numerics.scan_written_out`).
+    - `written_out`: in a batch its steps are written out in scalars where the states are few (`numerics.scan_written_out`), and
+      have the batch's axis last up to 14 (`numerics.scan_batch_last`).
     - `shares_covariances`: in a batch of runs with the same noises, of which no row is missing, it has one covariance for all.
     - `rows_between`: rows may be put between others, since what it does in a step depends on the time that passes alone. (Not
       where each step adds noise, or learns of one.)

@@ -25,6 +25,13 @@ from jaxveh.statespace.parameters import parameters_of
 FEW = 6
 """States up to which the steps of a batch are written out in scalars."""
 
+SOME = 14
+"""States up to which the steps of a batch are taken with its axis last. Of 7 to 14 each kind of filter gains, four to nine times
+(an iterated one 1.6), and compiles for at most twice as long; of more it is not measured."""
+
+TOGETHER = 64
+"""Runs of a block of these: their matrices stay in a processor's own cache."""
+
 WORTH = 10_000
 """Rows of all runs of a batch together from which on it is written out: fewer take some milliseconds either way, and compile in
 less time as they are. A small batch that is run thousands of times would gain nonetheless."""
@@ -89,9 +96,10 @@ def run(
 def scan(filter: AbstractFilter, model: StateSpace, rows: Row, key=None, keep: tuple[str, ...] = SHOWN) -> Estimate:
     """The compiled part of `run`, over rows with (T,) leaves.
 
-    Under `jax.vmap` a Gaussian filter of few states is another program, with a batch of runs in each of its scalars, from `WORTH`
-    rows of all runs together on: 14 times as fast for the log-likelihoods of 1000 unscented filters of three states, five to
-    seven times where all rows are kept.
+    Under `jax.vmap` a Gaussian filter of up to 14 states is another program, from `WORTH` rows of all runs together on. Up to six
+    states a batch of runs is in each of its scalars: 14 times as fast for the log-likelihoods of 1000 unscented filters of three
+    states, five to seven times where all rows are kept. Of more the batch is the last axis of its matrices: six times as fast
+    with 11 states.
     Differentiate what is summed over the batch; the gradients of each run by itself, batched, are three times as slow.
     """
     return scan_and_keep(filter, model, rows, key, _nothing, keep)[0]
@@ -112,22 +120,29 @@ def scan_and_keep(
 
 
 class Steps(enum.Enum):
-    """How steps are taken: on `whole` arrays, programs of their own; `written_out` in scalars; and so where it is known that each
-    row is `complete`."""
+    """How steps are taken: on `whole` arrays, programs of their own; so, but in a batch with its axis last (`batch_last`);
+    `written_out` in scalars; and so where it is known that each row is `complete`."""
 
     whole = "whole"
+    batch_last = "batch last"
     written_out = "written out"
     complete = "complete"
 
 
 def in_form_for_batches(form: Callable, filter: AbstractFilter, model: StateSpace, rows: Row, *more: Any) -> Any:
-    """`form(filter, model, rows, *more, steps=...)`: on whole arrays, but in a batch written out where the states are few.
+    """`form(filter, model, rows, *more, steps=...)`: on whole arrays, but in a batch written out up to `FEW` states, and
+    with the batch's axis last up to `SOME`.
 
-    Where a filter shares covariances, and of a block of runs no row is missing, they are reckoned once.
+    Where a filter that is written out shares covariances, and of a block of runs no row is missing, they are reckoned once.
     """
     whole = functools.partial(form, steps=Steps.whole)
-    if len(model.states) > FEW or who_lacks(filter, "written_out") is not None:
+    if len(model.states) > SOME or who_lacks(filter, "written_out") is not None:
         return whole(filter, model, rows, *more)
+
+    least = -(-WORTH // len(rows.t))
+    if len(model.states) > FEW:
+        last = functools.partial(form, steps=Steps.batch_last)
+        return numerics.by_batch(whole, last, filter, model, rows, *more, least=least, most=TOGETHER)
 
     def many(filter, model, rows, *more):
         of = lambda steps: lambda: form(filter, model, rows, *more, steps=steps)
@@ -137,7 +152,7 @@ def in_form_for_batches(form: Callable, filter: AbstractFilter, model: StateSpac
         of_any = jax.lax.pmax(missing.astype(jnp.int32), numerics.RUNS)
         return jax.lax.cond(of_any > 0, of(Steps.written_out), of(Steps.complete))
 
-    return numerics.by_batch(whole, many, filter, model, rows, *more, least=-(-WORTH // len(rows.t)))
+    return numerics.by_batch(whole, many, filter, model, rows, *more, least=least)
 
 
 def scan_in_form(
@@ -162,17 +177,23 @@ def scan_in_form(
         belief, info = filter.init(model, first, key)
     start = shown(belief, info)
 
-    if whole:
-        body = jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(KEPT))
-        belief, rest = jax.lax.scan(body, belief, rest)
-    else:
-        belief, rest = numerics.scan_written_out(body, belief, rest, complete=complete)
+    belief, rest = scan_by(steps, body, belief, rest)
     joined = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, rest)
     log_likelihood, results, (mean, std, info), kept = joined
     result, failed_at = first_failure(results)
     show = lambda report: None if report is None else parameters_of(model, report)
     total = jnp.sum(log_likelihood)
     return Estimate(rows.t, mean, std, total, info, result, failed_at, belief, show(mean), show(std)), kept
+
+
+def scan_by(steps: Steps, body: Callable, start: Any, rows: Any, *, reverse: bool = False) -> tuple[Any, Any]:
+    """`jax.lax.scan(body, start, rows, reverse=reverse)`, its steps taken so, and checkpointed."""
+    if steps is Steps.whole:
+        body = jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(KEPT))
+        return jax.lax.scan(body, start, rows, reverse=reverse)
+    if steps is Steps.batch_last:
+        return numerics.scan_batch_last(body, start, rows, reverse=reverse)
+    return numerics.scan_written_out(body, start, rows, reverse=reverse, complete=steps is Steps.complete)
 
 
 class Shown(NamedTuple):

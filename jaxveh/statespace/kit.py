@@ -24,6 +24,7 @@ from jaxveh.statespace.driver import (
     in_form_for_batches,
     raise_failure,
     scan_and_keep,
+    scan_by,
     scan_in_form,
 )
 from jaxveh.statespace.independent import whiten
@@ -56,6 +57,7 @@ __all__ = [
     "raise_failure",
     "scalar_row",
     "scan_and_keep",
+    "scan_by",
     "scan_in_form",
     "schedule_rows",
     "smoothing_of",

@@ -41,6 +41,7 @@ EVERY = "tests/numerics/test_every_derivative.py"
 HESSIAN = "tests/filters/test_every_hessian.py"
 SCORES = "tests/filters/test_choosing.py"
 WRITTEN_OUT = "tests/numerics/test_written_out.py"
+BATCH_LAST = "tests/numerics/test_batch_last.py"
 FITS = "tests/fitting/test_fitted_derivatives.py"
 ROOMS = {"fitting": FITS}
 """Rooms of solvers, all of whose derivatives are those of an optimum."""
@@ -72,6 +73,7 @@ PLACES = {
     },
     "numerics/float_bits.py": {"bitcast_convert_type": EVERY},
     "numerics/resampling.py": {"stop_gradient": EVERY},
+    "numerics/scan_last.py": {"Primitive": BATCH_LAST},
     "numerics/roots.py": {"stop_gradient": EVERY, "while_loop": EVERY},
     "numerics/tangents.py": {"Primitive": SCORES},
     "numerics/triangular.py": {"custom_jvp": EVERY},

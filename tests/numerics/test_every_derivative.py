@@ -88,6 +88,9 @@ CASES: dict[str, Callable] = {
     "band_harmonics": lambda x: mixed(jnp.stack(numerics.band_harmonics(KEY, 1 + x * x, 3 + x, 4, x.dtype))) / 9,
     "as_whole": lambda x: numerics.as_whole(lambda y: y * jnp.sin(y))(x),
     "by_batch": lambda x: numerics.by_batch(*2 * (lambda y: y * jnp.sin(y),), x),
+    "scan_batch_last": lambda x: mixed(
+        numerics.scan_batch_last(lambda c, r: (jnp.sin(c.T * r) / 2, ()), factor(x), count(x, 0, 1, 2) * x / 2)[0]
+    ),
     "scan_written_out": lambda x: mixed(
         numerics.scan_written_out(lambda c, r: (jnp.sin(c.T * r) / 2, ()), factor(x), count(x, 0, 1, 2) * x / 2)[0]
     ),

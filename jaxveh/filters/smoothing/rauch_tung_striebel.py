@@ -7,7 +7,6 @@ from typing import Any
 import equinox as eqx
 import jax
 
-from jaxveh import numerics
 from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import transition_image, with_spread
@@ -37,13 +36,7 @@ def _smoothed_in_form(
         found = given_later(filter, model, belief, t, u, later)
         return found, found.moments(model)
 
-    if steps is kit.Steps.whole:
-        back = jax.checkpoint(back, prevent_cse=False)
-        _, moments = jax.lax.scan(back, gaussian_of(last), (before, after), reverse=True)
-    else:
-        complete = steps is kit.Steps.complete
-        start = gaussian_of(last)
-        _, moments = numerics.scan_written_out(back, start, (before, after), reverse=True, complete=complete)
+    _, moments = kit.scan_by(steps, back, gaussian_of(last), (before, after), reverse=True)
     return smoothed_estimate(model, filtered, with_last(moments, last.moments(model)))
 
 

@@ -1,0 +1,153 @@
+"""The results of a program for a batch whose axis is the last one of every array, along which XLA's loops then run.
+
+Under `jax.vmap` a batch stands first, and XLA on the CPU takes its small matrices one by one: sums over 11 numbers are short
+loops, and each Cholesky factor is a call of LAPACK. What `written_out` does for few states in scalars would take too long to
+compile for more. A batch of unscented filters of 11 states takes a sixth of the time (1.5 instead of 9.5 us a run-step, jax 0.12,
+float64).
+
+A sum is a barrier: XLA would compute what it is made of once for each that reads it, as it does with no sum of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jax.extend import core
+
+from jaxveh.numerics import entry_rules, last_axis
+from jaxveh.numerics.fences import fence
+from jaxveh.numerics.last_axis import Last, Product, wide
+from jaxveh.numerics.platform import on_cpu
+from jaxveh.numerics.written_out import CALLS, FENCES, alone
+
+
+def boxed(arrays: Sequence[Any], of_batch: Sequence[bool]) -> list:
+    """The arrays, those `of_batch` as `Last`."""
+    return [Last(one) if last else one for one, last in zip(arrays, of_batch, strict=True)]
+
+
+def evaluate(program: Any, operands: Sequence[Any], size: int) -> list:
+    """The results of a closed jaxpr for operands that are `Last`, or the same for the whole batch."""
+    jaxpr = program.jaxpr if hasattr(program, "jaxpr") else program
+    values: dict[Any, Any] = {}
+    read = lambda one: np.asarray(one.val, one.aval.dtype) if isinstance(one, core.Literal) else values[one]
+    values.update(zip(jaxpr.constvars, getattr(program, "consts", ()), strict=True))
+    values.update(zip(jaxpr.invars, operands, strict=True))
+    summed = _only_summed(jaxpr)
+    for equation in jaxpr.eqns:
+        given = [read(one) for one in equation.invars]
+        if equation.primitive.name == "mul" and equation.outvars[0] in summed:
+            shape = equation.outvars[0].aval.shape
+            if any(isinstance(one, Last) for one in given):
+                values[equation.outvars[0]] = Product(tuple(wide(one, shape, size) for one in given))
+                continue
+        values.update(zip(equation.outvars, _results(equation, given, size), strict=True))
+    return [read(one) for one in jaxpr.outvars]
+
+
+def _only_summed(jaxpr: Any) -> set:
+    """Variables that one sum reads, and nothing else."""
+    readers: dict[Any, list] = {}
+    for equation in jaxpr.eqns:
+        for one in equation.invars:
+            if not isinstance(one, core.Literal):
+                readers.setdefault(one, []).append(equation.primitive.name)
+    results = {one for one in jaxpr.outvars if not isinstance(one, core.Literal)}
+    return {one for one, names in readers.items() if names == ["reduce_sum"] and one not in results}
+
+
+def _results(equation: Any, operands: list, size: int) -> list:
+    """The results of one equation."""
+    name, params = equation.primitive.name, equation.params
+    out = [one.aval for one in equation.outvars]
+    if not any(isinstance(one, Last | Product) for one in operands):
+        return _for_all(equation, operands)
+    if name in entry_rules.REDUCTIONS:
+        return [Last(_reduced(equation, operands[0]))]
+    if name in entry_rules.ELEMENTWISE:
+        how = dict(params, sharding=None) if "sharding" in params else params
+        return [Last(equation.primitive.bind(*(wide(one, out[0].shape, size) for one in operands), **how))]
+    if name in CALLS:
+        return evaluate(params["jaxpr"], operands, size)
+    if name in FENCES:
+        arrays = [one.array if isinstance(one, Last) else jnp.asarray(one) for one in operands]
+        return boxed(equation.primitive.bind(*arrays, **params), [isinstance(one, Last) for one in operands])
+    if name == "cond" and not isinstance(operands[0], Last):
+        return _branches(params, operands, out, size)
+    if name == "custom_jvp_call":
+        return evaluate(params["call_jaxpr"], operands, size)
+    if name == "gather" and not isinstance(operands[1], Last):
+        return [Last(last_axis.gather(params, operands[0].array, operands[1], out[0].shape))]
+    if name == "pad" and not isinstance(operands[1], Last):
+        config = (*params["padding_config"], (0, 0, 0))
+        return [Last(lax.pad(operands[0].array, jnp.asarray(operands[1]), config))]
+    rule = last_axis.MOVES.get(name) or last_axis.ALGEBRA.get(name)
+    if rule is not None:
+        arrays = [wide(one, var.aval.shape, size) for one, var in zip(operands, equation.invars, strict=True)]
+        found = rule(params, arrays, out)
+        if found is not None:
+            return [Last(one) for one in (found if isinstance(found, list) else [found])]
+    return _by_vmap(equation, operands)
+
+
+def _reduced(equation: Any, operand: Any) -> Any:
+    """A reduction, written out where it is of few terms."""
+    axes = tuple(equation.params["axes"])
+    array = operand if isinstance(operand, Product) else operand.array
+    if not axes:
+        return array
+    found = last_axis.reduction(entry_rules.REDUCTIONS[equation.primitive.name][1], axes, array)
+    if found is not None:
+        return found
+    if isinstance(array, Product):
+        array = array.factors[0] * array.factors[1]
+    return equation.primitive.bind(array, **equation.params)
+
+
+def _variables(equation: Any, operands: list) -> dict[Any, Any]:
+    """The values of an equation's variables, each once."""
+    return {
+        one: value for one, value in zip(equation.invars, operands, strict=True) if not isinstance(one, core.Literal)
+    }
+
+
+def _for_all(equation: Any, operands: list) -> list:
+    """An equation of what is the same for the whole batch."""
+    values = _variables(equation, operands)
+    return core.jaxpr_as_fun(alone(equation, list(values)))(*values.values())
+
+
+def _by_vmap(equation: Any, operands: list) -> list:
+    """An equation that nothing is known of here."""
+    values = _variables(equation, operands)
+    axes = [-1 if isinstance(one, Last) else None for one in values.values()]
+    arrays = [one.array if isinstance(one, Last) else one for one in values.values()]
+    # Else each number would be computed from the beginning, with all that it is made of.
+    found = jax.vmap(core.jaxpr_as_fun(alone(equation, list(values))), axes, -1)(*fence(arrays))
+    return [Last(one) for one in fence(found)]
+
+
+def _branches(params: dict[str, Any], operands: list, out: list, size: int) -> list:
+    """A conditional of one predicate for the whole batch."""
+    index, *rest = operands
+    of_batch = [isinstance(one, Last) for one in rest]
+    arrays = [one.array if last else one for one, last in zip(rest, of_batch, strict=True)]
+
+    def taken(branch):
+        def run(*some):
+            found = evaluate(branch, boxed(some, of_batch), size)
+            return [wide(one, like.shape, size) for one, like in zip(found, out, strict=True)]
+
+        return run
+
+    branches, platforms = params["branches"], params.get("branches_platforms")
+    if platforms is not None:  # a choice by the platform, which is known
+        here = "cpu" if on_cpu() else jax.default_backend()
+        chosen = next(i for i, names in enumerate(platforms) if names is None or here in names)
+        return [Last(one) for one in taken(branches[chosen])(*arrays)]
+    return [Last(one) for one in lax.switch(index, [taken(branch) for branch in branches], *arrays)]
