@@ -1,7 +1,7 @@
 """Scans whose steps are taken for a whole batch with its axis last (`batch_last`), and their derivatives.
 
 A step is a primitive, so that it is differentiated as it stands for one run, and its derivative is taken with the batch last,
-too. (Sums that are written out have derivatives that are sums of arrays of zeros with a slice in each: 1000 gradients of an
+too. (Sums that are written out have derivatives that are sums of arrays of zeros with a slice in each: 256 gradients of an
 unscented filter of 11 states took 20 times as long.)
 """
 

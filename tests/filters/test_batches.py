@@ -211,3 +211,28 @@ def test_remarks_are_told_though_nothing_is_kept():
         particles, MODELS["linear"](), recordings("linear")[0], key=jax.random.key(0), keep=(), throw=False
     )
     assert found.info.remark.shape == (25,) and found.info.nis is None and found.mean is None
+
+
+@pytest.mark.parametrize("name", ["Extended", "Unscented"])
+def test_a_long_run_that_shows_nothing_is_the_one_that_shows_its_rows(name, monkeypatch):
+    """Where nothing is kept it is written out alone, too; the rest of this file says that a batch is."""
+    filter_, model, recording = FILTERS[name].make(), MODELS["linear"](), recordings("linear")[1]
+    forms = []
+    form = kit.scan_in_form
+    monkeypatch.setattr("jaxveh.numerics.barriers_hold", lambda: True)
+    watched = lambda *given, steps, **more: forms.append(steps.value) or form(*given, steps=steps, **more)
+    monkeypatch.setattr("jaxveh.statespace.driver.scan_in_form", watched)
+    jax.clear_caches()
+    alone = filters.run(filter_, model, recording, keep=())
+    assert forms and set(forms) == {"written out"}
+    shown = filters.run(filter_, model, recording)
+    assert "whole" in forms
+    same(alone.log_likelihood, shown.log_likelihood)
+    same((alone.belief.mean, alone.belief.covariance), (shown.belief.mean, shown.belief.covariance))
+    assert alone.failed_at == shown.failed_at == -1
+    mean = model.prior.mean
+    at = lambda shift: eqx.tree_at(lambda m: m.prior.mean, model, jax.tree.map(lambda x: x + shift, mean))
+    values = lambda shift: filters.run(filter_, at(shift), recording, keep=()).log_likelihood
+    step = 1e-5
+    slope = jax.grad(values)(0.1)
+    np.testing.assert_allclose(slope, (values(0.1 + step) - values(0.1 - step)) / (2 * step), rtol=1e-5, atol=1e-6)

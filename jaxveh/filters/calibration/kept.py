@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -22,7 +23,7 @@ def run_and_keep(
     """
     filter.check(model)
     estimate, kept = _scan_and_keep(filter, model, model.rows(recording), key, keep)
-    estimate = eqx.tree_at(lambda e: e.time, estimate, recording.time)
+    estimate = dataclasses.replace(estimate, time=recording.time)
     if throw:
         kit.raise_failure(estimate, filter, model, recording)
     return estimate, kept
