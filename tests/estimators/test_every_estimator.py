@@ -1,4 +1,4 @@
-"""Every estimator keeps the contract of `estimators.contract`: five names, early errors, and live what it is on a log."""
+"""Every estimator keeps the contract of `estimators.contract`: its names, early errors, and live what it is on a log."""
 
 import dataclasses
 import functools
@@ -73,6 +73,16 @@ def estimator(name):
 
 def required(name):
     return [need for need in estimator(name).needs if not need.optional]
+
+
+@every
+def test_the_car_of_a_file_is_the_one_that_its_model_has(name):
+    case, one = case_of(name), estimator(name)
+    car = one.car_of(case.car)
+    assert one.car_of(car) is car
+    of_file, of_car = jax.tree.leaves(one.model(case.car)), jax.tree.leaves(one.model(car))
+    for a, b in zip(of_file, of_car, strict=True):
+        np.testing.assert_array_equal(a, b)
 
 
 def test_every_module_of_the_room_is_an_estimator_with_a_case_here():
