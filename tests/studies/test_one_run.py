@@ -98,6 +98,22 @@ def test_samples_stand_where_their_names_say():
     assert units["samples.car_mass"] == "kg" and units["samples.told_front_D"] == "N"
 
 
+def test_doing_nothing_is_told_the_same_car_as_the_filter():
+    """Of an estimator that is no single track: its mass and axles, on the file's tyres."""
+    made = study(
+        estimator={"name": "state-space", "fidelity": "linear"}, told={"mass": 1700.0}, drive={"speed": 25.0},
+        sensors={"yaw_rate": 0.01, "a_y": 0.1},
+    )  # fmt: skip
+    found = jax.jit(lambda key: made(made.design.point({}, {}), key))(KEY)
+    car = vehicles.named_car("passenger_car")
+    _, sensor_key, _ = jax.random.split(KEY, 3)
+    driver = manoeuvres.step_steer(25.0, np.radians(1.0), duration=2.0)
+    drive = simulate(car, driver, sensors.esc(0.01, 0.1), sensor_key, dt=0.05, solver="explicit")
+    nothing = estimators.open_loop(eqx.tree_at(lambda c: c.mass, car, jnp.asarray(1700.0)), drive)["sideslip"]
+    rms = np.sqrt(np.mean((nothing - np.asarray(drive["true.sideslip"])) ** 2))
+    np.testing.assert_allclose(found["baseline.sideslip"], rms, rtol=1e-9)
+
+
 def test_a_parameter_is_scored_against_the_true_cars():
     made = study(
         estimator={"name": "state-space", "estimate": ["mass"]}, car={"mass": 1600.0}, told={"mass": 1400.0}, filter="unscented",

@@ -108,3 +108,13 @@ def test_a_study_of_tables_is_the_same_as_one_of_a_file(tmp_path):
     drive = "\n".join(f"{key} = {value!r}" for key, value in DRIVE["drive"].items())
     text = f"seeds = 3\n[drive]\n{drive}\n[metrics]\nnames = {DRIVE['metrics']['names']!r}\n"
     assert read(tmp_path, text.replace("'", '"')).settings == studies.study_of(DRIVE).settings
+
+
+def test_ranges_have_equal_steps_or_equal_ratios():
+    ranges = {
+        "car.mass": {"from": 1000.0, "to": 2000.0, "count": 3},
+        "told.mass": {"from": 10.0, "to": 1000.0, "count": 3, "scale": "log"},
+    }
+    axes = studies.study_of({"vary": ranges}).design.axes
+    assert axes[0].labels == (1000.0, 1500.0, 2000.0)
+    assert axes[1].labels == pytest.approx((10.0, 100.0, 1000.0))
