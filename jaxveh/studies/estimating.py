@@ -47,7 +47,8 @@ def told_car(settings: Mapping[str, Any]) -> Any:
 
 
 def model_of(settings: Mapping[str, Any], drive: Drive) -> StateSpace:
-    """The state space that the filter sees: it knows nothing of `car`, of the drive the sensors' noise and the first speed."""
+    """The state space that the filter sees: it knows nothing of the table `car`, and of the drive the sensors' noise and the
+    first speed alone."""
     return estimator_of(settings).model(told_car(settings), settings, drive)
 
 
@@ -95,7 +96,6 @@ def where_of(names: Any, car: Any) -> Callable[[Any], list]:
 
 def _ready_made(module: Any) -> NamedEstimator:
     """An estimator of `jaxveh.estimators` (`estimators/contract.py`), at its word: neither calibrated nor smoothed."""
-
     options = [p.name for p in inspect.signature(module.model).parameters.values() if p.kind is p.KEYWORD_ONLY]
 
     def model(car: Any, settings: Mapping[str, Any], drive: Drive) -> StateSpace:

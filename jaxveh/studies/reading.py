@@ -10,7 +10,7 @@ from typing import Any
 from jaxveh import vehicles
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh.io import kit, read_car
-from jaxveh.studies.axes import axes_of, sampled_paths
+from jaxveh.studies.axes import Varied, axes_of, sampled_paths
 from jaxveh.studies.settings import DEFAULTS, WHOLE, with_defaults
 from jaxveh.studies.study import Study
 
@@ -101,16 +101,21 @@ def study_of(told: Mapping[str, Any], folder: Path = Path()) -> Study:
     check_whole("seed", seed, 0)
     settings, vary = with_defaults(told), told.get("vary", {})
     kit.check_keys("vary", vary, vary)
-    settings["drive"]["vehicle"] = _car(settings["drive"]["vehicle"], folder)
+    for key, found in FILES.items():
+        settings["drive"][key] = found(settings["drive"][key], folder)
     kit.check_keys("metrics", settings["metrics"], DEFAULTS["metrics"])
     axes = axes_of(vary)
-    axes = tuple(
-        axis._replace(values={label: _car(value, folder) for label, value in axis.values.items()})
-        if axis.path == "drive.vehicle"
-        else axis
-        for axis in axes
+    return Study(settings, tuple(_with_files(axis, folder) for axis in axes), sampled_paths(vary), seeds, seed)
+
+
+def _with_files(axis: Varied, folder: Path) -> Varied:
+    """The axis with the files that its values name."""
+    found = FILES.get((axis.path or "").removeprefix("drive."))
+    return (
+        axis
+        if found is None
+        else axis._replace(values={label: found(value, folder) for label, value in axis.values.items()})
     )
-    return Study(settings, axes, sampled_paths(vary), seeds, seed)
 
 
 def _car(name: Any, folder: Path) -> Any:
@@ -121,3 +126,14 @@ def _car(name: Any, folder: Path) -> Any:
         kit.check_known("drive.vehicle", "car", name, vehicles.kit.CARS, "Or give the path of a car's file (.toml).")
         return name
     return read_car(folder / name)
+
+
+def _road(name: Any, folder: Path) -> Any:
+    """A road's name as it is, or the whole path of its file, which every worker must see."""
+    if isinstance(name, str) and Path(name).suffix:
+        return str((folder / name).resolve())
+    return name
+
+
+FILES = {"vehicle": _car, "road": _road}
+"""Keys of `drive` that may name a file, looked for from the study's folder."""

@@ -58,13 +58,14 @@ class Study:
         )
         drive = s["drive"]
         car = drive["vehicle"] if isinstance(drive["vehicle"], str) else drive["vehicle"].name or "the car's file"
+        own = f", with its own {of('told')}" if of("told") else ""
         noise = "as measurement_noise says" if s["measurement_noise"] else "as it is"
         varied = ", ".join(paths) or "nothing"
         return (
             f"{car} as {drive['fidelity']}, {drive['manoeuvre']} on {drive['road']}, seen by {s['sensors']['devices']}, "
             f"estimated by {s['estimator']['name']} and {s['filter']['name']}, of which is varied: {varied}. "
             f"The estimator is told the car's numbers{' but for ' + of('car') if of('car') else ''}"
-            f"{', with its own ' + of('told') if of('told') else ''}, the sensors' noise {noise}, and the speed at the start."
+            f"{own}, the sensors' noise {noise}, the speed at the start, and exactly those inputs (steer) that no sensor measures."
         )
 
     def __call__(self, point: Any, key: jax.Array) -> dict[str, Any]:
@@ -89,9 +90,10 @@ class Study:
         **Raises** `InputError` for what is not there, or out of range.
         """
         for _, _, objects in self.design.combinations():
+            duration = self._duration(next(self._ends(objects, lambda path: False)))
             for point in self._ends(objects, lambda path: True):
                 settings = self.at(point)
-                drive = drive_of(settings, self.key, self._duration(point))
+                drive = drive_of(settings, self.key, duration)
                 filter_of(settings["filter"]).check(model_of(settings, drive))
                 asked_metrics(settings["metrics"]["names"])
 

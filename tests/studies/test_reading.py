@@ -38,6 +38,14 @@ def test_a_cars_file_is_read_from_the_studys_folder(tmp_path):
     assert axis.values[0].mass == 1420.0 and axis.values[1] == "sedan"
 
 
+def test_a_roads_file_is_found_from_the_studys_folder(tmp_path):
+    (tmp_path / "hill.toml").write_text("distance = [0.0, 100.0]\ngrade = [0.0, 0.02]\nfriction = 1.0\nbank = 0.0\n")
+    study = read(tmp_path, '[drive]\nroad = "hill.toml"\n[vary]\n"drive.road" = ["hill.toml", "wet"]\n')
+    assert study.settings["drive"]["road"] == str(tmp_path / "hill.toml")
+    assert study.design.axis("drive_road").values == (str(tmp_path / "hill.toml"), "wet")
+    assert study.design.axis("drive_road").labels == ("hill.toml", "wet")
+
+
 BAD = {
     "seed = 1\n[drives]\n": "no table 'drives' (did you mean 'drive'?)",
     "seeds = 0": "seeds = 0: must be a whole number of at least 1",
