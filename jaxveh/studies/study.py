@@ -65,7 +65,7 @@ class Study:
             f"{car} as {drive['fidelity']}, {drive['manoeuvre']} on {drive['road']}, seen by {s['sensors']['devices']}, "
             f"estimated by {s['estimator']['name']} and {s['filter']['name']}, of which is varied: {varied}. "
             f"The estimator is told the car's numbers{' but for ' + of('car') if of('car') else ''}"
-            f"{own}, the sensors' noise {noise}, the speed at the start, and exactly those inputs (steer) that no sensor measures."
+            f"{own}, the sensors' noise {noise}, the speed at the start, and, exactly, inputs (steer) that no sensor measures."
         )
 
     def __call__(self, point: Any, key: jax.Array) -> dict[str, Any]:
