@@ -20,7 +20,7 @@ from jaxveh.numerics.linear_algebra import (
     solve_psd,
     symmetric,
 )
-from jaxveh.numerics.platform import barriers_hold, on_cpu
+from jaxveh.numerics.platform import barriers_hold, on_cpu, pays_alone
 from jaxveh.numerics.random import cauchy, exponential, normal, normals, student_t, uniform
 from jaxveh.numerics.resampling import ess, multinomial, normalise, residual, stratified, systematic
 from jaxveh.numerics.roots import secant
@@ -31,13 +31,14 @@ from jaxveh.numerics.sums import total
 from jaxveh.numerics.tables import interpolate_linear, interpolate_smooth
 from jaxveh.numerics.tangents import derivative_alone
 from jaxveh.numerics.triangular import lower_factor
-from jaxveh.numerics.written_out import as_whole, scan_written_out, write_out
+from jaxveh.numerics.written_out import as_entries, as_whole, from_entries, scan_written_out, write_out
 
 __all__ = [
     "RUNS",
     "apart",
     "arctan",
     "arctan2",
+    "as_entries",
     "as_whole",
     "band_harmonics",
     "barriers_hold",
@@ -51,6 +52,7 @@ __all__ = [
     "fence",
     "fence_blocks",
     "fence_results",
+    "from_entries",
     "gauss_markov_harmonics",
     "hypot",
     "interpolate_linear",
@@ -65,6 +67,7 @@ __all__ = [
     "normalise",
     "normals",
     "on_cpu",
+    "pays_alone",
     "polynomials",
     "residual",
     "scan_batch_last",

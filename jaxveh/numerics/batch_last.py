@@ -26,7 +26,7 @@ from jaxveh.numerics.platform import on_cpu
 from jaxveh.numerics.written_out import CALLS, FENCES, alone
 
 
-def boxed(arrays: Sequence[Any], of_batch: Sequence[bool]) -> list:
+def as_last(arrays: Sequence[Any], of_batch: Sequence[bool]) -> list:
     """The arrays, those `of_batch` as `Last`."""
     return [Last(one) if last else one for one, last in zip(arrays, of_batch, strict=True)]
 
@@ -76,7 +76,7 @@ def _results(equation: Any, operands: list, size: int) -> list:
         return evaluate(params["jaxpr"], operands, size)
     if name in FENCES:
         arrays = [one.array if isinstance(one, Last) else jnp.asarray(one) for one in operands]
-        return boxed(equation.primitive.bind(*arrays, **params), [isinstance(one, Last) for one in operands])
+        return as_last(equation.primitive.bind(*arrays, **params), [isinstance(one, Last) for one in operands])
     if name == "cond" and not isinstance(operands[0], Last):
         return _branches(params, operands, out, size)
     if name == "custom_jvp_call":
@@ -140,7 +140,7 @@ def _branches(params: dict[str, Any], operands: list, out: list, size: int) -> l
 
     def taken(branch):
         def run(*some):
-            found = evaluate(branch, boxed(some, of_batch), size)
+            found = evaluate(branch, as_last(some, of_batch), size)
             return [wide(one, like.shape, size) for one, like in zip(found, out, strict=True)]
 
         return run

@@ -18,7 +18,7 @@ from jax import lax
 from jax.extend import core
 from jax.interpreters import ad, batching, mlir
 
-from jaxveh.numerics.batch_last import boxed, evaluate
+from jaxveh.numerics.batch_last import as_last, evaluate
 from jaxveh.numerics.fences import fence
 from jaxveh.numerics.last_axis import Last, wide
 
@@ -97,7 +97,7 @@ def _spread(of_batch: list[bool], program: Any, fixed: int, carried: int, size: 
         results: list[bool] = []
 
         def step(*some, of_batch=of_batch, results=results):
-            found = evaluate(program, boxed(some, of_batch), size)
+            found = evaluate(program, as_last(some, of_batch), size)
             results[:] = [isinstance(one, Last) for one in found]
             return [one.array if isinstance(one, Last) else one for one in found]
 
@@ -135,7 +135,7 @@ ad.primitive_jvps[_scan] = lambda primals, tangents, **how: jax.jvp(
 
 def _stepped(*operands: Any, program: Any, of_batch: tuple, results: tuple, size: int) -> list:
     """The results of the program."""
-    found = evaluate(program, boxed(operands, of_batch), size)
+    found = evaluate(program, as_last(operands, of_batch), size)
     return [
         wide(one, like.shape, size) if last else jnp.asarray(one, like.dtype)
         for one, like, last in zip(found, program.out_avals, results, strict=True)

@@ -242,3 +242,22 @@ def alone(equation: Any, variables: list) -> core.ClosedJaxpr:
         debug_info=empty.debug_info.with_unknown_names(),
     )  # fmt: skip
     return core.ClosedJaxpr(jaxpr, [])
+
+
+APART = 36
+"""Numbers of an array up to which its entries are taken apart."""
+
+
+def as_entries(tree: PyTree) -> PyTree:
+    """The tree with the scalars of each array in its place: what `scan_written_out` stacks then are single columns."""
+    few = lambda leaf: np.ndim(leaf) > 0 and np.size(leaf) <= APART
+    return jax.tree.map(lambda leaf: tuple(entries(leaf).reshape(-1)) if few(leaf) else leaf, tree)
+
+
+def from_entries(tree: PyTree, like: PyTree) -> PyTree:
+    """What `as_entries` gave, as the arrays of `like`."""
+    leaves, structure = jax.tree.flatten(like)
+    whole = lambda found, one: jnp.stack(found).reshape(np.shape(one)) if isinstance(found, tuple) else found
+    return jax.tree.unflatten(
+        structure, [whole(found, one) for found, one in zip(structure.flatten_up_to(tree), leaves, strict=True)]
+    )

@@ -121,7 +121,7 @@ def scan_and_keep(
     # A long run of which no row is shown need not be that of a live loop to the last bit; written out, one of three states takes
     # 180 instead of 203 ns a row (unscented, float64, jax 0.12; before, twice as long as it is).
     shows_nothing = not keep and of_belief is _nothing and len(rows.t) >= WORTH
-    alone = Steps.written_out if shows_nothing and numerics.barriers_hold() else Steps.whole
+    alone = Steps.written_out if shows_nothing and numerics.pays_alone() else Steps.whole
     return in_form_for_batches(form, filter, model, rows, key, alone=alone)
 
 

@@ -219,7 +219,7 @@ def test_a_long_run_that_shows_nothing_is_the_one_that_shows_its_rows(name, monk
     filter_, model, recording = FILTERS[name].make(), MODELS["linear"](), recordings("linear")[1]
     forms = []
     form = kit.scan_in_form
-    monkeypatch.setattr("jaxveh.numerics.barriers_hold", lambda: True)
+    monkeypatch.setattr("jaxveh.numerics.pays_alone", lambda: True)
     watched = lambda *given, steps, **more: forms.append(steps.value) or form(*given, steps=steps, **more)
     monkeypatch.setattr("jaxveh.statespace.driver.scan_in_form", watched)
     jax.clear_caches()

@@ -25,6 +25,7 @@ NONE = {
     "sigma_points": "a module: of constant points and weights",
     "barriers_hold": "a fact of the platform",
     "on_cpu": "a fact of the platform",
+    "pays_alone": "a fact of the platform",
     "cauchy": "numbers of a key, which has no derivative",
     "exponential": "numbers of a key, which has no derivative",
     "normal": "numbers of a key, which has no derivative",
@@ -68,6 +69,11 @@ def mixed(values):
     return jnp.sum(flat * jnp.cos(jnp.arange(flat.size, dtype=flat.dtype)))
 
 
+def joined(tree):
+    """The same of all arrays of a tree."""
+    return mixed(jnp.concatenate([jnp.ravel(leaf) for leaf in jax.tree.leaves(tree)]))
+
+
 def fenced(between):
     def case(x):
         first, second = between((x * x, jnp.sin(x) * jnp.ones(40, x.dtype)))
@@ -91,6 +97,8 @@ CASES: dict[str, Callable] = {
     "scan_batch_last": lambda x: mixed(
         numerics.scan_batch_last(lambda c, r: (jnp.sin(c.T * r) / 2, ()), factor(x), count(x, 0, 1, 2) * x / 2)[0]
     ),
+    "as_entries": lambda x: joined(numerics.as_entries((factor(x), x))),
+    "from_entries": lambda x: joined(numerics.from_entries(numerics.as_entries((factor(x), x)), (factor(x), x))),
     "scan_written_out": lambda x: mixed(
         numerics.scan_written_out(lambda c, r: (jnp.sin(c.T * r) / 2, ()), factor(x), count(x, 0, 1, 2) * x / 2)[0]
     ),

@@ -7,6 +7,7 @@ from typing import Any
 import equinox as eqx
 import jax
 
+from jaxveh import numerics
 from jaxveh.filters.gaussian import AbstractGaussianFilter
 from jaxveh.filters.gaussian.belief import GaussianBelief
 from jaxveh.filters.gaussian.filter import transition_image, with_spread
@@ -26,14 +27,19 @@ def _smoothed_in_form(
     filter: AbstractGaussianFilter, model: StateSpace, rows: Row, steps: kit.Steps
 ) -> SmoothedEstimate:
     """The same by steps of a kind."""
-    filtered, beliefs = kit.scan_in_form(filter, model, rows, None, lambda belief: belief, kit.SHOWN, steps)
-    last = jax.tree.map(lambda leaf: leaf[-1], beliefs)
+    # Between two scans in scalars a batch's matrices would be put together and taken apart again: 64 unscented smoothers of three
+    # states take 0.29 instead of 1.2 us a run-step without that (jax 0.10; 0.088 instead of 0.105 with 0.12).
+    in_scalars = steps in (kit.Steps.written_out, kit.Steps.complete)
+    kept = numerics.as_entries if in_scalars else lambda belief: belief
+    filtered, beliefs = kit.scan_in_form(filter, model, rows, None, kept, kit.SHOWN, steps)
+    whole = lambda belief: numerics.from_entries(belief, filtered.belief) if in_scalars else belief
+    last = whole(jax.tree.map(lambda leaf: leaf[-1], beliefs))
     before = jax.tree.map(lambda leaf: leaf[:-1], beliefs)
     after = jax.tree.map(lambda leaf: leaf[1:], (rows.t, rows.u))
 
     def back(later: GaussianBelief, pair):
         belief, (t, u) = pair
-        found = given_later(filter, model, belief, t, u, later)
+        found = given_later(filter, model, whole(belief), t, u, later)
         return found, found.moments(model)
 
     _, moments = kit.scan_by(steps, back, gaussian_of(last), (before, after), reverse=True)
