@@ -24,7 +24,7 @@ Store = Annotated[
 ]
 
 Processes = Annotated[
-    int | None, typer.Option("--processes", help="With --store: in so many processes of this machine.", min=1)
+    int | None, typer.Option("--processes", help="Compute in so many processes of this machine.", min=1)
 ]
 
 Scheduler = Annotated[
@@ -32,10 +32,16 @@ Scheduler = Annotated[
     typer.Option(
         "--scheduler",
         metavar="ADDRESS",
-        help="With --store: by the workers of a Dask scheduler (tcp://host:8786), which see FOLDER under the same path and have "
+        help="Have the workers of a Dask scheduler (tcp://host:8786) compute, which see the store under the same path and have "
         "the same versions and XLA_FLAGS.",
     ),
 ]
+
+
+def check_workers(processes: int | None, scheduler: str | None) -> None:
+    """Raise `InputError` where both kinds of workers are asked for."""
+    if processes is not None and scheduler is not None:
+        raise InputError("--processes and --scheduler: give one of them, not both.")
 
 
 def stores_of(folder: Path | None, processes: int | None, scheduler: str | None) -> Stores | None:
@@ -49,8 +55,7 @@ def stores_of(folder: Path | None, processes: int | None, scheduler: str | None)
         if asked:
             raise InputError(f"{asked[0]}: is for sweeps that are stored; name a folder with --store, or leave it out.")
         return None
-    if len(asked) == 2:
-        raise InputError("--processes and --scheduler: give one of them, not both.")
+    check_workers(processes, scheduler)
     # The nearest that is there is what the folder will be made in.
     there = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     if not there.is_dir():

@@ -13,6 +13,7 @@ from jaxveh import InputError
 from jaxveh.cli import options
 from jaxveh.cli.console import progress, results, table
 from jaxveh.cli.output import check_report, make_folder, write_numbers
+from jaxveh.cli.stores import Processes, Scheduler, check_workers
 
 if TYPE_CHECKING:
     from jaxveh.sweeps import Swept
@@ -23,13 +24,6 @@ RUN = "run"
 STUDY = typer.Argument(metavar="STUDY.toml", help="What to vary (jaxveh schema study).", show_default=False)
 STORE = typer.Option(
     "-o", metavar="STORE.zarr", help="Where the numbers go; one that is begun goes on.", show_default=False
-)
-PROCESSES = typer.Option("--processes", metavar="N", help="Processes of this machine.", min=1, show_default=False)
-SCHEDULER = typer.Option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="A Dask scheduler, tcp://host:8786, whose workers compute.",
-    show_default=False,
 )
 PART = typer.Option(
     "--part", metavar="I/N", help="One share of the chunks, 0/8 to 7/8, for an array of jobs.", show_default=False
@@ -51,8 +45,8 @@ class RunUnlessNamed(TyperGroup):
 def run(
     study: Annotated[Path | None, STUDY] = None,
     store: Annotated[Path | None, STORE] = None,
-    processes: Annotated[int | None, PROCESSES] = None,
-    scheduler: Annotated[str | None, SCHEDULER] = None,
+    processes: Processes = None,
+    scheduler: Scheduler = None,
     part: Annotated[str | None, PART] = None,
     batch: Annotated[int | None, BATCH] = None,
     out: options.Out = None,
@@ -71,8 +65,7 @@ def run(
         return _list()
     study, store = _check(study, store)
     share = _part(part)
-    if processes is not None and scheduler is not None:
-        raise InputError("--processes and --scheduler: one computes, not both; leave one away.")
+    check_workers(processes, scheduler)
     if share is not None and (out, numbers) != (None, None):
         raise InputError(
             "--part: a share has no tables of its own; use --out and --json with jaxveh sweep show at the end."

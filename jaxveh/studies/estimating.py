@@ -13,6 +13,7 @@ from jaxveh._core.parameter import every_parameter
 from jaxveh._core.recording import Recording
 from jaxveh.io import kit
 from jaxveh.statespace import Gaussian, StateSpace
+from jaxveh.studies.channels import hold
 from jaxveh.studies.drives import Drive, car_of, specification_of
 from jaxveh.studies.numbers import flat, with_numbers
 from jaxveh.studies.settings import speed_and_steer
@@ -20,7 +21,7 @@ from jaxveh.studies.settings import speed_and_steer
 
 class NamedEstimator(NamedTuple):
     """How to make the estimator's own car out of the study's tables, and a state space of that car; what a recording goes through
-    before its filter; which keys it has."""
+    before its filter, inputs held from row to row; which keys it has."""
 
     car: Callable[[Mapping[str, Any]], Any]
     model: Callable[[Any, Mapping[str, Any], Drive], StateSpace]
@@ -108,7 +109,11 @@ def _ready_made(module: Any) -> NamedEstimator:
         return module.model(car, **{name: value for name, value in settings["estimator"].items() if name != "name"})
 
     of_file = lambda settings: module.car_of(specification_of(settings["drive"]["vehicle"]))
-    clean = lambda model, recording: estimators.kit.clean_recording(module.live(model).cleaning, recording)
+
+    def clean(model: StateSpace, recording: Recording) -> Recording:
+        cleaning = module.live(model).cleaning
+        return estimators.kit.clean_recording(cleaning, hold(recording, cleaning.inputs or model.inputs))
+
     return NamedEstimator(of_file, model, clean, tuple(options), (module.__doc__ or "").partition("\n")[0])
 
 
@@ -129,7 +134,7 @@ ESTIMATORS: dict[str, NamedEstimator] = {
     "state-space": NamedEstimator(
         _track_car,
         _track_model,
-        lambda model, recording: recording,
+        lambda model, recording: hold(recording, model.inputs),
         OF_STATE_SPACE,
         "a vehicle of the package with its sensors (estimators.state_space)",
     ),

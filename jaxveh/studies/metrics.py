@@ -35,7 +35,7 @@ class Run(NamedTuple):
 
 
 class Metric(NamedTuple):
-    """How to compute it, its unit ("=": the quantity's, "2": its square), what to say; `of_quantity`: it is asked for as
+    """How to compute it, its unit ("=": the quantity's), what to say; `of_quantity`: it is asked for as
     `name.quantity`."""
 
     compute: Callable[[Any], Any]
@@ -134,10 +134,8 @@ def unit_of_metric(asked: AskedMetric, unit: str) -> str:
 
 def truth_of(recording: Any, car: Any, quantity: str, numbers: Any) -> Any:
     """The truth of a quantity, (T,): a channel of the truth, or a number of the true car."""
-    if f"{TRUTH}{quantity}" in recording:
-        return recording[f"{TRUTH}{quantity}"]
-    if quantity in numbers:
-        return jnp.broadcast_to(numbers[quantity], (len(recording),))
     there = [name.removeprefix(TRUTH) for name in recording.names if name.startswith(TRUTH)]
     kit.check_known("metrics.names", f"true quantity of {type(car).__name__}", quantity, [*there, *numbers])
-    raise AssertionError
+    return (
+        recording[f"{TRUTH}{quantity}"] if quantity in there else jnp.broadcast_to(numbers[quantity], (len(recording),))
+    )

@@ -13,6 +13,7 @@ from jaxveh import estimators, filters, vehicles
 from jaxveh._core.parameter import every_parameter, pick
 from jaxveh._core.recording import TRUTH
 from jaxveh.io import kit
+from jaxveh.studies.channels import hold, renamed_channels
 from jaxveh.studies.drives import Drive, car_of, drive_of, simulate
 from jaxveh.studies.estimating import estimator_of, model_of, told_car
 from jaxveh.studies.metrics import METRICS, AskedMetric, Errors, Run, asked_metrics, truth_of
@@ -31,7 +32,7 @@ def run_of(settings: Mapping[str, Any], key: jax.Array, duration: float | None =
     """Simulate and estimate as the settings say: the metrics by name. No estimator sees the truth."""
     drive_key, sensor_key, filter_key = jax.random.split(key, 3)
     drive = drive_of(settings, drive_key, duration)
-    recording = simulate(drive, sensor_key)
+    recording = renamed_channels(simulate(drive, sensor_key), settings["channels"])
     model = model_of(settings, drive)
     asked = asked_metrics(settings["metrics"]["names"])
     keep = ("mean", "std", *(("info.nis",) if AskedMetric("nis", "") in asked else ()))
@@ -66,8 +67,9 @@ def _nothing(quantity: str, settings, model: Any, recording: Any, log: Any) -> A
         told = told_car(settings)
         car = told if isinstance(told, vehicles.SingleTrack) else _single_track(settings, told)
         speed = speed_and_steer(settings["drive"])[0]
-        v_x = recording["v_x"] if "v_x" in recording else jnp.full((len(recording),), speed)
-        return estimators.open_loop_of(car, recording.time, recording["steer"], v_x)[quantity]
+        seen = hold(recording, ("steer", "v_x"))
+        v_x = seen["v_x"] if "v_x" in seen else jnp.full((len(seen),), speed)
+        return estimators.open_loop_of(car, seen.time, seen["steer"], v_x)[quantity]
     first = jax.tree.map(lambda leaf: leaf[0], model.rows(log))
     return getattr(model.report(first.t, model.prior.mean, first.u), quantity.replace(".", "_"))
 

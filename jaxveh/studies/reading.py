@@ -41,6 +41,9 @@ yaw_rate = 0.005                # rad/s
 a_y = 0.1                       # m/s^2
 v_x = 0.1                       # m/s: an input of the estimator's single track, which this car does not say otherwise
 
+# [channels]                    # what the estimator calls a channel that is recorded under another name; the inputs of its
+# v_x = "speed"                 # model are held from one row to the next in which a device says them
+
 [estimator]                     # the model that the filter sees
 name = "state-space"            # or "sideslip", "mass-and-grade"
 fidelity = "single-track"

@@ -16,6 +16,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     },
     "car": {},
     "sensors": {"devices": "esc"},
+    "channels": {},
     "estimator": {"name": "state-space"},
     "told": {},
     "process_noise": {},

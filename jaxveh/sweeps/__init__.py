@@ -4,8 +4,8 @@ from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.paired import Comparison, ConfidenceInterval, compare
 from jaxveh.sweeps.running import sweep
 from jaxveh.sweeps.sampling import Samples, latin_hypercube, sobol
-from jaxveh.sweeps.several import IN_MEMORY, Stores
 from jaxveh.sweeps.stored import read_sweep
+from jaxveh.sweeps.study_stores import IN_MEMORY, Stores
 from jaxveh.sweeps.swept import Swept
 from jaxveh.sweeps.table import Table
 

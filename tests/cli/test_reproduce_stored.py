@@ -13,7 +13,7 @@ from programs import error_line, run
 from jaxveh.cli import all_papers, reproduce
 from jaxveh.cli.family import Family
 from jaxveh.experiments.report import spread
-from jaxveh.sweeps import IN_MEMORY, Design, Swept, Table, several
+from jaxveh.sweeps import IN_MEMORY, Design, Swept, Table, study_stores
 
 
 class Found(NamedTuple):
@@ -36,7 +36,7 @@ def computed(monkeypatch):
         run=sweep, tables=tables, check=lambda found: [], settings=lambda found: {},
         as_printed=lambda **options: tables(sweep(**options)),
     )  # fmt: skip
-    monkeypatch.setattr(several, "RUNS", 2)
+    monkeypatch.setattr(study_stores, "RUNS", 2)
     monkeypatch.setattr(reproduce, "PAPERS", {"first": "a paper", "second": "another"})
     monkeypatch.setattr(reproduce, "_experiment", lambda name: paper)
     monkeypatch.setattr(reproduce, "_every_core", lambda: None)

@@ -137,7 +137,7 @@ BAD = {
     ("none.toml", "-o", "s.zarr"): "none.toml",
     ("study.toml", "-o", "s.zarr", "--part", "2/2"): "--part 2/2: must be I/N",
     ("study.toml", "-o", "s.zarr", "--part", "half"): "--part half: must be I/N",
-    ("study.toml", "-o", "s.zarr", "--processes", "2", "--scheduler", "tcp://x:1"): "one computes, not both",
+    ("study.toml", "-o", "s.zarr", "--processes", "2", "--scheduler", "tcp://x:1"): "give one of them, not both",
     ("study.toml", "-o", "s.zarr", "--part", "0/2", "--out", "figs"): "a share has no tables",
     ("show", "none.zarr"): "none.zarr",
     ("wrong.toml", "-o", "s.zarr"): "no manoeuvre 'step'",

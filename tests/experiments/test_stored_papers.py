@@ -16,7 +16,7 @@ from jaxveh.cli.output import plain
 from jaxveh.cli.reproduce import PAPERS, _experiment
 from jaxveh.experiments import mass_grade_aukf
 from jaxveh.experiments.mass_grade_aukf.report import _printed_table
-from jaxveh.sweeps import IN_MEMORY, Stores, several
+from jaxveh.sweeps import IN_MEMORY, Stores, study_stores
 from jaxveh.sweeps.store import DONE, Store
 
 SMALL = mass_grade_aukf.truck(duration=20.0, dt=0.1, max_step=0.01, guesses=(4000.0, 6000.0))
@@ -192,7 +192,7 @@ def written(monkeypatch):
 
 
 def test_a_paper_goes_on_and_computes_nothing_twice(tmp_path, monkeypatch, written, unstored):
-    monkeypatch.setattr(several, "RUNS", 3)
+    monkeypatch.setattr(study_stores, "RUNS", 3)
     stores = Stores(tmp_path / "stores")
     for count in (1, 4):
         with pytest.raises(KeyboardInterrupt):
@@ -210,7 +210,7 @@ def test_a_paper_goes_on_and_computes_nothing_twice(tmp_path, monkeypatch, writt
 
 def test_chunks_that_failed_end_the_paper(tmp_path, monkeypatch, unstored):
     """Tables without them would be of other drives; and what follows would be stored as of those."""
-    monkeypatch.setattr(several, "RUNS", 3)
+    monkeypatch.setattr(study_stores, "RUNS", 3)
     write = Store.write
 
     def failing(self, chunk, values):
@@ -224,7 +224,7 @@ def test_chunks_that_failed_end_the_paper(tmp_path, monkeypatch, unstored):
         small(stores)
     assert not (tmp_path / "race.zarr").exists()
     monkeypatch.undo()
-    monkeypatch.setattr(several, "RUNS", 3)
+    monkeypatch.setattr(study_stores, "RUNS", 3)
     assert small(stores) == unstored
 
 
@@ -263,7 +263,7 @@ def assert_alike(found, plain):
 @pytest.mark.full
 def test_every_paper_is_the_same_with_stores(paper, tmp_path, monkeypatch, written):
     """Begun in two processes, interrupted, and ended in this one, in small chunks: whose batches round otherwise."""
-    monkeypatch.setattr(several, "RUNS", 5)
+    monkeypatch.setattr(study_stores, "RUNS", 5)
     plain = paper.run(seeds=2)
     calls = itertools.count(1)
 

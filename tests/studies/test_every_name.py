@@ -10,11 +10,12 @@ import pytest
 from families import members
 from small_studies import study
 
-from jaxveh import InputError, estimators, filters, sensors, studies, vehicles
+from jaxveh import InputError, estimators, filters, roads, sensors, studies, vehicles
 from jaxveh._core.parameter import every_parameter, pick
 from jaxveh.manoeuvres import MANOEUVRES
 from jaxveh.statespace import AbstractFilter
 from jaxveh.studies.drives import drive_of, simulate
+from jaxveh.studies.estimating import model_of
 from jaxveh.studies.named_filters import kebab
 from jaxveh.studies.numbers import with_numbers
 from jaxveh.studies.settings import put_at
@@ -163,3 +164,75 @@ def test_every_estimator_runs(name):
     found = jax.jit(made)(made.design.point({}, {}), KEY)
     assert found["failed"] == 0
     assert all(np.isfinite(value) for value in found.values())
+
+
+NOISE = {"measurement_noise": {"yaw_rate": 0.005, "a_y": 0.1}}
+CHANNELS = {"production": {"v_x": "speed"}}
+"""What devices call otherwise: satellite navigation says a speed over ground."""
+
+
+ENOUGH = {"production": "sideslip", "proving-ground": "state-space"}
+"""An estimator that each set of devices is tried with; those of noise by channel are everywhere else."""
+
+
+def test_every_set_of_devices_is_tried():
+    assert set(ENOUGH) == {name for name, one in sensors.DEVICES.items() if not one.takes_noise} - {"none"}
+
+
+@pytest.mark.parametrize(("name", "estimator"), ENOUGH.items())
+def test_every_set_of_devices_is_enough(name, estimator):
+    made = study(
+        drive={"vehicle": "sedan", "fidelity": "two-track-3dof"}, sensors={"devices": name}, estimator=estimator,
+        channels=CHANNELS.get(name, {}), metrics={"names": ["rmse.sideslip"]}, **(NOISE if estimator == "state-space" else {}),
+    )  # fmt: skip
+    made.check()
+    found = jax.jit(lambda key: made(made.design.point({}, {}), key))(KEY)
+    assert found["failed"] == 0 and all(np.isfinite(value) for value in found.values())
+
+
+@pytest.mark.parametrize("road", roads.ROADS)
+def test_every_road_can_be_driven(road):
+    made = study(drive={"road": road, "fidelity": "two-track-3dof"}, sensors={"devices": "none"})
+    drive = lambda key: simulate(drive_of(made.settings, key), key)["true.v_x"]
+    assert jax.eval_shape(drive, KEY).shape == (41,)
+
+
+MOVED = {"longitudinal": "cruise"}
+
+
+@pytest.mark.parametrize("fidelity", kit.FIDELITIES)
+def test_every_fidelity_can_be_the_truth(fidelity):
+    name = next(n for n in kit.CARS if fidelity in _fidelities(n))
+    drive = {"vehicle": name, "fidelity": fidelity, "manoeuvre": MOVED.get(fidelity, "step-steer")}
+    made = study(drive=drive, sensors={"devices": "none"})
+    seen = jax.eval_shape(lambda key: simulate(drive_of(made.settings, key), key)["true.v_x"], KEY)
+    assert seen.shape == (41,)
+
+
+@pytest.mark.parametrize("fidelity", kit.FIDELITIES)
+def test_every_fidelity_can_be_told(fidelity):
+    """Of a car that has its numbers, on drives of a two-track car where it turns on tyres."""
+    name = next(n for n in kit.CARS if fidelity in _fidelities(n))
+    straight = fidelity == "longitudinal"
+    channel = "v_x" if straight else "yaw_rate"
+    truth = fidelity if "kinematic" in fidelity or straight else "two-track-3dof"
+    made = study(
+        drive={"vehicle": name, "fidelity": truth, "manoeuvre": "cruise" if straight else "step-steer"},
+        sensors={channel: 0.01} | ({} if "kinematic" in fidelity or straight else {"a_y": 0.1, "v_x": 0.1}),
+        estimator={"name": "state-space", "fidelity": fidelity},
+    )  # fmt: skip
+    made.check()
+    model = model_of(made.settings, drive_of(made.settings, KEY))
+    assert channel in model.channels and type(model.system.vehicle) is kit.FIDELITIES[fidelity]
+
+
+def test_a_filter_is_not_shown_its_inputs_twice():
+    made = study(sensors={"yaw_rate": 0.01, "a_y": 0.1, "v_x": 0.1})
+    model = model_of(made.settings, drive_of(made.settings, KEY))
+    assert model.channels == ("yaw_rate", "a_y") and "v_x" in model.inputs
+
+
+def test_lists_of_a_file_are_tuples_of_a_filter():
+    table = {"name": "adaptive-number", "bins": {"yaw_rate": 0.1}, "sizes": [10, 40]}
+    made = studies.filter_of({**table, "inner": {"name": "particle-filter", "particles": 40}})
+    assert made.sizes == (10, 40) and hash(made.sizes)

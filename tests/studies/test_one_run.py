@@ -11,6 +11,7 @@ from small_studies import DRIVE, study
 
 from jaxveh import (
     InputError,
+    Recording,
     diagnostics,
     estimators,
     filters,
@@ -21,7 +22,7 @@ from jaxveh import (
     sweeps,
     vehicles,
 )
-from jaxveh.studies import metrics
+from jaxveh.studies import channels, metrics
 
 KEY = jax.random.key(5)
 
@@ -153,3 +154,19 @@ def test_every_metric_is_documented_and_takes_what_it_says():
     for name, one in studies.METRICS.items():
         assert one.help and one.unit, name
         assert len(inspect.signature(one.compute).parameters) == 1
+
+
+def test_inputs_are_held_from_the_row_in_which_they_were_said():
+    nan = np.nan
+    recording = Recording(
+        np.arange(5.0), {"v_x": np.array([nan, 2.0, nan, nan, 3.0]), "a_y": np.array([nan, 1.0, nan, 1.0, 1.0])}
+    )
+    held = channels.hold(recording, ("v_x", "steer"))
+    np.testing.assert_array_equal(held["v_x"], [2.0, 2.0, 2.0, 2.0, 3.0])
+    np.testing.assert_array_equal(held["a_y"], recording["a_y"])
+    unknown = channels.hold(recording.replace(v_x=np.full(5, nan)), ("v_x",))
+    assert np.isnan(unknown["v_x"]).all()
+    named = channels.renamed_channels(recording, {"speed": "v_x"})
+    np.testing.assert_array_equal(named["speed"], recording["v_x"])
+    with pytest.raises(InputError, match="channels: no recorded channel 'v_z' .*v_x"):
+        channels.renamed_channels(recording, {"speed": "v_z"})

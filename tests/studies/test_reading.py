@@ -87,6 +87,7 @@ BAD = {
     '[vary]\n"drive.speed" = []': "must be a list",
     '[vary]\n"drive.speed" = ["fast"]': "vary.drive.speed = 'fast': must be a finite number",
     '[vary]\n"drive.speed" = [20.0, -20.0]': "speed = -20.0",
+    '[vary]\n"drive.steer_deg" = [1.0, 120.0]': "steer",
     '[vary]\n"car.mass" = {from = 1.0, to = -1.0}': "car.mass = -1.0",
     '[vary]\n"car.mass" = {from = 1.0, to = 2.0, count = 1}': "count = 1",
     '[vary]\n"car.mass" = {from = 0.0, to = 2.0, scale = "log"}': "a logarithmic range must be positive",

@@ -8,7 +8,7 @@ import pytest
 
 from jaxveh import sweeps
 from jaxveh._core.names import record
-from jaxveh.sweeps import IN_MEMORY, Design, Stores, several
+from jaxveh.sweeps import IN_MEMORY, Design, Stores, study_stores
 from jaxveh.sweeps.store import Store
 
 COUNT = 5
@@ -35,7 +35,7 @@ def pull(spring, key, start):
 @pytest.fixture
 def rows(monkeypatch):
     """Arguments of `pull`, rows in front; in a store they are three chunks."""
-    monkeypatch.setattr(several, "RUNS", 2)
+    monkeypatch.setattr(study_stores, "RUNS", 2)
     springs = Spring(jnp.arange(1.0, 1.0 + COUNT), "sine")
     return springs, jax.random.split(jax.random.key(2), COUNT), np.linspace(0.0, 1.0, COUNT)
 
@@ -66,7 +66,7 @@ def test_other_processes_find_the_same(tmp_path, rows):
 
 
 def test_a_sweep_has_what_it_has_in_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr(several, "RUNS", 4)
+    monkeypatch.setattr(study_stores, "RUNS", 4)
     design = Design(scale=[1.0, 2.0], law={"sine": jnp.sin, 7: jnp.tanh})
 
     def run(point, key):
