@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from jaxveh import InputError
+from jaxveh import InputError, io
 from jaxveh.cli import options
 from jaxveh.cli.console import progress, results, table
 from jaxveh.cli.output import check_report, make_folder, write_numbers
@@ -121,6 +121,7 @@ def _check(study: Path | None, store: Path | None) -> tuple[Path, Path]:
         )
     if store.suffix.lower() != SUFFIX:
         raise InputError(f"-o {store}: suffix {store.suffix!r}; it must end in {SUFFIX}.")
+    io.kit.require("zarr", "storing a sweep", "sweep")
     return study, store
 
 
