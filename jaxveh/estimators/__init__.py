@@ -1,11 +1,12 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
-from jaxveh.estimators import kit, mass_and_grade, sideslip
+from jaxveh.estimators import kit, mass_and_grade, sideslip, speed
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.contract import Calibration, Span
 from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
 from jaxveh.estimators.live import Live, LiveAnswer, LiveBelief
+from jaxveh.estimators.method import AbstractMethod, Answer, Answers, Filtered, LiveMethod, MethodOfCar
 from jaxveh.estimators.observability import observe, predict_measurements
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.state_space import PROCESS_NOISE, START_SPREAD, held_rows, state_space
@@ -13,10 +14,16 @@ from jaxveh.estimators.state_space import PROCESS_NOISE, START_SPREAD, held_rows
 __all__ = [
     "PROCESS_NOISE",
     "START_SPREAD",
+    "AbstractMethod",
+    "Answer",
+    "Answers",
     "Calibration",
+    "Filtered",
     "Live",
     "LiveAnswer",
     "LiveBelief",
+    "LiveMethod",
+    "MethodOfCar",
     "RearAxle",
     "Span",
     "clean",
@@ -30,6 +37,7 @@ __all__ = [
     "read_calibration",
     "rear_axle_model",
     "sideslip",
+    "speed",
     "state_space",
     "write_calibration",
 ]

@@ -2,14 +2,36 @@
 
 from jaxveh.estimators.contract import Need, check_needs, cut_pieces, model_of, spans_of, start_of
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, clean_recording
+from jaxveh.estimators.method import (
+    AbstractMethod,
+    Answer,
+    Answers,
+    Filtered,
+    LiveMethod,
+    MethodOfCar,
+    answer,
+    follow,
+    follow_rows,
+    method_of,
+)
 
 __all__ = [
     "AbstractCleaning",
+    "AbstractMethod",
+    "Answer",
+    "Answers",
     "AsItIs",
+    "Filtered",
+    "LiveMethod",
+    "MethodOfCar",
     "Need",
+    "answer",
     "check_needs",
     "clean_recording",
     "cut_pieces",
+    "follow",
+    "follow_rows",
+    "method_of",
     "model_of",
     "spans_of",
     "start_of",

@@ -1,0 +1,252 @@
+"""A way to a quantity: what it reads, what it remembers from row to row, and what it says of each, looking back only.
+
+A quantity has many methods: a formula of what is measured now, an observer with a memory, a filter on a model. All of them are an
+`AbstractMethod`, so that one driver follows a log, one answers live, and both say the same.
+
+A quantity is a module of `jaxveh.estimators` that has, beside what its calibration needs if it has one:
+
+- `SHOWN`: the names that all its methods report, and their units.
+- `METHODS`: `MethodOfCar` by name. `RECOMMENDED`: the name of the one that we would take.
+- `estimate(source, recording, *, method=...)` and `live(source, *, method=...)`; `source` is a car's file, or a method with
+  numbers of one's own.
+"""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_one_of, is_concrete
+from jaxveh._core.names import record
+from jaxveh._core.recording import Recording
+from jaxveh._core.result import Result, code
+from jaxveh.estimators.contract import Need, check_needs
+from jaxveh.estimators.live import AbstractCleaning, AsItIs
+from jaxveh.io import CarSpecification
+from jaxveh.numerics import apart
+from jaxveh.statespace import AbstractFilter, Row, StateSpace, kit
+
+
+class Answer(NamedTuple):
+    """What a method says of a row: `mean` and standard deviation `std` by name, NamedTuples with the same fields; a spread is NaN
+    where the method claims none. `known`: the same fields, False where the drive does not tell the quantity now, so that the mean
+    is a memory or a guess. `result`: a code of `jaxveh.Result`, 0 where all went well."""
+
+    mean: Any
+    std: Any
+    known: Any
+    result: Any
+
+
+class AbstractMethod(eqx.Module):
+    """A row is a time (s) and a mapping of the `needs`' channels to scalars, NaN where nothing was measured.
+
+    Numbers that one may want to fit are array leaves. Everything is a pure function of scalars: a batch is `jax.vmap`.
+    """
+
+    @property
+    @abc.abstractmethod
+    def needs(self) -> tuple[Need, ...]:
+        """The channels that it reads. An `optional` one is NaN in every row where a log lacks it."""
+
+    @abc.abstractmethod
+    def first(self, t: Any, values: dict[str, Any]) -> tuple[Any, Answer]:
+        """The memory after the first row, and the answer to it."""
+
+    @abc.abstractmethod
+    def next(self, memory: Any, t: Any, values: dict[str, Any]) -> tuple[Any, Answer]:
+        """The same of the next row."""
+
+
+class MethodOfCar(NamedTuple):
+    """How to make a method from a car's file (**raises** `InputError` for a key that the file lacks), what it is in a line, and
+    where it is from."""
+
+    make: Callable[[CarSpecification], AbstractMethod]
+    help: str
+    source: str
+
+
+class Answers(eqx.Module):
+    """What a method said along a log: `time` (T,), and the fields of `Answer` with (T,) in each."""
+
+    time: Any
+    mean: Any
+    std: Any
+    known: Any
+    result: Any
+
+    def __getitem__(self, name: str):
+        """The mean of a quantity by name, (T,)."""
+        return getattr(self.mean, name)
+
+
+def answer(mean: Mapping[str, Any], std: Mapping[str, Any] | None = None, known: Any = True) -> Answer:
+    """An `Answer` of scalars by name. `std`: those that are claimed, the others are NaN; `known`: one boolean, or some by name,
+    of which those that are not named are known. A mean that is not finite is not known, and has the code of a state that is not.
+    """
+    some = jnp.asarray(next(iter(mean.values())))
+    of = lambda values, default: {name: values.get(name, default) for name in mean}
+    means = {name: jnp.asarray(value, some.dtype) for name, value in mean.items()}
+    stds = {name: jnp.asarray(value, some.dtype) for name, value in of(std or {}, jnp.nan).items()}
+    told = of(known, True) if isinstance(known, Mapping) else dict.fromkeys(mean, known)
+    finite = {name: jnp.isfinite(value) for name, value in means.items()}
+    told = {name: jnp.asarray(told[name], bool) & finite[name] for name in mean}
+    lost = ~jnp.all(jnp.stack(list(finite.values())))
+    result = jnp.where(lost, code(Result.non_finite_state), jnp.int32(0))
+    return Answer(record("Answer", means), record("Answer", stds), record("Answer", told), result)
+
+
+class Filtered(AbstractMethod):
+    """A filter on a state space as a method. `cleaning` stands between the log and the filter.
+
+    `told_by(model, belief, row)`: booleans by name where something that is reported is not always known; by default all is,
+    unless the filter failed. `shown`: the names of the report to show, all by default.
+    """
+
+    model: StateSpace
+    filter: AbstractFilter
+    reads: tuple[Need, ...] = eqx.field(static=True)
+    cleaning: AbstractCleaning = AsItIs()
+    told_by: Callable[..., Mapping[str, Any]] | None = eqx.field(static=True, default=None)
+    shown: tuple[str, ...] | None = eqx.field(static=True, default=None)
+    key: Any = None
+
+    @property
+    def needs(self):
+        return self.reads
+
+    def first(self, t, values):
+        memory, cleaned = self.cleaning.first(t, values)
+        row = self._row(t, cleaned)
+        belief, info = self.filter.init(self.model, row, self.key)
+        return (belief, memory), self._answer(belief, row, info)
+
+    def next(self, memory, t, values):
+        belief, memory = memory
+        memory, cleaned = self.cleaning.next(memory, t, values)
+        row = self._row(t, cleaned)
+        belief, info = self.filter.step(self.model, belief, row)
+        return (belief, memory), self._answer(belief, row, info)
+
+    def _row(self, t, values) -> Row:
+        of = lambda kind, names: record(kind, {name: values[name] for name in names})
+        return Row(t, of("Inputs", self.model.inputs), of("Measurements", self.model.channels))
+
+    def _answer(self, belief, row, info) -> Answer:
+        mean, std = belief.moments(self.model)
+        names = self.shown or mean._fields
+        told = {} if self.told_by is None else self.told_by(self.model, belief, row)
+        well = info.result == 0
+        known = {name: well & told.get(name, True) for name in names}
+        said = answer(
+            {name: getattr(mean, name) for name in names}, {name: getattr(std, name) for name in names}, known
+        )
+        return said._replace(result=jnp.where(well, said.result, info.result))
+
+
+def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: str) -> AbstractMethod:
+    """A method as it is, or the one of a name for a car's file. **Raises** `InputError` for a name that is not there."""
+    if isinstance(source, AbstractMethod):
+        return source
+    check_one_of(f"{who}: method", name, methods)
+    if not isinstance(source, CarSpecification):
+        raise InputError(
+            f"{who}: source = {type(source).__name__}: must be an io.CarSpecification, which io.read_car reads, or a method."
+        )
+    return methods[name].make(source)
+
+
+def follow(who: str, method: AbstractMethod, recording: Recording) -> Answers:
+    """What the method says of each row of a log, in one scan; compiled once for each kind of method and length.
+
+    **Raises** `InputError` for channels that are missing, in other units, infinite, or not known throughout where they must be.
+    """
+    there = [need for need in method.needs if not need.optional or need.channel in recording]
+    check_needs(who, tuple(need._replace(optional=False) for need in there), recording)
+    for need in there:
+        _check_finite(who, need.channel, recording)
+    dtype, time = _dtype(method), recording.time
+    if isinstance(time, np.ndarray) and dtype != np.float64:
+        time = time - time[0]
+    none = jnp.full(len(recording), jnp.nan, dtype)
+    values = {need.channel: none for need in method.needs}
+    values |= {need.channel: jnp.asarray(recording[need.channel]).astype(dtype) for need in there}
+    said = follow_rows(method, jnp.asarray(time).astype(dtype), values)
+    return Answers(recording.time, said.mean, said.std, said.known, said.result)
+
+
+def _dtype(method: AbstractMethod) -> Any:
+    """That of the method's numbers; without any, that of numbers in general."""
+    leaves = jax.tree.leaves(eqx.filter(method, eqx.is_inexact_array))
+    return jnp.result_type(*leaves) if leaves else jax.dtypes.canonicalize_dtype(float)
+
+
+def _check_finite(who: str, name: str, recording: Recording) -> None:
+    if not is_concrete(recording[name]):
+        return
+    infinite = np.isinf(np.asarray(recording[name]))
+    if infinite.any():
+        raise InputError(
+            f"{who}: channel {name} is infinite at t = {np.asarray(recording.time)[np.argmax(infinite)]:g} s: must be finite, or "
+            "NaN where nothing was measured."
+        )
+
+
+@eqx.filter_jit
+def follow_rows(method: AbstractMethod, time: Any, values: dict[str, Any]) -> Answer:
+    """The compiled part of `follow`, of (T,) arrays; steps are checkpointed, so that long logs can be differentiated."""
+    take = lambda rows: jax.tree.map(lambda leaf: leaf[rows], (time, values))
+    start, rest = take(0), take(slice(1, None))
+    memory, said = apart(method.first, start[0], *start)
+    # What is remembered has the same types after each row as after the first.
+    body = jax.checkpoint(lambda memory, row: apart(method.next, row[0], memory, *row))
+    _, later = jax.lax.scan(body, memory, rest)
+    return jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), said, later)
+
+
+class LiveMethod(eqx.Module):
+    """A method that is given one row at a time, and says what `follow` says of the same rows.
+
+        live = estimators.speed.live(car)
+        memory, answer = live.init(t, {"a_x": ..., "wheel_speed_fl": ..., ...})
+        memory, answer = live.step(memory, t, {...})
+        answer.mean.v_x, answer.std.v_x, answer.known.v_x
+
+    Compiled once each. Channels that are not given, or NaN, were not measured. Where float32 rules, count time from the first row.
+    """
+
+    method: AbstractMethod
+
+    def init(self, t, channels: Mapping[str, Any]) -> tuple[Any, Answer]:
+        """The memory after the first row, and the answer to it. **Raises** `InputError` for a needed channel not given."""
+        return _first(self.method, *self._row(t, channels))
+
+    def step(self, memory: Any, t, channels: Mapping[str, Any]) -> tuple[Any, Answer]:
+        """The memory after the next row, and the answer to it."""
+        return _next(self.method, memory, *self._row(t, channels))
+
+    def _row(self, t, channels: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
+        needs = self.method.needs
+        missing = [need.channel for need in needs if need.throughout and need.channel not in channels]
+        if missing:
+            raise InputError(f"row: no value for {', '.join(missing)}.")
+        numbers = [channels.get(need.channel, np.nan) for need in needs]
+        t, *values = kit.scalar_row(t, numbers, _dtype(self.method))
+        return t, dict(zip([need.channel for need in needs], values, strict=True))
+
+
+@eqx.filter_jit
+def _first(method, t, values):
+    return apart(method.first, t, t, values)
+
+
+@eqx.filter_jit
+def _next(method, memory, t, values):
+    return apart(method.next, t, memory, t, values)
