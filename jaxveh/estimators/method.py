@@ -219,7 +219,8 @@ class LiveMethod(eqx.Module):
         memory, answer = live.step(memory, t, {...})
         answer.mean.v_x, answer.std.v_x, answer.known.v_x
 
-    Compiled once each. Channels that are not given, or NaN, were not measured. Where float32 rules, count time from the first row.
+    Compiled once each. Channels that are not given, or NaN, were not measured. Where float32 rules, count time from the first
+    row.
     """
 
     method: AbstractMethod

@@ -63,7 +63,8 @@ def channels(speed=15.0, seed=0):
     return {
         **one, "time": t, "roll": roll, "pitch": -one["grade"], "yaw": yaw, "sideslip": np.arctan2(v_y, np.abs(v_x)),
         "yaw_rate": noise(yaw_rate, 0.002), "a_x": noise(a_x, 0.05), "a_y": noise(flat + G * np.sin(roll), 0.05),
-        "a_z": noise(G * np.cos(roll), 0.05), "roll_rate": noise(rate(roll), 0.002), "pitch_rate": noise(-rate(one["grade"]), 0.002),
+        "a_z": noise(G * np.cos(roll), 0.05), "roll_rate": noise(rate(roll), 0.002),
+        "pitch_rate": noise(-rate(one["grade"]), 0.002),
         "x": satellite(np.cumsum(v_x * np.cos(yaw)) * STEP), "y": satellite(np.cumsum(v_x * np.sin(yaw)) * STEP),
         "speed": satellite(np.hypot(v_x, v_y)), "course": satellite(yaw + np.arctan2(v_y, v_x)), "heading": satellite(yaw),
         "steering_wheel": 16.0 * one["steer"], "steering_torque": front * 0.03 / 16.0,

@@ -38,7 +38,7 @@ def stacked(logs, needs, dtype=float):
 @every_quantity
 def test_a_quantity_says_what_it_shows_and_recommends_a_method(quantity):
     module = QUANTITIES[quantity]
-    assert module.RECOMMENDED in module.METHODS and module.NAME == quantity
+    assert module.RECOMMENDED in module.METHODS and quantity == module.NAME
     assert module.SHOWN and all(isinstance(unit, str) and unit for unit in module.SHOWN.values())
     for function, first in (("estimate", ["source", "recording"]), ("live", ["source"])):
         found = inspect.signature(getattr(module, function)).parameters

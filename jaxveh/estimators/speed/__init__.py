@@ -1,4 +1,4 @@
-"""Longitudinal speed of a car from its wheels, its accelerometer and its torques: section 2 of the review (Chen, Gao, Xu 2013)."""
+"""Longitudinal speed from wheels, accelerometer and torques: section 2 of the review (Chen, Gao, Xu 2013)."""
 
 from __future__ import annotations
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import abc
+
+import jax
 import jax.numpy as jnp
 
 from jaxveh.estimators.contract import Need
@@ -10,8 +13,12 @@ from jaxveh.estimators.method import AbstractMethod, answer
 WHEEL_SPEEDS = tuple(Need(f"wheel_speed_{at}", "m/s") for at in ("fl", "fr", "rl", "rr"))
 
 
-class _OneWheel(AbstractMethod):
+class AbstractOneWheel(AbstractMethod):
     """One of the four wheel speeds, chosen row by row; what the last rows said is held where no wheel speaks."""
+
+    @abc.abstractmethod
+    def choose(self, speeds: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """The speed of (4,) wheels, NaN where one does not speak, and whether one does."""
 
     @property
     def needs(self):
@@ -27,7 +34,7 @@ class _OneWheel(AbstractMethod):
         return v_x, answer({"v_x": v_x}, known=spoke)
 
 
-class FastestWheel(_OneWheel):
+class FastestWheel(AbstractOneWheel):
     """The review's maximum: of a braking car the wheel that slips least."""
 
     def choose(self, speeds):
@@ -35,7 +42,7 @@ class FastestWheel(_OneWheel):
         return jnp.max(jnp.where(there, speeds, -jnp.inf)), there.any()
 
 
-class SlowestWheel(_OneWheel):
+class SlowestWheel(AbstractOneWheel):
     """The review's minimum: of a driven car the wheel that slips least."""
 
     def choose(self, speeds):
