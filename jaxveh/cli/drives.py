@@ -46,17 +46,37 @@ def read_drives(
     """
     drives = []
     for log in logs:
-        recording = io.with_road_steer(car, io.read_recording(log, channels))
-        if "steering_wheel" in recording and "steer" not in recording:
-            words = "note: steering_wheel is not used: the car's file has no steering_ratio."
-            results().print(f"{log.name}: {words}", markup=False, soft_wrap=True)
-        wanted = options.span_of(span, float(recording.time[0]), float(recording.time[-1]), "--span")
-        recording = fill_gaps(recording if wanted is None else recording.between(*wanted), fill)
+        recording = fill_gaps(_read(log, car, channels, span), fill)
         findings = _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)
         drives.append(Drive(log, recording, findings))
     if not anyway:
         _check_one_car(drives)
     return drives
+
+
+def read_log(
+    log: Path,
+    car: CarSpecification,
+    channels: Path | None,
+    span: str | None,
+    used: tuple[str | None, ...],
+    anyway: bool,
+) -> Drive:
+    """One log, cut to its span, after `check` has looked at it; nothing in it is needed but what is `used`.
+
+    **Raises** `InputError` where `check` finds errors in the time or what is used, unless it goes on `anyway`.
+    """
+    recording = _read(log, car, channels, span)
+    return Drive(log, recording, _look_at(log, recording, car, {"time", *(name for name in used if name)}, anyway))
+
+
+def _read(log: Path, car: CarSpecification, channels: Path | None, span: str | None) -> Recording:
+    recording = io.with_road_steer(car, io.read_recording(log, channels))
+    if "steering_wheel" in recording and "steer" not in recording:
+        words = "note: steering_wheel is not used: the car's file has no steering_ratio."
+        results().print(f"{log.name}: {words}", markup=False, soft_wrap=True)
+    wanted = options.span_of(span, float(recording.time[0]), float(recording.time[-1]), "--span")
+    return recording if wanted is None else recording.between(*wanted)
 
 
 def _check_one_car(drives: Sequence[Drive]) -> None:

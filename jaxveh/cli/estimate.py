@@ -11,7 +11,7 @@ import typer
 
 from jaxveh import InputError, Recording, io
 from jaxveh._core.errors import check_at_least, check_one_of
-from jaxveh.cli import options, sideslip
+from jaxveh.cli import options, quantities, sideslip
 from jaxveh.cli.blanking import LogParts, split
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import Drive, read_drives
@@ -98,8 +98,11 @@ def estimate(
     report: Annotated[Path | None, REPORT] = None,
     force: options.Force = False,
     anyway: options.Anyway = False,
+    what: quantities.What = sideslip.NAME,
+    methods: quantities.Methods = None,
+    list_methods: quantities.Listed = False,
 ) -> None:
-    """Estimate sideslip, slip and forces of a car from v_x, a_x, a_y and yaw_rate.
+    """Estimate what a car cannot measure along its logs: sideslip, slip and forces, or another quantity (--what).
 
     A log calibrates itself: the rear axle, noises and sensor offsets are fitted on all its rows, of which no reference is seen,
     and all rows are estimated; several logs of a car calibrate themselves together. With --calibrate they are fitted on that span
@@ -118,7 +121,27 @@ def estimate(
     [bold]jaxveh estimate drive.csv --vehicle car.toml -o estimate.csv --calibrate 0:120 --calibrate-on v_y --truth v_y[/]
 
     [bold]jaxveh estimate monday.csv tuesday.csv --calibration calibration.toml -o estimates[/]
+
+    [bold]jaxveh estimate drive.csv --vehicle car.toml -o speed.csv --what speed --methods all --truth v_x[/]
     """
+    del list_methods
+    asked = quantities.names_of(what, "--what", tuple(quantities.QUANTITIES))
+    if asked != (sideslip.NAME,) or methods is not None:
+        others = {
+            "--calibration": calibration, "--calibrate": calibrate, "--calibrate-on": calibrate_on, "--report": report,
+            "--as-told": as_told or None,
+        }  # fmt: skip
+        given = [option for option, value in others.items() if value]
+        if given:
+            raise InputError(f"{', '.join(given)}: of --what sideslip without --methods alone; leave it out.")
+        quantities.estimate_quantities(
+            quantities.Asked(
+                logs, product, vehicle, channels, span, fill, asked, quantities.methods_of(methods, asked), truth, out, force,
+                anyway,
+            ),
+            numbers,
+        )  # fmt: skip
+        return
     choice = Choice(
         logs, product, vehicle, calibration, channels, span, calibrate, tuple(calibrate_on or ()), as_told, fill, truth,
         filter, particles, seed, out, report, force, anyway,

@@ -19,6 +19,10 @@ OFF = "off"
 CANNOT_READ = "Error reading persistent compilation cache entry"
 """How jax begins to say that a kept program is damaged (a start was killed while it wrote); it would say so at every start."""
 
+CANNOT_WRITE = ("Error writing persistent compilation cache entry", "FileNotFoundError")
+"""How it begins to say that it misses the file in which another program's last use should stand (a start was killed between both
+files), and what then comes; it would say so for every program of every start, and keep none."""
+
 DAMAGED = "damaged"
 """A file in a folder of programs that says so: the next start begins a new one."""
 
@@ -97,8 +101,10 @@ def folders(above: Path) -> list[Path]:
 
 
 def is_of_damage(message: str) -> bool:
-    """Whether a warning is jax's that it cannot read a kept program; then the next start forgets them all."""
-    place = folder() if JAX_VARIABLE not in os.environ and message.startswith(CANNOT_READ) else None
+    """Whether a warning is jax's that it cannot read a kept program, or none beside it; then the next start forgets them all."""
+    begin, reason = CANNOT_WRITE
+    damaged = message.startswith(CANNOT_READ) or (message.startswith(begin) and reason in message)
+    place = folder() if JAX_VARIABLE not in os.environ and damaged else None
     if place is None or not place.is_dir():
         return False
     (place / DAMAGED).touch()

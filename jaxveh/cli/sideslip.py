@@ -16,6 +16,8 @@ from jaxveh.estimators import Calibration, sideslip
 from jaxveh.estimators import open_loop as drive_open_loop
 from jaxveh.io import CarSpecification
 
+NAME = sideslip.NAME
+
 SCORED = ("v_y", "sideslip")
 """Channels that `--truth` can name."""
 

@@ -3,6 +3,7 @@
 from jaxveh.estimators import kit, mass_and_grade, sideslip, speed
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
+from jaxveh.estimators.comparison import Compared, MethodScore, compare, score_answers
 from jaxveh.estimators.contract import Calibration, Span
 from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
 from jaxveh.estimators.live import Live, LiveAnswer, LiveBelief
@@ -18,15 +19,18 @@ __all__ = [
     "Answer",
     "Answers",
     "Calibration",
+    "Compared",
     "Filtered",
     "Live",
     "LiveAnswer",
     "LiveBelief",
     "LiveMethod",
     "MethodOfCar",
+    "MethodScore",
     "RearAxle",
     "Span",
     "clean",
+    "compare",
     "held_rows",
     "kit",
     "mass_and_grade",
@@ -36,6 +40,7 @@ __all__ = [
     "predict_measurements",
     "read_calibration",
     "rear_axle_model",
+    "score_answers",
     "sideslip",
     "speed",
     "state_space",

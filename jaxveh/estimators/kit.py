@@ -1,5 +1,6 @@
 """What those who add an estimator build with: see `jaxveh.estimators.contract` for what one is."""
 
+from jaxveh.estimators.catalogue import FULL_CAR, catalogue, keys_asked
 from jaxveh.estimators.contract import Need, check_needs, cut_pieces, model_of, spans_of, start_of
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, clean_recording
 from jaxveh.estimators.method import (
@@ -16,6 +17,7 @@ from jaxveh.estimators.method import (
 )
 
 __all__ = [
+    "FULL_CAR",
     "AbstractCleaning",
     "AbstractMethod",
     "Answer",
@@ -26,11 +28,13 @@ __all__ = [
     "MethodOfCar",
     "Need",
     "answer",
+    "catalogue",
     "check_needs",
     "clean_recording",
     "cut_pieces",
     "follow",
     "follow_rows",
+    "keys_asked",
     "method_of",
     "model_of",
     "spans_of",

@@ -7,6 +7,7 @@ A quantity is a module of `jaxveh.estimators` that has, beside what its calibrat
 
 - `SHOWN`: the names that all its methods report, and their units.
 - `METHODS`: `MethodOfCar` by name. `RECOMMENDED`: the name of the one that we would take.
+- `do_nothing(car, recording)`: what one would say without any of them, (T,) by the names of `SHOWN`.
 - `estimate(source, recording, *, method=...)` and `live(source, *, method=...)`; `source` is a car's file, or a method with
   numbers of one's own.
 """

@@ -65,6 +65,17 @@ def test_a_second_start_compiles_nothing_and_after_damage_all_is_compiled_anew(o
     assert written > 5 and "damaged" not in said
 
 
+def test_a_program_whose_last_use_was_not_written_is_damage_too(own, tmp_path):
+    """A start that was killed between the two files of a program: jax would keep nothing from then on, and say so each time."""
+    counted()
+    (folder,) = own.iterdir()
+    next(folder.glob("*-atime")).unlink()
+    (_, _, written), said = simulated(tmp_path)
+    assert said.count("note: a program kept from an earlier start is damaged") == 1 and "UserWarning" not in said
+    (_, _, written), said = simulated(tmp_path)
+    assert written > 5 and "damaged" not in said
+
+
 def test_where_it_is_off_or_jax_is_told_nothing_is_ours(own, tmp_path, monkeypatch):
     monkeypatch.setenv("JAXVEH_CACHE", "OFF")
     assert counted()[0][1:] == [0, 0]

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
-from jaxveh.estimators.speed.wheels import FastestWheel, SlowestWheel
+from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, FastestWheel, SlowestWheel
+from jaxveh.io import CarSpecification
 
 NAME = "speed"
 
@@ -22,6 +25,18 @@ METHODS = {
 }
 
 RECOMMENDED = "fastest_wheel"
+
+
+def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+    """The mean of the wheels' speeds (m/s), held where none speaks."""
+    del car
+    wheels = [np.asarray(recording[need.channel], float) for need in WHEEL_SPEEDS if need.channel in recording]
+    if not wheels:
+        return {"v_x": np.full(len(recording), np.nan)}
+    said = np.isfinite(wheels)
+    mean = np.where(said, wheels, 0.0).sum(0) / np.maximum(said.sum(0), 1)
+    last = np.maximum.accumulate(np.where(said.any(0), np.arange(len(mean)), 0))
+    return {"v_x": mean[last]}
 
 
 def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:

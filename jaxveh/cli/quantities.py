@@ -1,0 +1,334 @@
+"""`jaxveh estimate --what`: quantities by their methods, side by side, and what each is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import typer
+
+from jaxveh import InputError, Recording, estimators, io
+from jaxveh._core.errors import check_one_of, check_positive
+from jaxveh._core.recording import TRUTH
+from jaxveh.cli.console import number, progress, results, spread, table
+from jaxveh.cli.drives import read_log
+from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
+from jaxveh.estimators import Answers, Compared, MethodScore
+from jaxveh.io import CarSpecification
+
+QUANTITIES: dict[str, ModuleType] = {
+    name: getattr(estimators, name)
+    for name in estimators.__all__
+    if isinstance(getattr(estimators, name), ModuleType) and hasattr(getattr(estimators, name), "METHODS")
+}
+"""By the name that `--what` takes."""
+
+ALL = "all"
+"""Of `--what`: the recommended method of each quantity that the log has channels for; of `--methods`: all of them."""
+
+NOTHING = "nothing done"
+
+What = Annotated[
+    str,
+    typer.Option(
+        "--what",
+        metavar="QUANTITY",
+        help="sideslip (calibrated and smoothed, with all options here), or by one of its methods each: "
+        f"{', '.join(QUANTITIES)}; several with commas; all: whatever the log can tell.",
+    ),
+]
+
+ALIKE = {"v_y": ("v_y", "sideslip"), "sideslip": ("v_y", "sideslip"), "speed": ("speed", "v_x"), "v_x": ("v_x",)}
+"""Channels that say a truth, too: no method gets to see them."""
+
+
+class Asked(NamedTuple):
+    """The options of `estimate` that count here; `methods` is None where the recommended ones are asked for."""
+
+    logs: list[Path]
+    product: Path
+    vehicle: Path | None
+    channels: Path | None
+    span: str | None
+    fill: float | None
+    what: tuple[str, ...]
+    methods: tuple[str, ...] | None
+    truth: str | None
+    out: Path | None
+    force: bool
+    anyway: bool
+
+
+class Shown(NamedTuple):
+    """Of one quantity and one log: what was compared, and the scores by method and name; that of doing nothing by name alone."""
+
+    compared: Compared
+    scores: dict[str, dict[str, MethodScore]]
+    nothing: dict[str, float]
+
+
+def names_of(text: str, option: str, known: Sequence[str]) -> tuple[str, ...]:
+    """The names of an option's value, separated by commas; `all` is all that are known.
+
+    **Raises** `InputError` for a name that is not known.
+    """
+    if text == ALL:
+        return tuple(known)
+    names = tuple(name.strip() for name in text.split(","))
+    for name in names:
+        check_one_of(option, name, (*known, ALL))
+    return names
+
+
+def methods_of(text: str | None, what: tuple[str, ...]) -> tuple[str, ...] | None:
+    """The methods of `--methods`; None where the recommended ones are meant.
+
+    **Raises** `InputError` for several quantities, or a name that its quantity has not.
+    """
+    if text is None:
+        return None
+    if len(what) > 1:
+        raise InputError(f"--methods is of one quantity: name one with --what, not {', '.join(what)}.")
+    return names_of(text, f"--methods of {what[0]}", tuple(QUANTITIES[what[0]].METHODS))
+
+
+def print_methods(wanted: bool) -> None:
+    """Print the methods of each quantity, and leave, where that is `wanted`."""
+    if not wanted:
+        return
+    for name, module in QUANTITIES.items():
+        mark = lambda method, module=module: " *" if method == module.RECOMMENDED else ""
+        rows = [(method + mark(method), one.help, one.source) for method, one in module.METHODS.items()]
+        shown = ", ".join(f"{field} [{unit}]" for field, unit in module.SHOWN.items())
+        table(f"--what {name}: {shown}", ("method (* recommended)", "what it is", "from"), rows, left=3)
+    raise typer.Exit
+
+
+Methods = Annotated[
+    str | None,
+    typer.Option(
+        "--methods",
+        metavar="NAMES",
+        show_default=False,
+        help="Methods to run side by side, with commas, or all (--list shows them).",
+    ),
+]
+
+Listed = Annotated[
+    bool,
+    typer.Option("--list", help="Print the methods of each quantity, and stop.", is_eager=True, callback=print_methods),
+]
+
+
+def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
+    """Estimate what is asked for along each log, print, draw and write it."""
+    check_report(asked.out, numbers)
+    products, car = _check(asked)
+    found: dict[str, Any] = {}
+    with progress("estimate") as report:
+        told = [_log(asked, log, car) for log in asked.logs]
+        shown = []
+        for k, (log, (seen, recording)) in enumerate(zip(asked.logs, told, strict=True)):
+            report(k, len(told), f"estimating along {log.name} (compiling first)")
+            shown.append({name: _one(asked, QUANTITIES[name], car, seen, recording) for name in asked.what})
+    for log, product, (_, recording), one in zip(asked.logs, products, told, shown, strict=True):
+        found[log.name] = _conclude(asked, log, product, recording, one)
+    content = found[asked.logs[0].name] if len(asked.logs) == 1 else {"logs": found}
+    configuration = {name: value for name, value in asked._asdict().items() if name not in ("product", "out", "force")}
+    write_numbers(numbers, content, configuration, None)
+
+
+def _check(asked: Asked) -> tuple[list[Path], CarSpecification]:
+    """The files to write, and the car. Raises where one could not be written, or options contradict each other."""
+    sources = (*asked.logs, asked.vehicle, asked.channels)
+    if asked.vehicle is None:
+        raise InputError("--vehicle is missing: give the car's file (jaxveh schema car).")
+    if asked.fill is not None:
+        check_positive("--fill", asked.fill, "s")
+    shown = {name for quantity in asked.what for name in QUANTITIES[quantity].SHOWN}
+    if asked.truth is not None:
+        check_one_of("--truth", asked.truth.removeprefix(TRUTH), sorted(shown))
+    if len(asked.logs) == 1:
+        check_product(asked.product, io.SUFFIXES, asked.force, sources)
+        return [asked.product], io.read_car(asked.vehicle)
+    products = [asked.product / f"{log.stem}.parquet" for log in asked.logs]
+    check_products(asked.product, products, asked.force, sources)
+    return products, io.read_car(asked.vehicle)
+
+
+def _log(asked: Asked, log: Path, car: CarSpecification) -> tuple[Recording, Recording]:
+    """What the methods see of a log, and all of it."""
+    drive = read_log(log, car, asked.channels, asked.span, (asked.truth,), asked.anyway)
+    recording = drive.recording
+    if asked.truth is None:
+        return _filled(asked, recording), recording
+    if asked.truth not in recording:
+        raise InputError(
+            f"--truth {asked.truth}: {log.name} has no such channel; it has: {', '.join(recording.names)}."
+        )
+    hidden = {asked.truth, *ALIKE.get(asked.truth.removeprefix(TRUTH), (asked.truth.removeprefix(TRUTH),))}
+    return _filled(asked, recording.without(*[name for name in recording.names if name in hidden])), recording
+
+
+def _filled(asked: Asked, recording: Recording) -> Recording:
+    """Inputs without gaps, where that is asked for."""
+    if asked.fill is None:
+        return recording
+    for name in ("steer", "v_x", "a_x"):
+        if name in recording and np.isfinite(np.asarray(recording[name])).any():
+            recording = recording.fill(name, "linear", asked.fill)
+    return recording
+
+
+def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Recording, recording: Recording) -> Shown:
+    """One quantity along one log. With `--what all` what the log cannot give is refused; what was asked for by name raises."""
+    if asked.methods is None and len(asked.what) > 1:
+        compared = _recommended(quantity, car, seen)
+    elif asked.methods is not None and set(asked.methods) == set(quantity.METHODS):
+        compared = estimators.compare(quantity, car, seen)
+    else:
+        compared = estimators.compare(quantity, car, seen, asked.methods or [quantity.RECOMMENDED])
+    if asked.truth is None or asked.truth.removeprefix(TRUTH) not in quantity.SHOWN:
+        return Shown(compared, {}, {})
+    name = asked.truth.removeprefix(TRUTH)
+    truth = np.asarray(recording[asked.truth], float)
+    scores = {method: {name: estimators.score_answers(one, name, truth)} for method, one in compared.answers.items()}
+    guess = np.asarray(quantity.do_nothing(car, seen)[name], float)
+    there = np.isfinite(truth) & np.isfinite(guess)
+    nothing = {name: float(np.sqrt(np.mean((guess - truth)[there] ** 2)))} if there.any() else {}
+    return Shown(compared, scores, nothing)
+
+
+def _recommended(quantity: ModuleType, car: CarSpecification, seen: Recording) -> Compared:
+    """The recommended method, or why it is not to be had."""
+    try:
+        return estimators.compare(quantity, car, seen, [quantity.RECOMMENDED])
+    except InputError as error:
+        return Compared({}, {quantity.RECOMMENDED: str(error)}, {})
+
+
+def _conclude(asked: Asked, log: Path, product: Path, recording: Recording, found: dict[str, Shown]) -> dict[str, Any]:
+    """Print, write and draw what became of one log: its numbers for the JSON file."""
+    _print(log, found)
+    answers = {
+        (quantity, method): one for quantity, shown in found.items() for method, one in shown.compared.answers.items()
+    }
+    if not answers:
+        raise InputError(f"{log.name}: no quantity can be estimated; the reasons stand above.")
+    io.write_frame(_frame(answers), product, overwrite=asked.force)
+    results().print(
+        f"{product}: {len(recording)} rows of {', '.join(_label(*key, answers) or '.'.join(key) for key in answers)}",
+        markup=False,
+    )
+    figures = [] if asked.out is None else _draw(asked, log, recording, found)
+    return {
+        "file": product, "rows": len(recording), "figures": figures,
+        **{quantity: _numbers(shown) for quantity, shown in found.items()},
+    }  # fmt: skip
+
+
+def _print(log: Path, found: dict[str, Shown]) -> None:
+    for quantity, shown in found.items():
+        module, rows = QUANTITIES[quantity], []
+        for method, answers in shown.compared.answers.items():
+            for name, unit in module.SHOWN.items():
+                mean, std, known = (
+                    np.asarray(getattr(part, name)) for part in (answers.mean, answers.std, answers.known)
+                )
+                score = shown.scores.get(method, {}).get(name)
+                rows.append((
+                    method, f"{name} [{unit}]", spread(mean[-1], std[-1]), f"{100.0 * known.mean():.0f} %",
+                    number(shown.compared.microseconds[method], 3), *_cells(score),
+                ))  # fmt: skip
+        rows += [
+            (NOTHING, f"{n} [{module.SHOWN[n]}]", "-", "-", "-", number(e), "-", "-", "-", "-")
+            for n, e in shown.nothing.items()
+        ]
+        columns = (
+            "method",
+            "what",
+            "at the end",
+            "known",
+            "us a step",
+            "rmse",
+            "of it known",
+            "worst",
+            "delay [s]",
+            "in 95 %",
+        )
+        width = len(columns) if shown.scores else 5
+        if rows:
+            table(f"{quantity} along {log.name}", columns[:width], [row[:width] for row in rows], left=2)
+        for method, reason in shown.compared.refused.items():
+            results().print(f"{quantity}, {method}: not taken. {reason}", markup=False, soft_wrap=True)
+
+
+def _cells(score: MethodScore | None) -> tuple[str, ...]:
+    if score is None:
+        return ("-",) * 5
+    inside = score.score.coverage_95
+    cells = (score.score.rmse, score.rmse_known, score.score.worst, score.delay)
+    return (*map(number, cells), "-" if np.isnan(inside) else f"{100.0 * inside:.0f} %")
+
+
+def _label(quantity: str, method: str, answers: dict[tuple[str, str], Answers]) -> str:
+    """What stands before a column's name: nothing where there is one answer; the quantity, and its method where several are."""
+    if len(answers) == 1:
+        return ""
+    several = sum(key[0] == quantity for key in answers) > 1
+    return f"{quantity}.{method}" if several else quantity
+
+
+def _frame(answers: dict[tuple[str, str], Answers]) -> Any:
+    """A column for what each method shows, its spread, and whether it is known (0 or 1)."""
+    columns, units = {}, {}
+    for key, one in answers.items():
+        before = _label(*key, answers)
+        for name, unit in QUANTITIES[key[0]].SHOWN.items():
+            column = f"{before}.{name}" if before else name
+            columns[column] = np.asarray(getattr(one.mean, name))
+            columns[f"{column}_std"] = np.asarray(getattr(one.std, name))
+            columns[f"{column}_known"] = np.asarray(getattr(one.known, name), float)
+            units |= {column: unit, f"{column}_std": unit}
+    time = np.asarray(next(iter(answers.values())).time)
+    return io.to_frame(Recording(time, columns, units))
+
+
+def _numbers(shown: Shown) -> dict[str, Any]:
+    scores = {
+        method: {
+            name: {**one.score._asdict(), "known": one.known, "rmse_known": one.rmse_known, "delay_s": one.delay}
+            for name, one in by_name.items()
+        }
+        for method, by_name in shown.scores.items()
+    }
+    ends = {
+        method: {name: float(np.asarray(one[name])[-1]) for name in one.mean._fields}
+        for method, one in shown.compared.answers.items()
+    }
+    return {
+        "at_the_end": ends, "scores": scores, "nothing_done_rmse": shown.nothing, "refused": shown.compared.refused,
+        "microseconds_a_step": shown.compared.microseconds,
+    }  # fmt: skip
+
+
+def _draw(asked: Asked, log: Path, recording: Recording, found: dict[str, Shown]) -> list[Path]:
+    """A figure a quantity: all its methods, and the truth."""
+    from jaxveh import plots
+
+    out = asked.out if len(asked.logs) == 1 else asked.out / log.stem  # type: ignore[operator]
+    make_folder(out)
+    paths = []
+    for quantity, shown in found.items():
+        if not shown.compared.answers:
+            continue
+        names = tuple(QUANTITIES[quantity].SHOWN)
+        name = None if asked.truth is None else asked.truth.removeprefix(TRUTH)
+        truth = {name: np.asarray(recording[asked.truth])} if name in names else None  # type: ignore[index]
+        figure = plots.estimate(shown.compared.answers, truth, names, errors=truth is not None)
+        paths.append(plots.save(figure, out / f"{quantity}.png"))
+        results().print(f"figure: {paths[-1]}", markup=False)
+    return paths

@@ -1,0 +1,68 @@
+"""All methods of all quantities as text: what each is, where it is from, what it reads, and what it asks of the car's file."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from types import ModuleType
+
+from jaxveh._core.errors import InputError
+from jaxveh.estimators.method import MethodOfCar
+from jaxveh.io import AxleTyre, CarSpecification
+
+FULL_CAR = CarSpecification(
+    mass=1500.0, yaw_inertia=2500.0, front_axle_to_cg=1.2, rear_axle_to_cg=1.5, front_cornering_stiffness=1.1e5,
+    rear_cornering_stiffness=1.3e5, name="every key", cg_height=0.55, track_front=1.5, track_rear=1.5, steering_ratio=16.0,
+    steer_offset=0.0, sensor_position=(0.0, 0.0, 0.0), reference_position=(0.0, 0.0, 0.0), low_pass=20.0, wheel_radius=0.32,
+    wheel_inertia=1.2, drag=0.4, rolling_resistance=0.012, front_drive=1.0, front_brake=0.65,
+    front=AxleTyre(B=8.0, C=1.3, D=9000.0, E=-0.5), rear=AxleTyre(B=12.0, C=1.3, D=8300.0, E=-0.5),
+)  # fmt: skip
+"""A file with every key, of which one after the other is left out to see who asks for it."""
+
+
+def catalogue(quantities: Mapping[str, ModuleType]) -> str:
+    """A Markdown table a quantity: of each method its name (the recommended one in bold), what it is, its source, the channels
+    that it reads (in brackets what it can do without), and the optional keys of the car's file that it asks for."""
+    parts = []
+    for name, module in quantities.items():
+        shown = ", ".join(f"`{field}` ({unit})" for field, unit in module.SHOWN.items())
+        lines = [f"## {name}", "", f"Shown: {shown}.", "", "| method | what it is | from | reads | asks for |"]
+        lines += ["| --- | --- | --- | --- | --- |"]
+        lines += [_row(method, one, module) for method, one in module.METHODS.items()]
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts) + "\n"
+
+
+def keys_asked(method: MethodOfCar) -> tuple[str, ...]:
+    """The optional keys of a car's file without which the method cannot be made."""
+    optional = [entry.name for entry in dataclasses.fields(CarSpecification) if entry.default is None]
+    return tuple(key for key in optional if not _made(method, dataclasses.replace(FULL_CAR, **{key: None})))
+
+
+def _made(method: MethodOfCar, car: CarSpecification) -> bool:
+    try:
+        method.make(car)
+    except InputError:
+        return False
+    return True
+
+
+def _row(name: str, method: MethodOfCar, module: ModuleType) -> str:
+    needs = method.make(FULL_CAR).needs
+    reads = [f"[{need.channel}]" if need.optional else need.channel for need in needs]
+    shown = f"**{name}**" if name == module.RECOMMENDED else name
+    asked = ", ".join(keys_asked(method)) or "nothing more"
+    return f"| {shown} | {method.help} | {method.source} | {', '.join(_short(reads))} | {asked} |"
+
+
+def _short(channels: list[str]) -> list[str]:
+    """The four wheels of a channel as one."""
+    found: list[str] = []
+    for channel in channels:
+        plain = channel.strip("[]")
+        stem, _, corner = plain.rpartition("_")
+        if corner in ("fl", "fr", "rl", "rr") and stem:
+            channel = channel.replace(plain, f"{stem}_*")
+        if channel not in found:
+            found.append(channel)
+    return found

@@ -1,0 +1,126 @@
+"""`jaxveh estimate --what`: quantities by their methods, side by side and scored; what is asked for wrongly in one line."""
+
+import dataclasses
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from programs import error_line, run
+
+from jaxveh import Recording, estimators, io
+from jaxveh.cli.quantities import QUANTITIES
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "estimators"))
+import method_logs
+
+
+@pytest.fixture
+def drive(tmp_path):
+    """A log with every channel, and the car's file."""
+    made = method_logs.channels()
+    time = made.pop("time")
+    units = {name: io.canonical_unit(name) or "" for name in made}
+    io.write_recording(Recording(time, made, units), tmp_path / "drive.csv")
+    io.write_car(method_logs.CAR, tmp_path / "car.toml")
+    return tmp_path
+
+
+def estimate(folder, *arguments, out="found.csv"):
+    return run("estimate", folder / "drive.csv", "--vehicle", folder / "car.toml", "-o", folder / out, *arguments)
+
+
+def test_list_has_every_method_of_every_quantity():
+    result = run("estimate", "--list")
+    assert result.exit_code == 0
+    words = " ".join(result.stdout.split())
+    for name, module in QUANTITIES.items():
+        assert f"--what {name}" in words
+        for method in module.METHODS:
+            assert method in words.replace(" ", "") or method in words
+
+
+def test_methods_stand_side_by_side_and_are_scored_blind(drive):
+    methods = "fastest_wheel,slowest_wheel"
+    result = estimate(
+        drive,
+        "--what",
+        "speed",
+        "--methods",
+        methods,
+        "--truth",
+        "v_x",
+        "--json",
+        drive / "n.json",
+        "--out",
+        drive / "figs",
+    )
+    assert result.exit_code == 0, result.output
+    frame = np.genfromtxt(drive / "found.csv", delimiter=",", names=True, deletechars="")
+    log = io.read_recording(drive / "drive.csv")
+    numbers = json.loads((drive / "n.json").read_text())["speed"]
+    for method in methods.split(","):
+        column = next(name for name in frame.dtype.names if name.startswith(f"speed.{method}.v_x"))
+        seen = log.without("v_x", "speed", "sideslip")
+        expected = estimators.speed.estimate(method_logs.CAR, seen, method=method)
+        np.testing.assert_allclose(frame[column], expected["v_x"], rtol=1e-12)
+        error = np.asarray(expected["v_x"]) - log["v_x"]
+        assert numbers["scores"][method]["v_x"]["rmse"] == pytest.approx(np.sqrt(np.mean(error**2)))
+        assert method in result.stdout
+    assert numbers["nothing_done_rmse"]["v_x"] > 0.0 and "nothing done" in result.stdout
+    assert (drive / "figs" / "speed.png").stat().st_size > 1000
+
+
+def test_all_gives_what_can_be_had_and_says_why_not(drive):
+    log = io.read_recording(drive / "drive.csv")
+    (drive / "drive.csv").unlink()
+    lacking = [name for name in log.names if name.startswith(("wheel_speed", "omega"))]
+    io.write_recording(log.without(*lacking), drive / "drive.csv")
+    result = estimate(drive, "--what", "all")
+    assert ("not taken" in result.stdout) and "wheel_speed_fl" in result.stdout
+    if len(QUANTITIES) == 1:
+        assert result.exit_code == 2 and "no quantity can be estimated" in result.stderr
+        return
+    assert result.exit_code == 0, result.output
+    names = (drive / "found.csv").read_text().splitlines()[0]
+    assert "sideslip.v_y" in names and "speed.v_x" not in names
+
+
+def test_what_is_asked_for_wrongly_is_said_in_a_line(drive):
+    assert "--what = 'spede': must be one of" in error_line(estimate(drive, "--what", "spede"))
+    assert "must be one of" in error_line(estimate(drive, "--what", "speed", "--methods", "guess"))
+    assert "--methods is of one quantity" in error_line(estimate(drive, "--what", "all", "--methods", "all"))
+    assert "--truth = 'mass': must be one of" in error_line(estimate(drive, "--what", "speed", "--truth", "mass"))
+    assert "--calibrate: of --what sideslip" in error_line(estimate(drive, "--what", "speed", "--calibrate", "0:5"))
+    missing = error_line(estimate(drive, "--what", "speed", "--truth", "true.v_x"))
+    assert "has no such channel" in missing
+    assert "--vehicle is missing" in error_line(
+        run("estimate", drive / "drive.csv", "-o", drive / "x.csv", "--what", "speed")
+    )
+
+
+def test_the_file_with_every_key_has_every_key():
+    full = estimators.kit.FULL_CAR
+    assert [field.name for field in dataclasses.fields(full) if getattr(full, field.name) is None] == [
+        "front_tyre", "rear_tyre"
+    ]  # fmt: skip
+
+
+def test_the_catalogue_is_what_the_methods_declare():
+    """`python tests/cli/test_quantities_program.py` writes it anew."""
+    assert CATALOGUE.read_text() == HEAD + estimators.kit.catalogue(QUANTITIES)
+
+
+CATALOGUE = Path(__file__).parents[2] / "notebooks" / "estimators.md"
+HEAD = """# Quantities and their methods
+
+What `jaxveh estimate --what` and `jaxveh.estimators` know. Channels in brackets may be missing; `*` stands for the four wheels;
+the last column names the optional keys of the car's file that a method cannot do without. Bold is what we recommend.
+
+This page is made of what the methods declare; a test holds it to that.
+
+"""
+
+if __name__ == "__main__":
+    CATALOGUE.write_text(HEAD + estimators.kit.catalogue(QUANTITIES))
