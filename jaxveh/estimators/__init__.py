@@ -1,6 +1,6 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
-from jaxveh.estimators import kit, mass_and_grade, sideslip, speed
+from jaxveh.estimators import kit, learned, mass_and_grade, sideslip, speed
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.comparison import Compared, MethodScore, compare, score_answers
@@ -33,6 +33,7 @@ __all__ = [
     "compare",
     "held_rows",
     "kit",
+    "learned",
     "mass_and_grade",
     "observe",
     "open_loop",

@@ -1,0 +1,172 @@
+"""The drives of the chapters: cars of fourteen degrees of freedom, and all that their devices say."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics, roads, sensors
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.experiments.sideslip_review.chapters.fleet import STEERING_RATIO, true_car
+from jaxveh.experiments.sideslip_review.chapters.scenarios import Scenario
+from jaxveh.manoeuvres import AbstractManoeuvre, DriverInputs, SpeedControl
+from jaxveh.roads import AbstractRoad
+from jaxveh.simulation import simulate
+from jaxveh.vehicles import FourteenDOF, linear_single_track
+
+DEGREE = math.pi / 180
+
+CORNERS = ("fl", "fr", "rl", "rr")
+
+AXES = ("a_x", "a_y", "a_z", "roll_rate", "pitch_rate", "yaw_rate")
+
+SPEED = 25.0
+"""m/s."""
+
+SATELLITES_LATE, TRAIL = 0.15, 0.03
+"""s, and m: by which the front wheels' contact lies behind the steering axis."""
+
+EVENT = 0.5
+"""Of the drive: when the driver brakes or accelerates, and where the friction changes."""
+
+
+class Wander(AbstractManoeuvre):
+    """Random steering, at a speed that wavers and, half way, changes by `change` (m/s) within 2 s."""
+
+    steer: jax.Array = parameter("rad", scale=0.01)
+    frequencies: jax.Array = parameter("Hz", scale=1.0)
+    phases: jax.Array = parameter("rad", scale=1.0)
+    wander: jax.Array = parameter("m/s", scale=1.0)
+    slow_frequencies: jax.Array = parameter("Hz", scale=0.1)
+    slow_phases: jax.Array = parameter("rad", scale=1.0)
+    change: jax.Array = parameter("m/s", scale=10.0)
+    duration: float = eqx.field(static=True)
+
+    def inputs(self, t: Any) -> DriverInputs:
+        t = jnp.asarray(t, jnp.result_type(self.steer))
+        v_x, v_x_rate = jax.jvp(self._v_x, (t,), (jnp.ones_like(t),))
+        inside = numerics.smooth_step(t) * numerics.smooth_step(self.duration - t)
+        steer = self.steer * numerics.sum_of_harmonics(t, self.frequencies, self.phases) * inside
+        return DriverInputs(steer=steer, v_x=v_x, v_x_rate=v_x_rate)
+
+    def _v_x(self, t):
+        waver = self.wander * numerics.sum_of_harmonics(t, self.slow_frequencies, self.slow_phases)
+        return SPEED + waver + self.change * numerics.smooth_step((t - EVENT * self.duration) / 2.0)
+
+
+class Frictions(AbstractRoad):
+    """Friction that changes at a distance `at` (m), and is less by the share `split` right of the middle."""
+
+    before: jax.Array = positive("-")
+    after: jax.Array = positive("-")
+    split: jax.Array = parameter("-", scale=0.1)
+    at_distance: jax.Array = parameter("m", scale=100.0)
+
+    def at(self, s: Any, y: Any = 0.0) -> roads.Surface:
+        s = jnp.asarray(s, jnp.result_type(self.before))
+        right = 1.0 - numerics.smooth_step(jnp.asarray(y, s.dtype) / 0.2 + 0.5)
+        level = self.before + (self.after - self.before) * numerics.smooth_step((s - self.at_distance) / 0.5)
+        friction = level * (1.0 - self.split * right)
+        return roads.Surface(friction, jnp.zeros_like(friction), jnp.zeros_like(friction), jnp.zeros_like(friction))
+
+
+def drive_once(built: FourteenDOF, scenario: Scenario, key, *, duration: float) -> dict[str, Any]:
+    """One drive: what the devices say by channel, and the truth as `true.` channels, (T,) each, and the car's own numbers.
+
+    A pure function of arrays, for `vmap` over cars, scenarios and keys.
+    """
+    car_key, steer_key, speed_key, road_key, offset_key, sensor_key, more_key = jax.random.split(key, 7)
+    car = true_car(built, scenario, car_key)
+    driver = SpeedControl(
+        _wander(scenario, steer_key, speed_key, duration),
+        total_mass(car.vehicle),
+        wheel_radius=car.vehicle.wheel_radius,
+    )
+    found = simulate(
+        car, driver, _devices(built, scenario, offset_key), sensor_key, road=_road(scenario, road_key, duration),
+        max_step=0.0025, solver="explicit", start={"v_x": SPEED}, throw=False,
+    )  # fmt: skip
+    channels = {name: found[name] for name in found.names}
+    channels |= _made_of(built, scenario, channels, jnp.asarray(found.time), more_key, duration)
+    return channels | _own_numbers(car.vehicle, channels["true.v_x"])
+
+
+def _own_numbers(car: FourteenDOF, like) -> dict[str, Any]:
+    """What the methods of mass, stiffness and geometry look for, in every row."""
+    plain = linear_single_track(car)
+    own = {
+        "mass": total_mass(car), "yaw_inertia": plain.yaw_inertia, "front_axle_to_cg": plain.front_axle_to_cg,
+        "front_cornering_stiffness": plain.front_stiffness, "rear_cornering_stiffness": plain.rear_stiffness,
+        "steering_ratio": jnp.asarray(STEERING_RATIO),
+    }  # fmt: skip
+    return {f"true.{name}": value * jnp.ones_like(like) for name, value in own.items()}
+
+
+def _made_of(
+    built: FourteenDOF, scenario: Scenario, said: dict[str, Any], time, key, duration: float
+) -> dict[str, Any]:
+    """What is computed of what the devices say: each wheel's torque, a second antenna's heading (late as the course is), the
+    torque at the steering wheel without assistance, satellites that are silent in the outage."""
+    heading_key, torque_key = jax.random.split(key)
+    share = built.drive.front_drive
+    drive = dict(zip(CORNERS, (share, share, 1.0 - share, 1.0 - share), strict=True))
+    wheels = {
+        f"torque_{at}": 0.5 * part * said["drive_torque"] - said[f"brake_torque_{at}"] for at, part in drive.items()
+    }
+    late = round(SATELLITES_LATE / 0.01)
+    heading = jnp.concatenate([jnp.full(late, said["true.yaw"][0]), said["true.yaw"][:-late]])
+    heading = heading + 0.2 * DEGREE * jax.random.normal(heading_key, heading.shape)
+    silent = (time > duration / 3.0) & (time <= duration / 3.0 + scenario.outage)
+    heard = {"speed": said["speed"], "course": said["course"]}
+    heard |= {"heading": jnp.where(jnp.isnan(said["speed"]), jnp.nan, heading)}
+    moment = sum(said[f"true.M_z_{at}"] - TRAIL * said[f"true.F_y_{at}"] for at in ("fl", "fr"))
+    felt = -moment / STEERING_RATIO + 0.05 * jax.random.normal(torque_key, time.shape)
+    return wheels | {name: jnp.where(silent, jnp.nan, one) for name, one in heard.items()} | {"steering_torque": felt}
+
+
+def total_mass(car: FourteenDOF) -> jax.Array:
+    """Body and wheels, kg."""
+    return car.sprung_mass + 2.0 * (car.unsprung_mass_front + car.unsprung_mass_rear)
+
+
+def _wander(scenario: Scenario, steer_key, speed_key, duration: float) -> Wander:
+    return Wander(
+        scenario.steer, *numerics.band_harmonics(steer_key, 0.1, 0.6, 20), scenario.wander,
+        *numerics.gauss_markov_harmonics(speed_key, 8.0, 0.2, 20), scenario.wheelspin - scenario.drop, duration,
+    )  # fmt: skip
+
+
+def _road(scenario: Scenario, key, duration: float) -> roads.Combined:
+    grade_key, bank_key = jax.random.split(key)
+    slope = lambda std, key: eqx.tree_at(
+        lambda v: v.std, roads.gauss_markov(1.0, 150.0, key, shortest=50.0, count=20), jnp.asarray(std)
+    )
+    shape = roads.RandomRoad(grade=slope(scenario.grade, grade_key), bank=slope(scenario.bank, bank_key))
+    friction = Frictions(scenario.friction, scenario.friction_later, scenario.split, EVENT * SPEED * duration)
+    return roads.Combined(friction=friction, grade=shape)
+
+
+def _devices(built: FourteenDOF, scenario: Scenario, key) -> sensors.Suite:
+    """What `sensors.production_car` has, with the inertial unit's other axes and its offsets drawn, and what control units know
+    of torques."""
+    made = sensors.production_car(built.wheel_radius, steering_ratio=STEERING_RATIO)
+    inertial, *others = made.devices
+    acceleration, rate = (inertial.signals[name] for name in ("a_x", "yaw_rate"))
+    draws = scenario.offsets * jax.random.normal(key, (len(AXES),))
+    offset = lambda signal, draw: eqx.tree_at(lambda one: one.bias, signal, draw * signal.bias)
+    signals = {
+        name: offset(acceleration if name.startswith("a_") else rate, draw)
+        for name, draw in zip(AXES, draws, strict=True)
+    }
+    unit = dataclasses.replace(inertial, signals=signals)
+    torque = sensors.Signal(noise=10.0, scale=0.03)
+    brakes = sensors.BrakeTorque(
+        {f"brake_torque_{at}": torque for at in CORNERS} | {"brake_torque": torque}, rate=100.0, lag=0.02
+    )
+    motor = sensors.MotorTorque({"drive_torque": torque}, rate=100.0, lag=0.05)
+    return sensors.Suite((unit, *others, brakes, motor))

@@ -1,0 +1,57 @@
+"""The cars of the chapters: what their files say, and what they truly are."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import vehicles
+from jaxveh.experiments.sideslip_review.chapters.scenarios import Scenario
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import AntiLock, FourteenDOF
+
+CARS = ("sedan", "van", "compact_car")
+"""Measured cars of CommonRoad's vehicle models, with tyres of Magic Formula 5.2; one a seed, in turn."""
+
+STEERING_RATIO = 16.0
+
+SPREADS = {"stiffness": 0.1, "grip": 0.05, "mass": 0.04, "yaw_inertia": 0.05, "place": 0.03}
+"""By how much a true car differs from its file (standard deviations, relative; `place` in m): as in the race of observers."""
+
+
+def told_cars() -> list[CarSpecification]:
+    """The files, each of a car as built: nobody's draw."""
+    named = lambda name: vehicles.specification_of(vehicles.kit.CARS[name]())
+    return [dataclasses.replace(named(name), steering_ratio=STEERING_RATIO) for name in CARS]
+
+
+def built_cars() -> FourteenDOF:
+    """The cars as built, stacked: one array axis of `CARS` on each leaf."""
+    cars = [vehicles.named_car(name, "fourteen-dof") for name in CARS]
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *cars)
+
+
+def true_car(built: FourteenDOF, scenario: Scenario, key) -> AntiLock:
+    """The car as it is: off from its file by draws, with the scenario's tyres and load, and anti-lock brakes.
+
+    Draws are lognormal: one can halve a parameter, and never makes it negative. A load lies a little behind the centre of
+    gravity.
+    """
+    draws = scenario.spread * jax.random.normal(key, (6,))
+    spreads = jnp.asarray([SPREADS[name] for name in ("stiffness", "stiffness", "grip", "mass", "yaw_inertia")])
+    front, rear, grip, mass, inertia = jnp.exp(draws[:5] * spreads)
+    back = 0.1 * scenario.load / 0.3 - SPREADS["place"] * draws[5]
+    tyre = lambda tyre, stiffness: eqx.tree_at(
+        lambda t: (t.scaling.LKY, t.scaling.LMUY, t.scaling.LMUX), tyre,
+        (tyre.scaling.LKY * stiffness * scenario.stiffness, tyre.scaling.LMUY * grip, tyre.scaling.LMUX * grip),
+    )  # fmt: skip
+    where = lambda c: (c.sprung_mass, c.yaw_inertia, c.front_axle_to_cg, c.rear_axle_to_cg, c.front, c.rear)
+    heavier = 1.0 + scenario.load
+    found = (
+        built.sprung_mass * mass * heavier, built.yaw_inertia * inertia * (1.0 + 0.6 * scenario.load),
+        built.front_axle_to_cg + back, built.rear_axle_to_cg - back, tyre(built.front, front), tyre(built.rear, rear),
+    )  # fmt: skip
+    return AntiLock(eqx.tree_at(where, built, found))

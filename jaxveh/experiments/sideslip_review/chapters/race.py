@@ -1,0 +1,203 @@
+"""Every method of every quantity on the same drives, and what each is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import estimators, sweeps
+from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.progress import Progress, part, silent
+from jaxveh.estimators import AbstractMethod, kit
+from jaxveh.experiments.sideslip_review.chapters.drives import drive_once
+from jaxveh.experiments.sideslip_review.chapters.fleet import CARS, built_cars, told_cars
+from jaxveh.experiments.sideslip_review.chapters.scenarios import SCENARIOS, scenario_at
+from jaxveh.sweeps import IN_MEMORY, Stores
+
+CHAPTERS = {
+    "lateral velocity": ("sideslip", "navigation"),
+    "longitudinal speed": ("speed",),
+    "friction": ("friction",),
+    "cornering stiffness": ("stiffness",),
+    "bank, grade and roll": ("bank", "grade", "roll"),
+    "mass and geometry": ("mass", "geometry"),
+}
+"""The review's chapters, and the quantities of `jaxveh.estimators` that belong to each."""
+
+LATEST, EARLIEST = 100, 50
+"""Rows by which an estimate may be late or early, to be called so."""
+
+PLAIN, WRAPPED = 1.0, 2.0
+
+
+class Raced(NamedTuple):
+    """`drives`: (scenarios, seeds, T) by channel; `found`: by quantity, method and shown name, values by metric, (scenarios,
+    seeds); `nothing`: the same of doing nothing, by quantity and name; `left_out`: why a method was not raced, by quantity and
+    method."""
+
+    drives: Mapping[str, np.ndarray]
+    found: dict[tuple[str, str, str], dict[str, np.ndarray]]
+    nothing: dict[tuple[str, str], dict[str, np.ndarray]]
+    left_out: dict[tuple[str, str], str]
+
+
+def quantities() -> dict[str, ModuleType]:
+    """Those of all chapters, by name."""
+    return {name: getattr(estimators, name) for names in CHAPTERS.values() for name in names}
+
+
+def channels_kept() -> tuple[str, ...]:
+    """What of a drive is kept: what some method reads, and the truths."""
+    shown = {f"true.{name}" for module in quantities().values() for name in module.SHOWN}
+    read = set()
+    for module in quantities().values():
+        for one in module.METHODS.values():
+            read |= {need.channel for need in one.make(told_cars()[0]).needs}
+    return tuple(sorted(shown | read | {"true.v_x"}))
+
+
+def drives_of(
+    seeds: int, key, *, duration: float, progress: Progress = silent, stores: Stores = IN_MEMORY
+) -> Mapping[str, np.ndarray]:
+    """Drives of all scenarios, one a seed: (scenarios, seeds, T) each. A seed steers alike in all, with one car; `car`
+    (scenarios, seeds): its index in `CARS`."""
+    check_whole("seeds", seeds, 2)
+    built, wanted = built_cars(), channels_kept()
+
+    def run(point, key):
+        index = jax.random.randint(jax.random.fold_in(key, 1), (), 0, len(CARS))
+        one = jax.tree.map(lambda leaf: leaf[index], built)
+        made = drive_once(one, scenario_at(point.scenario), key, duration=duration)
+        return {name: made[name] for name in wanted if name in made} | {"car": index}
+
+    return stores.sweep("drives", run, _design(), seeds, key, progress=progress).values
+
+
+def _design() -> sweeps.Design:
+    return sweeps.Design(scenario=[float(i) for i in range(len(SCENARIOS))])
+
+
+def race(
+    drives: Mapping[str, np.ndarray],
+    seeds: int,
+    key,
+    *,
+    step: float,
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
+) -> Raced:
+    """All methods on the drives."""
+    found: dict = {}
+    left_out: dict = {}
+    every = [(quantity, module, name) for quantity, module in quantities().items() for name in module.METHODS]
+    for i, (quantity, module, name) in enumerate(every):
+        told = part(progress, i / len(every), (i + 1) / len(every), f"{quantity}: {name}")
+        methods = [module.METHODS[name].make(car) for car in told_cars()]
+        lacking = [need.channel for need in methods[0].needs if not need.optional and need.channel not in drives]
+        if lacking:
+            left_out[quantity, name] = f"the drives have no {', '.join(lacking)}"
+            continue
+        run = _run(module, methods, step)
+        data = _data(module, methods[0], drives)
+        swept = stores.under(quantity).under(name).sweep("race", run, _design(), seeds, key, data=data, progress=told)
+        for path, values in swept.values.items():
+            shown, metric = path.rsplit(".", 1)
+            found.setdefault((quantity, name, shown), {})[metric] = values
+    return Raced(drives, found, _nothing(drives, step), left_out)
+
+
+def _data(module: ModuleType, method: AbstractMethod, drives: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    wanted = {need.channel for need in method.needs} | {f"true.{name}" for name in module.SHOWN} | {"car", "true.v_x"}
+    return {name: drives[name] for name in sorted(wanted) if name in drives}
+
+
+def _run(module: ModuleType, methods: list[AbstractMethod], step: float):
+    """One drive of a seed, as `sweeps.sweep` calls it: the method made of the file of the seed's car."""
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[eqx.filter(one, eqx.is_array) for one in methods])
+    rest = eqx.filter(methods[0], eqx.is_array, inverse=True)
+
+    def run(point, key, drive):
+        del point, key
+        own = eqx.combine(jax.tree.map(lambda leaf: leaf[drive["car"]], stacked), rest)
+        v_x = drive["true.v_x"]
+        time = step * jnp.arange(v_x.shape[0], dtype=v_x.dtype)
+        none = jnp.full_like(v_x, jnp.nan)
+        values = {need.channel: drive.get(need.channel, none) for need in own.needs}
+        said = kit.follow_rows(own, time, values)
+        return {
+            name: metrics(getattr(said.mean, name), getattr(said.known, name), drive[f"true.{name}"], step)
+            for name in module.SHOWN
+            if f"true.{name}" in drive
+        }
+
+    return run
+
+
+WARM_UP = 5.0
+"""s: not scored."""
+
+
+def metrics(mean, known, truth, step: float) -> dict[str, Any]:
+    """Of one drive: root mean square of the error over the first and the second half (`early`, `late`), over all (`rmse`) and
+    where the method says that it knows (`rmse_known`), the largest error (`worst`), the share of rows known (`known`), by how
+    many seconds it is late (`delay`), and whether it was finite throughout (`failed`)."""
+    rows = jnp.arange(truth.shape[0])
+    warm, half = rows >= round(WARM_UP / step), rows.shape[0] // 2
+    finite = jnp.isfinite(mean)
+    error = jnp.where(finite, mean - truth, 0.0)
+    rms = lambda which: jnp.sqrt(jnp.sum(jnp.where(which, error**2, 0.0)) / jnp.sum(which).astype(error.dtype))
+    return {
+        "rmse": rms(warm & finite), "early": rms(warm & finite & (rows < half)), "late": rms(finite & (rows >= half)),
+        "rmse_known": rms(warm & finite & known), "worst": jnp.max(jnp.where(warm & finite, jnp.abs(error), 0.0)),
+        "known": jnp.mean(jnp.where(warm, known, False)) * truth.shape[0] / jnp.sum(warm),
+        "delay": _delay(jnp.where(finite, mean, 0.0), truth, step), "failed": 1.0 - jnp.all(finite | ~warm).astype(error.dtype),
+    }  # fmt: skip
+
+
+def _delay(mean, truth, step: float):
+    """By which the truth must be shifted to be nearest to the estimate, constant errors aside, s, to the row."""
+    inner = slice(LATEST, truth.shape[0] - EARLIEST)
+
+    def left(shift):
+        moved = jnp.roll(truth, shift)[inner]
+        return jnp.var(mean[inner] - moved)
+
+    shifts = jnp.arange(-EARLIEST, LATEST + 1)
+    return step * shifts[jnp.argmin(jax.lax.map(left, shifts))].astype(mean.dtype)
+
+
+def _nothing(drives: Mapping[str, np.ndarray], step: float) -> dict[tuple[str, str], dict[str, np.ndarray]]:
+    """What doing nothing is worth, by quantity and name."""
+    found = {}
+    shape = drives["car"].shape
+    for quantity, module in quantities().items():
+        for name in module.SHOWN:
+            if f"true.{name}" in drives:
+                found[quantity, name] = {"rmse": np.full(shape, np.nan)}
+        for place in np.ndindex(shape):
+            log = _log(drives, place, step)
+            try:
+                guess = module.do_nothing(told_cars()[int(drives["car"][place])], log)
+            except InputError:
+                continue
+            for name, values in guess.items():
+                if (quantity, name) in found:
+                    error = (np.asarray(values) - drives[f"true.{name}"][place])[round(WARM_UP / step) :]
+                    found[quantity, name]["rmse"][place] = np.sqrt(np.nanmean(error**2))
+    return found
+
+
+def _log(drives: Mapping[str, np.ndarray], place, step: float):
+    from jaxveh import Recording
+
+    channels = {
+        name: np.asarray(v[place]) for name, v in drives.items() if name != "car" and not name.startswith("true.")
+    }
+    rows = drives["true.v_x"][place].shape[0]
+    return Recording(step * np.arange(rows), channels)

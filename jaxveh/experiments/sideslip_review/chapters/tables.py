@@ -1,0 +1,94 @@
+"""One table a chapter of what every method is worth in every scenario, and one of what it is like."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jaxveh.experiments.report import spread
+from jaxveh.experiments.sideslip_review.chapters.fleet import told_cars
+from jaxveh.experiments.sideslip_review.chapters.race import CHAPTERS, Raced, quantities
+from jaxveh.experiments.sideslip_review.chapters.scenarios import SCENARIOS
+from jaxveh.sweeps import Table
+
+SCALES = {"rad": (180.0 / np.pi, "deg"), "rad/s": (180.0 / np.pi, "deg/s"), "N/rad": (1e-3, "kN/rad")}
+"""Units in which people read what is shown."""
+
+NOTHING = "nothing done"
+
+NAMES = tuple(SCENARIOS)
+
+
+def chapter_tables(raced: Raced) -> list[Table]:
+    """Two tables a chapter."""
+    found = []
+    for chapter, names in CHAPTERS.items():
+        found += [_errors(raced, chapter, names), _properties(raced, chapter, names)]
+    return found
+
+
+def _shown(raced: Raced, names: tuple[str, ...]):
+    """(quantity, shown name, scale, unit) of a chapter, those that the drives know a truth of."""
+    for quantity in names:
+        for shown, unit in quantities()[quantity].SHOWN.items():
+            if any(key[0] == quantity and key[2] == shown for key in raced.found):
+                scale, word = SCALES.get(unit, (1.0, unit))
+                yield quantity, shown, scale, word
+
+
+def _errors(raced: Raced, chapter: str, names: tuple[str, ...]) -> Table:
+    rows = []
+    for quantity, shown, scale, unit in _shown(raced, names):
+        label = f"{shown} [{unit}]"
+        idle = raced.nothing.get((quantity, shown))
+        if idle is not None:
+            rows.append((label, NOTHING, *[spread(scale * idle["rmse"][i]) for i in range(len(NAMES))]))
+        for key, values in raced.found.items():
+            if key[0] == quantity and key[2] == shown:
+                cells = [spread(scale * values["rmse"][i]) for i in range(len(NAMES))]
+                rows.append((label, _name(quantity, key[1]), *cells))
+    return Table(
+        f"{chapter}: RMSE, median over seeds [quartiles]; * is what we recommend", ("what", "method", *NAMES), rows
+    )
+
+
+def _name(quantity: str, method: str) -> str:
+    return f"{method} *" if method == quantities()[quantity].RECOMMENDED else method
+
+
+def _properties(raced: Raced, chapter: str, names: tuple[str, ...]) -> Table:
+    """On ordinary drives, and over all: what is known, the worst, the delay, a long run; what it needs."""
+    rows = []
+    for quantity, shown, scale, unit in _shown(raced, names):
+        module, normal = quantities()[quantity], NAMES.index("normal")
+        for key, values in raced.found.items():
+            if key[0] != quantity or key[2] != shown:
+                continue
+            at = lambda metric, values=values, normal=normal: np.median(values[metric][normal])
+            method = module.METHODS[key[1]]
+            needs = method.make(told_cars()[0]).needs
+            rows.append((
+                f"{shown} [{unit}]", _name(quantity, key[1]), f"{100.0 * at('known'):.0f} %", scale * at("rmse_known"),
+                scale * np.nanmax(values["worst"]), at("delay"), at("late") / max(at("early"), 1e-12), values["failed"].sum(),
+                ", ".join(_short([need.channel for need in needs if not need.optional])), method.source,
+            ))  # fmt: skip
+    rows += [
+        ("", f"{q}: {m}", "not raced", "", "", "", "", "", why, "")
+        for (q, m), why in raced.left_out.items()
+        if q in names
+    ]
+    columns = (
+        "what", "method", "known, normal", "rmse of it known", "worst of all drives", "delay [s]", "late over early", "failed",
+        "needs", "from",
+    )  # fmt: skip
+    return Table(f"{chapter}: what the methods are like", columns, rows)
+
+
+def _short(channels: list[str]) -> list[str]:
+    """The four wheels of a channel as one."""
+    found: list[str] = []
+    for channel in channels:
+        stem, _, corner = channel.rpartition("_")
+        name = f"{stem}_*" if corner in ("fl", "fr", "rl", "rr") else channel
+        if name not in found:
+            found.append(name)
+    return found
