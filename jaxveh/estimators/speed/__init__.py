@@ -6,6 +6,8 @@ from typing import Any
 
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.speed.car_numbers import speed_car
+from jaxveh.estimators.speed.slip_aware import SlipAware
 from jaxveh.estimators.speed.wheels import FastestWheel, SlowestWheel
 
 NAME = "speed"
@@ -18,6 +20,11 @@ METHODS = {
     ),
     "slowest_wheel": MethodOfCar(
         lambda car: SlowestWheel(), "the slowest wheel: right unless all of them are driven", "section 2"
+    ),
+    "slip_aware": MethodOfCar(
+        lambda car: SlipAware(speed_car(car)),
+        "error-state filter that knows slip, radii and slopes, and distrusts wheels one by one",
+        "sections 2.1 to 2.3",
     ),
 }
 
