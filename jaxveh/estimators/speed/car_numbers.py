@@ -45,6 +45,11 @@ class SpeedCar(eqx.Module):
         return self.front_axle_to_cg + self.rear_axle_to_cg
 
     @property
+    def cornering_stiffnesses(self) -> tuple[Any, Any]:
+        """Of the front and the rear axle, N/rad."""
+        return self.front_cornering_stiffness, self.rear_cornering_stiffness
+
+    @property
     def loads(self) -> tuple[Any, Any]:
         """Load of a front and of a rear wheel at rest, N."""
         half = 0.5 * self.mass * GRAVITY / self.wheelbase

@@ -51,3 +51,21 @@ def update(belief: Belief, found: Innovation, trust: Any) -> Belief:
     gain = trust * along / found.variance
     mean = belief.mean + gain * found.residual
     return Belief(mean, symmetric(belief.covariance - jnp.outer(gain, along)))
+
+
+def innovations(belief: Belief, expect: Callable[[Any], Any], values: Any, variances: Any) -> Innovation:
+    """The same of several numbers (m,) at once, whose noises are independent: fields (m,), slopes (m, n)."""
+    expected, slopes = expect(belief.mean), jax.jacfwd(expect)(belief.mean)
+    there = ~jnp.isnan(values)
+    residuals = jnp.where(there, values, expected) - expected
+    slopes = jnp.where(there[:, None], slopes, 0.0)
+    return Innovation(residuals, jnp.sum(slopes @ belief.covariance * slopes, axis=1) + variances, slopes)
+
+
+def update_by_each(belief: Belief, found: Innovation, trusts: Any) -> Belief:
+    """The belief after `innovations`, one after the other, each of its trust; about one point, so that their order is nothing."""
+    start, noise = belief, found.variance - jnp.sum(found.slope @ belief.covariance * found.slope, axis=1)
+    for residual, own, slope, trust in zip(found.residual, noise, found.slope, trusts, strict=True):
+        left = residual - slope @ (belief.mean - start.mean)
+        belief = update(belief, Innovation(left, slope @ belief.covariance @ slope + own, slope), trust)
+    return belief

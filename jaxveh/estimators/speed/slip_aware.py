@@ -7,18 +7,23 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles, slip_stiffness
-from jaxveh.estimators.speed.gaussian import Belief, innovation, predict, update
+from jaxveh.estimators.speed.gaussian import Belief, Innovation, innovation, innovations, predict, update, update_by_each
 from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
+from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
 
-LEFT = (1.0, -1.0, 1.0, -1.0)
-FRONT = (True, True, False, False)
+LEFT = np.array([1.0, -1.0, 1.0, -1.0])
+FRONT = np.array([True, True, False, False])
+RADII = slice(5, 9)
+"""Where the radii are in the state."""
+
 HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in AT))
 """What is held between two of its samples."""
 
@@ -55,10 +60,10 @@ class Spreads(eqx.Module):
 
     slope: jax.Array = positive("m/s^2", default=0.3)
     slope_time: jax.Array = positive("s", default=15.0)
-    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.15)
+    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.1)
     offset: jax.Array = positive("m/s^2", default=0.12)
     offset_walk: jax.Array = positive("m/s^2/sqrt(s)", default=2e-3)
-    gain: jax.Array = positive("-", default=0.02)
+    gain: jax.Array = positive("-", default=0.012)
     radius: jax.Array = positive("-", default=0.004)
     radius_walk: jax.Array = positive("1/sqrt(s)", default=1e-4)
     softness: jax.Array = positive("-", default=0.35)
@@ -69,7 +74,10 @@ class Spreads(eqx.Module):
     wheel: jax.Array = positive("m/s", default=0.04)
     wheel_share: jax.Array = positive("-", default=1e-3)
     slip_share: jax.Array = positive("-", default=0.25)
-    limit_slip: jax.Array = positive("-", default=0.3)
+    peak_slip: jax.Array = positive("-", default=0.3)
+    limit_slip: jax.Array = positive("-", default=0.03)
+    suspicion_time: jax.Array = positive("s", default=0.4)
+    repeats: jax.Array = positive("-", default=25.0)
     turn: jax.Array = positive("m/s per rad/s", default=0.05)
     satellite: jax.Array = positive("m/s", default=0.06)
 
@@ -85,9 +93,19 @@ class Memory(NamedTuple):
     smooth: Any
     smooth_at: Any
     trust: Any
+    suspicion: Any
     rate: Any
     lost: Any
     zero: Any
+
+
+class Said(NamedTuple):
+    """What the wheels are expected to say, `speed`, and without slip, `rolling` (m/s); the `slip` in it and the force over load, `share` (-), (4,) each."""
+
+    speed: Any
+    rolling: Any
+    slip: Any
+    share: Any
 
 
 class SlipAware(AbstractMethod):
@@ -118,12 +136,13 @@ class SlipAware(AbstractMethod):
 
     car: SpeedCar
     spreads: Spreads = eqx.field(default_factory=Spreads)
-    gain: jax.Array = parameter("-", scale=0.03, default=0.045)
+    gain: jax.Array = parameter("-", scale=0.03, default=0.048)
     compression: jax.Array = positive("-", default=0.05)
     gate: jax.Array = positive("-", default=3.0)
     rate_gate: jax.Array = positive("m/s^2", default=2.0)
     calm: jax.Array = positive("-", default=0.1)
-    memory: jax.Array = positive("s", default=0.15)
+    bound_force: jax.Array = positive("m/s^2", default=1.5)
+    memory: jax.Array = positive("s", default=0.3)
     patience: jax.Array = positive("s", default=3.0)
     a_x_delay: jax.Array = positive("s", default=0.025)
     wheel_delay: jax.Array = positive("s", default=0.03)
@@ -161,7 +180,7 @@ class SlipAware(AbstractMethod):
         ones = jnp.ones_like(wheels)
         memory = Memory(
             belief, t, dict.fromkeys(HELD, zero), dict.fromkeys(HELD, never), jnp.where(there, wheels, v_x), t * ones, ones,
-            zero, t, t,
+            0.0 * ones, zero, t, t,
         )  # fmt: skip
         return self.next(memory, t, values)
 
@@ -250,46 +269,39 @@ class SlipAware(AbstractMethod):
         far = numerics.sqrt(jnp.square(found.residual) / found.variance)
         return _beyond(far / most)
 
-    def _wheel(self, memory: Memory, i: int):
-        """What a wheel would say of a mean (n,), m/s; and the slip (-) and force over load (-) in it."""
-        lag = self.wheel_delay - self.a_x_delay
+    def _wheels(self, memory: Memory, mean) -> Said:
+        """What the wheels would say of a mean (n,)."""
+        x, car = SpeedState(*mean), self.car
+        v_x = x.v_x - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
+        yaw_rate, a_y, _ = self._lateral(memory, x)
+        along = v_x - LEFT * 0.5 * _front_rear(car.track_front, car.track_rear) * yaw_rate
+        steer = memory.heard["steer"]
+        slip_angle = car.mass * car.rear_axle_to_cg / car.wheelbase * a_y / car.front_cornering_stiffness
+        turned = along * numerics.cos(steer) + v_x * (steer - slip_angle) * numerics.sin(steer)
+        along = jnp.where(FRONT, turned, along)
+        share, load = self._shares_of_load(memory, x)
+        front, rear = (slip_stiffness(c, n) for c, n in zip(car.cornering_stiffnesses, car.loads, strict=True))
+        softness = _front_rear(x.softness_front, x.softness_rear)
+        slip = jnp.exp(softness) * share / _front_rear(front, rear)
+        sink = self.compression / 3.0 * (load / _front_rear(*car.loads) - 1.0)
+        rolling = along * (1.0 + mean[RADII] + sink)
+        return Said(rolling + along * slip, rolling, slip, share)
+
+    def _shares_of_load(self, memory: Memory, x: SpeedState):
+        """Each wheel's longitudinal force over its load (-), and its load (N), (4,)."""
         car = self.car
-
-        def parts(mean):
-            x = SpeedState(*mean)
-            v_x = x.v_x - lag * self._acceleration(memory, x)
-            yaw_rate, a_y, _ = self._lateral(memory, x)
-            along = v_x - LEFT[i] * 0.5 * (car.track_front if FRONT[i] else car.track_rear) * yaw_rate
-            if FRONT[i]:
-                steer = memory.heard["steer"]
-                slip_angle = car.mass * car.rear_axle_to_cg / car.wheelbase * a_y / car.front_cornering_stiffness
-                along = along * numerics.cos(steer) + v_x * (steer - slip_angle) * numerics.sin(steer)
-            share, load = self._share_of_load(memory, x, i)
-            softness = x.softness_front if FRONT[i] else x.softness_rear
-            cornering = car.front_cornering_stiffness if FRONT[i] else car.rear_cornering_stiffness
-            at_rest = car.loads[0 if FRONT[i] else 1]
-            slip = jnp.exp(softness) * share / slip_stiffness(cornering, at_rest)
-            sink = self.compression / 3.0 * (load / at_rest - 1.0)
-            return along * (1.0 + mean[5 + i] + sink + slip), slip, share
-
-        return lambda mean: parts(mean)[0], parts
-
-    def _share_of_load(self, memory: Memory, x: SpeedState, i: int):
-        """Longitudinal force over load (-), and the load (N)."""
-        car = self.car
-        moved = 0.5 * car.mass * x.force * car.cg_height / car.wheelbase
-        at_rest = car.loads[0 if FRONT[i] else 1]
+        at_rest = _front_rear(*car.loads)
+        pitched = 0.5 * car.mass * x.force * car.cg_height / car.wheelbase
         a_y = self._lateral(memory, x)[1]
-        rolled = a_y / GRAVITY * car.cg_height / (0.5 * (car.track_front + car.track_rear))
-        load = (at_rest - moved if FRONT[i] else at_rest + moved) - LEFT[i] * 2.0 * at_rest * rolled
-        load = jnp.maximum(load, 0.1 * at_rest)
+        rolled = 2.0 * a_y / GRAVITY * car.cg_height / (0.5 * (car.track_front + car.track_rear))
+        load = jnp.maximum(at_rest * (1.0 - LEFT * rolled) + _front_rear(-pitched, pitched), 0.1 * at_rest)
         rolling = car.rolling_resistance * car.mass * GRAVITY
         push = car.mass * x.force + car.drag * x.v_x * jnp.abs(x.v_x) + rolling
-        force = forces_of_axles(car, push)[0 if FRONT[i] else 1]
-        brake = f"brake_torque_{AT[i]}"
-        drives = 0.5 * (car.front_drive if FRONT[i] else 1.0 - car.front_drive) * memory.heard["drive_torque"]
-        by_torque = (drives - memory.heard[brake]) / car.wheel_radius
-        known = self._speaks(memory, "drive_torque") & self._speaks(memory, brake)
+        force = _front_rear(*forces_of_axles(car, push))
+        brakes = [f"brake_torque_{place}" for place in AT]
+        drive = 0.5 * _front_rear(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
+        by_torque = (drive - jnp.stack([memory.heard[name] for name in brakes])) / car.wheel_radius
+        known = jnp.stack([self._speaks(memory, name) for name in brakes]) & self._speaks(memory, "drive_torque")
         return jnp.where(known, by_torque, force) / load - car.rolling_resistance, load
 
     # The wheels.
@@ -301,34 +313,69 @@ class SlipAware(AbstractMethod):
         smooth = memory.smooth + mixed * (jnp.where(there, wheels, memory.smooth) - memory.smooth)
         rates = (jnp.where(there, wheels, smooth) - smooth) / self.smoothing
         steady = _beyond((rates - memory.rate) / self.rate_gate)
+        said = self._wheels(memory, belief.mean)
+        suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
+        limit = jnp.maximum(suspicion, jnp.sort(suspicion)[1])
+        # A wheel at its limit slips the way its force goes.
+        at_limit = self.spreads.limit_slip * limit * belief.mean[0]
+        expect = lambda mean: self._wheels(memory, mean).speed + at_limit * said.share / (jnp.abs(said.share) + 0.02)
+        white, slow = self._wheel_variances(memory, belief, said)
+        slow = slow + jnp.square(at_limit)
+        found = innovations(belief, expect, wheels, white + slow)
+        now = self._gates(found, said, white + slow, there) * steady
         before = jnp.minimum(memory.trust + step / self.memory * (1.0 - memory.trust), 1.0)
-        trusts = []
-        for i in range(4):
-            expect, parts = self._wheel(memory, i)
-            found = innovation(belief, expect, wheels[i], self._wheel_variance(memory, belief, parts))
-            share = parts(belief.mean)[2]
-            gate = self.gate * (1.0 + 4.0 * jnp.exp(-jnp.square(share / self.calm)))
-            now = jnp.where(there[i], self._gate(found, gate) * steady[i], before[i])
-            trust = jnp.minimum(now, before[i])
-            belief = update(belief, found, jnp.where(there[i], trust, 0.0))
-            trusts.append(trust)
-        trust = jnp.stack(trusts)
+        trust = jnp.where(there, jnp.minimum(now, before), before)
+        # What stays for a while is not made smaller by being said often.
+        lasts = found.variance / (found.variance + self.spreads.repeats * slow)
+        belief = update_by_each(belief, found, jnp.where(there, trust * lasts, 0.0))
+        belief = self._bound(memory, belief, wheels, white)
         zero = jnp.where(jnp.all(jnp.where(there, wheels == 0.0, memory.smooth == 0.0)), memory.zero, t)
         belief = self._stand(belief, t, zero)
-        counts = jnp.any(there & (trust > 0.5))
         strange = jnp.any(there & (steady < 0.5)) | (zero < t)
-        lost = jnp.where(counts | strange, t, memory.lost)
-        smooth = jnp.where(there & (wheels == 0.0), 0.0, smooth)
-        new = dict(smooth=smooth, smooth_at=jnp.where(there, t, memory.smooth_at), trust=trust, zero=zero, lost=lost)
-        return belief, memory._replace(**new)
+        return belief, memory._replace(
+            smooth=jnp.where(there & (wheels == 0.0), 0.0, smooth),
+            smooth_at=jnp.where(there, t, memory.smooth_at),
+            trust=trust,
+            suspicion=jnp.where(there, jnp.maximum(suspicion, 1.0 - now), suspicion),
+            zero=zero,
+            lost=jnp.where(jnp.any(there & (trust > 0.5)) | strange, t, memory.lost),
+        )
 
-    def _wheel_variance(self, memory: Memory, belief: Belief, parts):
+    def _gates(self, found, said: Said, variance, there):
+        """How far each wheel's innovation lets it be trusted, (4,).
+
+        Where forces are small and the wheels agree, the belief is wrong rather than all the wheels: the gate is wide then.
+        """
+        apart = found.residual[:, None] - found.residual[None, :]
+        alike = jnp.exp(-jnp.square(apart) / (9.0 * (variance[:, None] + variance[None, :])))
+        others = jnp.sum(jnp.where(there[None, :], alike, 0.0), axis=1) - 1.0
+        agree = jnp.clip(others - 0.5, 0.0, 1.0)
+        calm = jnp.exp(-jnp.square(said.share / self.calm))
+        far = numerics.sqrt(jnp.square(found.residual) / found.variance)
+        return _beyond(far / (self.gate * (1.0 + 4.0 * calm * agree)))
+
+    def _wheel_variances(self, memory: Memory, belief: Belief, said: Said):
         s, v_x = self.spreads, jnp.abs(belief.mean[0])
-        _, slip, share = parts(belief.mean)
         yaw_rate = self._lateral(memory, SpeedState(*belief.mean))[0]
-        of_slip = s.slip_share * slip, s.limit_slip * jnp.square(jnp.square(share))
-        squares = [s.wheel, s.wheel_share * v_x, s.turn * yaw_rate, of_slip[0] * v_x, of_slip[1] * v_x]
-        return sum(jnp.square(one) for one in squares)
+        near_limit = s.peak_slip * jnp.square(jnp.square(said.share))
+        white = jnp.square(s.wheel) + jnp.square(s.wheel_share * v_x)
+        parts = [s.turn * yaw_rate, s.slip_share * said.slip * v_x, near_limit * v_x]
+        return white, sum(jnp.square(one) for one in parts)
+
+    def _bound(self, memory: Memory, belief: Belief, wheels, white) -> Belief:
+        """A braked wheel is not faster than the car, a driven one not slower: two wheels that are say where the speed ends.
+
+        One alone may be driven in a car that brakes, by the engine or a lifted wheel's differential.
+        """
+        found = innovations(belief, lambda mean: self._wheels(memory, mean).rolling, wheels, white)
+        there = ~jnp.isnan(wheels)
+        force = belief.mean[1]
+        sense = jnp.where(force < 0.0, 1.0, -1.0)
+        over = jnp.where(there, sense * found.residual, -jnp.inf)
+        second = jnp.argsort(over)[-2]
+        sure = smooth_step(jnp.abs(force) - self.bound_force)
+        one = Innovation(found.residual[second], found.variance[second], found.slope[second])
+        return update(belief, one, jnp.where(over[second] > 0.0, sure, 0.0))
 
     def _stand(self, belief: Belief, t, zero):
         """Wheels that have all said zero for a while, in a car that does not slow down, stand."""
@@ -351,6 +398,10 @@ class SlipAware(AbstractMethod):
             {"v_x": std, "grade": stds[2] / GRAVITY, "a_x_offset": stds[3]},
             known,
         )
+
+
+def _front_rear(front: Any, rear: Any) -> Any:
+    return jnp.where(FRONT, front, rear)
 
 
 def _beyond(far: Any) -> Any:
