@@ -15,15 +15,15 @@ A_X = Need("a_x", "m/s^2")
 
 
 class Felt(NamedTuple):
-    """Acceleration as it was said last (m/s^2), and when (s)."""
+    """What a channel said last, and when (s)."""
 
-    a_x: Any
+    value: Any
     at: Any
 
     def hear(self, t: Any, value: Any) -> Felt:
         """With a row's value, NaN for none."""
         there = ~jnp.isnan(value)
-        return Felt(jnp.where(there, value, self.a_x), jnp.where(there, t, self.at))
+        return Felt(jnp.where(there, value, self.value), jnp.where(there, t, self.at))
 
     def speaks(self, t: Any) -> Any:
         """Whether it has spoken lately."""
@@ -55,8 +55,8 @@ class AccelerometerIntegral(AbstractWheelMethod):
     Known for as long as an offset that is wrong by `offset_error` (m/s^2) has made less than `agreement` of the speed and
     `agreement_speed` together.
 
-    Chen, Gao, Xu 2013, section 2.1, refs 88 (wheels' acceleration corrects the offset; wheels must roll purely) and 89 (mean rates over
-    a time).
+    Chen, Gao, Xu 2013, section 2.1, refs 88 (wheels' acceleration corrects the offset; wheels must roll purely) and 89 (mean
+    rates over a time).
     """
 
     free_rate: jax.Array = positive("m/s^2", default=1.5)
@@ -77,7 +77,7 @@ class AccelerometerIntegral(AbstractWheelMethod):
     def follow(self, own: Integrated, wheels: Wheels, step, values):
         felt = own.felt.hear(wheels.t, values["a_x"])
         speaks = felt.speaks(wheels.t)
-        rate = jnp.where(speaks, felt.a_x - own.offset, 0.0)
+        rate = jnp.where(speaks, felt.value - own.offset, 0.0)
         strange = wheels.mean_rate - rate
         free = self.agree(wheels) & (jnp.abs(strange) < self.free_rate) & (jnp.abs(rate) < self.free_acceleration)
         v_x = own.v_x + step * rate
@@ -87,17 +87,3 @@ class AccelerometerIntegral(AbstractWheelMethod):
         alone = jnp.where(free, 0.0, own.alone + step)
         known = speaks & (self.offset_error * alone < self.agreement * jnp.abs(v_x) + self.agreement_speed)
         return Integrated(v_x, offset, felt, alone), v_x, known
-
-
-class Memberships(NamedTuple):
-    """How true each situation is (-): `stable`, `brakes` with slip, `drives` with slip, `swerves`."""
-
-    stable: Any
-    brakes: Any
-    drives: Any
-    swerves: Any
-
-
-def large(value: Any, low: Any, high: Any) -> jax.Array:
-    """The membership of large: 0 at `low`, 1 at `high`, linear between."""
-    return jnp.clip((jnp.abs(value) - low) / (high - low), 0.0, 1.0)

@@ -75,12 +75,22 @@ def speed_car(car: CarSpecification) -> SpeedCar:
     )
 
 
-def told(car: CarSpecification, who: str, **units: str) -> dict[str, float]:
+FORCE_KEYS = {
+    "mass": "kg",
+    "wheel_radius": "m",
+    "wheel_inertia": "kg m^2",
+    "drag": "N s^2/m^2",
+    "rolling_resistance": "-",
+}
+"""What turns torques at the wheels into a rate of the speed."""
+
+
+def told(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
     """Numbers of the file by key. **Raises** `InputError` for one that it lacks, naming the key and its unit."""
-    for name, unit in units.items():
+    for name, unit in keys.items():
         if getattr(car, name) is None:
             raise InputError(f"speed, {who}: the car's file has no {name} ({unit}); give it.")
-    return {name: getattr(car, name) for name in units}
+    return {name: getattr(car, name) for name in keys}
 
 
 def forces_of_axles(car: SpeedCar, push: Any) -> tuple[Any, Any]:

@@ -27,9 +27,9 @@ class Innovation(NamedTuple):
 
 
 def predict(belief: Belief, move: Callable[[Any], Any], noise: Any) -> Belief:
-    """The belief after `move` of a mean (n,), with process noise of variances `noise` (n,)."""
+    """The belief after `move` of a mean (n,), with process noise of covariance `noise` (n, n)."""
     slopes = jax.jacfwd(move)(belief.mean)
-    covariance = symmetric(slopes @ belief.covariance @ slopes.T) + jnp.diag(noise)
+    covariance = symmetric(slopes @ belief.covariance @ slopes.T) + noise
     return Belief(move(belief.mean), covariance)
 
 

@@ -14,14 +14,22 @@ from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles, slip_stiffness
-from jaxveh.estimators.speed.gaussian import Belief, Innovation, innovation, innovations, predict, update, update_by_each
+from jaxveh.estimators.speed.gaussian import (
+    Belief,
+    Innovation,
+    innovation,
+    innovations,
+    predict,
+    update,
+    update_by_each,
+)
 from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
 from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
 
 LEFT = np.array([1.0, -1.0, 1.0, -1.0])
 FRONT = np.array([True, True, False, False])
-RADII = slice(5, 9)
+RADII = slice(6, 10)
 """Where the radii are in the state."""
 
 HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in AT))
@@ -32,15 +40,20 @@ PATIENCE = 0.3
 
 
 class SpeedState(NamedTuple):
-    """`v_x` (m/s); `force`: what tyres and air push, over the mass (m/s^2); `slope`: gravity along the road (m/s^2, uphill
-    positive); `offset` (m/s^2) and `gain` (-) of the accelerometer; how much larger than stored its radius makes each wheel's
-    speed (-); how much softer than the file says the tyres of an axle slip (-, on the logarithm)."""
+    """`rolled`: what wheels without slip say on the mean, `(1 + radius) v_x` (m/s); `force`: what tyres and air push, over the mass
+    (m/s^2); `slope`: gravity along the road (m/s^2, uphill positive); `offset` (m/s^2) and `gain` (-) of the accelerometer;
+    `radius`: by how much the radii make all wheels' speeds too large (-), and each wheel's beyond that; how much softer than the
+    file says the tyres of an axle slip (-, on the logarithm).
 
-    v_x: Any
+    With the wheels' speed as a state, not the car's, no wheel can tell what the wheels have in common. (A filter of v_x, linear
+    about a speed that moves, would soon think that it knows.)"""
+
+    rolled: Any
     force: Any
     slope: Any
     offset: Any
     gain: Any
+    radius: Any
     radius_fl: Any
     radius_fr: Any
     radius_rl: Any
@@ -48,11 +61,17 @@ class SpeedState(NamedTuple):
     softness_front: Any
     softness_rear: Any
 
+    @property
+    def v_x(self) -> Any:
+        """The car's speed, m/s."""
+        return self.rolled / (1.0 + self.radius)
+
 
 class Spreads(eqx.Module):
     """Standard deviations that the filter begins with, of its random walks, and of what is measured.
 
-    `slope_walk` and so on are per root second; a slope also falls back to level with `slope_time`. `wheel` (m/s) is what edges of
+    `slope_walk` and so on are per root second; a slope also falls back to level with `slope_time`, a softness to the file's with
+    `softness_time` (s), in which it forgets as much as it spreads. `wheel` (m/s) is what edges of
     teeth leave, `wheel_share` (-) goes with the speed; `slip_share` (-) is of the slip that is expected, and `limit_slip` (-)
     the slip that nobody knows at a force of the whole load, less with its fourth power. `turn` (m/s per rad/s) is of the wheels'
     places.
@@ -60,14 +79,14 @@ class Spreads(eqx.Module):
 
     slope: jax.Array = positive("m/s^2", default=0.3)
     slope_time: jax.Array = positive("s", default=15.0)
-    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.1)
+    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.15)
     offset: jax.Array = positive("m/s^2", default=0.12)
     offset_walk: jax.Array = positive("m/s^2/sqrt(s)", default=2e-3)
     gain: jax.Array = positive("-", default=0.012)
     radius: jax.Array = positive("-", default=0.004)
     radius_walk: jax.Array = positive("1/sqrt(s)", default=1e-4)
     softness: jax.Array = positive("-", default=0.35)
-    softness_walk: jax.Array = positive("1/sqrt(s)", default=0.01)
+    softness_time: jax.Array = positive("s", default=300.0)
     force_walk: jax.Array = positive("m/s^2/sqrt(s)", default=6.0)
     speed_walk: jax.Array = positive("m/s/sqrt(s)", default=0.02)
     a_x: jax.Array = positive("m/s^2", default=0.1)
@@ -100,7 +119,8 @@ class Memory(NamedTuple):
 
 
 class Said(NamedTuple):
-    """What the wheels are expected to say, `speed`, and without slip, `rolling` (m/s); the `slip` in it and the force over load, `share` (-), (4,) each."""
+    """What the wheels are expected to say, `speed`, and without slip, `rolling` (m/s); the `slip` in it and the force over load,
+    `share` (-), (4,) each."""
 
     speed: Any
     rolling: Any
@@ -166,16 +186,16 @@ class SlipAware(AbstractMethod):
     def first(self, t, values):
         wheels = wheel_values(values)
         there = ~jnp.isnan(wheels)
-        count = jnp.sum(there)
-        v_x = jnp.sum(jnp.where(there, wheels, 0.0)) / jnp.maximum(count, 1)
+        count = jnp.sum(there.astype(t.dtype))
+        v_x = jnp.sum(jnp.where(there, wheels, 0.0)) / jnp.maximum(count, 1.0)
         s, zero = self.spreads, jnp.zeros_like(t)
-        mean = SpeedState(v_x, zero, zero, zero, zero + self.gain, *[zero] * 6)
+        mean = SpeedState(v_x, zero, zero, zero, zero + self.gain, *[zero] * 7)
         std = SpeedState(
             jnp.where(count > 0, 0.3 + 0.03 * jnp.abs(v_x), 30.0), 3.0, s.slope, s.offset, s.gain,
-            *[s.radius] * 4, *[s.softness] * 2,
+            0.5 * s.radius, *[0.0 * s.radius] * 4, *[s.softness] * 2,
         )  # fmt: skip
         stack = lambda state: jnp.stack([jnp.asarray(one, t.dtype) for one in state])
-        belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))))
+        belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + self._radii(s.radius))
         never = jnp.full_like(t, -jnp.inf)
         ones = jnp.ones_like(wheels)
         memory = Memory(
@@ -229,18 +249,27 @@ class SlipAware(AbstractMethod):
 
     def _move(self, memory: Memory, step) -> Belief:
         s = self.spreads
-        falls = jnp.exp(-step / s.slope_time)
+        falls, back = jnp.exp(-step / s.slope_time), jnp.exp(-step / s.softness_time)
 
         def move(mean):
             x = SpeedState(*mean)
-            x = x._replace(v_x=x.v_x + step * self._acceleration(memory, x), slope=falls * x.slope)
-            return jnp.stack(x)
+            rolled = x.rolled + step * (1.0 + x.radius) * self._acceleration(memory, x)
+            soft = [back * x.softness_front, back * x.softness_rear]
+            return jnp.stack([rolled, x.force, falls * x.slope, *x[3:10], *soft])
 
         lost = memory.t - memory.lost > self.patience
         wander = s.speed_walk + jnp.where(lost, 1.0, 0.0)
-        radii, soft = [s.radius_walk] * 4, [s.softness_walk] * 2
-        walks = SpeedState(wander, s.force_walk, s.slope_walk, s.offset_walk, 0.0 * s.gain, *radii, *soft)
-        return predict(memory.belief, move, step * jnp.square(jnp.stack(walks)))
+        soft = s.softness * numerics.sqrt(2.0 / s.softness_time)
+        none = 0.0 * s.gain
+        radii = [0.5 * s.radius_walk, *[none] * 4]
+        walks = SpeedState(wander, s.force_walk, s.slope_walk, s.offset_walk, none, *radii, soft, soft)
+        noise = jnp.diag(jnp.square(jnp.stack(walks))) + self._radii(s.radius_walk)
+        return predict(memory.belief, move, step * noise)
+
+    def _radii(self, std):
+        """The covariance of four radii of equal spread `std`, less their mean, where the state has them."""
+        free = jnp.eye(4) - 0.25
+        return jnp.zeros((12, 12)).at[RADII, RADII].set(free).astype(std.dtype) * jnp.square(std)
 
     def _smooth_rate(self, memory: Memory, belief: Belief, step):
         now = self._acceleration(memory, SpeedState(*belief.mean))
@@ -272,7 +301,7 @@ class SlipAware(AbstractMethod):
     def _wheels(self, memory: Memory, mean) -> Said:
         """What the wheels would say of a mean (n,)."""
         x, car = SpeedState(*mean), self.car
-        v_x = x.v_x - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
+        v_x = x.rolled - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
         yaw_rate, a_y, _ = self._lateral(memory, x)
         along = v_x - LEFT * 0.5 * _front_rear(car.track_front, car.track_rear) * yaw_rate
         steer = memory.heard["steer"]
@@ -315,7 +344,8 @@ class SlipAware(AbstractMethod):
         steady = _beyond((rates - memory.rate) / self.rate_gate)
         said = self._wheels(memory, belief.mean)
         suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
-        limit = jnp.maximum(suspicion, jnp.sort(suspicion)[1])
+        most = jnp.sort(suspicion)[1]
+        limit = jnp.maximum(suspicion, most)
         # A wheel at its limit slips the way its force goes.
         at_limit = self.spreads.limit_slip * limit * belief.mean[0]
         expect = lambda mean: self._wheels(memory, mean).speed + at_limit * said.share / (jnp.abs(said.share) + 0.02)
@@ -328,7 +358,7 @@ class SlipAware(AbstractMethod):
         # What stays for a while is not made smaller by being said often.
         lasts = found.variance / (found.variance + self.spreads.repeats * slow)
         belief = update_by_each(belief, found, jnp.where(there, trust * lasts, 0.0))
-        belief = self._bound(memory, belief, wheels, white)
+        belief = self._bound(memory, belief, wheels, white, most)
         zero = jnp.where(jnp.all(jnp.where(there, wheels == 0.0, memory.smooth == 0.0)), memory.zero, t)
         belief = self._stand(belief, t, zero)
         strange = jnp.any(there & (steady < 0.5)) | (zero < t)
@@ -362,10 +392,11 @@ class SlipAware(AbstractMethod):
         parts = [s.turn * yaw_rate, s.slip_share * said.slip * v_x, near_limit * v_x]
         return white, sum(jnp.square(one) for one in parts)
 
-    def _bound(self, memory: Memory, belief: Belief, wheels, white) -> Belief:
+    def _bound(self, memory: Memory, belief: Belief, wheels, white, most) -> Belief:
         """A braked wheel is not faster than the car, a driven one not slower: two wheels that are say where the speed ends.
 
-        One alone may be driven in a car that brakes, by the engine or a lifted wheel's differential.
+        Only where most wheels are at their limit (`most`), as noise would move the speed by what one side is believed. One
+        wheel alone may be driven in a car that brakes, by the engine or a lifted wheel's differential.
         """
         found = innovations(belief, lambda mean: self._wheels(memory, mean).rolling, wheels, white)
         there = ~jnp.isnan(wheels)
@@ -373,7 +404,7 @@ class SlipAware(AbstractMethod):
         sense = jnp.where(force < 0.0, 1.0, -1.0)
         over = jnp.where(there, sense * found.residual, -jnp.inf)
         second = jnp.argsort(over)[-2]
-        sure = smooth_step(jnp.abs(force) - self.bound_force)
+        sure = most * smooth_step(jnp.abs(force) - self.bound_force)
         one = Innovation(found.residual[second], found.variance[second], found.slope[second])
         return update(belief, one, jnp.where(over[second] > 0.0, sure, 0.0))
 
@@ -387,7 +418,7 @@ class SlipAware(AbstractMethod):
     def _answer(self, memory: Memory):
         mean, covariance = memory.belief
         x = SpeedState(*mean)
-        now = lambda mean: mean[0] + self.a_x_delay * self._acceleration(memory, SpeedState(*mean))
+        now = lambda mean: SpeedState(*mean).v_x + self.a_x_delay * self._acceleration(memory, SpeedState(*mean))
         v_x, slope = jax.value_and_grad(now)(mean)
         variance = lambda a: jnp.maximum(a @ covariance @ a, 0.0)
         std = numerics.sqrt(variance(slope) + jnp.square(0.5 * self.a_x_delay))

@@ -67,7 +67,7 @@ class Wheels(NamedTuple):
         return self.spoke & (self.fastest - self.slowest < share * jnp.abs(self.mean) + speed)
 
     def _mean(self, values):
-        count = jnp.maximum(jnp.sum(self.fresh), 1)
+        count = jnp.maximum(jnp.sum(self.fresh.astype(values.dtype)), 1.0)
         return jnp.sum(jnp.where(self.fresh, values, 0.0)) / count
 
 
