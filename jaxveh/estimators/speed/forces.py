@@ -97,7 +97,8 @@ class BrakeForces(AbstractForces):
         F_x = c_p p / R - M / R + J / R^2 dv_wheel/dt
 
     which as printed is positive in **braking** (an erratum of the review's list: its text calls F_x the force of drive and
-    brake). `brake_torque_per_pressure` is c_p of all brakes together, N m/Pa; M the channel `drive_torque`, 0 where there is none.
+    brake). `brake_torque_per_pressure` is c_p of all brakes together, N m/Pa; M the channel
+    `drive_torque`, 0 where there is none.
 
     Chen, Gao, Xu 2013, section 2.2, refs 2, 94, 95.
     """

@@ -27,7 +27,7 @@ from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
 from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
 
-LEFT = np.array([1.0, -1.0, 1.0, -1.0])
+LEFT = np.array([1, -1, 1, -1])
 FRONT = np.array([True, True, False, False])
 RADII = slice(6, 10)
 """Where the radii are in the state."""
@@ -40,8 +40,8 @@ PATIENCE = 0.3
 
 
 class SpeedState(NamedTuple):
-    """`rolled`: what wheels without slip say on the mean, `(1 + radius) v_x` (m/s); `force`: what tyres and air push, over the mass
-    (m/s^2); `slope`: gravity along the road (m/s^2, uphill positive); `offset` (m/s^2) and `gain` (-) of the accelerometer;
+    """`rolled`: what wheels without slip say on the mean, `(1 + radius) v_x` (m/s); `force`: what tyres and air push, over the
+    mass (m/s^2); `slope`: gravity along the road (m/s^2, uphill positive); `offset` (m/s^2) and `gain` (-) of the accelerometer;
     `radius`: by how much the radii make all wheels' speeds too large (-), and each wheel's beyond that; how much softer than the
     file says the tyres of an axle slip (-, on the logarithm).
 
@@ -202,7 +202,7 @@ class SlipAware(AbstractMethod):
             belief, t, dict.fromkeys(HELD, zero), dict.fromkeys(HELD, never), jnp.where(there, wheels, v_x), t * ones, ones,
             0.0 * ones, zero, t, t,
         )  # fmt: skip
-        return self.next(memory, t, values)
+        return memory, self._answer(memory)
 
     def next(self, memory: Memory, t, values):
         heard, at = self._hear(memory, t, values)
@@ -221,7 +221,10 @@ class SlipAware(AbstractMethod):
 
     def _hear(self, memory: Memory, t, values):
         steer = values["steer"] - self.car.steer_offset
-        turned = values["steering_wheel"] / self.car.steering_ratio
+        wheel = values["steering_wheel"]
+        # A NaN that is divided has a slope that is one, where it is not used, too.
+        turned = jnp.where(jnp.isnan(wheel), 0.0, wheel) / self.car.steering_ratio
+        turned = jnp.where(jnp.isnan(wheel), jnp.nan, turned)
         now = dict(values) | {"steer": jnp.where(jnp.isnan(steer), turned, steer)}
         torques = [values[f"torque_{place}"] for place in AT]
         now["drive_torque"] = jnp.where(jnp.isnan(now["drive_torque"]), sum(torques), now["drive_torque"])
@@ -268,8 +271,8 @@ class SlipAware(AbstractMethod):
 
     def _radii(self, std):
         """The covariance of four radii of equal spread `std`, less their mean, where the state has them."""
-        free = jnp.eye(4) - 0.25
-        return jnp.zeros((12, 12)).at[RADII, RADII].set(free).astype(std.dtype) * jnp.square(std)
+        free = jnp.eye(4, dtype=std.dtype) - 0.25
+        return jnp.zeros((12, 12), std.dtype).at[RADII, RADII].set(free * jnp.square(std))
 
     def _smooth_rate(self, memory: Memory, belief: Belief, step):
         now = self._acceleration(memory, SpeedState(*belief.mean))
@@ -303,7 +306,7 @@ class SlipAware(AbstractMethod):
         x, car = SpeedState(*mean), self.car
         v_x = x.rolled - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
         yaw_rate, a_y, _ = self._lateral(memory, x)
-        along = v_x - LEFT * 0.5 * _front_rear(car.track_front, car.track_rear) * yaw_rate
+        along = v_x - LEFT.astype(v_x.dtype) * 0.5 * _front_rear(car.track_front, car.track_rear) * yaw_rate
         steer = memory.heard["steer"]
         slip_angle = car.mass * car.rear_axle_to_cg / car.wheelbase * a_y / car.front_cornering_stiffness
         turned = along * numerics.cos(steer) + v_x * (steer - slip_angle) * numerics.sin(steer)
@@ -323,7 +326,9 @@ class SlipAware(AbstractMethod):
         pitched = 0.5 * car.mass * x.force * car.cg_height / car.wheelbase
         a_y = self._lateral(memory, x)[1]
         rolled = 2.0 * a_y / GRAVITY * car.cg_height / (0.5 * (car.track_front + car.track_rear))
-        load = jnp.maximum(at_rest * (1.0 - LEFT * rolled) + _front_rear(-pitched, pitched), 0.1 * at_rest)
+        load = jnp.maximum(
+            at_rest * (1.0 - LEFT.astype(rolled.dtype) * rolled) + _front_rear(-pitched, pitched), 0.1 * at_rest
+        )
         rolling = car.rolling_resistance * car.mass * GRAVITY
         push = car.mass * x.force + car.drag * x.v_x * jnp.abs(x.v_x) + rolling
         force = _front_rear(*forces_of_axles(car, push))
@@ -348,17 +353,25 @@ class SlipAware(AbstractMethod):
         limit = jnp.maximum(suspicion, most)
         # A wheel at its limit slips the way its force goes.
         at_limit = self.spreads.limit_slip * limit * belief.mean[0]
-        expect = lambda mean: self._wheels(memory, mean).speed + at_limit * said.share / (jnp.abs(said.share) + 0.02)
+        at_limit = at_limit * said.share / (jnp.abs(said.share) + 0.02)
+
+        def expect(mean):
+            one = self._wheels(memory, mean)
+            return jnp.concatenate([one.speed + at_limit, one.rolling])
+
         white, slow = self._wheel_variances(memory, belief, said)
         slow = slow + jnp.square(at_limit)
-        found = innovations(belief, expect, wheels, white + slow)
+        both = innovations(belief, expect, jnp.tile(wheels, 2), jnp.concatenate([white + slow, white + 0.0 * slow]))
+        found, rolling = (Innovation(*[part[rows] for part in both]) for rows in (slice(0, 4), slice(4, 8)))
         now = self._gates(found, said, white + slow, there) * steady
-        before = jnp.minimum(memory.trust + step / self.memory * (1.0 - memory.trust), 1.0)
-        trust = jnp.where(there, jnp.minimum(now, before), before)
+        trusted = jnp.minimum(memory.trust + step / self.memory * (1.0 - memory.trust), 1.0)
+        trust = jnp.where(there, jnp.minimum(now, trusted), trusted)
         # What stays for a while is not made smaller by being said often.
         lasts = found.variance / (found.variance + self.spreads.repeats * slow)
+        before = belief.mean
         belief = update_by_each(belief, found, jnp.where(there, trust * lasts, 0.0))
-        belief = self._bound(memory, belief, wheels, white, most)
+        rolling = rolling._replace(residual=rolling.residual - rolling.slope @ (belief.mean - before))
+        belief = self._bound(belief, rolling, there, white, most)
         zero = jnp.where(jnp.all(jnp.where(there, wheels == 0.0, memory.smooth == 0.0)), memory.zero, t)
         belief = self._stand(belief, t, zero)
         strange = jnp.any(there & (steady < 0.5)) | (zero < t)
@@ -392,20 +405,18 @@ class SlipAware(AbstractMethod):
         parts = [s.turn * yaw_rate, s.slip_share * said.slip * v_x, near_limit * v_x]
         return white, sum(jnp.square(one) for one in parts)
 
-    def _bound(self, memory: Memory, belief: Belief, wheels, white, most) -> Belief:
+    def _bound(self, belief: Belief, rolling: Innovation, there, white, most) -> Belief:
         """A braked wheel is not faster than the car, a driven one not slower: two wheels that are say where the speed ends.
 
         Only where most wheels are at their limit (`most`), as noise would move the speed by what one side is believed. One
         wheel alone may be driven in a car that brakes, by the engine or a lifted wheel's differential.
         """
-        found = innovations(belief, lambda mean: self._wheels(memory, mean).rolling, wheels, white)
-        there = ~jnp.isnan(wheels)
         force = belief.mean[1]
-        sense = jnp.where(force < 0.0, 1.0, -1.0)
-        over = jnp.where(there, sense * found.residual, -jnp.inf)
+        over = jnp.where(there, jnp.where(force < 0.0, 1.0, -1.0) * rolling.residual, -jnp.inf)
         second = jnp.argsort(over)[-2]
+        slope = rolling.slope[second]
+        one = Innovation(rolling.residual[second], slope @ belief.covariance @ slope + white, slope)
         sure = most * smooth_step(jnp.abs(force) - self.bound_force)
-        one = Innovation(found.residual[second], found.variance[second], found.slope[second])
         return update(belief, one, jnp.where(over[second] > 0.0, sure, 0.0))
 
     def _stand(self, belief: Belief, t, zero):
