@@ -1,5 +1,6 @@
 """What those who add a tyre law, or read one, build with."""
 
+from jaxveh.tyres.base import need_load, need_static
 from jaxveh.tyres.evaluation import EVALUATION_INPUTS, evaluate
 from jaxveh.tyres.generic import GENERIC_TYRE, GenericTyre
 from jaxveh.tyres.mf_tyre.typical import TYPICAL_COEFFICIENTS
@@ -14,4 +15,6 @@ __all__ = [
     "GenericTyre",
     "evaluate",
     "mirrored_contact",
+    "need_load",
+    "need_static",
 ]

@@ -1,6 +1,7 @@
 """Equations of motion and outputs of one vehicle at one instant; named parameter sets."""
 
 from jaxveh.vehicles import kit, sets
+from jaxveh.vehicles.anti_lock import AntiLock
 from jaxveh.vehicles.base import GRAVITY, AbstractVehicle, Motion
 from jaxveh.vehicles.commanded import Commanded
 from jaxveh.vehicles.drive import AbstractDrive, AxleDrive, FourMotors
@@ -56,6 +57,7 @@ __all__ = [
     "AbstractLoadTransfer",
     "AbstractVehicle",
     "AccelerationLimits",
+    "AntiLock",
     "AxleDrive",
     "CarNumbers",
     "Commanded",

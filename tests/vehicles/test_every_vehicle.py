@@ -97,6 +97,7 @@ class Car(NamedTuple):
 
 
 CARS = {
+    "AntiLock": Car(lambda: vehicles.AntiLock(seven())),
     "Commanded": Car(lambda: vehicles.Commanded(vehicles.passenger_car()), told_speed=True),
     "FourteenDOF": Car(fourteen),
     "FourteenDOF, MF-Tyre": Car(

@@ -8,23 +8,74 @@ import numpy as np
 
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
-from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, FastestWheel, SlowestWheel
+from jaxveh.estimators.speed.abs_peaks import AdaptiveNonlinear
+from jaxveh.estimators.speed.accelerometer import AccelerometerIntegral
+from jaxveh.estimators.speed.car_numbers import FORCE_KEYS, speed_car, told
+from jaxveh.estimators.speed.forces import BrakeForces, MotorForces
+from jaxveh.estimators.speed.fuzzy import Fuzzy
+from jaxveh.estimators.speed.slip_aware import SlipAware
+from jaxveh.estimators.speed.weighted import Weighted
+from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, Combined, FastestWheel, SlopeLimited, SlowestWheel
 from jaxveh.io import CarSpecification
 
 NAME = "speed"
 
 SHOWN = {"v_x": "m/s"}
 
+
+def _brake_forces(car: CarSpecification) -> BrakeForces:
+    return BrakeForces(**told(car, "brake_force", FORCE_KEYS | {"brake_torque_per_pressure": "N m/Pa"}))
+
+
 METHODS = {
     "fastest_wheel": MethodOfCar(
-        lambda car: FastestWheel(), "the fastest wheel: right unless all of them brake", "section 2"
+        lambda car: FastestWheel(), "the fastest wheel: right unless all of them brake", "section 2.1, ref 86"
     ),
     "slowest_wheel": MethodOfCar(
-        lambda car: SlowestWheel(), "the slowest wheel: right unless all of them are driven", "section 2"
+        lambda car: SlowestWheel(), "the slowest wheel: right unless all of them are driven", "section 2.1, ref 86"
+    ),
+    "slope_limited": MethodOfCar(
+        lambda car: SlopeLimited(), "the fastest wheel, within the slopes that a car can have", "section 2.1, ref 86"
+    ),
+    "combined": MethodOfCar(
+        lambda car: Combined(),
+        "the fastest wheel in braking, the slowest in driving, within slopes",
+        "section 2.1, ref 86",
+    ),
+    "adaptive_nonlinear": MethodOfCar(
+        lambda car: AdaptiveNonlinear(),
+        "the wheels' peaks under ABS, and the slope between them",
+        "section 2.1, refs 19, 87",
+    ),
+    "accelerometer": MethodOfCar(
+        lambda car: AccelerometerIntegral(),
+        "integral of a_x, its offset from wheels that roll",
+        "section 2.1, refs 88, 89",
+    ),
+    "weighted": MethodOfCar(
+        lambda car: Weighted(), "Kalman filter of wheels and a_x with offset and slope", "section 2.1, refs 90 to 92"
+    ),
+    "fuzzy": MethodOfCar(
+        lambda car: Fuzzy(), "fuzzy rules between the wheels and the integral of a_x", "section 2.1, ref 93"
+    ),
+    "brake_force": MethodOfCar(
+        _brake_forces,
+        "integral of the forces that brake pressure and half shafts make",
+        "section 2.2, eq 11, refs 2, 94, 95",
+    ),
+    "motor_force": MethodOfCar(
+        lambda car: MotorForces(**told(car, "motor_force", FORCE_KEYS)),
+        "integral of the forces that the wheels' motors make",
+        "section 2.3, eq 12, refs 34, 83, 96",
+    ),
+    "slip_aware": MethodOfCar(
+        lambda car: SlipAware(speed_car(car)),
+        "error-state filter that knows slip, radii and slopes, and distrusts wheels one by one",
+        "sections 2.1 to 2.3; the trust is ours",
     ),
 }
 
-RECOMMENDED = "fastest_wheel"
+RECOMMENDED = "slip_aware"
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:

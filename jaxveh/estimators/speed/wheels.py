@@ -1,50 +1,239 @@
-"""Speed from the wheels alone."""
+"""Speed from the wheels alone: the fastest, the slowest, and either within the slopes that a car can have."""
 
 from __future__ import annotations
 
 import abc
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.numerics import smooth_step
 
-WHEEL_SPEEDS = tuple(Need(f"wheel_speed_{at}", "m/s") for at in ("fl", "fr", "rl", "rr"))
+AT = ("fl", "fr", "rl", "rr")
+
+WHEEL_SPEEDS = tuple(Need(f"wheel_speed_{at}", "m/s") for at in AT)
+
+PATIENCE = 0.1
+"""s: for so long a sample stands for the samples that follow it."""
 
 
-class AbstractOneWheel(AbstractMethod):
-    """One of the four wheel speeds, chosen row by row; what the last rows said is held where no wheel speaks."""
+class Wheels(NamedTuple):
+    """What the wheels said last: `speed` (m/s) and when, `at` (s), (4,) each; their low-passed speeds `smooth` and the rates of
+    those (m/s^2); `t`: of the row; `new`: whether any wheel has spoken in it."""
 
-    @abc.abstractmethod
-    def choose(self, speeds: jax.Array) -> tuple[jax.Array, jax.Array]:
-        """The speed of (4,) wheels, NaN where one does not speak, and whether one does."""
+    speed: Any
+    at: Any
+    smooth: Any
+    rate: Any
+    t: Any
+    new: Any
+
+    @property
+    def fresh(self) -> jax.Array:
+        """Which wheels have spoken lately, (4,) booleans."""
+        return self.t - self.at <= PATIENCE
+
+    @property
+    def spoke(self) -> jax.Array:
+        """Whether one has."""
+        return jnp.any(self.fresh)
+
+    @property
+    def fastest(self) -> jax.Array:
+        """Speed of the fastest wheel, m/s; 0 where none has spoken."""
+        return jnp.where(self.spoke, jnp.max(jnp.where(self.fresh, self.speed, -jnp.inf)), 0.0)
+
+    @property
+    def slowest(self) -> jax.Array:
+        """Speed of the slowest, m/s; 0 where none has spoken."""
+        return jnp.where(self.spoke, jnp.min(jnp.where(self.fresh, self.speed, jnp.inf)), 0.0)
+
+    @property
+    def mean(self) -> jax.Array:
+        """Their mean speed, m/s."""
+        return self._mean(self.speed)
+
+    @property
+    def mean_rate(self) -> jax.Array:
+        """The mean of their rates, m/s^2."""
+        return self._mean(self.rate)
+
+    def agree(self, share: Any, speed: Any) -> jax.Array:
+        """Whether the fastest and the slowest differ by less than a `share` of their mean and a `speed` (m/s) together."""
+        return self.spoke & (self.fastest - self.slowest < share * jnp.abs(self.mean) + speed)
+
+    def _mean(self, values):
+        count = jnp.maximum(jnp.sum(self.fresh.astype(values.dtype)), 1.0)
+        return jnp.sum(jnp.where(self.fresh, values, 0.0)) / count
+
+
+def wheel_values(values: dict[str, Any]) -> jax.Array:
+    """The wheels' speeds in a row, (4,), NaN where one does not speak."""
+    return jnp.stack([values[need.channel] for need in WHEEL_SPEEDS])
+
+
+def first_wheels(t: Any, values: dict[str, Any]) -> Wheels:
+    """After the first row."""
+    speeds = wheel_values(values)
+    there = ~jnp.isnan(speeds)
+    said = jnp.where(there, speeds, 0.0)
+    return Wheels(said, jnp.where(there, t, -jnp.inf), said, jnp.zeros_like(said), t, jnp.any(there))
+
+
+def next_wheels(before: Wheels, t: Any, values: dict[str, Any], smoothing: Any) -> Wheels:
+    """After the next row; rates are those of a first-order low-pass of time constant `smoothing` (s), which begins anew at a
+    wheel that was silent."""
+    speeds = wheel_values(values)
+    there, late = ~jnp.isnan(speeds), t - before.at > PATIENCE
+    said = jnp.where(there, speeds, before.speed)
+    waited = jnp.where(there & ~late, t - before.at, 0.0)
+    mixed = 1.0 - jnp.exp(-waited / smoothing)
+    start = jnp.where(late & there, said, before.smooth)
+    smooth = start + mixed * (said - start)
+    rate = jnp.where(there, jnp.where(late, 0.0, (said - smooth) / smoothing), before.rate)
+    return Wheels(said, jnp.where(there, t, before.at), smooth, rate, t, jnp.any(there))
+
+
+class AbstractWheelMethod(AbstractMethod):
+    """A method that first of all hears the wheels. Its memory is theirs and its own, its answer is made of both.
+
+    `smoothing` (s): of the wheels' rates. Wheels agree where the fastest and the slowest differ by less than `agreement` (-) of
+    their mean and `agreement_speed` (m/s) together.
+    """
+
+    smoothing: jax.Array = positive("s", default=0.1)
+    agreement: jax.Array = positive("-", default=0.02)
+    agreement_speed: jax.Array = positive("m/s", default=0.1)
+
+    def __check_init__(self):
+        check_parameters(self)
 
     @property
     def needs(self):
         return WHEEL_SPEEDS
 
+    @abc.abstractmethod
+    def begin(self, wheels: Wheels, values: dict[str, Any]) -> Any:
+        """Its own memory before the first answer."""
+
+    @abc.abstractmethod
+    def follow(self, own: Any, wheels: Wheels, step: Any, values: dict[str, Any]) -> tuple[Any, Any, Any]:
+        """Its own memory after a row that came `step` s after the last, the speed (m/s), and whether that is known."""
+
+    def agree(self, wheels: Wheels) -> jax.Array:
+        """Whether the wheels agree."""
+        return wheels.agree(self.agreement, self.agreement_speed)
+
     def first(self, t, values):
-        return self.next(jnp.zeros_like(t), t, values)
+        wheels = first_wheels(t, values)
+        return self._say(self.begin(wheels, values), wheels, jnp.zeros_like(t), values)
 
     def next(self, memory, t, values):
-        del t
-        chosen, spoke = self.choose(jnp.stack([values[need.channel] for need in WHEEL_SPEEDS]))
-        v_x = jnp.where(spoke, chosen, memory)
-        return v_x, answer({"v_x": v_x}, known=spoke)
+        before, own = memory
+        wheels = next_wheels(before, t, values, self.smoothing)
+        return self._say(own, wheels, jnp.maximum(t - before.t, 0.0), values)
+
+    def _say(self, own, wheels, step, values):
+        own, v_x, known = self.follow(own, wheels, step, values)
+        return (wheels, own), answer({"v_x": v_x}, known=known)
+
+
+class AbstractOneWheel(AbstractWheelMethod):
+    """One of the four wheels, chosen row by row; what the last rows said is held where no wheel speaks.
+
+    Known where the wheels agree and their speed changes no faster than a road lets a car, between `-most_deceleration` and
+    `most_acceleration` (m/s^2): wheels that slip alike do not look different.
+    """
+
+    most_deceleration: jax.Array = positive("m/s^2", default=10.0)
+    most_acceleration: jax.Array = positive("m/s^2", default=6.0)
+
+    @abc.abstractmethod
+    def choose(self, wheels: Wheels) -> Any:
+        """The speed of the chosen wheel, m/s."""
+
+    def begin(self, wheels, values):
+        del values
+        return self.choose(wheels)
+
+    def follow(self, own, wheels, step, values):
+        del step, values
+        v_x = jnp.where(wheels.spoke, self.choose(wheels), own)
+        rate = wheels.mean_rate
+        can_be = (rate > -self.most_deceleration) & (rate < self.most_acceleration)
+        return v_x, v_x, self.agree(wheels) & can_be
 
 
 class FastestWheel(AbstractOneWheel):
-    """The review's maximum: of a braking car the wheel that slips least."""
+    """The review's maximum: of a braking car the wheel that slips least (Chen, Gao, Xu 2013, section 2.1, ref 86)."""
 
-    def choose(self, speeds):
-        there = ~jnp.isnan(speeds)
-        return jnp.max(jnp.where(there, speeds, -jnp.inf)), there.any()
+    def choose(self, wheels):
+        return wheels.fastest
 
 
 class SlowestWheel(AbstractOneWheel):
-    """The review's minimum: of a driven car the wheel that slips least."""
+    """The review's minimum: of a driven car the wheel that slips least (Chen, Gao, Xu 2013, section 2.1, ref 86)."""
 
-    def choose(self, speeds):
-        there = ~jnp.isnan(speeds)
-        return jnp.min(jnp.where(there, speeds, jnp.inf)), there.any()
+    def choose(self, wheels):
+        return wheels.slowest
+
+
+class AbstractSlopeLimited(AbstractWheelMethod):
+    """A wheel's speed, followed no faster than a car can slow down (`most_deceleration`, m/s^2) or gain speed
+    (`most_acceleration`, m/s^2).
+
+    Known where the wheels agree and neither limit has held it for the last `patience` (s).
+    """
+
+    most_deceleration: jax.Array = positive("m/s^2", default=10.0)
+    most_acceleration: jax.Array = positive("m/s^2", default=5.0)
+    patience: jax.Array = positive("s", default=0.3)
+
+    @abc.abstractmethod
+    def choose(self, wheels: Wheels) -> Any:
+        """The speed that is to be followed, m/s."""
+
+    def begin(self, wheels, values):
+        del values
+        return Slope(self.choose(wheels), jnp.zeros_like(wheels.t))
+
+    def follow(self, own, wheels, step, values):
+        del values
+        wish = jnp.where(wheels.spoke, self.choose(wheels), own.v_x)
+        v_x = jnp.clip(wish, own.v_x - self.most_deceleration * step, own.v_x + self.most_acceleration * step)
+        # Edges of teeth make steps that are none of the car's.
+        held = jnp.abs(wish - v_x) > 0.5 * self.agreement_speed
+        free = jnp.where(held, 0.0, own.free + step)
+        return Slope(v_x, free), v_x, self.agree(wheels) & (free >= self.patience)
+
+
+class Slope(NamedTuple):
+    """The speed (m/s), and for how long no limit has held it (s)."""
+
+    v_x: Any
+    free: Any
+
+
+class SlopeLimited(AbstractSlopeLimited):
+    """The fastest wheel within the slopes (Chen, Gao, Xu 2013, section 2.1, ref 86: the slope method)."""
+
+    def choose(self, wheels):
+        return wheels.fastest
+
+
+class Combined(AbstractSlopeLimited):
+    """The fastest wheel where the car brakes, the slowest where it is driven, their mean between, within the slopes.
+
+    What the car does say the wheels: braking and driving are told by their mean rate, whole at `edge` (m/s^2).
+    (Chen, Gao, Xu 2013, section 2.1, ref 86: the combined method.)
+    """
+
+    edge: jax.Array = positive("m/s^2", default=0.5)
+
+    def choose(self, wheels):
+        drives = smooth_step(0.5 + 0.5 * wheels.mean_rate / self.edge)
+        return drives * wheels.slowest + (1.0 - drives) * wheels.fastest

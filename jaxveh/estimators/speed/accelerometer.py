@@ -1,0 +1,89 @@
+"""Speed from the accelerometer, with its offset from the wheels."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.speed.wheels import PATIENCE, WHEEL_SPEEDS, AbstractWheelMethod, Wheels
+
+A_X = Need("a_x", "m/s^2")
+
+
+class Felt(NamedTuple):
+    """What a channel said last, and when (s)."""
+
+    value: Any
+    at: Any
+
+    def hear(self, t: Any, value: Any) -> Felt:
+        """With a row's value, NaN for none."""
+        there = ~jnp.isnan(value)
+        return Felt(jnp.where(there, value, self.value), jnp.where(there, t, self.at))
+
+    def speaks(self, t: Any) -> Any:
+        """Whether it has spoken lately."""
+        return t - self.at <= PATIENCE
+
+
+def never_felt(t: Any) -> Felt:
+    """Before the first row."""
+    return Felt(jnp.zeros_like(t), jnp.full_like(t, -jnp.inf))
+
+
+class Integrated(NamedTuple):
+    """Speed (m/s), offset (m/s^2), what is felt, and for how long no wheel has corrected it (s)."""
+
+    v_x: Any
+    offset: Any
+    felt: Felt
+    alone: Any
+
+
+class AccelerometerIntegral(AbstractWheelMethod):
+    """The integral of the accelerometer less its offset, from the speed at which the wheels last rolled freely.
+
+    Wheels roll freely where they agree and their mean rate, less what is felt, is below `free_rate` (m/s^2), at an acceleration
+    below `free_acceleration` (m/s^2). Then the speed is their mean's, taken over with the time constant `wheel_time` (s), and
+    the offset learns the difference of what is felt and the wheels' rate with `offset_time` (s): the offset, and the slope of the
+    road with it.
+
+    Known for as long as an offset that is wrong by `offset_error` (m/s^2) has made less than `agreement` of the speed and
+    `agreement_speed` together.
+
+    Chen, Gao, Xu 2013, section 2.1, refs 88 (wheels' acceleration corrects the offset; wheels must roll purely) and 89 (mean
+    rates over a time).
+    """
+
+    free_rate: jax.Array = positive("m/s^2", default=1.5)
+    free_acceleration: jax.Array = positive("m/s^2", default=2.0)
+    wheel_time: jax.Array = positive("s", default=0.05)
+    offset_time: jax.Array = positive("s", default=2.0)
+    offset_error: jax.Array = positive("m/s^2", default=0.1)
+
+    @property
+    def needs(self):
+        return (*WHEEL_SPEEDS, A_X)
+
+    def begin(self, wheels, values):
+        del values
+        zero = jnp.zeros_like(wheels.t)
+        return Integrated(wheels.mean, zero, never_felt(wheels.t), jnp.where(wheels.spoke, 0.0, jnp.inf))
+
+    def follow(self, own: Integrated, wheels: Wheels, step, values):
+        felt = own.felt.hear(wheels.t, values["a_x"])
+        speaks = felt.speaks(wheels.t)
+        rate = jnp.where(speaks, felt.value - own.offset, 0.0)
+        strange = wheels.mean_rate - rate
+        free = self.agree(wheels) & (jnp.abs(strange) < self.free_rate) & (jnp.abs(rate) < self.free_acceleration)
+        v_x = own.v_x + step * rate
+        v_x = jnp.where(free, v_x + (1.0 - jnp.exp(-step / self.wheel_time)) * (wheels.mean - v_x), v_x)
+        learns = free & speaks
+        offset = own.offset - jnp.where(learns, 1.0 - jnp.exp(-step / self.offset_time), 0.0) * strange
+        alone = jnp.where(free, 0.0, own.alone + step)
+        known = speaks & (self.offset_error * alone < self.agreement * jnp.abs(v_x) + self.agreement_speed)
+        return Integrated(v_x, offset, felt, alone), v_x, known

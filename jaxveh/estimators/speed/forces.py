@@ -1,0 +1,130 @@
+"""Speed from what brakes and motors do to the wheels: their dynamics give the tyres' forces, these the speed's rate."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.speed.accelerometer import Felt, never_felt
+from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, AbstractWheelMethod, Wheels
+from jaxveh.vehicles import GRAVITY
+
+
+class Pushed(NamedTuple):
+    """Speed (m/s), what is not in the wheels' dynamics, as a rate (m/s^2): the road's slope above all; the torques as they were
+    said last, and for how long no wheel has corrected (s)."""
+
+    v_x: Any
+    rest: Any
+    heard: dict[str, Felt]
+    alone: Any
+
+
+class AbstractForces(AbstractWheelMethod):
+    """`mass dv_x/dt = sum of the wheels' F_x - drag v_x |v_x|`, corrected by wheels that roll freely.
+
+    Where they agree and their mean rate is within `free_rate` (m/s^2) of that of the forces, at a rate below `free_acceleration`
+    (m/s^2), the speed takes over their mean with `wheel_time` (s), and what no torque explains (grade, rolling
+    resistance of the road, a wrong mass) is learned with `rest_time` (s). Known for as long as a rate that is wrong by
+    `rate_error` (m/s^2) has made less than `agreement` of the speed and `agreement_speed` together.
+    """
+
+    mass: jax.Array = positive("kg", default=1500.0)
+    wheel_radius: jax.Array = positive("m", default=0.32)
+    wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
+    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.4)
+    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.012)
+    free_rate: jax.Array = positive("m/s^2", default=1.5)
+    free_acceleration: jax.Array = positive("m/s^2", default=2.0)
+    wheel_time: jax.Array = positive("s", default=0.05)
+    rest_time: jax.Array = positive("s", default=3.0)
+    rate_error: jax.Array = positive("m/s^2", default=0.2)
+
+    @property
+    @abc.abstractmethod
+    def torques(self) -> tuple[Need, ...]:
+        """The channels of torques and pressures."""
+
+    @abc.abstractmethod
+    def force(self, wheels: Wheels, heard: dict[str, Any]) -> Any:
+        """Sum of the tyres' longitudinal forces, N, positive forwards, of what was heard last (0 where nothing was)."""
+
+    @property
+    def needs(self):
+        return (*WHEEL_SPEEDS, *self.torques)
+
+    def spin_up(self, wheels: Wheels) -> Any:
+        """The force that goes into the wheels' rotation, N."""
+        return self.wheel_inertia / jnp.square(self.wheel_radius) * 4.0 * wheels.mean_rate
+
+    def rolls(self, wheels: Wheels) -> Any:
+        """Rolling resistance of all wheels, N, against the travel; fades out at standstill."""
+        return self.rolling_resistance * self.mass * GRAVITY * jnp.tanh(wheels.mean)
+
+    def begin(self, wheels, values):
+        del values
+        zero = jnp.zeros_like(wheels.t)
+        heard = {need.channel: never_felt(wheels.t) for need in self.torques}
+        return Pushed(wheels.mean, zero, heard, jnp.where(wheels.spoke, 0.0, jnp.inf))
+
+    def follow(self, own: Pushed, wheels: Wheels, step, values):
+        t = wheels.t
+        heard = {name: felt.hear(t, values[name]) for name, felt in own.heard.items()}
+        speaks = jnp.stack([heard[need.channel].speaks(t) for need in self.torques if not need.optional])
+        speaks = jnp.all(speaks) & wheels.spoke
+        force = self.force(wheels, {name: jnp.where(f.speaks(t), f.value, 0.0) for name, f in heard.items()})
+        rate = (force - self.drag * own.v_x * jnp.abs(own.v_x)) / self.mass + own.rest
+        rate = jnp.where(speaks, rate, 0.0)
+        strange = wheels.mean_rate - rate
+        free = self.agree(wheels) & (jnp.abs(strange) < self.free_rate)
+        free = free & (jnp.abs(wheels.mean_rate) < self.free_acceleration)
+        v_x = own.v_x + step * rate
+        v_x = jnp.where(free, v_x + (1.0 - jnp.exp(-step / self.wheel_time)) * (wheels.mean - v_x), v_x)
+        rest = own.rest + jnp.where(free & speaks, 1.0 - jnp.exp(-step / self.rest_time), 0.0) * strange
+        alone = jnp.where(free, 0.0, own.alone + step)
+        known = speaks & (self.rate_error * alone < self.agreement * jnp.abs(v_x) + self.agreement_speed)
+        return Pushed(v_x, rest, heard, alone), v_x, known
+
+
+class BrakeForces(AbstractForces):
+    """Forces from the brake's pressure and the torque on the half shafts, eq 11, summed over the wheels:
+
+        F_x = c_p p / R - M / R + J / R^2 dv_wheel/dt
+
+    which as printed is positive in **braking** (an erratum of the review's list: its text calls F_x the force of drive and
+    brake). `brake_torque_per_pressure` is c_p of all brakes together, N m/Pa; M the channel
+    `drive_torque`, 0 where there is none.
+
+    Chen, Gao, Xu 2013, section 2.2, refs 2, 94, 95.
+    """
+
+    brake_torque_per_pressure: jax.Array = positive("N m/Pa", default=1.6e-3)
+
+    @property
+    def torques(self):
+        return Need("brake_pressure", "Pa"), Need("drive_torque", "N m", optional=True)
+
+    def force(self, wheels, heard):
+        braking = self.brake_torque_per_pressure * heard["brake_pressure"] * jnp.tanh(wheels.mean)
+        torque = heard["drive_torque"] - braking
+        return torque / self.wheel_radius - self.spin_up(wheels) - self.rolls(wheels)
+
+
+class MotorForces(AbstractForces):
+    """Forces from the torque of each wheel's motor, eq 12, summed: `T_m = F_x R + J domega/dt`.
+
+    Chen, Gao, Xu 2013, section 2.3, refs 34, 83, 96.
+    """
+
+    @property
+    def torques(self):
+        return tuple(Need(f"torque_{at}", "N m") for at in AT)
+
+    def force(self, wheels, heard):
+        torque = sum(heard[need.channel] for need in self.torques)
+        return torque / self.wheel_radius - self.spin_up(wheels) - self.rolls(wheels)

@@ -1,0 +1,452 @@
+"""The recommended speed: an error-state filter that knows slip, radii and slopes, and distrusts wheels one by one."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles, slip_stiffness
+from jaxveh.estimators.speed.gaussian import (
+    Belief,
+    Innovation,
+    innovation,
+    innovations,
+    predict,
+    update,
+    update_by_each,
+)
+from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
+from jaxveh.numerics import smooth_step
+from jaxveh.vehicles import GRAVITY
+
+LEFT = np.array([1, -1, 1, -1])
+FRONT = np.array([True, True, False, False])
+RADII = slice(6, 10)
+"""Where the radii are in the state."""
+
+HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in AT))
+"""What is held between two of its samples."""
+
+PATIENCE = 0.3
+"""s: for so long a sample is held, then the channel is silent."""
+
+
+class SpeedState(NamedTuple):
+    """`rolled`: what wheels without slip say on the mean, `(1 + radius) v_x` (m/s); `force`: what tyres and air push, over the
+    mass (m/s^2); `slope`: gravity along the road (m/s^2, uphill positive); `offset` (m/s^2) and `gain` (-) of the accelerometer;
+    `radius`: by how much the radii make all wheels' speeds too large (-), and each wheel's beyond that; how much softer than the
+    file says the tyres of an axle slip (-, on the logarithm).
+
+    With the wheels' speed as a state, not the car's, no wheel can tell what the wheels have in common. (A filter of v_x, linear
+    about a speed that moves, would soon think that it knows.)"""
+
+    rolled: Any
+    force: Any
+    slope: Any
+    offset: Any
+    gain: Any
+    radius: Any
+    radius_fl: Any
+    radius_fr: Any
+    radius_rl: Any
+    radius_rr: Any
+    softness_front: Any
+    softness_rear: Any
+
+    @property
+    def v_x(self) -> Any:
+        """The car's speed, m/s."""
+        return self.rolled / (1.0 + self.radius)
+
+
+class Spreads(eqx.Module):
+    """Standard deviations that the filter begins with, of its random walks, and of what is measured.
+
+    `slope_walk` and so on are per root second; a slope also falls back to level with `slope_time`, a softness to the file's with
+    `softness_time` (s), in which it forgets as much as it spreads. `wheel` (m/s) is what edges of
+    teeth leave, `wheel_share` (-) goes with the speed; `slip_share` (-) is of the slip that is expected, and `limit_slip` (-)
+    the slip that nobody knows at a force of the whole load, less with its fourth power. `turn` (m/s per rad/s) is of the wheels'
+    places.
+    """
+
+    slope: jax.Array = positive("m/s^2", default=0.3)
+    slope_time: jax.Array = positive("s", default=15.0)
+    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.15)
+    offset: jax.Array = positive("m/s^2", default=0.12)
+    offset_walk: jax.Array = positive("m/s^2/sqrt(s)", default=2e-3)
+    gain: jax.Array = positive("-", default=0.012)
+    radius: jax.Array = positive("-", default=0.004)
+    radius_walk: jax.Array = positive("1/sqrt(s)", default=1e-4)
+    softness: jax.Array = positive("-", default=0.35)
+    softness_time: jax.Array = positive("s", default=300.0)
+    force_walk: jax.Array = positive("m/s^2/sqrt(s)", default=6.0)
+    speed_walk: jax.Array = positive("m/s/sqrt(s)", default=0.02)
+    a_x: jax.Array = positive("m/s^2", default=0.1)
+    wheel: jax.Array = positive("m/s", default=0.04)
+    wheel_share: jax.Array = positive("-", default=1e-3)
+    slip_share: jax.Array = positive("-", default=0.25)
+    peak_slip: jax.Array = positive("-", default=0.3)
+    limit_slip: jax.Array = positive("-", default=0.03)
+    suspicion_time: jax.Array = positive("s", default=0.4)
+    repeats: jax.Array = positive("-", default=25.0)
+    turn: jax.Array = positive("m/s per rad/s", default=0.05)
+    satellite: jax.Array = positive("m/s", default=0.06)
+
+
+class Memory(NamedTuple):
+    """The belief and its time; what was heard last and when, by channel; each wheel's low-passed speed and trust; the car's
+    low-passed acceleration; since when no wheel was trusted, and since when all say zero."""
+
+    belief: Belief
+    t: Any
+    heard: dict[str, Any]
+    at: dict[str, Any]
+    smooth: Any
+    smooth_at: Any
+    trust: Any
+    suspicion: Any
+    rate: Any
+    lost: Any
+    zero: Any
+
+
+class Said(NamedTuple):
+    """What the wheels are expected to say, `speed`, and without slip, `rolling` (m/s); the `slip` in it and the force over load,
+    `share` (-), (4,) each."""
+
+    speed: Any
+    rolling: Any
+    slip: Any
+    share: Any
+
+
+class SlipAware(AbstractMethod):
+    """An error-state filter of [v_x, force, slope, accelerometer's offset and gain, four radii, slip softness of two axles].
+
+        dv_x/dt = force + v_y yaw_rate - slope,        a_x = (1 + gain) force + offset
+        wheel   = (1 + radius) (1 + sink) (1 + slip) (the speed of the wheel's own place along its plane)
+        slip    = exp(softness) F / (K F_z),           F from the torques where the log has them, else from `force`
+
+    `gain` is there because an accelerometer on the body pitches with it. Loads move with the force, and with them the radius
+    on which a tyre rolls (a third of its compression). Lateral speeds are those of a steady turn on the file's cornering
+    stiffnesses.
+
+    **Trust**: a wheel counts by `(gate / |e|)^8` where its normalised innovation e is beyond `gate`, and likewise where its own
+    acceleration is further than `rate_gate` (m/s^2) from the car's; trust is lost at once and comes back within `memory` (s). A
+    wheel that slips is left out, all four if need be: then the accelerometer carries on, with an offset, gain and slope
+    that the drive before has told. Wheels that agree with the accelerometer's rate for `patience` (s) and are still not
+    trusted widen the belief until they are.
+
+    **Delays** (s, of the production car): `a_x_delay` of accelerometer and its low-pass, `wheel_delay` of wheel speeds, half a
+    period included, `satellite_delay`. What is said is of now: the belief, moved on by its acceleration.
+
+    `speed` is known where its standard deviation is below `known_share` of itself and `known_speed` (m/s) together.
+    Reported: `v_x`; `grade` (rad), positive uphill, and `a_x_offset` (m/s^2), which are told apart by how fast they change only.
+
+    Chen, Gao, Xu 2013, section 2.1, refs 88 to 92, and sections 2.2, 2.3 for the forces; the trust is our choice.
+    """
+
+    car: SpeedCar
+    spreads: Spreads = eqx.field(default_factory=Spreads)
+    gain: jax.Array = parameter("-", scale=0.03, default=0.048)
+    compression: jax.Array = positive("-", default=0.05)
+    gate: jax.Array = positive("-", default=3.0)
+    rate_gate: jax.Array = positive("m/s^2", default=2.0)
+    calm: jax.Array = positive("-", default=0.1)
+    bound_force: jax.Array = positive("m/s^2", default=1.5)
+    memory: jax.Array = positive("s", default=0.3)
+    patience: jax.Array = positive("s", default=3.0)
+    a_x_delay: jax.Array = positive("s", default=0.025)
+    wheel_delay: jax.Array = positive("s", default=0.03)
+    satellite_delay: jax.Array = positive("s", default=0.15)
+    smoothing: jax.Array = positive("s", default=0.06)
+    known_share: jax.Array = positive("-", default=0.02)
+    known_speed: jax.Array = positive("m/s", default=0.15)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def needs(self):
+        optional = (
+            ("a_x", "m/s^2"), ("a_y", "m/s^2"), ("yaw_rate", "rad/s"), ("steer", "rad"), ("steering_wheel", "rad"),
+            ("speed", "m/s"), ("drive_torque", "N m"), *[(f"brake_torque_{at}", "N m") for at in AT],
+            *[(f"torque_{at}", "N m") for at in AT],
+        )  # fmt: skip
+        return (*WHEEL_SPEEDS, *[Need(name, unit, optional=True) for name, unit in optional])
+
+    def first(self, t, values):
+        wheels = wheel_values(values)
+        there = ~jnp.isnan(wheels)
+        count = jnp.sum(there.astype(t.dtype))
+        v_x = jnp.sum(jnp.where(there, wheels, 0.0)) / jnp.maximum(count, 1.0)
+        s, zero = self.spreads, jnp.zeros_like(t)
+        mean = SpeedState(v_x, zero, zero, zero, zero + self.gain, *[zero] * 7)
+        std = SpeedState(
+            jnp.where(count > 0, 0.3 + 0.03 * jnp.abs(v_x), 30.0), 3.0, s.slope, s.offset, s.gain,
+            0.5 * s.radius, *[0.0 * s.radius] * 4, *[s.softness] * 2,
+        )  # fmt: skip
+        stack = lambda state: jnp.stack([jnp.asarray(one, t.dtype) for one in state])
+        belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + self._radii(s.radius))
+        never = jnp.full_like(t, -jnp.inf)
+        ones = jnp.ones_like(wheels)
+        memory = Memory(
+            belief, t, dict.fromkeys(HELD, zero), dict.fromkeys(HELD, never), jnp.where(there, wheels, v_x), t * ones, ones,
+            0.0 * ones, zero, t, t,
+        )  # fmt: skip
+        return memory, self._answer(memory)
+
+    def next(self, memory: Memory, t, values):
+        heard, at = self._hear(memory, t, values)
+        memory = memory._replace(heard=heard, at=at)
+        step = jnp.maximum(t - memory.t, 0.0)
+        belief = self._move(memory, step)
+        told = innovation(belief, self._felt, values["a_x"], jnp.square(self.spreads.a_x))
+        belief = update(belief, told, self._gate(told, 2.0 * self.gate))
+        memory = memory._replace(rate=self._smooth_rate(memory, belief, step))
+        belief = self._satellite(memory, belief, values["speed"])
+        belief, memory = self._use_wheels(memory, belief, t, step, wheel_values(values))
+        memory = memory._replace(belief=belief, t=t)
+        return memory, self._answer(memory)
+
+    # What was heard last.
+
+    def _hear(self, memory: Memory, t, values):
+        steer = values["steer"] - self.car.steer_offset
+        wheel = values["steering_wheel"]
+        # A NaN that is divided has a slope that is one, where it is not used, too.
+        turned = jnp.where(jnp.isnan(wheel), 0.0, wheel) / self.car.steering_ratio
+        turned = jnp.where(jnp.isnan(wheel), jnp.nan, turned)
+        now = dict(values) | {"steer": jnp.where(jnp.isnan(steer), turned, steer)}
+        torques = [values[f"torque_{place}"] for place in AT]
+        now["drive_torque"] = jnp.where(jnp.isnan(now["drive_torque"]), sum(torques), now["drive_torque"])
+        heard = {n: jnp.where(jnp.isnan(now[n]), memory.heard[n], now[n]) for n in HELD}
+        return heard, {n: jnp.where(jnp.isnan(now[n]), memory.at[n], t) for n in HELD}
+
+    def _speaks(self, memory: Memory, name: str):
+        return memory.t - memory.at[name] <= PATIENCE
+
+    # The motion.
+
+    def _lateral(self, memory: Memory, x: SpeedState):
+        """Yaw rate (rad/s), lateral acceleration (m/s^2), and the lateral speed (m/s) of a steady turn."""
+        car, rear = self.car, memory.smooth
+        of_wheels = (rear[3] - rear[2]) / car.track_rear
+        yaw_rate = jnp.where(self._speaks(memory, "yaw_rate"), memory.heard["yaw_rate"], of_wheels)
+        a_y = jnp.where(self._speaks(memory, "a_y"), memory.heard["a_y"], x.v_x * yaw_rate)
+        share = car.mass * car.front_axle_to_cg / car.wheelbase
+        v_y = car.rear_axle_to_cg * yaw_rate - x.v_x * share * a_y / car.rear_cornering_stiffness
+        return yaw_rate, a_y, v_y
+
+    def _acceleration(self, memory: Memory, x: SpeedState):
+        yaw_rate, _, v_y = self._lateral(memory, x)
+        return x.force + v_y * yaw_rate - x.slope
+
+    def _move(self, memory: Memory, step) -> Belief:
+        s = self.spreads
+        falls, back = jnp.exp(-step / s.slope_time), jnp.exp(-step / s.softness_time)
+
+        def move(mean):
+            x = SpeedState(*mean)
+            rolled = x.rolled + step * (1.0 + x.radius) * self._acceleration(memory, x)
+            soft = [back * x.softness_front, back * x.softness_rear]
+            return jnp.stack([rolled, x.force, falls * x.slope, *x[3:10], *soft])
+
+        lost = memory.t - memory.lost > self.patience
+        wander = s.speed_walk + jnp.where(lost, 1.0, 0.0)
+        soft = s.softness * numerics.sqrt(2.0 / s.softness_time)
+        none = 0.0 * s.gain
+        radii = [0.5 * s.radius_walk, *[none] * 4]
+        walks = SpeedState(wander, s.force_walk, s.slope_walk, s.offset_walk, none, *radii, soft, soft)
+        noise = jnp.diag(jnp.square(jnp.stack(walks))) + self._radii(s.radius_walk)
+        return predict(memory.belief, move, step * noise)
+
+    def _radii(self, std):
+        """The covariance of four radii of equal spread `std`, less their mean, where the state has them."""
+        free = jnp.eye(4, dtype=std.dtype) - 0.25
+        return jnp.zeros((12, 12), std.dtype).at[RADII, RADII].set(free * jnp.square(std))
+
+    def _smooth_rate(self, memory: Memory, belief: Belief, step):
+        now = self._acceleration(memory, SpeedState(*belief.mean))
+        return memory.rate + (1.0 - jnp.exp(-step / self.smoothing)) * (now - memory.rate)
+
+    # What is measured.
+
+    def _felt(self, mean):
+        x = SpeedState(*mean)
+        return (1.0 + x.gain) * x.force + x.offset
+
+    def _satellite(self, memory: Memory, belief: Belief, value) -> Belief:
+        lag = self.satellite_delay - self.a_x_delay
+
+        def over_ground(mean):
+            x = SpeedState(*mean)
+            v_y = self._lateral(memory, x)[2]
+            return numerics.hypot(x.v_x - lag * memory.rate, v_y)
+
+        spread = self.spreads.satellite + 0.3 * lag * jnp.abs(memory.rate)
+        found = innovation(belief, over_ground, value, jnp.square(spread))
+        return update(belief, found, self._gate(found, self.gate))
+
+    def _gate(self, found, most):
+        """1 within `most` standard deviations, and less with the eighth power of how far beyond."""
+        far = numerics.sqrt(jnp.square(found.residual) / found.variance)
+        return _beyond(far / most)
+
+    def _wheels(self, memory: Memory, mean) -> Said:
+        """What the wheels would say of a mean (n,)."""
+        x, car = SpeedState(*mean), self.car
+        v_x = x.rolled - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
+        yaw_rate, a_y, _ = self._lateral(memory, x)
+        along = v_x - LEFT.astype(v_x.dtype) * 0.5 * _front_rear(car.track_front, car.track_rear) * yaw_rate
+        steer = memory.heard["steer"]
+        slip_angle = car.mass * car.rear_axle_to_cg / car.wheelbase * a_y / car.front_cornering_stiffness
+        turned = along * numerics.cos(steer) + v_x * (steer - slip_angle) * numerics.sin(steer)
+        along = jnp.where(FRONT, turned, along)
+        share, load = self._shares_of_load(memory, x)
+        front, rear = (slip_stiffness(c, n) for c, n in zip(car.cornering_stiffnesses, car.loads, strict=True))
+        softness = _front_rear(x.softness_front, x.softness_rear)
+        slip = jnp.exp(softness) * share / _front_rear(front, rear)
+        sink = self.compression / 3.0 * (load / _front_rear(*car.loads) - 1.0)
+        rolling = along * (1.0 + mean[RADII] + sink)
+        return Said(rolling + along * slip, rolling, slip, share)
+
+    def _shares_of_load(self, memory: Memory, x: SpeedState):
+        """Each wheel's longitudinal force over its load (-), and its load (N), (4,)."""
+        car = self.car
+        at_rest = _front_rear(*car.loads)
+        pitched = 0.5 * car.mass * x.force * car.cg_height / car.wheelbase
+        a_y = self._lateral(memory, x)[1]
+        rolled = 2.0 * a_y / GRAVITY * car.cg_height / (0.5 * (car.track_front + car.track_rear))
+        load = jnp.maximum(
+            at_rest * (1.0 - LEFT.astype(rolled.dtype) * rolled) + _front_rear(-pitched, pitched), 0.1 * at_rest
+        )
+        rolling = car.rolling_resistance * car.mass * GRAVITY
+        push = car.mass * x.force + car.drag * x.v_x * jnp.abs(x.v_x) + rolling
+        force = _front_rear(*forces_of_axles(car, push))
+        brakes = [f"brake_torque_{place}" for place in AT]
+        drive = 0.5 * _front_rear(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
+        by_torque = (drive - jnp.stack([memory.heard[name] for name in brakes])) / car.wheel_radius
+        known = jnp.stack([self._speaks(memory, name) for name in brakes]) & self._speaks(memory, "drive_torque")
+        return jnp.where(known, by_torque, force) / load - car.rolling_resistance, load
+
+    # The wheels.
+
+    def _use_wheels(self, memory: Memory, belief: Belief, t, step, wheels):
+        there = ~jnp.isnan(wheels)
+        waited = jnp.where(there, t - memory.smooth_at, 0.0)
+        mixed = 1.0 - jnp.exp(-waited / self.smoothing)
+        smooth = memory.smooth + mixed * (jnp.where(there, wheels, memory.smooth) - memory.smooth)
+        rates = (jnp.where(there, wheels, smooth) - smooth) / self.smoothing
+        steady = _beyond((rates - memory.rate) / self.rate_gate)
+        said = self._wheels(memory, belief.mean)
+        suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
+        most = jnp.sort(suspicion)[1]
+        limit = jnp.maximum(suspicion, most)
+        # A wheel at its limit slips the way its force goes.
+        at_limit = self.spreads.limit_slip * limit * belief.mean[0]
+        at_limit = at_limit * said.share / (jnp.abs(said.share) + 0.02)
+
+        def expect(mean):
+            one = self._wheels(memory, mean)
+            return jnp.concatenate([one.speed + at_limit, one.rolling])
+
+        white, slow = self._wheel_variances(memory, belief, said)
+        slow = slow + jnp.square(at_limit)
+        both = innovations(belief, expect, jnp.tile(wheels, 2), jnp.concatenate([white + slow, white + 0.0 * slow]))
+        found, rolling = (Innovation(*[part[rows] for part in both]) for rows in (slice(0, 4), slice(4, 8)))
+        now = self._gates(found, said, white + slow, there) * steady
+        trusted = jnp.minimum(memory.trust + step / self.memory * (1.0 - memory.trust), 1.0)
+        trust = jnp.where(there, jnp.minimum(now, trusted), trusted)
+        # What stays for a while is not made smaller by being said often.
+        lasts = found.variance / (found.variance + self.spreads.repeats * slow)
+        before = belief.mean
+        belief = update_by_each(belief, found, jnp.where(there, trust * lasts, 0.0))
+        rolling = rolling._replace(residual=rolling.residual - rolling.slope @ (belief.mean - before))
+        belief = self._bound(belief, rolling, there, white, most)
+        zero = jnp.where(jnp.all(jnp.where(there, wheels == 0.0, memory.smooth == 0.0)), memory.zero, t)
+        belief = self._stand(belief, t, zero)
+        strange = jnp.any(there & (steady < 0.5)) | (zero < t)
+        return belief, memory._replace(
+            smooth=jnp.where(there & (wheels == 0.0), 0.0, smooth),
+            smooth_at=jnp.where(there, t, memory.smooth_at),
+            trust=trust,
+            suspicion=jnp.where(there, jnp.maximum(suspicion, 1.0 - now), suspicion),
+            zero=zero,
+            lost=jnp.where(jnp.any(there & (trust > 0.5)) | strange, t, memory.lost),
+        )
+
+    def _gates(self, found, said: Said, variance, there):
+        """How far each wheel's innovation lets it be trusted, (4,).
+
+        Where forces are small and the wheels agree, the belief is wrong rather than all the wheels: the gate is wide then.
+        """
+        apart = found.residual[:, None] - found.residual[None, :]
+        alike = jnp.exp(-jnp.square(apart) / (9.0 * (variance[:, None] + variance[None, :])))
+        others = jnp.sum(jnp.where(there[None, :], alike, 0.0), axis=1) - 1.0
+        agree = jnp.clip(others - 0.5, 0.0, 1.0)
+        calm = jnp.exp(-jnp.square(said.share / self.calm))
+        far = numerics.sqrt(jnp.square(found.residual) / found.variance)
+        return _beyond(far / (self.gate * (1.0 + 4.0 * calm * agree)))
+
+    def _wheel_variances(self, memory: Memory, belief: Belief, said: Said):
+        s, v_x = self.spreads, jnp.abs(belief.mean[0])
+        yaw_rate = self._lateral(memory, SpeedState(*belief.mean))[0]
+        near_limit = s.peak_slip * jnp.square(jnp.square(said.share))
+        white = jnp.square(s.wheel) + jnp.square(s.wheel_share * v_x)
+        parts = [s.turn * yaw_rate, s.slip_share * said.slip * v_x, near_limit * v_x]
+        return white, sum(jnp.square(one) for one in parts)
+
+    def _bound(self, belief: Belief, rolling: Innovation, there, white, most) -> Belief:
+        """A braked wheel is not faster than the car, a driven one not slower: two wheels that are say where the speed ends.
+
+        Only where most wheels are at their limit (`most`), as noise would move the speed by what one side is believed. One
+        wheel alone may be driven in a car that brakes, by the engine or a lifted wheel's differential.
+        """
+        force = belief.mean[1]
+        over = jnp.where(there, jnp.where(force < 0.0, 1.0, -1.0) * rolling.residual, -jnp.inf)
+        second = jnp.argsort(over)[-2]
+        slope = rolling.slope[second]
+        one = Innovation(rolling.residual[second], slope @ belief.covariance @ slope + white, slope)
+        sure = most * smooth_step(jnp.abs(force) - self.bound_force)
+        return update(belief, one, jnp.where(over[second] > 0.0, sure, 0.0))
+
+    def _stand(self, belief: Belief, t, zero):
+        """Wheels that have all said zero for a while, in a car that does not slow down, stand."""
+        x = SpeedState(*belief.mean)
+        stands = (t - zero > 1.0) & (jnp.abs(x.force - x.slope) < 0.7)
+        found = innovation(belief, lambda mean: mean[0], jnp.zeros_like(t), jnp.square(self.spreads.wheel))
+        return update(belief, found, jnp.where(stands, 1.0, 0.0))
+
+    def _answer(self, memory: Memory):
+        mean, covariance = memory.belief
+        x = SpeedState(*mean)
+        now = lambda mean: SpeedState(*mean).v_x + self.a_x_delay * self._acceleration(memory, SpeedState(*mean))
+        v_x, slope = jax.value_and_grad(now)(mean)
+        variance = lambda a: jnp.maximum(a @ covariance @ a, 0.0)
+        std = numerics.sqrt(variance(slope) + jnp.square(0.5 * self.a_x_delay))
+        known = std < self.known_share * jnp.abs(v_x) + self.known_speed
+        stds = numerics.sqrt(jnp.maximum(jnp.diagonal(covariance), 0.0))
+        return answer(
+            {"v_x": v_x, "grade": numerics.arctan(x.slope / GRAVITY), "a_x_offset": x.offset},
+            {"v_x": std, "grade": stds[2] / GRAVITY, "a_x_offset": stds[3]},
+            known,
+        )
+
+
+def _front_rear(front: Any, rear: Any) -> Any:
+    return jnp.where(FRONT, front, rear)
+
+
+def _beyond(far: Any) -> Any:
+    """1 where |far| <= 1, else its inverse to the eighth power; safe for what is huge."""
+    size = jnp.clip(jnp.abs(far), 1.0, 1e3)
+    return 1.0 / jnp.square(jnp.square(jnp.square(size)))

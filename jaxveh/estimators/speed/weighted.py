@@ -1,0 +1,103 @@
+"""Wheels and accelerometer weighed by a Kalman filter, with the accelerometer's offset and the road's slope as states."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.method import answer
+from jaxveh.estimators.speed.accelerometer import A_X, Felt, never_felt
+from jaxveh.estimators.speed.gaussian import Belief, innovation, predict, update
+from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, AbstractWheelMethod, Wheels
+from jaxveh.vehicles import GRAVITY
+
+
+class Weighed(NamedTuple):
+    """The belief of [v_x (m/s), offset, slope (m/s^2)], and what is felt."""
+
+    belief: Belief
+    felt: Felt
+
+
+class Weighted(AbstractWheelMethod):
+    """A Kalman filter of [v_x, offset, slope], driven by the accelerometer, measuring the wheels' mean.
+
+        dv_x/dt = a_x - offset - slope,    doffset/dt = noise,    dslope/dt = -slope / slope_time + noise
+
+    The wheels count the less, the more the car accelerates and the further they are apart, as the driving state says which
+    signal to believe: the standard deviation of their mean is `wheel` (m/s), `share` (-) of it, `by_acceleration` (s) times
+    |a_x| and `by_spread` (-) times the difference of fastest and slowest, together. Where no accelerometer speaks, the speed
+    wanders with `unfelt_walk`.
+
+    Known where its standard deviation is below `agreement` of the speed and `agreement_speed` together. The slope and the offset
+    are told apart by how fast they change only. The band knows nothing of wheels that slip alike: it is too narrow then.
+
+    Chen, Gao, Xu 2013, section 2.1, refs 90 to 92.
+    """
+
+    wheel: jax.Array = positive("m/s", default=0.05)
+    share: jax.Array = positive("-", default=3e-3)
+    by_acceleration: jax.Array = positive("s", default=0.05)
+    by_spread: jax.Array = positive("-", default=1.0)
+    a_x: jax.Array = positive("m/s/sqrt(s)", default=0.02)
+    unfelt_walk: jax.Array = positive("m/s/sqrt(s)", default=2.0)
+    offset: jax.Array = positive("m/s^2", default=0.12)
+    offset_walk: jax.Array = positive("m/s^2/sqrt(s)", default=2e-3)
+    slope: jax.Array = positive("m/s^2", default=0.3)
+    slope_time: jax.Array = positive("s", default=15.0)
+    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.1)
+
+    @property
+    def needs(self):
+        return (*WHEEL_SPEEDS, A_X)
+
+    def begin(self, wheels, values):
+        del values
+        speed = jnp.where(wheels.spoke, 0.5 + 0.03 * jnp.abs(wheels.mean), 30.0)
+        zero = jnp.zeros_like(wheels.t)
+        std = jnp.stack([speed, zero + self.offset, zero + self.slope])
+        return Weighed(Belief(jnp.stack([wheels.mean, zero, zero]), jnp.diag(jnp.square(std))), never_felt(wheels.t))
+
+    def next(self, memory, t, values):
+        memory, said = super().next(memory, t, values)
+        return memory, self._with_bands(memory[1], said)
+
+    def first(self, t, values):
+        memory, said = super().first(t, values)
+        return memory, self._with_bands(memory[1], said)
+
+    def follow(self, own: Weighed, wheels: Wheels, step, values):
+        felt = own.felt.hear(wheels.t, values["a_x"])
+        speaks = felt.speaks(wheels.t)
+        falls = jnp.exp(-step / self.slope_time)
+
+        def move(mean):
+            rate = jnp.where(speaks, felt.value - mean[1] - mean[2], 0.0)
+            return jnp.stack([mean[0] + step * rate, mean[1], falls * mean[2]])
+
+        walk = jnp.where(speaks, self.a_x, self.unfelt_walk)
+        noise = step * jnp.diag(jnp.square(jnp.stack([walk, self.offset_walk, self.slope_walk])))
+        belief = predict(own.belief, move, noise)
+        parts = [self.wheel, self.share * wheels.mean, self.by_spread * (wheels.fastest - wheels.slowest)]
+        parts += [self.by_acceleration * jnp.where(speaks, felt.value, 0.0)]
+        variance = sum(jnp.square(one) for one in parts)
+        mean = jnp.where(wheels.new, wheels.mean, jnp.nan)
+        found = innovation(belief, lambda x: x[0], mean, variance)
+        belief = update(belief, found, 1.0)
+        std = _std(belief, 0)
+        known = std < self.agreement * jnp.abs(belief.mean[0]) + self.agreement_speed
+        return Weighed(belief, felt), belief.mean[0], known
+
+    def _with_bands(self, own: Weighed, said: Any):
+        belief = own.belief
+        mean = {"v_x": belief.mean[0], "grade": numerics.arctan(belief.mean[2] / GRAVITY), "a_x_offset": belief.mean[1]}
+        std = {"v_x": _std(belief, 0), "grade": _std(belief, 2) / GRAVITY, "a_x_offset": _std(belief, 1)}
+        return answer(mean, std, said.known.v_x)
+
+
+def _std(belief: Belief, i: int) -> jax.Array:
+    return numerics.sqrt(jnp.maximum(belief.covariance[i, i], 0.0))
