@@ -65,10 +65,10 @@ class FrictionBank(AbstractMethod):
     car: PlanarCar
     frictions: jax.Array
     prior: jax.Array
-    jumps: jax.Array = positive("1/s", default=0.03)
+    jumps: jax.Array = positive("1/s", default=0.025)
     walk: jax.Array = positive("1/sqrt(s)", default=0.03)
-    turn_time: jax.Array = positive("s", default=0.015)
-    force_time: jax.Array = positive("s", default=0.05)
+    turn_time: jax.Array = positive("s", default=0.011)
+    force_time: jax.Array = positive("s", default=0.03)
     certainty: jax.Array = parameter("-", scale=0.1, default=0.85)
     stiffness_spread: jax.Array = positive("-", default=0.15)
     stiffness_time: jax.Array = positive("s", default=3.0)
