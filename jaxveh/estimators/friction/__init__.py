@@ -35,7 +35,9 @@ COUNT, LEAST, MOST = 28, 0.1, 1.25
 def _wheels(car: CarSpecification, who: str) -> WheelForces:
     for key, unit in (("wheel_radius", "m"), ("wheel_inertia", "kg m^2")):
         if getattr(car, key) is None:
-            raise InputError(f"friction: {who}: the car's file has no {key} ({unit}), by which a torque becomes a force.")
+            raise InputError(
+                f"friction: {who}: the car's file has no {key} ({unit}), by which a torque becomes a force."
+            )
     rolling = 0.01 if car.rolling_resistance is None else car.rolling_resistance
     return WheelForces(car.wheel_radius, car.wheel_inertia, rolling)
 
@@ -94,7 +96,8 @@ METHODS = {
     ),
     "hybrid": MethodOfCar(
         lambda car: HybridObserver(_lateral(car)),
-        "the observer of lateral_curve, and nonlinear least squares over two seconds where they can tell; known only near the limit",
+        "the observer of lateral_curve, and nonlinear least squares over two seconds where they can tell; known only near the "
+        "limit",
         "section 3.1.1.1, figure 3, reference [101]",
     ),
     "augmented": MethodOfCar(
@@ -104,7 +107,8 @@ METHODS = {
     ),
     "slip_slope": MethodOfCar(
         lambda car: SlipSlope(_slips(car, "slip_slope")),
-        "the slope of force over slip at small slip, known only where torques vary; no friction without a calibration of the tyre",
+        "the slope of force over slip at small slip, known only where torques vary; no friction without a calibration of the "
+        "tyre",
         "section 3.1.2.1, references [112-116]",
     ),
     "reconstruction": MethodOfCar(

@@ -113,7 +113,8 @@ class AlongEvidence(eqx.Module):
     A radius is not known to better than `radius_noise`: what slip a wheel shows while it hardly pulls is learnt and taken off.
     A force's error is a share `force_noise` of it and `load_noise` of the load; a slip's is `slip_noise` and what is not learnt
     yet, which stays for `slip_time` (s), so that many rows say hardly more than one; a curve is less certain the further the
-    slip is beyond its peak. Slips below `knee` (-) hardly count: they tell stiffness, not friction. Rows closer than `correlation` (s) say the same.
+    slip is beyond its peak. Slips below `knee` (-) hardly count: they tell stiffness, not friction. Rows closer than
+    `correlation` (s) say the same.
     """
 
     car: PlanarCar
@@ -141,20 +142,25 @@ class AlongEvidence(eqx.Module):
         """The slips' offsets and variances after a row: of wheels that pull less than a tenth of their load."""
         rolls = seen.there & (jnp.abs(seen.force) < 0.1 * self.stiffness_ratio * stiffness * 0.05)
         shown = jnp.where(rolls, seen.slip - seen.force / (self.stiffness_ratio * stiffness * seen.load), 0.0)
-        variance = jnp.minimum(memory.variance + dt * jnp.square(self.slip_noise) / 100.0, jnp.square(self.radius_noise))
+        variance = jnp.minimum(
+            memory.variance + dt * jnp.square(self.slip_noise) / 100.0, jnp.square(self.radius_noise)
+        )
         # Errors of a slip are alike for half a second.
         rough = jnp.square(0.003 + 0.0 * variance) * 0.5 / jnp.maximum(dt, 1e-3)
         gain = jnp.where(rolls, variance / (variance + rough), 0.0)
         return memory.offset + gain * (shown - memory.offset), (1.0 - gain) * variance
 
     def next(self, memory: AlongMemory, t, values, told, frictions, weights):
-        """The memory, and the log-likelihood of each friction (K,), of probabilities `weights`, for the time since the last row."""
+        """The memory, and the log-likelihood of each friction (K,), of probabilities `weights`, for the time since the last
+        row."""
         dt = jnp.clip(t - memory.wheels.t, 0.0, 1.0)
         wheels = self.wheels.next(memory.wheels, t, values, told)
         held = lambda name, last: jnp.where(jnp.isnan(values[name]), last, values[name])
         yaw_rate, a_y = held("yaw_rate", memory.yaw_rate), held("a_y", memory.a_y)
         seen = self.wheels.slips(self.car, wheels, told, yaw_rate, a_y)
-        stiffness = 0.5 * jnp.stack([c.stiffness for c in (self.car.front, self.car.front, self.car.rear, self.car.rear)])
+        stiffness = 0.5 * jnp.stack(
+            [c.stiffness for c in (self.car.front, self.car.front, self.car.rear, self.car.rear)]
+        )
         offset, variance = self._learn(memory, seen, stiffness, dt)
         seen = seen._replace(slip=seen.slip - offset)
         lateral = self.car.axle_forces(a_y, jnp.zeros_like(a_y))
@@ -167,6 +173,9 @@ class AlongEvidence(eqx.Module):
             error, rough = jax.vmap(of)(frictions)
             # One variance for all, as for the motion.
             counts = one.slip**4 / (one.slip**4 + self.knee**4)
+            # A wheel that slides across tells little along.
+            limit = jnp.sum(weights * frictions) * curve.peak
+            counts = counts * jnp.square(jnp.maximum(1.0 - jnp.square(across / limit), 0.0))
             total = total - 0.25 * counts * jnp.square(error) / jnp.sum(weights * rough)
         return AlongMemory(wheels, offset, variance, yaw_rate, a_y), jnp.minimum(dt / self.correlation, 1.0) * total
 

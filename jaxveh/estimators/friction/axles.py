@@ -1,4 +1,5 @@
-"""Friction from the axles' lateral forces, which inertial sensors tell: by the tyre curve, by the steering torque, over a window."""
+"""Friction from the axles' lateral forces, which inertial sensors tell: by the tyre curve, by the steering torque, over a
+window."""
 
 from __future__ import annotations
 
@@ -19,14 +20,15 @@ from jaxveh.vehicles import GRAVITY
 
 
 class AxlesTold(NamedTuple):
-    """The motion and, low-pass filtered alike: steer (rad), yaw rate (rad/s), a_y (m/s^2); and what was measured last of the yaw
-    rate."""
+    """The motion and, low-pass filtered alike: steer (rad), yaw rate (rad/s), a_y (m/s^2); and what was measured last of yaw
+    rate and a_y."""
 
     told: Told
     steer: Any
     yaw_rate: Any
     a_y: Any
     last_yaw_rate: Any
+    last_a_y: Any
 
 
 class Axles(eqx.Module):
@@ -35,25 +37,27 @@ class Axles(eqx.Module):
     """
 
     car: PlanarCar
-    lag: jax.Array = positive("s", default=0.1)
+    lag: jax.Array = positive("s", default=0.06)
 
     def start(self, t, values) -> AxlesTold:
         """After the first row."""
         told, zero = first_told(t, values), jnp.zeros_like(t)
         known = lambda name: jnp.where(jnp.isnan(values[name]), zero, values[name])
-        return AxlesTold(told, told.steer, known("yaw_rate"), known("a_y"), known("yaw_rate"))
+        return AxlesTold(told, told.steer, known("yaw_rate"), known("a_y"), known("yaw_rate"), known("a_y"))
 
     def next(self, last: AxlesTold, t, values) -> AxlesTold:
         """After the next row."""
         dt = jnp.clip(t - last.told.t, 0.0, 1.0)
         told = next_told(last.told, t, values)
-        share = 1.0 - jnp.exp(-dt / self.lag)
-        yaw_rate = jnp.where(jnp.isnan(values["yaw_rate"]), last.last_yaw_rate, values["yaw_rate"])
-        a_y = jnp.where(jnp.isnan(values["a_y"]), last.a_y, values["a_y"])
-        follow = lambda old, new: old + share * (new - old)
+        # The bilinear low-pass, of which `(x - slow) / lag` is the derivative exactly.
+        share = dt / (2.0 * self.lag + dt)
+        held = lambda name, old: jnp.where(jnp.isnan(values[name]), old, values[name])
+        yaw_rate, a_y = held("yaw_rate", last.last_yaw_rate), held("a_y", last.last_a_y)
+        follow = lambda slow, old, new: slow + share * (new + old - 2.0 * slow)
         return AxlesTold(
-            told, follow(last.steer, told.steer), follow(last.yaw_rate, yaw_rate), follow(last.a_y, a_y), yaw_rate
-        )
+            told, follow(last.steer, last.told.steer, told.steer), follow(last.yaw_rate, last.last_yaw_rate, yaw_rate),
+            follow(last.a_y, last.last_a_y, a_y), yaw_rate, a_y,
+        )  # fmt: skip
 
     def forces(self, now: AxlesTold):
         """Of front and rear, N."""
@@ -65,7 +69,8 @@ class Axles(eqx.Module):
         return now.steer - self.car.wheelbase * now.yaw_rate / now.told.v_x
 
     def residual(self, forces, difference, log_friction):
-        """Front force (N) that is measured less the one that the brush makes of the front slip, the rear's being told by its force."""
+        """Front force (N) that is measured less the one that the brush makes of the front slip, the rear's being told by its
+        force."""
         mu, car = jnp.exp(log_friction), self.car
         rear = brush_curve.slip_of(forces[1], car.rear.stiffness, mu * car.rear.peak)
         return forces[0] - brush_curve.force(difference + rear, car.front.stiffness, mu * car.front.peak)
@@ -82,7 +87,7 @@ class LateralCurve(AbstractMethod):
 
     axles: Axles
     follower: Follower
-    force_noise: jax.Array = positive("-", default=0.1)
+    force_noise: jax.Array = positive("-", default=0.07)
     noise: jax.Array = positive("-", default=0.02)
 
     @property
@@ -198,7 +203,8 @@ class HybridObserver(AbstractMethod):
         sample = (front, rear, axles.slip_difference(now), jnp.where(now.told.moves, 1.0, 0.0))
         due = t - window.time >= self.every
         push = lambda old, new: jnp.where(due, jnp.concatenate([old[1:], new[None]]), old)
-        window = Window(*map(push, window[:4], sample), jnp.where(due, t, window.time))
+        front, rear, difference, weight = map(push, window[:4], sample)
+        window = Window(front, rear, difference, weight, jnp.where(due, t, window.time))
         mean, information = self._least_squares(window, state.mean)
         better = due & now.told.moves & (information > self.enough)
         variance = jnp.where(better, 1.0 / jnp.maximum(information, 1.0), state.variance)

@@ -119,7 +119,9 @@ class FrictionBank(AbstractMethod):
             self.stiffness_spread, 0.15 + 0.0 * self.stiffness_spread, self.steer_noise, GRAVITY * self.car.roll_gradient,
         ])  # fmt: skip
         lean = GRAVITY * self.car.roll_gradient + zero
-        return jnp.zeros((len(zero), STATES), zero.dtype).at[:, 6].set(lean), jnp.repeat(jnp.diag(spread**2)[None], len(zero), axis=0)
+        return jnp.zeros((len(zero), STATES), zero.dtype).at[:, 6].set(lean), jnp.repeat(
+            jnp.diag(spread**2)[None], len(zero), axis=0
+        )
 
     def _mix(self, bank: Bank, dt) -> Bank:
         """Friction walks and jumps: every filter takes over from those whose friction may have become its own."""

@@ -58,14 +58,14 @@ class SimilarCurve(eqx.Module):
 class PlanarCar(eqx.Module):
     """What the methods want of a car, each number a leaf; see `planar_car` for those that a file need not have."""
 
+    front: SimilarCurve
+    rear: SimilarCurve
     mass: jax.Array = positive("kg")
     yaw_inertia: jax.Array = positive("kg m^2")
     front_axle_to_cg: jax.Array = positive("m")
     rear_axle_to_cg: jax.Array = positive("m")
     cg_height: jax.Array = parameter("m", scale=0.5)
     half_track: jax.Array = positive("m")
-    front: SimilarCurve
-    rear: SimilarCurve
     front_drive: jax.Array = parameter("-", scale=0.5)
     front_brake: jax.Array = parameter("-", scale=0.5)
     roll_gradient: jax.Array = parameter("rad s^2/m", scale=0.005)

@@ -33,9 +33,9 @@ class Follower(eqx.Module):
 
     usual: jax.Array = positive("-", default=0.8)
     spread: jax.Array = positive("-", default=0.6)
-    memory: jax.Array = positive("s", default=20.0)
+    memory: jax.Array = positive("s", default=40.0)
     correlation: jax.Array = positive("s", default=0.2)
-    known: jax.Array = positive("-", default=0.12)
+    known: jax.Array = positive("-", default=0.15)
     surprise: jax.Array = positive("-", default=6.0)
     attention: jax.Array = positive("s", default=0.3)
 

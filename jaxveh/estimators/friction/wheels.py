@@ -22,7 +22,11 @@ SPEED = (Need("v_x", "m/s"),)
 WHEEL_CHANNELS = tuple(
     Need(f"{kind}_{at}", unit) for kind, unit in (("wheel_speed", "m/s"), ("torque", "N m")) for at in CORNERS
 )
-MORE = (Need("a_x", "m/s^2", optional=True), Need("a_y", "m/s^2", optional=True), Need("yaw_rate", "rad/s", optional=True))
+MORE = (
+    Need("a_x", "m/s^2", optional=True),
+    Need("a_y", "m/s^2", optional=True),
+    Need("yaw_rate", "rad/s", optional=True),
+)
 
 
 class WheelMemory(NamedTuple):
@@ -96,7 +100,8 @@ class SlipSlope(AbstractWheelMethod):
 
     **The slope is no friction.** Brush and Magic Formula have the same slope on every road; that measured slopes fall with
     friction is an observation on real tyres, whose size hangs on tyre, wear, temperature and pressure. `friction =
-    (K / K_0)^exponent`, K_0 the file's, is that calibration: `exponent` and `calibration_spread` (of ln mu) are to be found on the
+    (K / K_0)^exponent`, K_0 the file's, is that calibration: `exponent` and `calibration_spread` (of ln mu) are to be found on
+    the
     car at hand, and the spread that is claimed holds both. `known` says that the slope is, within a tenth.
     """
 
@@ -106,7 +111,7 @@ class SlipSlope(AbstractWheelMethod):
     calibration_spread: jax.Array = positive("-", default=0.3)
     slip_noise: jax.Array = positive("-", default=0.004)
     used: jax.Array = positive("-", default=0.3)
-    memory: jax.Array = positive("s", default=20.0)
+    memory: jax.Array = positive("s", default=60.0)
 
     def first(self, t, values):
         wheels = self.slips.start(t, values)
@@ -145,13 +150,14 @@ class SlipSlope(AbstractWheelMethod):
         usual = self._usual()
         compliance = jnp.clip(memory.mean[0], usual / 1.5, 10.0 * usual)
         friction = jnp.exp(self.exponent * jnp.log(usual / compliance))
-        slope = numerics.sqrt(memory.covariance[0, 0]) / usual
-        spread = numerics.hypot(self.exponent * slope * usual / compliance, self.calibration_spread)
+        slope = numerics.sqrt(memory.covariance[0, 0]) / compliance
+        spread = numerics.hypot(self.exponent * slope, self.calibration_spread)
         return answer({"friction": friction}, {"friction": friction * spread}, memory.wheels.told.moves & (slope < 0.1))
 
 
 class CurveMemory(NamedTuple):
-    """The filtered slip and used friction of the car's wheels, the curve's slope, and the friction that it points at; how long ago
+    """The filtered slip and used friction of the car's wheels, the curve's slope, and the friction that it points at; how long
+    ago
     the slope was measured (s)."""
 
     wheels: WheelMemory
@@ -166,7 +172,8 @@ class Reconstruction(AbstractWheelMethod):
     """The curve of used friction over slip, reconstructed (equations 18, 19, figure 6 of the review; references [3, 136-138]).
 
     `mu = F_x / F_z` (18) and its slope `d mu / d lambda = (d mu / dt) / (d lambda / dt)` (19), of the wheel that uses most. Where
-    `|d lambda / dt|` is below `least_rate` (1/s) (19) divides noise by noise: the slope is kept then. Figure 6 reads the peak where
+    `|d lambda / dt|` is below `least_rate` (1/s) (19) divides noise by noise: the slope is kept then. Figure 6 reads the peak
+    where
     the slope is zero; before it, the brush's curve says how far away that is: with the slope's share `k` of the first one,
     `1 - g = sqrt(k)` and the peak is `mu / (1 - (1 - g)^3)`. Without a `lag` (s) on both, derivatives of noise would rule.
 
@@ -232,11 +239,12 @@ class WheelObserver(AbstractWheelMethod):
 
     Each wheel: `J domega/dt = T - R F(slip, mu) + gain J (omega - observed)`; friction follows the gradient,
     `d mu / dt = - rate sum e dF/dmu / F_z - leak (mu - usual)`, normalised, where the leak (sigma-modification) holds it while
-    nothing is excited. Without a law `F = mu F_z phi(slip)`, phi the file's curve over its peak: linear in mu as [118] has it, and
+    nothing is excited. Without a law `F = mu F_z phi(slip)`, phi the file's curve over its peak: linear in mu as [118] has it,
+    and
     wrong where tyres keep their slope on slippery roads. With LuGre the bristles are taken as settled (they settle within
     milliseconds), and mu is what multiplies their friction.
 
-    `known`: the averaged `|dF/dmu| mu / F_z` is above `enough`. No spread is claimed.
+    `known`: the averaged `|F - slip dF/dslip| / F_z` of the wheel that has most of it is above `enough`. No spread is claimed.
     """
 
     slips: WheelSlips
@@ -246,7 +254,7 @@ class WheelObserver(AbstractWheelMethod):
     rate: jax.Array = positive("1/s", default=3.0)
     leak: jax.Array = positive("1/s", default=0.02)
     usual: jax.Array = positive("-", default=0.8)
-    enough: jax.Array = positive("-", default=0.25)
+    enough: jax.Array = positive("-", default=0.1)
 
     def first(self, t, values):
         wheels = self.slips.start(t, values)
@@ -262,6 +270,7 @@ class WheelObserver(AbstractWheelMethod):
         load = seen.load * self.slips.nominal()
         forces = lambda mu: self._forces(seen, wheels, mu)
         force, slope = jax.jvp(forces, (memory.friction,), (jnp.ones_like(memory.friction),))
+        ones = jnp.ones_like(seen.slip)
         torque = wheels.wheels.torque - one.wheel_radius * one.rolling_resistance * load
         error = speed - memory.speed
         push = one.wheel_radius * (torque - one.wheel_radius * force) / one.wheel_inertia
@@ -275,7 +284,11 @@ class WheelObserver(AbstractWheelMethod):
         step = -self.rate * jnp.sum(tells * lacks) / (squares + 0.05) - self.leak * (memory.friction - self.usual)
         friction = jnp.clip(memory.friction + dt * step, 0.05, 1.5)
         share = 1.0 - jnp.exp(-dt / 0.3)
-        excited = numerics.sqrt(jnp.max(tells**2)) * friction
+        # What the slip does not explain in proportion: the part of a force that is no stiffness.
+        _, stiff = jax.jvp(
+            lambda slip: self._forces(seen._replace(slip=slip), wheels, memory.friction), (seen.slip,), (ones,)
+        )
+        excited = jnp.max(jnp.where(seen.there, jnp.abs(force - seen.slip * stiff) / load, 0.0))
         excitation = memory.excitation + share * (excited - memory.excitation)
         after = ObserverMemory(wheels, observed, friction, excitation)
         return after, self._answer(after)
@@ -302,7 +315,8 @@ class SidesMemory(NamedTuple):
 
 
 class SidesApart(AbstractWheelMethod):
-    """Friction under the left and under the right wheels, each by a filter of ln mu on the forces and slips of its own wheels: what
+    """Friction under the left and under the right wheels, each by a filter of ln mu on the forces and slips of its own wheels:
+    what
     a road that is slippery on one side needs.
 
     `friction` is the mean of both, weighed by load. The force of each wheel is compared with the curve along of its axle; what
@@ -354,6 +368,10 @@ class SidesApart(AbstractWheelMethod):
         moves = memory.wheels.told.moves
         left, right = (self.follower.says(side, moves) for side in (memory.left, memory.right))
         mean = {"friction": 0.5 * (left[0] + right[0]), "friction_left": left[0], "friction_right": right[0]}
-        std = {"friction": 0.5 * numerics.hypot(left[1], right[1]), "friction_left": left[1], "friction_right": right[1]}
+        std = {
+            "friction": 0.5 * numerics.hypot(left[1], right[1]),
+            "friction_left": left[1],
+            "friction_right": right[1],
+        }
         known = {"friction": left[2] & right[2], "friction_left": left[2], "friction_right": right[2]}
         return answer(mean, std, known)

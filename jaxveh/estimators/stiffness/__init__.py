@@ -1,6 +1,7 @@
 """Cornering stiffness of both axles, as the linear single track has it: section 3.1.2.2 of the review (Chen, Gao, Xu 2013).
 
-It is the slope of an axle's lateral force over its slip angle at zero slip, with whatever else of the car goes with the force: camber
+It is the slope of an axle's lateral force over its slip angle at zero slip, with whatever else of the car goes with the force:
+camber
 thrust, compliance, roll steer. The car's file is where methods start from.
 """
 
@@ -31,8 +32,10 @@ METHODS = {
         "section 3.1.2.2, equation 15 (F_yr without cosine) and reference [120]",
     ),
     "derivatives": MethodOfCar(
-        lambda car: Derivatives(linear_car(car), Followed(lag=0.4)),
-        "the derivative of a force over that of its slip angle at constant speed; too small by what noise there is",
+        lambda car: Derivatives(linear_car(car), Followed(lag=0.3)),
+        "the derivative of a force over that of its slip angle at constant speed, too small by what noise there is; known only "
+        "where "
+        "steer and yaw move fast",
         "section 3.1.2.2, equation 16 as corrected, reference [122]",
     ),
 }

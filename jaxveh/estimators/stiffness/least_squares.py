@@ -24,11 +24,13 @@ class AxleForces(AbstractMethod):
     """Least squares on the axles' forces by equation 15 and the difference of their slip angles, with forgetting.
 
     `delta - l r / v = F_f / C_f - F_r / C_r + offset` holds without the lateral speed, so that no observer of it is needed (the
-    review's general way has one): linear in both compliances and an offset. Front and rear forces are nearly proportional in
+    review's general way has one): linear in both compliances, an offset, and how much later the
+    inertial sensors are than the steer. Front and rear forces are nearly proportional in
     slow driving, and then only the difference of the compliances is told; yaw accelerations tell them apart. Compliances are in
     units of the file's, so that the numbers are of one size.
 
-    `memory` (s) of the forgetting; `angle_noise` (rad) of the slip difference, alike for `correlation` (s); `known_spread` (-): up
+    `memory` (s) of the forgetting; `angle_noise` (rad) of the slip difference, alike for `correlation` (s); `known_spread`
+    (-): up
     to this relative spread a stiffness is known.
     """
 
@@ -46,7 +48,7 @@ class AxleForces(AbstractMethod):
 
     def first(self, t, values):
         signals = self.followed.start(t, values)
-        start = ForcesMemory(signals, jnp.stack([1.0, 1.0, 0.0]).astype(self.spread.dtype), self._start())
+        start = ForcesMemory(signals, jnp.asarray([1.0, 1.0, 0.0, 0.0], self.spread.dtype), self._start())
         return start, self._answer(start)
 
     def next(self, memory, t, values):
@@ -55,9 +57,12 @@ class AxleForces(AbstractMethod):
         turn = (now.yaw_rate - now.slow_yaw_rate) / self.followed.lag
         front, rear = self.car.axle_forces(now.slow_a_y / (1.0 + LEAN), turn)
         phi = jnp.stack([
-            front / self.car.front_cornering_stiffness, -rear / self.car.rear_cornering_stiffness, jnp.ones_like(front)
+            front / self.car.front_cornering_stiffness, -rear / self.car.rear_cornering_stiffness, jnp.ones_like(front),
+            (now.steer - now.slow_steer) / self.followed.lag,
         ])  # fmt: skip
-        difference = now.slow_steer - self.car.steer_offset - self.car.wheelbase * now.slow_yaw_rate / jnp.maximum(now.v_x, 1.0)
+        difference = (
+            now.slow_steer - self.car.steer_offset - self.car.wheelbase * now.slow_yaw_rate / jnp.maximum(now.v_x, 1.0)
+        )
         stays = jnp.exp(-dt / self.memory)
         mean = memory.mean
         # What is forgotten goes back to what was known before the drive, so that nothing winds up.
@@ -70,7 +75,9 @@ class AxleForces(AbstractMethod):
         return after, self._answer(after)
 
     def _start(self):
-        return jnp.diag(jnp.square(jnp.stack([self.spread, self.spread, 0.003 + 0.0 * self.spread])))
+        return jnp.diag(
+            jnp.square(jnp.stack([self.spread, self.spread, 0.003 + 0.0 * self.spread, 0.01 + 0.0 * self.spread]))
+        )
 
     def _answer(self, memory: ForcesMemory):
         compliance = jnp.clip(memory.mean[:2], 0.2, 5.0)
@@ -78,15 +85,22 @@ class AxleForces(AbstractMethod):
         car, names = self.car, ("front_cornering_stiffness", "rear_cornering_stiffness")
         mean = {name: getattr(car, name) / compliance[k] for k, name in enumerate(names)}
         spread = {name: mean[name] * std[k] / compliance[k] for k, name in enumerate(names)}
-        known = {name: memory.signals.moves & (std[k] / compliance[k] < self.known_spread) for k, name in enumerate(names)}
+        known = {
+            name: memory.signals.moves & (std[k] / compliance[k] < self.known_spread) for k, name in enumerate(names)
+        }
         return answer(mean, spread, known)
 
 
 class DerivativesMemory(NamedTuple):
-    """The signals; axle accelerations' last and filtered (2,), sums of products (2, 2) over the window, (front, rear)."""
+    """The signals; of front and rear, (2,): accelerations (m/s^2), filtered, slip rates (rad/s), filtered, and the mean over
+    the window
+    of their products and of the slip rates' squares."""
 
     signals: Signals
+    felt: Any
     slow: Any
+    raw_angle: Any
+    angle: Any
     product: Any
     square: Any
 
@@ -98,19 +112,21 @@ class Derivatives(AbstractMethod):
 
     a_f is the front axle's acceleration (erratum: the print has slip angles there); exact for `J_z = m l_f l_r` at a constant
     speed. The rear's is the same without steer: `C_r = m l_f / l (d a_r / dt) / (r - a_r / v)`, a_r = a_y - l_r dr/dt. Single
-    quotients are useless where the denominator is near zero, so the paper holds the last value within epsilon; here the quotient is
+    quotients are useless where the denominator is near zero, so the paper holds the last value within epsilon; here the
+    quotient is
     the least squares' over `memory` (s), numerator times denominator over denominator squared, and what is below `epsilon`
     (rad/s) hardly counts.
 
-    No spread is claimed: noise in the denominator makes it too small by a bias that grows with the noise. `known`: the mean square
+    No spread is claimed: noise in the denominator makes it too small by a bias that grows with the noise. `known`: the mean
+    square
     of the denominators in the window is above `enough` times epsilon's.
     """
 
     car: LinearCar
     followed: Followed
-    epsilon: jax.Array = positive("rad/s", default=0.02)
+    epsilon: jax.Array = positive("rad/s", default=0.01)
     memory: jax.Array = positive("s", default=30.0)
-    enough: jax.Array = positive("-", default=0.5)
+    enough: jax.Array = positive("-", default=0.1)
 
     @property
     def needs(self):
@@ -119,7 +135,7 @@ class Derivatives(AbstractMethod):
     def first(self, t, values):
         signals = self.followed.start(t, values)
         two = jnp.zeros((2,), t.dtype)
-        start = DerivativesMemory(signals, two, two, two)
+        start = DerivativesMemory(signals, two, two, two, two, two, two)
         return start, self._answer(start)
 
     def next(self, memory, t, values):
@@ -129,16 +145,19 @@ class Derivatives(AbstractMethod):
         turn = (now.yaw_rate - now.slow_yaw_rate) / lag
         a_y = now.slow_a_y / (1.0 + LEAN)
         felt = jnp.stack([a_y + self.car.front_axle_to_cg * turn, a_y - self.car.rear_axle_to_cg * turn])
-        share = 1.0 - jnp.exp(-dt / lag)
+        share = dt / (2.0 * lag + dt)
         # All once more through the same low-pass, so that derivative and value are of one age.
-        slow = memory.slow + share * (felt - memory.slow)
+        slow = memory.slow + share * (felt + memory.felt - 2.0 * memory.slow)
         rate = (felt - slow) / lag
         steer_rate = (now.steer - now.slow_steer) / lag
-        angle = jnp.stack([steer_rate + now.slow_yaw_rate, now.slow_yaw_rate]) - felt / jnp.maximum(now.v_x, 1.0)
+        raw = jnp.stack([steer_rate + now.slow_yaw_rate, now.slow_yaw_rate]) - felt / jnp.maximum(now.v_x, 1.0)
+        angle = memory.angle + share * (raw + memory.raw_angle - 2.0 * memory.angle)
         counts = jnp.where(now.moves, angle**2 / (angle**2 + self.epsilon**2), 0.0)
         fades = jnp.exp(-dt / self.memory)
         gather = lambda old, new: fades * old + (1.0 - fades) * counts * new
-        after = DerivativesMemory(now, slow, gather(memory.product, angle * rate), gather(memory.square, angle**2))
+        after = DerivativesMemory(
+            now, felt, slow, raw, angle, gather(memory.product, angle * rate), gather(memory.square, angle**2)
+        )
         return after, self._answer(after)
 
     def _answer(self, memory: DerivativesMemory):

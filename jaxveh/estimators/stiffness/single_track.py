@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -51,16 +52,18 @@ class LinearCar(eqx.Module):
 
 def linear_car(car: CarSpecification) -> LinearCar:
     """The car of a file."""
-    told = [getattr(car, name) for name in LinearCar.__dataclass_fields__ if name != "steer_offset"]
-    return LinearCar(*told, car.steer_offset or 0.0)
+    names = [field.name for field in dataclasses.fields(LinearCar) if field.name != "steer_offset"]
+    return LinearCar(**{name: getattr(car, name) for name in names}, steer_offset=car.steer_offset or 0.0)
 
 
 class Signals(NamedTuple):
-    """Time (s); what was measured last of speed (m/s), steer (rad), yaw rate (rad/s), a_y (m/s^2), each followed by its low-pass
-    filtered one; the oldest's age (s) and whether the car `moves` and all of them speak."""
+    """Time (s); what was measured last of speed (m/s), steer (rad), yaw rate (rad/s), a_y (m/s^2), the steer as late as these,
+    too;
+    the low-pass filtered ones; the oldest's age (s) and whether the car `moves` and all of them speak."""
 
     t: Any
     v_x: Any
+    raw_steer: Any
     steer: Any
     yaw_rate: Any
     a_y: Any
@@ -85,7 +88,7 @@ class Followed(eqx.Module):
         old = jnp.where(jnp.stack([jnp.isnan(values[need.channel]) for need in LATERAL]), 1e3, 0.0).astype(t.dtype)
         v_x = known("v_x")
         moves = (old.max() <= LONGEST) & (v_x >= LOWEST)
-        return Signals(t, v_x, steer, yaw_rate, a_y, steer, yaw_rate, a_y, old, moves)
+        return Signals(t, v_x, steer, steer, yaw_rate, a_y, steer, yaw_rate, a_y, old, moves)
 
     def next(self, last: Signals, t, values) -> Signals:
         """After the next row."""
@@ -95,12 +98,17 @@ class Followed(eqx.Module):
         ages = jnp.where(missing, last.ages + dt, 0.0)
         anew = jnp.max(last.ages) > LONGEST
         v_x, yaw_rate, a_y = held("v_x", last.v_x), held("yaw_rate", last.yaw_rate), held("a_y", last.a_y)
-        raw = held("steer", last.steer)
-        steer = jnp.where(anew, raw, last.steer + (raw - last.steer) * (1.0 - jnp.exp(-dt / self.late)))
-        share = jnp.where(anew, 1.0, 1.0 - jnp.exp(-dt / self.lag))
-        follow = lambda old, new: old + share * (new - old)
+        raw = held("steer", last.raw_steer)
+        # Pade's delay, an all-pass: `2 / (1 + s late / 2) - 1`, its low-pass bilinear.
+        mid = 0.5 * (last.steer + last.raw_steer)
+        mid = mid + dt / (self.late + dt) * (raw + last.raw_steer - 2.0 * mid)
+        steer = jnp.where(anew, raw, 2.0 * mid - raw)
+        # The bilinear low-pass, of which `(x - slow) / lag` is the derivative exactly.
+        share = dt / (2.0 * self.lag + dt)
+        follow = lambda slow, old, new: jnp.where(anew, new, slow + share * (new + old - 2.0 * slow))
         moves = (jnp.max(ages) <= LONGEST) & (v_x >= LOWEST)
         return Signals(
-            t, v_x, steer, yaw_rate, a_y, follow(last.slow_steer, steer), follow(last.slow_yaw_rate, yaw_rate),
-            follow(last.slow_a_y, a_y), ages, moves,
+            t, v_x, raw, steer, yaw_rate, a_y, follow(last.slow_steer, last.steer, steer), follow(last.slow_yaw_rate,
+            last.yaw_rate, yaw_rate),
+            follow(last.slow_a_y, last.a_y, a_y), ages, moves,
         )  # fmt: skip

@@ -14,7 +14,8 @@ from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.stiffness.single_track import LATERAL, LEAN, LOWEST, Followed, LinearCar, Signals
 
 STATES = 10
-"""v_y (m/s), yaw rate (rad/s), ln of both stiffnesses over the file's, offsets of steer (rad), a_y (m/s^2) and yaw rate (rad/s), and
+"""v_y (m/s), yaw rate (rad/s), ln of both stiffnesses over the file's, offsets of steer (rad), a_y (m/s^2) and yaw rate
+(rad/s), and
 by which share of itself a_y shows more because the body leans, the yaw (rad), and how much
 later than `late` inertial sensors are than the steer (s)."""
 
@@ -34,14 +35,19 @@ class WalkingStiffness(AbstractMethod):
     """An extended Kalman filter of [v_y, yaw rate, ln C_f, ln C_r, offsets of steer, a_y and yaw rate, lean, yaw, lateness].
 
     The linear single track of the file's mass, inertia and lengths; measured are yaw rate and lateral acceleration and, where the
-    log has it, the satellite's `course = yaw + v_y / v` (references [46, 47]), which alone sees the sideslip. It comes `course_delay`
-    (s) later than the inertial sensors; what it has turned since is the integral of a_y / v. What would be taken for stiffness is a state of its own: offsets,
-    and the lean of the body, by which an accelerometer shows more. Where tyres leave their linear range (`linear` m/s^2 of lateral
-    acceleration), measurements count less and less. On a slippery road it is the slope at zero slip still that is told, as long as
+    log has it, the satellite's `course = yaw + v_y / v` (references [46, 47]), which alone sees the sideslip. It comes
+    `course_delay`
+    (s) later than the inertial sensors; what it has turned since is the integral of a_y / v. What would be taken for stiffness
+    is a state of its own: offsets,
+    and the lean of the body, by which an accelerometer shows more. Where tyres leave their linear range (`linear` m/s^2 of
+    lateral
+    acceleration), measurements count less and less. On a slippery road it is the slope at zero slip still that is told, as
+    long as
     there is little lateral acceleration.
 
     `spread` (-) of ln C before the drive, `walk` (1/sqrt(s)); `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5); `a_y_noise`
-    (m/s^2), `yaw_rate_noise` (rad/s), `course_noise` (m/s across); `steer_noise` (rad/sqrt(s)): how the steer's offset walks, play
+    (m/s^2), `yaw_rate_noise` (rad/s), `course_noise` (m/s across); `steer_noise` (rad/sqrt(s)): how the steer's offset walks,
+    play
     included; `known_spread` (-).
     """
 
@@ -129,7 +135,9 @@ class WalkingStiffness(AbstractMethod):
             self.v_y_noise, self.yaw_noise, self.walk, self.walk, self.steer_noise, 0.002 + slow, 1e-5 + slow, 1e-4 + slow,
             2e-3 + slow, 1e-5 + slow,
         ])  # fmt: skip
-        return x.at[:2].add(dt * (inverse @ rate)).at[8].add(dt * x[1]), step @ P @ step.T + jnp.diag(jnp.square(walks) * dt)
+        return x.at[:2].add(dt * (inverse @ rate)).at[8].add(dt * x[1]), step @ P @ step.T + jnp.diag(
+            jnp.square(walks) * dt
+        )
 
     def _answer(self, memory: WalkMemory):
         now, x, P, _ = memory
