@@ -1,6 +1,6 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
-from jaxveh.estimators import kit, learned, mass_and_grade, sideslip, speed
+from jaxveh.estimators import friction, kit, learned, mass_and_grade, sideslip, speed, stiffness
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.comparison import Compared, MethodScore, compare, score_answers
@@ -31,6 +31,7 @@ __all__ = [
     "Span",
     "clean",
     "compare",
+    "friction",
     "held_rows",
     "kit",
     "learned",
@@ -45,5 +46,6 @@ __all__ = [
     "sideslip",
     "speed",
     "state_space",
+    "stiffness",
     "write_calibration",
 ]

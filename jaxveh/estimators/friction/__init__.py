@@ -1,0 +1,146 @@
+"""The road's friction from what it does to the tyres: section 3 of the review (Chen, Gao, Xu 2013).
+
+It is the friction over that on which the numbers of the car's tyres hold; for a file without tyre curves the peak force over the
+load. **Where tyres work in their linear range, nothing tells it**: force grows with ln mu by `F - s dF/ds` alone
+(`laws.SimilarCurve.told`), so every method says by `known` whether the drive excites it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from jaxveh._core.errors import InputError
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
+from jaxveh.estimators.friction.augmented import augmented
+from jaxveh.estimators.friction.axles import AligningTorque, Axles, HybridObserver, LateralCurve
+from jaxveh.estimators.friction.bank import FrictionBank
+from jaxveh.estimators.friction.laws import planar_car
+from jaxveh.estimators.friction.scalar import Follower
+from jaxveh.estimators.friction.wheels import Reconstruction, SidesApart, SlipSlope, WheelObserver, WheelSlips
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.io import CarSpecification
+from jaxveh.tyres import LuGre
+
+NAME = "friction"
+
+SHOWN = {"friction": "-"}
+
+COUNT, LEAST, MOST = 28, 0.1, 1.25
+"""Filters of the recommended method, evenly from the least to the largest friction on a logarithmic scale."""
+
+
+def _wheels(car: CarSpecification, who: str) -> WheelForces:
+    for key, unit in (("wheel_radius", "m"), ("wheel_inertia", "kg m^2")):
+        if getattr(car, key) is None:
+            raise InputError(
+                f"friction: {who}: the car's file has no {key} ({unit}), by which a torque becomes a force."
+            )
+    rolling = 0.01 if car.rolling_resistance is None else car.rolling_resistance
+    return WheelForces(car.wheel_radius, car.wheel_inertia, rolling)
+
+
+def _slips(car: CarSpecification, who: str) -> WheelSlips:
+    return WheelSlips(planar_car(car), _wheels(car, who))
+
+
+def _bank(car: CarSpecification) -> FrictionBank:
+    planar = planar_car(car)
+    frictions = jnp.exp(jnp.linspace(jnp.log(LEAST), jnp.log(MOST), COUNT))
+    wheels = None if car.wheel_radius is None or car.wheel_inertia is None else _wheels(car, "bank")
+    along = None if wheels is None else AlongEvidence(planar, wheels)
+    return FrictionBank(planar, frictions, frictions, along=along)
+
+
+def _lateral(car: CarSpecification) -> LateralCurve:
+    return LateralCurve(Axles(planar_car(car)), Follower())
+
+
+def _aligning(car: CarSpecification) -> AligningTorque:
+    if car.steering_ratio is None:
+        raise InputError("friction: aligning_torque: the car's file has no steering_ratio (-); give it.")
+    return AligningTorque(Axles(planar_car(car)), Follower(), car.steering_ratio)
+
+
+def _lugre(car: CarSpecification) -> WheelObserver:
+    slips = _slips(car, "lugre")
+    front = slips.car.front
+    # The bristles' slip stiffness over load is sigma_0 L / 2.
+    per_load = float(front.stiffness / slips.car.static_loads()[0])
+    friction = float(front.peak / slips.car.static_loads()[0])
+    law = LuGre(
+        stiffness_x=2.0 * per_load / 0.2, stiffness_y=2.0 * per_load / 0.2, static_friction=1.05 * friction,
+        kinetic_friction=0.8 * friction, stribeck_speed=6.0,
+    )  # fmt: skip
+    return WheelObserver(slips, law)
+
+
+METHODS = {
+    "bank": MethodOfCar(
+        _bank,
+        "a filter of the lateral motion for each of many frictions, with wheel slips where the log has them; known only near the "
+        "limit",
+        "section 3.1.2.1, joint with reference [99]; interacting multiple models (Blom & Bar-Shalom 1988)",
+    ),
+    "lateral_curve": MethodOfCar(
+        _lateral,
+        "the front axle's force beside its slip angle on a brush curve; known only near the limit",
+        "section 3.1.2.1, by tyre response",
+    ),
+    "aligning_torque": MethodOfCar(
+        _aligning,
+        "the steering torque's trail, which shrinks before the force saturates; trails are a guess",
+        "section 3.1.2.1, lateral and self-aligning",
+    ),
+    "hybrid": MethodOfCar(
+        lambda car: HybridObserver(_lateral(car)),
+        "the observer of lateral_curve, and nonlinear least squares over two seconds where they can tell; known only near the "
+        "limit",
+        "section 3.1.1.1, figure 3, reference [101]",
+    ),
+    "augmented": MethodOfCar(
+        lambda car: augmented(planar_car(car)),
+        "friction as a slow state of a nonlinear single track; known only near the limit",
+        "section 3.1.2.1.4, mu-dot = 0",
+    ),
+    "slip_slope": MethodOfCar(
+        lambda car: SlipSlope(_slips(car, "slip_slope")),
+        "the slope of force over slip at small slip, known only where torques vary; no friction without a calibration of the "
+        "tyre",
+        "section 3.1.2.1, references [112-116]",
+    ),
+    "reconstruction": MethodOfCar(
+        lambda car: Reconstruction(_slips(car, "reconstruction")),
+        "used friction over slip and its slope, to the peak; known only where the slope falls",
+        "section 3.2, equations 18 and 19, figure 6 (d lambda / dt guarded near 0)",
+    ),
+    "wheel_observer": MethodOfCar(
+        lambda car: WheelObserver(_slips(car, "wheel_observer")),
+        "an adaptive observer of the wheels, linear in friction; known only while wheels slip",
+        "section 3.1.2.1.3, equation 14, reference [118]",
+    ),
+    "lugre": MethodOfCar(
+        _lugre,
+        "an adaptive observer of the wheels on LuGre's bristles; known only while wheels slip",
+        "section 3.1.2.1.3, reference [119]",
+    ),
+    "sides_apart": MethodOfCar(
+        lambda car: SidesApart(_slips(car, "sides_apart"), Follower()),
+        "left and right wheels each for themselves; known only while wheels slip",
+        "section 3.2, equation 18 by wheel",
+    ),
+}
+
+RECOMMENDED = "bank"
+
+
+def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
+    """Friction along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as `follow`."""
+    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
+
+
+def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
+    """The same a row at a time."""
+    return LiveMethod(method_of(NAME, METHODS, source, method))

@@ -1,0 +1,230 @@
+"""Friction from the axles' lateral forces, which inertial sensors tell: by the tyre curve, by the steering torque, over a
+window."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.friction import brush_curve
+from jaxveh.estimators.friction.laws import PlanarCar
+from jaxveh.estimators.friction.motion import LATERAL, Told, first_told, next_told
+from jaxveh.estimators.friction.scalar import Follower, LogFriction
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.vehicles import GRAVITY
+
+
+class AxlesTold(NamedTuple):
+    """The motion and, low-pass filtered alike: steer (rad), yaw rate (rad/s), a_y (m/s^2); and what was measured last of yaw
+    rate and a_y."""
+
+    told: Told
+    steer: Any
+    yaw_rate: Any
+    a_y: Any
+    last_yaw_rate: Any
+    last_a_y: Any
+
+
+class Axles(eqx.Module):
+    """Lateral forces of both axles by equation 15, and the difference of their slip angles, which needs no lateral speed:
+    `alpha_f - alpha_r = delta - l r / v`. All is low-pass filtered by `lag` (s), whose derivative is the yaw acceleration's.
+    """
+
+    car: PlanarCar
+    lag: jax.Array = positive("s", default=0.06)
+
+    def start(self, t, values) -> AxlesTold:
+        """After the first row."""
+        told, zero = first_told(t, values), jnp.zeros_like(t)
+        known = lambda name: jnp.where(jnp.isnan(values[name]), zero, values[name])
+        return AxlesTold(told, told.steer, known("yaw_rate"), known("a_y"), known("yaw_rate"), known("a_y"))
+
+    def next(self, last: AxlesTold, t, values) -> AxlesTold:
+        """After the next row."""
+        dt = jnp.clip(t - last.told.t, 0.0, 1.0)
+        told = next_told(last.told, t, values)
+        # The bilinear low-pass, of which `(x - slow) / lag` is the derivative exactly.
+        share = dt / (2.0 * self.lag + dt)
+        held = lambda name, old: jnp.where(jnp.isnan(values[name]), old, values[name])
+        yaw_rate, a_y = held("yaw_rate", last.last_yaw_rate), held("a_y", last.last_a_y)
+        follow = lambda slow, old, new: slow + share * (new + old - 2.0 * slow)
+        return AxlesTold(
+            told, follow(last.steer, last.told.steer, told.steer), follow(last.yaw_rate, last.last_yaw_rate, yaw_rate),
+            follow(last.a_y, last.last_a_y, a_y), yaw_rate, a_y,
+        )  # fmt: skip
+
+    def forces(self, now: AxlesTold):
+        """Of front and rear, N."""
+        turn = (now.last_yaw_rate - now.yaw_rate) / self.lag
+        return self.car.axle_forces(now.a_y / (1.0 + GRAVITY * self.car.roll_gradient), turn)
+
+    def slip_difference(self, now: AxlesTold):
+        """That of front and rear slip angle, rad."""
+        return now.steer - self.car.wheelbase * now.yaw_rate / now.told.v_x
+
+    def residual(self, forces, difference, log_friction):
+        """Front force (N) that is measured less the one that the brush makes of the front slip, the rear's being told by its
+        force."""
+        mu, car = jnp.exp(log_friction), self.car
+        rear = brush_curve.slip_of(forces[1], car.rear.stiffness, mu * car.rear.peak)
+        return forces[0] - brush_curve.force(difference + rear, car.front.stiffness, mu * car.front.peak)
+
+
+class LateralCurve(AbstractMethod):
+    """Friction by an axle's brush curve: the front force beside the front slip angle.
+
+    The rear force tells its slip angle (the brush's inverse), steer and yaw rate the front's from it, and the front force what
+    friction there is. In the linear range nothing is told: the force grows by `F - alpha dF/dalpha` with ln mu.
+
+    `force_noise` (-): error of the front force as a share of its stiffness's part, `noise` as a share of the static load.
+    """
+
+    axles: Axles
+    follower: Follower
+    force_noise: jax.Array = positive("-", default=0.07)
+    noise: jax.Array = positive("-", default=0.02)
+
+    @property
+    def needs(self):
+        return LATERAL
+
+    def first(self, t, values):
+        now, state = self.axles.start(t, values), self.follower.start()
+        return (now, state), self._answer(now, state)
+
+    def next(self, memory, t, values):
+        last, state = memory
+        now = self.axles.next(last, t, values)
+        dt = jnp.clip(t - last.told.t, 0.0, 1.0)
+        forces, difference = self.axles.forces(now), self.axles.slip_difference(now)
+        noise = self.noise * self.axles.car.static_loads()[0] + self.force_noise * jnp.abs(forces[0])
+        residual = lambda x: self.axles.residual(forces, difference, x)
+        here = now.told.moves & ~jnp.isnan(values["a_y"])
+        state = self.follower.next(state, dt, residual, noise, here)
+        return (now, state), self._answer(now, state)
+
+    def _answer(self, now: AxlesTold, state: LogFriction):
+        mean, std, known = self.follower.says(state, now.told.moves)
+        return answer({"friction": mean}, {"friction": std}, known)
+
+
+class AligningTorque(AbstractMethod):
+    """Friction by the steering torque: the pneumatic trail shrinks from the smallest slip on, so that it knows sooner than the
+    force (reference [30]'s chain; the brush's trail `t_0 (1 - g)^3 / (1 - g + g^2 / 3)`).
+
+    The torque of the road on both front wheels is the steering wheel's times `steering_ratio` (friction and assistance of the
+    steering are not in it): `M = F_yf (caster_trail + t)`. `caster_trail`, `pneumatic_trail` t_0 (m): no file has them, the
+    defaults are a guess and the answer is as good as they are. `torque_noise` (N m at the steering wheel), `trail_noise` (m).
+    """
+
+    axles: Axles
+    follower: Follower
+    steering_ratio: jax.Array = positive("-")
+    caster_trail: jax.Array = positive("m", default=0.015)
+    pneumatic_trail: jax.Array = positive("m", default=0.02)
+    torque_noise: jax.Array = positive("N m", default=0.1)
+    trail_noise: jax.Array = positive("m", default=0.001)
+
+    @property
+    def needs(self):
+        return (*LATERAL, Need("steering_torque", "N m"))
+
+    def first(self, t, values):
+        now, state = self.axles.start(t, values), self.follower.start()
+        torque = jnp.where(jnp.isnan(values["steering_torque"]), 0.0, values["steering_torque"])
+        return (now, torque, state), self._answer(now, state)
+
+    def next(self, memory, t, values):
+        last, torque, state = memory
+        now = self.axles.next(last, t, values)
+        dt = jnp.clip(t - last.told.t, 0.0, 1.0)
+        measured = values["steering_torque"]
+        here = now.told.moves & ~jnp.isnan(measured) & ~jnp.isnan(values["a_y"])
+        share = 1.0 - jnp.exp(-dt / self.axles.lag)
+        torque = torque + jnp.where(jnp.isnan(measured), 0.0, share * (jnp.where(here, measured, torque) - torque))
+        force = self.axles.forces(now)[0]
+        limit = self.axles.car.front.peak
+
+        def residual(x):
+            trail = self.pneumatic_trail * brush_curve.trail_share(force, jnp.exp(x) * limit)
+            return self.steering_ratio * torque - force * (self.caster_trail + trail)
+
+        noise = self.steering_ratio * self.torque_noise + self.trail_noise * jnp.abs(force)
+        state = self.follower.next(state, dt, residual, noise, here)
+        return (now, torque, state), self._answer(now, state)
+
+    _answer = LateralCurve._answer
+
+
+class Window(NamedTuple):
+    """The last samples, (N,) each: both forces (N), slip differences (rad), their weights; the time of the newest (s)."""
+
+    front: Any
+    rear: Any
+    difference: Any
+    weight: Any
+    time: Any
+
+
+class HybridObserver(AbstractMethod):
+    """An observer and nonlinear least squares over a window, the one that can tell (figure 3 of the review; reference [101]).
+
+    The observer (`lateral`) follows row by row. Its gain fails at large front and small rear slip angles and where nothing is
+    excited; over a window of samples `every` (s) a few Gauss-Newton steps on the same residuals find ln mu at once. Where the
+    window's information, `sum (dF / d ln mu)^2 / noise^2`, is above `enough`, the answer is the least squares', and the observer
+    goes on from it.
+    """
+
+    lateral: LateralCurve
+    every: jax.Array = positive("s", default=0.1)
+    enough: jax.Array = positive("-", default=100.0)
+    samples: int = eqx.field(static=True, default=20)
+
+    @property
+    def needs(self):
+        return LATERAL
+
+    def first(self, t, values):
+        memory, said = self.lateral.first(t, values)
+        none = jnp.zeros((self.samples,), t.dtype)
+        return (memory, Window(none, none, none, none, t)), said
+
+    def next(self, memory, t, values):
+        inner, window = memory
+        (now, state), _ = self.lateral.next(inner, t, values)
+        axles = self.lateral.axles
+        front, rear = axles.forces(now)
+        sample = (front, rear, axles.slip_difference(now), jnp.where(now.told.moves, 1.0, 0.0))
+        due = t - window.time >= self.every
+        push = lambda old, new: jnp.where(due, jnp.concatenate([old[1:], new[None]]), old)
+        front, rear, difference, weight = map(push, window[:4], sample)
+        window = Window(front, rear, difference, weight, jnp.where(due, t, window.time))
+        mean, information = self._least_squares(window, state.mean)
+        better = due & now.told.moves & (information > self.enough)
+        variance = jnp.where(better, 1.0 / jnp.maximum(information, 1.0), state.variance)
+        state = state._replace(mean=jnp.where(better, mean, state.mean), variance=variance)
+        return ((now, state), window), self.lateral._answer(now, state)
+
+    def _least_squares(self, window: Window, start):
+        """ln mu and its information: three steps of Gauss and Newton, damped."""
+        axles, lateral = self.lateral.axles, self.lateral
+        noise = lateral.noise * axles.car.static_loads()[0] + lateral.force_noise * jnp.abs(window.front)
+
+        def weighed(x):
+            return window.weight * axles.residual((window.front, window.rear), window.difference, x) / noise
+
+        # Ten samples of a window are about one independent one a `correlation`.
+        share = jnp.minimum(self.every / self.lateral.follower.correlation, 1.0)
+        information, x = jnp.zeros_like(start), start
+        for _ in range(3):
+            errors, slopes = jax.jvp(weighed, (x,), (jnp.ones_like(x),))
+            information = share * jnp.sum(slopes**2)
+            x = x - jnp.clip(jnp.sum(slopes * errors) / (jnp.sum(slopes**2) + 1.0), -0.3, 0.3)
+            x = jnp.clip(x, jnp.log(0.05), jnp.log(1.5))
+        return x, information

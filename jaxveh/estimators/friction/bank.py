@@ -1,0 +1,255 @@
+"""The recommended method: a filter of the lateral motion for each of many frictions, weighed by what they foretold."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.friction.along import AlongEvidence
+from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar
+from jaxveh.estimators.friction.motion import LATERAL, Told, first_told, next_told
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.vehicles import GRAVITY
+
+STATES = 7
+"""v_y (m/s), yaw rate (rad/s), relative stiffness errors in front and at the rear, offsets of a_y (m/s^2) and steer (rad), and by
+which share of itself a_y shows more because the body leans."""
+
+
+STEER_TIME = 3.0
+"""s: how long an error of the measured steer lasts, most of it the play of the steering."""
+
+
+NEAR = 0.18232
+"""ln 1.2: a friction is known where it is within this of the truth."""
+
+
+class Bank(NamedTuple):
+    """Logarithms of the weights (K,), each filter's mean (K, 6) and covariance (K, 6, 6)."""
+
+    weights: Any
+    means: Any
+    covariances: Any
+
+
+class BankMemory(NamedTuple):
+    told: Told
+    bank: Bank
+    along: Any
+
+
+class FrictionBank(AbstractMethod):
+    """Friction by many filters, one a friction, whose weights are the probabilities of the frictions.
+
+    Each filter is an extended Kalman filter of a single track whose axle curves friction stretches (`SimilarCurve`), with what
+    would be taken for friction as states of its own: the axles' stiffness errors, the offsets of accelerometer and steer. In a
+    row they are mixed (interacting multiple models, Blom & Bar-Shalom 1988): friction walks slowly, and jumps now and then to
+    anything. So weights forget, a jump is followed as fast as the forces can tell it, and a spread says what is not known:
+    forces in the linear range say only that there is more friction than they use. Torques and wheel speeds, where the log has
+    them and the car's file a wheel, weigh the frictions by the longitudinal slips (`AlongEvidence`).
+
+    It says the median and the standard deviation about it. `known`: with `certainty` at least the friction is within 20 % of
+    the median. It answers of the road's friction over that on which the car's tyre numbers hold, one for all wheels.
+
+    `frictions` (K,) of the filters and `prior` (K,), their probabilities where nothing is told; `jumps` (1/s): how often it
+    changes to anything; `walk` (1/sqrt(s)): how fast ln mu wanders; `correlation` (s): rows closer than this say the same, their
+    likelihoods count less; `stiffness_spread` (-); `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5): what the model leaves out;
+    `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y; `yaw_rate_noise` (rad/s).
+    """
+
+    car: PlanarCar
+    frictions: jax.Array
+    prior: jax.Array
+    jumps: jax.Array = positive("1/s", default=0.025)
+    walk: jax.Array = positive("1/sqrt(s)", default=0.03)
+    turn_time: jax.Array = positive("s", default=0.011)
+    force_time: jax.Array = positive("s", default=0.03)
+    certainty: jax.Array = parameter("-", scale=0.1, default=0.85)
+    stiffness_spread: jax.Array = positive("-", default=0.15)
+    stiffness_time: jax.Array = positive("s", default=3.0)
+    steer_noise: jax.Array = positive("rad", default=0.0007)
+    v_y_noise: jax.Array = positive("m/s^1.5", default=0.15)
+    yaw_noise: jax.Array = positive("rad/s^1.5", default=0.03)
+    a_y_noise: jax.Array = positive("m/s^2", default=0.1)
+    force_noise: jax.Array = positive("-", default=0.03)
+    yaw_rate_noise: jax.Array = positive("rad/s", default=0.004)
+    along: AlongEvidence | None = None
+
+    @property
+    def needs(self):
+        return LATERAL + (() if self.along is None else self.along.needs) + (Need("a_x", "m/s^2", optional=True),)
+
+    def first(self, t, values):
+        bank = Bank(jnp.log(self._prior()), *self._start())
+        memory = BankMemory(first_told(t, values), bank, None if self.along is None else self.along.start(t))
+        return memory, self._answer(bank, memory.told)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.told.t, 0.0, 1.0)
+        told = next_told(memory.told, t, values)
+        bank = self._mix(memory.bank, dt)
+        moved = self._move(bank, told, dt)
+        moved, likelihoods = self._correct(moved, told, values, dt)
+        weights = bank.weights + likelihoods
+        along = None
+        if self.along is not None:
+            along, more = self.along.next(memory.along, t, values, told, self.frictions, jnp.exp(bank.weights))
+            weights = weights + more
+        means, covariances = self._start()
+        keep = lambda new, old: jnp.where(told.moves, new, old)
+        bank = Bank(
+            keep(weights - jax.nn.logsumexp(weights), bank.weights),
+            keep(moved.means, means),
+            keep(moved.covariances, covariances),
+        )
+        return BankMemory(told, bank, along), self._answer(bank, told)
+
+    def _prior(self):
+        return self.prior / jnp.sum(self.prior)
+
+    def _start(self):
+        zero = jnp.zeros_like(self.frictions)
+        spread = jnp.stack([
+            0.5 + 0.0 * self.stiffness_spread, 0.1 + 0.0 * self.stiffness_spread, self.stiffness_spread,
+            self.stiffness_spread, 0.15 + 0.0 * self.stiffness_spread, self.steer_noise, GRAVITY * self.car.roll_gradient,
+        ])  # fmt: skip
+        lean = GRAVITY * self.car.roll_gradient + zero
+        return jnp.zeros((len(zero), STATES), zero.dtype).at[:, 6].set(lean), jnp.repeat(
+            jnp.diag(spread**2)[None], len(zero), axis=0
+        )
+
+    def _mix(self, bank: Bank, dt) -> Bank:
+        """Friction walks and jumps: every filter takes over from those whose friction may have become its own."""
+        count = len(self.frictions)
+        spacing = jnp.log(self.frictions[1:] / self.frictions[:-1])
+        there = jnp.minimum(0.5 * jnp.square(self.walk / spacing) * dt, 0.3)
+        eye = jnp.eye(count, dtype=self.frictions.dtype)
+        up, down = jnp.diag(there, 1), jnp.diag(there, -1)
+        walks = eye + up + down - jnp.diag(jnp.sum(up + down, axis=1))
+        gone = 1.0 - jnp.exp(-self.jumps * dt)
+        moves = (1.0 - gone) * walks + gone * self._prior()[None, :]
+        joint = moves * jnp.exp(bank.weights)[:, None]
+        after = jnp.sum(joint, axis=0)
+        share = joint / after[None, :]
+        middle = jnp.sum(jnp.exp(bank.weights)[:, None] * bank.means, axis=0)
+        off = bank.means - middle
+        means = share.T @ off
+        squares = bank.covariances + off[:, :, None] * off[:, None, :]
+        mixed = jnp.einsum("ij,iab->jab", share, squares) - means[:, :, None] * means[:, None, :]
+        return Bank(jnp.log(after), means + middle, mixed)
+
+    def _forces(self, x, friction, told: Told):
+        """Lateral forces of both axles (N) in the body's axes, the longitudinal ones taken out of the friction."""
+        v_y, yaw_rate, soft_front, soft_rear, _, offset, _ = x
+        car = self.car
+        slips = car.slip_angles(told.steer - offset, told.v_x, v_y, yaw_rate)
+        loads = car.load_ratios(told.a_x)
+        share = jnp.where(told.a_x < 0.0, car.front_brake, car.front_drive)
+        forces = []
+        for curve, slip, load, soft, part in zip(
+            (car.front, car.rear), slips, loads, (soft_front, soft_rear), (share, 1.0 - share), strict=True
+        ):
+            limit = jnp.maximum(friction, LEAST_FRICTION) * curve.peak * load
+            left = numerics.sqrt(jnp.maximum(1.0 - jnp.square(car.mass * told.a_x * part / limit), 0.04))
+            forces.append(curve.force(slip, friction * left, load, 1.0 + soft))
+        return forces
+
+    def _rates(self, x, friction, told: Told):
+        front, rear = self._forces(x, friction, told)
+        car = self.car
+        v_y = (front + rear) / car.mass - told.v_x * x[1]
+        turn = (car.front_axle_to_cg * front - car.rear_axle_to_cg * rear) / car.yaw_inertia
+        return jnp.stack([v_y, turn])
+
+    def _felt(self, x, friction, told: Told):
+        """The lateral acceleration as the leaning accelerometer shows it."""
+        front, rear = self._forces(x, friction, told)
+        return (front + rear) / self.car.mass * (1.0 + x[6]) + x[4]
+
+    def _move(self, bank: Bank, told: Told, dt) -> Bank:
+        """A linearly implicit trapezoidal step: stable at any speed."""
+        soft = self.stiffness_spread * jnp.sqrt(2.0 / self.stiffness_time)
+        walks = jnp.stack([
+            self.v_y_noise, self.yaw_noise, soft, soft, 0.005 + 0.0 * dt,
+            self.steer_noise * jnp.sqrt(2.0 / STEER_TIME), 0.001 + 0.0 * dt,
+        ])  # fmt: skip
+        noise = jnp.diag(jnp.square(walks) * dt)
+        same = jnp.ones_like(dt)
+        dies = jnp.exp(-dt / self.stiffness_time)
+        fades = jnp.stack([same, same, dies, dies, same, jnp.exp(-dt / STEER_TIME), same])
+
+        def one(x, P, friction):
+            rates = lambda x: self._rates(x, friction, told)
+            rate, slope = rates(x), jax.jacfwd(rates)(x)
+            left = jnp.eye(2, dtype=x.dtype) - 0.5 * dt * slope[:, :2]
+            determinant = left[0, 0] * left[1, 1] - left[0, 1] * left[1, 0]
+            inverse = jnp.stack([
+                jnp.stack([left[1, 1], -left[0, 1]]), jnp.stack([-left[1, 0], left[0, 0]])
+            ]) / determinant  # fmt: skip
+            step = jnp.diag(fades).at[:2].add(dt * (inverse @ slope))
+            x = (fades * x).at[:2].add(dt * (inverse @ rate))
+            return x, step @ P @ step.T + noise
+
+        means, covariances = jax.vmap(one)(bank.means, bank.covariances, self.frictions)
+        return Bank(bank.weights, means, covariances)
+
+    def _correct(self, bank: Bank, told: Told, values, dt):
+        a_y = values["a_y"]
+        rough = jnp.square(self.a_y_noise) + jnp.square(self.force_noise * jnp.where(jnp.isnan(a_y), 0.0, a_y))
+        measured = (values["yaw_rate"], a_y)
+        noises = (jnp.square(self.yaw_rate_noise), rough)
+
+        def one(x, P, friction):
+            said = []
+            for value, noise, seen in zip(
+                measured, noises, (lambda x: x[1], lambda x: self._felt(x, friction, told)), strict=True
+            ):
+                x, P, error, variance = scalar_update(x, P, value, seen, noise)
+                said.append((error, variance))
+            return x, P, said
+
+        means, covariances, said = jax.vmap(one)(bank.means, bank.covariances, self.frictions)
+        likelihoods = jnp.zeros_like(self.frictions)
+        for (error, variance), time in zip(said, (self.turn_time, self.force_time), strict=True):
+            # One variance for all: what is foretold less sharply is no less likely where noises are a guess.
+            common = jnp.sum(jnp.exp(bank.weights) * variance)
+            likelihoods = likelihoods - 0.5 * (1.0 - jnp.exp(-dt / time)) * jnp.square(error) / common
+        return Bank(bank.weights, means, covariances), likelihoods
+
+    def _answer(self, bank: Bank, told: Told):
+        weights = jnp.exp(bank.weights)
+        logs = jnp.log(self.frictions)
+        median = jnp.exp(_quantile(logs, weights, 0.5))
+        spacing = (logs[-1] - logs[0]) / (len(logs) - 1)
+        within = jnp.square(spacing * self.frictions) / 12.0
+        std = numerics.sqrt(jnp.sum(weights * (jnp.square(self.frictions - median) + within)))
+        near = jnp.sum(jnp.where(jnp.abs(logs - jnp.log(median)) < NEAR, weights, 0.0))
+        known = told.moves & (near >= self.certainty)
+        return answer({"friction": median}, {"friction": std}, known)
+
+
+def scalar_update(x, P, measured, observation, variance):
+    """Kalman's update by one number, NaN where it is missing; and its innovation (0 there) with its variance."""
+    here = ~jnp.isnan(measured)
+    expected, slope = observation(x), jax.grad(observation)(x)
+    error = jnp.where(here, measured, expected) - expected
+    across = P @ slope
+    total = slope @ across + variance
+    gain = jnp.where(here, across / total, 0.0)
+    P = P - jnp.outer(gain, across)
+    return x + gain * error, 0.5 * (P + P.T), error, total
+
+
+def _quantile(places, weights, share: float):
+    """Where the weights, each spread evenly between the middles to its neighbours, reach a share."""
+    middles = 0.5 * (places[1:] + places[:-1])
+    edges = jnp.concatenate([2.0 * places[:1] - middles[:1], middles, 2.0 * places[-1:] - middles[-1:]])
+    sums = jnp.concatenate([jnp.zeros_like(weights[:1]), jnp.cumsum(weights)])
+    k = jnp.clip(jnp.sum(sums < share) - 1, 0, len(places) - 1)
+    part = (share - sums[k]) / jnp.maximum(weights[k], 1e-6)
+    return edges[k] + jnp.clip(part, 0.0, 1.0) * (edges[k + 1] - edges[k])

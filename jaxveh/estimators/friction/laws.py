@@ -1,0 +1,130 @@
+"""What a car's file says of its axles' forces on a road of any friction, and what a force can tell of that friction."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.io import CarSpecification
+from jaxveh.tyres import kit as tyres
+from jaxveh.vehicles import GRAVITY
+
+LEAST_FRICTION = 0.02
+"""The least friction by which a slip is divided."""
+
+ROLL_GRADIENT = 0.006
+"""rad s^2/m: how far an ordinary body leans for a lateral acceleration. A file does not say it."""
+
+
+class SimilarCurve(eqx.Module):
+    """An axle's force over its slip, stretched by friction as the similarity method has it (Pacejka, 3rd ed., sec. 4.2):
+
+        F = mu f D sin(C atan(x - E (x - atan x))),    x = k K s / (C D mu)
+
+    `stiffness` K (N/rad, or N along) at the static load, which friction leaves as it is; `peak` D (N) at the static load on the
+    road on which the file's numbers hold; `shape` C, `bend` E (-). f is load over static load, k a factor on the stiffness.
+    """
+
+    stiffness: jax.Array = positive("N/rad")
+    peak: jax.Array = positive("N")
+    shape: jax.Array = positive("-")
+    bend: jax.Array = parameter("-", scale=2.0)
+
+    def force(self, slip, friction, load=1.0, factor=1.0):
+        """Force (N) of the axle at a slip (rad, or -), `load` over the static one, `factor` on the stiffness."""
+        friction = jnp.maximum(friction, LEAST_FRICTION)
+        x = self.stiffness * factor / (self.shape * self.peak) * slip / friction
+        bent = x - self.bend * (x - numerics.arctan(x))
+        return friction * load * self.peak * numerics.sin(self.shape * numerics.arctan(bent))
+
+    def with_slope(self, slip, friction, load=1.0, factor=1.0):
+        """The force (N) and its slope over the slip (N/rad)."""
+        slip = jnp.asarray(slip)
+        return jax.jvp(lambda s: self.force(s, friction, load, factor), (slip,), (jnp.ones_like(slip),))
+
+    def told(self, slip, friction, load=1.0, factor=1.0):
+        """By how much the force (N) grows with the friction's logarithm: `dF / d ln mu = F - s dF/ds` of every law that friction
+        stretches alike. The linear part of a force says nothing; this is what is left.
+
+        The bound: a force known to `std` newton cannot tell ln mu better than `std / |told|`.
+        """
+        force, slope = self.with_slope(slip, friction, load, factor)
+        return force - slip * slope
+
+
+class PlanarCar(eqx.Module):
+    """What the methods want of a car, each number a leaf; see `planar_car` for those that a file need not have."""
+
+    front: SimilarCurve
+    rear: SimilarCurve
+    mass: jax.Array = positive("kg")
+    yaw_inertia: jax.Array = positive("kg m^2")
+    front_axle_to_cg: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    cg_height: jax.Array = parameter("m", scale=0.5)
+    half_track: jax.Array = positive("m")
+    front_drive: jax.Array = parameter("-", scale=0.5)
+    front_brake: jax.Array = parameter("-", scale=0.5)
+    roll_gradient: jax.Array = parameter("rad s^2/m", scale=0.005)
+
+    @property
+    def wheelbase(self):
+        """m."""
+        return self.front_axle_to_cg + self.rear_axle_to_cg
+
+    def static_loads(self):
+        """Loads of both axles, N."""
+        weight = self.mass * GRAVITY / self.wheelbase
+        return weight * self.rear_axle_to_cg, weight * self.front_axle_to_cg
+
+    def load_ratios(self, a_x):
+        """Loads of both axles over the static ones under a longitudinal acceleration (m/s^2)."""
+        moved = a_x * self.cg_height / GRAVITY
+        least = lambda ratio: jnp.maximum(ratio, 0.1)
+        return least(1.0 - moved / self.rear_axle_to_cg), least(1.0 + moved / self.front_axle_to_cg)
+
+    def axle_forces(self, a_y, yaw_acceleration):
+        """Lateral forces of both axles (N) by equation 15 of the review, small steer: what the inertial sensors say of them."""
+        turn = self.yaw_inertia * yaw_acceleration
+        lateral = self.mass * a_y
+        front = (turn + self.rear_axle_to_cg * lateral) / self.wheelbase
+        return front, (self.front_axle_to_cg * lateral - turn) / self.wheelbase
+
+    def slip_angles(self, steer, v_x, v_y, yaw_rate):
+        """Slip angles of both axles, rad; `v_x` (m/s) well above zero."""
+        front = steer - numerics.arctan((v_y + self.front_axle_to_cg * yaw_rate) / v_x)
+        return front, -numerics.arctan((v_y - self.rear_axle_to_cg * yaw_rate) / v_x)
+
+
+def planar_car(car: CarSpecification) -> PlanarCar:
+    """The car of a file. What the file leaves out is ordinary: a centre of gravity 0.55 m high, a track of 1.5 m, half of the
+    drive and 0.65 of the brakes in front; a tyre without a curve has the shape and the friction of `tyres.kit.GENERIC_TYRE`."""
+    told = lambda value, otherwise: otherwise if value is None else value
+    tracks = [track for track in (car.track_front, car.track_rear) if track is not None] or [1.5]
+    weight = car.mass * GRAVITY / car.wheelbase
+    curves = [
+        _curve(getattr(car, axle), getattr(car, f"{axle}_cornering_stiffness"), load)
+        for axle, load in (("front", weight * car.rear_axle_to_cg), ("rear", weight * car.front_axle_to_cg))
+    ]
+    return PlanarCar(
+        mass=car.mass, yaw_inertia=car.yaw_inertia, front_axle_to_cg=car.front_axle_to_cg,
+        rear_axle_to_cg=car.rear_axle_to_cg, cg_height=told(car.cg_height, 0.55), half_track=0.5 * sum(tracks) / len(tracks),
+        front=curves[0], rear=curves[1], front_drive=told(car.front_drive, 0.5), front_brake=told(car.front_brake, 0.65),
+        roll_gradient=ROLL_GRADIENT,
+    )  # fmt: skip
+
+
+def along_curve(curve: SimilarCurve, ratio: float = 1.2) -> SimilarCurve:
+    """The curve along of an axle whose lateral one is known: as much friction and the same shape, `ratio` times as stiff."""
+    return SimilarCurve(ratio * curve.stiffness, curve.peak, curve.shape, curve.bend)
+
+
+def _curve(tyre, stiffness: float, load: float) -> SimilarCurve:
+    ordinary = tyres.GENERIC_TYRE
+    if tyre is None:
+        return SimilarCurve(stiffness, ordinary.friction * load, ordinary.C, ordinary.E)
+    peak = tyre.D if tyre.nominal_load is None else tyre.D * load / tyre.nominal_load
+    return SimilarCurve(stiffness, peak, tyre.C, tyre.E)

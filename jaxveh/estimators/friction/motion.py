@@ -1,0 +1,64 @@
+"""What a log tells of the car's motion at the front of every lateral method: values held between rows, and their ages."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from jaxveh.estimators.contract import Need
+
+LATERAL = (Need("v_x", "m/s"), Need("steer", "rad"), Need("yaw_rate", "rad/s"), Need("a_y", "m/s^2"))
+"""Speed, steer at the road wheels, yaw rate and lateral acceleration."""
+
+LOWEST = 5.0
+"""m/s: below this speed nothing lateral is told."""
+
+LAG = 0.025
+"""s: inertial sensors are later than the steering angle's by about this, their low-pass included."""
+
+LONGEST = 0.3
+"""s: a value that is older than this is not known any more."""
+
+
+class Told(NamedTuple):
+    """The last row: its time `t` (s), `v_x` (m/s, never below `LOWEST`), `steer` (rad) as late as the inertial sensors are,
+    `a_x` (m/s^2), their ages (s) as far as they matter, and whether it `moves`: speed, steer and inertial sensors speak. What was
+    measured last is `raw_v_x` and `raw_steer`."""
+
+    t: Any
+    v_x: Any
+    steer: Any
+    a_x: Any
+    raw_v_x: Any
+    raw_steer: Any
+    speed_age: Any
+    steer_age: Any
+    inertial_age: Any
+    moves: Any
+
+
+def first_told(t, values) -> Told:
+    """What the first row tells."""
+    zero, old = jnp.zeros_like(t), jnp.full_like(t, 1e3)
+    return next_told(Told(t, zero + LOWEST, zero, zero, zero, zero, old, old, old, jnp.asarray(False)), t, values)
+
+
+def next_told(last: Told, t, values) -> Told:
+    """What the next row tells."""
+    dt = jnp.clip(t - last.t, 0.0, 1.0)
+    v_x, speed_age = _held(values["v_x"], last.raw_v_x, last.speed_age, dt)
+    raw_steer, steer_age = _held(values["steer"], last.raw_steer, last.steer_age, dt)
+    a_x, _ = _held(values.get("a_x", jnp.full_like(t, jnp.nan)), last.a_x, last.speed_age, dt)
+    silent = jnp.isnan(values["yaw_rate"]) | jnp.isnan(values["a_y"])
+    inertial_age = jnp.where(silent, last.inertial_age + dt, 0.0)
+    fresh = (speed_age <= LONGEST) & (steer_age <= LONGEST) & (inertial_age <= LONGEST)
+    late = last.steer + (raw_steer - last.steer) * (1.0 - jnp.exp(-dt / LAG))
+    steer = jnp.where(last.steer_age > LONGEST, raw_steer, late)
+    moves = fresh & (v_x >= LOWEST)
+    return Told(t, jnp.maximum(v_x, LOWEST), steer, a_x, v_x, raw_steer, speed_age, steer_age, inertial_age, moves)
+
+
+def _held(value, last, age, dt):
+    here = ~jnp.isnan(value)
+    return jnp.where(here, value, last), jnp.where(here, 0.0, age + dt)

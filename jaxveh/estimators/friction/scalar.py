@@ -1,0 +1,70 @@
+"""One number that walks: the friction's logarithm, followed by what single residuals say."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import positive
+
+LOWEST_FRICTION, HIGHEST_FRICTION = 0.05, 1.5
+"""What a friction is held between."""
+
+
+class LogFriction(NamedTuple):
+    """Mean and variance of ln mu, and the squared innovations over their variances, averaged."""
+
+    mean: Any
+    variance: Any
+    surprise: Any
+
+
+class Follower(eqx.Module):
+    """A Kalman filter of ln mu, which returns to `usual` friction within `memory` (s) where nothing is told, and is widened anew
+    where innovations are too large for its spread: so a jump is followed.
+
+    `spread` (-) of ln mu where nothing is told; `correlation` (s): residuals closer than this say the same; `known` (-): up to
+    this spread of ln mu the friction is known; `surprise`: how large averaged squared innovations over their variance may be;
+    `attention` (s): over which they are averaged.
+    """
+
+    usual: jax.Array = positive("-", default=0.8)
+    spread: jax.Array = positive("-", default=0.6)
+    memory: jax.Array = positive("s", default=40.0)
+    correlation: jax.Array = positive("s", default=0.2)
+    known: jax.Array = positive("-", default=0.15)
+    surprise: jax.Array = positive("-", default=6.0)
+    attention: jax.Array = positive("s", default=0.3)
+
+    def start(self) -> LogFriction:
+        """Where nothing is told yet."""
+        return LogFriction(jnp.log(self.usual), jnp.square(self.spread), jnp.ones_like(self.usual))
+
+    def next(self, last: LogFriction, dt, residual, noise, here) -> LogFriction:
+        """After `dt` (s) and a residual: a function of ln mu, zero at the truth but for `noise` (its standard deviation); `here`:
+        whether it was measured."""
+        stays = jnp.exp(-dt / self.memory)
+        mean = jnp.log(self.usual) + stays * (last.mean - jnp.log(self.usual))
+        variance = stays**2 * last.variance + (1.0 - stays**2) * jnp.square(self.spread)
+        slope_at = lambda x: jax.jvp(residual, (x,), (jnp.ones_like(x),))
+        error, slope = slope_at(mean)
+        rough = jnp.square(noise) * jnp.maximum(self.correlation / jnp.maximum(dt, 1e-3), 1.0)
+        squared = jnp.square(error) / (jnp.square(slope) * variance + jnp.square(noise))
+        share = 1.0 - jnp.exp(-dt / self.attention)
+        average = last.surprise + jnp.where(here, share, 0.0) * (jnp.minimum(squared, 50.0) - last.surprise)
+        jumped = here & (average > self.surprise)
+        variance = jnp.where(jumped, jnp.square(self.spread), variance)
+        total = jnp.square(slope) * variance + rough
+        gain = jnp.where(here, -variance * slope / total, 0.0)
+        step = jnp.clip(gain * jnp.where(here, error, 0.0), -0.5, 0.5)
+        after = jnp.where(here, variance * rough / total, variance)
+        mean = jnp.clip(mean + step, jnp.log(LOWEST_FRICTION), jnp.log(HIGHEST_FRICTION))
+        return LogFriction(mean, after, jnp.where(jumped, 1.0, average))
+
+    def says(self, state: LogFriction, moves):
+        """Friction, its standard deviation and whether it is known."""
+        mu = jnp.exp(state.mean)
+        return mu, mu * jnp.sqrt(state.variance), moves & (state.variance < jnp.square(self.known))

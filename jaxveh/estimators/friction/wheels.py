@@ -1,0 +1,377 @@
+"""Friction from the wheels' longitudinal slips and forces: slip slope, reconstruction, observers of the wheels, sides apart."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.friction.along import CORNERS, Slips, WheelForces, WheelsTold
+from jaxveh.estimators.friction.laws import PlanarCar, SimilarCurve
+from jaxveh.estimators.friction.motion import Told, first_told, next_told
+from jaxveh.estimators.friction.scalar import Follower, LogFriction
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.tyres import Contact, LuGre
+
+SPEED = (Need("v_x", "m/s"),)
+WHEEL_CHANNELS = tuple(
+    Need(f"{kind}_{at}", unit) for kind, unit in (("wheel_speed", "m/s"), ("torque", "N m")) for at in CORNERS
+)
+MORE = (
+    Need("a_x", "m/s^2", optional=True),
+    Need("a_y", "m/s^2", optional=True),
+    Need("yaw_rate", "rad/s", optional=True),
+)
+
+
+class WheelMemory(NamedTuple):
+    """The motion, the wheels, and what was measured last of yaw rate (rad/s) and a_y (m/s^2)."""
+
+    told: Told
+    wheels: WheelsTold
+    yaw_rate: Any
+    a_y: Any
+
+
+class WheelSlips(eqx.Module):
+    """Slips and forces of the wheels as a log tells them, row by row; a steer is not needed."""
+
+    car: PlanarCar
+    wheels: WheelForces
+
+    def start(self, t, values) -> WheelMemory:
+        """After the first row."""
+        return WheelMemory(
+            first_told(t, self._straight(t, values)), self.wheels.start(t), jnp.zeros_like(t), jnp.zeros_like(t)
+        )
+
+    def next(self, last: WheelMemory, t, values) -> tuple[WheelMemory, Slips]:
+        """After the next row, and what the wheels do."""
+        told = next_told(last.told, t, self._straight(t, values))
+        wheels = self.wheels.next(last.wheels, t, values, told)
+        held = lambda name, old: jnp.where(jnp.isnan(values[name]), old, values[name])
+        yaw_rate, a_y = held("yaw_rate", last.yaw_rate), held("a_y", last.a_y)
+        return WheelMemory(told, wheels, yaw_rate, a_y), self.wheels.slips(self.car, wheels, told, yaw_rate, a_y)
+
+    def nominal(self):
+        """Static loads of the four wheels, N."""
+        front, rear = self.car.static_loads()
+        return 0.5 * jnp.stack([front, front, rear, rear])
+
+    def curves(self, ratio) -> tuple[SimilarCurve, ...]:
+        """The curve along of each wheel: half its axle's, `ratio` times as stiff."""
+        axles = (self.car.front, self.car.front, self.car.rear, self.car.rear)
+        return tuple(SimilarCurve(0.5 * ratio * c.stiffness, 0.5 * c.peak, c.shape, c.bend) for c in axles)
+
+    def _straight(self, t, values):
+        """The lateral sensors count as speaking: nothing here hangs on them."""
+        still = jnp.zeros_like(t)
+        return {"v_x": values["v_x"], "a_x": values["a_x"], "steer": still, "yaw_rate": still, "a_y": still}
+
+
+class AbstractWheelMethod(AbstractMethod):
+    """What reads wheels: `slips` is how."""
+
+    slips: eqx.AbstractVar[WheelSlips]
+
+    @property
+    def needs(self):
+        return (*SPEED, *WHEEL_CHANNELS, *MORE)
+
+
+class SlopeMemory(NamedTuple):
+    """Compliance (slip over force over load) and the axles' slip offsets, (3,), and their covariance."""
+
+    wheels: WheelMemory
+    mean: Any
+    covariance: Any
+
+
+class SlipSlope(AbstractWheelMethod):
+    """Friction by the slope of the normalised force over the slip at small slip (references [112-116]).
+
+    Per axle `slip = (F_x / F_z) / K + offset` (F. Gustafsson, Automatica 33, 1997), the compliance 1/K one number and the
+    offsets, errors of radii, one an axle: a Kalman filter with forgetting, of used frictions up to `used` alone.
+
+    **The slope is no friction.** Brush and Magic Formula have the same slope on every road; that measured slopes fall with
+    friction is an observation on real tyres, whose size hangs on tyre, wear, temperature and pressure. `friction =
+    (K / K_0)^exponent`, K_0 the file's, is that calibration: `exponent` and `calibration_spread` (of ln mu) are to be found on
+    the
+    car at hand, and the spread that is claimed holds both. `known` says that the slope is, within a tenth.
+    """
+
+    slips: WheelSlips
+    stiffness_ratio: jax.Array = positive("-", default=1.0)
+    exponent: jax.Array = positive("-", default=1.0)
+    calibration_spread: jax.Array = positive("-", default=0.3)
+    slip_noise: jax.Array = positive("-", default=0.004)
+    used: jax.Array = positive("-", default=0.3)
+    memory: jax.Array = positive("s", default=60.0)
+
+    def first(self, t, values):
+        wheels = self.slips.start(t, values)
+        usual, zero = self._usual(), jnp.zeros_like(t)
+        start = SlopeMemory(wheels, jnp.stack([usual, zero, zero]), self._spread())
+        return start, self._answer(start)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 1.0)
+        wheels, seen = self.slips.next(memory.wheels, t, values)
+        mean, stays = memory.mean, jnp.exp(-dt / self.memory)
+        # What is forgotten returns to what was known before the drive.
+        P = stays**2 * memory.covariance + (1.0 - stays**2) * self._spread()
+        rough = jnp.square(self.slip_noise) * jnp.maximum(0.2 / jnp.maximum(dt, 1e-3), 1.0)
+        normal = seen.force / (seen.load * self.slips.nominal())
+        for k, axle in ((0, 1), (2, 2)):
+            force, slip = 0.5 * (normal[k] + normal[k + 1]), 0.5 * (seen.slip[k] + seen.slip[k + 1])
+            here = seen.there[k] & seen.there[k + 1] & (jnp.abs(force) < self.used)
+            phi = jnp.zeros_like(mean).at[0].set(force).at[axle].set(1.0)
+            across = P @ phi
+            gain = jnp.where(here, across / (phi @ across + rough), 0.0)
+            mean = mean + gain * (slip - phi @ mean)
+            P = P - jnp.outer(gain, across)
+        after = SlopeMemory(wheels, mean, 0.5 * (P + P.T))
+        return after, self._answer(after)
+
+    def _usual(self):
+        car = self.slips.car
+        return sum(car.static_loads()) / (self.stiffness_ratio * (car.front.stiffness + car.rear.stiffness))
+
+    def _spread(self):
+        usual = self._usual()
+        return jnp.diag(jnp.square(jnp.stack([0.5 * usual, 0.02 + 0.0 * usual, 0.02 + 0.0 * usual])))
+
+    def _answer(self, memory: SlopeMemory):
+        usual = self._usual()
+        compliance = jnp.clip(memory.mean[0], usual / 1.5, 10.0 * usual)
+        friction = jnp.exp(self.exponent * jnp.log(usual / compliance))
+        slope = numerics.sqrt(memory.covariance[0, 0]) / compliance
+        spread = numerics.hypot(self.exponent * slope, self.calibration_spread)
+        return answer({"friction": friction}, {"friction": friction * spread}, memory.wheels.told.moves & (slope < 0.1))
+
+
+class CurveMemory(NamedTuple):
+    """The filtered slip and used friction of the car's wheels, the curve's slope, and the friction that it points at; how long
+    ago
+    the slope was measured (s)."""
+
+    wheels: WheelMemory
+    slip: Any
+    used: Any
+    slope: Any
+    friction: Any
+    age: Any
+
+
+class Reconstruction(AbstractWheelMethod):
+    """The curve of used friction over slip, reconstructed (equations 18, 19, figure 6 of the review; references [3, 136-138]).
+
+    `mu = F_x / F_z` (18) and its slope `d mu / d lambda = (d mu / dt) / (d lambda / dt)` (19), of the wheel that uses most. Where
+    `|d lambda / dt|` is below `least_rate` (1/s) (19) divides noise by noise: the slope is kept then. Figure 6 reads the peak
+    where
+    the slope is zero; before it, the brush's curve says how far away that is: with the slope's share `k` of the first one,
+    `1 - g = sqrt(k)` and the peak is `mu / (1 - (1 - g)^3)`. Without a `lag` (s) on both, derivatives of noise would rule.
+
+    `known`: the slope is that of now and below `bent` of the first one, so that the curve has left the line. No spread is
+    claimed.
+    """
+
+    slips: WheelSlips
+    stiffness_ratio: jax.Array = positive("-", default=1.0)
+    least_rate: jax.Array = positive("1/s", default=0.05)
+    lag: jax.Array = positive("s", default=0.1)
+    bent: jax.Array = positive("-", default=0.4)
+    memory: jax.Array = positive("s", default=0.5)
+
+    def first(self, t, values):
+        wheels, zero = self.slips.start(t, values), jnp.zeros_like(t)
+        start = CurveMemory(wheels, zero, zero, zero + self._steepest(), zero + 1.0, zero + 10.0)
+        return start, self._answer(start)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 1.0)
+        wheels, seen = self.slips.next(memory.wheels, t, values)
+        normal = jnp.where(seen.there, seen.force / (seen.load * self.slips.nominal()), 0.0)
+        most = jnp.argmax(jnp.abs(normal))
+        sign = jnp.sign(normal[most])
+        used_now, slip_now, here = jnp.abs(normal[most]), sign * seen.slip[most], seen.there[most]
+        share = jnp.where(here, 1.0 - jnp.exp(-dt / self.lag), 0.0)
+        slip, used = memory.slip + share * (slip_now - memory.slip), memory.used + share * (used_now - memory.used)
+        faster, harder = (slip_now - slip) / self.lag, (used_now - used) / self.lag
+        moves = here & (jnp.abs(faster) > self.least_rate)
+        raw = harder / jnp.where(moves, faster, 1.0)
+        steepest = self._steepest()
+        slope = jnp.where(moves, memory.slope + share * (jnp.clip(raw, 0.0, steepest) - memory.slope), memory.slope)
+        age = jnp.where(moves, 0.0, memory.age + dt)
+        rest = numerics.sqrt(jnp.maximum(slope / steepest, 0.0))
+        peak = used / jnp.maximum(1.0 - rest**3, 0.05)
+        bends = here & (slope < self.bent * steepest) & (age < self.memory)
+        friction = jnp.where(bends, peak, jnp.maximum(memory.friction, used))
+        after = CurveMemory(wheels, slip, used, slope, friction, age)
+        return after, self._answer(after)
+
+    def _steepest(self):
+        car = self.slips.car
+        return self.stiffness_ratio * (car.front.stiffness + car.rear.stiffness) / sum(car.static_loads())
+
+    def _answer(self, memory: CurveMemory):
+        bends = (memory.slope < self.bent * self._steepest()) & (memory.age < self.memory)
+        known = memory.wheels.told.moves & bends & (memory.used > 0.1)
+        return answer({"friction": memory.friction}, known=known)
+
+
+class ObserverMemory(NamedTuple):
+    """Speeds of the observed wheels (4,), m/s; friction; its excitation, averaged (-)."""
+
+    wheels: WheelMemory
+    speed: Any
+    friction: Any
+    excitation: Any
+
+
+class WheelObserver(AbstractWheelMethod):
+    """An adaptive observer of the wheels' dynamics (`law` None: references [118]; a `tyres.LuGre`: reference [119]).
+
+    Each wheel: `J domega/dt = T - R F(slip, mu) + gain J (omega - observed)`; friction follows the gradient,
+    `d mu / dt = - rate sum e dF/dmu / F_z - leak (mu - usual)`, normalised, where the leak (sigma-modification) holds it while
+    nothing is excited. Without a law `F = mu F_z phi(slip)`, phi the file's curve over its peak: linear in mu as [118] has it,
+    and
+    wrong where tyres keep their slope on slippery roads. With LuGre the bristles are taken as settled (they settle within
+    milliseconds), and mu is what multiplies their friction.
+
+    `known`: the averaged `|F - slip dF/dslip| / F_z` of the wheel that has most of it is above `enough`. No spread is claimed.
+    """
+
+    slips: WheelSlips
+    law: LuGre | None = None
+    stiffness_ratio: jax.Array = positive("-", default=1.0)
+    gain: jax.Array = positive("1/s", default=20.0)
+    rate: jax.Array = positive("1/s", default=3.0)
+    leak: jax.Array = positive("1/s", default=0.02)
+    usual: jax.Array = positive("-", default=0.8)
+    enough: jax.Array = positive("-", default=0.1)
+
+    def first(self, t, values):
+        wheels = self.slips.start(t, values)
+        zero = jnp.zeros_like(t)
+        start = ObserverMemory(wheels, wheels.wheels.speed, zero + self.usual, zero)
+        return start, self._answer(start)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 0.1)
+        wheels, seen = self.slips.next(memory.wheels, t, values)
+        one = self.slips.wheels
+        speed = wheels.wheels.speed
+        load = seen.load * self.slips.nominal()
+        forces = lambda mu: self._forces(seen, wheels, mu)
+        force, slope = jax.jvp(forces, (memory.friction,), (jnp.ones_like(memory.friction),))
+        ones = jnp.ones_like(seen.slip)
+        torque = wheels.wheels.torque - one.wheel_radius * one.rolling_resistance * load
+        error = speed - memory.speed
+        push = one.wheel_radius * (torque - one.wheel_radius * force) / one.wheel_inertia
+        # Linearly implicit in the gain, so that no step is too long.
+        observed = memory.speed + dt * (push + self.gain * error) / (1.0 + dt * self.gain)
+        observed = jnp.where(seen.there & memory.wheels.told.moves, observed, speed)
+        # The error that stays is the force's: e = R^2 (F - F_true) / (J gain); per load it teaches friction.
+        lacks = jnp.where(seen.there, error * one.wheel_inertia * self.gain / one.wheel_radius**2 / load, 0.0)
+        tells = jnp.where(seen.there, slope / load, 0.0)
+        squares = jnp.sum(tells**2)
+        step = -self.rate * jnp.sum(tells * lacks) / (squares + 0.05) - self.leak * (memory.friction - self.usual)
+        friction = jnp.clip(memory.friction + dt * step, 0.05, 1.5)
+        share = 1.0 - jnp.exp(-dt / 0.3)
+        # What the slip does not explain in proportion: the part of a force that is no stiffness.
+        _, stiff = jax.jvp(
+            lambda slip: self._forces(seen._replace(slip=slip), wheels, memory.friction), (seen.slip,), (ones,)
+        )
+        excited = jnp.max(jnp.where(seen.there, jnp.abs(force - seen.slip * stiff) / load, 0.0))
+        excitation = memory.excitation + share * (excited - memory.excitation)
+        after = ObserverMemory(wheels, observed, friction, excitation)
+        return after, self._answer(after)
+
+    def _forces(self, seen: Slips, wheels: WheelMemory, mu):
+        load = seen.load * self.slips.nominal()
+        if self.law is None:
+            curves = self.slips.curves(self.stiffness_ratio)
+            return jnp.stack([mu * c.force(seen.slip[k], 1.0 + 0.0 * mu, seen.load[k]) for k, c in enumerate(curves)])
+        v_x = wheels.told.v_x
+        contact = Contact(slip_ratio=seen.slip, load=load, friction=mu, speed=v_x, slip_speed=v_x)
+        return self.law.forces(contact, self.law.start(contact)).F_x
+
+    def _answer(self, memory: ObserverMemory):
+        known = memory.wheels.told.moves & (memory.excitation > self.enough)
+        return answer({"friction": memory.friction}, known=known)
+
+
+class SidesMemory(NamedTuple):
+    wheels: WheelMemory
+    offset: Any
+    left: LogFriction
+    right: LogFriction
+
+
+class SidesApart(AbstractWheelMethod):
+    """Friction under the left and under the right wheels, each by a filter of ln mu on the forces and slips of its own wheels:
+    what
+    a road that is slippery on one side needs.
+
+    `friction` is the mean of both, weighed by load. The force of each wheel is compared with the curve along of its axle; what
+    slip a wheel shows while it hardly pulls, an error of its radius, is learnt within `learning` (s) and taken off. Beside, slips
+    are known to `slip_noise` (-), forces to `force_noise` (-) of themselves and `load_noise` of the load.
+    """
+
+    slips: WheelSlips
+    follower: Follower
+    stiffness_ratio: jax.Array = positive("-", default=1.0)
+    slip_noise: jax.Array = positive("-", default=0.004)
+    force_noise: jax.Array = positive("-", default=0.07)
+    load_noise: jax.Array = positive("-", default=0.015)
+    learning: jax.Array = positive("s", default=2.0)
+    rolls: jax.Array = parameter("-", scale=0.05, default=0.05)
+
+    def first(self, t, values):
+        wheels = self.slips.start(t, values)
+        start = self.follower.start()
+        memory = SidesMemory(wheels, jnp.zeros_like(wheels.wheels.speed), start, start)
+        return memory, self._answer(memory)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 1.0)
+        wheels, seen = self.slips.next(memory.wheels, t, values)
+        curves, nominal = self.slips.curves(self.stiffness_ratio), self.slips.nominal()
+        stiffness = jnp.stack([curve.stiffness for curve in curves])
+        free = seen.there & (jnp.abs(seen.force) < self.rolls * seen.load * nominal)
+        shown = seen.slip - seen.force / (stiffness * seen.load)
+        share = jnp.where(free, 1.0 - jnp.exp(-dt / self.learning), 0.0)
+        offset = memory.offset + share * (jnp.where(free, shown, 0.0) - memory.offset)
+        sides = [memory.left, memory.right]
+        for k, curve in enumerate(curves):
+            slip, force, load = seen.slip[k] - offset[k], seen.force[k], seen.load[k]
+            state = sides[k % 2]
+            _, slope = curve.with_slope(slip, jnp.exp(state.mean), load)
+            noise = numerics.sqrt(
+                jnp.square(slope * self.slip_noise)
+                + jnp.square(self.force_noise * force)
+                + jnp.square(self.load_noise * load * nominal[k])
+            )
+            residual = lambda x, c=curve, s=slip, f=force, n=load: f - c.force(s, jnp.exp(x), n)
+            # Time passes twice for a side, once a wheel: what is forgotten is, too.
+            sides[k % 2] = self.follower.next(state, dt, residual, noise, seen.there[k])
+        after = SidesMemory(wheels, offset, *sides)
+        return after, self._answer(after)
+
+    def _answer(self, memory: SidesMemory):
+        moves = memory.wheels.told.moves
+        left, right = (self.follower.says(side, moves) for side in (memory.left, memory.right))
+        mean = {"friction": 0.5 * (left[0] + right[0]), "friction_left": left[0], "friction_right": right[0]}
+        std = {
+            "friction": 0.5 * numerics.hypot(left[1], right[1]),
+            "friction_left": left[1],
+            "friction_right": right[1],
+        }
+        known = {"friction": left[2] & right[2], "friction_left": left[2], "friction_right": right[2]}
+        return answer(mean, std, known)

@@ -1,0 +1,53 @@
+"""Cornering stiffness of both axles, as the linear single track has it: section 3.1.2.2 of the review (Chen, Gao, Xu 2013).
+
+It is the slope of an axle's lateral force over its slip angle at zero slip, with whatever else of the car goes with the force:
+camber
+thrust, compliance, roll steer. The car's file is where methods start from.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.stiffness.least_squares import AxleForces, Derivatives
+from jaxveh.estimators.stiffness.single_track import Followed, linear_car
+from jaxveh.estimators.stiffness.walking import WalkingStiffness
+
+NAME = "stiffness"
+
+SHOWN = {"front_cornering_stiffness": "N/rad", "rear_cornering_stiffness": "N/rad"}
+
+METHODS = {
+    "walking": MethodOfCar(
+        lambda car: WalkingStiffness(linear_car(car), Followed()),
+        "walking states of a linear single track in a Kalman filter, with offsets, lean and satellite course; known only after "
+        "half a minute of steering",
+        "section 3.1.2.2, references [46, 47]",
+    ),
+    "axle_forces": MethodOfCar(
+        lambda car: AxleForces(linear_car(car), Followed()),
+        "recursive least squares on axle forces and the difference of slip angles; known only where yaw accelerates",
+        "section 3.1.2.2, equation 15 (F_yr without cosine) and reference [120]",
+    ),
+    "derivatives": MethodOfCar(
+        lambda car: Derivatives(linear_car(car), Followed(lag=0.3)),
+        "the derivative of a force over that of its slip angle at constant speed, too small by what noise there is; known only "
+        "where "
+        "steer and yaw move fast",
+        "section 3.1.2.2, equation 16 as corrected, reference [122]",
+    ),
+}
+
+RECOMMENDED = "walking"
+
+
+def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
+    """Stiffnesses along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as `follow`."""
+    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
+
+
+def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
+    """The same a row at a time."""
+    return LiveMethod(method_of(NAME, METHODS, source, method))

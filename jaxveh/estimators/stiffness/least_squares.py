@@ -1,0 +1,173 @@
+"""Stiffness by recursive least squares: from axle forces (equation 15), and from derivatives alone (equation 16)."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.stiffness.single_track import LATERAL, LEAN, Followed, LinearCar, Signals
+
+
+class ForcesMemory(NamedTuple):
+    """The signals; the means (4,) and covariance of the least squares."""
+
+    signals: Signals
+    mean: Any
+    covariance: Any
+
+
+class AxleForces(AbstractMethod):
+    """Least squares on the axles' forces by equation 15 and the difference of their slip angles, with forgetting.
+
+    `delta - l r / v = F_f / C_f - F_r / C_r + offset` holds without the lateral speed, so that no observer of it is needed (the
+    review's general way has one): linear in both compliances, an offset, and how much later the
+    inertial sensors are than the steer. Front and rear forces are nearly proportional in
+    slow driving, and then only the difference of the compliances is told; yaw accelerations tell them apart. Compliances are in
+    units of the file's, so that the numbers are of one size.
+
+    `memory` (s) of the forgetting; `angle_noise` (rad) of the slip difference, alike for `correlation` (s); `known_spread`
+    (-): up
+    to this relative spread a stiffness is known.
+    """
+
+    car: LinearCar
+    followed: Followed
+    memory: jax.Array = positive("s", default=60.0)
+    spread: jax.Array = positive("-", default=0.4)
+    angle_noise: jax.Array = positive("rad", default=7e-4)
+    correlation: jax.Array = positive("s", default=0.3)
+    known_spread: jax.Array = positive("-", default=0.1)
+
+    @property
+    def needs(self):
+        return LATERAL
+
+    def first(self, t, values):
+        signals = self.followed.start(t, values)
+        start = ForcesMemory(signals, jnp.asarray([1.0, 1.0, 0.0, 0.0], self.spread.dtype), self._start())
+        return start, self._answer(start)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.signals.t, 0.0, 1.0)
+        now = self.followed.next(memory.signals, t, values)
+        turn = (now.yaw_rate - now.slow_yaw_rate) / self.followed.lag
+        front, rear = self.car.axle_forces(now.slow_a_y / (1.0 + LEAN), turn)
+        phi = jnp.stack([
+            front / self.car.front_cornering_stiffness, -rear / self.car.rear_cornering_stiffness, jnp.ones_like(front),
+            (now.steer - now.slow_steer) / self.followed.lag,
+        ])  # fmt: skip
+        difference = (
+            now.slow_steer - self.car.steer_offset - self.car.wheelbase * now.slow_yaw_rate / jnp.maximum(now.v_x, 1.0)
+        )
+        stays = jnp.exp(-dt / self.memory)
+        mean = memory.mean
+        # What is forgotten goes back to what was known before the drive, so that nothing winds up.
+        P = jnp.where(now.moves, stays * memory.covariance + (1.0 - stays) * self._start(), memory.covariance)
+        rough = jnp.square(self.angle_noise) * jnp.maximum(self.correlation / jnp.maximum(dt, 1e-3), 1.0)
+        across = P @ phi
+        gain = jnp.where(now.moves, across / (phi @ across + rough), 0.0)
+        P = P - jnp.outer(gain, across)
+        after = ForcesMemory(now, mean + gain * (difference - phi @ mean), 0.5 * (P + P.T))
+        return after, self._answer(after)
+
+    def _start(self):
+        return jnp.diag(
+            jnp.square(jnp.stack([self.spread, self.spread, 0.003 + 0.0 * self.spread, 0.01 + 0.0 * self.spread]))
+        )
+
+    def _answer(self, memory: ForcesMemory):
+        compliance = jnp.clip(memory.mean[:2], 0.2, 5.0)
+        std = jnp.sqrt(jnp.diagonal(memory.covariance))[:2]
+        car, names = self.car, ("front_cornering_stiffness", "rear_cornering_stiffness")
+        mean = {name: getattr(car, name) / compliance[k] for k, name in enumerate(names)}
+        spread = {name: mean[name] * std[k] / compliance[k] for k, name in enumerate(names)}
+        known = {
+            name: memory.signals.moves & (std[k] / compliance[k] < self.known_spread) for k, name in enumerate(names)
+        }
+        return answer(mean, spread, known)
+
+
+class DerivativesMemory(NamedTuple):
+    """The signals; of front and rear, (2,): accelerations (m/s^2), filtered, slip rates (rad/s), filtered, and the mean over
+    the window
+    of their products and of the slip rates' squares."""
+
+    signals: Signals
+    felt: Any
+    slow: Any
+    raw_angle: Any
+    angle: Any
+    product: Any
+    square: Any
+
+
+class Derivatives(AbstractMethod):
+    """Stiffness by equation 16 as corrected, at constant speed: the derivative of a force over that of its slip angle.
+
+        C_f = m l_r / l  (d a_f / dt) / (d delta / dt - a_f / v + r),    a_f = a_y + l_f dr/dt
+
+    a_f is the front axle's acceleration (erratum: the print has slip angles there); exact for `J_z = m l_f l_r` at a constant
+    speed. The rear's is the same without steer: `C_r = m l_f / l (d a_r / dt) / (r - a_r / v)`, a_r = a_y - l_r dr/dt. Single
+    quotients are useless where the denominator is near zero, so the paper holds the last value within epsilon; here the
+    quotient is
+    the least squares' over `memory` (s), numerator times denominator over denominator squared, and what is below `epsilon`
+    (rad/s) hardly counts.
+
+    No spread is claimed: noise in the denominator makes it too small by a bias that grows with the noise. `known`: the mean
+    square
+    of the denominators in the window is above `enough` times epsilon's.
+    """
+
+    car: LinearCar
+    followed: Followed
+    epsilon: jax.Array = positive("rad/s", default=0.01)
+    memory: jax.Array = positive("s", default=30.0)
+    enough: jax.Array = positive("-", default=0.1)
+
+    @property
+    def needs(self):
+        return LATERAL
+
+    def first(self, t, values):
+        signals = self.followed.start(t, values)
+        two = jnp.zeros((2,), t.dtype)
+        start = DerivativesMemory(signals, two, two, two, two, two, two)
+        return start, self._answer(start)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.signals.t, 0.0, 1.0)
+        now = self.followed.next(memory.signals, t, values)
+        lag = self.followed.lag
+        turn = (now.yaw_rate - now.slow_yaw_rate) / lag
+        a_y = now.slow_a_y / (1.0 + LEAN)
+        felt = jnp.stack([a_y + self.car.front_axle_to_cg * turn, a_y - self.car.rear_axle_to_cg * turn])
+        share = dt / (2.0 * lag + dt)
+        # All once more through the same low-pass, so that derivative and value are of one age.
+        slow = memory.slow + share * (felt + memory.felt - 2.0 * memory.slow)
+        rate = (felt - slow) / lag
+        steer_rate = (now.steer - now.slow_steer) / lag
+        raw = jnp.stack([steer_rate + now.slow_yaw_rate, now.slow_yaw_rate]) - felt / jnp.maximum(now.v_x, 1.0)
+        angle = memory.angle + share * (raw + memory.raw_angle - 2.0 * memory.angle)
+        counts = jnp.where(now.moves, angle**2 / (angle**2 + self.epsilon**2), 0.0)
+        fades = jnp.exp(-dt / self.memory)
+        gather = lambda old, new: fades * old + (1.0 - fades) * counts * new
+        after = DerivativesMemory(
+            now, felt, slow, raw, angle, gather(memory.product, angle * rate), gather(memory.square, angle**2)
+        )
+        return after, self._answer(after)
+
+    def _answer(self, memory: DerivativesMemory):
+        car = self.car
+        masses = car.mass / car.wheelbase * jnp.stack([car.rear_axle_to_cg, car.front_axle_to_cg])
+        file = jnp.stack([car.front_cornering_stiffness, car.rear_cornering_stiffness])
+        told = memory.square > self.enough * jnp.square(self.epsilon)
+        found = masses * memory.product / jnp.where(told, memory.square, 1.0)
+        stiffness = jnp.where(told, jnp.clip(found, 0.2 * file, 5.0 * file), file)
+        names = ("front_cornering_stiffness", "rear_cornering_stiffness")
+        mean = {name: stiffness[k] for k, name in enumerate(names)}
+        known = {name: memory.signals.moves & told[k] for k, name in enumerate(names)}
+        return answer(mean, known=known)

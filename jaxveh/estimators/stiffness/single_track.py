@@ -1,0 +1,114 @@
+"""What all methods of cornering stiffness share: the single track's numbers, and signals low-pass filtered alike."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.contract import Need
+from jaxveh.io import CarSpecification
+
+LATERAL = (Need("v_x", "m/s"), Need("steer", "rad"), Need("yaw_rate", "rad/s"), Need("a_y", "m/s^2"))
+"""Speed, steer at the road wheels, yaw rate and lateral acceleration."""
+
+LOWEST = 5.0
+"""m/s: below this speed nothing is told."""
+
+LONGEST = 0.3
+"""s: a value that is older than this is not known any more."""
+
+LEAN = 0.059
+"""By which share of itself an ordinary car's accelerometer shows more of a lateral acceleration, because the body leans."""
+
+
+class LinearCar(eqx.Module):
+    """The numbers of a linear single track; the stiffnesses (N/rad, of the axles) are where methods start from."""
+
+    mass: jax.Array = positive("kg")
+    yaw_inertia: jax.Array = positive("kg m^2")
+    front_axle_to_cg: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    front_cornering_stiffness: jax.Array = positive("N/rad")
+    rear_cornering_stiffness: jax.Array = positive("N/rad")
+    steer_offset: jax.Array = parameter("rad", scale=0.002, default=0.0)
+
+    @property
+    def wheelbase(self):
+        """m."""
+        return self.front_axle_to_cg + self.rear_axle_to_cg
+
+    def axle_forces(self, a_y, yaw_acceleration):
+        """Lateral forces of both axles, N: equation 15 at small angles (F_yr has no cosine of the steer: erratum)."""
+        turn = self.yaw_inertia * yaw_acceleration
+        lateral = self.mass * a_y
+        front = (turn + self.rear_axle_to_cg * lateral) / self.wheelbase
+        return front, (self.front_axle_to_cg * lateral - turn) / self.wheelbase
+
+
+def linear_car(car: CarSpecification) -> LinearCar:
+    """The car of a file."""
+    names = [field.name for field in dataclasses.fields(LinearCar) if field.name != "steer_offset"]
+    return LinearCar(**{name: getattr(car, name) for name in names}, steer_offset=car.steer_offset or 0.0)
+
+
+class Signals(NamedTuple):
+    """Time (s); what was measured last of speed (m/s), steer (rad), yaw rate (rad/s), a_y (m/s^2), the steer as late as these,
+    too;
+    the low-pass filtered ones; the oldest's age (s) and whether the car `moves` and all of them speak."""
+
+    t: Any
+    v_x: Any
+    raw_steer: Any
+    steer: Any
+    yaw_rate: Any
+    a_y: Any
+    slow_steer: Any
+    slow_yaw_rate: Any
+    slow_a_y: Any
+    ages: Any
+    moves: Any
+
+
+class Followed(eqx.Module):
+    """Signals held between rows and low-pass filtered by `lag` (s), by which their derivatives are told: `(x - slow) / lag`.
+    The steer is delayed by `late` (s), by which inertial sensors are behind it."""
+
+    lag: jax.Array = positive("s", default=0.15)
+    late: jax.Array = positive("s", default=0.025)
+
+    def start(self, t, values) -> Signals:
+        """After the first row."""
+        known = lambda name: jnp.where(jnp.isnan(values[name]), 0.0, values[name])
+        steer, yaw_rate, a_y = known("steer"), known("yaw_rate"), known("a_y")
+        old = jnp.where(jnp.stack([jnp.isnan(values[need.channel]) for need in LATERAL]), 1e3, 0.0).astype(t.dtype)
+        v_x = known("v_x")
+        moves = (old.max() <= LONGEST) & (v_x >= LOWEST)
+        return Signals(t, v_x, steer, steer, yaw_rate, a_y, steer, yaw_rate, a_y, old, moves)
+
+    def next(self, last: Signals, t, values) -> Signals:
+        """After the next row."""
+        dt = jnp.clip(t - last.t, 0.0, 1.0)
+        missing = jnp.stack([jnp.isnan(values[need.channel]) for need in LATERAL])
+        held = lambda name, old: jnp.where(jnp.isnan(values[name]), old, values[name])
+        ages = jnp.where(missing, last.ages + dt, 0.0)
+        anew = jnp.max(last.ages) > LONGEST
+        v_x, yaw_rate, a_y = held("v_x", last.v_x), held("yaw_rate", last.yaw_rate), held("a_y", last.a_y)
+        raw = held("steer", last.raw_steer)
+        # Pade's delay, an all-pass: `2 / (1 + s late / 2) - 1`, its low-pass bilinear.
+        mid = 0.5 * (last.steer + last.raw_steer)
+        mid = mid + dt / (self.late + dt) * (raw + last.raw_steer - 2.0 * mid)
+        steer = jnp.where(anew, raw, 2.0 * mid - raw)
+        # The bilinear low-pass, of which `(x - slow) / lag` is the derivative exactly.
+        share = dt / (2.0 * self.lag + dt)
+        follow = lambda slow, old, new: jnp.where(anew, new, slow + share * (new + old - 2.0 * slow))
+        moves = (jnp.max(ages) <= LONGEST) & (v_x >= LOWEST)
+        return Signals(
+            t, v_x, raw, steer, yaw_rate, a_y, follow(last.slow_steer, last.steer, steer), follow(last.slow_yaw_rate,
+            last.yaw_rate, yaw_rate),
+            follow(last.slow_a_y, last.a_y, a_y), ages, moves,
+        )  # fmt: skip

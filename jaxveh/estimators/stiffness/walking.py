@@ -1,0 +1,161 @@
+"""The recommended method: stiffnesses as walking states of a linear single track, with offsets and satellite course."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.stiffness.single_track import LATERAL, LEAN, LOWEST, Followed, LinearCar, Signals
+
+STATES = 10
+"""v_y (m/s), yaw rate (rad/s), ln of both stiffnesses over the file's, offsets of steer (rad), a_y (m/s^2) and yaw rate
+(rad/s), and
+by which share of itself a_y shows more because the body leans, the yaw (rad), and how much
+later than `late` inertial sensors are than the steer (s)."""
+
+SATELLITE = (Need("course", "rad", optional=True),)
+
+
+class WalkMemory(NamedTuple):
+    """The signals; mean and covariance of the states; how fast the course turned of late, a_y / v (rad/s), low-pass filtered."""
+
+    signals: Signals
+    mean: Any
+    covariance: Any
+    turning: Any
+
+
+class WalkingStiffness(AbstractMethod):
+    """An extended Kalman filter of [v_y, yaw rate, ln C_f, ln C_r, offsets of steer, a_y and yaw rate, lean, yaw, lateness].
+
+    The linear single track of the file's mass, inertia and lengths; measured are yaw rate and lateral acceleration and, where the
+    log has it, the satellite's `course = yaw + v_y / v` (references [46, 47]), which alone sees the sideslip. It comes
+    `course_delay`
+    (s) later than the inertial sensors; what it has turned since is the integral of a_y / v. What would be taken for stiffness
+    is a state of its own: offsets,
+    and the lean of the body, by which an accelerometer shows more. Where tyres leave their linear range (`linear` m/s^2 of
+    lateral
+    acceleration), measurements count less and less. On a slippery road it is the slope at zero slip still that is told, as
+    long as
+    there is little lateral acceleration.
+
+    `spread` (-) of ln C before the drive, `walk` (1/sqrt(s)); `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5); `a_y_noise`
+    (m/s^2), `yaw_rate_noise` (rad/s), `course_noise` (m/s across); `steer_noise` (rad/sqrt(s)): how the steer's offset walks,
+    play
+    included; `known_spread` (-).
+    """
+
+    car: LinearCar
+    followed: Followed
+    spread: jax.Array = positive("-", default=0.35)
+    walk: jax.Array = positive("1/sqrt(s)", default=0.004)
+    v_y_noise: jax.Array = positive("m/s^1.5", default=0.13)
+    yaw_noise: jax.Array = positive("rad/s^1.5", default=0.05)
+    a_y_noise: jax.Array = positive("m/s^2", default=0.2)
+    yaw_rate_noise: jax.Array = positive("rad/s", default=0.004)
+    steer_noise: jax.Array = positive("rad/sqrt(s)", default=2e-4)
+    course_noise: jax.Array = positive("m/s", default=0.07)
+    course_delay: jax.Array = positive("s", default=0.125)
+    linear: jax.Array = positive("m/s^2", default=4.0)
+    known_spread: jax.Array = positive("-", default=0.07)
+
+    @property
+    def needs(self):
+        return LATERAL + SATELLITE
+
+    def first(self, t, values):
+        signals = self.followed.start(t, values)
+        mean = jnp.zeros((STATES,), self.spread.dtype).at[7].set(LEAN)
+        memory = WalkMemory(signals, mean, self._start(), jnp.zeros_like(t))
+        return memory, self._answer(memory)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.signals.t, 0.0, 1.0)
+        now = self.followed.next(memory.signals, t, values)
+        v_x = jnp.maximum(now.v_x, LOWEST)
+        share = 1.0 - jnp.exp(-2.0 * dt / self.course_delay)
+        turning = memory.turning + share * (now.a_y / (1.0 + LEAN) / v_x - memory.turning)
+        x, P = self._move(memory.mean, memory.covariance, now, dt)
+        rough = 1.0 + jnp.square(jnp.square(now.a_y / self.linear))
+        felt = lambda x: self._forces(x, now)[2] * (1.0 + x[7]) + x[5]
+        x, P = update(x, P, values["yaw_rate"], lambda x: x[1] + x[6], jnp.square(self.yaw_rate_noise) * rough)
+        x, P = update(x, P, values["a_y"], felt, jnp.square(self.a_y_noise) * rough)
+        seen = lambda x: x[8] + x[0] / v_x
+        late = values["course"] + self.course_delay * turning
+        nearest = seen(x) + numerics.wrap_angle(late - seen(x))
+        x, P = update(x, P, nearest, seen, jnp.square(self.course_noise / v_x) * rough)
+        x = jnp.where(now.moves, x, memory.mean.at[:2].set(0.0))
+        P = jnp.where(now.moves, P, self._standing(memory.covariance))
+        after = WalkMemory(now, x, P, turning)
+        return after, self._answer(after)
+
+    def _start(self):
+        soft = self.spread
+        spreads = [0.3, 0.1, None, None, 0.002, 0.15, 0.005, 0.06, 3.0, 0.01]
+        return jnp.diag(jnp.square(jnp.stack([soft if s is None else s + 0.0 * soft for s in spreads])))
+
+    def _standing(self, P):
+        """What is left of a covariance at standstill: that of the constants."""
+        start = self._start()
+        keep = (jnp.arange(STATES) >= 2) & (jnp.arange(STATES) != 8)
+        return jnp.where(keep[:, None] & keep[None, :], P, start)
+
+    def _forces(self, x, now: Signals):
+        """Of front and rear, N, and their acceleration, m/s^2."""
+        car = self.car
+        v_x = jnp.maximum(now.v_x, LOWEST)
+        front = car.front_cornering_stiffness * jnp.exp(jnp.clip(x[2], -1.6, 1.6))
+        rear = car.rear_cornering_stiffness * jnp.exp(jnp.clip(x[3], -1.6, 1.6))
+        steer = now.steer - x[9] * (now.steer - now.slow_steer) / self.followed.lag
+        front = front * (steer - car.steer_offset - x[4] - (x[0] + car.front_axle_to_cg * x[1]) / v_x)
+        rear = -rear * (x[0] - car.rear_axle_to_cg * x[1]) / v_x
+        return front, rear, (front + rear) / car.mass
+
+    def _move(self, x, P, now: Signals, dt):
+        car = self.car
+
+        def rates(x):
+            front, rear, push = self._forces(x, now)
+            turn = (car.front_axle_to_cg * front - car.rear_axle_to_cg * rear) / car.yaw_inertia
+            return jnp.stack([push - now.v_x * x[1], turn])
+
+        rate, slope = rates(x), jax.jacfwd(rates)(x)
+        left = jnp.eye(2, dtype=x.dtype) - 0.5 * dt * slope[:, :2]
+        determinant = left[0, 0] * left[1, 1] - left[0, 1] * left[1, 0]
+        inverse = jnp.stack([jnp.stack([left[1, 1], -left[0, 1]]), jnp.stack([-left[1, 0], left[0, 0]])]) / determinant
+        step = jnp.eye(STATES, dtype=x.dtype).at[:2].add(dt * (inverse @ slope)).at[8, 1].set(dt)
+        slow = 0.0 * dt
+        walks = jnp.stack([
+            self.v_y_noise, self.yaw_noise, self.walk, self.walk, self.steer_noise, 0.002 + slow, 1e-5 + slow, 1e-4 + slow,
+            2e-3 + slow, 1e-5 + slow,
+        ])  # fmt: skip
+        return x.at[:2].add(dt * (inverse @ rate)).at[8].add(dt * x[1]), step @ P @ step.T + jnp.diag(
+            jnp.square(walks) * dt
+        )
+
+    def _answer(self, memory: WalkMemory):
+        now, x, P, _ = memory
+        std = jnp.sqrt(jnp.diagonal(P))[2:4]
+        file = (self.car.front_cornering_stiffness, self.car.rear_cornering_stiffness)
+        names = ("front_cornering_stiffness", "rear_cornering_stiffness")
+        mean = {name: file[k] * jnp.exp(jnp.clip(x[2 + k], -1.6, 1.6)) for k, name in enumerate(names)}
+        known = {name: now.moves & (std[k] < self.known_spread) for k, name in enumerate(names)}
+        return answer(mean, {name: mean[name] * std[k] for k, name in enumerate(names)}, known)
+
+
+def update(x, P, measured, observation, variance):
+    """Kalman's update by one number, NaN where it is missing."""
+    here = ~jnp.isnan(measured)
+    expected, slope = observation(x), jax.grad(observation)(x)
+    across = P @ slope
+    gain = jnp.where(here, across / (slope @ across + variance), 0.0)
+    # Joseph's form, which stays positive definite in float32.
+    left = jnp.eye(len(x), dtype=x.dtype) - jnp.outer(gain, slope)
+    P = left @ P @ left.T + variance * jnp.outer(gain, gain)
+    return x + gain * (jnp.where(here, measured, expected) - expected), 0.5 * (P + P.T)

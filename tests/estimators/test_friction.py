@@ -1,0 +1,241 @@
+"""Friction: each method on a signal of which the answer is known, and the recommended one on a simulated car."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import method_logs
+import numpy as np
+import pytest
+
+from jaxveh import InputError, Recording, manoeuvres, roads, sensors, simulate, vehicles
+from jaxveh.estimators import friction
+from jaxveh.estimators.friction import brush_curve
+from jaxveh.estimators.friction.laws import planar_car
+from jaxveh.tyres import Brush, Contact
+
+CAR = dataclasses.replace(
+    method_logs.CAR, front_cornering_stiffness=9e4, rear_cornering_stiffness=1.1e5, rolling_resistance=0.0
+)
+PLANAR = planar_car(CAR)
+RADIUS, INERTIA = 0.32, 1.2  # as in the file
+DT, SPEED = 0.01, 20.0
+T = np.arange(0.0, 16.0, DT)
+CORNERS = ("fl", "fr", "rl", "rr")
+
+
+def brush_axles(mu, slip, k):
+    """Both axles' brush forces."""
+    curve = (PLANAR.front, PLANAR.rear)[k]
+    return brush_curve.force(slip, curve.stiffness, mu * curve.peak)
+
+
+def similar_axles(mu, slip, k):
+    """Both axles' forces of the similar curve."""
+    return (PLANAR.front, PLANAR.rear)[k].force(slip, mu)
+
+
+def lateral_drive(mu, steer, forces=similar_axles, lean=True):
+    """A single track on these axle forces, as sensors without errors show it; everything in one age."""
+
+    def body(x, row):
+        mu, steer = row
+
+        def rates(x):
+            slips = PLANAR.slip_angles(steer, SPEED, x[0], x[1])
+            front, rear = forces(mu, slips[0], 0), forces(mu, slips[1], 1)
+            turn = (PLANAR.front_axle_to_cg * front - PLANAR.rear_axle_to_cg * rear) / PLANAR.yaw_inertia
+            return jnp.stack([(front + rear) / PLANAR.mass - SPEED * x[1], turn]), (front, rear)
+
+        middle = x + 0.5 * DT * rates(x)[0]
+        _, (front, rear) = rates(x)
+        said = (x[1], (front + rear) / PLANAR.mass, front)
+        return x + DT * rates(middle)[0], said
+
+    mu = jnp.broadcast_to(jnp.asarray(mu, float), T.shape)
+    _, (yaw_rate, a_y, front) = jax.jit(lambda: jax.lax.scan(body, jnp.zeros(2), (mu, jnp.asarray(steer))))()
+    shows = 1.0 + 9.81 * float(PLANAR.roll_gradient) * lean
+    # Inertial sensors are later than the steer by what the methods allow for.
+    late = lambda values: np.interp(T - 0.025, T, np.asarray(values))
+    return {
+        "v_x": np.full(T.shape, SPEED), "steer": np.asarray(steer), "yaw_rate": late(yaw_rate), "a_y": shows * late(a_y),
+        "front": late(front),
+    }  # fmt: skip
+
+
+def estimated(name, channels, car=CAR):
+    method = friction.METHODS[name].make(car)
+    units = {need.channel: need.unit for need in method.needs}
+    channels = {n: v for n, v in channels.items() if n in units}
+    return friction.estimate(car, Recording(T, channels, {n: units[n] for n in channels}), method=name)
+
+
+def active(level, frequency=0.5):
+    """Steer that uses what there is of a friction: growing swings."""
+    return level * np.sin(2.0 * np.pi * frequency * T) * np.minimum(T / 2.0, 1.0)
+
+
+def test_what_a_force_tells_is_its_slope_over_the_logarithm_of_friction_and_nothing_in_the_linear_range():
+    curve = PLANAR.front
+    slip, mu, step = jnp.asarray(0.05), 0.6, 1e-6
+    difference = (curve.force(slip, mu * np.exp(step)) - curve.force(slip, mu * np.exp(-step))) / (2 * step)
+    np.testing.assert_allclose(curve.told(slip, mu), difference, rtol=1e-6)
+    np.testing.assert_allclose(curve.force(1e-7, mu) / 1e-7, curve.stiffness, rtol=1e-6)
+    assert abs(curve.told(jnp.asarray(0.002), 1.0)) < 0.01 * curve.force(0.002, 1.0)
+    # All slides: the force is the friction.
+    brush = lambda log_mu: brush_curve.force(0.5, curve.stiffness, jnp.exp(log_mu) * curve.peak)
+    np.testing.assert_allclose(jax.grad(brush)(jnp.log(0.5)), 0.5 * curve.peak, rtol=1e-12)
+
+
+def test_the_brush_curve_is_that_of_the_tyre_and_its_inverse():
+    tyre = Brush(slip_stiffness=9e4, cornering_stiffness=9e4, friction=1.0, half_length=0.06)
+    slips = jnp.asarray([-0.08, -0.01, 0.0, 0.004, 0.03, 0.06])
+    expected = tyre.forces(Contact(slip_angle=jnp.arctan(slips), load=5000.0, friction=0.7))
+    np.testing.assert_allclose(brush_curve.force(slips, 9e4, 3500.0), expected.F_y, rtol=1e-9, atol=1e-9)
+    forces = brush_curve.force(slips[1:5], 9e4, 3500.0)
+    np.testing.assert_allclose(brush_curve.slip_of(forces, 9e4, 3500.0), slips[1:5], atol=1e-12)
+    np.testing.assert_allclose(
+        0.02 * brush_curve.trail_share(forces, 3500.0) * forces, -expected.M_z[1:5], rtol=1e-7, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("mu", [0.3, 0.7])
+@pytest.mark.parametrize("name", ["bank", "augmented", "lateral_curve", "hybrid"])
+def test_near_the_limit_lateral_methods_find_the_friction_and_in_the_linear_range_they_say_that_they_do_not(name, mu):
+    brush = name in ("lateral_curve", "hybrid")
+    forces = brush_axles if brush else similar_axles
+    said = estimated(name, lateral_drive(mu, active(0.13 * mu, 0.25 if brush else 0.5), forces))
+    late = T > 6.0
+    assert said.known.friction[late].mean() > 0.3
+    right = late & np.asarray(said.known.friction)
+    np.testing.assert_allclose(said["friction"][right], mu, rtol=0.1)
+    gentle = estimated(name, lateral_drive(mu, active(0.01 * mu), forces))
+    assert not np.asarray(gentle.known.friction).any()
+
+
+def test_a_jump_is_followed_within_a_second_where_there_is_excitation():
+    mu = np.where(T < 8.0, 0.9, 0.35)
+    said = estimated("bank", lateral_drive(mu, active(0.07)))
+    friction_said = np.asarray(said["friction"])
+    assert friction_said[T < 7.9][-1] > 0.55
+    found = np.abs(friction_said / 0.35 - 1.0) < 0.2
+    assert found[T >= 9.0].all()
+    # And the spread says it.
+    assert np.asarray(said.known.friction)[T >= 10.0].mean() > 0.7
+
+
+def test_the_steering_torque_knows_sooner_than_the_force():
+    mu = 0.5
+    drive = lateral_drive(mu, active(0.034), brush_axles)
+    trail = 0.015 + 0.02 * brush_curve.trail_share(drive["front"], mu * PLANAR.front.peak)
+    drive["steering_torque"] = np.asarray(drive["front"] * trail / 16.0)
+    said, force = estimated("aligning_torque", drive), estimated("lateral_curve", drive)
+    used = np.abs(drive["front"]).max() / (mu * float(PLANAR.front.peak))
+    assert 0.5 < used < 0.9
+    late = T > 5.0
+    assert np.asarray(said.known.friction)[late].mean() > 0.5 + np.asarray(force.known.friction)[late].mean()
+    np.testing.assert_allclose(said["friction"][late & np.asarray(said.known.friction)], mu, rtol=0.12)
+
+
+def wheels_drive(mu, slip, side=None, ratio=1.0):
+    """All wheels at a longitudinal slip (T,), forces on the curve along of friction mu (by side where given)."""
+    channels = {"v_x": np.full(T.shape, SPEED), "a_x": np.zeros(T.shape), "a_y": np.zeros(T.shape)}
+    for k, at in enumerate(CORNERS):
+        axle = (PLANAR.front, PLANAR.rear)[k // 2]
+        own = mu if side is None else side[k % 2]
+        force = 0.5 * np.asarray(axle.force(ratio * slip, own))
+        speed = SPEED * (1.0 + slip)
+        spin = np.gradient(speed, T) / RADIUS
+        channels[f"wheel_speed_{at}"] = speed
+        channels[f"torque_{at}"] = RADIUS * force + INERTIA * spin
+    return channels
+
+
+def swings(most):
+    return most * np.sin(2.0 * np.pi * 0.25 * T)
+
+
+@pytest.mark.parametrize("name", ["sides_apart", "reconstruction"])
+def test_wheels_that_slip_show_the_friction(name):
+    mu = 0.4
+    said = estimated(name, wheels_drive(mu, swings(0.06)))
+    known = np.asarray(said.known.friction) & (T > 4.0)
+    assert known.mean() > 0.1
+    assert abs(np.median(said["friction"][known]) / mu - 1.0) < 0.15
+    calm = estimated(name, wheels_drive(mu, swings(0.001)))
+    assert not np.asarray(calm.known.friction)[T > 1.0].any()
+
+
+def test_observers_of_the_wheels_find_the_friction_of_their_own_law():
+    mu = 0.4
+    drive = wheels_drive(mu, swings(0.08))
+    # The law that is linear in friction: all of the dry curve times mu.
+    for k, at in enumerate(CORNERS):
+        force = 0.5 * mu * np.asarray((PLANAR.front, PLANAR.rear)[k // 2].force(swings(0.08), 1.0))
+        spin = np.gradient(drive[f"wheel_speed_{at}"], T) / RADIUS
+        drive[f"torque_{at}"] = RADIUS * force + INERTIA * spin
+    said = estimated("wheel_observer", drive)
+    known = np.asarray(said.known.friction) & (T > 8.0)
+    assert known.mean() > 0.1
+    assert abs(np.median(said["friction"][known]) / mu - 1.0) < 0.15
+    law = friction.METHODS["lugre"].make(CAR).law
+    for k, at in enumerate(CORNERS):
+        load = float(PLANAR.static_loads()[k // 2]) / 2.0
+        contact = Contact(slip_ratio=swings(0.08), load=load, friction=mu, speed=SPEED, slip_speed=SPEED)
+        force = np.asarray(law.forces(contact, law.start(contact)).F_x)
+        spin = np.gradient(drive[f"wheel_speed_{at}"], T) / RADIUS
+        drive[f"torque_{at}"] = RADIUS * force + INERTIA * spin
+    said = estimated("lugre", drive)
+    known = np.asarray(said.known.friction) & (T > 8.0)
+    assert known.mean() > 0.1
+    assert abs(np.median(said["friction"][known]) / mu - 1.0) < 0.15
+
+
+def test_sides_are_told_apart():
+    said = estimated("sides_apart", wheels_drive(None, swings(0.06), side=(0.3, 0.8)))
+    known = np.asarray(said.known.friction_left) & (T > 4.0)
+    assert known.mean() > 0.1
+    np.testing.assert_allclose(np.median(said["friction_left"][known]), 0.3, rtol=0.15)
+    assert np.median(said["friction_right"][T > 4.0]) > 0.6
+    both = 0.5 * (np.asarray(said["friction_left"]) + np.asarray(said["friction_right"]))
+    np.testing.assert_allclose(said["friction"], both)
+
+
+def test_the_slip_slope_is_a_stiffness_and_becomes_friction_by_its_calibration_alone():
+    # Two roads with one slope: the same answer, near one.
+    one, other = (estimated("slip_slope", wheels_drive(mu, swings(0.009)))["friction"][-1] for mu in (1.0, 0.5))
+    np.testing.assert_allclose([one, other], 1.0, rtol=0.1)
+    # Half the slope, at an exponent of one: half the friction.
+    soft = estimated("slip_slope", wheels_drive(1.0, swings(0.02), ratio=0.5))
+    assert bool(soft.known.friction[-1])
+    np.testing.assert_allclose(soft["friction"][-1], 0.5, rtol=0.1)
+    assert soft.std.friction[-1] > 0.3 * soft["friction"][-1] * 0.99
+
+
+def test_a_file_without_wheels_has_lateral_methods_alone():
+    bare = dataclasses.replace(CAR, wheel_radius=None)
+    assert friction.METHODS["bank"].make(bare).along is None
+    with pytest.raises(InputError, match="no wheel_radius"):
+        friction.METHODS["sides_apart"].make(bare)
+    with pytest.raises(InputError, match="no steering_ratio"):
+        friction.METHODS["aligning_torque"].make(dataclasses.replace(CAR, steering_ratio=None))
+
+
+@pytest.mark.studies
+def test_a_simulated_car_with_production_sensors_knows_its_friction_near_the_limit_and_finds_a_jump():
+    car = vehicles.named_car("suv", "seven-dof")
+    told = vehicles.specification_of(vehicles.kit.CARS["suv"]())
+    drive = manoeuvres.random_steering(20.0, 0.05, jax.random.key(8), lowest=0.2, highest=0.7, duration=24.0)
+    suite = sensors.production_car(float(car.wheel_radius), gnss=False)
+    log = simulate(car, drive, suite, jax.random.key(9), road=roads.MuJump(0.8, 0.4, 240.0), solver="explicit")
+    channels = {name: log[name] for name in ("steer", "yaw_rate", "a_y", "a_x")} | {"v_x": log["true.v_x"]}
+    units = {name: log.unit(name) for name in ("steer", "yaw_rate", "a_y", "a_x")} | {"v_x": "m/s"}
+    said = friction.estimate(told, Recording(log.time, channels, units))
+    truth, time = np.asarray(log["true.friction_fl"]), np.asarray(log.time)
+    error = np.abs(np.asarray(said["friction"]) / truth - 1.0)
+    known, wrong = np.asarray(said.known.friction), error > 0.2
+    assert known[time > 14.0].mean() > 0.2
+    assert np.mean(wrong[known]) < 0.05
+    assert np.mean(error[known & (time > 14.0)] < 0.1) > 0.8
+    used = np.hypot(log["true.F_y"], log["true.F_x"]) / (told.mass * 9.81 * truth)
+    assert used[time > 13.0].max() > 0.8

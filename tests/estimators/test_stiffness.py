@@ -1,0 +1,101 @@
+"""Cornering stiffness: each method on a linear single track whose stiffnesses are known, and on a simulated car."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import method_logs
+import numpy as np
+import pytest
+
+from jaxveh import Recording, manoeuvres, sensors, simulate, vehicles
+from jaxveh.estimators import stiffness
+
+# Equation 16 is exact for this inertia.
+CAR = dataclasses.replace(method_logs.CAR, yaw_inertia=1500.0 * 1.2 * 1.5)
+FRONT, REAR, SPEED, DT = 0.9e5, 1.5e5, 20.0, 0.01
+T = np.arange(0.0, 60.0, DT)
+SHOWN = {"front_cornering_stiffness": FRONT, "rear_cornering_stiffness": REAR}
+
+
+def drive(noise=0.0, lean=0.0, offset=0.0):
+    """A linear single track of FRONT and REAR, as sensors show it, and the satellite's course."""
+    rng = np.random.default_rng(3)
+    steer = 0.01 * np.sum([np.sin(rate * T + rate) for rate in (1.1, 2.3, 4.7, 7.1)], axis=0)
+    a, b, m, j = CAR.front_axle_to_cg, CAR.rear_axle_to_cg, CAR.mass, CAR.yaw_inertia
+    A = np.array([
+        [-(FRONT + REAR) / (m * SPEED), (b * REAR - a * FRONT) / (m * SPEED) - SPEED],
+        [(b * REAR - a * FRONT) / (j * SPEED), -(a * a * FRONT + b * b * REAR) / (j * SPEED)],
+    ])  # fmt: skip
+    B = np.array([FRONT / m, a * FRONT / j])
+    step = np.linalg.inv(np.eye(2) - 0.5 * DT * A)
+    x, states = np.zeros(2), []
+    for k in range(len(T)):
+        states.append(x)
+        middle = 0.5 * (steer[k] + steer[min(k + 1, len(T) - 1)])
+        x = step @ ((np.eye(2) + 0.5 * DT * A) @ x + DT * B * middle)
+    v_y, yaw_rate = np.array(states).T
+    a_y = (A[0, 0] * v_y + (A[0, 1] + SPEED) * yaw_rate) + B[0] * steer
+    yaw = np.cumsum(yaw_rate) * DT
+    late = lambda values, by: np.interp(T - by, T, values)
+    noisy = lambda values, std: values + noise * std * rng.normal(size=len(T))
+    course = np.where(np.arange(len(T)) % 20 == 0, noisy(late(yaw + v_y / SPEED, 0.15), 0.0025), np.nan)
+    return {
+        "v_x": np.full(T.shape, SPEED), "steer": steer + offset, "yaw_rate": noisy(late(yaw_rate, 0.025), 0.002),
+        "a_y": noisy((1.0 + lean) * late(a_y, 0.025), 0.05), "course": (course + np.pi) % (2.0 * np.pi) - np.pi,
+    }  # fmt: skip
+
+
+def estimated(name, channels, car=CAR):
+    method = stiffness.METHODS[name].make(car)
+    units = {need.channel: need.unit for need in method.needs}
+    channels = {n: v for n, v in channels.items() if n in units}
+    return stiffness.estimate(car, Recording(T, channels, {n: units[n] for n in channels}), method=name)
+
+
+@pytest.mark.parametrize(("name", "within"), [("walking", 0.05), ("axle_forces", 0.05), ("derivatives", 0.05)])
+def test_a_linear_car_without_noise_shows_its_stiffnesses(name, within):
+    lean = 0.059
+    said = estimated(name, drive(lean=lean))
+    for field, truth in SHOWN.items():
+        np.testing.assert_allclose(said[field][-1], truth, rtol=within, err_msg=field)
+        assert name == "axle_forces" or bool(getattr(said.known, field)[-1])
+
+
+def test_the_recommended_one_lives_with_noise_offsets_and_another_lean_and_its_spread_is_honest():
+    squares = []
+    for lean, offset in ((0.02, 0.001), (0.1, -0.001)):
+        said = estimated("walking", drive(noise=1.0, lean=lean, offset=offset))
+        for field, truth in SHOWN.items():
+            np.testing.assert_allclose(said[field][-1], truth, rtol=0.07, err_msg=f"{field} {lean}")
+            squares.append(((said[field][-1] - truth) / getattr(said.std, field)[-1]) ** 2)
+    assert np.mean(squares) < 3.0
+
+
+def test_straight_ahead_nothing_is_known():
+    straight = {name: np.zeros_like(values) for name, values in drive().items()} | {"v_x": np.full(T.shape, SPEED)}
+    for name in stiffness.METHODS:
+        said = estimated(name, straight)
+        for field in SHOWN:
+            assert not np.asarray(getattr(said.known, field)).any(), (name, field)
+
+
+@pytest.mark.studies
+def test_a_minute_of_ordinary_driving_shows_a_simulated_cars_stiffness_from_a_file_that_is_a_quarter_off():
+    car = vehicles.named_car("suv", "seven-dof")
+    told = vehicles.specification_of(vehicles.kit.CARS["suv"]())
+    assert told.front_cornering_stiffness and told.rear_cornering_stiffness
+    manoeuvre = manoeuvres.random_steering(22.0, 0.012, jax.random.key(4), lowest=0.1, highest=0.8, duration=60.0)
+    suite = sensors.production_car(float(car.wheel_radius))
+    log = simulate(car, manoeuvre, suite, jax.random.key(5), solver="explicit")
+    names = ("steer", "yaw_rate", "a_y", "course")
+    channels = {name: log[name] for name in names} | {"v_x": log["true.v_x"]}
+    units = {name: log.unit(name) for name in names} | {"v_x": "m/s"}
+    truth = (told.front_cornering_stiffness, told.rear_cornering_stiffness)
+    wrong = dataclasses.replace(
+        told, front=None, rear=None, front_cornering_stiffness=1.25 * truth[0], rear_cornering_stiffness=0.8 * truth[1]
+    )
+    said = stiffness.estimate(wrong, Recording(log.time, channels, units))
+    for field, value in zip(SHOWN, truth, strict=True):
+        np.testing.assert_allclose(said[field][-1], value, rtol=0.1, err_msg=field)
+    assert jnp.isfinite(said.std.front_cornering_stiffness).all()
