@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.estimators.stiffness.least_squares import AxleForces, Derivatives
@@ -41,6 +43,11 @@ METHODS = {
 }
 
 RECOMMENDED = "walking"
+
+
+def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+    """What the car's file says."""
+    return {name: np.full(len(recording), getattr(car, name)) for name in SHOWN}
 
 
 def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
