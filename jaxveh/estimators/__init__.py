@@ -1,6 +1,6 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
-from jaxveh.estimators import kit, mass_and_grade, sideslip, speed
+from jaxveh.estimators import kit, mass_and_grade, navigation, sideslip, speed
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.contract import Calibration, Span
@@ -30,6 +30,7 @@ __all__ = [
     "held_rows",
     "kit",
     "mass_and_grade",
+    "navigation",
     "observe",
     "open_loop",
     "open_loop_of",
