@@ -13,14 +13,11 @@ from jaxveh.estimators.navigation.window import rotate
 from jaxveh.vehicles import GRAVITY
 
 ROLLS, BALANCE = "rolls", "slip_balance"
-"""m/s: how much faster to the left the rear axle goes than where it points, which is nothing at a crawl; and than its force asks
-for. Both are measured to be nothing."""
+"""m/s: how much faster to the left the rear axle goes than where it points, which is little as long as nothing pushes the car
+aside; and than its force asks for. Both are measured to be nothing."""
 
 STANDS = "stands"
 """rad: how much more the body rolls and dips than its springs ask for, measured to be nothing as well."""
-
-CRAWL, FADES = 3.0, 1.5
-"""m/s: the axle rolls where it points at less, and by `FADES` more the less it is believed by a factor of e."""
 
 SATURATED = 0.93
 """The share of the grip beyond which the force no longer tells the slip angle."""
@@ -64,8 +61,9 @@ def observation(system: Navigator, t, x, u) -> Any:
     }
     rolling = system.rear_axle_to_cg * yaw_rate
     if parts.wheels:
-        # Wheels do not know the direction in which they turn.
-        seen["wheel_speed"] = (1.0 + x.wheel_scale) * numerics.sqrt(jnp.square(x.v_x) + 1e-4)
+        # Wheels do not know the direction in which they turn; pushing forward they turn faster.
+        slips = x.wheel_scale + x.wheel_slip * system.forces(x, u)[0]
+        seen["wheel_speed"] = (1.0 + slips) * numerics.sqrt(jnp.square(x.v_x) + 1e-4)
     if parts.axle == "none":
         seen[ROLLS] = x.v_y - rolling
     else:
@@ -111,21 +109,24 @@ def antenna_velocity(system: Navigator, x, u) -> tuple[Any, Any]:
 def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
     """The slip angle (rad) that the rear axle's force asks for, how much it grows with the force over load, and that.
 
-    Linear: force over load = stiffness angle. Saturating: `F = c a / sqrt(1 + (c a / grip)^2)`, whose inverse has a closed form.
+    Linear: force over load = stiffness angle. Saturating: `F = c a / (1 + |c a / grip|^shape)^(1 / shape)`, whose inverse has a
+    closed form.
     """
-    f_x, f_y = system.forces(x, u)
+    f_y = system.forces(x, u)[1]
     a, length = system.front_axle_to_cg, system.wheelbase
     force = (a * system.mass * f_y - system.yaw_inertia * u.yaw_acceleration) / length
-    load = system.mass * (GRAVITY * a + system.cg_height * f_x) / length
+    # The accelerometer as it speaks: no error of the law should be taken for an error of it.
+    load = system.mass * (GRAVITY * a + system.cg_height * u.a_x) / length
     share = force / jnp.maximum(load, 0.2 * GRAVITY * system.mass * a / length)
     stiffness = system.stiffness * (jnp.exp(x.stiffening) if system.parts.adapts else 1.0)
     if system.parts.axle == "linear":
         angle, slope = share / stiffness, 1.0 / stiffness + 0.0 * share
     else:
         used = numerics.smooth_clip(share / system.grip, -SATURATED, SATURATED, BEND)
-        rest = 1.0 - jnp.square(used)
-        angle = used * system.grip / (stiffness * numerics.sqrt(rest))
-        slope = 1.0 / (stiffness * rest * numerics.sqrt(rest))
+        # A little more than zero: a power of zero has no slope.
+        rest = 1.0 - numerics.sqrt(jnp.square(used) + 1e-12) ** system.shape
+        angle = used * system.grip / stiffness * rest ** (-1.0 / system.shape)
+        slope = rest ** (-1.0 - 1.0 / system.shape) / stiffness
     return jnp.clip(angle, -STEEPEST, STEEPEST), slope, share
 
 
@@ -163,9 +164,10 @@ def noise(system: Navigator, t, x, u) -> dict[str, Any]:
         f"{STANDS}_pitch": system.lean_error,
     }
     if parts.wheels:
-        std["wheel_speed"] = system.wheel_error + system.wheel_slip * jnp.abs(u.a_x) * moving
+        std["wheel_speed"] = system.wheel_error + system.wheel_slip_error * jnp.abs(u.a_x) * moving
     if parts.axle == "none":
-        std[ROLLS] = 0.1 * jnp.exp(jnp.clip((moving - CRAWL) / FADES, 0.0, 9.0))
+        slip = system.rolling_slip + system.slip_gradient * jnp.abs(system.forces(x, u)[1])
+        std[ROLLS] = (0.02 + moving * slip) * numerics.sqrt(system.slip_time / u.step)
     else:
         angle, slope, share = axle_slip(system, x, u)
         white = system.slip_noise / numerics.sqrt(jnp.maximum(u.step, 1e-4))
@@ -196,7 +198,7 @@ def report(system: Navigator, t, x, u) -> Any:
     }
     shown |= {name: value for name, value in x._asdict().items() if name.startswith("bias_")}
     if system.parts.wheels:
-        shown["wheel_scale"] = x.wheel_scale
+        shown |= {"wheel_scale": x.wheel_scale, "wheel_slip": x.wheel_slip}
     if system.parts.axle != "none":
         weight = system.mass * GRAVITY * system.front_axle_to_cg / system.wheelbase
         adapted = jnp.exp(x.stiffening) if system.parts.adapts else 1.0

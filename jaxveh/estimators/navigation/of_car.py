@@ -9,7 +9,7 @@ from typing import Any
 from jaxveh._core.errors import InputError
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.system import PLAIN, Navigator, Parts
-from jaxveh.io import CarSpecification
+from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 SATELLITE_DELAY, CAMERA_DELAY, UNIT_DELAY = 0.15, 0.08, 0.01
@@ -61,10 +61,39 @@ def _axle(car: CarSpecification) -> dict[str, float]:
     stiffness = car.rear_cornering_stiffness
     if stiffness is None:
         raise InputError("navigation: the car's file has no rear_cornering_stiffness (N/rad); give it.")
-    grip = 1.0
+    told = {"stiffness": stiffness / weight}
     if car.rear is not None:
-        grip = car.rear.D / (weight if car.rear.nominal_load is None else car.rear.nominal_load)
-    return {"stiffness": stiffness / weight, "grip": grip}
+        peak = car.rear.D / (weight if car.rear.nominal_load is None else car.rear.nominal_load)
+        told |= {"grip": peak, "shape": _shape(car.rear)}
+    return told
+
+
+BEND = 0.8
+"""The share of its peak at which a file's Magic Formula and the curve here are alike."""
+
+
+def _shape(tyre: AxleTyre) -> float:
+    """How sharply the curve has to bend to be like a Magic Formula of these coefficients.
+
+    The formula's slip angle at `BEND` of its peak, times the stiffness, over that force is `(1 - BEND^shape)^(-1 / shape)`.
+    """
+    formula = lambda x: math.sin(tyre.C * math.atan(x - tyre.E * (x - math.atan(x))))
+    # The argument B a at which it has risen so far; formulas that never do have one far out.
+    x = _crossing(lambda x: formula(x) - BEND, 0.0, 50.0)
+    stretch = max(tyre.C * x / BEND, 1.0 + 1e-3)
+    return _crossing(lambda shape: stretch - (1.0 - BEND**shape) ** (-1.0 / shape), *SHAPES)
+
+
+SHAPES = 1.0, 8.0
+"""No curve bends less sharply, or more."""
+
+
+def _crossing(rising: Callable[[float], float], low: float, high: float) -> float:
+    """Where a rising function is zero, by halving; an end where it is not between them."""
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if rising(middle) > 0 else (middle, high)
+    return 0.5 * (low + high)
 
 
 def _or(value: float | None, usual: float) -> float:

@@ -45,10 +45,12 @@ class Navigator(eqx.Module):
     - `along`, `across` (m/s): standard deviations of the satellites' velocity; `heading_error` (rad) of two antennas.
     - `bank_time`, `grade_time` (s): memories of the slow tilts, first-order Gauss-Markov.
     - `dip_gradient` (rad s^2/m): by how much the nose dips for each m/s^2 of braking.
-    - `wheel_error` (m/s), `wheel_slip` (s^2/m): standard deviation of the rear wheels' speed, and what of it comes with
+    - `wheel_error` (m/s), `wheel_slip_error` (s^2/m): standard deviation of the rear wheels' speed, and what of it comes with
       acceleration, as a share of speed; `lean_error` (rad): of a body's roll by its springs.
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m); `stiffness` (1/rad) and `grip`
-      (-): cornering stiffness and largest lateral force of the rear axle over its load; `slip_time` (s): memory of the error of
+      (-): cornering stiffness and largest lateral force of the rear axle over its load, `shape` (-): how sharply the curve
+      between bends; `rolling_slip` (rad), `slip_gradient`
+      (rad s^2/m): where no law of it is taken, its slip angle is within this, and this for each m/s^2; `slip_time` (s): memory of the error of
       its slip angle; `slip_noise` (rad sqrt s): the white part; `force_noise` (-): of the force over load, a row.
     - `lane_error` (m), `lane_angle_error` (rad), `bend_time` (s): of the camera, and the memory of the lane's curvature;
       `camera_x` (m): where it says how far the lane's middle is away, ahead of the centre of gravity.
@@ -68,8 +70,8 @@ class Navigator(eqx.Module):
     bank_time: jax.Array = positive("s", default=7.0)
     grade_time: jax.Array = positive("s", default=10.0)
     dip_gradient: jax.Array = parameter("rad s^2/m", scale=0.003, default=0.004)
-    wheel_error: jax.Array = positive("m/s", default=0.3)
-    wheel_slip: jax.Array = positive("s^2/m", default=0.01)
+    wheel_error: jax.Array = positive("m/s", default=0.5)
+    wheel_slip_error: jax.Array = positive("s^2/m", default=0.01)
     lean_error: jax.Array = positive("rad", default=0.01)
     mass: jax.Array = positive("kg", default=1500.0)
     yaw_inertia: jax.Array = positive("kg m^2", default=2500.0)
@@ -78,6 +80,9 @@ class Navigator(eqx.Module):
     cg_height: jax.Array = positive("m", default=0.55)
     stiffness: jax.Array = positive("1/rad", default=16.0)
     grip: jax.Array = positive("-", default=1.0)
+    shape: jax.Array = positive("-", default=2.5)
+    rolling_slip: jax.Array = positive("rad", default=0.002)
+    slip_gradient: jax.Array = positive("rad s^2/m", default=0.006)
     slip_time: jax.Array = positive("s", default=1.5)
     slip_noise: jax.Array = positive("rad s^0.5", default=5e-4)
     force_noise: jax.Array = positive("-", default=0.01)
@@ -126,7 +131,7 @@ def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
 
     Speeds (m/s) and yaw (rad) at the centre of gravity; `bias_` of each axis (m/s^2, rad/s); `bank`, `grade` (rad) that the car
     stands on; `lean_gradient` (rad s^2/m): roll on its springs for each m/s^2; `lean`, `dip` (rad): roll and pitch on its
-    springs; `wheel_scale` (-) of the rear wheels' speed; `slip_error` (rad) of the axle's law, `stiffening`: the logarithm of its
+    springs; `wheel_scale` (-) of the rear wheels' speed, and their `wheel_slip` (s^2/m) for each m/s^2 of push; `slip_error` (rad) of the axle's law, `stiffening`: the logarithm of its
     stiffness over the file's; `lane_offset` (m), `lane_heading` (rad) against the lane, to the left, and its `bend` (1/m).
     """
     degree = jnp.pi / 180
@@ -140,7 +145,7 @@ def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
         "bias_yaw_rate": (0.0, 0.3 * degree, 0.01 * degree),
         "bank": (0.0, 0.02, walk(0.02, 7.0)),
         "grade": (0.0, 0.02, walk(0.02, 10.0)),
-        "lean_gradient": (0.006, 0.002, 1e-5),
+        "lean_gradient": (0.008, 0.005, 1e-5),
     }
     if parts.three_more:
         states |= {
@@ -151,11 +156,11 @@ def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
             "bias_pitch_rate": (0.0, 0.3 * degree, 0.01 * degree),
         }
     if parts.wheels:
-        states |= {"wheel_scale": (0.0, 0.01, 1e-4)}
+        states |= {"wheel_scale": (0.0, 0.01, 1e-4), "wheel_slip": (0.0, 0.01, 1e-5)}
     if parts.axle != "none":
-        states |= {"slip_error": (0.0, 0.004, walk(0.004, 1.5))}
+        states |= {"slip_error": (0.0, 0.003, walk(0.003, 1.5))}
     if parts.adapts:
-        states |= {"stiffening": (0.0, 0.15, 0.005)}
+        states |= {"stiffening": (0.0, 0.15, 0.01)}
     if parts.camera:
         states |= {
             "lane_offset": (0.0, 1.0, 0.01),
