@@ -7,6 +7,7 @@ from typing import Any
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
+from jaxveh.estimators.navigation.multi_rate import multi_rate
 from jaxveh.estimators.navigation.of_car import navigation, navigation_of
 from jaxveh.estimators.navigation.system import Navigator, Parts
 
@@ -24,12 +25,6 @@ METHODS = {
     "two_antennas": MethodOfCar(
         navigation(Parts(heading=True)), "with the heading of two antennas", "section 1.3.2 [52, 53]"
     ),
-    "wheels": MethodOfCar(
-        navigation(Parts(wheels=True)), "with the rear wheels' speed, which holds in outages", "section 1.3.2 [49]"
-    ),
-    "linear_axle": MethodOfCar(
-        navigation(Parts(wheels=True, axle="linear")), "with a rear axle of known stiffness", "section 1.3.2 [46]"
-    ),
     "adapted_stiffness": MethodOfCar(
         navigation(Parts(wheels=True, axle="linear", adapts=True)),
         "with a rear axle whose stiffness satellites tell",
@@ -39,6 +34,9 @@ METHODS = {
         navigation(Parts(wheels=True, axle="saturating", adapts=True)),
         "with a rear axle that saturates, and adapts",
         "section 1.3.2 [46, 47], with another tyre law",
+    ),
+    "multi_rate": MethodOfCar(
+        multi_rate, "a linear single track with yaw rate, and the course at its own rate", "section 1.3.2 [51]"
     ),
     "camera": MethodOfCar(
         navigation(Parts(wheels=True, camera=True, axle="saturating")),

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from jaxveh._core.errors import InputError
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.system import PLAIN, Navigator, Parts
 from jaxveh.io import AxleTyre, CarSpecification
@@ -33,13 +32,11 @@ def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -
     A file that says no `antenna_position` has its antenna at the centre of gravity; without delays they are those of a usual
     series car, `SATELLITE_DELAY` and so on. `sensor_position` is the inertial unit's.
     """
-    low_pass = USUAL_LOW_PASS if car.low_pass is None else car.low_pass
-    # A Butterworth low-pass of second order delays slow signals by this.
-    sensor_lag = _or(car.inertial_delay, UNIT_DELAY) + math.sqrt(2.0) / (2.0 * math.pi * low_pass)
+    sensor_lag = unit_lag(car)
     antenna = car.antenna_position or (0.0, 0.0, 0.0)
     unit = car.sensor_position or (0.0, 0.0, 0.0)
     told = {
-        "lag": max(_or(car.satellite_delay, SATELLITE_DELAY) - sensor_lag, 0.0),
+        "lag": satellite_lag(car),
         "camera_lag": max(_or(car.camera_delay, CAMERA_DELAY) - sensor_lag, 0.0),
         "sensor_lag": sensor_lag,
         **dict(zip(("antenna_x", "antenna_y", "antenna_z"), antenna, strict=True)),
@@ -55,12 +52,22 @@ def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -
     return Navigation(navigation_model(Navigator(**{**told, **numbers}, parts=parts)))
 
 
+def unit_lag(car: CarSpecification) -> float:
+    """How late the inertial unit is, s: its delay, and that of a Butterworth low-pass of second order for slow signals."""
+    low_pass = USUAL_LOW_PASS if car.low_pass is None else car.low_pass
+    return _or(car.inertial_delay, UNIT_DELAY) + math.sqrt(2.0) / (2.0 * math.pi * low_pass)
+
+
+def satellite_lag(car: CarSpecification) -> float:
+    """How much later satellites speak than the inertial unit, s."""
+    return max(_or(car.satellite_delay, SATELLITE_DELAY) - unit_lag(car), 0.0)
+
+
 def _axle(car: CarSpecification) -> dict[str, float]:
     """Stiffness and grip of the rear axle, over its load at rest."""
     weight = car.mass * GRAVITY * car.front_axle_to_cg / car.wheelbase
-    stiffness = car.rear_cornering_stiffness
-    if stiffness is None:
-        raise InputError("navigation: the car's file has no rear_cornering_stiffness (N/rad); give it.")
+    # A file's axle always has one: its own, or that of its coefficients.
+    stiffness = car.rear_cornering_stiffness or 0.0
     told = {"stiffness": stiffness / weight}
     if car.rear is not None:
         peak = car.rear.D / (weight if car.rear.nominal_load is None else car.rear.nominal_load)

@@ -49,9 +49,8 @@ class Navigator(eqx.Module):
       acceleration, as a share of speed; `lean_error` (rad): of a body's roll by its springs.
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m); `stiffness` (1/rad) and `grip`
       (-): cornering stiffness and largest lateral force of the rear axle over its load, `shape` (-): how sharply the curve
-      between bends; `rolling_slip` (rad), `slip_gradient`
-      (rad s^2/m): where no law of it is taken, its slip angle is within this, and this for each m/s^2; `slip_time` (s): memory of the error of
-      its slip angle; `slip_noise` (rad sqrt s): the white part; `force_noise` (-): of the force over load, a row.
+      between bends; `rolling_slip` (rad), `slip_gradient` (rad s^2/m): where no law of it is taken, its slip angle is within
+      this, and this for each m/s^2; `slip_time` (s): memory of the error of its slip angle; `slip_noise` (rad sqrt s): the white part; `force_noise` (-): of the force over load, a row.
     - `lane_error` (m), `lane_angle_error` (rad), `bend_time` (s): of the camera, and the memory of the lane's curvature;
       `camera_x` (m): where it says how far the lane's middle is away, ahead of the centre of gravity.
     """
@@ -131,8 +130,9 @@ def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
 
     Speeds (m/s) and yaw (rad) at the centre of gravity; `bias_` of each axis (m/s^2, rad/s); `bank`, `grade` (rad) that the car
     stands on; `lean_gradient` (rad s^2/m): roll on its springs for each m/s^2; `lean`, `dip` (rad): roll and pitch on its
-    springs; `wheel_scale` (-) of the rear wheels' speed, and their `wheel_slip` (s^2/m) for each m/s^2 of push; `slip_error` (rad) of the axle's law, `stiffening`: the logarithm of its
-    stiffness over the file's; `lane_offset` (m), `lane_heading` (rad) against the lane, to the left, and its `bend` (1/m).
+    springs; `wheel_scale` (-) of the rear wheels' speed, and their `wheel_slip` (s^2/m) for each m/s^2 of push; `slip_error`
+    (rad) of the axle's law, `stiffening`: the logarithm of its stiffness over the file's; `lane_offset` (m), `lane_heading` (rad)
+    against the lane, to the left, and its `bend` (1/m).
     """
     degree = jnp.pi / 180
     walk = lambda std, time: std * (2.0 / time) ** 0.5
