@@ -62,7 +62,7 @@ def observation(system: Navigator, t, x, u) -> Any:
     rolling = system.rear_axle_to_cg * yaw_rate
     if parts.wheels:
         # Wheels do not know the direction in which they turn; pushing forward they turn faster.
-        slips = x.wheel_scale + x.wheel_slip * system.forces(x, u)[0]
+        slips = x.wheel_scale + x.wheel_slip * u.a_x
         seen["wheel_speed"] = (1.0 + slips) * numerics.sqrt(jnp.square(x.v_x) + 1e-4)
     if parts.axle == "none":
         seen[ROLLS] = x.v_y - rolling
@@ -153,21 +153,23 @@ def noise(system: Navigator, t, x, u) -> dict[str, Any]:
     """Standard deviations by channel. The course's is the velocity's error across, over speed."""
     del t
     parts, moving = system.parts, numerics.sqrt(jnp.square(x.v_x) + jnp.square(x.v_y) + SLOWEST**2)
+    # An error that lasts is told once in its time, not in every row.
+    lasting = numerics.sqrt(system.slip_time / u.step)
     std = {
         "speed": system.along,
         "course": system.across / moving,
         "heading": system.heading_error,
         "lane_offset": system.lane_error,
         "lane_heading": system.lane_angle_error,
-        "a_z": 0.5,
-        f"{STANDS}_roll": system.lean_error,
-        f"{STANDS}_pitch": system.lean_error,
+        "a_z": 0.3 * lasting,
+        f"{STANDS}_roll": system.lean_error * lasting,
+        f"{STANDS}_pitch": system.lean_error * lasting,
     }
     if parts.wheels:
         std["wheel_speed"] = system.wheel_error + system.wheel_slip_error * jnp.abs(u.a_x) * moving
     if parts.axle == "none":
         slip = system.rolling_slip + system.slip_gradient * jnp.abs(system.forces(x, u)[1])
-        std[ROLLS] = (0.02 + moving * slip) * numerics.sqrt(system.slip_time / u.step)
+        std[ROLLS] = (0.02 + moving * slip) * lasting
     else:
         angle, slope, share = axle_slip(system, x, u)
         white = system.slip_noise / numerics.sqrt(jnp.maximum(u.step, 1e-4))

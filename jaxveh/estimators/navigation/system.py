@@ -49,8 +49,9 @@ class Navigator(eqx.Module):
       acceleration, as a share of speed; `lean_error` (rad): of a body's roll by its springs.
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m); `stiffness` (1/rad) and `grip`
       (-): cornering stiffness and largest lateral force of the rear axle over its load, `shape` (-): how sharply the curve
-      between bends; `rolling_slip` (rad), `slip_gradient` (rad s^2/m): where no law of it is taken, its slip angle is within
-      this, and this for each m/s^2; `slip_time` (s): memory of the error of its slip angle; `slip_noise` (rad sqrt s): the white part; `force_noise` (-): of the force over load, a row.
+      between bends; `slip_noise` (rad sqrt s): the white part of the slip angle's error, `force_noise` (-): of the force over
+      load, a row. Where no law is taken, the slip angle is within `rolling_slip` (rad) and `slip_gradient` (rad s^2/m) times the
+      force over mass. `slip_time` (s): memory of errors that last, these, that of `slip_error`, and of how the body stands.
     - `lane_error` (m), `lane_angle_error` (rad), `bend_time` (s): of the camera, and the memory of the lane's curvature;
       `camera_x` (m): where it says how far the lane's middle is away, ahead of the centre of gravity.
     """
@@ -140,9 +141,9 @@ def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
         "v_x": (0.0, 1.0, 0.02),
         "v_y": (0.0, 0.5, 0.02),
         "yaw": (0.0, 0.03, 5e-4),
-        "bias_a_x": (0.0, 0.15, 2e-3),
-        "bias_a_y": (0.0, 0.15, 2e-3),
-        "bias_yaw_rate": (0.0, 0.3 * degree, 0.01 * degree),
+        "bias_a_x": (0.0, 0.1, 2e-3),
+        "bias_a_y": (0.0, 0.1, 2e-3),
+        "bias_yaw_rate": (0.0, 0.2 * degree, 0.01 * degree),
         "bank": (0.0, 0.02, walk(0.02, 7.0)),
         "grade": (0.0, 0.02, walk(0.02, 10.0)),
         "lean_gradient": (0.008, 0.005, 1e-5),
@@ -151,14 +152,14 @@ def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
         states |= {
             "lean": (0.0, 0.02, 1e-3),
             "dip": (0.0, 0.02, 1e-3),
-            "bias_a_z": (0.0, 0.15, 2e-3),
-            "bias_roll_rate": (0.0, 0.3 * degree, 0.01 * degree),
-            "bias_pitch_rate": (0.0, 0.3 * degree, 0.01 * degree),
+            "bias_a_z": (0.0, 0.1, 2e-3),
+            "bias_roll_rate": (0.0, 0.2 * degree, 0.01 * degree),
+            "bias_pitch_rate": (0.0, 0.2 * degree, 0.01 * degree),
         }
     if parts.wheels:
         states |= {"wheel_scale": (0.0, 0.01, 1e-4), "wheel_slip": (0.0, 0.01, 1e-5)}
     if parts.axle != "none":
-        states |= {"slip_error": (0.0, 0.003, walk(0.003, 1.5))}
+        states |= {"slip_error": (0.0, 0.0025, walk(0.0025, 1.5))}
     if parts.adapts:
         states |= {"stiffening": (0.0, 0.15, 0.01)}
     if parts.camera:
