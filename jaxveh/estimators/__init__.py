@@ -1,6 +1,6 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
-from jaxveh.estimators import friction, kit, learned, mass_and_grade, sideslip, speed, stiffness
+from jaxveh.estimators import friction, kit, learned, mass_and_grade, navigation, sideslip, speed, stiffness
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.comparison import Compared, MethodScore, compare, score_answers
@@ -36,6 +36,7 @@ __all__ = [
     "kit",
     "learned",
     "mass_and_grade",
+    "navigation",
     "observe",
     "open_loop",
     "open_loop_of",

@@ -35,6 +35,9 @@ TOLD_SPEED = "v_x"
 PROCESS_NOISE = {"v_x": 0.1, "v_y": 0.1, "yaw_rate": 0.05}
 """Default spreads of what a car's equations leave out: m/s and rad/s, per root second."""
 
+DIRECTIONS = ("yaw", "course")
+"""Outputs that are directions in the world: sensors say them to a whole turn, so that their innovations wrap."""
+
 START_SPREAD = {"v_x": 0.5, "v_y": 0.2, "yaw": 0.02, "yaw_rate": 0.02}
 """Default spreads of the start state: m/s, rad, rad/s."""
 
@@ -72,6 +75,7 @@ def state_space(
     - `report`: outputs of the car to show beside its states, such as `sideslip`, `F_yf`, `slip_angle_front`; by default the
       sideslip of a car that has one.
     - `solver`, `steps`: fixed steps between two rows; `input_path`: inputs `held` over a step or `linear`.
+    - A measured `yaw` or `course` may be told to a whole turn (within -pi to pi): their innovations wrap.
 
     The estimate's fields are the states, then `report`, then the parameters (`front_B`), in physical units.
     **Raises** `InputError` for unknown names, spreads that are not positive, sensors that are no `SensorSet` or measure what the
@@ -93,6 +97,7 @@ def state_space(
         prior=_start(system, start or {}, start_spread or {}),
         inputs=system.inputs,
         input_path=input_path,
+        angles=tuple(name for name in sensors.channels if name in DIRECTIONS),
     )
     if estimate is None:
         return model

@@ -40,6 +40,10 @@ rolling_resistance = 0.01            # force over load
 front_drive = 1.0                    # the front axle's share of the driving torque
 front_brake = 0.65                   # the front axle's share of the braking torque
 brake_torque_per_pressure = 1.6e-3   # N m/Pa: braking torque of all wheels together over the line pressure
+antenna_position = [-0.5, 0.0, 0.9]  # m from the centre of gravity: of the satellites' antenna
+satellite_delay = 0.15               # s by which speed and course of satellites are late
+inertial_delay = 0.01                # s by which accelerometers and gyroscope are late beside their low-pass
+camera_delay = 0.08                  # s by which a camera's lane is late
 # front_tyre = "tyres/front.tir"     # the tyre property file of a front wheel, from this file's folder
 # rear_tyre = "tyres/rear.tir"
 
@@ -62,7 +66,7 @@ E = 0.2
 """The file's schema as a commented example that reads, for programs to print."""
 
 
-PLACES = ("sensor_position", "reference_position")
+PLACES = ("sensor_position", "reference_position", "antenna_position")
 """Keys whose values are [x, y, z]."""
 
 
@@ -98,8 +102,9 @@ class CarSpecification:
     Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
     `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`,
     `reference_position`: x, y, z in metres from the centre of gravity of the accelerometer and of a reference for sideslip.
-    `low_pass`: cutoff in hertz, of second order. `front_tyre`, `rear_tyre`: paths of the tyre property files of a wheel, which
-    nobody opens before a car on four wheels is built.
+    `antenna_position`: likewise of the satellites' antenna; `satellite_delay`, `inertial_delay`, `camera_delay` in seconds: how
+    late these speak, an inertial unit's low-pass left out. `low_pass`: cutoff in hertz, of second order. `front_tyre`,
+    `rear_tyre`: paths of the tyre property files of a wheel, which nobody opens before a car on four wheels is built.
 
     **Raises** `InputError` with name, value and allowed range for what no car has, such as a negative mass.
     """
@@ -126,6 +131,10 @@ class CarSpecification:
     front_drive: float | None = _number(0.0, 1.0, default=None)
     front_brake: float | None = _number(0.0, 1.0, default=None)
     brake_torque_per_pressure: float | None = _number(0.0, 10.0, "N m/Pa", default=None)
+    antenna_position: tuple[float, float, float] | None = _number(-30.0, 30.0, "m", default=None)
+    satellite_delay: float | None = _number(0.0, 5.0, "s", default=None)
+    inertial_delay: float | None = _number(0.0, 5.0, "s", default=None)
+    camera_delay: float | None = _number(0.0, 5.0, "s", default=None)
     front_tyre: str | None = None
     rear_tyre: str | None = None
     front: AxleTyre | None = None

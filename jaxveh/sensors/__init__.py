@@ -1,5 +1,6 @@
 """What a car measures: sets of channels as filters see them, and devices that speak as those of a real car do."""
 
+from jaxveh.sensors.camera import LaneCamera
 from jaxveh.sensors.device import AbstractDevice, AbstractInstrument
 from jaxveh.sensors.faults import AbstractFault, BiasStep, Dropout, Spikes, Stuck
 from jaxveh.sensors.gnss import GNSS
@@ -30,6 +31,7 @@ __all__ = [
     "BrakeTorque",
     "Dropout",
     "Instrumented",
+    "LaneCamera",
     "LowPass",
     "Measured",
     "MotorTorque",

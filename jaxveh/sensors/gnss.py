@@ -19,8 +19,9 @@ from jaxveh.sensors.sensor_set import Position
 from jaxveh.sensors.signal import Signal
 from jaxveh.sensors.spans import as_spans, check_spans, inside
 
-_ALONG, _ACROSS, _X, _Y, _OUTAGES = range(5)
+_ALONG, _ACROSS, _X, _Y, _OUTAGES, _HEADING = range(6)
 _UNITS = {"speed": "m/s", "course": "rad", "x": "m", "y": "m"}
+_HEADING_UNITS = {"heading": "rad"}
 
 
 class GNSS(AbstractInstrument):
@@ -31,7 +32,8 @@ class GNSS(AbstractInstrument):
     - `lowest` (m/s): below this measured speed the course is undefined, NaN.
     - `position`: a `Signal` with the errors (m) of x and of y, each drawn for itself; the world's axes are the car's.
       Receivers' positions wander slowly: give it a `drift` and a `drift_time`. None: no position is said.
-    - `antenna`: its `Position` from the centre of gravity.
+    - `antenna`: its `Position` from the centre of gravity. `heading`: a `Signal` with the errors (rad) of what a second antenna
+      tells, the yaw, as `heading` within -pi to pi, at standstill too. None: there is no second antenna.
     - `outages`: spans ((start, end), ...) in s in which nothing is said; `outage_rate` (1/s) and `outage_length`
       (mean, s) add random ones.
 
@@ -46,6 +48,7 @@ class GNSS(AbstractInstrument):
     outage_rate: jax.Array | None = positive("1/s", default=None)
     outage_length: jax.Array | None = positive("s", default=None)
     outages: tuple[tuple[float, float], ...] = eqx.field(static=True, converter=as_spans, default=())
+    heading: Signal | None = None
 
     def __check_init__(self):
         check_parameters(self)
@@ -56,23 +59,26 @@ class GNSS(AbstractInstrument):
             )
         if not (self.position is None or isinstance(self.position, Signal)):
             raise InputError(f"GNSS.position = {self.position!r}: must be a Signal with the errors in m, or None.")
+        if not (self.heading is None or isinstance(self.heading, Signal)):
+            raise InputError(f"GNSS.heading = {self.heading!r}: must be a Signal with the errors in rad, or None.")
         if not isinstance(self.antenna, Position):
             raise InputError(f"GNSS.antenna = {self.antenna!r}: must be a Position.")
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Speed and course, and the position where it has one."""
-        return tuple(_UNITS)[: 2 if self.position is None else 4]
+        """Speed and course, and the position and heading where it has them."""
+        own = tuple(_UNITS)[: 2 if self.position is None else 4]
+        return own if self.heading is None else (*own, *_HEADING_UNITS)
 
     @property
     def units(self) -> dict[str, str]:
         """m/s, rad, m."""
-        return {name: _UNITS[name] for name in self.channels}
+        return {name: (_UNITS | _HEADING_UNITS)[name] for name in self.channels}
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Velocity and heading, and the position where it is said."""
-        return ("v_x", "v_y", "yaw", "yaw_rate", *self.channels[2:])
+        return ("v_x", "v_y", "yaw", "yaw_rate", *(("x", "y") if self.position is not None else ()))
 
     @property
     def may_use(self) -> tuple[str, ...]:
@@ -84,6 +90,9 @@ class GNSS(AbstractInstrument):
         said = self._motion(outputs, key)
         if self.position is not None:
             said |= self._place(outputs, key)
+        if self.heading is not None:
+            told = self.heading.apply(outputs["yaw"], self.period, subkey(key, _HEADING))
+            said["heading"] = numerics.wrap_angle(told)
         silent = inside(times, self.outages)
         if self.outage_rate is not None and self.outage_length is not None:
             random = on_and_off(

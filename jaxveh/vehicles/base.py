@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.names import check_names
 from jaxveh.roads import LEVEL, Ground
 
@@ -30,6 +31,17 @@ class Motion(NamedTuple):
     v_x: Any
     v_y: Any
     yaw_rate: Any
+
+
+OVER_GROUND = {"speed": "m/s", "course": "rad"}
+"""Units of what `over_ground` says."""
+
+
+def over_ground(yaw: Any, v_x: Any, v_y: Any) -> dict[str, Any]:
+    """The velocity over ground as satellites tell it: its magnitude `speed` (m/s), and its direction `course` (rad) from the
+    world's x axis, `yaw + atan2(v_y, v_x)`, that of the yaw at standstill. It goes on with the yaw, which is unwrapped, and
+    jumps by a turn where the car slides backwards; backwards it is the direction in which the car goes."""
+    return {"speed": numerics.hypot(v_x, v_y), "course": yaw + numerics.arctan2(v_y, v_x)}
 
 
 SHARED = "**Parameters** of "

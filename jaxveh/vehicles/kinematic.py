@@ -9,7 +9,7 @@ import jax
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion, given_or_zero, with_batch_shape
+from jaxveh.vehicles.base import OVER_GROUND, AbstractVehicle, Motion, given_or_zero, over_ground, with_batch_shape
 from jaxveh.vehicles.wheels import gravity
 
 
@@ -23,7 +23,8 @@ class KinematicOutputs(NamedTuple):
     """What can be said without forces, at the reference point: speeds m/s, angles rad, rates rad/s, accelerations m/s^2.
 
     `a_x` and `a_y` are those of an ideal accelerometer in a turn of constant speed and steer; `sideslip` is that of the steer,
-    forwards and backwards alike, at standstill too; `curvature` (1/m) is that of the rear axle's path.
+    forwards and backwards alike, at standstill too; `curvature` (1/m) is that of the rear axle's path; `speed` and `course` are
+    over ground.
     """
 
     v_x: Any
@@ -34,6 +35,8 @@ class KinematicOutputs(NamedTuple):
     a_y: Any
     sideslip: Any
     curvature: Any
+    speed: Any
+    course: Any
 
 
 UNITS = {
@@ -42,6 +45,7 @@ UNITS = {
     **dict.fromkeys(("steer", "yaw", "sideslip"), "rad"),
     "yaw_rate": "rad/s",
     "curvature": "1/m",
+    **OVER_GROUND,
 }
 
 
@@ -117,5 +121,6 @@ class Kinematic(AbstractKinematic):
             a_y=u.v_x * moves.yaw_rate - g_y,
             sideslip=numerics.arctan(self.rear_axle_to_reference * curvature),
             curvature=curvature,
+            **over_ground(x.yaw, u.v_x, moves.v_y),
         )
         return KinematicState(moves.yaw_rate), with_batch_shape(outputs)

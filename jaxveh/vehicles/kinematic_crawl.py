@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import AbstractVehicle, Motion, with_batch_shape
+from jaxveh.vehicles.base import AbstractVehicle, Motion, over_ground, with_batch_shape
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
 
 
@@ -90,7 +90,11 @@ class KinematicCrawl(AbstractVehicle):
             sideslip=jnp.where(slow, sideslip_rate, rates.sideslip), yaw=moves.yaw_rate, yaw_rate=yaw_acceleration
         )
         shown = outputs._replace(
-            v_x=moves.v_x, v_y=moves.v_y, yaw_rate=moves.yaw_rate, yaw_acceleration=yaw_acceleration
+            v_x=moves.v_x,
+            v_y=moves.v_y,
+            yaw_rate=moves.yaw_rate,
+            yaw_acceleration=yaw_acceleration,
+            **over_ground(moves.yaw, moves.v_x, moves.v_y),
         )
         return rates, with_batch_shape(shown)
 

@@ -13,7 +13,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import check
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import Motion, given_or_zero, with_batch_shape
+from jaxveh.vehicles.base import OVER_GROUND, Motion, given_or_zero, over_ground, with_batch_shape
 from jaxveh.vehicles.kinematic import AbstractKinematic
 from jaxveh.vehicles.wheels import gravity
 
@@ -28,7 +28,7 @@ class KinematicTrailerState(NamedTuple):
 class KinematicTrailerOutputs(NamedTuple):
     """What can be said without forces, at the car's rear axle: speeds m/s, angles rad, rates rad/s, accelerations m/s^2 (of an
     ideal accelerometer in a turn of constant speed and steer); `trailer_yaw`, and `trailer_v_x` (m/s), the speed of the
-    trailer's axle along the trailer."""
+    trailer's axle along the trailer; `speed` and `course` over ground."""
 
     v_x: Any
     v_y: Any
@@ -41,6 +41,8 @@ class KinematicTrailerOutputs(NamedTuple):
     hitch_rate: Any
     trailer_yaw: Any
     trailer_v_x: Any
+    speed: Any
+    course: Any
 
 
 UNITS = {
@@ -48,6 +50,7 @@ UNITS = {
     **dict.fromkeys(("a_x", "a_y"), "m/s^2"),
     **dict.fromkeys(("steer", "yaw", "sideslip", "hitch_angle", "trailer_yaw"), "rad"),
     **dict.fromkeys(("yaw_rate", "hitch_rate"), "rad/s"),
+    **OVER_GROUND,
 }
 
 
@@ -120,5 +123,6 @@ class KinematicTrailer(AbstractKinematic):
             hitch_rate=hitch_rate,
             trailer_yaw=x.yaw + x.hitch_angle,
             trailer_v_x=u.v_x * cosine - swing * sine,
+            **over_ground(x.yaw, u.v_x, moves.v_y),
         )
         return KinematicTrailerState(yaw_rate, hitch_rate), with_batch_shape(outputs)

@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError, check_positive
 from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import GRAVITY, Motion, given_or_zero, with_batch_shape
+from jaxveh.vehicles.base import GRAVITY, Motion, given_or_zero, over_ground, with_batch_shape
 from jaxveh.vehicles.lateral_system import LateralSystem
 from jaxveh.vehicles.shared import AbstractOneTrack
 from jaxveh.vehicles.single_track import UNITS, SingleTrackOutputs
@@ -106,6 +106,7 @@ class LinearSingleTrack(AbstractOneTrack):
             F_yr=F_yr,
             load_front=front * weight * b,
             load_rear=rear * weight * a,
+            **over_ground(x.yaw, moves.v_x, moves.v_y),
         )
         return rates, with_batch_shape(outputs)
 

@@ -14,7 +14,7 @@ from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import Contact
-from jaxveh.vehicles.base import GRAVITY, Motion, with_batch_shape
+from jaxveh.vehicles.base import GRAVITY, OVER_GROUND, Motion, over_ground, with_batch_shape
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
 from jaxveh.vehicles.shared import AbstractOnAxleTyres
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
@@ -33,7 +33,7 @@ class SingleTrackOutputs(NamedTuple):
     """What can be said of a single track at one instant, at the centre of gravity, in the body's axes.
 
     Speeds m/s, angles rad, rates rad/s, accelerations m/s^2 (those of an ideal accelerometer), axle
-    forces in the wheel's axes and loads N. `sideslip = atan2(v_y, v_x)`, zero at standstill.
+    forces in the wheel's axes and loads N. `sideslip = atan2(v_y, v_x)`, zero at standstill; `speed` and `course` over ground.
     """
 
     v_x: Any
@@ -50,6 +50,8 @@ class SingleTrackOutputs(NamedTuple):
     F_yr: Any
     load_front: Any
     load_rear: Any
+    speed: Any
+    course: Any
 
 
 UNITS = {
@@ -59,6 +61,7 @@ UNITS = {
     "yaw_rate": "rad/s",
     "yaw_acceleration": "rad/s^2",
     **dict.fromkeys(("F_yf", "F_yr", "load_front", "load_rear"), "N"),
+    **OVER_GROUND,
 }
 
 
@@ -149,6 +152,7 @@ class SingleTrack(AbstractOnAxleTyres):
             F_yr=rear.F_y,
             load_front=contacts[0].load,
             load_rear=contacts[1].load,
+            **over_ground(x.yaw, u.v_x, x.v_y),
         )
         return self.state_type(*rates, *tyres.rates(contacts, states)), with_batch_shape(outputs)
 

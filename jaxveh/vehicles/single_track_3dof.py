@@ -12,7 +12,7 @@ from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import Contact
 from jaxveh.vehicles import two_track
-from jaxveh.vehicles.base import Motion
+from jaxveh.vehicles.base import Motion, over_ground
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic, axle_loads
 from jaxveh.vehicles.shared import AbstractOnAxleTyres
 from jaxveh.vehicles.traction import AbstractSpinless, driven_forces
@@ -100,6 +100,7 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
             "a_x": a_x,
             "a_y": a_y,
             "sideslip": numerics.arctan2(x.v_y, x.v_x),
+            **over_ground(x.yaw, x.v_x, x.v_y),
             "steer": u.steer,
             "slip_angle_front": contacts[0].slip_angle,
             "slip_angle_rear": contacts[1].slip_angle,

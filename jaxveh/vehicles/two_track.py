@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import Motion
+from jaxveh.vehicles.base import OVER_GROUND, Motion, over_ground
 from jaxveh.vehicles.load_transfer import AbstractShiftingLoads
 from jaxveh.vehicles.shared import AbstractOnTyres
 from jaxveh.vehicles.wheels import (
@@ -39,6 +39,7 @@ UNITS = {
     **dict.fromkeys(("F_x", "F_y", *wheel_names("load"), *wheel_names("F_x"), *wheel_names("F_y")), "N"),
     **dict.fromkeys(("M_z", "drive_torque", "brake_torque", *wheel_names("torque"), *wheel_names("M_z")), "N m"),
     "drive_power": "W",
+    **OVER_GROUND,
 }
 """Units of what two-track cars have as states, inputs and outputs."""
 
@@ -166,7 +167,8 @@ def wheel_outputs(contacts: Wheels, forces: Wheels, omegas: Wheels | None = None
 
 
 def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steer: Any, push: BodyForces) -> dict:
-    """What the body says: speeds, accelerations (of an ideal accelerometer), sideslip, and the wheels' forces on it."""
+    """What the body says: speeds, accelerations (of an ideal accelerometer), sideslip, speed and course over ground, and the
+    wheels' forces on it."""
     return {
         "v_x": moves.v_x,
         "v_y": moves.v_y,
@@ -176,6 +178,7 @@ def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steer
         "a_x": a_x,
         "a_y": a_y,
         "sideslip": numerics.arctan2(moves.v_y, moves.v_x),
+        **over_ground(moves.yaw, moves.v_x, moves.v_y),
         "steer": steer,
         "F_x": push.F_x,
         "F_y": push.F_y,

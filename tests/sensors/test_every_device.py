@@ -43,6 +43,12 @@ def gnss(**clock):
     return sensors.GNSS(0.05, 0.03, 1.0, SMOOTH, SPOT, outage_rate=0.1, outage_length=0.5, outages=(1.0, 1.4), **clock)
 
 
+def camera(**clock):
+    return sensors.LaneCamera(
+        dict.fromkeys(("lane_offset", "lane_heading"), SMOOTH), SPOT, 0.3, 2.0, 300.0, 5.0, 0.5, 0.2, **clock
+    )
+
+
 def optical(**clock):
     return sensors.OpticalSideslip(dict.fromkeys(("v_x", "v_y", "sideslip"), SMOOTH), SPOT, 0.5, **clock)
 
@@ -71,6 +77,8 @@ DEVICES = {
         lambda **c: sensors.SteeringAngle(SMOOTH, None, 15.0, "steering_wheel", **c), lambda d: d.ratio
     ),
     "GNSS": Device(gnss, lambda d: d.along),
+    "GNSS, two antennas": Device(lambda **c: sensors.GNSS(0.05, heading=SMOOTH, **c), lambda d: d.heading.bias),
+    "LaneCamera": Device(camera, lambda d: d.position.x),
     "OpticalSideslip": Device(optical, lambda d: d.position.x),
     "BrakeTorque": Device(lambda **c: sensors.BrakeTorque({"brake_torque": SMOOTH}, 0.1, **c), lambda d: d.lag),
     "MotorTorque": Device(

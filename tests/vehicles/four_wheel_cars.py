@@ -67,8 +67,8 @@ def state(car, **values):
 # The mirror of the car's x-z plane
 
 ODD = {
-    "v_y", "yaw", "yaw_rate", "yaw_acceleration", "a_y", "a_y_felt", "sideslip", "steer", "steering_wheel", "steer_rate",
-    "steering_torque", "roll", "roll_rate", "roll_acceleration", "F_y", "M_z", "slip_angle", "bank",
+    "v_y", "yaw", "course", "yaw_rate", "yaw_acceleration", "a_y", "a_y_felt", "sideslip", "steer", "steering_wheel",
+    "steer_rate", "steering_torque", "roll", "roll_rate", "roll_acceleration", "F_y", "M_z", "slip_angle", "bank",
     "slip_angle_front", "slip_angle_rear", "F_yf", "F_yr", "M_zf", "M_zr",
 }  # fmt: skip
 OTHER = {"fl": "fr", "fr": "fl", "rl": "rr", "rr": "rl"}

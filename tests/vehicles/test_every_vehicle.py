@@ -164,8 +164,8 @@ STEPS = {
 """By how much states and inputs are stirred, by unit."""
 
 ODD = (
-    "y", "v_y", "yaw", "yaw_rate", "yaw_acceleration", "a_y", "a_y_felt", "sideslip", "steer", "steering_wheel", "F_y", "M_z",
-    "M_x", "roll", "roll_rate", "roll_acceleration", "bank", "slip_angle", "steering_torque", "steer_rate", "F_yf", "F_yr",
+    "y", "v_y", "yaw", "course", "yaw_rate", "yaw_acceleration", "a_y", "a_y_felt", "sideslip", "steer", "steering_wheel", "F_y",
+    "M_z", "M_x", "roll", "roll_rate", "roll_acceleration", "bank", "slip_angle", "steering_torque", "steer_rate", "F_yf", "F_yr",
     "slip_angle_front", "slip_angle_rear", "curvature", "hitch_angle", "hitch_rate", "trailer_yaw", "M_zf", "M_zr",
     "front_deflection_y", "rear_deflection_y", "camber",
 )  # fmt: skip
@@ -263,6 +263,23 @@ def test_names_units_and_shapes(name):
 
 
 @pytest.mark.parametrize("name", CARS)
+def test_speed_and_course_are_those_of_the_velocity_over_ground(name):
+    """Of every car that has a yaw; the others have none."""
+    car = made(name)
+    for x, u in (stirred(name), start(name, -5.0), start(name, 0.0)):
+        outputs, moves = car.outputs(0.0, x, u), car.motion(x, u)
+        assert ("course" in outputs._fields) == ("speed" in outputs._fields) == ("yaw" in outputs._fields)
+        if "course" not in outputs._fields:
+            continue
+        assert car.units["course"] == "rad" and car.units["speed"] == "m/s"
+        over_ground = complex(moves.v_x, moves.v_y) * np.exp(1j * float(moves.yaw))
+        found = float(outputs.speed) * np.exp(1j * float(outputs.course))
+        np.testing.assert_allclose([found.real, found.imag], [over_ground.real, over_ground.imag], atol=1e-12)
+        if moves.v_x > 1.0:
+            np.testing.assert_allclose(outputs.course, outputs.yaw + outputs.sideslip, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", CARS)
 def test_straight_running_stays_straight(name):
     car, (x, u) = made(name), start(name)
     rates, outputs = car.evaluate(0.0, x, u)
@@ -293,7 +310,8 @@ def test_turning_and_moving_the_world_changes_nothing(name):
         if field not in ("x", "y"):
             np.testing.assert_allclose(value, getattr(rates, field), rtol=1e-12, atol=1e-12, err_msg=field)
     for field, value in seen._asdict().items():
-        expected = getattr(outputs, field) + shift.get(field.removeprefix("trailer_"), 0.0)
+        turned_with = {"course": "yaw"}.get(field, field.removeprefix("trailer_"))
+        expected = getattr(outputs, field) + shift.get(turned_with, 0.0)
         np.testing.assert_allclose(value, expected, rtol=1e-12, atol=1e-10, err_msg=field)
     if "x" in x._fields:
         turned = complex(rates.x, rates.y) * np.exp(2.0j)

@@ -16,6 +16,7 @@ ODD = (
         "v_y",
         "sideslip",
         "yaw",
+        "course",
         "yaw_rate",
         "hitch_angle",
         "steer",

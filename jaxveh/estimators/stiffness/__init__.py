@@ -16,6 +16,7 @@ from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, m
 from jaxveh.estimators.stiffness.least_squares import AxleForces, Derivatives
 from jaxveh.estimators.stiffness.single_track import Followed, linear_car
 from jaxveh.estimators.stiffness.walking import WalkingStiffness
+from jaxveh.io import CarSpecification
 
 NAME = "stiffness"
 

@@ -1,0 +1,73 @@
+"""Satellite navigation with an inertial unit, and a camera: section 1.3.2 and 1.3.3 of the review (Chen, Gao, Xu 2013)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.navigation.method import Navigation, navigation_model
+from jaxveh.estimators.navigation.multi_rate import multi_rate
+from jaxveh.estimators.navigation.of_car import navigation, navigation_of
+from jaxveh.estimators.navigation.system import Navigator, Parts
+
+NAME = "navigation"
+
+SHOWN = {"v_x": "m/s", "v_y": "m/s", "yaw": "rad", "sideslip": "rad"}
+
+METHODS = {
+    "kinematic": MethodOfCar(
+        navigation(Parts()), "inertial unit of three axes and satellites, no vehicle", "section 1.3.2 [44, 45]"
+    ),
+    "six_axes": MethodOfCar(
+        navigation(Parts(three_more=True)), "with roll and pitch of six axes", "sections 1.1.2, 1.3.2 [48-50]"
+    ),
+    "two_antennas": MethodOfCar(
+        navigation(Parts(heading=True)), "with the heading of two antennas", "section 1.3.2 [52, 53]"
+    ),
+    "adapted_stiffness": MethodOfCar(
+        navigation(Parts(wheels=True, axle="linear", adapts=True)),
+        "with a rear axle whose stiffness satellites tell",
+        "section 1.3.2 [46, 47]",
+    ),
+    "rear_axle": MethodOfCar(
+        navigation(Parts(wheels=True, axle="saturating", adapts=True)),
+        "with a rear axle that saturates, and adapts",
+        "section 1.3.2 [46, 47], with another tyre law",
+    ),
+    "multi_rate": MethodOfCar(
+        multi_rate, "a linear single track with yaw rate, and the course at its own rate", "section 1.3.2 [51]"
+    ),
+    "camera": MethodOfCar(
+        navigation(Parts(wheels=True, camera=True, axle="saturating")),
+        "with a rear axle and a camera that sees the lane, slow and late",
+        "section 1.3.3 [54, 55]",
+    ),
+}
+
+RECOMMENDED = "rear_axle"
+
+__all__ = [
+    "METHODS",
+    "NAME",
+    "RECOMMENDED",
+    "SHOWN",
+    "Navigation",
+    "Navigator",
+    "Parts",
+    "estimate",
+    "live",
+    "navigation_model",
+    "navigation_of",
+]
+
+
+def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
+    """Velocity, yaw and sideslip along a log, with roll, slopes and biases. `source`: a car's file, or a method; `method`: a name
+    of `METHODS`. **Raises** as `follow`."""
+    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
+
+
+def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
+    """The same a row at a time."""
+    return LiveMethod(method_of(NAME, METHODS, source, method))

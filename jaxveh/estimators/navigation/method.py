@@ -1,0 +1,147 @@
+"""Navigation as a method: it begins with the first fix, coasts without, and begins anew after the inertial unit was silent."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.names import record
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.navigation.cleaning import Cleaning, Felt
+from jaxveh.estimators.navigation.observed import ANGLES, channels_of, noise, observation, report
+from jaxveh.estimators.navigation.system import Navigator, inputs_of, state_type, states_of, transition
+from jaxveh.filters import Extended
+from jaxveh.filters.kit import AbstractRuleFilter, with_spread
+from jaxveh.statespace import Continuous, Gaussian, Prior, Row, StateDependent, StateSpace
+
+LEAST_SPEED = 2.0
+"""m/s: a fix of less does not begin a navigation, and sideslip is not told at less."""
+
+ENOUGH = {"v_x": 1.0, "v_y": 0.5, "yaw": 0.05, "sideslip": 0.02}
+"""m/s, rad: what is less certain than this is not known; of what is not here the answer is a memory as good as its spread."""
+
+FORGOTTEN = ("v_x", "v_y", "yaw", "lane_offset", "lane_heading")
+"""What is not known any more where the inertial unit was silent; its biases, the axle's stiffness and the like are kept."""
+
+
+def navigation_model(system: Navigator) -> StateSpace:
+    """The state space, for any Gaussian filter whose rows `Cleaning` has made."""
+    states = states_of(system.parts)
+    kind = state_type(system.parts)
+    return StateSpace(
+        system=system,
+        transition=transition,
+        observation=observation,
+        report=report,
+        process_noise=Continuous(Gaussian({name: walk for name, (_, _, walk) in states.items()})),
+        measurement_noise=StateDependent(noise, channels_of(system.parts)),
+        prior=Prior(kind(*(mean for mean, _, _ in states.values())), {n: std for n, (_, std, _) in states.items()}),
+        inputs=inputs_of(system.parts),
+        angles=tuple(name for name in channels_of(system.parts) if name in ANGLES),
+        input_path="linear",
+    )
+
+
+class Known(NamedTuple):
+    """What is remembered: the filter's belief, the cleaning's memory, and whether a fix has begun it."""
+
+    belief: Any
+    felt: Felt
+    begun: Any
+
+
+class Navigation(AbstractMethod):
+    """A Gaussian `filter` on `navigation_model`, begun by the first fix whose speed is more than `LEAST_SPEED`: its course is the
+    yaw to within the spread of the sideslip, its speed the car's. The car is taken to go forwards then.
+
+    An outage of the satellites is coasted through; what is `known` follows from the spread (`ENOUGH`). Where the inertial unit is
+    silent for longer than `cleaning.LONGEST_SILENCE` velocity and yaw are lost, and the next fix begins them anew.
+    """
+
+    model: StateSpace
+    filter: AbstractRuleFilter = Extended()
+
+    @property
+    def cleaning(self) -> Cleaning:
+        """What is made of a row before the filter sees it."""
+        return Cleaning(self.model.system)
+
+    @property
+    def needs(self):
+        parts = self.model.system.parts
+        speeds = tuple(Need(f"wheel_speed_{at}", "m/s", optional=True) for at in ("rl", "rr"))
+        more = (Need("a_z", "m/s^2"), Need("roll_rate", "rad/s"), Need("pitch_rate", "rad/s"))
+        return (
+            Need("a_x", "m/s^2"),
+            Need("a_y", "m/s^2"),
+            Need("yaw_rate", "rad/s"),
+            Need("speed", "m/s"),
+            Need("course", "rad"),
+            *(more if parts.three_more else ()),
+            *((Need("heading", "rad"),) if parts.heading else ()),
+            *(speeds if parts.wheels else ()),
+            *((Need("lane_offset", "m"), Need("lane_heading", "rad")) if parts.camera else ()),
+        )
+
+    def first(self, t, values):
+        felt, cleaned = self.cleaning.first(t, values)
+        row = self._row(t, cleaned)
+        belief = self.filter.prior(self.model, row)
+        return self._said(belief, felt, jnp.zeros_like(t, bool), row, cleaned, jnp.int32(0))
+
+    def next(self, memory: Known, t, values):
+        felt, cleaned = self.cleaning.next(memory.felt, t, values)
+        row = self._row(t, cleaned)
+        after, info = self.filter.step(self.model, memory.belief, row)
+        goes_on = memory.begun & cleaned["felt"]
+        held = dataclasses.replace(memory.belief, t=row.t, u=row.u)
+        belief = _choose(goes_on, after, held)
+        return self._said(belief, felt, goes_on, row, cleaned, jnp.where(goes_on, info.result, 0))
+
+    def _said(self, belief, felt, begun, row, cleaned, result):
+        """The memory and the answer; a fix begins what has not begun."""
+        fix = jnp.isfinite(row.y.speed) & jnp.isfinite(row.y.course) & (row.y.speed > LEAST_SPEED)
+        begins = ~begun & fix & cleaned["felt"]
+        belief = _choose(begins, self._begun(belief, row), belief)
+        begun = begun | begins
+        mean, std = belief.moments(self.model)
+        told = {name: begun & (getattr(std, name) < most) for name, most in ENOUGH.items()}
+        told["sideslip"] = told["sideslip"] & (jnp.abs(mean.v_x) > LEAST_SPEED)
+        known = {name: told.get(name, begun) for name in mean._fields}
+        said = answer(mean._asdict(), std._asdict(), known)
+        well = result == 0
+        said = said._replace(
+            known=type(said.known)(*[one & well for one in said.known]), result=jnp.where(well, said.result, result)
+        )
+        return Known(belief, felt, begun), said
+
+    def _begun(self, belief, row: Row):
+        """The belief with what a fix says of velocity and yaw, and the prior's spread of them."""
+        prior, system = self.model.prior, self.model.system
+        speed = jnp.where(row.y.speed > LEAST_SPEED, row.y.speed, LEAST_SPEED)
+        yaw = jnp.where(jnp.isfinite(row.y.course), row.y.course, 0.0) + row.u.turned
+        slip = self.model.states.index("v_y")
+        started = dict(prior.mean._asdict(), v_x=speed + row.u.gained_x, yaw=yaw)
+        anew = jnp.asarray([name in FORGOTTEN for name in self.model.states])
+        mean = jnp.where(anew, jnp.stack([started[name] for name in self.model.states]), belief.vector)
+        kept = ~anew[:, None] & ~anew[None, :]
+        covariance = jnp.where(kept, belief.covariance, 0.0) + jnp.where(anew, 1.0, 0.0) * prior.covariance()
+        # Yaw and lateral velocity are wrong together: their sum is the course.
+        both = covariance[slip, slip]
+        place = self.model.states.index("yaw")
+        fixed = jnp.square(system.across / speed)
+        covariance = covariance.at[place, place].set(both / jnp.square(speed) + fixed)
+        covariance = covariance.at[place, slip].set(-both / speed).at[slip, place].set(-both / speed)
+        return with_spread(belief, mean, self.filter.form.start(covariance), t=row.t, u=row.u)
+
+    def _row(self, t, cleaned) -> Row:
+        of = lambda kind, names: record(kind, {name: cleaned[name] for name in names})
+        return Row(t, of("Inputs", self.model.inputs), of("Measurements", self.model.channels))
+
+
+def _choose(condition, one, other):
+    return jax.tree.map(lambda a, b: jnp.where(condition, a, b), one, other)

@@ -1,0 +1,210 @@
+"""What satellites, wheels, the rear axle and a camera would say of a state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.names import record, record_type
+from jaxveh.estimators.navigation.system import SLOWEST, Navigator, Parts
+from jaxveh.estimators.navigation.window import rotate
+from jaxveh.vehicles import GRAVITY
+
+ROLLS, BALANCE = "rolls", "slip_balance"
+"""m/s: how much faster to the left the rear axle goes than where it points, which is little as long as nothing pushes the car
+aside; and than its force asks for. Both are measured to be nothing."""
+
+STANDS = "stands"
+"""rad: how much more the body rolls and dips than its springs ask for, measured to be nothing as well."""
+
+SATURATED = 0.93
+"""The share of the grip beyond which the force no longer tells the slip angle."""
+
+BEND = 0.05
+"""The share of the grip over which that sets in."""
+
+STEEPEST = 0.6
+"""rad: no axle's slip angle is taken to be more, where the tangent would run away."""
+
+
+def channels_of(parts: Parts) -> tuple[str, ...]:
+    """What is measured, and what is measured to be nothing."""
+    named = {
+        "heading": parts.heading,
+        "wheel_speed": parts.wheels,
+        ROLLS: parts.axle == "none",
+        BALANCE: parts.axle != "none",
+        "lane_offset": parts.camera,
+        "lane_heading": parts.camera,
+        "a_z": parts.three_more,
+        f"{STANDS}_roll": parts.three_more,
+        f"{STANDS}_pitch": parts.three_more,
+    }
+    return ("speed", "course", *(name for name, there in named.items() if there))
+
+
+ANGLES = ("course", "heading", "lane_heading")
+"""Channels that are told to a whole turn."""
+
+
+def observation(system: Navigator, t, x, u) -> Any:
+    """All of it by channel."""
+    del t
+    parts, yaw_rate = system.parts, u.yaw_rate - x.bias_yaw_rate
+    ahead, aside = antenna_velocity(system, x, u)
+    seen = {
+        "speed": numerics.hypot(ahead, aside),
+        "course": x.yaw + numerics.arctan2(aside, ahead),
+        "heading": x.yaw - (u.turned - system.lag * x.bias_yaw_rate),
+    }
+    rolling = system.rear_axle_to_cg * yaw_rate
+    if parts.wheels:
+        # Wheels do not know the direction in which they turn; pushing forward they turn faster.
+        slips = x.wheel_scale + x.wheel_slip * u.a_x
+        seen["wheel_speed"] = (1.0 + slips) * numerics.sqrt(jnp.square(x.v_x) + 1e-4)
+    if parts.axle == "none":
+        seen[ROLLS] = x.v_y - rolling
+    else:
+        angle = axle_slip(system, x, u)[0] + x.slip_error
+        seen[BALANCE] = x.v_y - rolling + x.v_x * numerics.tan(angle)
+    if parts.camera:
+        seen |= lane(system, x, u)
+    if parts.three_more:
+        f_x, f_y = system.forces(x, u)
+        roll, pitch = system.tilts(x, u)
+        seen["a_z"] = GRAVITY * numerics.cos(roll) * numerics.cos(pitch) + x.bias_a_z
+        seen[f"{STANDS}_roll"] = x.lean - x.lean_gradient * f_y
+        seen[f"{STANDS}_pitch"] = x.dip + system.dip_gradient * f_x
+    channels = channels_of(parts)
+    return record("NavigationOutputs", {name: seen[name] + 0.0 * x.v_x for name in channels})
+
+
+def antenna_velocity(system: Navigator, x, u) -> tuple[Any, Any]:
+    """The antenna's velocity (m/s) when the satellites saw it, in the axes in which the car stands now.
+
+    With d the lag, the car's velocity then is that of now less what was felt since, `u.gained` less what of it biases and slopes
+    have made. To it comes `omega x r` of the lever arm, whose place was turned back by the angle of these d seconds, and of the
+    antenna's height where the unit says how the body rolls.
+    """
+    lag, gain = system.lag, (1.0, 1.0) if system.parts.three_more else system.gains(x)
+    leant = (0.0, 0.0)
+    if system.parts.three_more:
+        # On the average of these moments.
+        half = 0.5 * lag
+        dip = x.dip - half * (u.pitch_rate - x.bias_pitch_rate)
+        leant = -dip, x.lean - half * (u.roll_rate - x.bias_roll_rate)
+    tilts = x.grade + leant[0], x.bank + leant[1]
+    biases = x.bias_a_x, x.bias_a_y
+    ahead, aside = (
+        v - ((gained - lag * bias) / g - lag * GRAVITY * tilt)
+        for v, gained, bias, g, tilt in zip((x.v_x, x.v_y), (u.gained_x, u.gained_y), biases, gain, tilts, strict=True)
+    )
+    spun, turned = u.spun - x.bias_yaw_rate, u.turned - lag * x.bias_yaw_rate
+    swing_x, swing_y = rotate(-spun * system.antenna_y, spun * system.antenna_x - u.rolled * system.antenna_z, -turned)
+    return ahead + swing_x, aside + swing_y
+
+
+def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
+    """The slip angle (rad) that the rear axle's force asks for, how much it grows with the force over load, and that.
+
+    Linear: force over load = stiffness angle. Saturating: `F = c a / (1 + |c a / grip|^shape)^(1 / shape)`, whose inverse has a
+    closed form.
+    """
+    f_y = system.forces(x, u)[1]
+    a, length = system.front_axle_to_cg, system.wheelbase
+    force = (a * system.mass * f_y - system.yaw_inertia * u.yaw_acceleration) / length
+    # The accelerometer as it speaks: no error of the law should be taken for an error of it.
+    load = system.mass * (GRAVITY * a + system.cg_height * u.a_x) / length
+    share = force / jnp.maximum(load, 0.2 * GRAVITY * system.mass * a / length)
+    stiffness = system.stiffness * (jnp.exp(x.stiffening) if system.parts.adapts else 1.0)
+    if system.parts.axle == "linear":
+        angle, slope = share / stiffness, 1.0 / stiffness + 0.0 * share
+    else:
+        used = numerics.smooth_clip(share / system.grip, -SATURATED, SATURATED, BEND)
+        # A little more than zero: a power of zero has no slope.
+        rest = 1.0 - numerics.sqrt(jnp.square(used) + 1e-12) ** system.shape
+        angle = used * system.grip / stiffness * rest ** (-1.0 / system.shape)
+        slope = rest ** (-1.0 - 1.0 / system.shape) / stiffness
+    return jnp.clip(angle, -STEEPEST, STEEPEST), slope, share
+
+
+def lane(system: Navigator, x, u) -> dict[str, Any]:
+    """Offset from the lane's middle (m, to the left) and heading against it (rad) when the camera saw them."""
+    lag = system.camera_lag
+    turned = u.camera_turned - lag * x.bias_yaw_rate
+    along = lag * x.v_x * x.bend
+    middle = x.lane_heading - 0.5 * (turned - along)
+    then = x.lane_heading - (turned - along)
+    gains = (1.0, 1.0) if system.parts.three_more else system.gains(x)
+    ahead = x.v_x - 0.5 * (u.camera_gained_x - lag * x.bias_a_x) / gains[0]
+    aside = x.v_y - 0.5 * ((u.camera_gained_y - lag * x.bias_a_y) / gains[1] - lag * GRAVITY * x.bank)
+    # Of the velocity in the axes of now, by half the angle turned back: those of the middle of the lag.
+    ahead, aside = rotate(ahead, aside, -0.5 * turned)
+    gone = lag * (ahead * numerics.sin(middle) + aside * numerics.cos(middle))
+    return {
+        "lane_offset": x.lane_offset - gone + system.camera_x * numerics.sin(then),
+        "lane_heading": then,
+    }
+
+
+def noise(system: Navigator, t, x, u) -> dict[str, Any]:
+    """Standard deviations by channel. The course's is the velocity's error across, over speed."""
+    del t
+    parts, moving = system.parts, numerics.sqrt(jnp.square(x.v_x) + jnp.square(x.v_y) + SLOWEST**2)
+    # An error that lasts is told once in its time, not in every row.
+    lasting = numerics.sqrt(system.slip_time / u.step)
+    std = {
+        "speed": system.along,
+        "course": system.across / moving,
+        "heading": system.heading_error,
+        "lane_offset": system.lane_error,
+        "lane_heading": system.lane_angle_error,
+        "a_z": 0.3 * lasting,
+        f"{STANDS}_roll": system.lean_error * lasting,
+        f"{STANDS}_pitch": system.lean_error * lasting,
+    }
+    if parts.wheels:
+        std["wheel_speed"] = system.wheel_error + system.wheel_slip_error * jnp.abs(u.a_x) * moving
+    if parts.axle == "none":
+        slip = system.rolling_slip + system.slip_gradient * jnp.abs(system.forces(x, u)[1])
+        std[ROLLS] = (0.02 + moving * slip) * lasting
+    else:
+        angle, slope, share = axle_slip(system, x, u)
+        white = system.slip_noise / numerics.sqrt(jnp.maximum(u.step, 1e-4))
+        # Of a force of which little is left to grow the law says less and less.
+        uncertain = numerics.sqrt(jnp.square(white) + jnp.square(system.force_noise * slope * (1.0 + jnp.abs(share))))
+        std[BALANCE] = 0.02 + jnp.abs(x.v_x) * (1.0 + jnp.square(numerics.tan(angle))) * uncertain
+    return {name: std[name] + 0.0 * x.v_x for name in channels_of(parts)}
+
+
+def report(system: Navigator, t, x, u) -> Any:
+    """What is shown: of the time at which the inertial unit speaks, its own lag made up by what it feels."""
+    del t
+    a_x, a_y = system.accelerations(x, u)
+    roll, pitch = system.tilts(x, u)
+    lag, yaw_rate = system.sensor_lag, u.yaw_rate - x.bias_yaw_rate
+    v_x = x.v_x + lag * (a_x + yaw_rate * x.v_y)
+    v_y = x.v_y + lag * (a_y - yaw_rate * x.v_x)
+    shown = {
+        "v_x": v_x,
+        "v_y": v_y,
+        "yaw": x.yaw + lag * yaw_rate,
+        "sideslip": numerics.arctan2(v_y, numerics.sqrt(jnp.square(v_x) + 1e-4)),
+        "roll": roll,
+        "pitch": pitch,
+        "bank": x.bank,
+        "grade": x.grade,
+        "lean_gradient": x.lean_gradient,
+    }
+    shown |= {name: value for name, value in x._asdict().items() if name.startswith("bias_")}
+    if system.parts.wheels:
+        shown |= {"wheel_scale": x.wheel_scale, "wheel_slip": x.wheel_slip}
+    if system.parts.axle != "none":
+        weight = system.mass * GRAVITY * system.front_axle_to_cg / system.wheelbase
+        adapted = jnp.exp(x.stiffening) if system.parts.adapts else 1.0
+        shown |= {"slip_error": x.slip_error, "stiffness_rear": system.stiffness * weight * adapted}
+    if system.parts.camera:
+        shown |= {"lane_offset": x.lane_offset, "lane_heading": x.lane_heading}
+    return record_type("NavigationReport", shown)(*[value + 0.0 * x.v_x for value in shown.values()])

@@ -1,0 +1,107 @@
+"""A navigation of a car's file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from jaxveh.estimators.navigation.method import Navigation, navigation_model
+from jaxveh.estimators.navigation.system import PLAIN, Navigator, Parts
+from jaxveh.io import AxleTyre, CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+SATELLITE_DELAY, CAMERA_DELAY, UNIT_DELAY = 0.15, 0.08, 0.01
+"""s: what is usual of a series car where its file does not say."""
+
+USUAL_LOW_PASS = 15.0
+"""Hz: so is the low-pass in its inertial unit."""
+
+USUAL_HEIGHT = 0.55
+"""m: of a centre of gravity whose height a file does not say; it shifts load by acceleration, a correction."""
+
+
+def navigation(parts: Parts) -> Callable[[CarSpecification], Navigation]:
+    """What makes a navigation with these `parts` of a car's file."""
+    return lambda car: navigation_of(car, parts)
+
+
+def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -> Navigation:
+    """The navigation of a car, with these `parts`; `numbers` of `Navigator` that are not in the file, by name.
+
+    A file that says no `antenna_position` has its antenna at the centre of gravity; without delays they are those of a usual
+    series car, `SATELLITE_DELAY` and so on. `sensor_position` is the inertial unit's.
+    """
+    sensor_lag = unit_lag(car)
+    antenna = car.antenna_position or (0.0, 0.0, 0.0)
+    unit = car.sensor_position or (0.0, 0.0, 0.0)
+    told = {
+        "lag": satellite_lag(car),
+        "camera_lag": max(_or(car.camera_delay, CAMERA_DELAY) - sensor_lag, 0.0),
+        "sensor_lag": sensor_lag,
+        **dict(zip(("antenna_x", "antenna_y", "antenna_z"), antenna, strict=True)),
+        **dict(zip(("unit_x", "unit_y"), unit[:2], strict=True)),
+        "rear_axle_to_cg": car.rear_axle_to_cg,
+        "front_axle_to_cg": car.front_axle_to_cg,
+        "mass": car.mass,
+        "yaw_inertia": car.yaw_inertia,
+        "cg_height": car.cg_height or USUAL_HEIGHT,
+    }
+    if parts.axle != "none":
+        told |= _axle(car)
+    return Navigation(navigation_model(Navigator(**{**told, **numbers}, parts=parts)))
+
+
+def unit_lag(car: CarSpecification) -> float:
+    """How late the inertial unit is, s: its delay, and that of a Butterworth low-pass of second order for slow signals."""
+    low_pass = USUAL_LOW_PASS if car.low_pass is None else car.low_pass
+    return _or(car.inertial_delay, UNIT_DELAY) + math.sqrt(2.0) / (2.0 * math.pi * low_pass)
+
+
+def satellite_lag(car: CarSpecification) -> float:
+    """How much later satellites speak than the inertial unit, s."""
+    return max(_or(car.satellite_delay, SATELLITE_DELAY) - unit_lag(car), 0.0)
+
+
+def _axle(car: CarSpecification) -> dict[str, float]:
+    """Stiffness and grip of the rear axle, over its load at rest."""
+    weight = car.mass * GRAVITY * car.front_axle_to_cg / car.wheelbase
+    # A file's axle always has one: its own, or that of its coefficients.
+    stiffness = car.rear_cornering_stiffness or 0.0
+    told = {"stiffness": stiffness / weight}
+    if car.rear is not None:
+        peak = car.rear.D / (weight if car.rear.nominal_load is None else car.rear.nominal_load)
+        told |= {"grip": peak, "shape": _shape(car.rear)}
+    return told
+
+
+BEND = 0.8
+"""The share of its peak at which a file's Magic Formula and the curve here are alike."""
+
+
+def _shape(tyre: AxleTyre) -> float:
+    """How sharply the curve has to bend to be like a Magic Formula of these coefficients.
+
+    The formula's slip angle at `BEND` of its peak, times the stiffness, over that force is `(1 - BEND^shape)^(-1 / shape)`.
+    """
+    formula = lambda x: math.sin(tyre.C * math.atan(x - tyre.E * (x - math.atan(x))))
+    # The argument B a at which it has risen so far; formulas that never do have one far out.
+    x = _crossing(lambda x: formula(x) - BEND, 0.0, 50.0)
+    stretch = max(tyre.C * x / BEND, 1.0 + 1e-3)
+    return _crossing(lambda shape: stretch - (1.0 - BEND**shape) ** (-1.0 / shape), *SHAPES)
+
+
+SHAPES = 1.0, 8.0
+"""No curve bends less sharply, or more."""
+
+
+def _crossing(rising: Callable[[float], float], low: float, high: float) -> float:
+    """Where a rising function is zero, by halving; an end where it is not between them."""
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if rising(middle) > 0 else (middle, high)
+    return 0.5 * (low + high)
+
+
+def _or(value: float | None, usual: float) -> float:
+    return usual if value is None else value
