@@ -26,10 +26,6 @@ from jaxveh.estimators.sideslip_methods.worst_case import h_infinity
 PARTICLES = 100
 """Of the particle filters: two states need no more."""
 
-SHOWN = {"v_y": "m/s", "sideslip": "rad"}
-
-RECOMMENDED = "rear_axle"
-
 
 def _in_tyres(tyre: str, equation: str) -> MethodOfCar:
     return MethodOfCar(
@@ -63,7 +59,9 @@ METHODS = {
         single_track_filter(filters.Unscented()), "the same, unscented filter", "section 1.4.5, [68-71]"
     ),
     "pf": MethodOfCar(
-        single_track_filter(filters.ParticleFilter(PARTICLES), random=True), "the same, particles", "section 1.4.6, [72-75]"
+        single_track_filter(filters.ParticleFilter(PARTICLES), random=True),
+        "the same, particles",
+        "section 1.4.6, [72-75]",
     ),
     "upf": MethodOfCar(
         single_track_filter(filters.Guided(PARTICLES, rule="unscented"), random=True),
@@ -77,9 +75,7 @@ METHODS = {
     "ukf_unitire": _in_tyres("unitire", "section 1.2.2, [26]"),
     "two_track": MethodOfCar(two_track, "four wheels, load moves across, unscented filter", "section 1.2.1, [19]"),
     "roll_3dof": MethodOfCar(roll_3dof, "four wheels and a leaning body, unscented filter", "section 1.2.1, [22]"),
-    "roll_4dof": MethodOfCar(
-        roll_4dof, "the same, driven by torques, its speed a state", "section 1.2.1, [23]"
-    ),
+    "roll_4dof": MethodOfCar(roll_4dof, "the same, driven by torques, its speed a state", "section 1.2.1, [23]"),
     "motor_moment": MethodOfCar(
         motor_moment, "single track with the yaw moment of motors, unscented filter", "eq 10 with its erratum, [34, 83]"
     ),
@@ -102,7 +98,9 @@ METHODS = {
     "error_linearising": MethodOfCar(
         error_linearising, "gains at the estimate that make the error linear", "section 1.4.2, [59]"
     ),
-    "sliding_mode": MethodOfCar(sliding_mode, "most of the gain through a smooth switch", "section 1.4.3, eq 9, [60-62]"),
+    "sliding_mode": MethodOfCar(
+        sliding_mode, "most of the gain through a smooth switch", "section 1.4.3, eq 9, [60-62]"
+    ),
     "decoupled": MethodOfCar(decoupled, "blind to whatever disturbs the front axle", "section 1.4.4, [21, 65]"),
     "h_infinity": MethodOfCar(h_infinity, "single track, worst case bounded", "section 1.4.4, [66, 67]"),
     "adaptive": MethodOfCar(
@@ -110,4 +108,4 @@ METHODS = {
     ),
 }
 
-__all__ = ["METHODS", "RECOMMENDED", "SHOWN"]
+__all__ = ["METHODS"]

@@ -1,4 +1,5 @@
-"""What the methods of sideslip share: the channels, when an answer counts as known, and the sheet of the car that they ask for."""
+"""What the methods of sideslip share: the channels, when an answer counts as known, and the sheet of the car that they ask
+for."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 
 from jaxveh import filters, numerics, tyres
-from jaxveh._core.names import record_type
+from jaxveh._core.names import record, record_type
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.sideslip_methods.common import (
     ROLL_RATE,
@@ -24,6 +24,7 @@ from jaxveh.estimators.sideslip_methods.single_track import (
     A_Y_NOISE,
     SENSORS,
     STEP,
+    USUAL_SPEED,
     YAW_RATE_NOISE,
     Lateral,
     LateralReport,
@@ -51,7 +52,8 @@ from jaxveh.vehicles import (
 )
 
 STIFFEST = 2.0
-"""Of a wheel's load at rest: where its cornering stiffness is greatest, so that an axle whose load moves to one side is softer."""
+"""Of a wheel's load at rest: where its cornering stiffness is greatest, so that an axle whose load moves to one side is
+softer."""
 
 UNSPRUNG = 0.025
 """Of the car's mass: that of a wheel with what does not ride on its spring."""
@@ -106,41 +108,41 @@ def two_track(car: CarSpecification) -> Guarded:
 
 
 def leaning_observation(system: Lateral, t, x, u):
-    """What sensors on the leaning body say: the accelerometer feels gravity, too."""
+    """What sensors on the leaning body say, whose accelerometer feels gravity, too; and the speed."""
     outputs = system.car.outputs(t, full_state(system.car, x), u)
     felt = outputs.a_y * numerics.cos(x.roll) + GRAVITY * numerics.sin(x.roll)
-    return record_type("Measurements", ("yaw_rate", "a_y", "roll_rate"))(x.yaw_rate, felt, x.roll_rate)
+    seen = {"yaw_rate": x.yaw_rate, "a_y": felt, "roll_rate": x.roll_rate, "v_x": outputs.v_x}
+    return record("Measurements", seen)
 
 
-def _leaning_model(vehicle: Any, car: CarSpecification) -> StateSpace:
-    """A state space with v_y, yaw rate and roll as states."""
+def _leaning_model(vehicle: Any, car: CarSpecification, *, driven: bool = False) -> StateSpace:
+    """A state space with v_y, yaw rate and roll as states, and the speed of one that is `driven`."""
     noise = process_noise(vehicle) | {"roll_rate": ROLL_ERROR}
     seen = {"yaw_rate": YAW_RATE_NOISE, "a_y": A_Y_NOISE, "roll_rate": ROLL_RATE_NOISE}
-    spread = {"v_y": 0.5, "yaw_rate": 0.1, "roll": 0.05, "roll_rate": 0.1}
+    spread, states, start = {"v_y": 0.5, "yaw_rate": 0.1, "roll": 0.05, "roll_rate": 0.1}, LEANING, [0.0] * 4
+    if driven:
+        noise, seen, spread = ({"v_x": one} | rest for one, rest in (
+            (SPEED_ERROR, noise), (SPEED_NOISE, seen), (1.0, spread)
+        ))  # fmt: skip
+        states, start = ("v_x", *LEANING), [USUAL_SPEED, *start]
     return StateSpace(
         system=Lateral(vehicle, slowest_of(car)),
-        transition=transition,
+        transition=driven_transition if driven else transition,
         observation=leaning_observation,
         report=report,
         process_noise=Continuous(Gaussian(noise)),
         measurement_noise=Gaussian(seen),
-        prior=Prior(record_type("LeaningState", LEANING)(0.0, 0.0, 0.0, 0.0), Gaussian(spread)),
-        inputs=("steer", "v_x"),
+        prior=Prior(record_type("LeaningState", states)(*start), Gaussian(spread)),
+        inputs=("steer", *[need.channel for need in PEDALS]) if driven else ("steer", "v_x"),
     )
 
 
 def roll_3dof(car: CarSpecification) -> Guarded:
-    """The unscented filter of the car that leans, at a given speed: three degrees of freedom (the review's [22]). The roll rate is
-    measured where there is one."""
+    """The unscented filter of the car that leans, at a given speed: three degrees of freedom (the review's [22]). The roll rate
+    is measured where there is one."""
     numbers = car_numbers(car, "the leaning car", leaning=True)
     vehicle = build(numbers, Roll3DOF, load_transfer=QuasiStatic(), **wheel_options(car))
     return filtered(car, _leaning_model(vehicle, car), filters.Unscented(), more=(ROLL_RATE._replace(optional=True),))
-
-
-def driven_observation(system: Lateral, t, x, u):
-    """The same, and the speed."""
-    seen = leaning_observation(system, t, x, u)
-    return record_type("Measurements", ("yaw_rate", "a_y", "roll_rate", "v_x"))(*seen, x.v_x)
 
 
 def driven_transition(system: Lateral, t0, t1, x, u):
@@ -157,21 +159,7 @@ def roll_4dof(car: CarSpecification) -> Guarded:
     is a state, and measured."""
     numbers = car_numbers(car, "the leaning car", leaning=True)
     vehicle = build(numbers, Roll4DOF, load_transfer=QuasiStatic(), **wheel_options(car))
-    plain = _leaning_model(vehicle, car)
-    names = ("v_x", *LEANING)
-    noise, law, spread = plain.process_noise.law.std, plain.measurement_noise.std, plain.prior.law.std
-    model = StateSpace(
-        system=plain.system,
-        transition=driven_transition,
-        observation=driven_observation,
-        report=report,
-        process_noise=Continuous(Gaussian(noise._asdict() | {"v_x": SPEED_ERROR})),
-        measurement_noise=Gaussian(law._asdict() | {"v_x": SPEED_NOISE}),
-        prior=Prior(record_type("DrivenState", names)(20.0, *plain.prior.mean), Gaussian({"v_x": 1.0, **spread._asdict()})),
-        inputs=("steer", "drive_torque", "brake_torque"),
-    )
+    model = _leaning_model(vehicle, car, driven=True)
     needs = (V_X, STEER, *SENSORS, ROLL_RATE._replace(optional=True), *PEDALS)
     inner = AtSpeed(model, filters.Unscented(), needs, shown=LateralReport._fields)
     return guard(car, inner, SENSORS)
-
-

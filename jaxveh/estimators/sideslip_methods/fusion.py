@@ -35,7 +35,7 @@ slippery, or the tyres slide."""
 BANKED, BANK_TIME = 0.5, 1.0
 """m/s^2, and s: a_y - v_x r that stays beyond this over this time is gravity on a banked road, and would be integrated."""
 
-PSEUDO_TIME = 1.0
+PSEUDO_TIME = 0.2
 """s: faster than this the integral counts, slower the dynamic estimate."""
 
 
@@ -96,7 +96,8 @@ class PseudoIntegration(AbstractFusion):
 
 
 class Switched(AbstractFusion):
-    """A. Nishio et al. (the review's [40]): the dynamic estimate, and where its tyres are not to be trusted the integral from there.
+    """A. Nishio et al. (the review's [40]): the dynamic estimate, and where its tyres are not to be trusted the integral from
+    there.
 
     They are not where |a_y| is more than `hard`, or where the steer asks a linear car (`steady`) for `slippery` more than is felt
     (m/s^2: little friction). On a road that looks banked, `a_y - v_x r` having been more than `banked` (m/s^2) over `bank_time`
@@ -112,6 +113,10 @@ class Switched(AbstractFusion):
     def __check_init__(self):
         check_parameters(self)
 
+    @property
+    def needs(self):
+        return joined_needs(self.inner, self.steady)
+
     def next(self, memory, t, values):
         inner, said = self.inner.next(memory.inner, t, values)
         dt, rate, a_y = t - memory.t, self._rate(values, memory.rate), values["a_y"]
@@ -126,8 +131,8 @@ class Switched(AbstractFusion):
 
 
 class Weighted(AbstractMethod):
-    """H. Lee (the review's [41]): the kinematic and the dynamic estimate, weighed by the inverses of the variances that their filters
-    state, as if their errors were independent (both read the same sensors)."""
+    """H. Lee (the review's [41]): the kinematic and the dynamic estimate, weighed by the inverses of the variances that their
+    filters state, as if their errors were independent (both read the same sensors)."""
 
     kinematic: AbstractMethod
     dynamic: AbstractMethod
@@ -154,7 +159,7 @@ class Weighted(AbstractMethod):
 
 
 SENSORS = (YAW_RATE, A_Y)
-EXTENDED = single_track_filter(filters.Extended())
+EXTENDED = single_track_filter(filters.Extended(), claims=True)
 
 
 def pseudo_integration(car: CarSpecification) -> Guarded:
@@ -172,4 +177,4 @@ def switched(car: CarSpecification) -> Guarded:
 
 def weighted(car: CarSpecification) -> Guarded:
     """The weighted mean of the kinematic and the single track's extended filter, for a car's file."""
-    return guard(car, Weighted(kinematic_kalman(car), EXTENDED(car)), (*SENSORS, A_X))
+    return guard(car, Weighted(kinematic_kalman(car, claims=True), EXTENDED(car)), (*SENSORS, A_X), claims=False)

@@ -27,13 +27,13 @@ from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 OFFSET = 0.1
-"""m/s^2: what an accelerometer says too much, by its own offset and by gravity through a body that leans by some 0.01 rad. That of a
-series car's inertial unit (`sensors.production_car`). Lateral velocity drifts by so much a second."""
+"""m/s^2: what an accelerometer says too much, by its own offset and by gravity through a body that leans by some 0.01 rad. That
+of a series car's inertial unit (`sensors.production_car`). Lateral velocity drifts by so much a second."""
 
 START = 0.5
 """m/s: lateral velocity at the first row, which is taken to be none, is not known better."""
 
-ROLL_TIME = 4.0
+ROLL_TIME = 1.0
 """s: over which the roll angle that the gyroscope's integral gives is drawn to the one that accelerations ask for."""
 
 LEFT = 0.3
@@ -54,8 +54,9 @@ class Integral(NamedTuple):
 
 
 class AbstractIntegration(AbstractMethod):
-    """By trapezia from no lateral velocity at the first row, and anew where the car is slower than `slowest` (m/s), where it rolls
-    as its rear axle points (`rear_axle_to_cg`, m). Known as long as `drift` (m/s^2) has not made sideslip uncertain by `WIDEST`.
+    """By trapezia from no lateral velocity at the first row, and anew where the car is slower than `slowest` (m/s), where it
+    rolls as its rear axle points (`rear_axle_to_cg`, m). Known as long as `drift` (m/s^2) has not made sideslip uncertain by
+    `WIDEST`.
     """
 
     rear_axle_to_cg: jax.Array = positive("m")
@@ -95,7 +96,8 @@ class AbstractIntegration(AbstractMethod):
 
 
 class DirectIntegration(AbstractIntegration):
-    """`v_y = integral of (a_y - v_x r)`, the kinematic method of section 1.1 (its [5]): nothing of the car, and nothing that forgets."""
+    """`v_y = integral of (a_y - v_x r)`, the kinematic method of section 1.1 (its [5]): nothing of the car, and nothing that
+    forgets."""
 
     @property
     def needs(self):
@@ -112,8 +114,8 @@ class RollCompensated(AbstractIntegration):
         dphi/dt = p + (phi_a - phi) / T,    sin(phi_a) = (a_y - v_x r) / g,    dv_y/dt = a_y - g sin(phi) - v_x r
 
     Slowly the roll angle is the one with which the car would turn steadily, quickly it is the integral of the gyroscope: body
-    roll, bank and the accelerometer's offset are all in it, so that v_y does not drift; what v_y does in more than `time` T (s) is
-    lost. Hac, Nichols & Sygnarowicz also know the suspension; here nothing of the car is asked for.
+    roll, bank and the accelerometer's offset are all in it, so that v_y does not drift; what v_y does in more than `time` T (s)
+    is lost. Hac, Nichols & Sygnarowicz also know the suspension; here nothing of the car is asked for.
     """
 
     time: jax.Array = positive("s", default=ROLL_TIME)

@@ -30,11 +30,13 @@ from jaxveh.vehicles import GRAVITY
 STRAIGHT_RATE, STRAIGHT_A_Y = 0.01, 0.3
 """rad/s, m/s^2: a car that neither yaws nor is pushed aside by more goes straight, and has no lateral velocity."""
 
-ACCELEROMETER, GYROSCOPE = 0.08, 0.002
-"""m/s per root second, rad per root second: what inertial sensors' errors and gravity through roll add, as white noise."""
+UNLEVELLED, ACCELEROMETER, GYROSCOPE = 0.2, 0.05, 0.005
+"""m/s per root second, rad per root second: what errors of inertial sensors add, as white noise; the first is an accelerometer's in
+a body that leans, whose gravity nobody takes out."""
 
 SPEED, ASIDE, UPWARD = 0.05, 0.1, 0.05
-"""m/s: standard deviations of the measured speed, of the lateral velocity of a car that goes straight, and of the vertical one."""
+"""m/s: standard deviations of the measured speed, of the lateral velocity of a car that goes straight, and of the vertical
+one."""
 
 LEAN = 0.05
 """rad: that of roll and pitch at the start."""
@@ -131,13 +133,13 @@ def report(system, t, x, u) -> VelocityReport:
 
 
 def kinematic_model(
-    *, accelerometer: float = ACCELEROMETER, speed: float = SPEED, aside: float = ASIDE, start: float = 20.0
+    *, accelerometer: float = UNLEVELLED, speed: float = SPEED, aside: float = ASIDE, start: float = 20.0
 ) -> StateSpace:
-    """v_x and v_y driven by accelerometers and gyroscope, both measured, v_y where the car goes straight: the model of the review's
-    [8] (section 1.1), in which the yaw rate is taken as known.
+    """v_x and v_y driven by accelerometers and gyroscope, both measured, v_y where the car goes straight: the model of the
+    review's [8] (section 1.1), in which the yaw rate is taken as known.
 
-    Only while the car yaws does the speed tell the lateral velocity: `d(dv_x/dt) / dv_y = r`. Standard deviations: `accelerometer`
-    (m/s per root second), `speed`, `aside` (m/s); `start`: the speed at first (m/s)."""
+    Only while the car yaws does the speed tell the lateral velocity: `d(dv_x/dt) / dv_y = r`. Standard deviations:
+    `accelerometer` (m/s per root second), `speed`, `aside` (m/s); `start`: the speed at first (m/s)."""
     return StateSpace(
         transition=Propagate(plane_drift, Heun()),
         observation=seen(("v_x", "v_y")),
@@ -177,9 +179,9 @@ def six_axis_model(
     )
 
 
-def kinematic_kalman(car: CarSpecification) -> Guarded:
-    """The kinematic filter for a car's file."""
-    return _filtered(car, kinematic_model(), (A_X, A_Y, YAW_RATE))
+def kinematic_kalman(car: CarSpecification, *, claims: bool = False) -> Guarded:
+    """The kinematic filter for a car's file. Its spread knows of no bank and of no offset: it is not claimed unless asked for."""
+    return _filtered(car, kinematic_model(), (A_X, A_Y, YAW_RATE), claims=claims)
 
 
 def six_axis(car: CarSpecification) -> Guarded:
@@ -187,6 +189,6 @@ def six_axis(car: CarSpecification) -> Guarded:
     return _filtered(car, six_axis_model(), (A_X, A_Y, A_Z, ROLL_RATE, PITCH_RATE, YAW_RATE))
 
 
-def _filtered(car: CarSpecification, model: StateSpace, sensors: tuple[Need, ...]) -> Guarded:
+def _filtered(car: CarSpecification, model: StateSpace, sensors: tuple[Need, ...], *, claims: bool = True) -> Guarded:
     inner = AtSpeed(model, filters.Extended(), (V_X, *sensors), GoingStraight())
-    return guard(car, inner, sensors, sensors, anew=True)
+    return guard(car, inner, sensors, sensors, anew=True, claims=claims)

@@ -1,4 +1,5 @@
-"""The single track with the yaw moment of wheel torques: eq 10 of the review (section 1.5), for cars with a motor in each wheel."""
+"""The single track with the yaw moment of wheel torques: eq 10 of the review (section 1.5), for cars with a motor in each
+wheel."""
 
 from __future__ import annotations
 
@@ -6,7 +7,6 @@ from typing import Any
 
 import equinox as eqx
 import jax
-
 
 from jaxveh import filters, numerics
 from jaxveh._core.names import record_type

@@ -31,15 +31,15 @@ from jaxveh.statespace import Gaussian, Prior, StateSpace
 from jaxveh.vehicles import SingleTrack, linear
 
 POLES = (-10.0, -12.0)
-"""1/s, of a car of the usual wheelbase: about those of a car at 15 m/s, so that the error dies out within 0.3 s where the car's own
-poles are slower, and noise is not made larger."""
+"""1/s, of a car of the usual wheelbase: about those of a car at 15 m/s, so that the error dies out within 0.3 s where the car's
+own poles are slower, and noise is not made larger."""
 
 ROBUST_POLES = (-4.0, -5.0)
 """The same of the observer that is blind to the front axle: it has the rear axle's force alone to hold v_y."""
 
 LEAST_SLOPE = 0.2
-"""Of its value on straight running: `d a_y / d v_y`, by which a gain is divided, is taken to be at least so steep. A tyre that slides
-tells nothing."""
+"""Of its value on straight running: `d a_y / d v_y`, by which a gain is divided, is taken to be at least so steep. A tyre that
+slides tells nothing."""
 
 LEAST_LEVER = 0.1
 """Of the axles' moments together, `(a C_f + b C_r) / J`: as much must the yaw acceleration change with sideslip, or the yaw rate
@@ -115,8 +115,8 @@ def seen_by(model: StateSpace, row, vector):
 
 
 class ErrorLinearising(AbstractPlaced):
-    """The nonlinear observer of U. Kiencke & A. Daiss (the review's [59], section 1.4.2): gains at the estimate with which the error
-    obeys one linear equation, wherever it is.
+    """The nonlinear observer of U. Kiencke & A. Daiss (the review's [59], section 1.4.2): gains at the estimate with which the
+    error obeys one linear equation, wherever it is.
 
         L(x, u):  df/dx - L dh/dx = diag(poles)    in a step:  K = (I - diag(z) F^-1) H^-1
 
@@ -149,8 +149,8 @@ class ArctangentSliding(ConstantPoles):
 
         x = x- + share K e + M (2 / pi) arctan(lambda e),    M = (pi / 2) (1 - share) K / lambda
 
-    K places the poles; near no error the observer is linear with K, and far from it a row corrects no more than M. `share` (-), and
-    `boundary` = 1 / lambda (rad/s, m/s^2) of each channel.
+    K places the poles; near no error the observer is linear with K, and far from it a row corrects no more than M. `share` (-),
+    and `boundary` = 1 / lambda (rad/s, m/s^2) of each channel.
     """
 
     share: jax.Array = positive("-", default=LINEAR_SHARE)
@@ -168,8 +168,8 @@ def saturated_sign(error: Any, steepness: Any) -> Any:
 
 
 class StateDependentGain(AbstractPlaced):
-    """M. Zeitz's extended Luenberger observer (the review's [58], section 1.4.2): Ackermann's formula at the estimate, with the yaw
-    rate alone.
+    """M. Zeitz's extended Luenberger observer (the review's [58], section 1.4.2): Ackermann's formula at the estimate, with the
+    yaw rate alone.
 
     Of the slopes f of a step, whose determinant is D, and the poles z:
 
@@ -195,7 +195,8 @@ class StateDependentGain(AbstractPlaced):
 
 
 class RearForce(eqx.Module):
-    """What an observer knows that is blind to the front axle: the `car`, of which the rear axle counts; `slowest` as in `Lateral`."""
+    """What an observer knows that is blind to the front axle: the `car`, of which the rear axle counts; `slowest` as in
+    `Lateral`."""
 
     car: SingleTrack = eqx.field(metadata=UNNAMED)
     slowest: jax.Array = positive("m/s")
@@ -226,7 +227,8 @@ def yaw_rate_alone(system, t, x, u):
 
 
 def rear_force_model(car: SingleTrack, slowest: float) -> StateSpace:
-    """The observer of lateral velocity that no disturbance of the front axle's force reaches (the review's [21, 65], section 1.4.4).
+    """The observer of lateral velocity that no disturbance of the front axle's force reaches (the review's [21, 65], section
+    1.4.4).
 
     A force d at the front adds d / m to dv_y/dt and to the measured a_y, and a d / J to dr/dt. A gain `(1, m a / J)` from a_y
     therefore takes it out of the error's equation, whatever it is: a wrong stiffness in front, a wrong steer, a slippery road

@@ -1,4 +1,5 @@
-"""What `sideslip.live` says, as a method: integration held by the rear axle's force, with bands that know how little a file knows."""
+"""What `sideslip.live` says, as a method: integration held by the rear axle's force, with bands that know how little a file
+knows."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from jaxveh.io import CarSpecification
 
 
 class AsLive(AbstractMethod):
-    """A live estimator as a method: its row is a time and the channels that its cleaning reads. Spreads are those of its bands."""
+    """A live estimator as a method: its row is a time and the channels that its cleaning reads. Spreads are those of its
+    bands."""
 
     live: Live
 

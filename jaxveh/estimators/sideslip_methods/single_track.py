@@ -37,8 +37,8 @@ FORCE_ERROR = 0.02
 """s^0.5: what an axle's tyre law leaves out, over its load, as white noise: force errors of 3 % of the load that last 0.4 s."""
 
 YAW_RATE_NOISE, A_Y_NOISE = 0.003, 0.3
-"""rad/s, m/s^2: of the gyroscope, its offset included; of the accelerometer, which also feels gravity through roll and bank, and the
-errors of both axles' forces."""
+"""rad/s, m/s^2: of the gyroscope, its offset included; of the accelerometer, which also feels gravity through roll and bank,
+and the errors of both axles' forces."""
 
 USUAL_SPEED = 20.0
 """m/s, of a car of the usual wheelbase: at which a spread of v_y is made one of sideslip."""
@@ -100,8 +100,8 @@ STEP = StiffStep(derivatives)
 
 
 def transition(system: Lateral, t0, t1, x, u):
-    """The state moved with the inputs of the step's first row; slower than `slowest`, and backwards, the kinematic single track of
-    the steer: `r = v_x delta / l`, `v_y = l_r r`."""
+    """The state moved with the inputs of the step's first row; slower than `slowest`, and backwards, the kinematic single track
+    of the steer: `r = v_x delta / l`, `v_y = l_r r`."""
     return rolling_below(system, STEP(system, t0, t1, x, u), u)
 
 
@@ -129,8 +129,8 @@ def report(system: Lateral, t, x, u) -> LateralReport:
 
 
 def process_noise(car: Any, force_error: float = FORCE_ERROR) -> dict[str, float]:
-    """What white errors of the axles' forces, of `force_error` (s^0.5) times their loads, add to v_y (m/s per root second) and the
-    yaw rate (rad/s per root second) of this car."""
+    """What white errors of the axles' forces, of `force_error` (s^0.5) times their loads, add to v_y (m/s per root second) and
+    the yaw rate (rad/s per root second) of this car."""
     a, b = float(car.front_axle_to_cg), float(car.rear_axle_to_cg)
     push = GRAVITY * force_error / (a + b)
     return {
@@ -188,8 +188,9 @@ TYRES: dict[str, Callable[[Axle], AbstractTyre]] = {
     "arctangent": _arctangent,
     "unitire": lambda axle: tyres.UniTire(axle.stiffness, axle.stiffness, axle.grip / axle.load),
 }
-"""Tyre laws of section 1.2.2 by name, each with the cornering stiffness and the grip of the file's axle at its static load: eqs 3 to 7
-with their errata, which stand in the laws' own docstrings. Laws with a longitudinal part are as stiff along as across."""
+"""Tyre laws of section 1.2.2 by name, each with the cornering stiffness and the grip of the file's axle at its static load: eqs
+3 to 7 with their errata, which stand in the laws' own docstrings. Laws with a longitudinal part are as stiff along as
+across."""
 
 
 def single_track(car: CarSpecification, tyre: str = "magic_formula") -> SingleTrack:
@@ -211,7 +212,7 @@ def axles_of(car: Any) -> tuple[Axle, Axle]:
 
 def filtered(
     car: CarSpecification, model: StateSpace, filter: AbstractFilter, *, more: tuple[Need, ...] = (), key: Any = None,
-    claims: bool = True,
+    claims: bool = False,
 ) -> Guarded:  # fmt: skip
     """A filter or an observer on a model of steer, speed and the channels in `more`, as a method."""
     inner = Filtered(model, filter, (V_X, STEER, *SENSORS, *more), shown=LateralReport._fields, key=key)
@@ -219,9 +220,13 @@ def filtered(
 
 
 def single_track_filter(
-    filter: AbstractFilter, tyre: str = "magic_formula", *, random: bool = False, claims: bool = True
+    filter: AbstractFilter, tyre: str = "magic_formula", *, random: bool = False, claims: bool = False
 ) -> Callable[[CarSpecification], Guarded]:
-    """A maker of the single track on a tyre law of `TYRES` in a filter; `random`: it draws, with one fixed key."""
+    """A maker of the single track on a tyre law of `TYRES` in a filter; `random`: it draws, with one fixed key.
+
+    The filter's spread is that of white errors about the file's curves. It is too small wherever the curve is another, by road or
+    by car, for seconds, and so it is not claimed unless asked for.
+    """
 
     def make(car: CarSpecification) -> Guarded:
         model = lateral_model(single_track(car, tyre), slowest_of(car))
@@ -234,9 +239,7 @@ def linear_kalman(car: CarSpecification) -> Guarded:
     """The Kalman filter on the linear single track of a car's file: section 1.2.2, its [17]."""
     plain = linear(single_track(car))
     known = {name: getattr(plain, name) for name in ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg")}
-    stiffness = dict(
-        front_stiffness=plain.front.cornering_stiffness, rear_stiffness=plain.rear.cornering_stiffness
-    )
+    stiffness = dict(front_stiffness=plain.front.cornering_stiffness, rear_stiffness=plain.rear.cornering_stiffness)
     model = lateral_model(LinearSingleTrack(**known, **stiffness), slowest_of(car))
     return filtered(car, model, filters.Kalman())
 
@@ -266,5 +269,3 @@ class OpenLoop(AbstractMethod):
 def open_loop(car: CarSpecification) -> Guarded:
     """The linear single track of a car's file, in open loop."""
     return guard(car, OpenLoop(Lateral(linear(single_track(car)), slowest_of(car))))
-
-

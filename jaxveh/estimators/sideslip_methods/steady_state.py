@@ -104,7 +104,9 @@ class SteadyTurn(AbstractSteadyState):
 
 def numbers(car: CarSpecification) -> dict[str, float]:
     """The linear single track of a car's file."""
-    assert car.front_cornering_stiffness is not None and car.rear_cornering_stiffness is not None  # the file has filled it
+    assert (
+        car.front_cornering_stiffness is not None and car.rear_cornering_stiffness is not None
+    )  # the file has filled it
     return dict(
         mass=car.mass,
         front_axle_to_cg=car.front_axle_to_cg,

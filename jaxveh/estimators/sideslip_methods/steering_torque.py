@@ -25,8 +25,8 @@ from jaxveh.io import CarSpecification
 STEERING_TORQUE = Need("steering_torque", "N m")
 
 TRAIL = 0.05
-"""m, of a car of the usual size: how far the side force acts behind the steering axis, some 0.02 m of caster and 0.03 m of the tyre's
-own trail."""
+"""m, of a car of the usual size: how far the side force acts behind the steering axis, some 0.02 m of caster and 0.03 m of the
+tyre's own trail."""
 
 USED = 0.4
 """Of the front axle's grip: beyond it the tyre's own trail shrinks, and the moment no longer tells the force."""
@@ -37,8 +37,9 @@ class SteeringTorque(AbstractMethod):
 
         F_f = i (1 + assist) M / trail,    alpha_f = F_f / C_f,    beta = delta - alpha_f - l_f r / v_x
 
-    M (N m) is the driver's torque, `ratio` i and `assist` (-) the steering's, `trail` (m) what the force's moment about the steering
-    axis has as its arm. Friction and inertia of the steering are left out. Known up to `USED` of the front axle's `grip` (N).
+    M (N m) is the driver's torque, `ratio` i and `assist` (-) the steering's, `trail` (m) what the force's moment about the
+    steering axis has as its arm. Friction and inertia of the steering are left out. Known up to `USED` of the front axle's
+    `grip` (N).
     """
 
     front_axle_to_cg: jax.Array = positive("m")

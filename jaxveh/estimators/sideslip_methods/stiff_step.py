@@ -1,4 +1,4 @@
-"""A step of stiff equations of a few states that is stable however long it is."""
+"""A step of stiff equations of a few states that stays stable."""
 
 from __future__ import annotations
 
@@ -13,6 +13,10 @@ GAMMA = 1.0 - 0.5**0.5
 """Of the method: with it what dies out in the equations dies out in one long step, too."""
 
 
+LONGEST = 0.2
+"""s: of a step. What was before is forgotten by then; over more a slope at its start says nothing of a tyre's curve."""
+
+
 class StiffStep(eqx.Module):
     """A transition by one step of ROS2, a linearly implicit method of second order that is L-stable (J. Verwer, E. Spee,
     J. Blom & W. Hundsdorfer, SIAM J. Sci. Comput. 20, 1999), inputs held.
@@ -20,13 +24,13 @@ class StiffStep(eqx.Module):
         (I - g h J) k1 = f(x),    (I - g h J) k2 = f(x + h k1) - 2 k1,    x + h (3 k1 + k2) / 2
 
     The poles of lateral motion go with one over the speed, 80 1/s and more where a car crawls, and logs have rows of 0.1 s and
-    gaps. `derivatives(system, t, x, u)`: a NamedTuple of scalars as x, or of arrays for a batch of states.
+    gaps; longer ones than `LONGEST` are cut to it. `derivatives(system, t, x, u)`: a NamedTuple of scalars as x, or of arrays for a batch of states.
     """
 
     derivatives: Callable = eqx.field(static=True)
 
     def __call__(self, system: Any, t0: Any, t1: Any, x: Any, u: Any) -> Any:
-        h, kind, values = t1 - t0, type(x), tuple(x)
+        h, kind, values = jnp.minimum(t1 - t0, LONGEST), type(x), tuple(x)
         n, f = len(values), lambda *at: tuple(self.derivatives(system, t0, kind(*at), u))
         rates, push = jax.linearize(f, *values)
         # All columns of J at once: a program a column would take as many times as long to compile.

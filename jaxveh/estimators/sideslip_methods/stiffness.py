@@ -17,10 +17,10 @@ from jaxveh.statespace import StateSpace, with_parameters
 from jaxveh.tyres import AbstractTyre, Contact, Forces
 
 SPREAD, WALK = 0.2, 0.3
-"""Of the logarithm of an axle's stiffness: how well a car's file knows it, and how much it changes in a second, in which a tyre may go
-from its linear range to sliding."""
+"""Of the logarithm of an axle's stiffness: how well a car's file knows it, and how much it changes in a second, in which a tyre
+may go from its linear range to sliding."""
 
-FORCE_ERROR = 0.01
+FORCE_ERROR = 0.03
 """s^0.5: as in `single_track`, of a law whose stiffness is allowed to err."""
 
 RATE = 0.05
@@ -65,7 +65,7 @@ def adapted_stiffness(car: CarSpecification) -> Guarded:
     """The unscented filter of the linear single track with both stiffnesses among its states: section 1.2.2, as M. Best,
     T. Gordon & P. Dixon do (the review's [29]) and A. von Vietinghoff et al. ([7])."""
     model = with_parameters(linear_model(car, force_error=FORCE_ERROR), chosen, SPREAD, WALK)
-    return filtered(car, model, filters.Unscented())
+    return filtered(car, model, filters.Unscented(), claims=True)
 
 
 def adaptive(car: CarSpecification) -> Guarded:

@@ -28,7 +28,9 @@ class HInfinityShare(HInfinity):
     not well known, or a tyre that slides, does not end the filter.
     """
 
-    share: jax.Array = eqx.field(converter=lambda v: float_array(np.asarray(v, float) if isinstance(v, float) else v), default=SHARE)
+    share: jax.Array = eqx.field(
+        converter=lambda v: float_array(np.asarray(v, float) if isinstance(v, float) else v), default=SHARE
+    )
 
     def __check_init__(self):
         check("HInfinityShare.share", self.share, lambda s: (s > 0) & (s < 1), "between 0 and 1")
@@ -45,5 +47,4 @@ def h_infinity(car: CarSpecification) -> Guarded:
     """The worst-case filter for a car's file: the review's [66], and [67] on nonlinear tyres. What it states is no spread."""
     model = lateral_model(single_track(car), slowest_of(car))
     filter = HInfinityShare(filters.Extended(), BOUND, {"v_y": 1.0})
-    return filtered(car, model, filter, claims=False)
-
+    return filtered(car, model, filter)
