@@ -128,11 +128,11 @@ class Live(eqx.Module):
         **Raises** `InputError` for an input that is not given, and as the filter does.
         """
         self.filter.check(self.model)
-        return _live_init(self, self._row(t, channels))
+        return live_init(self, self._row(t, channels))
 
     def step(self, belief: LiveBelief, t, channels: Mapping[str, Any]) -> tuple[LiveBelief, LiveAnswer]:
         """The belief after the next row, and what it says. **Raises** `InputError` for an input that is not given."""
-        return _live_step(self, belief, self._row(t, channels))
+        return live_step(self, belief, self._row(t, channels))
 
     def _row(self, t, channels: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
         """Time and channels as scalars: those that the cleaning reads, else those of the model; NaN for what is not given."""
@@ -147,7 +147,8 @@ class Live(eqx.Module):
 
 
 @eqx.filter_jit
-def _live_init(live: Live, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
+def live_init(live: Live, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
+    """What `Live.init` does, of a row's time and channels as scalars."""
     memory, values = apart(live.cleaning.first, row[0], *row)
     cleaned = _cleaned(live.model, row[0], values)
     belief, info = live.filter.init(live.model, cleaned, live.key)
@@ -157,7 +158,8 @@ def _live_init(live: Live, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
 
 
 @eqx.filter_jit
-def _live_step(live: Live, before: LiveBelief, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
+def live_step(live: Live, before: LiveBelief, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
+    """What `Live.step` does, of a row's time and channels as scalars."""
     memory, values = apart(live.cleaning.next, row[0], before.memory, *row)
     cleaned = _cleaned(live.model, row[0], values)
     belief, info = live.filter.step(live.model, before.belief, cleaned)

@@ -1,7 +1,8 @@
 """Sideslip of a real car: calibrated on a span of a log, then estimated on another, blind of any reference.
 
 What is measured is what every production car has: speed, yaw rate and accelerations. Lateral velocity is integrated from them,
-and held by the slip angle that the rear axle's force asks for: see `rear_axle`.
+and held by the slip angle that the rear axle's force asks for: see `rear_axle`. All other ways to sideslip of the review (Chen,
+Gao & Xu 2013) are `METHODS` beside it, by name.
 """
 
 from __future__ import annotations
@@ -9,35 +10,45 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, overload
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, JaxvehWarning, check_one_of, is_concrete
 from jaxveh._core.parameter import pick, prior_spread
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
-from jaxveh.diagnostics import Score, score_band
 from jaxveh.estimators.alignment import a_y_delay, on_time
 from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
 from jaxveh.estimators.coarse_log import coarse_logs
 from jaxveh.estimators.contract import Calibration, Need, Span, check_needs, model_of, spans_of, start_of
 from jaxveh.estimators.front_axle import front_axle
-from jaxveh.estimators.linear_baseline import open_loop
 from jaxveh.estimators.live import Live
+from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod, follow, method_of
 from jaxveh.estimators.parameter_bands import Members, estimate_with_members, members_of_fit, members_of_prior
 from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
 from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters
+from jaxveh.estimators.sideslip_methods import METHODS
+from jaxveh.estimators.sideslip_score import at_centre, least_speed_of, measured, reference_sideslip, score
 from jaxveh.estimators.standing import offsets_at_standstill
 from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
 from jaxveh.io import AxleTyre, CarSpecification, with_road_steer
 from jaxveh.statespace import Smoothing, StateSpace, kit
-from jaxveh.vehicles import GRAVITY, from_specification
+from jaxveh.vehicles import GRAVITY
 
 NAME = "sideslip"
+
+SHOWN = {"v_y": "m/s", "sideslip": "rad"}
+"""What all methods report."""
+
+RECOMMENDED = "rear_axle"
+"""Of `METHODS`: what `live` says without one."""
+
+__all__ = [
+    "METHODS", "NAME", "RECOMMENDED", "REFERENCES", "SHOWN", "at_centre", "calibrate", "car_of", "chosen_parameters", "estimate",
+    "fitted_car", "least_speed_of", "little_told", "live", "model", "needs", "reference_sideslip", "score",
+]  # fmt: skip
 
 needs = BLIND
 """Speed in every row; yaw rate and accelerations where they were measured."""
@@ -134,9 +145,9 @@ def _fit(
 
 def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
     check_needs(NAME, (*needs, *(Need(name, REFERENCES[name]) for name in uses)), recording)
-    if not _measured(recording, "yaw_rate"):
+    if not measured(recording, "yaw_rate"):
         raise InputError("sideslip: yaw_rate (rad/s) is NaN in every row: there is nothing to calibrate on.")
-    if not _measured(recording, "a_y"):
+    if not measured(recording, "a_y"):
         raise InputError(
             "sideslip: a_y (m/s^2) is missing from the log: without an accelerometer no tyre can be calibrated. Estimate "
             "with the car's file at its word, or calibrate on another log of the car."
@@ -148,10 +159,6 @@ def _seen(recording: Recording, uses: tuple[str, ...]) -> Recording:
         recording = recording.replace(v_y=np.asarray(recording["v_x"]) * np.tan(np.asarray(recording["sideslip"])))
         uses = ("v_y",)
     return recording.select([name for name in (*[need.channel for need in needs], *uses) if name in recording])
-
-
-def _measured(recording: Recording, name: str) -> bool:
-    return name in recording and bool(np.isfinite(np.asarray(recording[name])).any())
 
 
 def _wheelbase(model: StateSpace) -> Any:
@@ -171,25 +178,6 @@ def _blank(log: Recording, hidden: np.ndarray, channels: tuple[str, ...]) -> Rec
 
 def _reference(logs: Sequence[Recording], weight: float | None) -> Reference | None:
     return None if weight is None else Reference([reference_sideslip(log) for log in logs], weight)
-
-
-def at_centre(car: CarSpecification | RearAxle, recording: Recording) -> Recording:
-    """The recording with the `v_y` of a reference, m/s, moved to the centre of gravity from where the car's file says that it is
-    measured (`reference_position`): less that place's distance ahead times the yaw rate."""
-    ahead = _reference_ahead(car)
-    if not ahead:
-        return recording
-    return recording.replace(v_y=np.asarray(recording["v_y"]) - ahead * np.asarray(recording["yaw_rate"]))
-
-
-def _reference_ahead(car: CarSpecification | RearAxle) -> float:
-    place = car.reference_position if isinstance(car, CarSpecification) else None
-    return 0.0 if place is None else place[0]
-
-
-def reference_sideslip(recording: Recording) -> jax.Array:
-    """atan2(v_y, v_x) of a recording that has v_y, rad, (T,)."""
-    return jnp.arctan2(recording["v_y"], recording["v_x"])
 
 
 def _validate(filter, model, logs: Sequence[Recording], counted: Sequence[np.ndarray]) -> float:
@@ -237,7 +225,7 @@ def fitted_car(
     )
     recordings = [recording] if isinstance(recording, Recording) else recording
     recordings = [with_road_steer(car, one) for one in recordings]
-    steered = [one for one in recordings if _measured(one, "steer") and _measured(one, "a_y")]
+    steered = [one for one in recordings if measured(one, "steer") and measured(one, "a_y")]
     if not steered:
         return found
     told, new = car.front, front_axle(source.model, steered)
@@ -251,14 +239,28 @@ def fitted_car(
     return dataclasses.replace(found, front=told, **new._asdict())
 
 
+Known = Calibration | StateSpace | CarSpecification | RearAxle
+"""What `estimate` and `live` take without a `method`."""
+
+
+@overload
 def estimate(
-    source: Calibration | StateSpace | CarSpecification | RearAxle,
+    source: Known, recording: Recording, *, filter: AbstractFilter | None = None, key: Any = None, smoothed: bool = True,
+    method: None = None,
+) -> Estimate | SmoothedEstimate: ...  # fmt: skip
+@overload
+def estimate(source: AbstractMethod, recording: Recording) -> Answers: ...
+@overload
+def estimate(source: CarSpecification | AbstractMethod, recording: Recording, *, method: str) -> Answers: ...
+def estimate(
+    source: Any,
     recording: Recording,
     *,
     filter: AbstractFilter | None = None,
-    key=None,
+    key: Any = None,
     smoothed: bool = True,
-) -> Estimate | SmoothedEstimate:
+    method: str | None = None,
+) -> Estimate | SmoothedEstimate | Answers:
     """Sideslip of the car along a log from v_x, a_x, a_y and yaw_rate: see `rear_axle.RearAxleReport` for the names.
 
     `source`: a `Calibration`, a model, or a car taken at its word. Every row is estimated from all rows (a smoother), or, with
@@ -268,7 +270,13 @@ def estimate(
 
     An accelerometer that a calibration found to be late is shifted, and so is all that the car's file has a `low_pass` in, where
     every row is estimated from all; what is said live must do with it.
+
+    `method`: a name of `METHODS`, then `source` is a car's file, or a method with numbers of one's own, and the `Answers` are
+    what that method says, looking back only; the filter is the method's own, and nothing is smoothed. **Raises** as `follow`.
     """
+    if method is not None or isinstance(source, AbstractMethod):
+        _check_alone(filter, key)
+        return follow(NAME, method_of(NAME, METHODS, source, method or RECOMMENDED), recording)
     check_needs(NAME, needs, recording)
     one = model_of(NAME, source, model)
     if smoothed:
@@ -281,6 +289,11 @@ def estimate(
     return smooth(used, one, log) if smoothed and gaussian else run(used, one, log, key=key)
 
 
+def _check_alone(filter: AbstractFilter | None, key: Any) -> None:
+    if filter is not None or key is not None:
+        raise InputError("sideslip: a method has its own filter and key: give a method, or a filter and a key.")
+
+
 def _members(source: Calibration | StateSpace | CarSpecification | RearAxle, model: StateSpace) -> Members | None:
     """Models that stand for what is not known of the parameters; none where a model is taken to be known."""
     if isinstance(source, Calibration):
@@ -288,62 +301,20 @@ def _members(source: Calibration | StateSpace | CarSpecification | RearAxle, mod
     return None if isinstance(source, StateSpace) else members_of_prior(model, chosen_parameters, SPREADS)
 
 
+@overload
+def live(source: Known, *, filter: AbstractFilter | None = None, key: Any = None, method: None = None) -> Live: ...
+@overload
+def live(source: AbstractMethod) -> LiveMethod: ...
+@overload
+def live(source: CarSpecification | AbstractMethod, *, method: str) -> LiveMethod: ...
 def live(
-    source: Calibration | StateSpace | CarSpecification | RearAxle, *, filter: AbstractFilter | None = None, key=None
-) -> Live:
+    source: Any, *, filter: AbstractFilter | None = None, key: Any = None, method: str | None = None
+) -> Live | LiveMethod:
     """The same a row at a time, cleaning and bands included; a late accelerometer stays late, for what comes cannot be
-    shifted."""
+    shifted. `method` as in `estimate`, with the `LiveMethod` that says the same."""
+    if method is not None or isinstance(source, AbstractMethod):
+        _check_alone(filter, key)
+        return LiveMethod(method_of(NAME, METHODS, source, method or RECOMMENDED))
     one, used = model_of(NAME, source, model), filter or Extended()
     members = _members(source, one) if kit.smoothing_of(used) is Smoothing.gaussian else None
     return Live(used, one, RearAxleCleaning(_wheelbase(one)), key, members)
-
-
-def least_speed_of(car: CarSpecification) -> float:
-    """Speed (m/s) below which sideslip is not scored unless one says otherwise: 3, and 0.5 for cars of less than a metre between
-    their axles. Slower, it is the quotient of two small numbers."""
-    return 3.0 if car.wheelbase >= 1.0 else 0.5
-
-
-def score(
-    car: CarSpecification, found: Estimate | SmoothedEstimate, recording: Recording, *, least_speed: float | None = None
-) -> dict[str, float]:
-    """Errors of an estimate against a reference recording with `v_y`, next to the open-loop linear model's: the car's file with
-    linear tyres, steered from rest, which is the do-nothing baseline. Both are compared where the file says that the reference is
-    measured (`reference_position`).
-
-    Over the rows where the reference is finite and `v_x` at least `least_speed` (m/s, default `least_speed_of`). **Returns** by
-    name, for sideslip in degrees (`sideslip_rmse_deg`) and for v_y in m/s, what `diagnostics.Score` has: the
-    error as measured, its constant part and the rest (an INS that is turned against the car by half a degree says so in every
-    row), the largest, coverage of the bands, CRPS; the errors of the baseline as `open_loop_sideslip_...`, where there is a
-    `steer`; `rows` and `least_speed`.
-
-    **Raises** `InputError` where no row is left.
-    """
-    recording = with_road_steer(car, recording)
-    v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
-    floor = least_speed_of(car) if least_speed is None else least_speed
-    ahead = _reference_ahead(car)
-    there = lambda v_y, turning: np.asarray(v_y) + (ahead * np.asarray(turning["yaw_rate"]) if ahead else 0.0)
-    mean = there(found["v_y"], recording)
-    fast = (v_x >= floor) & np.isfinite(mean)
-    if not (fast & np.isfinite(v_y)).any():
-        raise InputError(
-            f"score: no row has both a reference v_y and a speed of at least {floor:g} m/s; there is nothing to score against."
-        )
-    degrees = lambda v_y: np.degrees(np.arctan2(v_y, v_x))
-    stds = np.degrees(np.asarray(found.std.sideslip)), np.asarray(found.std.v_y)
-    sideslip = score_band(degrees(v_y), degrees(mean), stds[0], fast)
-    named = _named("sideslip", "_deg", sideslip) | _named("v_y", "", score_band(v_y, mean, stds[1], fast))
-    if _measured(recording, "steer"):
-        baseline = open_loop(from_specification(car), recording)
-        plain = score_band(degrees(v_y), degrees(there(baseline["v_y"], baseline)), which=fast)
-        told = _named("open_loop_sideslip", "_deg", plain)
-        named |= {name: value for name, value in told.items() if not np.isnan(value)}
-    return named | {"rows": sideslip.rows, "least_speed": floor}
-
-
-def _named(quantity: str, unit: str, found: Score) -> dict[str, float]:
-    """A score's numbers by the names of the JSON file; shares have no unit."""
-    numbers = found._asdict()
-    del numbers["rows"]
-    return {f"{quantity}_{name}{'' if name.startswith('coverage') else unit}": value for name, value in numbers.items()}

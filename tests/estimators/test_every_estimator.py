@@ -104,7 +104,10 @@ def test_the_five_names_have_the_same_arguments(name):
     one = estimator(name)
     by_place, by_name, needed = parameters(one.estimate)
     assert (by_place, by_name[:2], needed) == (["source", "recording"], ["filter", "key"], ["source", "recording"])
-    assert parameters(one.live) == (["source"], ["filter", "key"], ["source"])
+    by_place, by_name, needed = parameters(one.live)
+    assert (by_place, by_name[:2], needed) == (["source"], ["filter", "key"], ["source"])
+    # A quantity that has methods beside the calibrated estimator takes the name of one.
+    assert by_name[2:] == (["method"] if hasattr(one, "METHODS") else [])
     by_place, by_name, needed = parameters(one.calibrate)
     assert (by_place, needed, by_name[:2]) == (["car", "recording"], ["car", "recording"], ["filter", "progress"])
     by_place, _, needed = parameters(one.model)

@@ -1,0 +1,149 @@
+"""What the methods of sideslip share: the channels, when an answer counts as known, and the sheet of the car that they ask
+for."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
+from jaxveh._core.names import record
+from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.method import AbstractMethod, Answer, answer
+from jaxveh.estimators.rear_axle import USUAL_WHEELBASE
+from jaxveh.io import CarSpecification
+
+V_X = Need("v_x", "m/s", throughout=True)
+STEER = Need("steer", "rad", throughout=True)
+YAW_RATE = Need("yaw_rate", "rad/s")
+A_X, A_Y, A_Z = (Need(f"a_{axis}", "m/s^2") for axis in "xyz")
+ROLL_RATE, PITCH_RATE = Need("roll_rate", "rad/s"), Need("pitch_rate", "rad/s")
+
+SLOWEST = 3.0
+"""m/s, of a car of the usual wheelbase: slower, or backwards, sideslip is not told. It is the quotient of two small numbers."""
+
+LONGEST_SILENCE = 0.3
+"""s: a channel that a method listens to and that has been silent for longer leaves its answer a guess."""
+
+WIDEST = 0.05
+"""rad: an answer whose own standard deviation of sideslip is larger is not known. A stability control acts on some 0.05."""
+
+LONG_AGO = 1e3
+"""s: the age of what was never measured."""
+
+
+class Watched(NamedTuple):
+    """What `Guarded` remembers: `inner`, the method's memory; time `t` (s); last values by name, `held`, and their `ages` (s)."""
+
+    inner: Any
+    t: Any
+    held: Any
+    ages: Any
+
+
+class Guarded(AbstractMethod):
+    """A method of sideslip whose answers say when they are known.
+
+    That is where the car goes forward faster than `slowest` (m/s), each of the channels in `hears` was measured in the last
+    `LONGEST_SILENCE`, and the standard deviation of sideslip, where `inner` claims one, is at most `WIDEST`. `holds`: channels
+    of which `inner` gets the last value where none was measured (0 before the first). `anew`: `inner` begins anew with the first
+    row after such a silence, for an integral of what was not measured is worth nothing. `claims` False: no spread is passed on.
+    """
+
+    inner: AbstractMethod
+    slowest: jax.Array = positive("m/s")
+    hears: tuple[str, ...] = eqx.field(static=True, default=())
+    holds: tuple[str, ...] = eqx.field(static=True, default=())
+    anew: bool = eqx.field(static=True, default=False)
+    claims: bool = eqx.field(static=True, default=True)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def needs(self):
+        return self.inner.needs
+
+    def first(self, t, values):
+        none = jnp.zeros_like(t)
+        there = {name: ~jnp.isnan(values[name]) for name in {*self.hears, *self.holds}}
+        held = record("Held", {n: jnp.where(there[n], values[n], none) for n in self.holds})
+        ages = record("Ages", {n: jnp.where(there[n], none, LONG_AGO) for n in self.hears})
+        inner, said = self.inner.first(t, values | held._asdict())
+        return Watched(inner, t, held, ages), self._answer(said, values["v_x"], ages)
+
+    def next(self, memory, t, values):
+        there = {name: ~jnp.isnan(values[name]) for name in {*self.hears, *self.holds}}
+        held = memory.held._replace(
+            **{n: jnp.where(there[n], values[n], old) for n, old in memory.held._asdict().items()}
+        )
+        older = {n: jnp.where(there[n], 0.0, age + (t - memory.t)) for n, age in memory.ages._asdict().items()}
+        ages = memory.ages._replace(**older)
+        values = values | held._asdict()
+        after = self.inner.next(memory.inner, t, values)
+        if self.anew:
+            heard = lambda ages: jnp.all(jnp.stack(ages) <= LONGEST_SILENCE)
+            back = heard(ages) & ~heard(memory.ages)
+            after = jax.tree.map(lambda a, b: jnp.where(back, a, b), self.inner.first(t, values), after)
+        inner, said = after
+        return Watched(inner, t, held, ages), self._answer(said, values["v_x"], ages)
+
+    def _answer(self, said: Answer, v_x, ages) -> Answer:
+        told = v_x >= self.slowest
+        for age in ages:
+            told &= age <= LONGEST_SILENCE
+        # A spread that is not claimed is NaN, and no spread is too wide then.
+        told &= ~(said.std.sideslip > WIDEST)
+        known = jax.tree.map(lambda one: one & told, said.known)
+        std = said.std if self.claims else jax.tree.map(lambda one: jnp.full_like(one, jnp.nan), said.std)
+        return said._replace(known=known, std=std)
+
+
+def guard(
+    car: CarSpecification, inner: AbstractMethod, hears: tuple[Need, ...] = (), holds: tuple[Need, ...] = (), *,
+    anew: bool = False, claims: bool = True,
+) -> Guarded:  # fmt: skip
+    """The method, `Guarded` as a car of this size asks for."""
+    names = lambda needs: tuple(need.channel for need in needs)
+    return Guarded(inner, slowest_of(car), names(hears), names(holds), anew, claims)
+
+
+def size_of(car: CarSpecification) -> float:
+    """The car's wheelbase over the usual one: times and speeds of cars that differ in size alone go with its root (Froude)."""
+    return car.wheelbase / USUAL_WHEELBASE
+
+
+def slowest_of(car: CarSpecification) -> float:
+    """`SLOWEST` of a car of this size, m/s."""
+    return SLOWEST * size_of(car) ** 0.5
+
+
+def sideslip_answer(v_y: Any, v_x: Any, known: Any = True, std: Any = None) -> Answer:
+    """The answer of a lateral velocity (m/s) of standard deviation `std` (m/s; None: it claims none) at a speed (m/s)."""
+    speed = jnp.square(v_x) + jnp.square(v_y)
+    # d atan2(v_y, v_x) = v_x / (v_x^2 + v_y^2) d v_y, finite at standstill.
+    stds = None if std is None else {"v_y": std, "sideslip": std * jnp.abs(v_x) / jnp.maximum(speed, 1e-6)}
+    return answer({"v_y": v_y, "sideslip": numerics.arctan2(v_y, v_x)}, stds, known)
+
+
+def joined_needs(*methods: AbstractMethod) -> tuple[Need, ...]:
+    """What several methods read together."""
+    found: dict[str, Need] = {}
+    for need in (need for method in methods for need in method.needs):
+        other = found.get(need.channel, need)
+        optional, throughout = need.optional and other.optional, need.throughout or other.throughout
+        found[need.channel] = need._replace(optional=optional, throughout=throughout)
+    return tuple(found.values())
+
+
+def told(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
+    """The values of these keys of a car's file; `keys` has their units. **Raises** `InputError` for those that it lacks."""
+    missing = [f"{key} ({unit})" for key, unit in keys.items() if getattr(car, key) is None]
+    if missing:
+        raise InputError(f"sideslip: {who} needs {', '.join(missing)} of the car's file; give it.")
+    return {key: getattr(car, key) for key in keys}

@@ -1,0 +1,299 @@
+"""Observers of v_y and yaw rate whose gains are made anew in each row: constant poles at any speed, on any slope of the tyres."""
+
+# No postponed annotations in this file: they would make fields of class variables.
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.errors import check
+from jaxveh._core.names import record_type
+from jaxveh._core.parameter import UNNAMED, check_parameters, positive, table
+from jaxveh.estimators.method import Filtered
+from jaxveh.estimators.sideslip_methods.common import A_Y, STEER, V_X, YAW_RATE, Guarded, guard, size_of, slowest_of
+from jaxveh.estimators.sideslip_methods.single_track import (
+    YAW_RATE_NOISE,
+    LateralReport,
+    LateralState,
+    filtered,
+    full_state,
+    lateral_model,
+    report,
+    single_track,
+)
+from jaxveh.estimators.sideslip_methods.stiff_step import StiffStep
+from jaxveh.io import CarSpecification
+from jaxveh.observers import AbstractObserver, PointBelief
+from jaxveh.statespace import Gaussian, Prior, StateSpace
+from jaxveh.vehicles import SingleTrack, linear
+
+POLES = (-10.0, -12.0)
+"""1/s, of a car of the usual wheelbase: about those of a car at 15 m/s, so that the error dies out within 0.3 s where the car's
+own poles are slower, and noise is not made larger."""
+
+ROBUST_POLES = (-4.0, -5.0)
+"""The same of the observer that is blind to the front axle: it has the rear axle's force alone to hold v_y."""
+
+LEAST_SLOPE = 0.2
+"""Of its value on straight running: `d a_y / d v_y`, by which a gain is divided, is taken to be at least so steep. A tyre that
+slides tells nothing."""
+
+LEAST_LEVER = 0.1
+"""Of the axles' moments together, `(a C_f + b C_r) / J`: as much must the yaw acceleration change with sideslip, or the yaw rate
+alone tells nothing of v_y; the gain fades out there."""
+
+LINEAR_SHARE, BOUNDARY = 0.3, (0.02, 1.0)
+"""Of the sliding observer's gain that is linear; and where its switch bends, rad/s and m/s^2: some ten of the sensors' noises."""
+
+TINY = 1e-12
+
+
+class StepMemory(NamedTuple):
+    """Slopes of the last step, (2, 2), and whether the car was fast enough to have any."""
+
+    slopes: Any
+    moves: Any
+
+
+class AbstractPlaced(AbstractObserver):
+    """An observer whose error, after each correction, obeys `(I - K H) F` with the poles `exp(poles dt)`; `poles` (2,), 1/s.
+
+    F are the slopes of the step, H those of the observation, taken anew in each row. Where a channel is missing, nothing is
+    corrected.
+    """
+
+    poles: jax.Array = table("1/s")
+
+    def __check_init__(self):
+        check_parameters(self)
+        check(f"{type(self).__name__}.poles", self.poles, lambda p: p < 0, "negative")
+
+    @abc.abstractmethod
+    def gain(self, model: StateSpace, F: Any, H: Any, z: Any, row: Any) -> Any:
+        """The gain (2, m) of slopes F (2, 2) and H (m, 2) and the poles z (2,) of this step."""
+
+    def at(self, model: StateSpace, vector: Any) -> Any:
+        """The state (2,) at which slopes are taken."""
+        del model
+        return vector
+
+    def check(self, model):
+        del model
+
+    def start(self, model):
+        eye = jnp.eye(2, dtype=model.prior.mean[0].dtype)
+        return StepMemory(eye, jnp.zeros((), bool))
+
+    def predict(self, model, belief, row):
+        u = model.step_inputs(belief.t, row.t, belief.u, row.u)
+        move = lambda vector: jnp.stack(model.transition(belief.t, row.t, belief.state_type(*vector), u))
+        F = jax.jacfwd(move)(self.at(model, belief.vector))
+        moves = belief.u.v_x >= model.system.slowest
+        eye = jnp.eye(2, dtype=F.dtype)
+        return move(belief.vector), StepMemory(jnp.where(moves, F, eye), moves)
+
+    def correct(self, model, belief: PointBelief, row, error, here):
+        F, moves = belief.memory
+        see = lambda vector: jnp.stack([getattr(seen_by(model, row, vector), name) for name in model.channels])
+        H = jax.jacfwd(see)(self.at(model, belief.vector))
+        z = jnp.exp(self.poles.astype(error.dtype) * (row.t - belief.t))
+        K = self.gain(model, F, H, z, row)
+        corrects = jnp.all(here) & moves
+        return jnp.where(corrects, self.change(K, error), 0.0), belief.memory
+
+    def change(self, K: Any, error: Any) -> Any:
+        """The correction (2,) of a gain and the channels' errors."""
+        return K @ error
+
+
+def seen_by(model: StateSpace, row, vector):
+    """What the sensors would say of a state (2,)."""
+    return model.observation(row.t, type(model.prior.mean)(*vector), row.u)
+
+
+class ErrorLinearising(AbstractPlaced):
+    """The nonlinear observer of U. Kiencke & A. Daiss (the review's [59], section 1.4.2): gains at the estimate with which the
+    error obeys one linear equation, wherever it is.
+
+        L(x, u):  df/dx - L dh/dx = diag(poles)    in a step:  K = (I - diag(z) F^-1) H^-1
+
+    Yaw rate and a_y are measured, so that H is square; its slope `d a_y / d v_y` is held at `LEAST_SLOPE` of that on straight
+    running, where the axles slide.
+    """
+
+    def gain(self, model, F, H, z, row):
+        car: Any = model.system.car
+        plain = stiffnesses(car)
+        least = LEAST_SLOPE * (plain[0] + plain[1]) / car.mass / jnp.maximum(row.u.v_x, model.system.slowest)
+        # Channels are yaw rate, which is the second state, and a_y.
+        slope, turning = -jnp.maximum(-H[1, 0], least), H[1, 1]
+        inverse = jnp.stack([jnp.stack([-turning / slope, 1.0 / slope]), jnp.stack([1.0 + 0.0 * slope, 0.0 * slope])])
+        determinant = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+        back = jnp.stack([jnp.stack([F[1, 1], -F[0, 1]]), jnp.stack([-F[1, 0], F[0, 0]])]) / determinant
+        return (jnp.eye(2, dtype=F.dtype) - z[:, None] * back) @ inverse
+
+
+class ConstantPoles(ErrorLinearising):
+    """The Luenberger observer (section 1.4.2) with the gain of straight running at the row's speed."""
+
+    def at(self, model, vector):
+        del model
+        return jnp.zeros_like(vector)
+
+
+class ArctangentSliding(ConstantPoles):
+    """The sliding-mode observer of section 1.4.3 (its [60-62]), with eq 9 for the sign:
+
+        x = x- + share K e + M (2 / pi) arctan(lambda e),    M = (pi / 2) (1 - share) K / lambda
+
+    K places the poles; near no error the observer is linear with K, and far from it a row corrects no more than M. `share` (-),
+    and `boundary` = 1 / lambda (rad/s, m/s^2) of each channel.
+    """
+
+    share: jax.Array = positive("-", default=LINEAR_SHARE)
+    boundary: jax.Array = table("rad/s, m/s^2", default=BOUNDARY)
+
+    def change(self, K, error):
+        edge = self.boundary.astype(error.dtype)
+        switching = 0.5 * jnp.pi * (1.0 - self.share) * edge
+        return K @ (self.share * error + switching * saturated_sign(error, 1.0 / edge))
+
+
+def saturated_sign(error: Any, steepness: Any) -> Any:
+    """Eq 9 of the review: `(2 / pi) arctan(lambda e)` in place of sgn(e); its slope at 0 is 2 lambda / pi."""
+    return 2.0 / jnp.pi * jnp.arctan(steepness * error)
+
+
+class StateDependentGain(AbstractPlaced):
+    """M. Zeitz's extended Luenberger observer (the review's [58], section 1.4.2): Ackermann's formula at the estimate, with the
+    yaw rate alone.
+
+    Of the slopes f of a step, whose determinant is D, and the poles z:
+
+        k_r = 1 - z1 z2 / D,    k_v = (f_11 + f_22 z1 z2 / D - z1 - z2) / f_21
+
+    f_21 goes with `(b C_r - a C_f) / (J v)`: a neutral car's yaw rate does not tell v_y. Where it is less than `least` (1/s^2)
+    over the speed the correction of v_y fades out, and the yaw rate has its own pole.
+    """
+
+    least: jax.Array = positive("1/s^2", default=1.0)
+
+    def gain(self, model, F, H, z, row):
+        del H
+        # The step's length out of its poles: a row that takes no time corrects nothing.
+        step = jnp.log(z[0]) / self.poles[0].astype(z.dtype)
+        edge = self.least.astype(z.dtype) * step / jnp.maximum(row.u.v_x, model.system.slowest)
+        lever = F[1, 0]
+        telling = jnp.square(lever) + jnp.square(edge) + TINY
+        share, product = jnp.square(lever) / telling, z[0] * z[1] / (F[0, 0] * F[1, 1] - F[0, 1] * lever)
+        aside = (F[0, 0] + F[1, 1] * product - z[0] - z[1]) * lever / telling
+        turning = share * (1.0 - product) + (1.0 - share) * (1.0 - jnp.min(z) / F[1, 1])
+        return jnp.stack([aside, turning])[:, None]
+
+
+class RearForce(eqx.Module):
+    """What an observer knows that is blind to the front axle: the `car`, of which the rear axle counts; `slowest` as in
+    `Lateral`."""
+
+    car: SingleTrack = eqx.field(metadata=UNNAMED)
+    slowest: jax.Array = positive("m/s")
+
+
+def rear_derivatives(system: RearForce, t, x: LateralState, u) -> LateralState:
+    """`dv_y/dt = a_y - v_x r`, `J dr/dt = a m a_y - (a + b) F_r`: the front axle's force is what a_y leaves of the rear's."""
+    car: Any = system.car
+    straight = record_type("Inputs", ("steer", "v_x"))(0.0 * u.v_x, u.v_x)
+    F_r = car.outputs(t, full_state(car, x), straight).F_yr
+    moment = car.front_axle_to_cg * car.mass * u.a_y - car.wheelbase * F_r
+    return LateralState(u.a_y - u.v_x * x.yaw_rate, moment / car.yaw_inertia)
+
+
+REAR_STEP = StiffStep(rear_derivatives)
+
+
+def rear_transition(system: RearForce, t0, t1, x: LateralState, u) -> LateralState:
+    """The state moved; slower than `slowest` the rear wheels roll where they point."""
+    moved = REAR_STEP(system, t0, t1, x, u)
+    rolling = LateralState(system.car.rear_axle_to_cg * x.yaw_rate, x.yaw_rate)
+    return jax.tree.map(lambda a, b: jnp.where(u.v_x >= system.slowest, a, b), moved, rolling)
+
+
+def yaw_rate_alone(system, t, x, u):
+    """The gyroscope."""
+    return record_type("Measurements", ("yaw_rate",))(x.yaw_rate)
+
+
+def rear_force_model(car: SingleTrack, slowest: float) -> StateSpace:
+    """The observer of lateral velocity that no disturbance of the front axle's force reaches (the review's [21, 65], section
+    1.4.4).
+
+    A force d at the front adds d / m to dv_y/dt and to the measured a_y, and a d / J to dr/dt. A gain `(1, m a / J)` from a_y
+    therefore takes it out of the error's equation, whatever it is: a wrong stiffness in front, a wrong steer, a slippery road
+    under the front wheels. With it the model's front force is gone too, a_y is an input, and the yaw rate is left to place poles.
+    The rear axle's stiffness still counts.
+    """
+    return StateSpace(
+        system=RearForce(car, slowest),
+        transition=rear_transition,
+        observation=yaw_rate_alone,
+        report=report,
+        process_noise=None,
+        measurement_noise=Gaussian({"yaw_rate": YAW_RATE_NOISE}),
+        prior=Prior(LateralState(0.0, 0.0), Gaussian({"v_y": 0.5, "yaw_rate": 0.1})),
+        inputs=("v_x", "a_y"),
+    )
+
+
+def decoupled(car: CarSpecification) -> Guarded:
+    """The observer that is blind to the front axle, for a car's file."""
+    model = rear_force_model(single_track(car), slowest_of(car))
+    filter = StateDependentGain(_poles(car, ROBUST_POLES), _least(model.system.car))
+    inner = Filtered(model, filter, (V_X, YAW_RATE, A_Y), shown=LateralReport._fields)
+    return guard(car, inner, (YAW_RATE, A_Y), (A_Y,))
+
+
+def luenberger(car: CarSpecification) -> Guarded:
+    """The observer with the gain of straight running, for a car's file."""
+    return _observer(car, ConstantPoles(_poles(car)))
+
+
+def error_linearising(car: CarSpecification) -> Guarded:
+    """The error-linearising observer for a car's file."""
+    return _observer(car, ErrorLinearising(_poles(car)))
+
+
+def sliding_mode(car: CarSpecification) -> Guarded:
+    """The sliding-mode observer for a car's file."""
+    return _observer(car, ArctangentSliding(_poles(car)))
+
+
+def state_dependent(car: CarSpecification) -> Guarded:
+    """The extended Luenberger observer for a car's file."""
+    plain = lateral_model(single_track(car), slowest_of(car))
+    model = eqx.tree_at(lambda m: m.measurement_noise, plain, Gaussian({"yaw_rate": YAW_RATE_NOISE}))
+    filter = StateDependentGain(_poles(car), _least(model.system.car))
+    inner = Filtered(model, filter, (V_X, STEER, YAW_RATE), shown=LateralReport._fields)
+    return guard(car, inner, (YAW_RATE,))
+
+
+def _observer(car: CarSpecification, observer: AbstractPlaced) -> Guarded:
+    return filtered(car, lateral_model(single_track(car), slowest_of(car)), observer)
+
+
+def _poles(car: CarSpecification, poles: tuple[float, float] = POLES) -> list[float]:
+    return [pole / size_of(car) ** 0.5 for pole in poles]
+
+
+def _least(car: SingleTrack) -> float:
+    front, rear = (float(one) for one in stiffnesses(car))
+    a, b = float(car.front_axle_to_cg), float(car.rear_axle_to_cg)
+    return LEAST_LEVER * (a * front + b * rear) / float(car.yaw_inertia)
+
+
+def stiffnesses(car: Any) -> tuple[Any, Any]:
+    """Cornering stiffnesses of the axles, N/rad, at rest."""
+    plain = linear(car)
+    return plain.front.cornering_stiffness, plain.rear.cornering_stiffness

@@ -1,0 +1,48 @@
+"""What `sideslip.live` says, as a method: integration held by the rear axle's force, with bands that know how little a file
+knows."""
+
+from __future__ import annotations
+
+from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning
+from jaxveh.estimators.live import Live, live_init, live_step
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.parameter_bands import members_of_prior
+from jaxveh.estimators.rear_axle import rear_axle_model
+from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters
+from jaxveh.estimators.sideslip_methods.common import A_Y, YAW_RATE, Guarded, guard
+from jaxveh.filters import Extended
+from jaxveh.io import CarSpecification
+
+
+class AsLive(AbstractMethod):
+    """A live estimator as a method: its row is a time and the channels that its cleaning reads. Spreads are those of its
+    bands."""
+
+    live: Live
+
+    @property
+    def needs(self):
+        return BLIND
+
+    def first(self, t, values):
+        return self._said(live_init(self.live, (t, self._of_its_own(values))))
+
+    def next(self, memory, t, values):
+        return self._said(live_step(self.live, memory, (t, self._of_its_own(values))))
+
+    def _of_its_own(self, values):
+        return {name: values[name] for name in self.live.cleaning.channels}
+
+    def _said(self, found):
+        memory, told = found
+        said = answer(told.mean._asdict(), told.std._asdict(), told.info.result == 0)
+        return memory, said._replace(result=told.info.result)
+
+
+def rear_axle(car: CarSpecification) -> Guarded:
+    """`rear_axle.RearAxle` of a car's file at its word, as `sideslip.live` has it without a calibration."""
+    system = car_of(car)
+    model = rear_axle_model(system)
+    cleaning = RearAxleCleaning(car.wheelbase)
+    members = members_of_prior(model, chosen_parameters, SPREADS)
+    return guard(car, AsLive(Live(Extended(), model, cleaning, None, members)), (YAW_RATE, A_Y))

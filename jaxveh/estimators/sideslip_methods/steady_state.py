@@ -1,0 +1,126 @@
+"""Sideslip of a steady turn: two formulas of the linear single track."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.estimators.method import AbstractMethod
+from jaxveh.estimators.sideslip_methods.common import A_Y, STEER, V_X, YAW_RATE, Guarded, guard, sideslip_answer
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+LINEAR = 0.4
+"""Of gravity: the lateral acceleration up to which a linear single track is good enough on dry road, as section 1.2.1 of the
+review says after its [15]. The formulas' answers are known no further."""
+
+LEAST_STEADINESS = 0.2
+"""The least of `1 + K v^2 / l`, of which eq 1's denominator is made, that is trusted: an oversteering car near its critical speed
+has no steady turn."""
+
+
+class AbstractSteadyState(AbstractMethod):
+    """The linear single track's numbers: `mass` (kg), distances of the axles (m), their cornering stiffnesses (N/rad)."""
+
+    mass: jax.Array = positive("kg")
+    front_axle_to_cg: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    front_stiffness: jax.Array = positive("N/rad")
+    rear_stiffness: jax.Array = positive("N/rad")
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def wheelbase(self):
+        """Distance of the axles, m."""
+        return self.front_axle_to_cg + self.rear_axle_to_cg
+
+    def first(self, t, values):
+        return self.next((), t, values)
+
+
+class SteadySteer(AbstractSteadyState):
+    """Eq 1 of the review, of its [20]: sideslip of the steer and the speed, in a steady turn of the linear single track.
+
+        beta = (1 - m l_f v^2 / (2 l_r k_r l)) / (1 - m (l_f k_f - l_r k_r) v^2 / (2 l^2 k_f k_r)) (l_r / l) delta
+
+    Erratum: the printed k is of one tyre, so that an axle has C = 2 k. Known where the lateral acceleration of that turn is at
+    most `LINEAR` g. `steer_offset` (rad): what is added to the channel.
+    """
+
+    steer_offset: jax.Array = parameter("rad", scale=0.02, default=0.0)
+
+    @property
+    def needs(self):
+        return (STEER, V_X)
+
+    def turning(self, v_x, steer):
+        """The steer over what it would have to be without understeer (rad), and whether there is a steady turn at all."""
+        leverage = self.front_axle_to_cg * self.front_stiffness - self.rear_axle_to_cg * self.rear_stiffness
+        stiff = self.wheelbase**2 * self.front_stiffness * self.rear_stiffness
+        steadiness = 1.0 - self.mass * jnp.square(v_x) * leverage / stiff
+        steady = steadiness >= LEAST_STEADINESS
+        return (steer + self.steer_offset) / jnp.where(steady, steadiness, 1.0), steady
+
+    def asked_acceleration(self, v_x, steer):
+        """The lateral acceleration of that turn, m/s^2."""
+        return jnp.square(v_x) * self.turning(v_x, steer)[0] / self.wheelbase
+
+    def next(self, memory, t, values):
+        del t
+        v_x, steer = values["v_x"], values["steer"]
+        length, a, b = self.wheelbase, self.front_axle_to_cg, self.rear_axle_to_cg
+        turning, steady = self.turning(v_x, steer)
+        square = self.mass * jnp.square(v_x)
+        sideslip = (1.0 - square * a / (b * self.rear_stiffness * length)) * (b / length) * turning
+        linear = jnp.abs(self.asked_acceleration(v_x, steer)) <= LINEAR * GRAVITY
+        bounded = jnp.clip(sideslip, -1.0, 1.0)
+        return memory, sideslip_answer(v_x * numerics.tan(bounded), v_x, steady & linear & (bounded == sideslip))
+
+
+class SteadyTurn(AbstractSteadyState):
+    """Eq 2 of the review, of its [28]: sideslip of the yaw rate and the lateral acceleration, in a steady turn.
+
+        beta = l_r r / v_x - m l_f a_y / (2 l k_r)
+
+    Erratum: the printed k_r is of one tyre. It needs no steer, and holds where v_y does not change; the axle's force is taken to
+    be linear, so that it is known up to `LINEAR` g.
+    """
+
+    @property
+    def needs(self):
+        return (V_X, YAW_RATE, A_Y)
+
+    def next(self, memory, t, values):
+        del t
+        v_x, a_y = values["v_x"], values["a_y"]
+        slip = self.mass * self.front_axle_to_cg / (self.wheelbase * self.rear_stiffness) * a_y
+        v_y = self.rear_axle_to_cg * values["yaw_rate"] - slip * v_x
+        return memory, sideslip_answer(v_y, v_x, jnp.abs(a_y) <= LINEAR * GRAVITY)
+
+
+def numbers(car: CarSpecification) -> dict[str, float]:
+    """The linear single track of a car's file."""
+    assert (
+        car.front_cornering_stiffness is not None and car.rear_cornering_stiffness is not None
+    )  # the file has filled it
+    return dict(
+        mass=car.mass,
+        front_axle_to_cg=car.front_axle_to_cg,
+        rear_axle_to_cg=car.rear_axle_to_cg,
+        front_stiffness=car.front_cornering_stiffness,
+        rear_stiffness=car.rear_cornering_stiffness,
+    )
+
+
+def steady_steer(car: CarSpecification) -> Guarded:
+    """Eq 1 for a car's file."""
+    return guard(car, SteadySteer(**numbers(car), steer_offset=-(car.steer_offset or 0.0)))
+
+
+def steady_turn(car: CarSpecification) -> Guarded:
+    """Eq 2 for a car's file."""
+    return guard(car, SteadyTurn(**numbers(car)), (YAW_RATE, A_Y), (YAW_RATE, A_Y))

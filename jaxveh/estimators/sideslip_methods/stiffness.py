@@ -1,0 +1,87 @@
+"""Linear tyres whose cornering stiffnesses are estimated beside the state: what a curve does, stiffnesses that change do too."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+
+from jaxveh import filters, observers
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.sideslip_methods.common import Guarded, size_of, slowest_of
+from jaxveh.estimators.sideslip_methods.observers import POLES
+from jaxveh.estimators.sideslip_methods.single_track import USUAL_SPEED, axles_of, filtered, lateral_model, single_track
+from jaxveh.io import CarSpecification
+from jaxveh.statespace import StateSpace, with_parameters
+from jaxveh.tyres import AbstractTyre, Contact, Forces
+
+SPREAD, WALK = 0.2, 0.3
+"""Of the logarithm of an axle's stiffness: how well a car's file knows it, and how much it changes in a second, in which a tyre
+may go from its linear range to sliding."""
+
+FORCE_ERROR = 0.03
+"""s^0.5: as in `single_track`, of a law whose stiffness is allowed to err."""
+
+RATE = 0.05
+"""1/s: of the adaptation, what the stiffnesses' logarithms might wander in variance a second."""
+
+LEAST, MOST = 0.2, 1.6
+"""Of the file's stiffnesses: between these an adapted one stays."""
+
+DEAD_ZONE, LEAKAGE = 1.0, 0.1
+"""Errors within so many of the sensors' spreads teach nothing; 1/s, by which stiffnesses return to the file's where nothing tells
+them."""
+
+ROW = 0.01
+"""s: of the rows for which the gain of the adaptive observer places its poles. At others its error dies out as fast by rows."""
+
+
+class ShareOfStiffness(AbstractTyre):
+    """A linear tyre with a `share` (-) of the `cornering_stiffness` (N/rad) that the car's file has."""
+
+    cornering_stiffness: jax.Array = positive("N/rad")
+    share: jax.Array = positive("-", default=1.0)
+
+    def forces(self, contact: Contact, state: Any = None) -> Forces:
+        """Lateral force alone, N."""
+        return Forces(F_y=self.share * self.cornering_stiffness * contact.slip_angle)
+
+
+def chosen(model: StateSpace):
+    """What is left of both axles' stiffnesses."""
+    car = model.system.car
+    return (car.front.share, car.rear.share)
+
+
+def linear_model(car: CarSpecification, **noise: float) -> StateSpace:
+    """The single track of a car's file on linear tyres; nonlinear in its angles alone."""
+    plain = single_track(car)
+    axles = tuple(ShareOfStiffness(axle.stiffness) for axle in axles_of(plain))
+    return lateral_model(eqx.tree_at(lambda c: (c.front, c.rear), plain, axles), slowest_of(car), **noise)
+
+
+def adapted_stiffness(car: CarSpecification) -> Guarded:
+    """The unscented filter of the linear single track with both stiffnesses among its states: section 1.2.2, as M. Best,
+    T. Gordon & P. Dixon do (the review's [29]) and A. von Vietinghoff et al. ([7])."""
+    model = with_parameters(linear_model(car, force_error=FORCE_ERROR), chosen, SPREAD, WALK)
+    return filtered(car, model, filters.Unscented(), claims=True)
+
+
+def adaptive(car: CarSpecification) -> Guarded:
+    """The observer of the linear single track with both stiffnesses adapted by a law of Lyapunov's: section 1.4.7, after
+    M. Kaminaga & G. Naito (the review's [77]), H. Cherouat et al. and H. Grip et al. ([78, 79]).
+
+    Their function is the sum of squares of the errors of yaw rate and sideslip; `observers.Adaptive` has the one, of the errors
+    and the parameters', for which the adaptation holds at any rate.
+    """
+    plain = linear_model(car)
+    size = size_of(car) ** 0.5
+    poles = [pole / size for pole in POLES]
+    gain = observers.place_poles(plain, poles, dt=ROW * size, u={"v_x": USUAL_SPEED * size})
+    model = with_parameters(plain, chosen, SPREAD, 0.0)
+    names = [name for name in model.states if name not in plain.states]
+    bounds = dict.fromkeys(names, (LEAST, MOST))
+    rates = dict.fromkeys(names, RATE)
+    observer = observers.Adaptive(gain, rates, bounds=bounds, leakage=LEAKAGE, dead_zone=DEAD_ZONE)
+    return filtered(car, model, observer)
