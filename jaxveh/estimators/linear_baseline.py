@@ -10,8 +10,9 @@ import numpy as np
 from jaxveh import numerics
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
+from jaxveh.io import CarSpecification, with_road_steer
 from jaxveh.statespace import Propagate, Row
-from jaxveh.vehicles import SingleTrack, linear
+from jaxveh.vehicles import SingleTrack, from_specification, linear
 
 
 def _derivatives(car: SingleTrack, t, x, u):
@@ -29,6 +30,16 @@ def open_loop(car: SingleTrack, recording: Recording) -> dict[str, np.ndarray]:
     """
     found = open_loop_of(car, recording.time, recording["steer"], recording["v_x"])
     return {name: np.asarray(values) for name, values in found.items()}
+
+
+def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+    """`v_y` and `sideslip` of the car's file by `open_loop`; without `steer` or `v_x` those of a car that does not slip."""
+    recording = with_road_steer(car, recording)
+    steered = all(name in recording and np.isfinite(np.asarray(recording[name])).any() for name in ("steer", "v_x"))
+    if not steered:
+        return dict.fromkeys(("v_y", "sideslip"), np.zeros(len(recording)))
+    found = open_loop(from_specification(car), recording)
+    return {name: found[name] for name in ("v_y", "sideslip")}
 
 
 @eqx.filter_jit

@@ -23,6 +23,7 @@ from jaxveh.estimators.cleaning import BLIND, RearAxleCleaning, clean
 from jaxveh.estimators.coarse_log import coarse_logs
 from jaxveh.estimators.contract import Calibration, Need, Span, check_needs, model_of, spans_of, start_of
 from jaxveh.estimators.front_axle import front_axle
+from jaxveh.estimators.linear_baseline import do_nothing
 from jaxveh.estimators.live import Live
 from jaxveh.estimators.method import AbstractMethod, Answers, LiveMethod, follow, method_of
 from jaxveh.estimators.parameter_bands import Members, estimate_with_members, members_of_fit, members_of_prior
@@ -46,8 +47,8 @@ RECOMMENDED = "rear_axle"
 """Of `METHODS`: what `live` says without one."""
 
 __all__ = [
-    "METHODS", "NAME", "RECOMMENDED", "REFERENCES", "SHOWN", "at_centre", "calibrate", "car_of", "chosen_parameters", "estimate",
-    "fitted_car", "least_speed_of", "little_told", "live", "model", "needs", "reference_sideslip", "score",
+    "METHODS", "NAME", "RECOMMENDED", "REFERENCES", "SHOWN", "at_centre", "calibrate", "car_of", "chosen_parameters",
+    "do_nothing", "estimate", "fitted_car", "least_speed_of", "little_told", "live", "model", "needs", "reference_sideslip", "score",
 ]  # fmt: skip
 
 needs = BLIND

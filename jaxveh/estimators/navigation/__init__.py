@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
 from jaxveh.estimators.navigation.multi_rate import multi_rate
 from jaxveh.estimators.navigation.of_car import navigation, navigation_of
 from jaxveh.estimators.navigation.system import Navigator, Parts
+from jaxveh.io import CarSpecification
 
 NAME = "navigation"
 
@@ -55,11 +58,31 @@ __all__ = [
     "Navigation",
     "Navigator",
     "Parts",
+    "do_nothing",
     "estimate",
     "live",
     "navigation_model",
     "navigation_of",
 ]
+
+
+def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+    """The satellites' last speed and course, as if the car did not slip; NaN before the first."""
+    del car
+    said = {"v_x": _held(recording, "speed"), "yaw": _held(recording, "course")}
+    return said | dict.fromkeys(("v_y", "sideslip"), np.zeros(len(recording)))
+
+
+def _held(recording: Recording, name: str) -> np.ndarray:
+    if name not in recording:
+        return np.full(len(recording), np.nan)
+    values = np.asarray(recording[name], float)
+    last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(values.size), 0))
+    held = values[last]
+    there = np.isfinite(held)
+    if name == "course":
+        held[there] = np.unwrap(held[there])
+    return held
 
 
 def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
