@@ -14,7 +14,8 @@ FULL_CAR = CarSpecification(
     mass=1500.0, yaw_inertia=2500.0, front_axle_to_cg=1.2, rear_axle_to_cg=1.5, front_cornering_stiffness=1.1e5,
     rear_cornering_stiffness=1.3e5, name="every key", cg_height=0.55, track_front=1.5, track_rear=1.5, steering_ratio=16.0,
     steer_offset=0.0, sensor_position=(0.0, 0.0, 0.0), reference_position=(0.0, 0.0, 0.0), low_pass=20.0, wheel_radius=0.32,
-    wheel_inertia=1.2, drag=0.4, rolling_resistance=0.012, front_drive=1.0, front_brake=0.65,
+    wheel_inertia=1.2, drag=0.4, rolling_resistance=0.012, front_drive=1.0, front_brake=0.65, brake_torque_per_pressure=1.6e-3,
+    antenna_position=(-0.5, 0.0, 0.9), satellite_delay=0.15, inertial_delay=0.01, camera_delay=0.08,
     front=AxleTyre(B=8.0, C=1.3, D=9000.0, E=-0.5), rear=AxleTyre(B=12.0, C=1.3, D=8300.0, E=-0.5),
 )  # fmt: skip
 """A file with every key, of which one after the other is left out to see who asks for it."""

@@ -48,7 +48,8 @@ RECOMMENDED = "rear_axle"
 
 __all__ = [
     "METHODS", "NAME", "RECOMMENDED", "REFERENCES", "SHOWN", "at_centre", "calibrate", "car_of", "chosen_parameters",
-    "do_nothing", "estimate", "fitted_car", "least_speed_of", "little_told", "live", "model", "needs", "reference_sideslip", "score",
+    "do_nothing", "estimate", "fitted_car", "least_speed_of", "little_told", "live", "model", "needs", "reference_sideslip",
+    "score",
 ]  # fmt: skip
 
 needs = BLIND

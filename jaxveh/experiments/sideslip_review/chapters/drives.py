@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics, roads, sensors
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.experiments.sideslip_review.chapters.fleet import STEERING_RATIO, true_car
+from jaxveh.experiments.sideslip_review.chapters.fleet import KNOWN, STEERING_RATIO, true_car
 from jaxveh.experiments.sideslip_review.chapters.scenarios import Scenario
 from jaxveh.manoeuvres import AbstractManoeuvre, DriverInputs, SpeedControl
 from jaxveh.roads import AbstractRoad
@@ -28,7 +28,7 @@ AXES = ("a_x", "a_y", "a_z", "roll_rate", "pitch_rate", "yaw_rate")
 SPEED = 25.0
 """m/s."""
 
-SATELLITES_LATE, TRAIL = 0.15, 0.03
+SATELLITES_LATE, TRAIL = KNOWN["satellite_delay"], 0.03
 """s, and m: by which the front wheels' contact lies behind the steering axis."""
 
 EVENT = 0.5
@@ -93,7 +93,10 @@ def drive_once(built: FourteenDOF, scenario: Scenario, key, *, duration: float) 
     )  # fmt: skip
     channels = {name: found[name] for name in found.names}
     channels |= _made_of(built, scenario, channels, jnp.asarray(found.time), more_key, duration)
-    return channels | _own_numbers(car.vehicle, channels["true.v_x"])
+    # Over what the file's tyres have: the road's friction, and the draw of the car's own.
+    grip = car.vehicle.front.scaling.LMUY / built.front.scaling.LMUY
+    friction = grip * sum(channels[f"true.friction_{at}"] for at in CORNERS) / 4.0
+    return channels | {"true.friction": friction} | _own_numbers(car.vehicle, channels["true.v_x"])
 
 
 def _own_numbers(car: FourteenDOF, like) -> dict[str, Any]:
@@ -110,8 +113,9 @@ def _own_numbers(car: FourteenDOF, like) -> dict[str, Any]:
 def _made_of(
     built: FourteenDOF, scenario: Scenario, said: dict[str, Any], time, key, duration: float
 ) -> dict[str, Any]:
-    """What is computed of what the devices say: each wheel's torque, a second antenna's heading (late as the course is), the
-    torque at the steering wheel without assistance, satellites that are silent in the outage."""
+    """What is computed of what the devices say: the road wheels' steer, each wheel's torque, the brakes' pressure, a second
+    antenna's heading (late as the course is), the torque at the steering wheel without assistance, satellites that are silent in
+    the outage."""
     heading_key, torque_key = jax.random.split(key)
     share = built.drive.front_drive
     drive = dict(zip(CORNERS, (share, share, 1.0 - share, 1.0 - share), strict=True))
@@ -124,9 +128,17 @@ def _made_of(
     silent = (time > duration / 3.0) & (time <= duration / 3.0 + scenario.outage)
     heard = {"speed": said["speed"], "course": said["course"]}
     heard |= {"heading": jnp.where(jnp.isnan(said["speed"]), jnp.nan, heading)}
+    pressure = {"brake_pressure": said["brake_torque"] / KNOWN["brake_torque_per_pressure"]}
     moment = sum(said[f"true.M_z_{at}"] - TRAIL * said[f"true.F_y_{at}"] for at in ("fl", "fr"))
     felt = -moment / STEERING_RATIO + 0.05 * jax.random.normal(torque_key, time.shape)
-    return wheels | {name: jnp.where(silent, jnp.nan, one) for name, one in heard.items()} | {"steering_torque": felt}
+    steer = {"steer": said["steering_wheel"] / STEERING_RATIO}
+    return (
+        steer
+        | wheels
+        | pressure
+        | {name: jnp.where(silent, jnp.nan, one) for name, one in heard.items()}
+        | {"steering_torque": felt}
+    )
 
 
 def total_mass(car: FourteenDOF) -> jax.Array:
@@ -135,9 +147,11 @@ def total_mass(car: FourteenDOF) -> jax.Array:
 
 
 def _wander(scenario: Scenario, steer_key, speed_key, duration: float) -> Wander:
+    frequencies, phases = numerics.band_harmonics(steer_key, 0.1, 0.6, 20)
+    slow_frequencies, slow_phases = numerics.gauss_markov_harmonics(speed_key, 8.0, 0.2, 20)
     return Wander(
-        scenario.steer, *numerics.band_harmonics(steer_key, 0.1, 0.6, 20), scenario.wander,
-        *numerics.gauss_markov_harmonics(speed_key, 8.0, 0.2, 20), scenario.wheelspin - scenario.drop, duration,
+        steer=scenario.steer, frequencies=frequencies, phases=phases, wander=scenario.wander, slow_frequencies=slow_frequencies,
+        slow_phases=slow_phases, change=scenario.wheelspin - scenario.drop, duration=duration,
     )  # fmt: skip
 
 

@@ -16,7 +16,13 @@ from jaxveh.vehicles import AntiLock, FourteenDOF
 CARS = ("sedan", "van", "compact_car")
 """Measured cars of CommonRoad's vehicle models, with tyres of Magic Formula 5.2; one a seed, in turn."""
 
-STEERING_RATIO = 16.0
+KNOWN = {
+    "steering_ratio": 16.0, "drag": 0.4, "rolling_resistance": 0.012, "brake_torque_per_pressure": 1.6e-3, "satellite_delay":
+    0.15, "inertial_delay": 0.01,
+}  # fmt: skip
+"""What the cars have beyond their measured numbers, by the keys of a car's file."""
+
+STEERING_RATIO = KNOWN["steering_ratio"]
 
 SPREADS = {"stiffness": 0.1, "grip": 0.05, "mass": 0.04, "yaw_inertia": 0.05, "place": 0.03}
 """By how much a true car differs from its file (standard deviations, relative; `place` in m): as in the race of observers."""
@@ -25,12 +31,14 @@ SPREADS = {"stiffness": 0.1, "grip": 0.05, "mass": 0.04, "yaw_inertia": 0.05, "p
 def told_cars() -> list[CarSpecification]:
     """The files, each of a car as built: nobody's draw."""
     named = lambda name: vehicles.specification_of(vehicles.kit.CARS[name]())
-    return [dataclasses.replace(named(name), steering_ratio=STEERING_RATIO) for name in CARS]
+    return [dataclasses.replace(named(name), **KNOWN) for name in CARS]
 
 
 def built_cars() -> FourteenDOF:
     """The cars as built, stacked: one array axis of `CARS` on each leaf."""
-    cars = [vehicles.named_car(name, "fourteen-dof") for name in CARS]
+    where = lambda car: (car.drag, car.rolling_resistance)
+    resists = (jnp.asarray(KNOWN["drag"]), jnp.asarray(KNOWN["rolling_resistance"]))
+    cars = [eqx.tree_at(where, vehicles.named_car(name, "fourteen-dof"), resists) for name in CARS]
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *cars)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import functools
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -11,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import estimators, sweeps
+from jaxveh import Recording, estimators, sweeps
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.estimators import AbstractMethod, kit
@@ -32,8 +34,6 @@ CHAPTERS = {
 
 LATEST, EARLIEST = 100, 50
 """Rows by which an estimate may be late or early, to be called so."""
-
-PLAIN, WRAPPED = 1.0, 2.0
 
 
 class Raced(NamedTuple):
@@ -58,7 +58,8 @@ def channels_kept() -> tuple[str, ...]:
     read = set()
     for module in quantities().values():
         for one in module.METHODS.values():
-            read |= {need.channel for need in one.make(told_cars()[0]).needs}
+            with contextlib.suppress(InputError):
+                read |= {need.channel for need in one.make(told_cars()[0]).needs}
     return tuple(sorted(shown | read | {"true.v_x"}))
 
 
@@ -76,7 +77,18 @@ def drives_of(
         made = drive_once(one, scenario_at(point.scenario), key, duration=duration)
         return {name: made[name] for name in wanted if name in made} | {"car": index}
 
-    return stores.sweep("drives", run, _design(), seeds, key, progress=progress).values
+    drives = stores.sweep("drives", run, _design(), seeds, key, progress=part(progress, 0.0, 0.9, "drives")).values
+    return {**drives, "v_x": _told_speed(drives, seeds, key, stores, part(progress, 0.9, 1.0, "speed"))}
+
+
+def _told_speed(drives: Mapping[str, np.ndarray], seeds: int, key, stores: Stores, progress: Progress) -> np.ndarray:
+    """The speed that methods of other quantities are told: no car measures it, so it is our own estimate, looking back only."""
+    module = estimators.speed
+    methods = [module.METHODS[module.RECOMMENDED].make(car) for car in told_cars()]
+    said = lambda answer, drive: {"v_x": answer.mean.v_x}
+    run = _run(methods, said)
+    data = _data(module, methods[0], drives)
+    return stores.sweep("speed", run, _design(), seeds, key, data=data, progress=progress).values["v_x"]
 
 
 def _design() -> sweeps.Design:
@@ -98,18 +110,22 @@ def race(
     every = [(quantity, module, name) for quantity, module in quantities().items() for name in module.METHODS]
     for i, (quantity, module, name) in enumerate(every):
         told = part(progress, i / len(every), (i + 1) / len(every), f"{quantity}: {name}")
-        methods = [module.METHODS[name].make(car) for car in told_cars()]
+        try:
+            methods = [module.METHODS[name].make(car) for car in told_cars()]
+        except InputError as error:
+            left_out[quantity, name] = str(error)
+            continue
         lacking = [need.channel for need in methods[0].needs if not need.optional and need.channel not in drives]
         if lacking:
             left_out[quantity, name] = f"the drives have no {', '.join(lacking)}"
             continue
-        run = _run(module, methods, step)
+        run = _run(methods, functools.partial(_score, module))
         data = _data(module, methods[0], drives)
         swept = stores.under(quantity).under(name).sweep("race", run, _design(), seeds, key, data=data, progress=told)
         for path, values in swept.values.items():
             shown, metric = path.rsplit(".", 1)
             found.setdefault((quantity, name, shown), {})[metric] = values
-    return Raced(drives, found, _nothing(drives, step), left_out)
+    return Raced(drives, found, _nothing(drives), left_out)
 
 
 def _data(module: ModuleType, method: AbstractMethod, drives: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -117,8 +133,9 @@ def _data(module: ModuleType, method: AbstractMethod, drives: Mapping[str, np.nd
     return {name: drives[name] for name in sorted(wanted) if name in drives}
 
 
-def _run(module: ModuleType, methods: list[AbstractMethod], step: float):
-    """One drive of a seed, as `sweeps.sweep` calls it: the method made of the file of the seed's car."""
+def _run(methods: list[AbstractMethod], conclude: Callable[[Any, dict], dict]):
+    """One drive of a seed, as `sweeps.sweep` calls it: `conclude(answers, drive)` of the method made of the file of the seed's
+    car."""
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[eqx.filter(one, eqx.is_array) for one in methods])
     rest = eqx.filter(methods[0], eqx.is_array, inverse=True)
 
@@ -126,29 +143,32 @@ def _run(module: ModuleType, methods: list[AbstractMethod], step: float):
         del point, key
         own = eqx.combine(jax.tree.map(lambda leaf: leaf[drive["car"]], stacked), rest)
         v_x = drive["true.v_x"]
-        time = step * jnp.arange(v_x.shape[0], dtype=v_x.dtype)
+        time = STEP * jnp.arange(v_x.shape[0], dtype=v_x.dtype)
         none = jnp.full_like(v_x, jnp.nan)
         values = {need.channel: drive.get(need.channel, none) for need in own.needs}
-        said = kit.follow_rows(own, time, values)
-        return {
-            name: metrics(getattr(said.mean, name), getattr(said.known, name), drive[f"true.{name}"], step)
-            for name in module.SHOWN
-            if f"true.{name}" in drive
-        }
+        return conclude(kit.follow_rows(own, time, values), drive)
 
     return run
 
+
+def _score(module: ModuleType, said: Any, drive: dict) -> dict[str, Any]:
+    shown = [name for name in module.SHOWN if f"true.{name}" in drive]
+    return {name: metrics(getattr(said.mean, name), getattr(said.known, name), drive[f"true.{name}"]) for name in shown}
+
+
+STEP = 0.01
+"""s: between rows, of the fastest device."""
 
 WARM_UP = 5.0
 """s: not scored."""
 
 
-def metrics(mean, known, truth, step: float) -> dict[str, Any]:
+def metrics(mean, known, truth) -> dict[str, Any]:
     """Of one drive: root mean square of the error over the first and the second half (`early`, `late`), over all (`rmse`) and
     where the method says that it knows (`rmse_known`), the largest error (`worst`), the share of rows known (`known`), by how
     many seconds it is late (`delay`), and whether it was finite throughout (`failed`)."""
     rows = jnp.arange(truth.shape[0])
-    warm, half = rows >= round(WARM_UP / step), rows.shape[0] // 2
+    warm, half = rows >= round(WARM_UP / STEP), rows.shape[0] // 2
     finite = jnp.isfinite(mean)
     error = jnp.where(finite, mean - truth, 0.0)
     rms = lambda which: jnp.sqrt(jnp.sum(jnp.where(which, error**2, 0.0)) / jnp.sum(which).astype(error.dtype))
@@ -156,11 +176,11 @@ def metrics(mean, known, truth, step: float) -> dict[str, Any]:
         "rmse": rms(warm & finite), "early": rms(warm & finite & (rows < half)), "late": rms(finite & (rows >= half)),
         "rmse_known": rms(warm & finite & known), "worst": jnp.max(jnp.where(warm & finite, jnp.abs(error), 0.0)),
         "known": jnp.mean(jnp.where(warm, known, False)) * truth.shape[0] / jnp.sum(warm),
-        "delay": _delay(jnp.where(finite, mean, 0.0), truth, step), "failed": 1.0 - jnp.all(finite | ~warm).astype(error.dtype),
+        "delay": _delay(jnp.where(finite, mean, 0.0), truth), "failed": 1.0 - jnp.all(finite | ~warm).astype(error.dtype),
     }  # fmt: skip
 
 
-def _delay(mean, truth, step: float):
+def _delay(mean, truth):
     """By which the truth must be shifted to be nearest to the estimate, constant errors aside, s, to the row."""
     inner = slice(LATEST, truth.shape[0] - EARLIEST)
 
@@ -169,10 +189,10 @@ def _delay(mean, truth, step: float):
         return jnp.var(mean[inner] - moved)
 
     shifts = jnp.arange(-EARLIEST, LATEST + 1)
-    return step * shifts[jnp.argmin(jax.lax.map(left, shifts))].astype(mean.dtype)
+    return STEP * shifts[jnp.argmin(jax.lax.map(left, shifts))].astype(mean.dtype)
 
 
-def _nothing(drives: Mapping[str, np.ndarray], step: float) -> dict[tuple[str, str], dict[str, np.ndarray]]:
+def _nothing(drives: Mapping[str, np.ndarray]) -> dict[tuple[str, str], dict[str, np.ndarray]]:
     """What doing nothing is worth, by quantity and name."""
     found = {}
     shape = drives["car"].shape
@@ -181,23 +201,21 @@ def _nothing(drives: Mapping[str, np.ndarray], step: float) -> dict[tuple[str, s
             if f"true.{name}" in drives:
                 found[quantity, name] = {"rmse": np.full(shape, np.nan)}
         for place in np.ndindex(shape):
-            log = _log(drives, place, step)
+            log = _log(drives, place)
             try:
                 guess = module.do_nothing(told_cars()[int(drives["car"][place])], log)
             except InputError:
                 continue
             for name, values in guess.items():
                 if (quantity, name) in found:
-                    error = (np.asarray(values) - drives[f"true.{name}"][place])[round(WARM_UP / step) :]
+                    error = (np.asarray(values) - drives[f"true.{name}"][place])[round(WARM_UP / STEP) :]
                     found[quantity, name]["rmse"][place] = np.sqrt(np.nanmean(error**2))
     return found
 
 
-def _log(drives: Mapping[str, np.ndarray], place, step: float):
-    from jaxveh import Recording
-
+def _log(drives: Mapping[str, np.ndarray], place) -> Recording:
     channels = {
         name: np.asarray(v[place]) for name, v in drives.items() if name != "car" and not name.startswith("true.")
     }
     rows = drives["true.v_x"][place].shape[0]
-    return Recording(step * np.arange(rows), channels)
+    return Recording(STEP * np.arange(rows), channels)
