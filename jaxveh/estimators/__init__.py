@@ -1,6 +1,6 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
-from jaxveh.estimators import kit, mass_and_grade, sideslip, speed
+from jaxveh.estimators import bank, kit, mass_and_grade, roll, sideslip, speed
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.contract import Calibration, Span
@@ -26,6 +26,7 @@ __all__ = [
     "MethodOfCar",
     "RearAxle",
     "Span",
+    "bank",
     "clean",
     "held_rows",
     "kit",
@@ -36,6 +37,7 @@ __all__ = [
     "predict_measurements",
     "read_calibration",
     "rear_axle_model",
+    "roll",
     "sideslip",
     "speed",
     "state_space",

@@ -39,6 +39,10 @@ drag = 0.4                           # N s^2/m^2: half the air's density times c
 rolling_resistance = 0.01            # force over load
 front_drive = 1.0                    # the front axle's share of the driving torque
 front_brake = 0.65                   # the front axle's share of the braking torque
+roll_gradient = 0.006                # rad/(m/s^2): how far the body rolls over the road for a lateral acceleration
+roll_frequency = 1.6                 # Hz, of the body that rolls on its springs, undamped
+roll_damping = 0.3                   # damping ratio of that roll
+pitch_gradient = 0.004               # rad/(m/s^2): how far the nose rises over the road for a longitudinal acceleration
 # front_tyre = "tyres/front.tir"     # the tyre property file of a front wheel, from this file's folder
 # rear_tyre = "tyres/rear.tir"
 
@@ -97,7 +101,8 @@ class CarSpecification:
     Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
     `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`,
     `reference_position`: x, y, z in metres from the centre of gravity of the accelerometer and of a reference for sideslip.
-    `low_pass`: cutoff in hertz, of second order. `front_tyre`, `rear_tyre`: paths of the tyre property files of a wheel, which
+    `low_pass`: cutoff in hertz, of second order. `roll_gradient`, `pitch_gradient`: of the body over the road, for what an
+    accelerometer in the road's axes shows. `front_tyre`, `rear_tyre`: paths of the tyre property files of a wheel, which
     nobody opens before a car on four wheels is built.
 
     **Raises** `InputError` with name, value and allowed range for what no car has, such as a negative mass.
@@ -124,6 +129,10 @@ class CarSpecification:
     rolling_resistance: float | None = _number(0.0, 1.0, default=None)
     front_drive: float | None = _number(0.0, 1.0, default=None)
     front_brake: float | None = _number(0.0, 1.0, default=None)
+    roll_gradient: float | None = _number(0.0, 0.1, "rad/(m/s^2)", default=None)
+    roll_frequency: float | None = _number(0.1, 100.0, "Hz", default=None)
+    roll_damping: float | None = _number(1e-3, 10.0, default=None)
+    pitch_gradient: float | None = _number(-0.1, 0.1, "rad/(m/s^2)", default=None)
     front_tyre: str | None = None
     rear_tyre: str | None = None
     front: AxleTyre | None = None
