@@ -71,17 +71,20 @@ class MotionMemory(NamedTuple):
     slow_speed: Any
     late_yaw_rate: Any
     silence: Any
+    pull_silence: Any
     speed_silence: Any
     started: Any
 
 
 class BodyMotion(AbstractCleaning):
-    """Every row complete: `a_x`, `a_y`, `yaw_rate`, `v_x` as last heard, and what follows of them.
+    """Every row complete: `a_x`, `a_y`, `yaw_rate`, `v_x` as last heard (`speed_spoke`: whether a speed is new), and what
+    follows of them.
 
-    - `v_x_rate` (m/s^2) and `slope` (rad): rate of the speed through a low-pass of `slope_time` (s), and the body's pitch
-      against the horizon, nose up, `(a_x - v_x_rate) / g` through the same.
+    - `v_x_rate`, `slow_a_x` (m/s^2) and `slope` (rad): rate of the speed and `a_x` through a low-pass of `slope_time` (s), and
+    the body's pitch against the horizon, nose up, `(a_x - v_x_rate) / g` through the same.
     - `late_yaw_rate` (rad/s): lower-passed by half the satellites' `delay` (s), the mean over that delay.
-    - `dt` (s): since the last row; `silence` (s): since the inertial sensors, or the speed, were last heard.
+    - `dt` (s): since the last row; `silence`, `pull_silence` (s): since `a_y` and `yaw_rate`, or `a_x`, or the speed, were last
+      heard.
 
     `front_share`: the front axle's share of the driving torque. Other channels are handed on.
     """
@@ -97,7 +100,7 @@ class BodyMotion(AbstractCleaning):
     def first(self, t, values):
         zero = jnp.zeros_like(t)
         silent = zero + SILENCE
-        memory = MotionMemory(t, zero, zero, zero, zero, zero, zero, zero, silent, silent, zero)
+        memory = MotionMemory(t, zero, zero, zero, zero, zero, zero, zero, silent, silent, silent, zero)
         return self.next(memory, t, values)
 
     def next(self, memory, t, values):
@@ -105,6 +108,7 @@ class BodyMotion(AbstractCleaning):
         heard, spoke = speed_heard(values, self.front_share)
         v_x = jnp.where(spoke, heard, memory.v_x)
         a_x, a_y, yaw_rate = (hold(values[name], getattr(memory, name)) for name in ("a_x", "a_y", "yaw_rate"))
+        pulled = ~jnp.isnan(values["a_x"])
         turned = ~(jnp.isnan(values["a_y"]) | jnp.isnan(values["yaw_rate"]))
         # The first speed is where the low-passes begin: no speed was lost before.
         begins = spoke & (memory.started == 0)
@@ -115,14 +119,25 @@ class BodyMotion(AbstractCleaning):
         v_x_rate = (v_x - slow_speed) / self.slope_time
         memory = MotionMemory(
             t, a_x, a_y, yaw_rate, v_x, slow_a_x, slow_speed, late,
-            jnp.where(turned, 0.0, memory.silence + dt), jnp.where(spoke, 0.0, memory.speed_silence + dt),
+            jnp.where(turned, 0.0, memory.silence + dt), jnp.where(pulled, 0.0, memory.pull_silence + dt),
+            jnp.where(spoke, 0.0, memory.speed_silence + dt),
             jnp.where(spoke, 1.0, memory.started),
         )  # fmt: skip
         slope = jnp.clip((slow_a_x - v_x_rate) / GRAVITY, -0.5, 0.5)
         made = {
-            "a_x": a_x, "a_y": a_y, "yaw_rate": yaw_rate, "v_x": v_x, "v_x_rate": v_x_rate, "late_yaw_rate": late, "dt": dt,
-            "slope": slope, "silence": jnp.maximum(memory.silence, memory.speed_silence),
-        }  # fmt: skip
+            "a_x": a_x,
+            "a_y": a_y,
+            "yaw_rate": yaw_rate,
+            "v_x": v_x,
+            "speed_spoke": spoke,
+            "v_x_rate": v_x_rate,
+            "slow_a_x": slow_a_x,
+            "slope": slope,
+            "late_yaw_rate": late,
+            "dt": dt,
+            "silence": jnp.maximum(memory.silence, memory.speed_silence),
+            "pull_silence": jnp.maximum(memory.pull_silence, memory.speed_silence),
+        }
         return memory, values | made
 
 

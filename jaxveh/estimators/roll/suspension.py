@@ -29,7 +29,8 @@ class SteadyMemory(NamedTuple):
 
 class Steady(AbstractMethod):
     """`roll = R a_y / (1 + g R)` (A. Hac et al. 2010, of the suspension): R = `roll_gradient` for the acceleration in the
-    road's plane, of which a sensor on the rolling body shows `1 + g R`. Through a low-pass of `time` (s), whose derivative is the rate.
+    road's plane, of which a sensor on the rolling body shows `1 + g R`. Through a low-pass of `time` (s), whose
+    derivative is the rate.
     """
 
     roll_gradient: jax.Array = positive("rad/(m/s^2)")
