@@ -1,6 +1,19 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
-from jaxveh.estimators import friction, kit, learned, mass_and_grade, navigation, sideslip, speed, stiffness
+from jaxveh.estimators import (
+    bank,
+    friction,
+    grade,
+    kit,
+    learned,
+    mass,
+    mass_and_grade,
+    navigation,
+    roll,
+    sideslip,
+    speed,
+    stiffness,
+)
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.comparison import Compared, MethodScore, compare, score_answers
@@ -29,12 +42,15 @@ __all__ = [
     "MethodScore",
     "RearAxle",
     "Span",
+    "bank",
     "clean",
     "compare",
     "friction",
+    "grade",
     "held_rows",
     "kit",
     "learned",
+    "mass",
     "mass_and_grade",
     "navigation",
     "observe",
@@ -43,6 +59,7 @@ __all__ = [
     "predict_measurements",
     "read_calibration",
     "rear_axle_model",
+    "roll",
     "score_answers",
     "sideslip",
     "speed",

@@ -16,6 +16,7 @@ FULL_CAR = CarSpecification(
     steer_offset=0.0, sensor_position=(0.0, 0.0, 0.0), reference_position=(0.0, 0.0, 0.0), low_pass=20.0, wheel_radius=0.32,
     wheel_inertia=1.2, drag=0.4, rolling_resistance=0.012, front_drive=1.0, front_brake=0.65, brake_torque_per_pressure=1.6e-3,
     antenna_position=(-0.5, 0.0, 0.9), satellite_delay=0.15, inertial_delay=0.01, camera_delay=0.08,
+    roll_gradient=0.006, roll_frequency=1.6, roll_damping=0.3, pitch_gradient=0.004,
     front=AxleTyre(B=8.0, C=1.3, D=9000.0, E=-0.5), rear=AxleTyre(B=12.0, C=1.3, D=8300.0, E=-0.5),
 )  # fmt: skip
 """A file with every key, of which one after the other is left out to see who asks for it."""

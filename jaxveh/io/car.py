@@ -44,6 +44,10 @@ antenna_position = [-0.5, 0.0, 0.9]  # m from the centre of gravity: of the sate
 satellite_delay = 0.15               # s by which speed and course of satellites are late
 inertial_delay = 0.01                # s by which accelerometers and gyroscope are late beside their low-pass
 camera_delay = 0.08                  # s by which a camera's lane is late
+roll_gradient = 0.006                # rad/(m/s^2): how far the body rolls over the road for a lateral acceleration
+roll_frequency = 1.6                 # Hz, of the body that rolls on its springs, undamped
+roll_damping = 0.3                   # damping ratio of that roll
+pitch_gradient = 0.004               # rad/(m/s^2): how far the nose rises over the road for a longitudinal acceleration
 # front_tyre = "tyres/front.tir"     # the tyre property file of a front wheel, from this file's folder
 # rear_tyre = "tyres/rear.tir"
 
@@ -103,8 +107,9 @@ class CarSpecification:
     `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`,
     `reference_position`: x, y, z in metres from the centre of gravity of the accelerometer and of a reference for sideslip.
     `antenna_position`: likewise of the satellites' antenna; `satellite_delay`, `inertial_delay`, `camera_delay` in seconds: how
-    late these speak, an inertial unit's low-pass left out. `low_pass`: cutoff in hertz, of second order. `front_tyre`,
-    `rear_tyre`: paths of the tyre property files of a wheel, which nobody opens before a car on four wheels is built.
+    late these speak, an inertial unit's low-pass left out. `low_pass`: cutoff in hertz, of second order. `roll_gradient`,
+    `pitch_gradient`: of the body over the road, for what an accelerometer in the road's axes shows. `front_tyre`, `rear_tyre`:
+    paths of the tyre property files of a wheel, which nobody opens before a car on four wheels is built.
 
     **Raises** `InputError` with name, value and allowed range for what no car has, such as a negative mass.
     """
@@ -135,6 +140,10 @@ class CarSpecification:
     satellite_delay: float | None = _number(0.0, 5.0, "s", default=None)
     inertial_delay: float | None = _number(0.0, 5.0, "s", default=None)
     camera_delay: float | None = _number(0.0, 5.0, "s", default=None)
+    roll_gradient: float | None = _number(0.0, 0.1, "rad/(m/s^2)", default=None)
+    roll_frequency: float | None = _number(0.1, 100.0, "Hz", default=None)
+    roll_damping: float | None = _number(1e-3, 10.0, default=None)
+    pitch_gradient: float | None = _number(-0.1, 0.1, "rad/(m/s^2)", default=None)
     front_tyre: str | None = None
     rear_tyre: str | None = None
     front: AxleTyre | None = None

@@ -16,6 +16,7 @@ CAR = io.CarSpecification(
     rear_cornering_stiffness=1.3e5, cg_height=0.55, track_front=1.5, track_rear=1.5, steering_ratio=16.0, wheel_radius=0.32,
     wheel_inertia=1.2, drag=0.4, rolling_resistance=0.012, front_drive=1.0, front_brake=0.65,
     brake_torque_per_pressure=1.6e-3,
+    roll_gradient=0.006, roll_frequency=1.6, roll_damping=0.3, pitch_gradient=0.004,
 )  # fmt: skip
 """Every key that a method may ask for."""
 

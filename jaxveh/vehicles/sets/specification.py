@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from jaxveh._core.errors import InputError
@@ -48,7 +49,8 @@ def _tyre(s: Any, axle: str, load: float) -> TyreNumbers:
 def specification_of(numbers: CarNumbers) -> CarSpecification:
     """What a car's file would say of these numbers: the inverse of `numbers_of`, with each axle's tyres as a Magic Formula.
 
-    A file knows nothing of suspensions and trailers, and of four motors no more than the front axle's share.
+    A file knows of a suspension how the body leans (`leaning`), nothing of trailers, and of four motors no more than the front
+    axle's share.
 
     **Raises** `InputError` for a car without mass, yaw inertia or tyres, which no file can leave out.
     """
@@ -58,9 +60,38 @@ def specification_of(numbers: CarNumbers) -> CarSpecification:
     loads = {axle: 2.0 * load for axle, load in zip(("front", "rear"), numbers.wheel_loads(), strict=True)}
     tyres = {axle: axle_tyre(getattr(numbers, axle), load) for axle, load in loads.items()}
     optional = ("cg_height", "drag", "rolling_resistance")
+    told: dict[str, Any] = leaning(numbers)
     return CarSpecification(
         name=numbers.name,
         **{name: getattr(numbers, name) for name in (*NAMED_ALIKE, *SHARES, *optional)},
         **{axle: AxleTyre(*map(float, (t.B, t.C, t.D, t.E)), nominal_load=loads[axle]) for axle, t in tyres.items()},
         steer_offset=-numbers.steer_offset or None,
+        **told,
     )
+
+
+def leaning(numbers: CarNumbers) -> dict[str, float]:
+    """How the body leans over the road: `roll_gradient`, `pitch_gradient` (rad per m/s^2), `roll_frequency` (Hz) and
+    `roll_damping` (-) of a small roll about the roll axis; nothing where the suspension or the tracks are not known.
+
+    With roll stiffness K and damping C of both axles, the sprung mass m at h above the roll axis and its inertia J about it:
+    `m h / (K - m g h)`, `sqrt((K - m g h) / J) / 2 pi`, `C / (2 sqrt((K - m g h) J))`. Pitch: all of the longitudinal transfer of
+    the sprung mass goes through springs and tyres, as without anti-dive.
+    """
+    s, known = numbers.suspension, numbers.values()
+    names = [f"roll_{what}_{axle}" for what in ("stiffness", "damping") for axle in ("front", "rear")]
+    if s is None or any(name not in known for name in names):
+        return {}
+    parts = [float(known[name]) for name in names]
+    a, b, mass, height = s.front_axle_to_cg, s.rear_axle_to_cg, s.sprung_mass, s.cg_height
+    arm = height - (b * s.roll_centre_front + a * s.roll_centre_rear) / (a + b)
+    stiffness, damping = parts[0] + parts[1] - mass * GRAVITY * arm, parts[2] + parts[3]
+    inertia = s.roll_inertia + mass * arm**2
+    wheel = lambda spring: 2.0 * spring * s.tyre_stiffness / (spring + s.tyre_stiffness)
+    pitching = wheel(s.spring_front) * a**2 + wheel(s.spring_rear) * b**2 - mass * GRAVITY * height
+    return {
+        "roll_gradient": mass * arm / stiffness,
+        "roll_frequency": math.sqrt(stiffness / inertia) / (2.0 * math.pi),
+        "roll_damping": damping / (2.0 * math.sqrt(stiffness * inertia)),
+        "pitch_gradient": mass * height / pitching,
+    }

@@ -1,0 +1,80 @@
+"""Bank of a car in steady running, faded out where it is not."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.body_motion import CRAWL, LATERAL, SILENCE, BodyMotion, arcsin_of, guarded, hold, number_of
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.lateral import Lateral, lateral_of, motion_of
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.io import CarSpecification
+
+STEERING = Need("steering_wheel", "rad")
+
+
+class TsengMemory(NamedTuple):
+    """What was heard, the steering wheel's angle (rad), the low-passed static bank and dynamics factor, and for how long (s)."""
+
+    motion: Any
+    wheel: Any
+    bank: Any
+    agreement: Any
+    age: Any
+
+
+class Tseng(AbstractMethod):
+    """The bank of H. E. Tseng (Vehicle System Dynamics 36, 2001): `bank = static max(0, 1 - |DFC| - |d static / dt|)`.
+
+    `static = arcsin((f_y - v_x r) / g)`. The dynamics factor DFC is how far acceleration, yaw rate and steer disagree about a
+    steady state, in which `l r / v_x = steer - understeer f_y`: that residual over `doubt` (rad); the rate is over `doubt_rate`
+    (rad/s). All through a low-pass of `time` (s). `ratio` (-), `offset` (rad at the road wheels): of the steering.
+    """
+
+    motion: BodyMotion
+    car: Lateral
+    ratio: jax.Array = positive("-")
+    time: jax.Array = positive("s", default=0.5)
+    doubt: jax.Array = positive("rad", default=0.02)
+    doubt_rate: jax.Array = positive("rad/s", default=0.3)
+
+    @property
+    def needs(self):
+        return (*LATERAL, STEERING)
+
+    def first(self, t, values):
+        motion, heard = self.motion.first(t, values)
+        return self._next(motion, heard, TsengMemory(motion, *[jnp.zeros_like(t)] * 4))
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory.motion, t, values)
+        return self._next(motion, heard, memory)
+
+    def _next(self, motion, heard, memory):
+        dt, v_x, turn = heard["dt"], heard["v_x"], heard["yaw_rate"]
+        wheel = hold(heard["steering_wheel"], memory.wheel)
+        f_y = self.car.plane_force(heard["a_y"])
+        share = dt / (self.time + dt)
+        static = arcsin_of(f_y - v_x * turn)
+        slow = memory.bank + share * (static - memory.bank)
+        rate = (static - slow) / self.time
+        residual = wheel / self.ratio - self.car.wheelbase * turn / guarded(v_x) - self.car.understeer * f_y
+        trust = jnp.maximum(0.0, 1.0 - jnp.abs(residual) / self.doubt - jnp.abs(rate) / self.doubt_rate)
+        agreement = memory.agreement + share * (trust - memory.agreement)
+        there = heard["silence"] < SILENCE
+        age = jnp.where(there, memory.age + dt, 0.0)
+        known = there & (age > 3.0 * self.time) & (agreement > 0.5) & (jnp.abs(v_x) > CRAWL)
+        said = answer({"bank": slow * agreement, "agreement": agreement}, known={"bank": known})
+        return TsengMemory(motion, wheel, slow, agreement, age), said
+
+
+def tseng_of(car: CarSpecification, who: str) -> Tseng:
+    """Of a car's file."""
+    return Tseng(motion_of(car), lateral_of(car, who), ratio=number_of(car, "steering_ratio", who, "-"))
+
+
+__all__ = ["STEERING", "Tseng", "tseng_of"]

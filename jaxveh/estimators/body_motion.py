@@ -1,0 +1,152 @@
+"""How a car moves, of what its control unit hears: held from row to row, with the angles and rates that attitude, grade and mass
+are made of."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.errors import InputError
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.live import AbstractCleaning
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY, regularised_speed
+
+AT = ("fl", "fr", "rl", "rr")
+SPEEDS = (Need("v_x", "m/s", optional=True), *(Need(f"wheel_speed_{at}", "m/s", optional=True) for at in AT))
+"""Where the speed is from: the channel `v_x`, which another estimator may have made, else the wheels."""
+
+LATERAL = (Need("a_y", "m/s^2"), Need("yaw_rate", "rad/s"), Need("a_x", "m/s^2", optional=True), *SPEEDS)
+"""What a stability control knows of how the car turns and leans."""
+
+SILENCE = 0.5
+"""s: a quantity is not known after its sensors have said nothing for so long."""
+
+CRAWL = 2.0
+"""m/s: below this speed angles that are divided by it are regularised."""
+
+
+def number_of(car: CarSpecification, key: str, who: str, unit: str) -> float:
+    """A number of a car's file. **Raises** `InputError` naming key and unit where the file is silent."""
+    value = getattr(car, key)
+    if value is None:
+        raise InputError(f"{who}: the car's file has no {key} ({unit}); give it.")
+    return value
+
+
+def hold(value: Any, last: Any) -> Any:
+    """A measurement, or where there is none what was last said."""
+    return jnp.where(jnp.isnan(value), last, value)
+
+
+def speed_heard(values: dict[str, Any], front_share: Any) -> tuple[Any, Any]:
+    """Speed in this row (m/s) and whether any was heard: the channel `v_x`, else the wheels that are there.
+
+    Wheels of the axle that drives slip under power: each axle counts with the other one's share of the driving torque.
+    """
+    speeds = jnp.stack([values[need.channel] for need in SPEEDS[1:]])
+    there = ~jnp.isnan(speeds)
+    share = jnp.asarray(front_share, speeds.dtype)
+    # A little of each, so that one axle alone is a speed, too.
+    weights = jnp.where(there, jnp.stack([1.02 - share, 1.02 - share, 0.02 + share, 0.02 + share]), 0.0)
+    total = jnp.sum(weights)
+    wheels = jnp.sum(weights * jnp.where(there, speeds, 0.0)) / jnp.where(total > 0, total, 1.0)
+    given = values["v_x"]
+    return jnp.where(jnp.isnan(given), wheels, given), ~jnp.isnan(given) | (total > 0)
+
+
+class MotionMemory(NamedTuple):
+    """The time (s), what was last heard (SI units), low-passed values, and for how long the sensors have been silent (s)."""
+
+    t: Any
+    a_x: Any
+    a_y: Any
+    yaw_rate: Any
+    v_x: Any
+    slow_a_x: Any
+    slow_speed: Any
+    late_yaw_rate: Any
+    silence: Any
+    pull_silence: Any
+    speed_silence: Any
+    started: Any
+
+
+class BodyMotion(AbstractCleaning):
+    """Every row complete: `a_x`, `a_y`, `yaw_rate`, `v_x` as last heard (`speed_spoke`: whether a speed is new), and what
+    follows of them.
+
+    - `v_x_rate`, `slow_a_x` (m/s^2) and `slope` (rad): rate of the speed and `a_x` through a low-pass of `slope_time` (s), and
+    the body's pitch against the horizon, nose up, `(a_x - v_x_rate) / g` through the same.
+    - `late_yaw_rate` (rad/s): lower-passed by half the satellites' `delay` (s), the mean over that delay.
+    - `dt` (s): since the last row; `silence`, `pull_silence` (s): since `a_y` and `yaw_rate`, or `a_x`, or the speed, were last
+      heard.
+
+    `front_share`: the front axle's share of the driving torque. Other channels are handed on.
+    """
+
+    front_share: jax.Array = parameter("-", default=0.5)
+    slope_time: jax.Array = positive("s", default=0.7)
+    delay: jax.Array = positive("s", default=0.15)
+
+    @property
+    def channels(self):
+        return tuple(need.channel for need in LATERAL)
+
+    def first(self, t, values):
+        zero = jnp.zeros_like(t)
+        silent = zero + SILENCE
+        memory = MotionMemory(t, zero, zero, zero, zero, zero, zero, zero, silent, silent, silent, zero)
+        return self.next(memory, t, values)
+
+    def next(self, memory, t, values):
+        dt = t - memory.t
+        heard, spoke = speed_heard(values, self.front_share)
+        v_x = jnp.where(spoke, heard, memory.v_x)
+        a_x, a_y, yaw_rate = (hold(values[name], getattr(memory, name)) for name in ("a_x", "a_y", "yaw_rate"))
+        pulled = ~jnp.isnan(values["a_x"])
+        turned = ~(jnp.isnan(values["a_y"]) | jnp.isnan(values["yaw_rate"]))
+        # The first speed is where the low-passes begin: no speed was lost before.
+        begins = spoke & (memory.started == 0)
+        share = dt / (self.slope_time + dt)
+        slow_speed = jnp.where(begins, v_x, memory.slow_speed + share * (v_x - memory.slow_speed))
+        slow_a_x = jnp.where(begins, a_x, memory.slow_a_x + share * (a_x - memory.slow_a_x))
+        late = memory.late_yaw_rate + dt / (0.5 * self.delay + dt) * (yaw_rate - memory.late_yaw_rate)
+        v_x_rate = (v_x - slow_speed) / self.slope_time
+        memory = MotionMemory(
+            t, a_x, a_y, yaw_rate, v_x, slow_a_x, slow_speed, late,
+            jnp.where(turned, 0.0, memory.silence + dt), jnp.where(pulled, 0.0, memory.pull_silence + dt),
+            jnp.where(spoke, 0.0, memory.speed_silence + dt),
+            jnp.where(spoke, 1.0, memory.started),
+        )  # fmt: skip
+        slope = jnp.clip((slow_a_x - v_x_rate) / GRAVITY, -0.5, 0.5)
+        made = {
+            "a_x": a_x,
+            "a_y": a_y,
+            "yaw_rate": yaw_rate,
+            "v_x": v_x,
+            "speed_spoke": spoke,
+            "v_x_rate": v_x_rate,
+            "slow_a_x": slow_a_x,
+            "slope": slope,
+            "late_yaw_rate": late,
+            "dt": dt,
+            "silence": jnp.maximum(memory.silence, memory.speed_silence),
+            "pull_silence": jnp.maximum(memory.pull_silence, memory.speed_silence),
+        }
+        return memory, values | made
+
+
+def guarded(v_x: Any) -> Any:
+    """A speed to divide by, m/s, never near zero."""
+    return regularised_speed(v_x, CRAWL)
+
+
+def arcsin_of(a: Any) -> Any:
+    """The angle whose gravity an acceleration `a` (m/s^2) is, rad; beyond 0.9 g that of 0.9 g."""
+    s = jnp.clip(a / GRAVITY, -0.9, 0.9)
+    return numerics.arctan2(s, jnp.sqrt(1.0 - s * s))

@@ -1,0 +1,49 @@
+"""The slope of the road along the car, positive uphill: section 3.1.2.3 of the review (Chen, Gao, Xu 2013), and paper 004's.
+
+An accelerometer feels `d v_x/dt - v_y r + g sin(grade)`. What it feels beside the speed's rate is the grade and its own offset:
+0.1 m/s^2 is 0.58 degrees. What the torques at the wheels push tells the two apart.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.grade.kinematic import kinematic_of, satellite_of
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.pulling import joint_filter, pulling_of
+
+NAME = "grade"
+
+SHOWN = {"grade": "rad"}
+
+METHODS = {
+    "kinematic": MethodOfCar(
+        kinematic_of, "what the accelerometer feels beside the rate of the wheels' speed", "paper 004 [12]"
+    ),
+    "satellite": MethodOfCar(
+        satellite_of, "what the accelerometer feels beside the rate of the satellites' speed", "3.1.2.3 [128]"
+    ),
+    "joint": MethodOfCar(
+        lambda car: joint_filter(car, ("grade",)),
+        "the filter of mass, grade and offset of `mass_and_grade`",
+        "paper 004",
+    ),
+    "filter": MethodOfCar(
+        lambda car: pulling_of(car, NAME),
+        "kinematics with the accelerometer's offset as a state, which torques at the wheels tell where there are any",
+        "3.1.2.3 [124, 127]",
+    ),
+}
+
+RECOMMENDED = "filter"
+
+
+def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
+    """Grade (rad) along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as `follow`."""
+    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
+
+
+def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
+    """The same a row at a time."""
+    return LiveMethod(method_of(NAME, METHODS, source, method))

@@ -1,0 +1,121 @@
+"""Grade of what an accelerometer feels beside the rate of a speed."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.body_motion import SILENCE, BodyMotion, arcsin_of, hold
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.lateral import motion_of
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.pulling import ALONG
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+
+class KinematicMemory(NamedTuple):
+    """What was heard, and for how long (s)."""
+
+    motion: Any
+    age: Any
+
+
+class Kinematic(AbstractMethod):
+    """`grade = arcsin((a_x / (1 + g P) - d v_x/dt + v_y r) / g)`, P = `pitch_gradient` (rad/(m/s^2)), through the low-pass of the
+    motion (`slope_time`); of `v_y` what the rear axle's place alone makes, `rear_axle_to_cg r`."""
+
+    motion: BodyMotion
+    rear_axle_to_cg: jax.Array = positive("m")
+    pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005)
+
+    @property
+    def needs(self):
+        return ALONG
+
+    def first(self, t, values):
+        motion, heard = self.motion.first(t, values)
+        return self._next(motion, heard, jnp.zeros_like(t))
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory.motion, t, values)
+        return self._next(motion, heard, memory.age)
+
+    def _next(self, motion, heard, age):
+        there = heard["pull_silence"] < SILENCE
+        age = jnp.where(there, age + heard["dt"], 0.0)
+        felt = heard["slow_a_x"] / (1.0 + GRAVITY * self.pitch_gradient)
+        turning = self.rear_axle_to_cg * jnp.square(heard["late_yaw_rate"])
+        grade = arcsin_of(felt - heard["v_x_rate"] + turning)
+        known = there & (age > 3.0 * self.motion.slope_time)
+        return KinematicMemory(motion, age), answer({"grade": grade}, known=known)
+
+
+class SatelliteMemory(NamedTuple):
+    """What was heard; of satellites the last speed, its low-passed value (m/s), the time since it (s) and whether there was any;
+    the accelerometer as late and as low-passed (m/s^2)."""
+
+    motion: Any
+    speed: Any
+    slow_speed: Any
+    since: Any
+    started: Any
+    late: Any
+    felt: Any
+    age: Any
+
+
+class Satellite(AbstractMethod):
+    """`grade = arcsin((a_x / (1 + g P) - d speed/dt) / g)`, the speed of satellites, which slips with no wheel (P. Sahlholm, K.
+    Johansson 2008, whose vertical speed is no channel here). Both through a low-pass of `time` (s), the accelerometer through
+    another of the satellites' `delay` (s). In bends the speed over ground is not v_x, by little."""
+
+    motion: BodyMotion
+    pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005)
+    time: jax.Array = positive("s", default=1.0)
+    delay: jax.Array = positive("s", default=0.15)
+
+    @property
+    def needs(self):
+        return (*ALONG, Need("speed", "m/s"))
+
+    def first(self, t, values):
+        motion, heard = self.motion.first(t, values)
+        zero = jnp.zeros_like(t)
+        return self._next(motion, heard, SatelliteMemory(motion, zero, zero, zero, zero, zero, zero, zero))
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory.motion, t, values)
+        return self._next(motion, heard, memory)
+
+    def _next(self, motion, heard, memory):
+        dt, spoke = heard["dt"], ~jnp.isnan(heard["speed"])
+        since = memory.since + dt
+        speed = hold(heard["speed"], memory.speed)
+        share = since / (self.time + since)
+        begins = spoke & (memory.started == 0)
+        moved = jnp.where(spoke, memory.slow_speed + share * (speed - memory.slow_speed), memory.slow_speed)
+        slow = jnp.where(begins, speed, moved)
+        started = jnp.where(spoke, 1.0, memory.started)
+        late = memory.late + dt / (self.delay + dt) * (heard["a_x"] - memory.late)
+        felt = memory.felt + dt / (self.time + dt) * (late - memory.felt)
+        since = jnp.where(spoke, 0.0, since)
+        there = (heard["pull_silence"] < SILENCE) & (since < 2.0 * SILENCE) & (started > 0)
+        age = jnp.where(there, memory.age + dt, 0.0)
+        grade = arcsin_of(felt / (1.0 + GRAVITY * self.pitch_gradient) - (speed - slow) / self.time)
+        known = there & (age > 3.0 * self.time)
+        memory = SatelliteMemory(motion, speed, slow, since, started, late, felt, age)
+        return memory, answer({"grade": grade}, known=known)
+
+
+def kinematic_of(car: CarSpecification) -> Kinematic:
+    """Of a car's file; a body that does not pitch where it says nothing of that."""
+    return Kinematic(motion_of(car), car.rear_axle_to_cg, car.pitch_gradient or 0.0)
+
+
+def satellite_of(car: CarSpecification) -> Satellite:
+    """Of a car's file; a body that does not pitch where it says nothing of that."""
+    return Satellite(motion_of(car), car.pitch_gradient or 0.0)

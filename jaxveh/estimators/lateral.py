@@ -1,0 +1,54 @@
+"""The lateral motion of a car with little slip, of its file's numbers: what simple methods of bank, roll and geometry share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.estimators.body_motion import BodyMotion, guarded, number_of
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+
+class Lateral(eqx.Module):
+    """`wheelbase`, `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle for a lateral acceleration,
+    `m l_f / (l C_r)`; `understeer` (rad/(m/s^2)): the front axle's less the rear axle's; `roll_gradient` (rad/(m/s^2))."""
+
+    wheelbase: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    rear_compliance: jax.Array = positive("rad/(m/s^2)")
+    understeer: jax.Array = parameter("rad/(m/s^2)", scale=0.002)
+    roll_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.006)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    def plane_force(self, a_y: Any) -> Any:
+        """Lateral specific force in the road's plane (m/s^2) of what a sensor on the rolling body shows: `a_y / (1 + g R)`."""
+        return a_y / (1.0 + GRAVITY * self.roll_gradient)
+
+    def rear_speed(self, v_x: Any, yaw_rate: Any, f_y: Any) -> Any:
+        """Lateral speed (m/s) at the centre of gravity of a rear axle that carries its share of `f_y`."""
+        return self.rear_axle_to_cg * yaw_rate - v_x * self.rear_compliance * f_y * (v_x / guarded(v_x))
+
+
+def lateral_of(car: CarSpecification, who: str) -> Lateral:
+    """Of a car's file. **Raises** `InputError` for one without `roll_gradient` or stiffnesses."""
+    front = number_of(car, "front_cornering_stiffness", who, "N/rad")
+    rear = number_of(car, "rear_cornering_stiffness", who, "N/rad")
+    rear_compliance = car.mass * car.front_axle_to_cg / (car.wheelbase * rear)
+    return Lateral(
+        wheelbase=car.wheelbase,
+        rear_axle_to_cg=car.rear_axle_to_cg,
+        rear_compliance=rear_compliance,
+        understeer=car.mass * car.rear_axle_to_cg / (car.wheelbase * front) - rear_compliance,
+        roll_gradient=number_of(car, "roll_gradient", who, "rad/(m/s^2)"),
+    )
+
+
+def motion_of(car: CarSpecification) -> BodyMotion:
+    """What makes rows complete, with the car's share of driving torque."""
+    return BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive)

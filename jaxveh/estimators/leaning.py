@@ -1,0 +1,226 @@
+"""Bank and roll in one filter: the lateral kinematics, a body on its springs, a road that tilts slowly."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.names import record_type
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, guarded, number_of
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.sequential import Normal, corrected, moved, normal_of, spread_of
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+DEGREE = math.pi / 180.0
+
+NEEDS = (*LATERAL, Need("roll_rate", "rad/s", optional=True), Need("course", "rad", optional=True))
+"""Those of a stability control; a gyroscope about the x axis and satellite navigation where there are any."""
+
+STATES = (
+    "v_y", "yaw", "bank", "bank_rate", "body_roll", "body_roll_rate", "a_y_bias", "yaw_rate_bias", "roll_rate_bias",
+    "slope_bias", "rear_scale", "roll_scale",
+)  # fmt: skip
+
+State = record_type("LeaningState", STATES)
+
+WIDEST = 1.0 * DEGREE
+"""rad: with a wider spread bank and roll count as not known."""
+
+
+LINEAR = 4.0
+"""m/s^2: about here a tyre's slip angle begins to grow faster than its force."""
+
+SLOWEST = 3.0
+"""m/s: a road passes at least so fast, so that the law of its bank has a spread at standstill."""
+
+
+MORE = ("v_y", "rear_scale", "roll_scale", "a_y_bias", "yaw_rate_bias", "roll_rate_bias")
+"""States that are reported beside bank and roll."""
+
+
+class Memory(NamedTuple):
+    """What was heard, and what is believed."""
+
+    motion: Any
+    belief: Normal
+
+
+class Leaning(AbstractMethod):
+    """Bank, roll and the offsets of the sensors that tell them, by an extended Kalman filter (small angles):
+
+        d v_y = f_y - g bank - v_x r,    f_y = a_y - a_y_bias - g body_roll,    r = yaw_rate - yaw_rate_bias
+        body_roll'' = w^2 (gradient f_y - body_roll) - 2 D w body_roll'
+        bank' = bank_rate - v_x / bank_length bank,    bank_rate' = -v_x / bank_edge bank_rate + noise
+
+    `f_y` is the lateral acceleration in the road's plane. What is measured: the rear axle's slip angle against that of its
+    force, wrong by an error that lasts; `course` of satellites, the heading and the sideslip angle `delay` ago, which knows
+    nothing of tyres; `roll_rate`: roll and bank that change, less the yaw rate's part in a car that points uphill. A constant
+    bank and the accelerometer's offset are the same to all of them: what separates them is that roads tilt to either side about
+    level, and the offset stays. So the spread of a bank falls slowly, and an offset of earlier drives helps (`a_y_offset`).
+
+    **Parameters**: `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle for a lateral acceleration,
+    `m l_f / (l C_r)`; `roll_gradient` (rad/(m/s^2)), `roll_frequency` (Hz), `roll_damping` (-) of the body over the road;
+    `bank_spread` (rad), `bank_length`, `bank_edge` (m): standard deviation of banks, over which they are forgotten, and over
+    which they begin to change; `slip_error` (rad), which lasts `slip_error_time` (s); `roll_rate_noise` (rad/s), `across` (m/s):
+    of the gyroscope about x, of the satellites' velocity across; `delay` (s) of these; `a_y_offset` (m/s^2): what is known of the
+    accelerometer's, `a_y_offset_spread`, `gyro_offset_spread` (rad/s): how well at the start; `scale_spread` (-): of compliance
+    and roll gradient about the car's file.
+    """
+
+    motion: BodyMotion
+    rear_axle_to_cg: jax.Array = positive("m")
+    rear_compliance: jax.Array = positive("rad/(m/s^2)")
+    roll_gradient: jax.Array = positive("rad/(m/s^2)")
+    roll_frequency: jax.Array = positive("Hz", default=1.5)
+    roll_damping: jax.Array = positive("-", default=0.3)
+    bank_spread: jax.Array = positive("rad", default=0.025)
+    bank_length: jax.Array = positive("m", default=150.0)
+    bank_edge: jax.Array = positive("m", default=6.0)
+    slip_error: jax.Array = positive("rad", default=0.0008)
+    slip_error_time: jax.Array = positive("s", default=0.1)
+    roll_rate_noise: jax.Array = positive("rad/s", default=0.006)
+    across: jax.Array = positive("m/s", default=0.06)
+    delay: jax.Array = parameter("s", scale=0.1, default=0.14)
+    a_y_offset: jax.Array = parameter("m/s^2", scale=0.1, default=0.0)
+    a_y_offset_spread: jax.Array = positive("m/s^2", default=0.06)
+    gyro_offset_spread: jax.Array = positive("rad/s", default=0.12 * DEGREE)
+    scale_spread: jax.Array = positive("-", default=0.12)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def needs(self):
+        return NEEDS
+
+    def first(self, t, values):
+        memory, heard = self.motion.first(t, values)
+        gyro, scale = self.gyro_offset_spread, self.scale_spread
+        stds = {
+            "v_y": 0.5, "yaw": 3.0, "bank": self.bank_spread, "bank_rate": 0.01, "body_roll": 0.02, "body_roll_rate": 0.05,
+            "a_y_bias": self.a_y_offset_spread, "yaw_rate_bias": gyro, "roll_rate_bias": gyro, "slope_bias": 0.008,
+            "rear_scale": scale, "roll_scale": scale,
+        }  # fmt: skip
+        belief = normal_of(State, {"a_y_bias": self.a_y_offset}, stds, t)
+        return self._answer(memory, self._measured(belief, heard), heard)
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory.motion, t, values)
+        belief = self._ahead(memory.belief, heard)
+        return self._answer(motion, self._measured(belief, heard), heard)
+
+    def _ahead(self, belief: Normal, heard) -> Normal:
+        dt = heard["dt"]
+        fast = self._passing(heard["v_x"])
+        # The bank's law by the metre: a chain of two first-order lags, with this variance.
+        slow, quick = fast / self.bank_length, fast / self.bank_edge
+        bank_walk = 2.0 * jnp.square(self.bank_spread) * slow * quick * (slow + quick)
+        per_second = {
+            "v_y": 4e-5, "yaw": 1e-7, "bank_rate": bank_walk, "body_roll_rate": 2e-3, "a_y_bias": 4e-6, "yaw_rate_bias": 3e-8,
+            "roll_rate_bias": 3e-8, "slope_bias": 1e-7, "rear_scale": 1e-5, "roll_scale": 1e-6,
+        }  # fmt: skip
+        step = lambda x: self._step(x, heard, slow, quick)
+        return moved(belief, step, {name: value * dt for name, value in per_second.items()}, State)
+
+    def _passing(self, v_x):
+        return jnp.maximum(jnp.abs(v_x), SLOWEST)
+
+    def _plane_force(self, x, heard):
+        return heard["a_y"] - x.a_y_bias - GRAVITY * x.body_roll
+
+    def _step(self, x, heard, slow, quick):
+        dt = heard["dt"]
+        f_y, turn = self._plane_force(x, heard), heard["yaw_rate"] - x.yaw_rate_bias
+        v_y = x.v_y + dt * (f_y - GRAVITY * x.bank - heard["v_x"] * turn)
+        # Trapezoidal: a body on its springs stays stable however long a row is.
+        w, half = 2.0 * math.pi * self.roll_frequency, 0.5 * dt
+        damping = 2.0 * self.roll_damping * w
+        gradient = self.roll_gradient * (1.0 + x.roll_scale)
+        push = w * w * (gradient * f_y - x.body_roll - half * x.body_roll_rate)
+        rate = x.body_roll_rate + dt * (push - damping * x.body_roll_rate) / (
+            1.0 + half * damping + half * half * w * w
+        )
+        return x._replace(
+            v_y=v_y,
+            yaw=x.yaw + dt * turn,
+            bank=x.bank * jnp.exp(-dt * slow) + dt * x.bank_rate,
+            bank_rate=x.bank_rate * jnp.exp(-dt * quick),
+            body_roll=x.body_roll + half * (x.body_roll_rate + rate),
+            body_roll_rate=rate,
+        )
+
+    def _measured(self, belief: Normal, heard) -> Normal:
+        v_x, dt = heard["v_x"], heard["dt"]
+        fast = guarded(v_x)
+
+        def rear(x):
+            turn = heard["yaw_rate"] - x.yaw_rate_bias
+            slip = self.rear_compliance * (1.0 + x.rear_scale) * self._plane_force(x, heard) * (v_x / fast)
+            return -(x.v_y - self.rear_axle_to_cg * turn) / fast - slip
+
+        def course(x):
+            turn = heard["yaw_rate"] - x.yaw_rate_bias
+            drifts = (self._plane_force(x, heard) - GRAVITY * x.bank - v_x * turn) / fast
+            rate = drifts + heard["late_yaw_rate"] - x.yaw_rate_bias
+            said = x.yaw + numerics.arctan2(x.v_y, fast) - self.delay * rate
+            return numerics.wrap_angle(jnp.where(satellites, heard["course"], 0.0) - said)
+
+        def rolling(x):
+            turn = heard["yaw_rate"] - x.yaw_rate_bias
+            said = (
+                x.body_roll_rate
+                + x.bank_rate
+                - forgets * x.bank
+                + turn * (heard["slope"] + x.slope_bias)
+                + x.roll_rate_bias
+            )
+            return jnp.where(gyroscope, heard["roll_rate"], 0.0) - said
+
+        forgets = self._passing(v_x) / self.bank_length
+        satellites, gyroscope = ~jnp.isnan(heard["course"]), ~jnp.isnan(heard["roll_rate"])
+        # An error that lasts counts once in its time, however many rows there are; in hard turns tyres are not linear.
+        lasting = jnp.square(self.slip_error) * 2.0 * self.slip_error_time / jnp.maximum(dt, 1e-3)
+        slip = lasting * (1.0 + jnp.square(jnp.square(heard["a_y"] / LINEAR)))
+        there = heard["silence"] < SILENCE
+        belief = corrected(belief, rear, slip, there, State)
+        belief = corrected(belief, course, jnp.square(self.across / fast), satellites & (v_x > 1.0), State, 3.0)
+        return corrected(belief, rolling, jnp.square(self.roll_rate_noise), gyroscope, State)
+
+    def _answer(self, motion, belief, heard):
+        x = State(*belief.mean)
+        forgets = self._passing(heard["v_x"]) / self.bank_length
+        wide = lambda *names: spread_of(belief, dict.fromkeys(names, 1.0), State)
+        said = {
+            "bank": x.bank,
+            "roll": x.bank + x.body_roll,
+            "roll_rate": x.bank_rate - forgets * x.bank + x.body_roll_rate,
+            "body_roll": x.body_roll,
+            **{name: getattr(x, name) for name in MORE},
+        }
+        sums = {"roll": ("bank", "body_roll"), "roll_rate": ("bank_rate", "body_roll_rate")}
+        stds = {name: wide(*sums.get(name, (name,))) for name in said}
+        there = heard["silence"] < SILENCE
+        widest = {"bank": WIDEST, "roll": WIDEST, "body_roll": WIDEST, "roll_rate": 6.0 * WIDEST}
+        known = {name: there & (stds[name] < widest.get(name, jnp.inf)) for name in said}
+        return Memory(motion, belief), answer(said, stds, known)
+
+
+def leaning_filter(car: CarSpecification, who: str, **options: Any) -> Leaning:
+    """The filter of a car's file. **Raises** `InputError` for one without `roll_gradient`, which tells roll from bank."""
+    stiffness = number_of(car, "rear_cornering_stiffness", who, "N/rad")
+    told = {name: getattr(car, name) for name in ("roll_frequency", "roll_damping")}
+    return Leaning(
+        BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive),
+        rear_axle_to_cg=car.rear_axle_to_cg,
+        rear_compliance=car.mass * car.front_axle_to_cg / (car.wheelbase * stiffness),
+        roll_gradient=number_of(car, "roll_gradient", who, "rad/(m/s^2)"),
+        **{name: value for name, value in told.items() if value is not None},
+        **options,
+    )

@@ -1,0 +1,63 @@
+"""The mass of a car: refs [8], [11], [12], [13] of paper 004, and section 3.1.2.4 of the review (Chen, Gao, Xu 2013).
+
+A force over a mass is an acceleration: what is known of the mass is what is known of the torque at the wheels and of the wheels'
+radius, and it is known only where pedals move. `known` says whether the spread is within 4 per cent; the mean stays where a
+drive tells nothing more.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.mass.forgetting import forgetting_of
+from jaxveh.estimators.mass.ratios import gated_of, high_pass_of, kinematic_of
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.pulling import joint_filter, pulling_of
+
+NAME = "mass"
+
+SHOWN = {"mass": "kg"}
+
+METHODS = {
+    "gated": MethodOfCar(
+        lambda car: gated_of(car, NAME), "least squares of force over acceleration above 0.6 m/s^2", "paper 004 [8]"
+    ),
+    "high_pass": MethodOfCar(
+        lambda car: high_pass_of(car, NAME),
+        "least squares of what is fast in force and in the speed's rate, where grades are slow",
+        "paper 004 [11]",
+    ),
+    "forgetting": MethodOfCar(
+        forgetting_of,
+        "recursive least squares of mass and grade, which forgets the grade faster",
+        "paper 004 [13], 3.1.2.3 [127]",
+    ),
+    "kinematic_grade": MethodOfCar(
+        lambda car: kinematic_of(car, NAME),
+        "the grade of accelerometer and speed first, then least squares",
+        "paper 004 [12]",
+    ),
+    "joint": MethodOfCar(
+        lambda car: joint_filter(car, ("mass",)),
+        "the filter of mass, grade and offset of `mass_and_grade`",
+        "paper 004",
+    ),
+    "filter": MethodOfCar(
+        lambda car: pulling_of(car, NAME),
+        "grade, mass and the accelerometer's offset in one filter, with bends, slip and a road that changes by the metre",
+        "paper 004 [9, 10]",
+    ),
+}
+
+RECOMMENDED = "filter"
+
+
+def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
+    """Mass (kg) along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as `follow`."""
+    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
+
+
+def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
+    """The same a row at a time."""
+    return LiveMethod(method_of(NAME, METHODS, source, method))

@@ -1,0 +1,201 @@
+"""Mass as the ratio of force and acceleration, by least squares with one unknown."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.body_motion import SILENCE, BodyMotion, hold, number_of
+from jaxveh.estimators.lateral import motion_of
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.pulling import JOINT, SLOWEST, WIDEST_MASS
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+
+class Pull(eqx.Module):
+    """What pulls a car: torques over `wheel_radius` (m), air (`drag`, N s^2/m^2), wheels that spin up (`wheel_inertia`, kg m^2),
+    `rolling_resistance` (-), `pitch_gradient` (rad/(m/s^2))."""
+
+    wheel_radius: jax.Array = positive("m")
+    wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
+    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.4)
+    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.012)
+    pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005, default=0.0)
+
+    def force(self, drive: Any, brake: Any, heard: Any) -> Any:
+        """Force along the road, N, without rolling resistance, which goes with the mass."""
+        spins = 4.0 * self.wheel_inertia / jnp.square(self.wheel_radius) * heard["v_x_rate"]
+        return (drive - brake) / self.wheel_radius - self.drag * heard["v_x"] * jnp.abs(heard["v_x"]) - spins
+
+
+class RatioMemory(NamedTuple):
+    """What was heard, torques (N m), low-passed force (N), slow force and acceleration, the sums of squares and products and of
+    squared residuals, and the time (s) that they are of."""
+
+    motion: Any
+    drive: Any
+    brake: Any
+    force: Any
+    slow_force: Any
+    slow_rate: Any
+    square: Any
+    product: Any
+    residual: Any
+    age: Any
+
+
+class AbstractRatio(AbstractMethod):
+    """`mass = sum(a F) / sum(a^2)`, sums over time that start with a car of the file's `mass` (kg), as far as `prior_spread` (-)
+    says, and forget with the time constant `memory` (s). The spread is that of residuals that last `lasting` (s)."""
+
+    motion: eqx.AbstractVar[BodyMotion]
+    pull: eqx.AbstractVar[Pull]
+    mass: eqx.AbstractVar[jax.Array]
+    memory: eqx.AbstractVar[jax.Array]
+    lasting: eqx.AbstractVar[jax.Array]
+    prior_spread: eqx.AbstractVar[jax.Array]
+
+    @abc.abstractmethod
+    def pair(self, heard: Any, force: Any, memory: RatioMemory) -> tuple[Any, Any, Any]:
+        """Acceleration (m/s^2), force (N), and how much they count (0 to 1); slow parts in the memory are those of before this
+        row."""
+
+    @property
+    def needs(self):
+        return JOINT
+
+    def first(self, t, values):
+        motion, heard = self.motion.first(t, values)
+        zero = jnp.zeros_like(t)
+        # As if a second of a m/s^2, with a residual of its own, had been seen before.
+        start = jnp.square(RESIDUAL / self.prior_spread) * 2.0 * self.lasting + zero
+        memory = RatioMemory(motion, zero, zero, zero, zero, zero, start, start * self.mass, zero, zero)
+        return self._next(motion, heard, memory, values)
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory.motion, t, values)
+        return self._next(motion, heard, memory, values)
+
+    def _next(self, motion, heard, memory, values):
+        dt = heard["dt"]
+        drive, brake = hold(values["drive_torque"], memory.drive), hold(values["brake_torque"], memory.brake)
+        raw = self.pull.force(drive, brake, heard)
+        # The speed's rate has been through this low-pass, too.
+        force = memory.force + dt / (self.motion.slope_time + dt) * (raw - memory.force)
+        rate, push, counts = self.pair(heard, force, memory)
+        spoke = ~(jnp.isnan(values["drive_torque"]) | jnp.isnan(values["brake_torque"]))
+        there = spoke & (heard["pull_silence"] < SILENCE) & (heard["v_x"] > SLOWEST)
+        weight = jnp.where(there & (memory.age > START), counts * dt, 0.0)
+        keep = jnp.exp(-weight / self.memory)
+        mass = memory.product / memory.square
+        off = push / mass - rate
+        square = keep * memory.square + weight * jnp.square(rate)
+        product = keep * memory.product + weight * rate * push
+        residual = keep * memory.residual + weight * jnp.square(off)
+        share = dt / (SLOW + dt)
+        memory = RatioMemory(
+            motion, drive, brake, force, memory.slow_force + share * (force - memory.slow_force),
+            memory.slow_rate + share * (heard["v_x_rate"] - memory.slow_rate), square, product, residual, memory.age + dt,
+        )  # fmt: skip
+        # Squared residuals: at first those that the start assumes.
+        start = jnp.square(RESIDUAL / self.prior_spread) * 2.0 * self.lasting
+        gathered = jnp.maximum(square - start, 0.0)
+        mean_square = (residual + jnp.square(RESIDUAL)) / (memory.age + 1.0)
+        variance = jnp.maximum(mean_square, jnp.square(RESIDUAL)) * 2.0 * self.lasting / (start + gathered)
+        mass = product / square
+        std = mass * numerics.sqrt(variance)
+        return memory, answer({"mass": mass}, {"mass": std}, known=std < WIDEST_MASS * mass)
+
+
+RESIDUAL = 0.05
+"""m/s^2: by so much force over mass and acceleration differ at least, for a while."""
+
+
+def beyond(rate: Any, gate: Any) -> Any:
+    """1 of an acceleration larger than the gate, 0 of a smaller one, and smoothly between within a tenth of it (m/s^2)."""
+    return numerics.smooth_step(0.5 + 5.0 * (jnp.abs(rate) / gate - 1.0))
+
+
+START = 2.5
+"""s: until the low-passes have forgotten where they began."""
+
+SLOW = 4.0
+"""s: what is slower than this is the grade's."""
+
+
+class Gated(AbstractRatio):
+    """The accelerometer against the force, where it shows more than `gate` m/s^2 (P. Karoshi et al. 2018, ref. [8] of paper
+    004)."""
+
+    motion: BodyMotion
+    pull: Pull
+    mass: jax.Array = positive("kg")
+    gate: jax.Array = positive("m/s^2", default=0.6)
+    memory: jax.Array = positive("s", default=300.0)
+    lasting: jax.Array = positive("s", default=0.5)
+    prior_spread: jax.Array = positive("-", default=0.3)
+
+    def pair(self, heard, force, memory):
+        felt = heard["slow_a_x"] / (1.0 + GRAVITY * self.pull.pitch_gradient)
+        return felt + GRAVITY * self.pull.rolling_resistance, force, beyond(felt, self.gate)
+
+
+class KinematicGrade(AbstractRatio):
+    """The grade of accelerometer and speed first, then `F = m (d v_x/dt + g sin(grade) + g f_r)` (ref. [12] of paper 004)."""
+
+    motion: BodyMotion
+    pull: Pull
+    mass: jax.Array = positive("kg")
+    memory: jax.Array = positive("s", default=300.0)
+    lasting: jax.Array = positive("s", default=0.5)
+    prior_spread: jax.Array = positive("-", default=0.3)
+
+    def pair(self, heard, force, memory):
+        pitch = self.pull.pitch_gradient
+        sine = heard["slope"] - pitch * (heard["slow_a_x"] / (1.0 + GRAVITY * pitch))
+        rate = heard["v_x_rate"] + GRAVITY * (sine + self.pull.rolling_resistance)
+        return rate, force, beyond(rate, 0.2)
+
+
+class HighPass(AbstractRatio):
+    """What is faster than `SLOW` in the force against what is in the speed's rate (ref. [11] of paper 004): grades are slower."""
+
+    motion: BodyMotion
+    pull: Pull
+    mass: jax.Array = positive("kg")
+    memory: jax.Array = positive("s", default=300.0)
+    lasting: jax.Array = positive("s", default=1.0)
+    prior_spread: jax.Array = positive("-", default=0.3)
+
+    def pair(self, heard, force, memory):
+        rate = heard["v_x_rate"] - memory.slow_rate
+        return rate, force - memory.slow_force, beyond(rate, 0.1)
+
+
+def pull_of(car: CarSpecification, who: str) -> Pull:
+    """Of a car's file. **Raises** `InputError` for one without `wheel_radius`, by which a torque becomes a force."""
+    told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")}
+    known = {name: value for name, value in told.items() if value is not None}
+    return Pull(number_of(car, "wheel_radius", who, "m"), **known)
+
+
+def gated_of(car: CarSpecification, who: str) -> Gated:
+    """Of a car's file."""
+    return Gated(motion_of(car), pull_of(car, who), car.mass)
+
+
+def kinematic_of(car: CarSpecification, who: str) -> KinematicGrade:
+    """Of a car's file."""
+    return KinematicGrade(motion_of(car), pull_of(car, who), car.mass)
+
+
+def high_pass_of(car: CarSpecification, who: str) -> HighPass:
+    """Of a car's file."""
+    return HighPass(motion_of(car), pull_of(car, who), car.mass)

@@ -1,0 +1,270 @@
+"""Grade and mass in one filter: speed, accelerometer and torques of a car that goes straight or round a bend."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.names import record_type
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.estimators import mass_and_grade
+from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, guarded, hold, number_of
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.live import AbstractCleaning
+from jaxveh.estimators.method import AbstractMethod, Filtered, answer
+from jaxveh.estimators.sequential import Normal, corrected, moved, normal_of, spread_of
+from jaxveh.filters import Extended
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+DEGREE = math.pi / 180.0
+
+ALONG = (
+    Need("a_x", "m/s^2"),
+    *SPEEDS,
+    Need("a_y", "m/s^2", optional=True),
+    Need("yaw_rate", "rad/s", optional=True),
+)
+"""What tells how a car speeds up; in bends, how it turns."""
+
+TORQUES = (Need("drive_torque", "N m", optional=True), Need("brake_torque", "N m", optional=True))
+
+SATELLITES = Need("speed", "m/s", optional=True)
+
+State = record_type(
+    "PullingState", ("v_x", "grade", "grade_rate", "a_x_bias", "log_mass", "rolling_bias", "wheel_scale", "slip")
+)
+
+SLOWEST = 3.0
+"""m/s: a road passes at least so fast, so that the law of its grade has a spread at standstill."""
+
+WIDEST = 0.8 * DEGREE
+"""rad: with a wider spread the grade counts as not known,"""
+
+WIDEST_MASS = 0.04
+"""and with a wider spread of its logarithm the mass."""
+
+
+class PullingMemory(NamedTuple):
+    """What was heard, and what is believed."""
+
+    motion: Any
+    belief: Normal
+
+
+class Pulling(AbstractMethod):
+    """Grade, mass and the accelerometer's offset, by an extended Kalman filter:
+
+        d v_x = f_x + v_y r - g sin(grade),    f_x = (a_x - a_x_bias) / (1 + g pitch_gradient)
+        f_x = (T / radius - drag v^2 - 4 J_w / radius^2 dv_x/dt) / mass - g rolling - f_y (l_r / l) steer
+
+    The first is kinematics and knows no mass: a constant grade and the offset are one to it. The second, where there are torques,
+    is what the car pushes: the offset is what the accelerometer says beside it, the mass how much it says for a torque. What
+    rolling resistance and air are not as in the car's file is a further state, with a spread (`rolling_spread`), which is what
+    the offset can be known to; wheels that brake slip (`slip` of the speed per m/s^2, a state, too). Grades change by the metre
+    (`grade_length`, `grade_edge`). Brakes are trusted to `brake_doubt` of their torque. (A. Vahidi et al. 2005 and P. Lingman,
+    B. Schmidtbauer 2003, with an accelerometer and its offset.)
+
+    **Parameters**: of the car `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2), `drag` (N s^2/m^2),
+    `rolling_resistance` (-), `rear_share` (l_r / l), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`, `pitch_gradient`
+    (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`, `rolling_spread`
+    (m/s^2); of the sensors `wheel_noise`, `satellite_noise` (m/s), `delay` of these (s), `force_noise` (m/s^2), which lasts
+    `force_time` (s).
+    """
+
+    motion: BodyMotion
+    mass: jax.Array = positive("kg")
+    wheel_radius: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    wheelbase: jax.Array = positive("m")
+    rear_compliance: jax.Array = parameter("rad/(m/s^2)", scale=0.01, default=0.0)
+    wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
+    drag: jax.Array = parameter("N s^2/m^2", scale=0.4, default=0.4)
+    rolling_resistance: jax.Array = parameter("-", scale=0.01, default=0.012)
+    pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005, default=0.0)
+    mass_spread: jax.Array = positive("-", default=0.15)
+    grade_spread: jax.Array = positive("rad", default=0.03)
+    grade_length: jax.Array = positive("m", default=200.0)
+    grade_edge: jax.Array = positive("m", default=6.0)
+    a_x_offset: jax.Array = parameter("m/s^2", scale=0.1, default=0.0)
+    a_x_offset_spread: jax.Array = positive("m/s^2", default=0.06)
+    rolling_spread: jax.Array = positive("m/s^2", default=0.025)
+    wheel_noise: jax.Array = positive("m/s", default=0.012)
+    satellite_noise: jax.Array = positive("m/s", default=0.06)
+    delay: jax.Array = parameter("s", scale=0.1, default=0.14)
+    force_noise: jax.Array = positive("m/s^2", default=0.05)
+    force_time: jax.Array = positive("s", default=1.0)
+    slip: jax.Array = positive("1/(m/s^2)", default=0.003)
+    slip_spread: jax.Array = positive("1/(m/s^2)", default=0.003)
+    brake_doubt: jax.Array = positive("-", default=0.1)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def needs(self):
+        return (*ALONG, *TORQUES, SATELLITES)
+
+    def first(self, t, values):
+        motion, heard = self.motion.first(t, values)
+        stds = {
+            "v_x": 1.0, "grade": self.grade_spread, "grade_rate": 0.01, "a_x_bias": self.a_x_offset_spread,
+            "log_mass": self.mass_spread, "rolling_bias": self.rolling_spread, "wheel_scale": 0.005, "slip": self.slip_spread,
+        }  # fmt: skip
+        belief = normal_of(State, {"v_x": heard["v_x"], "a_x_bias": self.a_x_offset, "slip": self.slip}, stds, t)
+        return self._answer(motion, self._measured(belief, heard, values), heard)
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory.motion, t, values)
+        belief = self._ahead(memory.belief, heard)
+        return self._answer(motion, self._measured(belief, heard, values), heard)
+
+    def _ahead(self, belief: Normal, heard) -> Normal:
+        dt = heard["dt"]
+        fast = jnp.maximum(jnp.abs(heard["v_x"]), SLOWEST)
+        slow, quick = fast / self.grade_length, fast / self.grade_edge
+        walk = 2.0 * jnp.square(self.grade_spread) * slow * quick * (slow + quick)
+        per_second = {
+            "v_x": 4e-5, "grade_rate": walk, "a_x_bias": 4e-6, "log_mass": 1e-8, "rolling_bias": 1e-6, "wheel_scale": 1e-9,
+        }  # fmt: skip
+
+        def step(x):
+            return x._replace(
+                v_x=x.v_x + dt * self._speeds_up(x, heard),
+                grade=x.grade * jnp.exp(-dt * slow) + dt * x.grade_rate,
+                grade_rate=x.grade_rate * jnp.exp(-dt * quick),
+            )
+
+        return moved(belief, step, {name: value * dt for name, value in per_second.items()}, State)
+
+    def _felt(self, x, heard):
+        """Specific force along the road, m/s^2."""
+        return (heard["a_x"] - x.a_x_bias) / (1.0 + GRAVITY * self.pitch_gradient)
+
+    def _speeds_up(self, x, heard):
+        turn, v_x = heard["yaw_rate"], heard["v_x"]
+        slip = self.rear_compliance * heard["a_y"] * (v_x / guarded(v_x))
+        v_y = self.rear_axle_to_cg * turn - v_x * slip
+        return self._felt(x, heard) + v_y * turn - GRAVITY * numerics.sin(x.grade)
+
+    def _measured(self, belief: Normal, heard, values) -> Normal:
+        v_x, dt = heard["v_x"], jnp.maximum(heard["dt"], 1e-3)
+        drive, brake = values["drive_torque"], values["brake_torque"]
+        pushed = ~(jnp.isnan(drive) | jnp.isnan(brake))
+        drive, brake = jnp.where(pushed, drive, 0.0), jnp.where(pushed, brake, 0.0)
+        spoke, said = heard["speed_spoke"], values["speed"]
+        satellites = ~jnp.isnan(said)
+        steer = self.wheelbase * heard["yaw_rate"] / guarded(v_x)
+        turning = heard["a_y"] * self.rear_axle_to_cg / self.wheelbase * steer
+
+        def balance(x):
+            force = (drive - brake) / self.wheel_radius - self.drag * v_x * jnp.abs(v_x)
+            force = force - 4.0 * self.wheel_inertia / jnp.square(self.wheel_radius) * self._speeds_up(x, heard)
+            pull = force * jnp.exp(-x.log_mass) / self.mass
+            return self._felt(x, heard) - (pull - GRAVITY * self.rolling_resistance + x.rolling_bias - turning)
+
+        def satellite(x):
+            ago = x.v_x - self.delay * self._speeds_up(x, heard)
+            return jnp.where(satellites, said, 0.0) - ago
+
+        slowing = brake / (self.wheel_radius * self.mass)
+        slips = jnp.square(self.wheel_noise) + jnp.square(0.002 * v_x * slowing)
+        doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
+        lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt)
+        belief = corrected(
+            belief, lambda x: v_x - x.v_x * (1.0 + x.wheel_scale - x.slip * slowing), slips, spoke, State, 3.0
+        )
+        belief = corrected(belief, satellite, jnp.square(self.satellite_noise), satellites & (v_x > 1.0), State, 3.0)
+        there = (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
+        return corrected(belief, balance, lasting, pushed & there, State, 3.0)
+
+    def _answer(self, motion, belief, heard):
+        x = State(*belief.mean)
+        wide = {name: spread_of(belief, {name: 1.0}, State) for name in State._fields}
+        mass = self.mass * jnp.exp(x.log_mass)
+        said = {"grade": x.grade, "mass": mass, "v_x": x.v_x, "a_x_bias": x.a_x_bias}
+        stds = {
+            "grade": wide["grade"],
+            "mass": mass * wide["log_mass"],
+            "v_x": wide["v_x"],
+            "a_x_bias": wide["a_x_bias"],
+        }
+        there = heard["pull_silence"] < SILENCE
+        known = {"grade": there & (wide["grade"] < WIDEST), "mass": wide["log_mass"] < WIDEST_MASS, "v_x": there}
+        return PullingMemory(motion, belief), answer(said, stds, known)
+
+
+def pulling_of(car: CarSpecification, who: str, **options: Any) -> Pulling:
+    """Of a car's file. **Raises** `InputError` for one without `wheel_radius`, by which a torque becomes a force."""
+    told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")}
+    stiffness = car.rear_cornering_stiffness
+    compliance = 0.0 if stiffness is None else car.mass * car.front_axle_to_cg / (car.wheelbase * stiffness)
+    return Pulling(
+        BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive),
+        mass=car.mass,
+        wheel_radius=number_of(car, "wheel_radius", who, "m"),
+        rear_axle_to_cg=car.rear_axle_to_cg,
+        wheelbase=car.wheelbase,
+        rear_compliance=compliance,
+        **{name: value for name, value in told.items() if value is not None},
+        **options,
+    )
+
+
+class Held(AbstractCleaning):
+    """What the filter of `mass_and_grade` reads of a row: torques and speed as last heard, the accelerometer without the body's
+    pitch, and none of either where nothing was heard."""
+
+    motion: BodyMotion
+    pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005)
+
+    @property
+    def channels(self):
+        return tuple(need.channel for need in JOINT)
+
+    def first(self, t, values):
+        motion, heard = self.motion.first(t, values)
+        return self._next(motion, heard, values, jnp.zeros_like(t), jnp.zeros_like(t))
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory[0], t, values)
+        return self._next(motion, heard, values, *memory[1:])
+
+    def _next(self, motion, heard, values, drive, brake):
+        drive, brake = hold(values["drive_torque"], drive), hold(values["brake_torque"], brake)
+        silent = jnp.isnan(values["a_x"])
+        felt = jnp.where(silent, 0.0, values["a_x"]) / (1.0 + GRAVITY * self.pitch_gradient)
+        made = {
+            "drive_torque": drive,
+            "brake_torque": brake,
+            "v_x": jnp.where(heard["speed_spoke"], heard["v_x"], jnp.nan),
+            "a_x": jnp.where(silent, jnp.nan, felt),
+        }
+        return (motion, drive, brake), heard | made
+
+
+JOINT = (*ALONG, *[need._replace(optional=False) for need in TORQUES])
+"""What the filter of `mass_and_grade` reads."""
+
+
+def joint_filter(car: CarSpecification, shown: tuple[str, ...]) -> Filtered:
+    """The filter of `mass_and_grade` with accelerometer and offset, as a method. **Raises** as `mass_and_grade.model`.
+
+    It starts where a car may, at 20 m/s give or take 20. Bends, slip and the road's metres are not in its model. `known` where
+    the spread of the mass is below `WIDEST_MASS` of it, of the grade below `WIDEST`; where the mass' logarithm is held by too few
+    pedals, as the model's own documentation says, both are wide.
+    """
+    model = mass_and_grade.model(car, v_x=0.03, a_x=0.15, a_x_bias=0.06, mass_spread=0.15, grade_rate_walk=0.01)
+    cleaning = Held(
+        BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive), car.pitch_gradient or 0.0
+    )
+    return Filtered(model, Extended(), JOINT, cleaning, _joint_told, shown)
+
+
+def _joint_told(model, belief, row):
+    mean, std = belief.moments(model)
+    return {"grade": std.grade < WIDEST, "mass": std.mass < WIDEST_MASS * mean.mass}

@@ -1,0 +1,57 @@
+"""The body's roll, positive with the left side up: sections 1.1.1 and 1.1.2 of the review (Chen, Gao, Xu 2013).
+
+`roll` is the body's against the **horizon**, what tilts gravity in an accelerometer; `body_roll` the body's on its springs
+against the road. Roll is the bank and the body's roll together. The two methods `steady` and `springs` know the suspension
+alone: what they call roll is the body's, right against the horizon where the road is level. `roll_rate` is the angle's rate; a
+gyroscope says it less what the yaw rate does in a car that points up or down.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxveh._core.recording import Recording
+from jaxveh.estimators.leaning import leaning_filter
+from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.estimators.roll.gyro import gyro_of
+from jaxveh.estimators.roll.six_axis import six_axis_of
+from jaxveh.estimators.roll.suspension import springs_of, steady_of
+
+NAME = "roll"
+
+SHOWN = {"roll": "rad", "roll_rate": "rad/s"}
+
+METHODS = {
+    "gyro": MethodOfCar(
+        gyro_of, "the gyroscope integrated, slowly drawn to what the accelerometer says of gravity", "1.1.1 [10]"
+    ),
+    "steady": MethodOfCar(
+        lambda car: steady_of(car, NAME),
+        "the suspension's roll for the lateral acceleration, on a level road",
+        "1.1.1 [10]",
+    ),
+    "springs": MethodOfCar(
+        lambda car: springs_of(car, NAME), "the same with the body's inertia and dampers, on a level road", "1.1.1 [10]"
+    ),
+    "six_axis": MethodOfCar(
+        six_axis_of, "attitude and velocity of a six-axis unit, corrected by the wheels' speed", "1.1.2 [9]"
+    ),
+    "filter": MethodOfCar(
+        lambda car: leaning_filter(car, NAME),
+        "bank, roll and the sensors' offsets in one Kalman filter; satellites' course and a roll gyroscope where there are any",
+        "1.1.1, 1.1.2, 1.3.2 [46]",
+    ),
+}
+
+RECOMMENDED = "filter"
+
+
+def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
+    """Roll (rad) and its rate along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as
+    `follow`."""
+    return follow(NAME, method_of(NAME, METHODS, source, method), recording)
+
+
+def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
+    """The same a row at a time."""
+    return LiveMethod(method_of(NAME, METHODS, source, method))

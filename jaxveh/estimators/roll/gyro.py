@@ -1,0 +1,79 @@
+"""Roll of a gyroscope about the car's x axis."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, arcsin_of, hold
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.lateral import motion_of
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.io import CarSpecification
+
+ROLL_RATE = Need("roll_rate", "rad/s")
+
+
+class GyroMemory(NamedTuple):
+    """What was heard, the gyroscope (rad/s) and for how long it is silent (s), roll (rad), its offset (rad/s), the time (s)."""
+
+    motion: Any
+    rate: Any
+    silence: Any
+    roll: Any
+    offset: Any
+    age: Any
+
+
+class Gyro(AbstractMethod):
+    """A complementary filter (A. Hac, D. Nichols, D. Sygnarowicz 2010: roll first, then the lateral speed):
+
+        d roll = roll_rate + r slope - offset + e / time,   d offset = -e / (4 time^2),   e = arcsin((a_y - v_x r) / g) - roll
+
+    Fast roll is the gyroscope's, slow roll the accelerometer's, whose reference is right but for `d v_y/dt`, which has no mean.
+    `slope`: the car's pitch, through which the gyroscope sees a part of the yaw rate r. `time` (s): between slow and fast.
+    """
+
+    motion: BodyMotion
+    time: jax.Array = positive("s", default=4.0)
+
+    @property
+    def needs(self):
+        return (*LATERAL, ROLL_RATE)
+
+    def first(self, t, values):
+        motion, heard = self.motion.first(t, values)
+        zero = jnp.zeros_like(t)
+        return self._next(motion, heard, GyroMemory(motion, zero, zero + SILENCE, zero, zero, zero))
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory.motion, t, values)
+        return self._next(motion, heard, memory)
+
+    def _next(self, motion, heard, memory):
+        dt = heard["dt"]
+        rate = hold(heard["roll_rate"], memory.rate)
+        silence = jnp.where(jnp.isnan(heard["roll_rate"]), memory.silence + dt, 0.0)
+        there = (silence < SILENCE) & (heard["silence"] < SILENCE)
+        turning = rate + heard["yaw_rate"] * heard["slope"]
+        ahead = memory.roll + dt * (turning - memory.offset)
+        error = arcsin_of(heard["a_y"] - heard["v_x"] * heard["yaw_rate"]) - ahead
+        gain = dt / (self.time + dt)
+        # At first the accelerometer alone: nothing is known of the angle.
+        gain = jnp.maximum(gain, dt / (memory.age + dt + 1e-6))
+        error = jnp.where(there, error, 0.0)
+        roll = ahead + gain * error
+        offset = memory.offset - 0.25 * dt / (jnp.square(self.time) + jnp.square(dt)) * error
+        age = jnp.where(there, memory.age + dt, 0.0)
+        said = answer(
+            {"roll": roll, "roll_rate": turning - offset, "roll_rate_bias": offset}, known=there & (age > self.time)
+        )
+        return GyroMemory(motion, rate, silence, roll, offset, age), said
+
+
+def gyro_of(car: CarSpecification) -> Gyro:
+    """Of a car's file."""
+    return Gyro(motion_of(car))

@@ -1,0 +1,110 @@
+"""Attitude and velocity of a unit of six axes, corrected by the wheels' speed."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.names import record_type
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, hold
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.lateral import motion_of
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.sequential import Normal, corrected, moved, normal_of, spread_of
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+SIX = (
+    *[need._replace(optional=False) if need.channel == "a_x" else need for need in LATERAL],
+    Need("roll_rate", "rad/s"),
+    Need("pitch_rate", "rad/s"),
+)
+
+State = record_type("SixAxisState", ("v_x", "v_y", "roll", "pitch"))
+
+
+class SixAxisMemory(NamedTuple):
+    """What was heard, the two further gyroscopes (rad/s), for how long one is silent (s), the belief."""
+
+    motion: Any
+    roll_rate: Any
+    pitch_rate: Any
+    silence: Any
+    belief: Normal
+
+
+class SixAxis(AbstractMethod):
+    """The kinematic Kalman filter of W. Klier, A. Reim, D. Stapel (SAE 2008-01-0582), of a car that stays on the road (v_z = 0):
+
+        d v_x = a_x + v_y r + g sin(pitch),                   d v_y = a_y - v_x r - g sin(roll) cos(pitch)
+        d roll = p + tan(pitch) (q sin(roll) + r cos(roll)),  d pitch = q cos(roll) - r sin(roll)
+
+    (ISO 8855: pitch positive nose down), measured: v_x of the wheels, and a lateral speed that stays small (`slip` m/s, which
+    lasts `slip_time` s). It knows nothing of the sensors' offsets, as the review says: `roll` is off by theirs.
+
+    `a_noise` (m/s per root second), `gyro_noise` (rad per root second): of what is integrated; `v_noise` (m/s): of the wheels.
+    """
+
+    motion: BodyMotion
+    a_noise: jax.Array = positive("m/s/sqrt(s)", default=0.05)
+    gyro_noise: jax.Array = positive("rad/sqrt(s)", default=0.004)
+    v_noise: jax.Array = positive("m/s", default=0.2)
+    slip: jax.Array = positive("m/s", default=0.3)
+    slip_time: jax.Array = positive("s", default=0.5)
+
+    @property
+    def needs(self):
+        return SIX
+
+    def first(self, t, values):
+        motion, heard = self.motion.first(t, values)
+        stds = {"v_x": 1.0, "v_y": 0.3, "roll": 0.1, "pitch": 0.1}
+        belief = normal_of(State, {"v_x": heard["v_x"]}, stds, t)
+        zero = jnp.zeros_like(t)
+        return self._next(motion, heard, SixAxisMemory(motion, zero, zero, zero + SILENCE, belief))
+
+    def next(self, memory, t, values):
+        motion, heard = self.motion.next(memory.motion, t, values)
+        return self._next(motion, heard, memory)
+
+    def _next(self, motion, heard, memory):
+        dt, r = heard["dt"], heard["yaw_rate"]
+        p, q = hold(heard["roll_rate"], memory.roll_rate), hold(heard["pitch_rate"], memory.pitch_rate)
+        spoke = ~(jnp.isnan(heard["roll_rate"]) | jnp.isnan(heard["pitch_rate"]))
+        silence = jnp.where(spoke, 0.0, memory.silence + dt)
+
+        def step(x):
+            s, c = numerics.sin(x.roll), numerics.cos(x.roll)
+            pitch = jnp.clip(x.pitch, -0.7, 0.7)
+            return State(
+                x.v_x + dt * (heard["a_x"] + x.v_y * r + GRAVITY * numerics.sin(x.pitch)),
+                x.v_y + dt * (heard["a_y"] - x.v_x * r - GRAVITY * s * numerics.cos(x.pitch)),
+                x.roll + dt * (p + numerics.tan(pitch) * (q * s + r * c)),
+                x.pitch + dt * (q * c - r * s),
+            )
+
+        noise = {
+            "v_x": self.a_noise, "v_y": self.a_noise, "roll": self.gyro_noise, "pitch": self.gyro_noise
+        }  # fmt: skip
+        belief = moved(memory.belief, step, {name: jnp.square(std) * dt for name, std in noise.items()}, State)
+        lasting = jnp.square(self.slip) * 2.0 * self.slip_time / jnp.maximum(dt, 1e-3)
+        there = heard["silence"] < SILENCE
+        belief = corrected(belief, lambda x: heard["v_x"] - x.v_x, jnp.square(self.v_noise), there, State)
+        belief = corrected(belief, lambda x: -x.v_y, lasting, there, State)
+        x = State(*belief.mean)
+        wide = {name: spread_of(belief, {name: 1.0}, State) for name in State._fields}
+        tilt = numerics.tan(jnp.clip(x.pitch, -0.7, 0.7)) * r
+        said = answer(
+            {"roll": x.roll, "roll_rate": p + tilt, "pitch": x.pitch, "v_y": x.v_y},
+            known=there & (silence < SILENCE) & (wide["roll"] < 0.03),
+        )
+        return SixAxisMemory(motion, p, q, silence, belief), said
+
+
+def six_axis_of(car: CarSpecification) -> SixAxis:
+    """Of a car's file."""
+    return SixAxis(motion_of(car))
