@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.bank.observers import disturbance_observer, unknown_input_observer
 from jaxveh.estimators.bank.tseng import tseng_of
 from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.io import CarSpecification
 
 NAME = "bank"
 
@@ -43,6 +46,12 @@ METHODS = {
 }
 
 RECOMMENDED = "filter"
+
+
+def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+    """A road that does not bank."""
+    del car
+    return dict.fromkeys(SHOWN, np.zeros(len(recording)))
 
 
 def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.grade.kinematic import kinematic_of, satellite_of
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.estimators.pulling import joint_filter, pulling_of
+from jaxveh.io import CarSpecification
 
 NAME = "grade"
 
@@ -37,6 +40,12 @@ METHODS = {
 }
 
 RECOMMENDED = "filter"
+
+
+def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+    """A level road."""
+    del car
+    return dict.fromkeys(SHOWN, np.zeros(len(recording)))
 
 
 def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:

@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.leaning import leaning_filter
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.estimators.roll.gyro import gyro_of
 from jaxveh.estimators.roll.six_axis import six_axis_of
 from jaxveh.estimators.roll.suspension import springs_of, steady_of
+from jaxveh.io import CarSpecification
 
 NAME = "roll"
 
@@ -44,6 +47,12 @@ METHODS = {
 }
 
 RECOMMENDED = "filter"
+
+
+def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+    """A body that does not roll."""
+    del car
+    return dict.fromkeys(SHOWN, np.zeros(len(recording)))
 
 
 def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
