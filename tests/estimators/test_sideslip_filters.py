@@ -26,7 +26,7 @@ def body(time, lean):
     time."""
     v_x, v_y = (lambda t: 18.0 + 2.0 * jnp.sin(0.5 * t)), (lambda t: 0.6 * jnp.sin(0.9 * t) + 0.2 * jnp.sin(2.1 * t))
     roll, pitch = (lambda t: lean * jnp.sin(0.4 * t + 0.3)), (lambda t: 0.5 * lean * jnp.sin(0.7 * t))
-    yaw = lambda t: 0.5 * jnp.cos(0.6 * t)
+    yaw = lambda t: 0.3 * t + 0.2 * jnp.sin(0.5 * t)
     at = {name: jax.vmap(f)(time) for name, f in (("v_x", v_x), ("v_y", v_y), ("roll", roll), ("pitch", pitch))}
     slope = {
         n: derivative(f)(time) for n, f in (("v_x", v_x), ("v_y", v_y), ("roll", roll), ("pitch", pitch), ("yaw", yaw))
@@ -50,7 +50,7 @@ def recording(time, channels):
 
 
 def test_six_axes_tell_lateral_velocity_through_any_roll_and_pitch_and_a_plane_filter_on_a_plane():
-    time = jnp.arange(3000) * 0.01
+    time = jnp.arange(3000.0) * 0.01
     said, truth = body(time, 0.08)
     found = sideslip.estimate(CAR, recording(time, said), method="six_axis")
     late = np.asarray(time) > 10.0
@@ -63,9 +63,9 @@ def test_six_axes_tell_lateral_velocity_through_any_roll_and_pitch_and_a_plane_f
 
 
 def test_the_equations_of_the_six_axes_are_those_of_the_motion():
-    time = jnp.arange(50) * 0.1
+    time = jnp.arange(50.0) * 0.1
     said, truth = body(time, 0.3)
-    slopes = {n: np.gradient(np.asarray(body(jnp.arange(5001) * 0.001, 0.3)[1][n]), 0.001)[::100][:50] for n in truth}
+    slopes = {n: np.gradient(np.asarray(body(jnp.arange(5001.0) * 0.001, 0.3)[1][n]), 0.001)[::100][:50] for n in truth}
     u = record("Inputs", {name: said[name] for name in kinematic.six_axis_model().inputs})
     x = kinematic.BodyState(truth["v_x"], truth["v_y"], 0.0 * time, truth["roll"], truth["pitch"])
     rates = kinematic.body_drift(None, 0.0, x, u)
@@ -85,7 +85,7 @@ def test_a_car_on_four_wheels_finds_its_own_motion(name, lean):
         return model.transition(t, t + 0.01, x, u), (u._asdict() | seen._asdict(), shown.v_y, getattr(x, "roll", t))
 
     start = jax.tree.map(jnp.zeros_like, model.prior.mean)
-    time = jnp.arange(300) * 0.01
+    time = jnp.arange(300.0) * 0.01
     _, (channels, v_y, roll) = jax.jit(lambda x: jax.lax.scan(row, x, time))(start)
     found = sideslip.estimate(CAR, recording(time, channels), method=name)
     assert np.sqrt(np.mean(np.asarray(found["v_y"] - v_y) ** 2)) < 5e-3 * np.abs(v_y).max()

@@ -162,4 +162,4 @@ def roll_4dof(car: CarSpecification) -> Guarded:
     model = _leaning_model(vehicle, car, driven=True)
     needs = (V_X, STEER, *SENSORS, ROLL_RATE._replace(optional=True), *PEDALS)
     inner = AtSpeed(model, filters.Unscented(), needs, shown=LateralReport._fields)
-    return guard(car, inner, SENSORS)
+    return guard(car, inner, SENSORS, claims=False)
