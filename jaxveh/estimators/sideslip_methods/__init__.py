@@ -5,12 +5,12 @@ from __future__ import annotations
 from jaxveh import filters
 from jaxveh.estimators.method import MethodOfCar
 from jaxveh.estimators.sideslip_methods.four_wheels import roll_3dof, roll_4dof, two_track
-from jaxveh.estimators.sideslip_methods.fusion import pseudo_integration, switched, weighted
+from jaxveh.estimators.sideslip_methods.fusion import by_switch, pseudo_integration, weighted_mean
 from jaxveh.estimators.sideslip_methods.integration import direct_integration, roll_compensated
 from jaxveh.estimators.sideslip_methods.kinematic import kinematic_kalman, six_axis
 from jaxveh.estimators.sideslip_methods.motors import motor_moment
 from jaxveh.estimators.sideslip_methods.observers import (
-    decoupled,
+    blind_to_front,
     error_linearising,
     luenberger,
     sliding_mode,
@@ -83,10 +83,10 @@ METHODS = {
         steering_torque, "steering torque to aligning moment, front force, slip angle", "section 1.2.3, [37, 38]"
     ),
     "switched": MethodOfCar(
-        switched, "integration where tyres are not to be trusted, extended filter else", "section 1.3.1, [40]"
+        by_switch, "integration where tyres are not to be trusted, extended filter else", "section 1.3.1, [40]"
     ),
     "weighted": MethodOfCar(
-        weighted, "kinematic and extended filter, weighed by their variances", "section 1.3.1, [41]"
+        weighted_mean, "kinematic and extended filter, weighed by their variances", "section 1.3.1, [41]"
     ),
     "pseudo_integration": MethodOfCar(
         pseudo_integration, "slow part of the extended filter, fast part of the integral", "section 1.3.1, [40, 42, 43]"
@@ -101,7 +101,7 @@ METHODS = {
     "sliding_mode": MethodOfCar(
         sliding_mode, "most of the gain through a smooth switch", "section 1.4.3, eq 9, [60-62]"
     ),
-    "decoupled": MethodOfCar(decoupled, "blind to whatever disturbs the front axle", "section 1.4.4, [21, 65]"),
+    "decoupled": MethodOfCar(blind_to_front, "blind to whatever disturbs the front axle", "section 1.4.4, [21, 65]"),
     "h_infinity": MethodOfCar(h_infinity, "single track, worst case bounded", "section 1.4.4, [66, 67]"),
     "adaptive": MethodOfCar(
         adaptive, "linear tyres, both stiffnesses adapted by a law of Lyapunov's", "section 1.4.7, [77-79]"

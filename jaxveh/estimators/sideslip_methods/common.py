@@ -141,7 +141,7 @@ def joined_needs(*methods: AbstractMethod) -> tuple[Need, ...]:
     return tuple(found.values())
 
 
-def told(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
+def keys_of(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
     """The values of these keys of a car's file; `keys` has their units. **Raises** `InputError` for those that it lacks."""
     missing = [f"{key} ({unit})" for key, unit in keys.items() if getattr(car, key) is None]
     if missing:

@@ -16,8 +16,8 @@ from jaxveh.estimators.sideslip_methods.common import (
     V_X,
     Guarded,
     guard,
+    keys_of,
     slowest_of,
-    told,
 )
 from jaxveh.estimators.sideslip_methods.kinematic import AtSpeed
 from jaxveh.estimators.sideslip_methods.single_track import (
@@ -29,8 +29,8 @@ from jaxveh.estimators.sideslip_methods.single_track import (
     Lateral,
     LateralReport,
     axles_of,
-    filtered,
     full_state,
+    in_filter,
     lateral_model,
     process_noise,
     report,
@@ -88,7 +88,7 @@ def car_numbers(car: CarSpecification, who: str, *, leaning: bool) -> CarNumbers
 
     **Raises** `InputError` for a file without a height of the centre of gravity, or tracks.
     """
-    told(car, who, dict.fromkeys(("cg_height", "track_front", "track_rear"), "m"))
+    keys_of(car, who, dict.fromkeys(("cg_height", "track_front", "track_rear"), "m"))
     found = numbers_of(car)
     if not leaning:
         return found
@@ -104,7 +104,7 @@ def two_track(car: CarSpecification) -> Guarded:
     [19]), with load that moves across."""
     numbers = car_numbers(car, "the two-track car", leaning=False)
     vehicle = build(numbers, TwoTrack2DOF, load_transfer=QuasiStatic(), **wheel_options(car))
-    return filtered(car, lateral_model(vehicle, slowest_of(car)), filters.Unscented())
+    return in_filter(car, lateral_model(vehicle, slowest_of(car)), filters.Unscented())
 
 
 def leaning_observation(system: Lateral, t, x, u):
@@ -142,7 +142,7 @@ def roll_3dof(car: CarSpecification) -> Guarded:
     is measured where there is one."""
     numbers = car_numbers(car, "the leaning car", leaning=True)
     vehicle = build(numbers, Roll3DOF, load_transfer=QuasiStatic(), **wheel_options(car))
-    return filtered(car, _leaning_model(vehicle, car), filters.Unscented(), more=(ROLL_RATE._replace(optional=True),))
+    return in_filter(car, _leaning_model(vehicle, car), filters.Unscented(), more=(ROLL_RATE._replace(optional=True),))
 
 
 def driven_transition(system: Lateral, t0, t1, x, u):
@@ -162,4 +162,4 @@ def roll_4dof(car: CarSpecification) -> Guarded:
     model = _leaning_model(vehicle, car, driven=True)
     needs = (V_X, STEER, *SENSORS, ROLL_RATE._replace(optional=True), *PEDALS)
     inner = AtSpeed(model, filters.Unscented(), needs, shown=LateralReport._fields)
-    return guard(car, inner, SENSORS)
+    return guard(car, inner, SENSORS, claims=False)

@@ -168,13 +168,13 @@ def pseudo_integration(car: CarSpecification) -> Guarded:
     return guard(car, inner, SENSORS)
 
 
-def switched(car: CarSpecification) -> Guarded:
+def by_switch(car: CarSpecification) -> Guarded:
     """The switch with the extended filter of the single track, for a car's file."""
     steady = SteadySteer(**numbers(car), steer_offset=-(car.steer_offset or 0.0))
     inner = Switched(EXTENDED(car), steady, bank_time=BANK_TIME * size_of(car) ** 0.5)
     return guard(car, inner, SENSORS)
 
 
-def weighted(car: CarSpecification) -> Guarded:
+def weighted_mean(car: CarSpecification) -> Guarded:
     """The weighted mean of the kinematic and the single track's extended filter, for a car's file."""
     return guard(car, Weighted(kinematic_kalman(car, claims=True), EXTENDED(car)), (*SENSORS, A_X), claims=False)

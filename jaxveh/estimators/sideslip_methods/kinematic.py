@@ -31,8 +31,8 @@ STRAIGHT_RATE, STRAIGHT_A_Y = 0.01, 0.3
 """rad/s, m/s^2: a car that neither yaws nor is pushed aside by more goes straight, and has no lateral velocity."""
 
 UNLEVELLED, ACCELEROMETER, GYROSCOPE = 0.2, 0.05, 0.005
-"""m/s per root second, rad per root second: what errors of inertial sensors add, as white noise; the first is an accelerometer's in
-a body that leans, whose gravity nobody takes out."""
+"""m/s per root second, rad per root second: what errors of inertial sensors add, as white noise; the first is an
+accelerometer's in a body that leans, whose gravity nobody takes out."""
 
 SPEED, ASIDE, UPWARD = 0.05, 0.1, 0.05
 """m/s: standard deviations of the measured speed, of the lateral velocity of a car that goes straight, and of the vertical
@@ -113,11 +113,6 @@ def body_drift(system, t, x: BodyState, u) -> BodyState:
     )
 
 
-def seen(names: tuple[str, ...]):
-    """The observation that says these states as they are."""
-    return Seen(names)
-
-
 class Seen(eqx.Module):
     """States as they are."""
 
@@ -142,7 +137,7 @@ def kinematic_model(
     `accelerometer` (m/s per root second), `speed`, `aside` (m/s); `start`: the speed at first (m/s)."""
     return StateSpace(
         transition=Propagate(plane_drift, Heun()),
-        observation=seen(("v_x", "v_y")),
+        observation=Seen(("v_x", "v_y")),
         report=report,
         process_noise=Continuous(Gaussian({"v_x": accelerometer, "v_y": accelerometer})),
         measurement_noise=Gaussian({"v_x": speed, "v_y": aside}),
@@ -166,7 +161,7 @@ def six_axis_model(
     noise = dict.fromkeys(("v_x", "v_y", "v_z"), accelerometer) | dict.fromkeys(("roll", "pitch"), gyroscope)
     return StateSpace(
         transition=Propagate(body_drift, Heun()),
-        observation=seen(("v_x", "v_y", "v_z")),
+        observation=Seen(("v_x", "v_y", "v_z")),
         report=report,
         process_noise=Continuous(Gaussian(noise)),
         measurement_noise=Gaussian({"v_x": speed, "v_y": aside, "v_z": UPWARD}),

@@ -12,11 +12,11 @@ from jaxveh import filters, numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import UNNAMED, positive
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.sideslip_methods.common import Guarded, slowest_of, told
+from jaxveh.estimators.sideslip_methods.common import Guarded, keys_of, slowest_of
 from jaxveh.estimators.sideslip_methods.single_track import (
     LateralState,
-    filtered,
     full_state,
+    in_filter,
     lateral_model,
     report,
     rolling_below,
@@ -86,7 +86,7 @@ def observation(system: MotorTrack, t, x, u):
 
 def motor_model(car: CarSpecification) -> StateSpace:
     """The state space of eq 10. **Raises** `InputError` for a file without tracks or wheel radius."""
-    keys = told(car, "the moment of motors", dict.fromkeys(("track_front", "track_rear", "wheel_radius"), "m"))
+    keys = keys_of(car, "the moment of motors", dict.fromkeys(("track_front", "track_rear", "wheel_radius"), "m"))
     plain = lateral_model(single_track(car), slowest_of(car))
     return StateSpace(
         system=MotorTrack(single_track(car), slowest_of(car), **keys),
@@ -102,4 +102,4 @@ def motor_model(car: CarSpecification) -> StateSpace:
 
 def motor_moment(car: CarSpecification) -> Guarded:
     """The unscented filter of eq 10 for a car's file."""
-    return filtered(car, motor_model(car), filters.Unscented(), more=TORQUES)
+    return in_filter(car, motor_model(car), filters.Unscented(), more=TORQUES)

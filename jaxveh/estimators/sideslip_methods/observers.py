@@ -18,8 +18,8 @@ from jaxveh.estimators.sideslip_methods.single_track import (
     YAW_RATE_NOISE,
     LateralReport,
     LateralState,
-    filtered,
     full_state,
+    in_filter,
     lateral_model,
     report,
     single_track,
@@ -33,9 +33,6 @@ from jaxveh.vehicles import SingleTrack, linear
 POLES = (-10.0, -12.0)
 """1/s, of a car of the usual wheelbase: about those of a car at 15 m/s, so that the error dies out within 0.3 s where the car's
 own poles are slower, and noise is not made larger."""
-
-ROBUST_POLES = (-4.0, -5.0)
-"""The same of the observer that is blind to the front axle: it has the rear axle's force alone to hold v_y."""
 
 LEAST_SLOPE = 0.2
 """Of its value on straight running: `d a_y / d v_y`, by which a gain is divided, is taken to be at least so steep. A tyre that
@@ -97,7 +94,7 @@ class AbstractPlaced(AbstractObserver):
 
     def correct(self, model, belief: PointBelief, row, error, here):
         F, moves = belief.memory
-        see = lambda vector: jnp.stack([getattr(seen_by(model, row, vector), name) for name in model.channels])
+        see = lambda vector: jnp.stack([getattr(channels_of(model, row, vector), name) for name in model.channels])
         H = jax.jacfwd(see)(self.at(model, belief.vector))
         z = jnp.exp(self.poles.astype(error.dtype) * (row.t - belief.t))
         K = self.gain(model, F, H, z, row)
@@ -109,7 +106,7 @@ class AbstractPlaced(AbstractObserver):
         return K @ error
 
 
-def seen_by(model: StateSpace, row, vector):
+def channels_of(model: StateSpace, row, vector):
     """What the sensors would say of a state (2,)."""
     return model.observation(row.t, type(model.prior.mean)(*vector), row.u)
 
@@ -247,10 +244,10 @@ def rear_force_model(car: SingleTrack, slowest: float) -> StateSpace:
     )
 
 
-def decoupled(car: CarSpecification) -> Guarded:
+def blind_to_front(car: CarSpecification) -> Guarded:
     """The observer that is blind to the front axle, for a car's file."""
     model = rear_force_model(single_track(car), slowest_of(car))
-    filter = StateDependentGain(_poles(car, ROBUST_POLES), _least(model.system.car))
+    filter = StateDependentGain(_poles(car), _least(model.system.car))
     inner = Filtered(model, filter, (V_X, YAW_RATE, A_Y), shown=LateralReport._fields)
     return guard(car, inner, (YAW_RATE, A_Y), (A_Y,))
 
@@ -280,11 +277,11 @@ def state_dependent(car: CarSpecification) -> Guarded:
 
 
 def _observer(car: CarSpecification, observer: AbstractPlaced) -> Guarded:
-    return filtered(car, lateral_model(single_track(car), slowest_of(car)), observer)
+    return in_filter(car, lateral_model(single_track(car), slowest_of(car)), observer)
 
 
-def _poles(car: CarSpecification, poles: tuple[float, float] = POLES) -> list[float]:
-    return [pole / size_of(car) ** 0.5 for pole in poles]
+def _poles(car: CarSpecification) -> list[float]:
+    return [pole / size_of(car) ** 0.5 for pole in POLES]
 
 
 def _least(car: SingleTrack) -> float:

@@ -210,7 +210,7 @@ def axles_of(car: Any) -> tuple[Axle, Axle]:
     return found[0], found[1]
 
 
-def filtered(
+def in_filter(
     car: CarSpecification, model: StateSpace, filter: AbstractFilter, *, more: tuple[Need, ...] = (), key: Any = None,
     claims: bool = False,
 ) -> Guarded:  # fmt: skip
@@ -230,7 +230,7 @@ def single_track_filter(
 
     def make(car: CarSpecification) -> Guarded:
         model = lateral_model(single_track(car, tyre), slowest_of(car))
-        return filtered(car, model, filter, key=jax.random.key(0) if random else None, claims=claims)
+        return in_filter(car, model, filter, key=jax.random.key(0) if random else None, claims=claims)
 
     return make
 
@@ -241,7 +241,7 @@ def linear_kalman(car: CarSpecification) -> Guarded:
     known = {name: getattr(plain, name) for name in ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg")}
     stiffness = dict(front_stiffness=plain.front.cornering_stiffness, rear_stiffness=plain.rear.cornering_stiffness)
     model = lateral_model(LinearSingleTrack(**known, **stiffness), slowest_of(car))
-    return filtered(car, model, filters.Kalman())
+    return in_filter(car, model, filters.Kalman())
 
 
 class OpenLoop(AbstractMethod):

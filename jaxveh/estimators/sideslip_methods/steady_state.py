@@ -57,7 +57,7 @@ class SteadySteer(AbstractSteadyState):
     def needs(self):
         return (STEER, V_X)
 
-    def turning(self, v_x, steer):
+    def turn_of_steer(self, v_x, steer):
         """The steer over what it would have to be without understeer (rad), and whether there is a steady turn at all."""
         leverage = self.front_axle_to_cg * self.front_stiffness - self.rear_axle_to_cg * self.rear_stiffness
         stiff = self.wheelbase**2 * self.front_stiffness * self.rear_stiffness
@@ -67,13 +67,13 @@ class SteadySteer(AbstractSteadyState):
 
     def asked_acceleration(self, v_x, steer):
         """The lateral acceleration of that turn, m/s^2."""
-        return jnp.square(v_x) * self.turning(v_x, steer)[0] / self.wheelbase
+        return jnp.square(v_x) * self.turn_of_steer(v_x, steer)[0] / self.wheelbase
 
     def next(self, memory, t, values):
         del t
         v_x, steer = values["v_x"], values["steer"]
         length, a, b = self.wheelbase, self.front_axle_to_cg, self.rear_axle_to_cg
-        turning, steady = self.turning(v_x, steer)
+        turning, steady = self.turn_of_steer(v_x, steer)
         square = self.mass * jnp.square(v_x)
         sideslip = (1.0 - square * a / (b * self.rear_stiffness * length)) * (b / length) * turning
         linear = jnp.abs(self.asked_acceleration(v_x, steer)) <= LINEAR * GRAVITY

@@ -15,9 +15,9 @@ from jaxveh.estimators.sideslip_methods.common import (
     YAW_RATE,
     Guarded,
     guard,
+    keys_of,
     sideslip_answer,
     size_of,
-    told,
 )
 from jaxveh.estimators.sideslip_methods.single_track import axles_of, single_track
 from jaxveh.io import CarSpecification
@@ -72,7 +72,7 @@ class SteeringTorque(AbstractMethod):
 
 def steering_torque(car: CarSpecification) -> Guarded:
     """The chain for a car's file. **Raises** `InputError` for one without a steering ratio."""
-    keys = told(car, "the steering torque", {"steering_ratio": "-"})
+    keys = keys_of(car, "the steering torque", {"steering_ratio": "-"})
     front, _ = axles_of(single_track(car))
     method = SteeringTorque(
         car.front_axle_to_cg, front.stiffness, front.grip, keys["steering_ratio"], TRAIL * size_of(car),

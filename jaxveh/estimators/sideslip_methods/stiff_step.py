@@ -24,7 +24,8 @@ class StiffStep(eqx.Module):
         (I - g h J) k1 = f(x),    (I - g h J) k2 = f(x + h k1) - 2 k1,    x + h (3 k1 + k2) / 2
 
     The poles of lateral motion go with one over the speed, 80 1/s and more where a car crawls, and logs have rows of 0.1 s and
-    gaps; longer ones than `LONGEST` are cut to it. `derivatives(system, t, x, u)`: a NamedTuple of scalars as x, or of arrays for a batch of states.
+    gaps; longer ones than `LONGEST` are cut to it. `derivatives(system, t, x, u)`: a NamedTuple of scalars as x, or of arrays
+    for a batch of states.
     """
 
     derivatives: Callable = eqx.field(static=True)

@@ -11,7 +11,13 @@ from jaxveh import filters, observers
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.sideslip_methods.common import Guarded, size_of, slowest_of
 from jaxveh.estimators.sideslip_methods.observers import POLES
-from jaxveh.estimators.sideslip_methods.single_track import USUAL_SPEED, axles_of, filtered, lateral_model, single_track
+from jaxveh.estimators.sideslip_methods.single_track import (
+    USUAL_SPEED,
+    axles_of,
+    in_filter,
+    lateral_model,
+    single_track,
+)
 from jaxveh.io import CarSpecification
 from jaxveh.statespace import StateSpace, with_parameters
 from jaxveh.tyres import AbstractTyre, Contact, Forces
@@ -48,7 +54,7 @@ class ShareOfStiffness(AbstractTyre):
         return Forces(F_y=self.share * self.cornering_stiffness * contact.slip_angle)
 
 
-def chosen(model: StateSpace):
+def shares(model: StateSpace):
     """What is left of both axles' stiffnesses."""
     car = model.system.car
     return (car.front.share, car.rear.share)
@@ -64,8 +70,8 @@ def linear_model(car: CarSpecification, **noise: float) -> StateSpace:
 def adapted_stiffness(car: CarSpecification) -> Guarded:
     """The unscented filter of the linear single track with both stiffnesses among its states: section 1.2.2, as M. Best,
     T. Gordon & P. Dixon do (the review's [29]) and A. von Vietinghoff et al. ([7])."""
-    model = with_parameters(linear_model(car, force_error=FORCE_ERROR), chosen, SPREAD, WALK)
-    return filtered(car, model, filters.Unscented(), claims=True)
+    model = with_parameters(linear_model(car, force_error=FORCE_ERROR), shares, SPREAD, WALK)
+    return in_filter(car, model, filters.Unscented(), claims=True)
 
 
 def adaptive(car: CarSpecification) -> Guarded:
@@ -79,9 +85,9 @@ def adaptive(car: CarSpecification) -> Guarded:
     size = size_of(car) ** 0.5
     poles = [pole / size for pole in POLES]
     gain = observers.place_poles(plain, poles, dt=ROW * size, u={"v_x": USUAL_SPEED * size})
-    model = with_parameters(plain, chosen, SPREAD, 0.0)
+    model = with_parameters(plain, shares, SPREAD, 0.0)
     names = [name for name in model.states if name not in plain.states]
     bounds = dict.fromkeys(names, (LEAST, MOST))
     rates = dict.fromkeys(names, RATE)
     observer = observers.Adaptive(gain, rates, bounds=bounds, leakage=LEAKAGE, dead_zone=DEAD_ZONE)
-    return filtered(car, model, observer)
+    return in_filter(car, model, observer)

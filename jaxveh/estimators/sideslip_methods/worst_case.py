@@ -10,7 +10,7 @@ import numpy as np
 from jaxveh import filters
 from jaxveh._core.errors import check, float_array
 from jaxveh.estimators.sideslip_methods.common import Guarded, slowest_of
-from jaxveh.estimators.sideslip_methods.single_track import filtered, lateral_model, single_track
+from jaxveh.estimators.sideslip_methods.single_track import in_filter, lateral_model, single_track
 from jaxveh.filters import HInfinity
 from jaxveh.io import CarSpecification
 
@@ -47,4 +47,4 @@ def h_infinity(car: CarSpecification) -> Guarded:
     """The worst-case filter for a car's file: the review's [66], and [67] on nonlinear tyres. What it states is no spread."""
     model = lateral_model(single_track(car), slowest_of(car))
     filter = HInfinityShare(filters.Extended(), BOUND, {"v_y": 1.0})
-    return filtered(car, model, filter)
+    return in_filter(car, model, filter)
