@@ -222,7 +222,7 @@ def test_a_file_without_wheels_has_lateral_methods_alone():
 
 
 @pytest.mark.studies
-def test_a_simulated_car_with_production_sensors_knows_its_friction_near_the_limit_and_finds_a_jump():
+def test_a_simulated_car_with_production_sensors_is_never_wrong_and_known_but_in_the_second_after_a_jump():
     car = vehicles.named_car("suv", "seven-dof")
     told = vehicles.specification_of(vehicles.kit.CARS["suv"]())
     drive = manoeuvres.random_steering(20.0, 0.05, jax.random.key(8), lowest=0.2, highest=0.7, duration=24.0)
@@ -235,7 +235,10 @@ def test_a_simulated_car_with_production_sensors_knows_its_friction_near_the_lim
     error = np.abs(np.asarray(said["friction"]) / truth - 1.0)
     known, wrong = np.asarray(said.known.friction), error > 0.2
     assert known[time > 14.0].mean() > 0.2
-    assert np.mean(wrong[known]) < 0.05
+    # No force shows a jump before it is excited: a second is allowed, and nothing beside it.
+    since = time - time[np.argmax(truth < 0.6)]
+    assert not (wrong & known)[(since < 0.0) | (since > 1.0)].any()
     assert np.mean(error[known & (time > 14.0)] < 0.1) > 0.8
     used = np.hypot(log["true.F_y"], log["true.F_x"]) / (told.mass * 9.81 * truth)
-    assert used[time > 13.0].max() > 0.8
+    # The drive does excite it.
+    assert used[since > 0.0].max() > 0.8

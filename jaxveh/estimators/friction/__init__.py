@@ -20,7 +20,8 @@ from jaxveh.estimators.friction.axles import AligningTorque, Axles, HybridObserv
 from jaxveh.estimators.friction.bank import FrictionBank
 from jaxveh.estimators.friction.laws import planar_car
 from jaxveh.estimators.friction.scalar import Follower
-from jaxveh.estimators.friction.wheels import Reconstruction, SidesApart, SlipSlope, WheelObserver, WheelSlips
+from jaxveh.estimators.friction.slipping_wheels import SidesApart, WheelObserver
+from jaxveh.estimators.friction.wheels import Reconstruction, SlipSlope, WheelSlips
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.io import CarSpecification
 from jaxveh.tyres import LuGre

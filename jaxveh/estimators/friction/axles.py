@@ -116,7 +116,7 @@ class LateralCurve(AbstractMethod):
 
 class AligningTorque(AbstractMethod):
     """Friction by the steering torque: the pneumatic trail shrinks from the smallest slip on, so that it knows sooner than the
-    force (reference [30]'s chain; the brush's trail `t_0 (1 - g)^3 / (1 - g + g^2 / 3)`).
+    force (the review names the chain; the trail is the brush's, `t_0 (1 - g)^3 / (1 - g + g^2 / 3)`).
 
     The torque of the road on both front wheels is the steering wheel's times `steering_ratio` (friction and assistance of the
     steering are not in it): `M = F_yf (caster_trail + t)`. `caster_trail`, `pneumatic_trail` t_0 (m): no file has them, the
@@ -201,7 +201,8 @@ class HybridObserver(AbstractMethod):
         axles = self.lateral.axles
         front, rear = axles.forces(now)
         sample = (front, rear, axles.slip_difference(now), jnp.where(now.told.moves, 1.0, 0.0))
-        due = t - window.time >= self.every
+        # A little earlier, so that rounding does not choose the rows.
+        due = t - window.time >= 0.95 * self.every
         push = lambda old, new: jnp.where(due, jnp.concatenate([old[1:], new[None]]), old)
         front, rear, difference, weight = map(push, window[:4], sample)
         window = Window(front, rear, difference, weight, jnp.where(due, t, window.time))

@@ -1,0 +1,168 @@
+"""Friction while wheels slip: adaptive observers of the wheels, and left and right wheels each for themselves."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import parameter, positive
+from jaxveh.estimators.friction.along import Slips
+from jaxveh.estimators.friction.scalar import Follower, LogFriction
+from jaxveh.estimators.friction.wheels import AbstractWheelMethod, WheelMemory, WheelSlips
+from jaxveh.estimators.method import answer
+from jaxveh.tyres import Contact, LuGre
+
+
+class ObserverMemory(NamedTuple):
+    """Speeds of the observed wheels (4,), m/s; friction; its excitation, averaged (-)."""
+
+    wheels: WheelMemory
+    speed: Any
+    friction: Any
+    excitation: Any
+
+
+class WheelObserver(AbstractWheelMethod):
+    """An adaptive observer of the wheels' dynamics (`law` None: references [118]; a `tyres.LuGre`: reference [119]).
+
+    Each wheel: `J domega/dt = T - R F(slip, mu) + gain J (omega - observed)`; friction follows the gradient,
+    `d mu / dt = - rate sum e dF/dmu / F_z - leak (mu - usual)`, normalised, where the leak (sigma-modification) holds it while
+    nothing is excited. Without a law `F = mu F_z phi(slip)`, phi the file's curve over its peak: linear in mu as [118] has it,
+    and
+    wrong where tyres keep their slope on slippery roads. With LuGre the bristles are taken as settled (they settle within
+    milliseconds), and mu is what multiplies their friction.
+
+    `known`: the averaged `|F - slip dF/dslip| / F_z` of the wheel that has most of it is above `enough`. No spread is claimed.
+    """
+
+    slips: WheelSlips
+    law: LuGre | None = None
+    stiffness_ratio: jax.Array = positive("-", default=1.0)
+    gain: jax.Array = positive("1/s", default=20.0)
+    rate: jax.Array = positive("1/s", default=3.0)
+    leak: jax.Array = positive("1/s", default=0.02)
+    usual: jax.Array = positive("-", default=0.8)
+    enough: jax.Array = positive("-", default=0.1)
+
+    def first(self, t, values):
+        wheels = self.slips.start(t, values)
+        zero = jnp.zeros_like(t)
+        start = ObserverMemory(wheels, wheels.wheels.speed, zero + self.usual, zero)
+        return start, self._answer(start)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 0.1)
+        wheels, seen = self.slips.next(memory.wheels, t, values)
+        one = self.slips.wheels
+        speed = wheels.wheels.speed
+        load = seen.load * self.slips.nominal()
+        forces = lambda mu: self._forces(seen, wheels, mu)
+        force, slope = jax.jvp(forces, (memory.friction,), (jnp.ones_like(memory.friction),))
+        ones = jnp.ones_like(seen.slip)
+        torque = wheels.wheels.torque - one.wheel_radius * one.rolling_resistance * load
+        error = speed - memory.speed
+        push = one.wheel_radius * (torque - one.wheel_radius * force) / one.wheel_inertia
+        # Linearly implicit in the gain, so that no step is too long.
+        observed = memory.speed + dt * (push + self.gain * error) / (1.0 + dt * self.gain)
+        observed = jnp.where(seen.there & memory.wheels.told.moves, observed, speed)
+        # The error that stays is the force's: e = R^2 (F - F_true) / (J gain); per load it teaches friction.
+        lacks = jnp.where(seen.there, error * one.wheel_inertia * self.gain / one.wheel_radius**2 / load, 0.0)
+        tells = jnp.where(seen.there, slope / load, 0.0)
+        squares = jnp.sum(tells**2)
+        step = -self.rate * jnp.sum(tells * lacks) / (squares + 0.05) - self.leak * (memory.friction - self.usual)
+        friction = jnp.clip(memory.friction + dt * step, 0.05, 1.5)
+        share = 1.0 - jnp.exp(-dt / 0.3)
+        # What the slip does not explain in proportion: the part of a force that is no stiffness.
+        _, stiff = jax.jvp(
+            lambda slip: self._forces(seen._replace(slip=slip), wheels, memory.friction), (seen.slip,), (ones,)
+        )
+        excited = jnp.max(jnp.where(seen.there, jnp.abs(force - seen.slip * stiff) / load, 0.0))
+        excitation = memory.excitation + share * (excited - memory.excitation)
+        after = ObserverMemory(wheels, observed, friction, excitation)
+        return after, self._answer(after)
+
+    def _forces(self, seen: Slips, wheels: WheelMemory, mu):
+        load = seen.load * self.slips.nominal()
+        if self.law is None:
+            curves = self.slips.curves(self.stiffness_ratio)
+            return jnp.stack([mu * c.force(seen.slip[k], 1.0 + 0.0 * mu, seen.load[k]) for k, c in enumerate(curves)])
+        v_x = wheels.told.v_x
+        contact = Contact(slip_ratio=seen.slip, load=load, friction=mu, speed=v_x, slip_speed=v_x)
+        return self.law.forces(contact, self.law.start(contact)).F_x
+
+    def _answer(self, memory: ObserverMemory):
+        known = memory.wheels.told.moves & (memory.excitation > self.enough)
+        return answer({"friction": memory.friction}, known=known)
+
+
+class SidesMemory(NamedTuple):
+    wheels: WheelMemory
+    offset: Any
+    left: LogFriction
+    right: LogFriction
+
+
+class SidesApart(AbstractWheelMethod):
+    """Friction under the left and under the right wheels, each by a filter of ln mu on the forces and slips of its own wheels:
+    what
+    a road that is slippery on one side needs.
+
+    `friction` is the mean of both, weighed by load. The force of each wheel is compared with the curve along of its axle; what
+    slip a wheel shows while it hardly pulls, an error of its radius, is learnt within `learning` (s) and taken off. Beside, slips
+    are known to `slip_noise` (-), forces to `force_noise` (-) of themselves and `load_noise` of the load.
+    """
+
+    slips: WheelSlips
+    follower: Follower
+    stiffness_ratio: jax.Array = positive("-", default=1.0)
+    slip_noise: jax.Array = positive("-", default=0.004)
+    force_noise: jax.Array = positive("-", default=0.07)
+    load_noise: jax.Array = positive("-", default=0.015)
+    learning: jax.Array = positive("s", default=2.0)
+    rolls: jax.Array = parameter("-", scale=0.05, default=0.05)
+
+    def first(self, t, values):
+        wheels = self.slips.start(t, values)
+        start = self.follower.start()
+        memory = SidesMemory(wheels, jnp.zeros_like(wheels.wheels.speed), start, start)
+        return memory, self._answer(memory)
+
+    def next(self, memory, t, values):
+        dt = jnp.clip(t - memory.wheels.told.t, 0.0, 1.0)
+        wheels, seen = self.slips.next(memory.wheels, t, values)
+        curves, nominal = self.slips.curves(self.stiffness_ratio), self.slips.nominal()
+        stiffness = jnp.stack([curve.stiffness for curve in curves])
+        free = seen.there & (jnp.abs(seen.force) < self.rolls * seen.load * nominal)
+        shown = seen.slip - seen.force / (stiffness * seen.load)
+        share = jnp.where(free, 1.0 - jnp.exp(-dt / self.learning), 0.0)
+        offset = memory.offset + share * (jnp.where(free, shown, 0.0) - memory.offset)
+        sides = [memory.left, memory.right]
+        for k, curve in enumerate(curves):
+            slip, force, load = seen.slip[k] - offset[k], seen.force[k], seen.load[k]
+            state = sides[k % 2]
+            _, slope = curve.with_slope(slip, jnp.exp(state.mean), load)
+            noise = numerics.sqrt(
+                jnp.square(slope * self.slip_noise)
+                + jnp.square(self.force_noise * force)
+                + jnp.square(self.load_noise * load * nominal[k])
+            )
+            residual = lambda x, c=curve, s=slip, f=force, n=load: f - c.force(s, jnp.exp(x), n)
+            # Time passes twice for a side, once a wheel: what is forgotten is, too.
+            sides[k % 2] = self.follower.next(state, dt, residual, noise, seen.there[k])
+        after = SidesMemory(wheels, offset, *sides)
+        return after, self._answer(after)
+
+    def _answer(self, memory: SidesMemory):
+        moves = memory.wheels.told.moves
+        left, right = (self.follower.says(side, moves) for side in (memory.left, memory.right))
+        mean = {"friction": 0.5 * (left[0] + right[0]), "friction_left": left[0], "friction_right": right[0]}
+        std = {
+            "friction": 0.5 * numerics.hypot(left[1], right[1]),
+            "friction_left": left[1],
+            "friction_right": right[1],
+        }
+        known = {"friction": left[2] & right[2], "friction_left": left[2], "friction_right": right[2]}
+        return answer(mean, std, known)
