@@ -1,6 +1,6 @@
 """A vehicle and its sensors as a state space, and ready-made answers built on it."""
 
-from jaxveh.estimators import bank, grade, kit, mass, mass_and_grade, roll, sideslip, speed
+from jaxveh.estimators import bank, geometry, grade, kit, mass, mass_and_grade, roll, sideslip, speed
 from jaxveh.estimators.calibration_file import read_calibration, write_calibration
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.contract import Calibration, Span
@@ -28,6 +28,7 @@ __all__ = [
     "Span",
     "bank",
     "clean",
+    "geometry",
     "grade",
     "held_rows",
     "kit",
