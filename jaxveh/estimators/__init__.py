@@ -3,6 +3,7 @@
 from jaxveh.estimators import (
     bank,
     friction,
+    geometry,
     grade,
     kit,
     learned,
@@ -46,6 +47,7 @@ __all__ = [
     "clean",
     "compare",
     "friction",
+    "geometry",
     "grade",
     "held_rows",
     "kit",

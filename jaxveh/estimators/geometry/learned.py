@@ -1,0 +1,127 @@
+"""What one drive has learned of a car, as a file that the next one starts from."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.errors import InputError, check_positive
+from jaxveh._core.version import VERSION
+from jaxveh.estimators.geometry.learner import UNITS, Learner
+from jaxveh.io import kit, write_text
+
+KEYS = ("value", "std", "unit", "valid")
+
+SPREADS = {
+    "yaw_inertia": "inertia_spread", "front_axle_to_cg": "place_spread", "steer_offset": "offset_spread",
+    "steering_ratio": "ratio_spread",
+}  # fmt: skip
+"""The learner's parameter that says how well a number is known before a drive."""
+
+RELATIVE = ("yaw_inertia", "steering_ratio")
+"""Those whose spread is relative to the number."""
+
+
+class Entry(NamedTuple):
+    """A number, its standard deviation (both in the unit of `UNITS`), and whether it counts as known."""
+
+    value: float
+    std: float
+    valid: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Learned:
+    """What is known of a car: an `Entry` by name, for each of `UNITS`.
+
+    **Raises** `InputError` for names that are missing or unknown, a spread that is not positive, a value that no car has.
+    """
+
+    entries: dict[str, Entry]
+
+    def __post_init__(self):
+        kit.check_keys("Learned", self.entries, UNITS)
+        missing = [name for name in UNITS if name not in self.entries]
+        if missing:
+            raise InputError(f"Learned: no {', '.join(missing)}: cut short, or of another version; learn again.")
+        for name, entry in self.entries.items():
+            check_positive(f"{name}: std", entry.std, UNITS[name])
+            if name != "steer_offset":
+                check_positive(name, entry.value, UNITS[name])
+
+
+def learned_of(said: Any) -> Learned:
+    """The last of what a learner said: of `Answers` along a log, or of a live `Answer`."""
+    last = lambda part, name: np.asarray(getattr(part, name)).reshape(-1)[-1]
+    return Learned(
+        {
+            name: Entry(float(last(said.mean, name)), float(last(said.std, name)), bool(last(said.known, name)))
+            for name in UNITS
+        }
+    )
+
+
+def with_learned(method: Learner, learned: Learned) -> Learner:
+    """The learner that starts where another drive ended: values of `valid` entries and their spreads, of the others nothing.
+
+    A spread grows by a fifth from drive to drive, so that what changes is learned anew.
+    """
+    changes: dict[str, Any] = {}
+    for name, entry in learned.entries.items():
+        if entry.valid:
+            changes[name] = entry.value
+            changes[SPREADS[name]] = 1.2 * entry.std / (entry.value if name in RELATIVE else 1.0)
+    names = tuple(changes)
+    dtype = method.mass.dtype
+    values = [jnp.asarray(changes[name], dtype) for name in names]
+    return eqx.tree_at(lambda m: [getattr(m, name) for name in names], method, values) if names else method
+
+
+def write_learned(learned: Learned, path: str | os.PathLike, *, overwrite: bool = False) -> None:
+    """Write what was learned as TOML that `read_learned` reads back bit for bit; the file appears as a whole or not at all.
+
+    **Raises** `InputError` where the file exists and `overwrite` is False.
+    """
+    lines = [
+        "# What jaxveh has learned of a car. SI units; valid: the spread is small enough to be used.",
+        f"version = {kit.toml_string(VERSION)}",
+    ]
+    for name, entry in learned.entries.items():
+        lines += ["", f"[{name}]", f"value = {entry.value!r}", f"std = {entry.std!r}"]
+        lines += [f"unit = {kit.toml_string(UNITS[name])}", f"valid = {str(entry.valid).lower()}"]
+    write_text("\n".join(lines) + "\n", path, overwrite)
+
+
+def read_learned(path: str | os.PathLike) -> Learned:
+    """What `write_learned` wrote. **Raises** `InputError`, naming file and key, for a file that is none, is cut short, or has
+    another unit."""
+    path = Path(path)
+    content = dict(kit.read_toml(path))
+    try:
+        kit.check_keys("the file", content, ("version", *UNITS))
+        content.pop("version", None)
+        return Learned({name: _entry(name, table) for name, table in content.items()})
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _entry(name: str, table: Any) -> Entry:
+    kit.check_keys(f"[{name}]", table, KEYS)
+    missing = [key for key in KEYS if key not in table]
+    if missing:
+        raise InputError(f"[{name}]: no {', '.join(missing)}: cut short; learn again.")
+    if kit.toml_text(f"[{name}]: unit", table["unit"]) != UNITS[name]:
+        raise InputError(f"[{name}]: unit = {table['unit']!r}: must be {UNITS[name]!r}.")
+    if not isinstance(table["valid"], bool):
+        raise InputError(f"[{name}]: valid = {table['valid']!r}: must be true or false.")
+    return Entry(
+        kit.toml_number(f"[{name}]: value", table["value"]),
+        kit.toml_number(f"[{name}]: std", table["std"]),
+        table["valid"],
+    )

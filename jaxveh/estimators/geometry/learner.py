@@ -1,0 +1,230 @@
+"""The learner of what changes slowly: two least-squares fits that only lively rows move."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.names import record_type
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.estimators.body_motion import SILENCE, guarded, hold, number_of
+from jaxveh.estimators.contract import Need
+from jaxveh.estimators.leaning import NEEDS, Leaning, leaning_filter
+from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.sequential import Normal, corrected, normal_of
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+UNITS = {"yaw_inertia": "kg m^2", "front_axle_to_cg": "m", "steer_offset": "rad", "steering_ratio": "-"}
+"""What is learned, and its unit."""
+
+RATES = {"yaw_inertia": 10.0, "front_axle_to_cg": 0.005, "steer_offset": 2e-4, "steering_ratio": 0.05}
+"""Units per second: no faster does what is reported move."""
+
+NARROW = {"yaw_inertia": 0.1, "front_axle_to_cg": 0.05, "steer_offset": 6e-4, "steering_ratio": 0.025}
+"""A spread below which a number is known: of inertia and ratio relative to the start, of the others in their units."""
+
+STEERING = Need("steering_wheel", "rad")
+
+Steering = record_type("SteeringFit", ("ratio", "offset", "understeer"))
+"""Relative error of the ratio, offset at the road wheels (rad), understeer gradient beside the start's (rad/(m/s^2))."""
+
+Turning = record_type("TurningFit", ("stiffness", "inertia"))
+"""Relative errors of the front axle's cornering stiffness and of the yaw inertia."""
+
+
+class LearnerMemory(NamedTuple):
+    """The memory of the filter of roll and bank, the steering wheel (rad), low-passed steer (rad), yaw rate (rad/s), lateral
+    force (m/s^2) and lateral speed (m/s), the two fits, and what is reported."""
+
+    leaning: Any
+    wheel: Any
+    steer: Any
+    turn: Any
+    force: Any
+    v_y: Any
+    steering: Normal
+    turning: Normal
+    shown: Any
+    age: Any
+
+
+class Learner(AbstractMethod):
+    """Steering ratio and offset, the centre of gravity and the yaw inertia, learned while a car drives.
+
+    In turns of little lateral acceleration, with the yaw rate and the roll that the filter of `leaning` has corrected,
+
+        steering_wheel / ratio = offset + l r / v_x + understeer f_y
+
+    tells ratio, offset and understeer; the last is a place of the centre of gravity where both cornering stiffnesses are known
+    (eq 17 of the review, corrected: `l r / v - delta`): `l_f = l (m / C_f - understeer) / (m (1 / C_f + 1 / C_r))`.
+
+        m l_r f_y = C_f l alpha_f - J_z dr/dt,    alpha_f = steer - (v_y + l_f r) / v_x
+
+    tells yaw inertia and front stiffness. What the stiffnesses of the file are wrong by (`stiffness_spread`) is in the spread of
+    l_f. What is reported moves no faster than `RATES`, and is known where its spread is within `NARROW`.
+
+    **Parameters**: the car's `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `wheelbase` (m), `front_stiffness`,
+    `rear_stiffness` (N/rad), `steering_ratio` (-), `steer_offset` (rad, at the road wheels); how well they are known before:
+    `ratio_spread`, `stiffness_spread`, `inertia_spread` (-), `offset_spread` (rad), `place_spread` (m); `steer_error` (rad at the
+    road wheels) and `moment_error` (of m g l), which last `lasting` (s); `time` (s) of the low-pass of both sides.
+    """
+
+    leaning: Leaning
+    mass: jax.Array = positive("kg")
+    yaw_inertia: jax.Array = positive("kg m^2")
+    front_axle_to_cg: jax.Array = positive("m")
+    wheelbase: jax.Array = positive("m")
+    front_stiffness: jax.Array = positive("N/rad")
+    rear_stiffness: jax.Array = positive("N/rad")
+    steering_ratio: jax.Array = positive("-")
+    steer_offset: jax.Array = parameter("rad", scale=1e-3)
+    ratio_spread: jax.Array = positive("-", default=0.1)
+    offset_spread: jax.Array = positive("rad", default=2e-3)
+    stiffness_spread: jax.Array = positive("-", default=0.2)
+    place_spread: jax.Array = positive("m", default=0.15)
+    inertia_spread: jax.Array = positive("-", default=0.3)
+    steer_error: jax.Array = positive("rad", default=1.2e-3)
+    moment_error: jax.Array = positive("-", default=0.015)
+    lasting: jax.Array = positive("s", default=0.4)
+    time: jax.Array = positive("s", default=0.15)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def needs(self):
+        return (*NEEDS, STEERING)
+
+    def first(self, t, values):
+        leaning, said = self.leaning.first(t, values)
+        zero = jnp.zeros_like(t)
+        stds = {"ratio": self.ratio_spread, "offset": self.offset_spread, "understeer": self._understeer_spread()}
+        steering = normal_of(Steering, {"offset": self.steer_offset}, stds, t)
+        turning = normal_of(Turning, {}, {"stiffness": self.stiffness_spread, "inertia": self.inertia_spread}, t)
+        start = {name: getattr(self, name) + zero for name in UNITS}
+        memory = LearnerMemory(leaning, zero, zero, zero, zero, zero, steering, turning, start, zero)
+        return self._next(memory, leaning, said, zero, values)
+
+    def next(self, memory, t, values):
+        before = memory.leaning.motion.t
+        leaning, said = self.leaning.next(memory.leaning, t, values)
+        return self._next(memory, leaning, said, t - before, values)
+
+    def _next(self, memory, leaning, said, dt, values):
+        wheel = hold(values["steering_wheel"], memory.wheel)
+        motion, believed = leaning.motion, said.mean
+        share = dt / (self.time + dt)
+        turn_now = motion.yaw_rate - believed.yaw_rate_bias
+        force_now = motion.a_y - believed.a_y_bias - GRAVITY * believed.body_roll
+        slow = lambda before, now: before + share * (now - before)
+        steer, turn = slow(memory.steer, wheel / self.steering_ratio), slow(memory.turn, turn_now)
+        force, v_y = slow(memory.force, force_now), slow(memory.v_y, believed.v_y)
+        rate = (turn_now - turn) / self.time
+        silent = jnp.maximum(motion.silence, motion.speed_silence) > 0.5 * SILENCE
+        there = ~silent & ~jnp.isnan(values["steering_wheel"]) & (memory.age > START) & (motion.v_x > SLOWEST)
+        fast = guarded(motion.v_x)
+        # Rows count less in hard turns and at a crawl, smoothly.
+        doubt = 1.0 + jnp.square(jnp.square(force / LINEAR)) + jnp.square(jnp.square(QUICK / fast))
+        lasting = doubt * 2.0 * self.lasting / jnp.maximum(dt, 1e-3)
+        curve = self.wheelbase * turn / fast
+        start = self._understeer()
+        off = lambda x: steer - (1.0 + x.ratio) * (x.offset + curve + (start + x.understeer) * force)
+        steering = corrected(memory.steering, off, jnp.square(self.steer_error) * lasting, there, Steering)
+        fit = Steering(*steering.mean)
+        front = steer / (1.0 + fit.ratio) - fit.offset - (v_y + self.front_axle_to_cg * turn) / fast
+        scale = self.mass * GRAVITY * self.wheelbase
+        rear = self.wheelbase - self.front_axle_to_cg
+
+        def moment(x):
+            tyres = self.front_stiffness * (1.0 + x.stiffness) * self.wheelbase * front
+            return (self.mass * rear * force - tyres + self.yaw_inertia * (1.0 + x.inertia) * rate) / scale
+
+        turning = corrected(memory.turning, moment, jnp.square(self.moment_error) * lasting, there, Turning)
+        means, stds = self._numbers(steering, turning, said.std.yaw_rate_bias / jnp.maximum(fast, QUICK))
+        most = {name: RATES[name] * jnp.where(there, dt, 0.0) for name in UNITS}
+        shown = {
+            name: memory.shown[name] + jnp.clip(means[name] - memory.shown[name], -most[name], most[name])
+            for name in UNITS
+        }
+        narrow = {
+            "yaw_inertia": NARROW["yaw_inertia"] * self.yaw_inertia,
+            "front_axle_to_cg": NARROW["front_axle_to_cg"],
+        }
+        narrow |= {"steer_offset": NARROW["steer_offset"]}
+        narrow |= {"steering_ratio": NARROW["steering_ratio"] * self.steering_ratio}
+        known = {
+            name: (stds[name] < narrow[name]) & (jnp.abs(means[name] - shown[name]) < narrow[name]) for name in UNITS
+        }
+        memory = LearnerMemory(leaning, wheel, steer, turn, force, v_y, steering, turning, shown, memory.age + dt)
+        return memory, answer(shown, stds, known)
+
+    def _understeer(self):
+        rear = self.wheelbase - self.front_axle_to_cg
+        return self.mass * (rear / self.front_stiffness - self.front_axle_to_cg / self.rear_stiffness) / self.wheelbase
+
+    def _place_slope(self):
+        """How the understeer gradient changes with the place of the centre of gravity, rad/(m/s^2) per m."""
+        return -self.mass * (1.0 / self.front_stiffness + 1.0 / self.rear_stiffness) / self.wheelbase
+
+    def _understeer_spread(self):
+        rear = self.wheelbase - self.front_axle_to_cg
+        axles = numerics.hypot(rear / self.front_stiffness, self.front_axle_to_cg / self.rear_stiffness)
+        of_tyres = self.mass * self.stiffness_spread * axles / self.wheelbase
+        return numerics.hypot(of_tyres, self._place_slope() * self.place_spread)
+
+    def _numbers(self, steering: Normal, turning: Normal, heading: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What the fits say of each number, and spreads, with that of the yaw rate's offset over the speed, `heading`."""
+        fit, turn = Steering(*steering.mean), Turning(*turning.mean)
+        std = Steering(*numerics.sqrt(jnp.diagonal(steering.covariance)))
+        # Of the understeer's spread the tyres have a part, which no drive takes away from the place.
+        prior = self._understeer_spread()
+        gain = self._place_slope() * jnp.square(self.place_spread / prior)
+        place = self.front_axle_to_cg + gain * fit.understeer
+        seen = jnp.maximum(jnp.square(prior) - jnp.square(std.understeer), 0.0)
+        left = jnp.square(self.place_spread) - jnp.square(gain) * seen
+        inertia = numerics.sqrt(turning.covariance[1, 1])
+        means = {
+            "yaw_inertia": self.yaw_inertia * (1.0 + turn.inertia),
+            "front_axle_to_cg": place,
+            "steer_offset": fit.offset,
+            "steering_ratio": self.steering_ratio * (1.0 + fit.ratio),
+        }
+        stds = {
+            "yaw_inertia": self.yaw_inertia * inertia,
+            "front_axle_to_cg": numerics.sqrt(jnp.maximum(left, 1e-8)),
+            "steer_offset": numerics.hypot(std.offset, self.wheelbase * heading),
+            "steering_ratio": self.steering_ratio * std.ratio,
+        }
+        return means, stds
+
+
+START = 2.0
+"""s: until the low-passes have forgotten where they began."""
+
+SLOWEST = 3.0
+"""m/s: slower is not learned from,"""
+
+QUICK = 5.0
+"""and below this little."""
+
+LINEAR = 3.0
+"""m/s^2: above this tyres are not linear, and little is learned."""
+
+
+def learner_of(car: CarSpecification, who: str) -> Learner:
+    """Of a car's file. **Raises** `InputError` for one without stiffnesses, `steering_ratio` or `roll_gradient`."""
+    return Learner(
+        leaning_filter(car, who),
+        car.mass,
+        car.yaw_inertia,
+        car.front_axle_to_cg,
+        car.wheelbase,
+        number_of(car, "front_cornering_stiffness", who, "N/rad"),
+        number_of(car, "rear_cornering_stiffness", who, "N/rad"),
+        number_of(car, "steering_ratio", who, "-"),
+        car.steer_offset or 0.0,
+    )
