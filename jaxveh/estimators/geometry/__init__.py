@@ -9,10 +9,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.geometry.learned import Learned, learned_of, read_learned, with_learned, write_learned
 from jaxveh.estimators.geometry.learner import UNITS, learner_of
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
+from jaxveh.io import CarSpecification
 
 NAME = "geometry"
 
@@ -27,6 +30,13 @@ METHODS = {
 }
 
 RECOMMENDED = "learner"
+
+
+def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
+    """What the car's file says; an offset that it leaves out is none, a ratio is NaN."""
+    told = {name: getattr(car, name) for name in SHOWN}
+    told |= {"steer_offset": told["steer_offset"] or 0.0}
+    return {name: np.full(len(recording), np.nan if value is None else value) for name, value in told.items()}
 
 
 def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:

@@ -100,7 +100,6 @@ def race(
     seeds: int,
     key,
     *,
-    step: float,
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Raced:

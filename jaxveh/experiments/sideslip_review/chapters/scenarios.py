@@ -45,7 +45,7 @@ SCENARIOS = {
     "bank": Scenario(bank=0.05),
     "grade": Scenario(grade=0.06),
     "ABS": Scenario(friction=0.35, friction_later=0.35, steer=0.006, drop=14.0),
-    "wheelspin": Scenario(friction=0.3, friction_later=0.3, steer=0.003, wheelspin=6.0),
+    "wheelspin": Scenario(friction=0.4, friction_later=0.4, steer=0.002, wheelspin=4.0),
     "sensor bias": Scenario(offsets=5.0),
     "satellite outage": Scenario(outage=20.0),
     "wrong stiffness": Scenario(stiffness=0.65),
