@@ -56,6 +56,7 @@ __all__ = [
     "RECOMMENDED",
     "SHOWN",
     "Learned",
+    "do_nothing",
     "estimate",
     "learned_of",
     "live",

@@ -31,6 +31,9 @@ SPEED = 25.0
 SATELLITES_LATE, TRAIL = KNOWN["satellite_delay"], 0.03
 """s, and m: by which the front wheels' contact lies behind the steering axis."""
 
+STEER_OFFSET = 0.5 * DEGREE / STEERING_RATIO
+"""rad at the road wheels: what the steering angle of `sensors.production_car` shows in straight running."""
+
 EVENT = 0.5
 """Of the drive: when the driver brakes or accelerates, and where the friction changes."""
 
@@ -105,7 +108,7 @@ def _own_numbers(car: FourteenDOF, like) -> dict[str, Any]:
     own = {
         "mass": total_mass(car), "yaw_inertia": plain.yaw_inertia, "front_axle_to_cg": plain.front_axle_to_cg,
         "front_cornering_stiffness": plain.front_stiffness, "rear_cornering_stiffness": plain.rear_stiffness,
-        "steering_ratio": jnp.asarray(STEERING_RATIO),
+        "steering_ratio": jnp.asarray(STEERING_RATIO), "steer_offset": jnp.asarray(STEER_OFFSET),
     }  # fmt: skip
     return {f"true.{name}": value * jnp.ones_like(like) for name, value in own.items()}
 
