@@ -138,6 +138,8 @@ class Delayed(AbstractWrapper):
 
     def _with_rows(self, model: StateSpace, belief: DelayedBelief, piece: Row, real) -> DelayedBelief:
         """The belief with the piece among its rows; the oldest of them goes into the base."""
+        # What is not real is filtered and thrown away: a step back in time would have no derivative.
+        piece = piece._replace(t=jnp.where(real, piece.t, belief.base.t))
         longer = lambda rows, one: jnp.concatenate([rows, one[None]])
         rows, reals = jax.tree.map(longer, (belief.rows, belief.real), (piece, real))
         order = jnp.argsort(jnp.where(reals, rows.t, -jnp.inf), stable=True)

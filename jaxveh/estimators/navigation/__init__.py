@@ -9,7 +9,7 @@ import numpy as np
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.estimators.navigation.method import Navigation, navigation_model
-from jaxveh.estimators.navigation.multi_rate import multi_rate
+from jaxveh.estimators.navigation.multi_rate import multi_rate_of
 from jaxveh.estimators.navigation.of_car import navigation, navigation_of
 from jaxveh.estimators.navigation.system import Navigator, Parts
 from jaxveh.io import CarSpecification
@@ -39,10 +39,10 @@ METHODS = {
         "section 1.3.2 [46, 47], with another tyre law",
     ),
     "multi_rate": MethodOfCar(
-        multi_rate, "a linear single track with yaw rate, and the course at its own rate", "section 1.3.2 [51]"
+        multi_rate_of, "a linear single track with yaw rate, and the course at its own rate", "section 1.3.2 [51]"
     ),
     "camera": MethodOfCar(
-        navigation(Parts(wheels=True, camera=True, axle="saturating")),
+        navigation(Parts(wheels=True, camera=True, axle="saturating", adapts=True)),
         "with a rear axle and a camera that sees the lane, slow and late",
         "section 1.3.3 [54, 55]",
     ),

@@ -163,7 +163,7 @@ SPREAD = {"sideslip": 0.05, "yaw_rate": 0.5, "yaw": 2.0, "bias_yaw_rate": 0.005,
 """rad, rad/s: at the start, the yaw as good as unknown."""
 
 
-def multi_rate(car: CarSpecification) -> MultiRate:
+def multi_rate_of(car: CarSpecification) -> MultiRate:
     """The filter of a car's file. The fix is put among the rows at its own time, and these are filtered anew (`Delayed`).
 
     Between two fixes the paper predicts the residual of the course, and corrects by it; a filter needs none there, since its

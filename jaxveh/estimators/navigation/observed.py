@@ -102,7 +102,7 @@ def antenna_velocity(system: Navigator, x, u) -> tuple[Any, Any]:
         for v, gained, bias, g, tilt in zip((x.v_x, x.v_y), (u.gained_x, u.gained_y), biases, gain, tilts, strict=True)
     )
     spun, turned = u.spun - x.bias_yaw_rate, u.turned - lag * x.bias_yaw_rate
-    swing_x, swing_y = rotate(-spun * system.antenna_y, spun * system.antenna_x - u.rolled * system.antenna_z, -turned)
+    swing_x, swing_y = rotate(-spun * system.antenna_y, spun * system.antenna_x - u.rolled * system.antenna_z, turned)
     return ahead + swing_x, aside + swing_y
 
 

@@ -70,7 +70,8 @@ def look_back(window: Window, lag: Any) -> Past:
     share = jnp.where(used, jnp.clip((lag - ended) / length, 0.0, 1.0), 0.0)
     turned = share * window.turned
     later = jnp.cumsum(turned[::-1])[::-1] - turned
-    x, y = rotate(window.gained_x, window.gained_y, later)
+    # Of a piece that counts in part it is the later part, less turned against the end than all of it on the average.
+    x, y = rotate(window.gained_x, window.gained_y, later - 0.5 * (1.0 - share) * window.turned)
     # Rates run linearly within a piece; before the first they are its own.
     before = lambda leaf: jnp.where(jnp.roll(used, 1).at[0].set(False), jnp.roll(leaf, 1), leaf)
     within = used & (lag >= ended) & (lag < began)
