@@ -93,7 +93,7 @@ class Where(ast.NodeVisitor):
 def functions(paper):
     """By module: its functions by name."""
     found = {}
-    for file in sorted(Path(paper.__file__).parent.glob("*.py")):
+    for file in sorted(Path(paper.__file__).parent.rglob("*.py")):
         every = list(ast.walk(ast.parse(file.read_text())))
         found[file.stem] = {one.name: one for one in every if isinstance(one, ast.FunctionDef)}
         for kind in (one for one in every if isinstance(one, ast.ClassDef)):

@@ -10,6 +10,13 @@ import jax
 
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.experiments.report import Check, at_most, interval, leave_open, spread, with_terms
+from jaxveh.experiments.sideslip_review.chapters import (
+    ChaptersRaced,
+    chapter_drives,
+    chapter_tables,
+    conclusion_table,
+    race_methods,
+)
 from jaxveh.experiments.sideslip_review.contestants import WHAT
 from jaxveh.experiments.sideslip_review.criteria import (
     CELLS,
@@ -41,13 +48,18 @@ from jaxveh.sweeps import IN_MEMORY, Stores, Table, compare
 FIRST = next(iter(WHAT))
 """The baseline."""
 
+CHAPTER_SEEDS, CHAPTER_DURATION = 6, 40.0
+"""Of the chapters, whose cars cost fifty times as much: seeds at most, and s of a drive."""
+
 
 class Reproduction(NamedTuple):
-    """Everything the experiment found: the simulated drives, and the real log (None: none was given)."""
+    """Everything the experiment found: the simulated drives, the real log (None: none was given), and the chapters (None: they
+    were left out)."""
 
     seeds: int
     raced: Raced
     logged: Logged | None
+    chapters: ChaptersRaced | None = None
 
 
 def run(
@@ -57,15 +69,18 @@ def run(
     seed: int = 0,
     log: Any = None,
     car: Any = None,
+    chapters: bool = True,
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
 ) -> Reproduction:
     """All drives and methods over `seeds` seeds (at least two).
 
     `log` and `car`: a recording with `steer`, `v_x`, `a_x`, `a_y`, `yaw_rate` and, to score against, `v_y`, and the car's
-    specification; or their paths. Without them the real log is left out.
+    specification; or their paths. Without them the real log is left out. `chapters`: also every method of `jaxveh.estimators` in
+    every scenario, over at most `CHAPTER_SEEDS` seeds.
     """
     study = study or Study()
+    whole, progress = progress, part(progress, 0.0, 0.3 if chapters else 1.0, "race")
     share = 1.0 if log is None else 0.6
     # Other drives than those on which the noises were chosen.
     key = jax.random.fold_in(jax.random.key(seed), 1)
@@ -73,8 +88,17 @@ def run(
     told = part(progress, 0.25 * share, share, "methods")
     raced = race(study, drives, jax.random.key(seed), progress=told, stores=stores)
     logged = None if log is None else on_log(study, log, car, progress=part(progress, share, 1.0, "log"))
-    progress(1.0, 1.0, "done")
-    return Reproduction(seeds, raced, logged)
+    found = _chapters(seeds, seed, part(whole, 0.3, 1.0, "chapters"), stores.under("chapters")) if chapters else None
+    whole(1.0, 1.0, "done")
+    return Reproduction(seeds, raced, logged, found)
+
+
+def _chapters(seeds: int, seed: int, progress: Progress, stores: Stores) -> ChaptersRaced:
+    few = min(seeds, CHAPTER_SEEDS)
+    key = jax.random.fold_in(jax.random.key(seed), 2)
+    told = part(progress, 0.0, 0.3, "drives")
+    drives = chapter_drives(few, key, duration=CHAPTER_DURATION, progress=told, stores=stores)
+    return race_methods(drives, few, key, progress=part(progress, 0.3, 1.0, "methods"), stores=stores)
 
 
 def check(result: Reproduction) -> list[Check]:
@@ -116,6 +140,7 @@ def tables(result: Reproduction) -> list[Table]:
         _against_open_loop(result),
         _log_table(result),
         equations(),
+        *([] if result.chapters is None else [*chapter_tables(result.chapters), conclusion_table(result.chapters)]),
     ]
 
 

@@ -17,8 +17,8 @@ from jaxveh import Recording, estimators, sweeps
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.estimators import AbstractMethod, kit
-from jaxveh.experiments.sideslip_review.chapters.drives import drive_once
 from jaxveh.experiments.sideslip_review.chapters.fleet import CARS, built_cars, told_cars
+from jaxveh.experiments.sideslip_review.chapters.fleet_drives import drive_once
 from jaxveh.experiments.sideslip_review.chapters.scenarios import SCENARIOS, scenario_at
 from jaxveh.sweeps import IN_MEMORY, Stores
 
@@ -36,7 +36,7 @@ LATEST, EARLIEST = 100, 50
 """Rows by which an estimate may be late or early, to be called so."""
 
 
-class Raced(NamedTuple):
+class ChaptersRaced(NamedTuple):
     """`drives`: (scenarios, seeds, T) by channel; `found`: by quantity, method and shown name, values by metric, (scenarios,
     seeds); `nothing`: the same of doing nothing, by quantity and name; `left_out`: why a method was not raced, by quantity and
     method."""
@@ -63,7 +63,7 @@ def channels_kept() -> tuple[str, ...]:
     return tuple(sorted(shown | read | {"true.v_x"}))
 
 
-def drives_of(
+def chapter_drives(
     seeds: int, key, *, duration: float, progress: Progress = silent, stores: Stores = IN_MEMORY
 ) -> Mapping[str, np.ndarray]:
     """Drives of all scenarios, one a seed: (scenarios, seeds, T) each. A seed steers alike in all, with one car; `car`
@@ -95,14 +95,14 @@ def _design() -> sweeps.Design:
     return sweeps.Design(scenario=[float(i) for i in range(len(SCENARIOS))])
 
 
-def race(
+def race_methods(
     drives: Mapping[str, np.ndarray],
     seeds: int,
     key,
     *,
     progress: Progress = silent,
     stores: Stores = IN_MEMORY,
-) -> Raced:
+) -> ChaptersRaced:
     """All methods on the drives."""
     found: dict = {}
     left_out: dict = {}
@@ -124,7 +124,7 @@ def race(
         for path, values in swept.values.items():
             shown, metric = path.rsplit(".", 1)
             found.setdefault((quantity, name, shown), {})[metric] = values
-    return Raced(drives, found, _nothing(drives), left_out)
+    return ChaptersRaced(drives, found, _nothing(drives), left_out)
 
 
 def _data(module: ModuleType, method: AbstractMethod, drives: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxveh.experiments.report import spread
 from jaxveh.experiments.sideslip_review.chapters.fleet import told_cars
-from jaxveh.experiments.sideslip_review.chapters.race import CHAPTERS, Raced, quantities
+from jaxveh.experiments.sideslip_review.chapters.racing import CHAPTERS, ChaptersRaced, quantities
 from jaxveh.experiments.sideslip_review.chapters.scenarios import SCENARIOS
 from jaxveh.sweeps import Table
 
@@ -18,7 +18,7 @@ NOTHING = "nothing done"
 NAMES = tuple(SCENARIOS)
 
 
-def chapter_tables(raced: Raced) -> list[Table]:
+def chapter_tables(raced: ChaptersRaced) -> list[Table]:
     """Two tables a chapter."""
     found = []
     for chapter, names in CHAPTERS.items():
@@ -26,7 +26,7 @@ def chapter_tables(raced: Raced) -> list[Table]:
     return found
 
 
-def _shown(raced: Raced, names: tuple[str, ...]):
+def _shown(raced: ChaptersRaced, names: tuple[str, ...]):
     """(quantity, shown name, scale, unit) of a chapter, those that the drives know a truth of."""
     for quantity in names:
         for shown, unit in quantities()[quantity].SHOWN.items():
@@ -35,7 +35,7 @@ def _shown(raced: Raced, names: tuple[str, ...]):
                 yield quantity, shown, scale, word
 
 
-def _errors(raced: Raced, chapter: str, names: tuple[str, ...]) -> Table:
+def _errors(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table:
     rows = []
     for quantity, shown, scale, unit in _shown(raced, names):
         label = f"{shown} [{unit}]"
@@ -55,7 +55,7 @@ def _name(quantity: str, method: str) -> str:
     return f"{method} *" if method == quantities()[quantity].RECOMMENDED else method
 
 
-def _properties(raced: Raced, chapter: str, names: tuple[str, ...]) -> Table:
+def _properties(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table:
     """On ordinary drives, and over all: what is known, the worst, the delay, a long run; what it needs."""
     rows = []
     for quantity, shown, scale, unit in _shown(raced, names):
