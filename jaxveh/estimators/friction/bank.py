@@ -59,12 +59,12 @@ class FrictionBank(AbstractMethod):
     `frictions` (K,) of the filters and `prior` (K,), their probabilities where nothing is told; `jumps` (1/s): how often it
     changes to anything; `walk` (1/sqrt(s)): how fast ln mu wanders; `turn_time`, `force_time` (s): innovations of yaw rate and of
     a_y closer than this count as one; `stiffness_spread` (-) of an axle's slope, which changes within `stiffness_time` (s) so
-    that it takes up what the curve lacks; `steer_noise` (rad), play included; `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5): what the
-    model leaves out; `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y; `yaw_rate_noise` (rad/s).
+    that it takes up what the curve lacks; `steer_noise` (rad), play included; `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5):
+    what the model leaves out; `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y; `yaw_rate_noise` (rad/s).
 
     The weights are no exact likelihoods: one innovation variance serves all frictions, for each its own would prefer little
-    friction wherever noises are overrated. So the spread hangs on noises that were chosen on simulated cars: too wide on some, too small on others.
-    A friction that was known stays so for up to a few seconds after a jump that nothing excites.
+    friction wherever noises are overrated. So the spread hangs on noises that were chosen on simulated cars: too wide on some,
+    too small on others. A friction that was known stays so for up to a few seconds after a jump that nothing excites.
     """
 
     car: PlanarCar
