@@ -79,9 +79,9 @@ def test_what_a_force_tells_is_its_slope_over_the_logarithm_of_friction_and_noth
     curve = PLANAR.front
     slip, mu, step = jnp.asarray(0.05), 0.6, 1e-6
     difference = (curve.force(slip, mu * np.exp(step)) - curve.force(slip, mu * np.exp(-step))) / (2 * step)
-    np.testing.assert_allclose(curve.told(slip, mu), difference, rtol=1e-6)
+    np.testing.assert_allclose(curve.sensitivity(slip, mu), difference, rtol=1e-6)
     np.testing.assert_allclose(curve.force(1e-7, mu) / 1e-7, curve.stiffness, rtol=1e-6)
-    assert abs(curve.told(jnp.asarray(0.002), 1.0)) < 0.01 * curve.force(0.002, 1.0)
+    assert abs(curve.sensitivity(jnp.asarray(0.002), 1.0)) < 0.01 * curve.force(0.002, 1.0)
     # All slides: the force is the friction.
     brush = lambda log_mu: brush_curve.force(0.5, curve.stiffness, jnp.exp(log_mu) * curve.peak)
     np.testing.assert_allclose(jax.grad(brush)(jnp.log(0.5)), 0.5 * curve.peak, rtol=1e-12)

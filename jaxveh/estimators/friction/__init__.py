@@ -2,7 +2,7 @@
 
 It is the friction over that on which the numbers of the car's tyres hold; for a file without tyre curves the peak force over the
 load. **Where tyres work in their linear range, nothing tells it**: force grows with ln mu by `F - s dF/ds` alone
-(`laws.SimilarCurve.told`), so every method says by `known` whether the drive excites it.
+(`laws.SimilarCurve.sensitivity`), so every method says by `known` whether the drive excites it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
-from jaxveh.estimators.friction.augmented import augmented
+from jaxveh.estimators.friction.augmented import augmented_filter
 from jaxveh.estimators.friction.axles import AligningTorque, Axles, HybridObserver, LateralCurve
 from jaxveh.estimators.friction.bank import FrictionBank
 from jaxveh.estimators.friction.laws import planar_car
@@ -103,7 +103,7 @@ METHODS = {
         "section 3.1.1.1, figure 3, reference [101]",
     ),
     "augmented": MethodOfCar(
-        lambda car: augmented(planar_car(car)),
+        lambda car: augmented_filter(planar_car(car)),
         "friction as a slow state of a nonlinear single track; known only near the limit",
         "section 3.1.2.1.4, mu-dot = 0",
     ),

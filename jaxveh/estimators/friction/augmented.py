@@ -36,7 +36,7 @@ class State(NamedTuple):
     log_friction: Any
 
 
-def augmented(car: PlanarCar) -> Filtered:
+def augmented_filter(car: PlanarCar) -> Filtered:
     """An unscented filter of [v_y, yaw rate, ln mu]; friction walks by 0.05 of itself in a second. Below `LOWEST` the model
     runs as
     at that speed, and nothing is known. It knows no jumps: it follows one as fast as its walk lets it, and its spread, that of

@@ -13,7 +13,7 @@ from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction import brush_curve
 from jaxveh.estimators.friction.laws import PlanarCar
-from jaxveh.estimators.friction.motion import LATERAL, Told, first_told, next_told
+from jaxveh.estimators.friction.motion import LATERAL, Told, start_told, next_told
 from jaxveh.estimators.friction.scalar import Follower, LogFriction
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.vehicles import GRAVITY
@@ -41,7 +41,7 @@ class Axles(eqx.Module):
 
     def start(self, t, values) -> AxlesTold:
         """After the first row."""
-        told, zero = first_told(t, values), jnp.zeros_like(t)
+        told, zero = start_told(t, values), jnp.zeros_like(t)
         known = lambda name: jnp.where(jnp.isnan(values[name]), zero, values[name])
         return AxlesTold(told, told.steer, known("yaw_rate"), known("a_y"), known("yaw_rate"), known("a_y"))
 

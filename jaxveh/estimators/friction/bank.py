@@ -12,7 +12,7 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.along import AlongEvidence
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar
-from jaxveh.estimators.friction.motion import LATERAL, Told, first_told, next_told
+from jaxveh.estimators.friction.motion import LATERAL, Told, start_told, next_told
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.vehicles import GRAVITY
 
@@ -91,7 +91,7 @@ class FrictionBank(AbstractMethod):
 
     def first(self, t, values):
         bank = Bank(jnp.log(self._prior()), *self._start())
-        memory = BankMemory(first_told(t, values), bank, None if self.along is None else self.along.start(t))
+        memory = BankMemory(start_told(t, values), bank, None if self.along is None else self.along.start(t))
         return memory, self._answer(bank, memory.told)
 
     def next(self, memory, t, values):

@@ -45,7 +45,7 @@ class SimilarCurve(eqx.Module):
         slip = jnp.asarray(slip)
         return jax.jvp(lambda s: self.force(s, friction, load, factor), (slip,), (jnp.ones_like(slip),))
 
-    def told(self, slip, friction, load=1.0, factor=1.0):
+    def sensitivity(self, slip, friction, load=1.0, factor=1.0):
         """By how much the force (N) grows with the friction's logarithm: `dF / d ln mu = F - s dF/ds` of every law that friction
         stretches alike. The linear part of a force says nothing; this is what is left.
 

@@ -38,7 +38,7 @@ class Told(NamedTuple):
     moves: Any
 
 
-def first_told(t, values) -> Told:
+def start_told(t, values) -> Told:
     """What the first row tells."""
     zero, old = jnp.zeros_like(t), jnp.full_like(t, 1e3)
     return next_told(Told(t, zero + LOWEST, zero, zero, zero, zero, old, old, old, jnp.asarray(False)), t, values)

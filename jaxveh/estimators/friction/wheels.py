@@ -13,7 +13,7 @@ from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.along import CORNERS, Slips, WheelForces, WheelsTold
 from jaxveh.estimators.friction.laws import PlanarCar, SimilarCurve
-from jaxveh.estimators.friction.motion import Told, first_told, next_told
+from jaxveh.estimators.friction.motion import Told, start_told, next_told
 from jaxveh.estimators.method import AbstractMethod, answer
 
 SPEED = (Need("v_x", "m/s"),)
@@ -45,7 +45,7 @@ class WheelSlips(eqx.Module):
     def start(self, t, values) -> WheelMemory:
         """After the first row."""
         return WheelMemory(
-            first_told(t, self._straight(t, values)), self.wheels.start(t), jnp.zeros_like(t), jnp.zeros_like(t)
+            start_told(t, self._straight(t, values)), self.wheels.start(t), jnp.zeros_like(t), jnp.zeros_like(t)
         )
 
     def next(self, last: WheelMemory, t, values) -> tuple[WheelMemory, Slips]:

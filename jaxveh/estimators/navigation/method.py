@@ -66,7 +66,7 @@ class Navigation(AbstractMethod):
     filter: AbstractRuleFilter = Extended()
 
     @property
-    def cleaning(self) -> Cleaning:
+    def _cleaning(self) -> Cleaning:
         """What is made of a row before the filter sees it."""
         return Cleaning(self.model.system)
 
@@ -88,13 +88,13 @@ class Navigation(AbstractMethod):
         )
 
     def first(self, t, values):
-        felt, cleaned = self.cleaning.first(t, values)
+        felt, cleaned = self._cleaning.first(t, values)
         row = self._row(t, cleaned)
         belief = self.filter.prior(self.model, row)
         return self._said(belief, felt, jnp.zeros_like(t, bool), row, cleaned, jnp.int32(0))
 
     def next(self, memory: Known, t, values):
-        felt, cleaned = self.cleaning.next(memory.felt, t, values)
+        felt, cleaned = self._cleaning.next(memory.felt, t, values)
         row = self._row(t, cleaned)
         after, info = self.filter.step(self.model, memory.belief, row)
         goes_on = memory.begun & cleaned["felt"]

@@ -192,10 +192,10 @@ def multi_rate_of(car: CarSpecification) -> MultiRate:
     )
     lag = satellite_lag(car)
     filter = Delayed(Extended(), {"course": lag}, DEPTH) if lag > 0 else Extended()
-    return MultiRate(Filtered(model, filter, reads, Held(), told))
+    return MultiRate(Filtered(model, filter, reads, Held(), what_is_told))
 
 
-def told(model: StateSpace, belief: Any, row: Any) -> dict[str, Any]:
+def what_is_told(model: StateSpace, belief: Any, row: Any) -> dict[str, Any]:
     """What is known: all but the yaw while the car is not slow and sideslip is certain enough; the yaw after a fix."""
     std = belief.moments(model)[1]
     moving = row.u.v_x > SLOWEST
