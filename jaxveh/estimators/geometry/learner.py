@@ -37,11 +37,13 @@ Turning = record_type("TurningFit", ("stiffness", "inertia"))
 
 
 class LearnerMemory(NamedTuple):
-    """The memory of the filter of roll and bank, the steering wheel (rad), low-passed steer (rad), yaw rate (rad/s), lateral
+    """The memory of the filter of roll and bank, the steering wheel (rad), the steer as late as
+    the yaw rate, low-passed steer (rad), yaw rate (rad/s), lateral
     force (m/s^2) and lateral speed (m/s), the two fits, and what is reported."""
 
     leaning: Any
     wheel: Any
+    late: Any
     steer: Any
     turn: Any
     force: Any
@@ -57,7 +59,7 @@ class Learner(AbstractMethod):
 
     In turns of little lateral acceleration, with the yaw rate and the roll that the filter of `leaning` has corrected,
 
-        steering_wheel / ratio = offset + l r / v_x + understeer f_y
+        steering_wheel / ratio = offset + l r / v_x + understeer f_y + J_z (1 / C_f + 1 / C_r) / l dr/dt
 
     tells ratio, offset and understeer; the last is a place of the centre of gravity where both cornering stiffnesses are known
     (eq 17 of the review, corrected: `l r / v - delta`): `l_f = l (m / C_f - understeer) / (m (1 / C_f + 1 / C_r))`.
@@ -70,7 +72,8 @@ class Learner(AbstractMethod):
     **Parameters**: the car's `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `wheelbase` (m), `front_stiffness`,
     `rear_stiffness` (N/rad), `steering_ratio` (-), `steer_offset` (rad, at the road wheels); how well they are known before:
     `ratio_spread`, `stiffness_spread`, `inertia_spread` (-), `offset_spread` (rad), `place_spread` (m); `steer_error` (rad at the
-    road wheels) and `moment_error` (of m g l), which last `lasting` (s); `time` (s) of the low-pass of both sides.
+    road wheels) and `moment_error` (of m g l), which last `lasting` (s); `time` (s) of the low-pass of both
+    sides; `late` (s): by how much the inertial unit is later than the steering sensor.
     """
 
     leaning: Leaning
@@ -83,13 +86,14 @@ class Learner(AbstractMethod):
     steering_ratio: jax.Array = positive("-")
     steer_offset: jax.Array = parameter("rad", scale=1e-3)
     ratio_spread: jax.Array = positive("-", default=0.1)
-    offset_spread: jax.Array = positive("rad", default=2e-3)
+    offset_spread: jax.Array = positive("rad", default=7e-4)
     stiffness_spread: jax.Array = positive("-", default=0.2)
     place_spread: jax.Array = positive("m", default=0.15)
     inertia_spread: jax.Array = positive("-", default=0.3)
     steer_error: jax.Array = positive("rad", default=1.2e-3)
     moment_error: jax.Array = positive("-", default=0.015)
     lasting: jax.Array = positive("s", default=0.4)
+    late: jax.Array = positive("s", default=0.025)
     time: jax.Array = positive("s", default=0.15)
 
     def __check_init__(self):
@@ -106,7 +110,7 @@ class Learner(AbstractMethod):
         steering = normal_of(Steering, {"offset": self.steer_offset}, stds, t)
         turning = normal_of(Turning, {}, {"stiffness": self.stiffness_spread, "inertia": self.inertia_spread}, t)
         start = {name: getattr(self, name) + zero for name in UNITS}
-        memory = LearnerMemory(leaning, zero, zero, zero, zero, zero, steering, turning, start, zero)
+        memory = LearnerMemory(leaning, zero, zero, zero, zero, zero, zero, steering, turning, start, zero)
         return self._next(memory, leaning, said, zero, values)
 
     def next(self, memory, t, values):
@@ -121,7 +125,8 @@ class Learner(AbstractMethod):
         turn_now = motion.yaw_rate - believed.yaw_rate_bias
         force_now = motion.a_y - believed.a_y_bias - GRAVITY * believed.body_roll
         slow = lambda before, now: before + share * (now - before)
-        steer, turn = slow(memory.steer, wheel / self.steering_ratio), slow(memory.turn, turn_now)
+        late = memory.late + dt / (self.late + dt) * (wheel / self.steering_ratio - memory.late)
+        steer, turn = slow(memory.steer, late), slow(memory.turn, turn_now)
         force, v_y = slow(memory.force, force_now), slow(memory.v_y, believed.v_y)
         rate = (turn_now - turn) / self.time
         silent = jnp.maximum(motion.silence, motion.speed_silence) > 0.5 * SILENCE
@@ -131,11 +136,12 @@ class Learner(AbstractMethod):
         doubt = 1.0 + jnp.square(jnp.square(force / LINEAR)) + jnp.square(jnp.square(QUICK / fast))
         lasting = doubt * 2.0 * self.lasting / jnp.maximum(dt, 1e-3)
         curve = self.wheelbase * turn / fast
-        start = self._understeer()
-        off = lambda x: steer - (1.0 + x.ratio) * (x.offset + curve + (start + x.understeer) * force)
-        steering = corrected(memory.steering, off, jnp.square(self.steer_error) * lasting, there, Steering)
+        start = self._understeer() * force - self.yaw_inertia * self._place_slope() / self.mass * rate
+        off = lambda x: steer - x.offset - (1.0 + x.ratio) * (curve + start + x.understeer * force)
+        calm = 1.0 + jnp.square(jnp.square(rate / CALM))
+        steering = corrected(memory.steering, off, jnp.square(self.steer_error) * lasting * calm, there, Steering)
         fit = Steering(*steering.mean)
-        front = steer / (1.0 + fit.ratio) - fit.offset - (v_y + self.front_axle_to_cg * turn) / fast
+        front = (steer - fit.offset) / (1.0 + fit.ratio) - (v_y + self.front_axle_to_cg * turn) / fast
         scale = self.mass * GRAVITY * self.wheelbase
         rear = self.wheelbase - self.front_axle_to_cg
 
@@ -143,13 +149,15 @@ class Learner(AbstractMethod):
             tyres = self.front_stiffness * (1.0 + x.stiffness) * self.wheelbase * front
             return (self.mass * rear * force - tyres + self.yaw_inertia * (1.0 + x.inertia) * rate) / scale
 
-        turning = corrected(memory.turning, moment, jnp.square(self.moment_error) * lasting, there, Turning)
+        # What ratio and place are wrong by stays: no number of rows averages it.
+        wrong = numerics.hypot(
+            steer * numerics.sqrt(steering.covariance[0, 0]), numerics.hypot(self.place_spread * turn / fast, 1e-4)
+        )
+        stays = jnp.square(self.front_stiffness * self.wheelbase / scale * wrong) * (STAYS / self.lasting)
+        turning = corrected(memory.turning, moment, (jnp.square(self.moment_error) + stays) * lasting, there, Turning)
         means, stds = self._numbers(steering, turning, said.std.yaw_rate_bias / jnp.maximum(fast, QUICK))
         most = {name: RATES[name] * jnp.where(there, dt, 0.0) for name in UNITS}
-        shown = {
-            name: memory.shown[name] + jnp.clip(means[name] - memory.shown[name], -most[name], most[name])
-            for name in UNITS
-        }
+        shown = {name: memory.shown[name] + _within(means[name] - memory.shown[name], most[name]) for name in UNITS}
         narrow = {
             "yaw_inertia": NARROW["yaw_inertia"] * self.yaw_inertia,
             "front_axle_to_cg": NARROW["front_axle_to_cg"],
@@ -159,7 +167,7 @@ class Learner(AbstractMethod):
         known = {
             name: (stds[name] < narrow[name]) & (jnp.abs(means[name] - shown[name]) < narrow[name]) for name in UNITS
         }
-        memory = LearnerMemory(leaning, wheel, steer, turn, force, v_y, steering, turning, shown, memory.age + dt)
+        memory = LearnerMemory(leaning, wheel, late, steer, turn, force, v_y, steering, turning, shown, memory.age + dt)
         return memory, answer(shown, stds, known)
 
     def _understeer(self):
@@ -202,6 +210,12 @@ class Learner(AbstractMethod):
         return means, stds
 
 
+def _within(change: Any, most: Any) -> Any:
+    """A change that does not exceed the most, smoothly; small ones are themselves."""
+    bound = jnp.where(most > 0, most, 1.0)
+    return jnp.where(most > 0, bound * jnp.tanh(change / bound), 0.0)
+
+
 START = 2.0
 """s: until the low-passes have forgotten where they began."""
 
@@ -211,8 +225,14 @@ SLOWEST = 3.0
 QUICK = 5.0
 """and below this little."""
 
-LINEAR = 3.0
+LINEAR = 2.0
 """m/s^2: above this tyres are not linear, and little is learned."""
+
+CALM = 0.15
+"""rad/s^2: above this yaw acceleration little is learned of the steering."""
+
+STAYS = 10.0
+"""s: so long an error counts as one that stays."""
 
 
 def learner_of(car: CarSpecification, who: str) -> Learner:

@@ -56,7 +56,7 @@ class Kinematic(AbstractMethod):
 
 class SatelliteMemory(NamedTuple):
     """What was heard; of satellites the last speed, its low-passed value (m/s), the time since it (s) and whether there was any;
-    the accelerometer as late and as low-passed (m/s^2)."""
+    the accelerometer as late (m/s^2), its integral since then (m/s), and as low-passed."""
 
     motion: Any
     speed: Any
@@ -64,6 +64,7 @@ class SatelliteMemory(NamedTuple):
     since: Any
     started: Any
     late: Any
+    gathered: Any
     felt: Any
     age: Any
 
@@ -85,7 +86,7 @@ class Satellite(AbstractMethod):
     def first(self, t, values):
         motion, heard = self.motion.first(t, values)
         zero = jnp.zeros_like(t)
-        return self._next(motion, heard, SatelliteMemory(motion, zero, zero, zero, zero, zero, zero, zero))
+        return self._next(motion, heard, SatelliteMemory(motion, zero, zero, zero, zero, zero, zero, zero, zero))
 
     def next(self, memory, t, values):
         motion, heard = self.motion.next(memory.motion, t, values)
@@ -101,13 +102,17 @@ class Satellite(AbstractMethod):
         slow = jnp.where(begins, speed, moved)
         started = jnp.where(spoke, 1.0, memory.started)
         late = memory.late + dt / (self.delay + dt) * (heard["a_x"] - memory.late)
-        felt = memory.felt + dt / (self.time + dt) * (late - memory.felt)
+        # Both go through one filter, at the satellites' pace: of what was felt between two speeds, the mean.
+        gathered = memory.gathered + dt * late
+        mean = gathered / jnp.where(since > 0, since, 1.0)
+        felt = jnp.where(spoke, memory.felt + share * (mean - memory.felt), memory.felt)
+        gathered = jnp.where(spoke, 0.0, gathered)
         since = jnp.where(spoke, 0.0, since)
         there = (heard["pull_silence"] < SILENCE) & (since < 2.0 * SILENCE) & (started > 0)
         age = jnp.where(there, memory.age + dt, 0.0)
         grade = arcsin_of(felt / (1.0 + GRAVITY * self.pitch_gradient) - (speed - slow) / self.time)
         known = there & (age > 3.0 * self.time)
-        memory = SatelliteMemory(motion, speed, slow, since, started, late, felt, age)
+        memory = SatelliteMemory(motion, speed, slow, since, started, late, gathered, felt, age)
         return memory, answer({"grade": grade}, known=known)
 
 

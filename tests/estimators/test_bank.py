@@ -1,0 +1,92 @@
+"""Bank: each method where the right answer is known, and the filter on simulated cars."""
+
+import dataclasses
+
+import equinox as eqx
+import numpy as np
+import pytest
+from banked_drives import DEGREE, file_of, follow_all
+from method_logs import CAR
+from steady_logs import G, banked_circle
+from winding_roads import SCORED, heard_of
+
+from jaxveh import InputError
+from jaxveh.estimators import bank
+
+SIMPLE = ("disturbance_observer", "unknown_input", "tseng")
+
+
+@pytest.mark.parametrize("name", SIMPLE)
+@pytest.mark.parametrize("tilt", [-0.06, 0.04])
+def test_a_steady_circle_on_a_bank_has_that_bank(name, tilt):
+    method = bank.METHODS[name].make(CAR)
+    found = bank.estimate(method, banked_circle(method.needs, bank=tilt)[0])
+    assert found.known.bank[-1] and not found.known.bank[0]
+    np.testing.assert_allclose(found["bank"][-1], tilt, rtol=0.02)
+
+
+@pytest.mark.parametrize("name", SIMPLE)
+def test_an_accelerometer_s_offset_is_a_bank_to_what_has_no_state_for_it(name):
+    method = bank.METHODS[name].make(CAR)
+    found = [
+        bank.estimate(method, banked_circle(method.needs, a_y_offset=offset)[0])["bank"][-1] for offset in (0.0, 0.1)
+    ]
+    share = 1.0 if name == "disturbance_observer" else 0.9
+    expected = 0.1 / (1.0 + G * CAR.roll_gradient) / G
+    assert share * 0.9 * expected < found[1] - found[0] < 1.05 * expected
+
+
+def test_steer_that_yaw_rate_and_acceleration_do_not_bear_out_fades_a_bank():
+    method = bank.METHODS["tseng"].make(CAR)
+    log = banked_circle(method.needs)[0]
+    skidding = log.replace(steering_wheel=np.asarray(log["steering_wheel"]) - 0.5)
+    found = bank.estimate(method, skidding)
+    assert abs(found["bank"][-1]) < 1e-3 and not found.known.bank[-1]
+
+
+def test_the_filter_tells_bank_and_roll_apart_where_it_knows_the_offset():
+    method = eqx.tree_at(lambda m: m.a_y_offset_spread, bank.METHODS["filter"].make(CAR), np.asarray(1e-4))
+    log, roll = banked_circle(method.needs, rows=3000)
+    found = bank.estimate(method, log)
+    assert abs(found["bank"][-1] - 0.04) < 0.15 * DEGREE
+    assert abs(found["roll"][-1] - roll) < 0.15 * DEGREE
+    assert abs(found["bank"][-1] - 0.04) < 3.0 * found.std.bank[-1]
+
+
+def test_a_constant_bank_is_not_told_from_an_offset_and_the_spread_says_so():
+    method = bank.METHODS["filter"].make(CAR)
+    found = bank.estimate(method, banked_circle(method.needs, bank=0.0, a_y_offset=0.06, rows=3000)[0])
+    assert 0.0 < found.mean.a_y_bias[-1] < 0.06
+    assert found.std.a_y_bias[-1] > 0.02 and found.std.bank[-1] > 0.02 / G
+    assert abs(found["bank"][-1]) < 2.5 * found.std.bank[-1]
+
+
+def test_the_yaw_rate_s_offset_is_found_by_satellites_alone():
+    method = bank.METHODS["filter"].make(CAR)
+    log = banked_circle(method.needs, rows=3000)[0]
+    turned = log.replace(yaw_rate=np.asarray(log["yaw_rate"]) + 0.003)
+    with_course, without = (bank.estimate(method, one) for one in (turned, turned.without("course")))
+    assert abs(with_course.mean.yaw_rate_bias[-1] - 0.003) < 0.0005
+    assert without.std.yaw_rate_bias[-1] > 3.0 * with_course.std.yaw_rate_bias[-1]
+
+
+def test_a_file_without_what_tells_roll_from_bank_is_refused():
+    for key, unit in (("roll_gradient", r"rad/\(m/s\^2\)"), ("steering_ratio", "-")):
+        method = "tseng" if key == "steering_ratio" else "filter"
+        with pytest.raises(InputError, match=f"bank: the car's file has no {key} \\({unit}\\)"):
+            bank.METHODS[method].make(dataclasses.replace(CAR, **{key: None}))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("six_axes", "most"), [(False, 0.5), (True, 0.45)])
+def test_on_unseen_cars_the_bank_is_within_half_a_degree(six_axes, most):
+    cases, truths, offsets, time = heard_of(SCORED, range(4), 120.0, six_axes)
+    said = follow_all(lambda car: bank.METHODS["filter"].make(file_of(car)), cases, time)
+    error = np.stack([said.mean.bank[k] - truth["bank"] for k, truth in enumerate(truths)])[:, 1000:]
+    assert np.sqrt(np.mean(error**2)) < most * DEGREE
+    assert 0.4 < np.mean((error / said.std.bank[:, 1000:]) ** 2) < 2.0
+    turning = said.mean.yaw_rate_bias[:, -1000:].mean(1) - [one["yaw_rate"] for one in offsets]
+    assert np.sqrt(np.mean(turning**2)) < 0.2 * 0.2 * DEGREE
+    shove = said.mean.a_y_bias[:, -1] - [one["a_y"] for one in offsets]
+    # Not within 0.02: two minutes of random banks do not tell an offset from a bank.
+    assert np.mean((shove / said.std.a_y_bias[:, -1]) ** 2) < 2.0

@@ -1,0 +1,61 @@
+"""Grade: each method where the right answer is known, and the filter on simulated cars."""
+
+import numpy as np
+import pytest
+from banked_drives import DEGREE, file_of, follow_all
+from method_logs import CAR
+from steady_logs import G, pushed
+from winding_roads import SCORED, heard_of
+
+from jaxveh.estimators import grade
+
+
+@pytest.mark.parametrize("name", list(grade.METHODS))
+@pytest.mark.parametrize("slope", [-0.05, 0.03])
+def test_a_steady_climb_has_its_grade(name, slope):
+    method = grade.METHODS[name].make(CAR)
+    found = grade.estimate(method, pushed(method.needs, grade=slope))
+    late = slice(1500, None)
+    assert found.known.grade[late].all()
+    # Who holds an offset and an air that may be wrong for possible leaves a little of a long climb to them.
+    most = 0.15 if name in ("filter", "joint") else 0.1
+    assert abs(np.mean(found["grade"][late]) - slope) < most * DEGREE
+    assert np.std(found["grade"][late]) < 0.5 * DEGREE
+
+
+@pytest.mark.parametrize("name", ["kinematic", "satellite"])
+def test_an_accelerometer_s_offset_is_a_grade_to_kinematics_alone(name):
+    method = grade.METHODS[name].make(CAR)
+    two = [grade.estimate(method, pushed(method.needs, offset=offset))["grade"][1500:] for offset in (0.0, 0.1)]
+    expected = 0.1 / (1.0 + G * CAR.pitch_gradient) / G
+    np.testing.assert_allclose(np.mean(two[1]) - np.mean(two[0]), expected, rtol=0.01)
+
+
+@pytest.mark.parametrize("name", ["joint", "filter"])
+def test_torques_tell_the_offset_from_the_grade(name):
+    method = grade.METHODS[name].make(CAR)
+    found = grade.estimate(method, pushed(method.needs, offset=0.1))
+    # What rolling resistance may be wrong by is what the filter leaves of it.
+    assert abs(np.mean(found["grade"][3000:]) - 0.03) < 0.25 * 0.1 / G
+    assert abs(np.mean(found["grade"][3000:]) - 0.03) < 2.0 * found.std.grade[-1]
+
+
+def test_without_torques_the_filter_cannot_tell_them_apart_and_says_so():
+    method = grade.METHODS["filter"].make(CAR)
+    log = pushed(method.needs, offset=0.1)
+    with_torques = grade.estimate(method, log)
+    found = grade.estimate(method, log.without("drive_torque", "brake_torque"))
+    assert found.std.a_x_bias[-1] > 1.3 * with_torques.std.a_x_bias[-1]
+    assert abs(found["grade"][-1] - 0.03) < 3.0 * found.std.grade[-1]
+
+
+@pytest.mark.full
+def test_on_unseen_cars_the_grade_is_known():
+    cases, truths, offsets, time = heard_of(SCORED, range(4), 120.0)
+    said = follow_all(lambda car: grade.METHODS["filter"].make(file_of(car, 1.12)), cases, time)
+    error = np.stack([said.mean.grade[k] - truth["grade"] for k, truth in enumerate(truths)])[:, 1000:]
+    # Not 0.2 degrees: a filter that looks back only is late where the grade changes within 40 m.
+    assert np.sqrt(np.mean(error**2)) < 0.4 * DEGREE
+    assert np.mean((error / said.std.grade[:, 1000:]) ** 2) < 2.0
+    off = said.mean.a_x_bias[:, -1000:].mean(1) - [one["a_x"] for one in offsets]
+    assert np.sqrt(np.mean(off**2)) < 0.03
