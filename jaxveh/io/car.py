@@ -40,6 +40,7 @@ rolling_resistance = 0.01            # force over load
 front_drive = 1.0                    # the front axle's share of the driving torque
 front_brake = 0.65                   # the front axle's share of the braking torque
 brake_torque_per_pressure = 1.6e-3   # N m/Pa: braking torque of all wheels together over the line pressure
+pitch_gradient = 0.005               # rad s^2/m: by how much the nose dips over the deceleration, on the suspension
 # front_tyre = "tyres/front.tir"     # the tyre property file of a front wheel, from this file's folder
 # rear_tyre = "tyres/rear.tir"
 
@@ -126,6 +127,7 @@ class CarSpecification:
     front_drive: float | None = _number(0.0, 1.0, default=None)
     front_brake: float | None = _number(0.0, 1.0, default=None)
     brake_torque_per_pressure: float | None = _number(0.0, 10.0, "N m/Pa", default=None)
+    pitch_gradient: float | None = _number(0.0, 0.1, "rad s^2/m", default=None)
     front_tyre: str | None = None
     rear_tyre: str | None = None
     front: AxleTyre | None = None

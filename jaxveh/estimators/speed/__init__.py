@@ -11,10 +11,11 @@ from jaxveh.estimators.speed.accelerometer import AccelerometerIntegral
 from jaxveh.estimators.speed.car_numbers import FORCE_KEYS, speed_car, told
 from jaxveh.estimators.speed.forces import BrakeForces, MotorForces
 from jaxveh.estimators.speed.fuzzy import Fuzzy
-from jaxveh.estimators.speed.slip_aware import SlipAware
+from jaxveh.estimators.speed.slip_aware import SlipAware, Spreads
 from jaxveh.estimators.speed.weighted import Weighted
 from jaxveh.estimators.speed.wheels import Combined, FastestWheel, SlopeLimited, SlowestWheel
 from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
 
 NAME = "speed"
 
@@ -23,6 +24,13 @@ SHOWN = {"v_x": "m/s"}
 
 def _brake_forces(car: CarSpecification) -> BrakeForces:
     return BrakeForces(**told(car, "brake_force", FORCE_KEYS | {"brake_torque_per_pressure": "N m/Pa"}))
+
+
+def _slip_aware(car: CarSpecification) -> SlipAware:
+    """With the accelerometer's gain of the file's pitch gradient, known to 0.3 % of what is felt, or that of usual cars."""
+    if car.pitch_gradient is None:
+        return SlipAware(speed_car(car))
+    return SlipAware(speed_car(car), Spreads(gain=0.003), GRAVITY * car.pitch_gradient)
 
 
 METHODS = {
@@ -67,7 +75,7 @@ METHODS = {
         "section 2.3, eq 12, refs 34, 83, 96",
     ),
     "slip_aware": MethodOfCar(
-        lambda car: SlipAware(speed_car(car)),
+        _slip_aware,
         "error-state filter that knows slip, radii and slopes, and distrusts wheels one by one",
         "sections 2.1 to 2.3; the trust is ours",
     ),
