@@ -141,7 +141,7 @@ class BodyMotion(AbstractCleaning):
         return memory, values | made
 
 
-def guarded(v_x: Any) -> Any:
+def away_from_zero(v_x: Any) -> Any:
     """A speed to divide by, m/s, never near zero."""
     return regularised_speed(v_x, CRAWL)
 

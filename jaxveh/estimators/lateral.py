@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.estimators.body_motion import BodyMotion, guarded, number_of
+from jaxveh.estimators.body_motion import BodyMotion, away_from_zero, number_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -32,7 +32,7 @@ class Lateral(eqx.Module):
 
     def rear_speed(self, v_x: Any, yaw_rate: Any, f_y: Any) -> Any:
         """Lateral speed (m/s) at the centre of gravity of a rear axle that carries its share of `f_y`."""
-        return self.rear_axle_to_cg * yaw_rate - v_x * self.rear_compliance * f_y * (v_x / guarded(v_x))
+        return self.rear_axle_to_cg * yaw_rate - v_x * self.rear_compliance * f_y * (v_x / away_from_zero(v_x))
 
 
 def lateral_of(car: CarSpecification, who: str) -> Lateral:

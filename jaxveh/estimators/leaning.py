@@ -11,10 +11,10 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, guarded, number_of
+from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.sequential import Normal, corrected, moved, normal_of, spread_of
+from jaxveh.estimators.sequential import Normal, correct, move, normal_of, spread_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -127,7 +127,7 @@ class Leaning(AbstractMethod):
             "roll_rate_bias": 3e-8, "slope_bias": 1e-7, "rear_scale": 1e-5, "roll_scale": 1e-6,
         }  # fmt: skip
         step = lambda x: self._step(x, heard, slow, quick)
-        return moved(belief, step, {name: value * dt for name, value in per_second.items()}, State)
+        return move(belief, step, {name: value * dt for name, value in per_second.items()}, State)
 
     def _passing(self, v_x):
         return jnp.maximum(jnp.abs(v_x), SLOWEST)
@@ -158,7 +158,7 @@ class Leaning(AbstractMethod):
 
     def _measured(self, belief: Normal, heard) -> Normal:
         v_x, dt = heard["v_x"], heard["dt"]
-        fast = guarded(v_x)
+        fast = away_from_zero(v_x)
 
         def rear(x):
             turn = heard["yaw_rate"] - x.yaw_rate_bias
@@ -189,9 +189,9 @@ class Leaning(AbstractMethod):
         lasting = jnp.square(self.slip_error) * 2.0 * self.slip_error_time / jnp.maximum(dt, 1e-3)
         slip = lasting * (1.0 + jnp.square(jnp.square(heard["a_y"] / LINEAR)))
         there = heard["silence"] < SILENCE
-        belief = corrected(belief, rear, slip, there, State)
-        belief = corrected(belief, course, jnp.square(self.across / fast), satellites & (v_x > 1.0), State, 3.0)
-        return corrected(belief, rolling, jnp.square(self.roll_rate_noise), gyroscope, State)
+        belief = correct(belief, rear, slip, there, State)
+        belief = correct(belief, course, jnp.square(self.across / fast), satellites & (v_x > 1.0), State, 3.0)
+        return correct(belief, rolling, jnp.square(self.roll_rate_noise), gyroscope, State)
 
     def _answer(self, motion, belief, heard):
         x = State(*belief.mean)

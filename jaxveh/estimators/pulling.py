@@ -12,11 +12,11 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators import mass_and_grade
-from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, guarded, hold, number_of
+from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, away_from_zero, hold, number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Filtered, answer
-from jaxveh.estimators.sequential import Normal, corrected, moved, normal_of, spread_of
+from jaxveh.estimators.sequential import Normal, correct, move, normal_of, spread_of
 from jaxveh.filters import Extended
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
@@ -139,7 +139,7 @@ class Pulling(AbstractMethod):
                 grade_rate=x.grade_rate * jnp.exp(-dt * quick),
             )
 
-        return moved(belief, step, {name: value * dt for name, value in per_second.items()}, State)
+        return move(belief, step, {name: value * dt for name, value in per_second.items()}, State)
 
     def _felt(self, x, heard):
         """Specific force along the road, m/s^2."""
@@ -147,7 +147,7 @@ class Pulling(AbstractMethod):
 
     def _speeds_up(self, x, heard):
         turn, v_x = heard["yaw_rate"], heard["v_x"]
-        slip = self.rear_compliance * heard["a_y"] * (v_x / guarded(v_x))
+        slip = self.rear_compliance * heard["a_y"] * (v_x / away_from_zero(v_x))
         v_y = self.rear_axle_to_cg * turn - v_x * slip
         return self._felt(x, heard) + v_y * turn - GRAVITY * numerics.sin(x.grade)
 
@@ -158,7 +158,7 @@ class Pulling(AbstractMethod):
         drive, brake = jnp.where(pushed, drive, 0.0), jnp.where(pushed, brake, 0.0)
         spoke, said = heard["speed_spoke"], values["speed"]
         satellites = ~jnp.isnan(said)
-        steer = self.wheelbase * heard["yaw_rate"] / guarded(v_x)
+        steer = self.wheelbase * heard["yaw_rate"] / away_from_zero(v_x)
         turning = heard["a_y"] * self.rear_axle_to_cg / self.wheelbase * steer
 
         def balance(x):
@@ -175,12 +175,12 @@ class Pulling(AbstractMethod):
         slips = jnp.square(self.wheel_noise) + jnp.square(0.002 * v_x * slowing)
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
         lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt)
-        belief = corrected(
+        belief = correct(
             belief, lambda x: v_x - x.v_x * (1.0 + x.wheel_scale - x.slip * slowing), slips, spoke, State, 3.0
         )
-        belief = corrected(belief, satellite, jnp.square(self.satellite_noise), satellites & (v_x > 1.0), State, 3.0)
+        belief = correct(belief, satellite, jnp.square(self.satellite_noise), satellites & (v_x > 1.0), State, 3.0)
         there = (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
-        return corrected(belief, balance, lasting, pushed & there, State, 3.0)
+        return correct(belief, balance, lasting, pushed & there, State, 3.0)
 
     def _answer(self, motion, belief, heard):
         x = State(*belief.mean)
@@ -198,7 +198,7 @@ class Pulling(AbstractMethod):
         return PullingMemory(motion, belief), answer(said, stds, known)
 
 
-def pulling_of(car: CarSpecification, who: str, **options: Any) -> Pulling:
+def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
     """Of a car's file. **Raises** `InputError` for one without `wheel_radius`, by which a torque becomes a force."""
     told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")}
     stiffness = car.rear_cornering_stiffness

@@ -31,7 +31,7 @@ def normal_of(state_type: Any, means: Mapping[str, Any], stds: Mapping[str, Any]
     return Normal(mean, jnp.diag(jnp.square(stack([stds[name] for name in names]))))
 
 
-def moved(belief: Normal, step: Callable[[Any], Any], variances: Mapping[str, Any], state_type: Any) -> Normal:
+def move(belief: Normal, step: Callable[[Any], Any], variances: Mapping[str, Any], state_type: Any) -> Normal:
     """The belief after `step(state) -> state` with independent noise of these variances."""
     function = lambda vector: jnp.stack(step(state_type(*vector)))
     F = jax.jacfwd(function)(belief.mean)
@@ -40,7 +40,7 @@ def moved(belief: Normal, step: Callable[[Any], Any], variances: Mapping[str, An
     return Normal(function(belief.mean), F @ belief.covariance @ F.T + Q)
 
 
-def corrected(
+def correct(
     belief: Normal, error_of: Callable[[Any], Any], variance: Any, here: Any, state_type: Any, gate: float | None = None
 ) -> Normal:
     """The belief after one measurement with this noise variance, where it is `here`; Joseph's form.

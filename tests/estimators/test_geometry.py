@@ -86,7 +86,7 @@ def test_the_place_follows_the_understeer_as_equation_17_corrected_says():
 
 def test_what_was_learned_is_a_file_that_the_next_drive_starts_from(tmp_path):
     method = told(CAR)
-    one = geometry.learned_of(geometry.estimate(method, drive(method.needs, offset=0.001)))
+    one = geometry.numbers_learned(geometry.estimate(method, drive(method.needs, offset=0.001)))
     assert one.entries["steer_offset"].valid and not one.entries["yaw_inertia"].valid
     path = tmp_path / "car.toml"
     geometry.write_learned(one, path)
@@ -94,12 +94,12 @@ def test_what_was_learned_is_a_file_that_the_next_drive_starts_from(tmp_path):
     with pytest.raises(InputError, match="exists"):
         geometry.write_learned(one, path)
     geometry.write_learned(one, path, overwrite=True)
-    again = geometry.with_learned(method, geometry.read_learned(path))
+    again = geometry.start_from(method, geometry.read_learned(path))
     assert float(again.steer_offset) == one.entries["steer_offset"].value
     assert float(again.yaw_inertia) == CAR.yaw_inertia
     start = geometry.estimate(again, drive(again.needs, offset=0.001).rows(slice(0, 50)))
     assert start.known.steer_offset[0]
-    assert geometry.learned_of(geometry.live(again).init(0.0, {})[1]).entries["steer_offset"].value == float(
+    assert geometry.numbers_learned(geometry.live(again).init(0.0, {})[1]).entries["steer_offset"].value == float(
         again.steer_offset
     )
 

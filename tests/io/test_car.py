@@ -35,7 +35,7 @@ def test_plain_car(toml):
     assert car.wheelbase == pytest.approx(2.7)
     assert (car.front_cornering_stiffness, car.rear_cornering_stiffness) == (9e4, 1.1e5)
     optional = [entry.name for entry in dataclasses.fields(car)][6:]
-    assert len(optional) == 23
+    assert len(optional) == 28
     assert all(getattr(car, name) is None for name in optional)
 
 

@@ -8,7 +8,16 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.body_motion import CRAWL, LATERAL, SILENCE, BodyMotion, arcsin_of, guarded, hold, number_of
+from jaxveh.estimators.body_motion import (
+    CRAWL,
+    LATERAL,
+    SILENCE,
+    BodyMotion,
+    arcsin_of,
+    away_from_zero,
+    hold,
+    number_of,
+)
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import Lateral, lateral_of, motion_of
 from jaxveh.estimators.method import AbstractMethod, answer
@@ -62,7 +71,7 @@ class Tseng(AbstractMethod):
         static = arcsin_of(f_y - v_x * turn)
         slow = memory.bank + share * (static - memory.bank)
         rate = (static - slow) / self.time
-        residual = wheel / self.ratio - self.car.wheelbase * turn / guarded(v_x) - self.car.understeer * f_y
+        residual = wheel / self.ratio - self.car.wheelbase * turn / away_from_zero(v_x) - self.car.understeer * f_y
         trust = jnp.maximum(0.0, 1.0 - jnp.abs(residual) / self.doubt - jnp.abs(rate) / self.doubt_rate)
         agreement = memory.agreement + share * (trust - memory.agreement)
         there = heard["silence"] < SILENCE

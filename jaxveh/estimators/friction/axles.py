@@ -13,7 +13,7 @@ from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction import brush_curve
 from jaxveh.estimators.friction.laws import PlanarCar
-from jaxveh.estimators.friction.motion import LATERAL, Told, start_told, next_told
+from jaxveh.estimators.friction.motion import LATERAL, Told, next_told, start_told
 from jaxveh.estimators.friction.scalar import Follower, LogFriction
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.vehicles import GRAVITY

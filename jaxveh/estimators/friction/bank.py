@@ -12,7 +12,7 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.along import AlongEvidence
 from jaxveh.estimators.friction.laws import LEAST_FRICTION, PlanarCar
-from jaxveh.estimators.friction.motion import LATERAL, Told, start_told, next_told
+from jaxveh.estimators.friction.motion import LATERAL, Told, next_told, start_told
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.vehicles import GRAVITY
 

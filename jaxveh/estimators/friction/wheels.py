@@ -13,7 +13,7 @@ from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction.along import CORNERS, Slips, WheelForces, WheelsTold
 from jaxveh.estimators.friction.laws import PlanarCar, SimilarCurve
-from jaxveh.estimators.friction.motion import Told, start_told, next_told
+from jaxveh.estimators.friction.motion import Told, next_told, start_told
 from jaxveh.estimators.method import AbstractMethod, answer
 
 SPEED = (Need("v_x", "m/s"),)

@@ -2,7 +2,7 @@
 
 Section 3.1.2.4 of the review (Chen, Gao, Xu 2013), eq 17 with its erratum (`l r / v - delta`). The learner says nothing new where
 nothing excites it: its values stay, their spreads too, and `known` is a flag of a spread that is small enough. Between drives
-it is a file (`write_learned`, `read_learned`), which the next drive starts from (`with_learned`).
+it is a file (`write_learned`, `read_learned`), which the next drive starts from (`start_from`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.geometry.learned import Learned, learned_of, read_learned, with_learned, write_learned
+from jaxveh.estimators.geometry.learned import Learned, numbers_learned, read_learned, start_from, write_learned
 from jaxveh.estimators.geometry.learner import UNITS, learner_of
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.io import CarSpecification
@@ -58,9 +58,9 @@ __all__ = [
     "Learned",
     "do_nothing",
     "estimate",
-    "learned_of",
     "live",
+    "numbers_learned",
     "read_learned",
-    "with_learned",
+    "start_from",
     "write_learned",
 ]

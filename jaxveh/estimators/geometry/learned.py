@@ -56,7 +56,7 @@ class Learned:
                 check_positive(name, entry.value, UNITS[name])
 
 
-def learned_of(said: Any) -> Learned:
+def numbers_learned(said: Any) -> Learned:
     """The last of what a learner said: of `Answers` along a log, or of a live `Answer`."""
     last = lambda part, name: np.asarray(getattr(part, name)).reshape(-1)[-1]
     return Learned(
@@ -67,7 +67,7 @@ def learned_of(said: Any) -> Learned:
     )
 
 
-def with_learned(method: Learner, learned: Learned) -> Learner:
+def start_from(method: Learner, learned: Learned) -> Learner:
     """The learner that starts where another drive ended: values of `valid` entries and their spreads, of the others nothing.
 
     A spread grows by a fifth from drive to drive, so that what changes is learned anew.

@@ -10,11 +10,11 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.estimators.body_motion import SILENCE, guarded, hold, number_of
+from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold, number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.leaning import NEEDS, Leaning, leaning_filter
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.sequential import Normal, corrected, normal_of
+from jaxveh.estimators.sequential import Normal, correct, normal_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -131,7 +131,7 @@ class Learner(AbstractMethod):
         rate = (turn_now - turn) / self.time
         silent = jnp.maximum(motion.silence, motion.speed_silence) > 0.5 * SILENCE
         there = ~silent & ~jnp.isnan(values["steering_wheel"]) & (memory.age > START) & (motion.v_x > SLOWEST)
-        fast = guarded(motion.v_x)
+        fast = away_from_zero(motion.v_x)
         # Rows count less in hard turns and at a crawl, smoothly.
         doubt = 1.0 + jnp.square(jnp.square(force / LINEAR)) + jnp.square(jnp.square(QUICK / fast))
         lasting = doubt * 2.0 * self.lasting / jnp.maximum(dt, 1e-3)
@@ -139,7 +139,7 @@ class Learner(AbstractMethod):
         start = self._understeer() * force - self.yaw_inertia * self._place_slope() / self.mass * rate
         off = lambda x: steer - x.offset - (1.0 + x.ratio) * (curve + start + x.understeer * force)
         calm = 1.0 + jnp.square(jnp.square(rate / CALM))
-        steering = corrected(memory.steering, off, jnp.square(self.steer_error) * lasting * calm, there, Steering)
+        steering = correct(memory.steering, off, jnp.square(self.steer_error) * lasting * calm, there, Steering)
         fit = Steering(*steering.mean)
         front = (steer - fit.offset) / (1.0 + fit.ratio) - (v_y + self.front_axle_to_cg * turn) / fast
         scale = self.mass * GRAVITY * self.wheelbase
@@ -154,7 +154,7 @@ class Learner(AbstractMethod):
             steer * numerics.sqrt(steering.covariance[0, 0]), numerics.hypot(self.place_spread * turn / fast, 1e-4)
         )
         stays = jnp.square(self.front_stiffness * self.wheelbase / scale * wrong) * (STAYS / self.lasting)
-        turning = corrected(memory.turning, moment, (jnp.square(self.moment_error) + stays) * lasting, there, Turning)
+        turning = correct(memory.turning, moment, (jnp.square(self.moment_error) + stays) * lasting, there, Turning)
         means, stds = self._numbers(steering, turning, said.std.yaw_rate_bias / jnp.maximum(fast, QUICK))
         most = {name: RATES[name] * jnp.where(there, dt, 0.0) for name in UNITS}
         shown = {name: memory.shown[name] + _within(means[name] - memory.shown[name], most[name]) for name in UNITS}

@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh._core.recording import Recording
 from jaxveh.estimators.grade.kinematic import kinematic_of, satellite_of
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
-from jaxveh.estimators.pulling import joint_filter, pulling_of
+from jaxveh.estimators.pulling import joint_filter, pulling_filter
 from jaxveh.io import CarSpecification
 
 NAME = "grade"
@@ -33,7 +33,7 @@ METHODS = {
         "paper 004",
     ),
     "filter": MethodOfCar(
-        lambda car: pulling_of(car, NAME),
+        lambda car: pulling_filter(car, NAME),
         "kinematics with the accelerometer's offset as a state, which torques at the wheels tell where there are any",
         "3.1.2.3 [124, 127]",
     ),

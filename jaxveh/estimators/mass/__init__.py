@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.mass.forgetting import forgetting_of
-from jaxveh.estimators.mass.ratios import gated_of, high_pass_of, kinematic_of
+from jaxveh.estimators.mass.forgetting import forgetting_factors
+from jaxveh.estimators.mass.ratios import gated_ratios, high_pass_of, kinematic_of
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
-from jaxveh.estimators.pulling import joint_filter, pulling_of
+from jaxveh.estimators.pulling import joint_filter, pulling_filter
 from jaxveh.io import CarSpecification
 
 NAME = "mass"
@@ -24,7 +24,7 @@ SHOWN = {"mass": "kg"}
 
 METHODS = {
     "gated": MethodOfCar(
-        lambda car: gated_of(car, NAME), "least squares of force over acceleration above 0.6 m/s^2", "paper 004 [8]"
+        lambda car: gated_ratios(car, NAME), "least squares of force over acceleration above 0.6 m/s^2", "paper 004 [8]"
     ),
     "high_pass": MethodOfCar(
         lambda car: high_pass_of(car, NAME),
@@ -32,7 +32,7 @@ METHODS = {
         "paper 004 [11]",
     ),
     "forgetting": MethodOfCar(
-        forgetting_of,
+        forgetting_factors,
         "recursive least squares of mass and grade, which forgets the grade faster",
         "paper 004 [13], 3.1.2.3 [127]",
     ),
@@ -47,7 +47,7 @@ METHODS = {
         "paper 004",
     ),
     "filter": MethodOfCar(
-        lambda car: pulling_of(car, NAME),
+        lambda car: pulling_filter(car, NAME),
         "grade, mass and the accelerometer's offset in one filter, with bends, slip and a road that changes by the metre",
         "paper 004 [9, 10]",
     ),

@@ -59,7 +59,7 @@ class Pulled(AbstractCleaning):
         return (motion, drive, brake, force, age + dt), heard | made | {"pushed": jnp.where(there, counts, 0.0)}
 
 
-def forgetting_of(car: CarSpecification) -> Filtered:
+def forgetting_factors(car: CarSpecification) -> Filtered:
     """`F = m (d v_x/dt + g f_r) + m g sin(grade)` with a factor for the mass and one for the grade (A. Vahidi et al. 2005), their
     variances apart (`observers.RecursiveLeastSquares`). An observer claims no spread: `known` in rows that pedals excite.
 

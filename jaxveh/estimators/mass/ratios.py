@@ -186,7 +186,7 @@ def pull_of(car: CarSpecification, who: str) -> Pull:
     return Pull(number_of(car, "wheel_radius", who, "m"), **known)
 
 
-def gated_of(car: CarSpecification, who: str) -> Gated:
+def gated_ratios(car: CarSpecification, who: str) -> Gated:
     """Of a car's file."""
     return Gated(motion_of(car), pull_of(car, who), car.mass)
 

@@ -14,7 +14,7 @@ from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, hold
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.sequential import Normal, corrected, moved, normal_of, spread_of
+from jaxveh.estimators.sequential import Normal, correct, move, normal_of, spread_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -90,11 +90,11 @@ class SixAxis(AbstractMethod):
         noise = {
             "v_x": self.a_noise, "v_y": self.a_noise, "roll": self.gyro_noise, "pitch": self.gyro_noise
         }  # fmt: skip
-        belief = moved(memory.belief, step, {name: jnp.square(std) * dt for name, std in noise.items()}, State)
+        belief = move(memory.belief, step, {name: jnp.square(std) * dt for name, std in noise.items()}, State)
         lasting = jnp.square(self.slip) * 2.0 * self.slip_time / jnp.maximum(dt, 1e-3)
         there = heard["silence"] < SILENCE
-        belief = corrected(belief, lambda x: heard["v_x"] - x.v_x, jnp.square(self.v_noise), there, State)
-        belief = corrected(belief, lambda x: -x.v_y, lasting, there, State)
+        belief = correct(belief, lambda x: heard["v_x"] - x.v_x, jnp.square(self.v_noise), there, State)
+        belief = correct(belief, lambda x: -x.v_y, lasting, there, State)
         x = State(*belief.mean)
         wide = {name: spread_of(belief, {name: 1.0}, State) for name in State._fields}
         tilt = numerics.tan(jnp.clip(x.pitch, -0.7, 0.7)) * r

@@ -12,24 +12,28 @@ from jaxveh.estimators.speed.wheels import AbstractWheelMethod
 
 
 class Peaks(NamedTuple):
-    """Speed (m/s) and slope (m/s^2, positive in braking); speed and time (s) of the last peak; whether it follows a wheel, and
-    since when (s)."""
+    """Speed (m/s) and slope (m/s^2, positive in braking); whether the wheels come `up`, their `highest` speed since (m/s);
+    the last peak and when it was (s); for how long a wheel has been followed without a break, and for how long not (s)."""
 
     v_x: Any
     slope: Any
+    up: Any
+    highest: Any
     peak: Any
     peak_at: Any
-    follows: Any
-    since: Any
+    followed: Any
+    alone: Any
 
 
 class AdaptiveNonlinear(AbstractWheelMethod):
     """A filter that follows the fastest wheel up, and falls with a slope of its own where all wheels fall faster.
 
-    The slope is that of the wheels at the start of braking, as long as one is followed; then, at each local peak at which a
-    wheel comes up to the speed again, that from the last peak to this one, mixed in by `renewal` (-). It stays between
-    `least_slope` and `greatest_slope` (m/s^2). Without model and accelerometer; an anti-lock system that lets wheels come
-    up seldom, or not wholly, leaves it to its slope, which is what the review says against it: the start counts for much.
+    While a wheel has been followed for `slope_time` (s), the slope is that of the wheels: at the start of braking it is the
+    car's. Then it is that from each local peak of the fastest wheel to the next, mixed in by `renewal` (-), by which part the
+    speed, too, goes to the peak: there a wheel rolls best. A peak is where the mean rate, after `turn` (m/s^2) upwards, is `turn`
+    downwards. The slope stays between `least_slope` and `greatest_slope` (m/s^2). Without model and accelerometer; an anti-lock
+    system whose wheels come up seldom, or not wholly, leaves it to its slope, which is what the review says against it: the
+    start counts for much.
 
     Known where a wheel was followed within `patience` (s).
 
@@ -40,26 +44,43 @@ class AdaptiveNonlinear(AbstractWheelMethod):
     greatest_slope: jax.Array = positive("m/s^2", default=10.0)
     renewal: jax.Array = positive("-", default=0.5)
     slack: jax.Array = positive("m/s", default=0.05)
-    slope_time: jax.Array = positive("s", default=0.1)
+    slope_time: jax.Array = positive("s", default=0.15)
+    turn: jax.Array = positive("m/s^2", default=1.0)
     patience: jax.Array = positive("s", default=0.25)
 
     def begin(self, wheels, values):
         del values
-        zero = jnp.zeros_like(wheels.t)
-        return Peaks(wheels.fastest, zero + self.least_slope, wheels.fastest, wheels.t, jnp.asarray(True), zero)
+        zero, fastest = jnp.zeros_like(wheels.t), wheels.fastest
+        return Peaks(fastest, zero + self.least_slope, jnp.asarray(False), fastest, fastest, wheels.t, zero, zero)
 
     def follow(self, own: Peaks, wheels, step, values):
         del values
+        fastest, rate = wheels.fastest, wheels.mean_rate
         fallen = own.v_x - own.slope * step
-        follows = wheels.spoke & (wheels.fastest >= fallen - self.slack)
-        v_x = jnp.where(follows, wheels.fastest, jnp.maximum(fallen, 0.0))
-        waited = wheels.t - own.peak_at
-        between = (own.peak - v_x) / jnp.where(waited > 0.0, waited, 1.0)
-        at_peak = follows & ~own.follows & (waited > 0.05)
+        # A wheel that has been followed is believed as long as it falls no faster than a car.
+        steepest = jnp.where(own.followed > self.slope_time, self.greatest_slope, own.slope)
+        follows = wheels.spoke & (fastest >= own.v_x - steepest * step - self.slack)
+        v_x = jnp.where(follows, fastest, jnp.maximum(fallen, 0.0))
+        followed = jnp.where(follows, own.followed + step, 0.0)
+        # Wheels that fall faster than any car slip: of the car they say nothing.
+        learns = (followed > self.slope_time) & (-rate < self.greatest_slope)
         mixed = 1.0 - jnp.exp(-step / self.slope_time)
-        slope = jnp.where(follows, own.slope + mixed * (-wheels.mean_rate - own.slope), own.slope)
-        slope = jnp.where(at_peak, own.slope + self.renewal * (between - own.slope), slope)
-        slope = jnp.clip(slope, self.least_slope, self.greatest_slope)
-        peak, peak_at = jnp.where(follows, v_x, own.peak), jnp.where(follows, wheels.t, own.peak_at)
-        since = jnp.where(follows, 0.0, own.since + step)
-        return Peaks(v_x, slope, peak, peak_at, follows, since), v_x, wheels.spoke & (since <= self.patience)
+        slope = jnp.where(learns, own.slope + mixed * (-rate - own.slope), own.slope)
+        over = own.up & (rate < -self.turn) & wheels.spoke
+        waited = wheels.t - own.peak_at
+        between = (own.peak - own.highest) / jnp.where(waited > 0.0, waited, 1.0)
+        slope = jnp.where(over & ~learns & (waited > 0.05), slope + self.renewal * (between - slope), slope)
+        v_x = jnp.where(over & ~follows, v_x + self.renewal * (own.highest - v_x), v_x)
+        up = jnp.where(over, False, own.up | (rate > self.turn))
+        anew = learns | over
+        said = Peaks(
+            v_x,
+            jnp.clip(slope, self.least_slope, self.greatest_slope),
+            up,
+            jnp.where(up & own.up, jnp.maximum(own.highest, fastest), fastest),
+            jnp.where(anew, jnp.where(learns, v_x, own.highest), own.peak),
+            jnp.where(anew, wheels.t, own.peak_at),
+            followed,
+            jnp.where(follows, 0.0, own.alone + step),
+        )
+        return said, v_x, wheels.spoke & (said.alone <= self.patience)

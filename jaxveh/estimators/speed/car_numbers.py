@@ -85,7 +85,7 @@ FORCE_KEYS = {
 """What turns torques at the wheels into a rate of the speed."""
 
 
-def told(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
+def keys_of(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
     """Numbers of the file by key. **Raises** `InputError` for one that it lacks, naming the key and its unit."""
     for name, unit in keys.items():
         if getattr(car, name) is None:

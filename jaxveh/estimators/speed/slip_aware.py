@@ -96,6 +96,7 @@ class Spreads(eqx.Module):
     peak_slip: jax.Array = positive("-", default=0.3)
     limit_slip: jax.Array = positive("-", default=0.03)
     suspicion_time: jax.Array = positive("s", default=0.4)
+    other_slip: jax.Array = positive("-", default=0.015)
     repeats: jax.Array = positive("-", default=25.0)
     turn: jax.Array = positive("m/s per rad/s", default=0.05)
     satellite: jax.Array = positive("m/s", default=0.06)
@@ -241,9 +242,9 @@ class SlipAware(AbstractMethod):
         car, rear = self.car, memory.smooth
         of_wheels = (rear[3] - rear[2]) / car.track_rear
         yaw_rate = jnp.where(self._speaks(memory, "yaw_rate"), memory.heard["yaw_rate"], of_wheels)
-        a_y = jnp.where(self._speaks(memory, "a_y"), memory.heard["a_y"], x.v_x * yaw_rate)
+        a_y = jnp.where(self._speaks(memory, "a_y"), memory.heard["a_y"], x.rolled * yaw_rate)
         share = car.mass * car.front_axle_to_cg / car.wheelbase
-        v_y = car.rear_axle_to_cg * yaw_rate - x.v_x * share * a_y / car.rear_cornering_stiffness
+        v_y = car.rear_axle_to_cg * yaw_rate - x.rolled * share * a_y / car.rear_cornering_stiffness
         return yaw_rate, a_y, v_y
 
     def _acceleration(self, memory: Memory, x: SpeedState):
@@ -252,11 +253,14 @@ class SlipAware(AbstractMethod):
 
     def _move(self, memory: Memory, step) -> Belief:
         s = self.spreads
-        falls, back = jnp.exp(-step / s.slope_time), jnp.exp(-step / s.softness_time)
+        # Without an accelerometer no slope can be told from a force.
+        felt = self._speaks(memory, "a_x")
+        falls, back = jnp.where(felt, jnp.exp(-step / s.slope_time), 0.0), jnp.exp(-step / s.softness_time)
 
         def move(mean):
             x = SpeedState(*mean)
-            rolled = x.rolled + step * (1.0 + x.radius) * self._acceleration(memory, x)
+            # Of wheels with a radius that is not the stored one the rate is a little larger; the accelerometer's gain has that.
+            rolled = x.rolled + step * self._acceleration(memory, x)
             soft = [back * x.softness_front, back * x.softness_rear]
             return jnp.stack([rolled, x.force, falls * x.slope, *x[3:10], *soft])
 
@@ -264,8 +268,9 @@ class SlipAware(AbstractMethod):
         wander = s.speed_walk + jnp.where(lost, 1.0, 0.0)
         soft = s.softness * numerics.sqrt(2.0 / s.softness_time)
         none = 0.0 * s.gain
-        radii = [0.5 * s.radius_walk, *[none] * 4]
-        walks = SpeedState(wander, s.force_walk, s.slope_walk, s.offset_walk, none, *radii, soft, soft)
+        slope_walk = jnp.where(felt, s.slope_walk, 0.0)
+        # Of a wheel's own radius: below.
+        walks = [wander, s.force_walk, slope_walk, s.offset_walk, none, 0.5 * s.radius_walk, *[none] * 4, soft, soft]
         noise = jnp.diag(jnp.square(jnp.stack(walks))) + self._radii(s.radius_walk)
         return predict(memory.belief, move, step * noise)
 
@@ -330,7 +335,7 @@ class SlipAware(AbstractMethod):
             at_rest * (1.0 - LEFT.astype(rolled.dtype) * rolled) + _front_rear(-pitched, pitched), 0.1 * at_rest
         )
         rolling = car.rolling_resistance * car.mass * GRAVITY
-        push = car.mass * x.force + car.drag * x.v_x * jnp.abs(x.v_x) + rolling
+        push = car.mass * x.force + car.drag * x.rolled * jnp.abs(x.rolled) + rolling
         force = _front_rear(*forces_of_axles(car, push))
         brakes = [f"brake_torque_{place}" for place in AT]
         drive = 0.5 * _front_rear(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
@@ -346,7 +351,9 @@ class SlipAware(AbstractMethod):
         mixed = 1.0 - jnp.exp(-waited / self.smoothing)
         smooth = memory.smooth + mixed * (jnp.where(there, wheels, memory.smooth) - memory.smooth)
         rates = (jnp.where(there, wheels, smooth) - smooth) / self.smoothing
-        steady = _beyond((rates - memory.rate) / self.rate_gate)
+        # Without an accelerometer the car's rate is that of the wheels.
+        gate = self.rate_gate * jnp.where(self._speaks(memory, "a_x"), 1.0, 4.0)
+        steady = _beyond((rates - memory.rate) / gate)
         said = self._wheels(memory, belief.mean)
         suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
         most = jnp.sort(suspicion)[1]
@@ -361,6 +368,8 @@ class SlipAware(AbstractMethod):
 
         white, slow = self._wheel_variances(memory, belief, said)
         slow = slow + jnp.square(at_limit)
+        # Where one wheel drags or spins, others have a force that nobody knows.
+        slow = slow + jnp.square(self.spreads.other_slip * jnp.max(suspicion) * belief.mean[0])
         both = innovations(belief, expect, jnp.tile(wheels, 2), jnp.concatenate([white + slow, white + 0.0 * slow]))
         found, rolling = (Innovation(*[part[rows] for part in both]) for rows in (slice(0, 4), slice(4, 8)))
         now = self._gates(found, said, white + slow, there) * steady

@@ -49,8 +49,8 @@ def _tyre(s: Any, axle: str, load: float) -> TyreNumbers:
 def specification_of(numbers: CarNumbers) -> CarSpecification:
     """What a car's file would say of these numbers: the inverse of `numbers_of`, with each axle's tyres as a Magic Formula.
 
-    A file knows of a suspension how the body leans (`leaning`), nothing of trailers, and of four motors no more than the front
-    axle's share.
+    A file knows of a suspension how the body leans (`leaning_numbers`), nothing of trailers, and of four motors no more than the
+    front axle's share.
 
     **Raises** `InputError` for a car without mass, yaw inertia or tyres, which no file can leave out.
     """
@@ -60,7 +60,7 @@ def specification_of(numbers: CarNumbers) -> CarSpecification:
     loads = {axle: 2.0 * load for axle, load in zip(("front", "rear"), numbers.wheel_loads(), strict=True)}
     tyres = {axle: axle_tyre(getattr(numbers, axle), load) for axle, load in loads.items()}
     optional = ("cg_height", "drag", "rolling_resistance")
-    told: dict[str, Any] = leaning(numbers)
+    told: dict[str, Any] = leaning_numbers(numbers)
     return CarSpecification(
         name=numbers.name,
         **{name: getattr(numbers, name) for name in (*NAMED_ALIKE, *SHARES, *optional)},
@@ -70,7 +70,7 @@ def specification_of(numbers: CarNumbers) -> CarSpecification:
     )
 
 
-def leaning(numbers: CarNumbers) -> dict[str, float]:
+def leaning_numbers(numbers: CarNumbers) -> dict[str, float]:
     """How the body leans over the road: `roll_gradient`, `pitch_gradient` (rad per m/s^2), `roll_frequency` (Hz) and
     `roll_damping` (-) of a small roll about the roll axis; nothing where the suspension or the tracks are not known.
 
