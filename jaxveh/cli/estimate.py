@@ -11,7 +11,7 @@ import typer
 
 from jaxveh import InputError, Recording, io
 from jaxveh._core.errors import check_at_least, check_one_of
-from jaxveh.cli import options, quantities, sideslip
+from jaxveh.cli import options, quantities, quantity_options, sideslip
 from jaxveh.cli.blanking import LogParts, split
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import Drive, read_drives
@@ -98,9 +98,9 @@ def estimate(
     report: Annotated[Path | None, REPORT] = None,
     force: options.Force = False,
     anyway: options.Anyway = False,
-    what: quantities.What = sideslip.NAME,
-    methods: quantities.Methods = None,
-    list_methods: quantities.Listed = False,
+    what: quantity_options.What = sideslip.NAME,
+    methods: quantity_options.Methods = None,
+    list_methods: quantity_options.Listed = False,
 ) -> None:
     """Estimate what a car cannot measure along its logs: sideslip, slip and forces, or another quantity (--what).
 
@@ -125,36 +125,27 @@ def estimate(
     [bold]jaxveh estimate drive.csv --vehicle car.toml -o speed.csv --what speed --methods all --truth v_x[/]
     """
     del list_methods
-    asked = quantities.names_of(what, "--what", tuple(quantities.QUANTITIES))
-    if asked != (sideslip.NAME,) or methods is not None:
-        others = {
-            "--calibration": calibration, "--calibrate": calibrate, "--calibrate-on": calibrate_on, "--report": report,
-            "--as-told": as_told or None,
-        }  # fmt: skip
-        given = [option for option, value in others.items() if value]
-        if given:
-            raise InputError(f"{', '.join(given)}: of --what sideslip without --methods alone; leave it out.")
-        quantities.estimate_quantities(
-            quantities.Asked(
-                logs, product, vehicle, channels, span, fill, asked, quantities.methods_of(methods, asked), truth, out, force,
-                anyway,
-            ),
-            numbers,
-        )  # fmt: skip
-        return
     choice = Choice(
         logs, product, vehicle, calibration, channels, span, calibrate, tuple(calibrate_on or ()), as_told, fill, truth,
         filter, particles, seed, out, report, force, anyway,
     )  # fmt: skip
-    check_report(out, numbers)
+    by_methods = quantities.asked_of(choice, what, methods)
+    if by_methods is None:
+        _estimate_sideslip(choice, numbers)
+    else:
+        quantities.estimate_quantities(by_methods, numbers)
+
+
+def _estimate_sideslip(choice: Choice, numbers: Path | None) -> None:
+    check_report(choice.out, numbers)
     fitted, estimates = _estimate(choice)
-    shown = estimates[logs[0].name] if len(logs) == 1 else {"logs": estimates}
+    shown = estimates[choice.logs[0].name] if len(choice.logs) == 1 else {"logs": estimates}
     configuration = {
         name: value
         for name, value in choice._asdict().items()
         if name not in ("product", "seed", "out", "report", "force")
     }
-    write_numbers(numbers, {**sideslip.fitted_parameters(fitted), **shown}, configuration, seed)
+    write_numbers(numbers, {**sideslip.fitted_parameters(fitted), **shown}, configuration, choice.seed)
 
 
 class Choice(NamedTuple):

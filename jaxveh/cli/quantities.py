@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-import typer
 
 from jaxveh import InputError, Recording, estimators, io
 from jaxveh._core.errors import check_one_of, check_positive
@@ -16,30 +15,14 @@ from jaxveh._core.recording import TRUTH
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import read_log
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
+from jaxveh.cli.quantity_options import QUANTITIES
 from jaxveh.estimators import Answers, Compared, MethodScore
 from jaxveh.io import CarSpecification
-
-QUANTITIES: dict[str, ModuleType] = {
-    name: getattr(estimators, name)
-    for name in estimators.__all__
-    if isinstance(getattr(estimators, name), ModuleType) and hasattr(getattr(estimators, name), "METHODS")
-}
-"""By the name that `--what` takes."""
 
 ALL = "all"
 """Of `--what`: the recommended method of each quantity that the log has channels for; of `--methods`: all of them."""
 
 NOTHING = "nothing done"
-
-What = Annotated[
-    str,
-    typer.Option(
-        "--what",
-        metavar="QUANTITY",
-        help="sideslip (calibrated and smoothed, with all options here), or by one of its methods each: "
-        f"{', '.join(QUANTITIES)}; several with commas; all: whatever the log can tell.",
-    ),
-]
 
 ALIKE = {"v_y": ("v_y", "sideslip"), "sideslip": ("v_y", "sideslip"), "speed": ("speed", "v_x"), "v_x": ("v_x",)}
 """Channels that say a truth, too: no method gets to see them."""
@@ -83,6 +66,27 @@ def names_of(text: str, option: str, known: Sequence[str]) -> tuple[str, ...]:
     return names
 
 
+def asked_of(choice: Any, what: str, methods: str | None) -> Asked | None:
+    """What `estimate` was asked for in `choice`, its options; None where that is sideslip, by its own program.
+
+    **Raises** `InputError` for a quantity or a method that is not there, or an option of that program.
+    """
+    quantities = names_of(what, "--what", tuple(QUANTITIES))
+    if quantities == (estimators.sideslip.NAME,) and methods is None:
+        return None
+    others = {
+        "--calibration": choice.calibration, "--calibrate": choice.calibrate, "--calibrate-on": choice.calibrate_on,
+        "--report": choice.report, "--as-told": choice.as_told,
+    }  # fmt: skip
+    given = [option for option, value in others.items() if value]
+    if given:
+        raise InputError(f"{', '.join(given)}: of --what sideslip without --methods alone; leave it out.")
+    return Asked(
+        choice.logs, choice.product, choice.vehicle, choice.channels, choice.span, choice.fill, quantities,
+        methods_of(methods, quantities), choice.truth, choice.out, choice.force, choice.anyway,
+    )  # fmt: skip
+
+
 def methods_of(text: str | None, what: tuple[str, ...]) -> tuple[str, ...] | None:
     """The methods of `--methods`; None where the recommended ones are meant.
 
@@ -93,34 +97,6 @@ def methods_of(text: str | None, what: tuple[str, ...]) -> tuple[str, ...] | Non
     if len(what) > 1:
         raise InputError(f"--methods is of one quantity: name one with --what, not {', '.join(what)}.")
     return names_of(text, f"--methods of {what[0]}", tuple(QUANTITIES[what[0]].METHODS))
-
-
-def print_methods(wanted: bool) -> None:
-    """Print the methods of each quantity, and leave, where that is `wanted`."""
-    if not wanted:
-        return
-    for name, module in QUANTITIES.items():
-        mark = lambda method, module=module: " *" if method == module.RECOMMENDED else ""
-        rows = [(method + mark(method), one.help, one.source) for method, one in module.METHODS.items()]
-        shown = ", ".join(f"{field} [{unit}]" for field, unit in module.SHOWN.items())
-        table(f"--what {name}: {shown}", ("method (* recommended)", "what it is", "from"), rows, left=3)
-    raise typer.Exit
-
-
-Methods = Annotated[
-    str | None,
-    typer.Option(
-        "--methods",
-        metavar="NAMES",
-        show_default=False,
-        help="Methods to run side by side, with commas, or all (--list shows them).",
-    ),
-]
-
-Listed = Annotated[
-    bool,
-    typer.Option("--list", help="Print the methods of each quantity, and stop.", is_eager=True, callback=print_methods),
-]
 
 
 def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
@@ -188,9 +164,9 @@ def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Record
     if asked.methods is None and len(asked.what) > 1:
         compared = _recommended(quantity, car, seen)
     elif asked.methods is not None and set(asked.methods) == set(quantity.METHODS):
-        compared = estimators.compare(quantity, car, seen)
+        compared = estimators.compare(car, seen, quantity)
     else:
-        compared = estimators.compare(quantity, car, seen, asked.methods or [quantity.RECOMMENDED])
+        compared = estimators.compare(car, seen, quantity, asked.methods or [quantity.RECOMMENDED])
     if asked.truth is None or asked.truth.removeprefix(TRUTH) not in quantity.SHOWN:
         return Shown(compared, {}, {})
     name = asked.truth.removeprefix(TRUTH)
@@ -205,7 +181,7 @@ def _one(asked: Asked, quantity: ModuleType, car: CarSpecification, seen: Record
 def _recommended(quantity: ModuleType, car: CarSpecification, seen: Recording) -> Compared:
     """The recommended method, or why it is not to be had."""
     try:
-        return estimators.compare(quantity, car, seen, [quantity.RECOMMENDED])
+        return estimators.compare(car, seen, quantity, [quantity.RECOMMENDED])
     except InputError as error:
         return Compared({}, {quantity.RECOMMENDED: str(error)}, {})
 

@@ -37,7 +37,7 @@ class MethodScore(NamedTuple):
 
 
 def compare(
-    quantity: ModuleType, car: CarSpecification, recording: Recording, methods: Iterable[str] | None = None
+    car: CarSpecification, recording: Recording, quantity: ModuleType, methods: Iterable[str] | None = None
 ) -> Compared:
     """Run methods of a quantity, all of them unless `methods` names some, along a log.
 

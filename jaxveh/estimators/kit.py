@@ -4,12 +4,6 @@ from jaxveh.estimators.catalogue import FULL_CAR, catalogue, keys_asked
 from jaxveh.estimators.contract import Need, check_needs, cut_pieces, model_of, spans_of, start_of
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, clean_recording
 from jaxveh.estimators.method import (
-    AbstractMethod,
-    Answer,
-    Answers,
-    Filtered,
-    LiveMethod,
-    MethodOfCar,
     answer,
     follow,
     follow_rows,
@@ -19,13 +13,7 @@ from jaxveh.estimators.method import (
 __all__ = [
     "FULL_CAR",
     "AbstractCleaning",
-    "AbstractMethod",
-    "Answer",
-    "Answers",
     "AsItIs",
-    "Filtered",
-    "LiveMethod",
-    "MethodOfCar",
     "Need",
     "answer",
     "catalogue",

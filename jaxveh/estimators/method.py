@@ -54,7 +54,7 @@ class AbstractMethod(eqx.Module):
     @property
     @abc.abstractmethod
     def needs(self) -> tuple[Need, ...]:
-        """The channels that it reads. An `optional` one is NaN in every row where a log lacks it."""
+        """The channels that it reads. An `optional` one is NaN in every row of a log without it."""
 
     @abc.abstractmethod
     def first(self, t: Any, values: dict[str, Any]) -> tuple[Any, Answer]:

@@ -70,7 +70,7 @@ class Pulling(AbstractMethod):
     B. Schmidtbauer 2003, with an accelerometer and its offset.)
 
     **Parameters**: of the car `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2), `drag` (N s^2/m^2),
-    `rolling_resistance` (-), `rear_share` (l_r / l), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`, `pitch_gradient`
+    `rolling_resistance` (-), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`, `pitch_gradient`
     (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`, `rolling_spread`
     (m/s^2); of the sensors `wheel_noise`, `satellite_noise` (m/s), `delay` of these (s), `force_noise` (m/s^2), which lasts
     `force_time` (s).

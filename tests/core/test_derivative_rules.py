@@ -51,6 +51,7 @@ PLACES = {
     "experiments/sideslip_review/contestants.py": {
         "custom_batching": "particle filters one by one; nothing is differentiated"
     },
+    "estimators/mass/forgetting.py": {"least_squares": "a name: recursive least squares, a filter"},
     "experiments/tyre_apf/saturated.py": {"least_squares": "a fit, whose values alone are used"},
     "filters/adaptive_number.py": {
         "stop_gradient": "how many particles are drawn, and the draws that say so: whole numbers"

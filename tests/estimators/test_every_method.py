@@ -62,7 +62,7 @@ def test_a_quantity_says_what_it_shows_and_recommends_a_method(quantity):
         assert [p.name for p in found.values() if p.kind is p.POSITIONAL_OR_KEYWORD] == first
         assert "method" in found and getattr(module, function).__doc__
     for one in module.METHODS.values():
-        assert one.help and one.source and isinstance(one, kit.MethodOfCar)
+        assert one.help and one.source and isinstance(one, estimators.MethodOfCar)
     needs = made(quantity, module.RECOMMENDED).needs
     guess = module.do_nothing(method_logs.CAR, method_logs.log(needs))
     assert set(guess) == set(module.SHOWN)

@@ -134,7 +134,7 @@ def test_the_aligning_torque_chain_is_exact_in_a_steady_linear_turn():
     assert not np.asarray(hard.known.v_y).any()
 
 
-class Says(kit.AbstractMethod):
+class Says(estimators.AbstractMethod):
     """A method that says one lateral velocity, of one spread."""
 
     v_y: Any

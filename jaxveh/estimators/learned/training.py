@@ -55,14 +55,12 @@ def train(
     logarithm); `prior`: the standard deviation there, in units of the number's scale, about where it started, one for all or by
     the last part of a name: what little data tells no better stays what it was.
 
-    Needs the extra `learn`. **Raises** `InputError` for a filter without a derivative, recordings too short for a piece,
-    arguments out of range.
+    Needs the extra `learn`. **Raises** `InputError` for recordings too short for a piece and arguments out of range.
     """
     optax = io.require("optax", "training through a filter", "learn")
-    for name, value in (("learning_rate", learning_rate), ("piece", piece), ("warm_up", warm_up)):
-        check_positive(name, value)
-    check_whole("steps", steps, 1)
-    check_whole("batch", batch, 1)
+    _check(learning_rate=learning_rate, piece=piece, warm_up=warm_up)
+    for name, value in (("steps", steps), ("batch", batch)):
+        check_whole(name, value, 1)
     filter.check(model)
     pieces, rows_of_warm_up = _pieces(model, recordings, piece, warm_up)
     count = jax.tree.leaves(pieces)[0].shape[0]
@@ -93,6 +91,11 @@ def train(
         return jax.lax.scan(body, state, jax.random.split(key, min(TOLD, steps)))
 
     return _walk(go_on, (start, search.init(start)), model, chosen, steps, key, progress)
+
+
+def _check(**values: float) -> None:
+    for name, value in values.items():
+        check_positive(name, value)
 
 
 def _walk(go_on, state, model, chosen, steps: int, key, progress: Progress) -> Trained:

@@ -16,7 +16,8 @@ LATERAL = (Need("a_y", "m/s^2", optional=True), Need("yaw_rate", "rad/s", option
 
 
 class Situations(NamedTuple):
-    """How true each is (-), between 0 and 1: wheels roll `stable`; all `brake` or all `drive` with slip; the car `swerves`."""
+    """How true each is (-), between 0 and 1: wheels roll `stable`; all `brake` or all `drive` with slip; the car swerves,
+    `swerve`."""
 
     stable: Any
     brake: Any

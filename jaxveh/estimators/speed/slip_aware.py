@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
@@ -23,110 +20,23 @@ from jaxveh.estimators.speed.gaussian import (
     update,
     update_by_each,
 )
+from jaxveh.estimators.speed.slip_aware_state import (
+    FRONT,
+    HELD,
+    LEFT,
+    PATIENCE,
+    RADII,
+    Memory,
+    Said,
+    SpeedState,
+    Spreads,
+    beyond,
+    of_axles,
+    wheel_loads,
+)
 from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
 from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
-
-LEFT = np.array([1, -1, 1, -1])
-FRONT = np.array([True, True, False, False])
-RADII = slice(6, 10)
-"""Where the radii are in the state."""
-
-HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in AT))
-"""What is held between two of its samples."""
-
-PATIENCE = 0.3
-"""s: for so long a sample is held, then the channel is silent."""
-
-
-class SpeedState(NamedTuple):
-    """`rolled`: what wheels without slip say on the mean, `(1 + radius) v_x` (m/s); `force`: what tyres and air push, over the
-    mass (m/s^2); `slope`: gravity along the road (m/s^2, uphill positive); `offset` (m/s^2) and `gain` (-) of the accelerometer;
-    `radius`: by how much the radii make all wheels' speeds too large (-), and each wheel's beyond that; how much softer than the
-    file says the tyres of an axle slip (-, on the logarithm).
-
-    With the wheels' speed as a state, not the car's, no wheel can tell what the wheels have in common. (A filter of v_x, linear
-    about a speed that moves, would soon think that it knows.)"""
-
-    rolled: Any
-    force: Any
-    slope: Any
-    offset: Any
-    gain: Any
-    radius: Any
-    radius_fl: Any
-    radius_fr: Any
-    radius_rl: Any
-    radius_rr: Any
-    softness_front: Any
-    softness_rear: Any
-
-    @property
-    def v_x(self) -> Any:
-        """The car's speed, m/s."""
-        return self.rolled / (1.0 + self.radius)
-
-
-class Spreads(eqx.Module):
-    """Standard deviations that the filter begins with, of its random walks, and of what is measured.
-
-    `slope_walk` and so on are per root second; a slope also falls back to level with `slope_time`, a softness to the file's with
-    `softness_time` (s), in which it forgets as much as it spreads. `wheel` (m/s) is what edges of
-    teeth leave, `wheel_share` (-) goes with the speed; `slip_share` (-) is of the slip that is expected, and `limit_slip` (-)
-    the slip that nobody knows at a force of the whole load, less with its fourth power. `turn` (m/s per rad/s) is of the wheels'
-    places.
-    """
-
-    slope: jax.Array = positive("m/s^2", default=0.3)
-    slope_time: jax.Array = positive("s", default=15.0)
-    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.15)
-    offset: jax.Array = positive("m/s^2", default=0.12)
-    offset_walk: jax.Array = positive("m/s^2/sqrt(s)", default=2e-3)
-    gain: jax.Array = positive("-", default=0.012)
-    radius: jax.Array = positive("-", default=0.004)
-    radius_walk: jax.Array = positive("1/sqrt(s)", default=1e-4)
-    softness: jax.Array = positive("-", default=0.35)
-    softness_time: jax.Array = positive("s", default=300.0)
-    force_walk: jax.Array = positive("m/s^2/sqrt(s)", default=6.0)
-    speed_walk: jax.Array = positive("m/s/sqrt(s)", default=0.02)
-    a_x: jax.Array = positive("m/s^2", default=0.1)
-    wheel: jax.Array = positive("m/s", default=0.04)
-    wheel_share: jax.Array = positive("-", default=1e-3)
-    slip_share: jax.Array = positive("-", default=0.25)
-    peak_slip: jax.Array = positive("-", default=0.3)
-    limit_slip: jax.Array = positive("-", default=0.03)
-    suspicion_time: jax.Array = positive("s", default=0.4)
-    other_slip: jax.Array = positive("-", default=0.015)
-    repeats: jax.Array = positive("-", default=25.0)
-    turn: jax.Array = positive("m/s per rad/s", default=0.05)
-    satellite: jax.Array = positive("m/s", default=0.06)
-
-
-class Memory(NamedTuple):
-    """The belief and its time; what was heard last and when, by channel; each wheel's low-passed speed and trust; the car's
-    low-passed acceleration; since when no wheel was trusted, and since when all say zero."""
-
-    belief: Belief
-    t: Any
-    heard: dict[str, Any]
-    at: dict[str, Any]
-    smooth: Any
-    smooth_at: Any
-    trust: Any
-    suspicion: Any
-    rate: Any
-    lost: Any
-    zero: Any
-
-
-class Said(NamedTuple):
-    """What the wheels are expected to say, `speed`, and without slip, `rolling` (m/s); the `slip` in it and the force over load,
-    `share` (-), (4,) each."""
-
-    speed: Any
-    rolling: Any
-    slip: Any
-    share: Any
 
 
 class SlipAware(AbstractMethod):
@@ -304,41 +214,35 @@ class SlipAware(AbstractMethod):
     def _gate(self, found, most):
         """1 within `most` standard deviations, and less with the eighth power of how far beyond."""
         far = numerics.sqrt(jnp.square(found.residual) / found.variance)
-        return _beyond(far / most)
+        return beyond(far / most)
 
     def _wheels(self, memory: Memory, mean) -> Said:
         """What the wheels would say of a mean (n,)."""
         x, car = SpeedState(*mean), self.car
         v_x = x.rolled - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
         yaw_rate, a_y, _ = self._lateral(memory, x)
-        along = v_x - LEFT.astype(v_x.dtype) * 0.5 * _front_rear(car.track_front, car.track_rear) * yaw_rate
+        along = v_x - LEFT.astype(v_x.dtype) * 0.5 * of_axles(car.track_front, car.track_rear) * yaw_rate
         steer = memory.heard["steer"]
         slip_angle = car.mass * car.rear_axle_to_cg / car.wheelbase * a_y / car.front_cornering_stiffness
         turned = along * numerics.cos(steer) + v_x * (steer - slip_angle) * numerics.sin(steer)
         along = jnp.where(FRONT, turned, along)
         share, load = self._shares_of_load(memory, x)
         front, rear = (slip_stiffness(c, n) for c, n in zip(car.cornering_stiffnesses, car.loads, strict=True))
-        softness = _front_rear(x.softness_front, x.softness_rear)
-        slip = jnp.exp(softness) * share / _front_rear(front, rear)
-        sink = self.compression / 3.0 * (load / _front_rear(*car.loads) - 1.0)
+        softness = of_axles(x.softness_front, x.softness_rear)
+        slip = jnp.exp(softness) * share / of_axles(front, rear)
+        sink = self.compression / 3.0 * (load / of_axles(*car.loads) - 1.0)
         rolling = along * (1.0 + mean[RADII] + sink)
         return Said(rolling + along * slip, rolling, slip, share)
 
     def _shares_of_load(self, memory: Memory, x: SpeedState):
         """Each wheel's longitudinal force over its load (-), and its load (N), (4,)."""
         car = self.car
-        at_rest = _front_rear(*car.loads)
-        pitched = 0.5 * car.mass * x.force * car.cg_height / car.wheelbase
-        a_y = self._lateral(memory, x)[1]
-        rolled = 2.0 * a_y / GRAVITY * car.cg_height / (0.5 * (car.track_front + car.track_rear))
-        load = jnp.maximum(
-            at_rest * (1.0 - LEFT.astype(rolled.dtype) * rolled) + _front_rear(-pitched, pitched), 0.1 * at_rest
-        )
+        load = wheel_loads(car, x.force, self._lateral(memory, x)[1])
         rolling = car.rolling_resistance * car.mass * GRAVITY
         push = car.mass * x.force + car.drag * x.rolled * jnp.abs(x.rolled) + rolling
-        force = _front_rear(*forces_of_axles(car, push))
+        force = of_axles(*forces_of_axles(car, push))
         brakes = [f"brake_torque_{place}" for place in AT]
-        drive = 0.5 * _front_rear(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
+        drive = 0.5 * of_axles(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
         by_torque = (drive - jnp.stack([memory.heard[name] for name in brakes])) / car.wheel_radius
         known = jnp.stack([self._speaks(memory, name) for name in brakes]) & self._speaks(memory, "drive_torque")
         return jnp.where(known, by_torque, force) / load - car.rolling_resistance, load
@@ -353,7 +257,7 @@ class SlipAware(AbstractMethod):
         rates = (jnp.where(there, wheels, smooth) - smooth) / self.smoothing
         # Without an accelerometer the car's rate is that of the wheels.
         gate = self.rate_gate * jnp.where(self._speaks(memory, "a_x"), 1.0, 4.0)
-        steady = _beyond((rates - memory.rate) / gate)
+        steady = beyond((rates - memory.rate) / gate)
         said = self._wheels(memory, belief.mean)
         suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
         most = jnp.sort(suspicion)[1]
@@ -404,7 +308,7 @@ class SlipAware(AbstractMethod):
         agree = jnp.clip(others - 0.5, 0.0, 1.0)
         calm = jnp.exp(-jnp.square(said.share / self.calm))
         far = numerics.sqrt(jnp.square(found.residual) / found.variance)
-        return _beyond(far / (self.gate * (1.0 + 4.0 * calm * agree)))
+        return beyond(far / (self.gate * (1.0 + 4.0 * calm * agree)))
 
     def _wheel_variances(self, memory: Memory, belief: Belief, said: Said):
         s, v_x = self.spreads, jnp.abs(belief.mean[0])
@@ -449,13 +353,3 @@ class SlipAware(AbstractMethod):
             {"v_x": std, "grade": stds[2] / GRAVITY, "a_x_offset": stds[3]},
             known,
         )
-
-
-def _front_rear(front: Any, rear: Any) -> Any:
-    return jnp.where(FRONT, front, rear)
-
-
-def _beyond(far: Any) -> Any:
-    """1 where |far| <= 1, else its inverse to the eighth power; safe for what is huge."""
-    size = jnp.clip(jnp.abs(far), 1.0, 1e3)
-    return 1.0 / jnp.square(jnp.square(jnp.square(size)))
