@@ -129,7 +129,7 @@ def estimate(
         logs, product, vehicle, calibration, channels, span, calibrate, tuple(calibrate_on or ()), as_told, fill, truth,
         filter, particles, seed, out, report, force, anyway,
     )  # fmt: skip
-    by_methods = quantities.asked_of(choice, what, methods)
+    by_methods = quantities.quantities_asked(choice, what, methods)
     if by_methods is None:
         _estimate_sideslip(choice, numbers)
     else:

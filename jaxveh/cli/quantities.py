@@ -66,7 +66,7 @@ def names_of(text: str, option: str, known: Sequence[str]) -> tuple[str, ...]:
     return names
 
 
-def asked_of(choice: Any, what: str, methods: str | None) -> Asked | None:
+def quantities_asked(choice: Any, what: str, methods: str | None) -> Asked | None:
     """What `estimate` was asked for in `choice`, its options; None where that is sideslip, by its own program.
 
     **Raises** `InputError` for a quantity or a method that is not there, or an option of that program.

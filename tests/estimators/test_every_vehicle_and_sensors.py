@@ -29,6 +29,7 @@ def named(fidelity):
 
 
 CARS = {fidelity: (lambda fidelity=fidelity: named(fidelity)) for fidelity in vehicles.sets.FIDELITIES} | {
+    "anti-lock": lambda: vehicles.AntiLock(named("seven-dof")),
     "commanded": lambda: vehicles.Commanded(vehicles.passenger_car()),
     "crawling": lambda: vehicles.KinematicCrawl(named("linear")),
     "steered": lambda: vehicles.Steered(named("two-track-3dof"), 16.0, 2e-5, trail=0.02),

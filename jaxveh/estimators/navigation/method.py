@@ -14,8 +14,7 @@ from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.navigation.cleaning import Cleaning, Felt
 from jaxveh.estimators.navigation.observed import ANGLES, channels_of, noise, observation, report
 from jaxveh.estimators.navigation.system import Navigator, inputs_of, state_type, states_of, transition
-from jaxveh.filters import Extended
-from jaxveh.filters.kit import AbstractRuleFilter, with_spread
+from jaxveh.filters import Extended, kit
 from jaxveh.statespace import Continuous, Gaussian, Prior, Row, StateDependent, StateSpace
 
 LEAST_SPEED = 2.0
@@ -63,7 +62,7 @@ class Navigation(AbstractMethod):
     """
 
     model: StateSpace
-    filter: AbstractRuleFilter = Extended()
+    filter: kit.AbstractRuleFilter = Extended()
 
     @property
     def _cleaning(self) -> Cleaning:
@@ -136,7 +135,7 @@ class Navigation(AbstractMethod):
         fixed = jnp.square(system.across / speed)
         covariance = covariance.at[place, place].set(both / jnp.square(speed) + fixed)
         covariance = covariance.at[place, slip].set(-both / speed).at[slip, place].set(-both / speed)
-        return with_spread(belief, mean, self.filter.form.start(covariance), t=row.t, u=row.u)
+        return kit.with_spread(belief, mean, self.filter.form.start(covariance), t=row.t, u=row.u)
 
     def _row(self, t, cleaned) -> Row:
         of = lambda kind, names: record(kind, {name: cleaned[name] for name in names})

@@ -33,7 +33,7 @@ from jaxveh.estimators.speed.slip_aware_state import (
     beyond,
     of_axles,
     wheel_loads,
-)
+)  # fmt: skip
 from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
 from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
@@ -128,8 +128,6 @@ class SlipAware(AbstractMethod):
         memory = memory._replace(belief=belief, t=t)
         return memory, self._answer(memory)
 
-    # What was heard last.
-
     def _hear(self, memory: Memory, t, values):
         steer = values["steer"] - self.car.steer_offset
         wheel = values["steering_wheel"]
@@ -144,8 +142,6 @@ class SlipAware(AbstractMethod):
 
     def _speaks(self, memory: Memory, name: str):
         return memory.t - memory.at[name] <= PATIENCE
-
-    # The motion.
 
     def _lateral(self, memory: Memory, x: SpeedState):
         """Yaw rate (rad/s), lateral acceleration (m/s^2), and the lateral speed (m/s) of a steady turn."""
@@ -192,8 +188,6 @@ class SlipAware(AbstractMethod):
     def _smooth_rate(self, memory: Memory, belief: Belief, step):
         now = self._acceleration(memory, SpeedState(*belief.mean))
         return memory.rate + (1.0 - jnp.exp(-step / self.smoothing)) * (now - memory.rate)
-
-    # What is measured.
 
     def _felt(self, mean):
         x = SpeedState(*mean)
@@ -246,8 +240,6 @@ class SlipAware(AbstractMethod):
         by_torque = (drive - jnp.stack([memory.heard[name] for name in brakes])) / car.wheel_radius
         known = jnp.stack([self._speaks(memory, name) for name in brakes]) & self._speaks(memory, "drive_torque")
         return jnp.where(known, by_torque, force) / load - car.rolling_resistance, load
-
-    # The wheels.
 
     def _use_wheels(self, memory: Memory, belief: Belief, t, step, wheels):
         there = ~jnp.isnan(wheels)
