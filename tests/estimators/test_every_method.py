@@ -34,6 +34,9 @@ every = pytest.mark.parametrize(
     ("quantity", "name"), [case(quantity, name) for quantity, module in QUANTITIES.items() for name in module.METHODS]
 )
 
+third = pytest.mark.product
+"""Of sixty methods each test has a third by default, and each method a third of the tests; `-m full` has them all."""
+
 
 def draws(method):
     """Whether a filter in it draws random numbers: one key draws others in another precision, and jumps where others are
@@ -88,6 +91,7 @@ def test_what_it_lacks_is_named(quantity, name):
         module.estimate(method_logs.CAR, log, method="nothing")
 
 
+@third
 @every
 def test_an_answer_is_finite_or_not_known_whatever_the_log_lacks(quantity, name):
     module, method = QUANTITIES[quantity], made(quantity, name)
@@ -115,6 +119,7 @@ def test_an_answer_is_finite_or_not_known_whatever_the_log_lacks(quantity, name)
     assert known or "known only" in module.METHODS[name].help
 
 
+@third
 @every
 def test_live_says_what_it_says_of_a_log_and_is_compiled_once(quantity, name):
     module, method = QUANTITIES[quantity], made(quantity, name)
@@ -146,6 +151,7 @@ def test_live_says_what_it_says_of_a_log_and_is_compiled_once(quantity, name):
         np.testing.assert_array_equal([getattr(one.known, field) for one in answers], getattr(found.known, field))
 
 
+@third
 @every
 def test_float32_is_float32_throughout_and_near(quantity, name):
     method = made(quantity, name)
@@ -168,6 +174,7 @@ def test_float32_is_float32_throughout_and_near(quantity, name):
         assert near <= share * max(np.abs(there[known]).max(), 1e-2), field
 
 
+@third
 @every
 def test_gradients_with_respect_to_its_numbers_and_its_rows_are_finite_and_right(quantity, name):
     module, method = QUANTITIES[quantity], made(quantity, name)
