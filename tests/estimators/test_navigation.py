@@ -132,7 +132,7 @@ def test_the_height_of_an_antenna_counts_where_gyroscopes_say_how_the_body_rolls
     method = navigation.navigation_of(high, navigation.Parts(three_more=True))
     x = method.model.prior.mean._replace(v_x=jnp.asarray(20.0))
     u = record("Inputs", dict.fromkeys(method.model.inputs, jnp.asarray(0.0)))
-    swung = u._replace(rolled=jnp.asarray(0.2))
+    swung = u._replace(sky_rolled=jnp.asarray(0.2))
     aside = lambda u: observed.antenna_velocity(method.model.system, x, u)[1]
     np.testing.assert_allclose(aside(swung) - aside(u), -0.2, rtol=1e-6)
 
@@ -324,7 +324,7 @@ def test_the_single_track_at_two_rates_finds_what_it_is_made_of():
     method = multi_rate.multi_rate_of(CAR)
     t = np.arange(0.0, 12.0, 0.01)
     steer = 0.02 * np.sin(0.9 * t) + 0.01 * np.sin(2.3 * t)
-    model, states = method.tracked.model, [multi_rate.Track(0.0, 0.0, 0.3, 0.0, 0.0)]
+    model, states = method.tracked.model, [multi_rate.Track(0.0, 0.0, 0.3, 0.0, 0.0, 0.0)]
     step = jax.jit(lambda t0, t1, x, u: multi_rate.transition(model.system, t0, t1, x, u))
     inputs = record("Inputs", {"steer": jnp.asarray(steer), "v_x": jnp.full(t.size, 20.0)})
     body = lambda x, k: (
