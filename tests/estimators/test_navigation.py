@@ -7,12 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from navigation_drives import CAR, STEP, Drive, rmse, silent
+from shared_data import shared
 
-from jaxveh import estimators, sensors, vehicles
+from jaxveh import Recording, estimators, io, manoeuvres, roads, sensors, vehicles
 from jaxveh._core.names import record
 from jaxveh.estimators import kit, navigation
 from jaxveh.estimators.navigation import multi_rate, observed, window
 from jaxveh.estimators.navigation.cleaning import Cleaning
+from jaxveh.simulation import simulate
 from jaxveh.statespace import Gaussian
 
 DURATION = 40.0
@@ -132,7 +134,7 @@ def test_the_height_of_an_antenna_counts_where_gyroscopes_say_how_the_body_rolls
     method = navigation.navigation_of(high, navigation.Parts(three_more=True))
     x = method.model.prior.mean._replace(v_x=jnp.asarray(20.0))
     u = record("Inputs", dict.fromkeys(method.model.inputs, jnp.asarray(0.0)))
-    swung = u._replace(rolled=jnp.asarray(0.2))
+    swung = u._replace(sky_rolled=jnp.asarray(0.2))
     aside = lambda u: observed.antenna_velocity(method.model.system, x, u)[1]
     np.testing.assert_allclose(aside(swung) - aside(u), -0.2, rtol=1e-6)
 
@@ -324,7 +326,7 @@ def test_the_single_track_at_two_rates_finds_what_it_is_made_of():
     method = multi_rate.multi_rate_of(CAR)
     t = np.arange(0.0, 12.0, 0.01)
     steer = 0.02 * np.sin(0.9 * t) + 0.01 * np.sin(2.3 * t)
-    model, states = method.tracked.model, [multi_rate.Track(0.0, 0.0, 0.3, 0.0, 0.0)]
+    model, states = method.tracked.model, [multi_rate.Track(0.0, 0.0, 0.3, 0.0, 0.0, 0.0)]
     step = jax.jit(lambda t0, t1, x, u: multi_rate.transition(model.system, t0, t1, x, u))
     inputs = record("Inputs", {"steer": jnp.asarray(steer), "v_x": jnp.full(t.size, 20.0)})
     body = lambda x, k: (
@@ -381,3 +383,84 @@ def test_a_measured_course_wraps_in_a_state_space():
     model = estimators.state_space(car, suite, start={"yaw": 3.1}, start_spread={"yaw": 0.05})
     assert model.angles == ("course",)
     assert estimators.state_space(car, sensors.esc()).angles == ()
+
+
+@pytest.mark.studies
+def test_a_simulated_van_with_a_series_car_s_sensors_is_followed_through_a_tunnel():
+    """Seven degrees of freedom on a banked and hilly road, late and noisy sensors with offsets, an antenna off the centre."""
+    place = (-0.6, 0.2, 0.0)
+    car = vehicles.named_car("van", "seven-dof")
+    told = dataclasses.replace(vehicles.specification_of(vehicles.kit.CARS["van"]()), antenna_position=place)
+    suite = sensors.production_car(float(car.wheel_radius))
+    antenna = sensors.Position(*place)
+    devices = [
+        dataclasses.replace(one, antenna=antenna, outages=((35.0, 45.0),)) if isinstance(one, sensors.GNSS) else one
+        for one in suite.devices
+        if not isinstance(one, sensors.SteeringAngle)
+    ]
+    keys = jax.random.split(jax.random.key(11), 4)
+    road = roads.RandomRoad(
+        grade=roads.gauss_markov(0.015, 200.0, keys[0]), bank=roads.gauss_markov(0.015, 150.0, keys[1])
+    )
+    steering = manoeuvres.random_steering(22.0, 0.016, keys[2], lowest=0.05, highest=0.5, duration=50.0)
+    drive = simulate(car, steering, sensors.Suite(tuple(devices)), keys[3], road=road, start={"v_x": 22.0})
+    truth = np.arctan2(np.asarray(drive["true.v_y"]), np.asarray(drive["true.v_x"]))
+    time = np.asarray(drive.time)
+    before, within = (time > 15.0) & (time < 35.0), (time >= 35.0) & (time < 45.0)
+    found = {name: navigation.estimate(told, drive, method=name) for name in ("kinematic", "rear_axle")}
+    errors = {
+        (name, where): rmse(one["sideslip"], truth, rows)
+        for name, one in found.items()
+        for where, rows in (("before", before), ("within", within))
+    }
+    nothing = np.sqrt(np.mean(truth[before] ** 2))
+    assert errors["rear_axle", "before"] < 0.2 * DEGREE and errors["rear_axle", "within"] < 0.25 * DEGREE, errors
+    assert errors["rear_axle", "before"] < 0.5 * nothing, (errors, nothing)
+    assert errors["rear_axle", "within"] < errors["kinematic", "within"], errors
+    best = found["rear_axle"]
+    assert np.asarray(best.known.sideslip)[before | within].all()
+    normalised = np.square((np.asarray(best["sideslip"]) - truth) / np.asarray(best.std.sideslip))[before | within]
+    assert 0.1 < np.mean(normalised) < 2.0
+    # The offsets of the devices, which `production_car` states.
+    at = np.searchsorted(time, 34.9)
+    for axis, offset in (("a_x", 0.1), ("a_y", 0.1), ("yaw_rate", 0.2 * DEGREE)):
+        name = f"bias_{axis}"
+        assert abs(float(best[name][at]) - offset) < 3.0 * float(getattr(best.std, name)[at]), name
+
+
+@pytest.mark.studies
+def test_the_log_of_a_race_car_is_followed_from_a_course_that_its_reference_gives():
+    """Five fixes a second, 0.15 s late, made of the reference's speeds and of the integrated yaw rate: no satellite was there.
+
+    A car file as its authors wrote it down, a vibrating accelerometer, tyres near their limit.
+    """
+    log = io.read_recording(shared("ferrari_250lm_100hz.csv"))
+    car = dataclasses.replace(
+        io.read_car(shared("ferrari_250lm.toml")), satellite_delay=0.15, inertial_delay=0.0, low_pass=50.0
+    )
+    time = np.asarray(log.time) - log.time[0]
+    of = lambda name: np.asarray(log[name])
+    yaw = np.concatenate([[0.0], np.cumsum(0.5 * (of("yaw_rate")[1:] + of("yaw_rate")[:-1]) * np.diff(time))])
+    late = lambda values: np.interp(np.maximum(time - 0.15, 0.0), time, values)
+    rng, fresh = np.random.default_rng(0), np.arange(time.size) % 20 == 0
+    along, across = (
+        late(np.hypot(of("v_x"), of("v_y"))) + 0.05 * rng.normal(size=time.size),
+        0.05 * rng.normal(size=time.size),
+    )
+    course = late(yaw + np.arctan2(of("v_y"), of("v_x"))) + np.arctan2(across, along)
+    made = {
+        "speed": np.where(fresh, np.hypot(along, across), np.nan),
+        "course": np.where(fresh, (course + np.pi) % (2.0 * np.pi) - np.pi, np.nan),
+        **{name: of(name) for name in ("a_x", "a_y", "yaw_rate")},
+    }
+    drive = Recording(
+        time, made, {"speed": "m/s", "course": "rad", "a_x": "m/s^2", "a_y": "m/s^2", "yaw_rate": "rad/s"}
+    )
+    truth = np.arctan2(of("v_y"), of("v_x"))
+    rows = time > 15.0
+    errors = {
+        name: rmse(navigation.estimate(car, drive, method=name)["sideslip"], truth, rows)
+        for name in ("kinematic", "rear_axle")
+    }
+    nothing = np.sqrt(np.mean(truth[rows] ** 2))
+    assert errors["kinematic"] < 0.3 * nothing and errors["rear_axle"] < 0.25 * nothing, (errors, nothing)

@@ -82,6 +82,15 @@ class TestDelayed:
         with pytest.raises(FilterError, match="older than the rows that are kept"):
             filters.run(filter_, MODEL, Recording(0.2 * time, dict(arriving.channels)))
 
+    def test_gradients_are_finite_where_a_delayed_value_is_from_before_the_first_row(self):
+        """It is left out, and with it a step back in time that nobody takes."""
+        time = np.arange(6) * 0.1
+        log = Recording(time, {"y0": np.sin(time), "y1": np.cos(time), "force": np.full(6, 0.7)})
+        filter_, rows = filters.Delayed(filters.Kalman(), {"y1": 0.25}, depth=4), MODEL.rows(log)
+        arrays, rest = eqx.partition(MODEL, eqx.is_inexact_array)
+        likelihood = lambda arrays: filters.scan(filter_, eqx.combine(arrays, rest), rows).log_likelihood
+        assert all(np.isfinite(slope).all() for slope in jax.tree.leaves(jax.grad(likelihood)(arrays)))
+
     def test_what_is_too_late_is_said_and_left_out(self):
         found = filters.scan(OUT_OF_ORDER, MODEL, taken(ROWS, [0, *range(2, 11), 1, *range(11, 30)]))
         assert Result(int(found.result)) is Result.measurement_too_late and int(found.failed_at) == 10

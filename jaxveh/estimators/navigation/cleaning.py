@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.navigation.observed import BALANCE, ROLLS, STANDS
 from jaxveh.estimators.navigation.system import Navigator, Parts
@@ -23,16 +24,21 @@ LONGEST_SILENCE = 0.25
 """s: an inertial unit that has been silent for longer is no witness: all must begin anew."""
 
 
+ROUGH_TIME = 2.0
+"""s: memory of how rough the lateral acceleration is."""
+
+
 class Felt(NamedTuple):
-    """The last row: its time (s), what the unit said last by channel, when (s), the yaw rate behind a low-pass (rad/s), and the
-    last moments of the satellites' lag, and of the camera's where there is one."""
+    """The last row: its time (s), what the unit said last by channel, when (s), the yaw rate behind a low-pass (rad/s), the
+    lateral acceleration of the two rows before (m/s^2) and the square of its roughness, and the last moments."""
 
     t: Any
     held: dict[str, Any]
     spoke: Any
     smooth: Any
+    lately: tuple[Any, Any]
+    rough: Any
     window: Window
-    camera: Window | None
 
 
 class Cleaning(AbstractCleaning):
@@ -60,9 +66,9 @@ class Cleaning(AbstractCleaning):
     def first(self, t, values):
         nothing = jnp.zeros_like(t)
         start = {name: nothing + (GRAVITY if name == "a_z" else 0.0) for name in self.unit}
-        camera = empty_window(t) if self.parts.camera else None
         spoken = jnp.where(jnp.isnan(values["yaw_rate"]), start["yaw_rate"], values["yaw_rate"])
-        memory = Felt(t, start, t - 2.0 * LONGEST_SILENCE, spoken, empty_window(t), camera)
+        lately = jnp.where(jnp.isnan(values["a_y"]), nothing, values["a_y"])
+        memory = Felt(t, start, t - 2.0 * LONGEST_SILENCE, spoken, (lately, lately), nothing, empty_window(t))
         return self._with_row(memory, t, values)
 
     def next(self, memory, t, values):
@@ -79,17 +85,25 @@ class Cleaning(AbstractCleaning):
         yaw_acceleration = (held["yaw_rate"] - smooth) / SMOOTH
         before, now = self._at_centre(memory.held, 0.0), self._at_centre(held, yaw_acceleration)
         lost = silent | (dt > LONGEST_SILENCE)
-        window = self._window(memory.window, before, now, dt, lost, self.system.lag)
-        past = look_back(window, self.system.lag)
+        window = self._window(memory.window, before, now, dt, lost)
         step = jnp.clip(t - memory.spoke, 1e-3, LONGEST_SILENCE)
-        cleaned = now | past._asdict() | {"yaw_acceleration": yaw_acceleration, "step": step}
-        cleaned |= self._measured(values, past, said)
-        camera = memory.camera
-        if camera is not None:
-            camera = self._window(camera, before, now, dt, lost, self.system.camera_lag)
-            cleaned |= self._seen(values, look_back(camera, self.system.camera_lag))
+        lately, rough = self._roughness(memory, held["a_y"], said, step)
+        cleaned = now | {"step": step, "rough": numerics.sqrt(rough)}
+        pasts = {}
+        for name, lag in self.system.lags.items():
+            past = pasts[name] = look_back(window, lag)
+            cleaned |= {f"{name}_{what}": value for what, value in past._asdict().items()}
+        cleaned |= self._measured(values, pasts, said)
         cleaned["felt"] = t - spoke <= LONGEST_SILENCE
-        return Felt(t, held, spoke, smooth, window, camera), cleaned
+        return Felt(t, held, spoke, smooth, lately, rough, window), cleaned
+
+    def _roughness(self, memory: Felt, a_y, said, step):
+        """The last two lateral accelerations, and the variance of what is white in them, by second differences."""
+        bend = a_y - 2.0 * memory.lately[0] + memory.lately[1]
+        share = 1.0 - jnp.exp(-step / ROUGH_TIME)
+        rough = memory.rough + share * (jnp.square(bend) / 6.0 - memory.rough)
+        kept = lambda new, old: jnp.where(said, new, old)
+        return (kept(a_y, memory.lately[0]), kept(memory.lately[0], memory.lately[1])), kept(rough, memory.rough)
 
     def _at_centre(self, held, yaw_acceleration) -> dict[str, Any]:
         """Accelerations of the centre of gravity in a plane motion; the other channels as they are."""
@@ -100,36 +114,30 @@ class Cleaning(AbstractCleaning):
         }
         return held | moved
 
-    def _window(self, window: Window, before, now, dt, lost, lag) -> Window:
+    def _window(self, window: Window, before, now, dt, lost) -> Window:
         middle = lambda name: 0.5 * (before[name] + now[name])
         turned = dt * middle("yaw_rate")
         gained = rotate(dt * middle("a_x"), dt * middle("a_y"), 0.5 * turned)
         rolled = now["roll_rate"] if self.parts.three_more else jnp.zeros_like(dt)
         piece = Window(dt, turned, *gained, now["yaw_rate"], rolled)
-        after = window_after(window, piece, lag)
+        after = window_after(window, piece, self.system.longest_lag)
         return jax.tree.map(lambda new, none: jnp.where(lost, none, new), after, empty_window(dt))
 
-    def _measured(self, values, past: Past, said) -> dict[str, Any]:
-        """What satellites and wheels said, where the past that it is of is known; and what is measured to be nothing."""
-        known = lambda value: jnp.where(past.covered, value, jnp.nan)
+    def _measured(self, values, pasts: dict[str, Past], said) -> dict[str, Any]:
+        """What satellites, wheels and camera said, where the past that it is of is known; and what is measured to be nothing."""
+        known = lambda name, value: jnp.where(pasts[name].covered, value, jnp.nan)
         # An unit that is silent says nothing of the axle either.
-        nothing = jnp.where(said, jnp.zeros_like(past.turned), jnp.nan)
-        seen = {"speed": known(values["speed"]), "course": known(values["course"])}
-        seen |= {BALANCE: nothing, ROLLS: nothing, f"{STANDS}_roll": nothing, f"{STANDS}_pitch": nothing}
+        nothing = jnp.where(said, jnp.zeros_like(values["a_y"]), jnp.nan)
+        seen = {name: known("sky", values[name]) for name in ("speed", "course")}
+        seen |= {ROLLS: nothing, f"{STANDS}_roll": nothing, f"{STANDS}_pitch": nothing}
+        if self.parts.axle != "none":
+            seen[BALANCE] = known("whole", nothing)
         if self.parts.heading:
-            seen["heading"] = known(values["heading"])
+            seen["heading"] = known("sky", values["heading"])
         if self.parts.wheels:
             seen["wheel_speed"] = 0.5 * (jnp.abs(values["wheel_speed_rl"]) + jnp.abs(values["wheel_speed_rr"]))
+        if self.parts.camera:
+            seen |= {name: known("camera", values[name]) for name in ("lane_offset", "lane_heading")}
         if self.parts.three_more:
             seen["a_z"] = values["a_z"]
         return seen
-
-    def _seen(self, values, past: Past) -> dict[str, Any]:
-        known = lambda value: jnp.where(past.covered, value, jnp.nan)
-        return {
-            "camera_turned": past.turned,
-            "camera_gained_x": past.gained_x,
-            "camera_gained_y": past.gained_y,
-            "lane_offset": known(values["lane_offset"]),
-            "lane_heading": known(values["lane_heading"]),
-        }

@@ -122,9 +122,9 @@ class Navigation(AbstractMethod):
         """The belief with what a fix says of velocity and yaw, and the prior's spread of them."""
         prior, system = self.model.prior, self.model.system
         speed = jnp.where(row.y.speed > LEAST_SPEED, row.y.speed, LEAST_SPEED)
-        yaw = jnp.where(jnp.isfinite(row.y.course), row.y.course, 0.0) + row.u.turned
+        yaw = jnp.where(jnp.isfinite(row.y.course), row.y.course, 0.0) + row.u.sky_turned
         slip = self.model.states.index("v_y")
-        started = dict(prior.mean._asdict(), v_x=speed + row.u.gained_x, yaw=yaw)
+        started = dict(prior.mean._asdict(), v_x=speed + row.u.sky_gained_x, yaw=yaw)
         anew = jnp.asarray([name in FORGOTTEN for name in self.model.states])
         mean = jnp.where(anew, jnp.stack([started[name] for name in self.model.states]), belief.vector)
         kept = ~anew[:, None] & ~anew[None, :]

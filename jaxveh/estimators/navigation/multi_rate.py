@@ -25,15 +25,21 @@ DEPTH = 24
 """How many rows are kept for a fix that is late."""
 
 
+SLIP_ERROR, SLIP_TIME = 0.004, 2.0
+"""rad and s: size and memory of what a linear single track does not know of sideslip."""
+
+
 class Track(NamedTuple):
-    """`sideslip` (rad), `yaw_rate` (rad/s) and `yaw` (rad) of the centre of gravity; `bias_yaw_rate` (rad/s) of the gyroscope,
-    `steer_offset` (rad) of the road wheels."""
+    """`sideslip` (rad), `yaw_rate` (rad/s) and `yaw` (rad) of the centre of gravity as the single track has them;
+    `bias_yaw_rate` (rad/s) of the gyroscope, `steer_offset` (rad) of the road wheels, and `slip_error` (rad): by how much the
+    true sideslip is more, first-order Gauss-Markov."""
 
     sideslip: Any
     yaw_rate: Any
     yaw: Any
     bias_yaw_rate: Any
     steer_offset: Any
+    slip_error: Any
 
 
 class TrackReport(NamedTuple):
@@ -89,7 +95,12 @@ def transition(system: LinearTrack, t0, t1, x: Track, u) -> Track:
     determinant = m_11 * m_22 - m_12 * m_21
     sideslip = (m_22 * right_1 - m_12 * right_2) / determinant
     yaw_rate = (m_11 * right_2 - m_21 * right_1) / determinant
-    return x._replace(sideslip=sideslip, yaw_rate=yaw_rate, yaw=x.yaw + half * (x.yaw_rate + yaw_rate))
+    return x._replace(
+        sideslip=sideslip,
+        yaw_rate=yaw_rate,
+        yaw=x.yaw + half * (x.yaw_rate + yaw_rate),
+        slip_error=jnp.exp(-2.0 * half / SLIP_TIME) * x.slip_error,
+    )
 
 
 class Seen(NamedTuple):
@@ -102,14 +113,14 @@ class Seen(NamedTuple):
 def observation(system: LinearTrack, t, x: Track, u) -> Seen:
     """Yaw rate with its bias, and the course, yaw and sideslip together."""
     del system, t, u
-    return Seen(x.yaw_rate + x.bias_yaw_rate, x.yaw + x.sideslip)
+    return Seen(x.yaw_rate + x.bias_yaw_rate, x.yaw + x.sideslip + x.slip_error)
 
 
 def report(system: LinearTrack, t, x: Track, u) -> TrackReport:
     """What is shown."""
     del system, t
-    v_x = u.v_x + 0.0 * x.sideslip
-    return TrackReport(v_x, v_x * x.sideslip, x.yaw, x.sideslip, x.yaw_rate, x.bias_yaw_rate, x.steer_offset)
+    v_x, sideslip = u.v_x + 0.0 * x.sideslip, x.sideslip + x.slip_error
+    return TrackReport(v_x, v_x * sideslip, x.yaw, sideslip, x.yaw_rate, x.bias_yaw_rate, x.steer_offset)
 
 
 class Held(AbstractCleaning):
@@ -156,10 +167,24 @@ def _without_speed(said: Answer) -> Answer:
     return said._replace(std=said.std._replace(v_x=jnp.full_like(said.std.v_x, jnp.nan)))
 
 
-PROCESS_NOISE = {"sideslip": 0.01, "yaw_rate": 0.05, "yaw": 1e-4, "bias_yaw_rate": 1e-4, "steer_offset": 1e-4}
+PROCESS_NOISE = {
+    "sideslip": 0.01,
+    "yaw_rate": 0.05,
+    "yaw": 1e-4,
+    "bias_yaw_rate": 1e-4,
+    "steer_offset": 1e-4,
+    "slip_error": SLIP_ERROR * (2.0 / SLIP_TIME) ** 0.5,
+}
 """rad and rad/s, per root second."""
 
-SPREAD = {"sideslip": 0.05, "yaw_rate": 0.5, "yaw": 2.0, "bias_yaw_rate": 0.005, "steer_offset": 0.01}
+SPREAD = {
+    "sideslip": 0.05,
+    "yaw_rate": 0.5,
+    "yaw": 2.0,
+    "bias_yaw_rate": 0.005,
+    "steer_offset": 0.01,
+    "slip_error": SLIP_ERROR,
+}
 """rad, rad/s: at the start, the yaw as good as unknown."""
 
 
@@ -178,7 +203,7 @@ def multi_rate_of(car: CarSpecification) -> MultiRate:
         report=report,
         process_noise=Continuous(Gaussian(PROCESS_NOISE)),
         measurement_noise=Gaussian({"yaw_rate": 0.003, "course": 0.004}),
-        prior=Prior(Track(0.0, 0.0, 0.0, 0.0, 0.0), Gaussian(SPREAD)),
+        prior=Prior(Track(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), Gaussian(SPREAD)),
         inputs=("steer", "v_x"),
         angles=("course",),
     )

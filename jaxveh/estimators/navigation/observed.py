@@ -52,23 +52,21 @@ ANGLES = ("course", "heading", "lane_heading")
 def observation(system: Navigator, t, x, u) -> Any:
     """All of it by channel."""
     del t
-    parts, yaw_rate = system.parts, u.yaw_rate - x.bias_yaw_rate
+    parts = system.parts
     ahead, aside = antenna_velocity(system, x, u)
     seen = {
         "speed": numerics.hypot(ahead, aside),
         "course": x.yaw + numerics.arctan2(aside, ahead),
-        "heading": x.yaw - (u.turned - system.lag * x.bias_yaw_rate),
+        "heading": x.yaw - turned_since(system, x, u, "sky"),
     }
-    rolling = system.rear_axle_to_cg * yaw_rate
     if parts.wheels:
         # Wheels do not know the direction in which they turn; pushing forward they turn faster.
         slips = x.wheel_scale + x.wheel_slip * u.a_x
         seen["wheel_speed"] = (1.0 + slips) * numerics.sqrt(jnp.square(x.v_x) + 1e-4)
     if parts.axle == "none":
-        seen[ROLLS] = x.v_y - rolling
+        seen[ROLLS] = x.v_y - system.rear_axle_to_cg * (u.yaw_rate - x.bias_yaw_rate)
     else:
-        angle = axle_slip(system, x, u)[0] + x.slip_error
-        seen[BALANCE] = x.v_y - rolling + x.v_x * numerics.tan(angle)
+        seen[BALANCE] = balance(system, x, u)
     if parts.camera:
         seen |= lane(system, x, u)
     if parts.three_more:
@@ -81,14 +79,12 @@ def observation(system: Navigator, t, x, u) -> Any:
     return record("NavigationOutputs", {name: seen[name] + 0.0 * x.v_x for name in channels})
 
 
-def antenna_velocity(system: Navigator, x, u) -> tuple[Any, Any]:
-    """The antenna's velocity (m/s) when the satellites saw it, in the axes in which the car stands now.
+def velocity_then(system: Navigator, x, u, past: str) -> tuple[Any, Any]:
+    """The velocity of the centre of gravity (m/s) when `past` began, in the axes in which the car stands now.
 
-    With d the lag, the car's velocity then is that of now less what was felt since, `u.gained` less what of it biases and slopes
-    have made. To it comes `omega x r` of the lever arm, whose place was turned back by the angle of these d seconds, and of the
-    antenna's height where the unit says how the body rolls.
+    It is that of now less what was felt since, and what was felt is `gained` less what of it biases and slopes have made.
     """
-    lag, gain = system.lag, (1.0, 1.0) if system.parts.three_more else system.gains(x)
+    lag, gains = system.lags[past], (1.0, 1.0) if system.parts.three_more else system.gains(x)
     leant = (0.0, 0.0)
     if system.parts.three_more:
         # On the average of these moments.
@@ -96,14 +92,52 @@ def antenna_velocity(system: Navigator, x, u) -> tuple[Any, Any]:
         dip = x.dip - half * (u.pitch_rate - x.bias_pitch_rate)
         leant = -dip, x.lean - half * (u.roll_rate - x.bias_roll_rate)
     tilts = x.grade + leant[0], x.bank + leant[1]
+    gained = getattr(u, f"{past}_gained_x"), getattr(u, f"{past}_gained_y")
     biases = x.bias_a_x, x.bias_a_y
     ahead, aside = (
-        v - ((gained - lag * bias) / g - lag * GRAVITY * tilt)
-        for v, gained, bias, g, tilt in zip((x.v_x, x.v_y), (u.gained_x, u.gained_y), biases, gain, tilts, strict=True)
+        v - ((felt - lag * bias) / gain - lag * GRAVITY * tilt)
+        for v, felt, bias, gain, tilt in zip((x.v_x, x.v_y), gained, biases, gains, tilts, strict=True)
     )
-    spun, turned = u.spun - x.bias_yaw_rate, u.turned - lag * x.bias_yaw_rate
-    swing_x, swing_y = rotate(-spun * system.antenna_y, spun * system.antenna_x - u.rolled * system.antenna_z, turned)
+    return ahead, aside
+
+
+def turned_since(system: Navigator, x, u, past: str) -> Any:
+    """By what angle (rad) the car has turned since."""
+    return getattr(u, f"{past}_turned") - system.lags[past] * x.bias_yaw_rate
+
+
+def antenna_velocity(system: Navigator, x, u) -> tuple[Any, Any]:
+    """The antenna's velocity (m/s) when the satellites saw it, in the axes in which the car stands now.
+
+    To that of the centre of gravity comes `omega x r` of the lever arm, whose place was turned back by the angle of these
+    moments, and of the antenna's height where the unit says how the body rolls.
+    """
+    ahead, aside = velocity_then(system, x, u, "sky")
+    spun, turned = u.sky_spun - x.bias_yaw_rate, turned_since(system, x, u, "sky")
+    arm_x, arm_y, arm_z = system.antenna_x, system.antenna_y, system.antenna_z
+    swing_x, swing_y = rotate(-spun * arm_y, spun * arm_x - u.sky_rolled * arm_z, turned)
     return ahead + swing_x, aside + swing_y
+
+
+def balance(system: Navigator, x, u) -> Any:
+    """How much faster to the left the rear axle goes than its force asks for, m/s.
+
+    Force and motion are averages over `axle_time`, the motion's by Simpson's rule: a single acceleration is rough, and a law
+    that adapts would take its noise for slip that needs no force.
+    """
+    moves = [(x.v_x, x.v_y, u.yaw_rate)]
+    for past in ("half", "whole"):
+        ahead, aside = rotate(*velocity_then(system, x, u, past), -turned_since(system, x, u, past))
+        moves.append((ahead, aside, getattr(u, f"{past}_spun")))
+    v_x, v_y, spun = ((now + 4.0 * half + whole) / 6.0 for now, half, whole in zip(*moves, strict=True))
+    law, _, share = axle_slip(system, x, u)
+    angle = law + x.slip_error * error_growth(system, share)
+    return v_y - system.rear_axle_to_cg * (spun - x.bias_yaw_rate) + v_x * numerics.tan(angle)
+
+
+def error_growth(system: Navigator, share) -> Any:
+    """How much larger the law's error is under a force of this share of load than without one."""
+    return 1.0 + system.slip_growth * numerics.hypot(share, 0.01)
 
 
 def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
@@ -112,11 +146,17 @@ def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
     Linear: force over load = stiffness angle. Saturating: `F = c a / (1 + |c a / grip|^shape)^(1 / shape)`, whose inverse has a
     closed form.
     """
-    f_y = system.forces(x, u)[1]
-    a, length = system.front_axle_to_cg, system.wheelbase
-    force = (a * system.mass * f_y - system.yaw_inertia * u.yaw_acceleration) / length
+    time, a, length = system.axle_time, system.front_axle_to_cg, system.wheelbase
+    a_x, a_y = rotate(u.whole_gained_x / time, u.whole_gained_y / time, -0.5 * u.whole_turned)
+    felt = u._replace(a_y=a_y)
+    if system.parts.three_more:
+        # The body as it stood in the middle of this time.
+        felt = felt._replace(a_y=a_y + GRAVITY * 0.5 * time * (u.roll_rate - x.bias_roll_rate))
+    f_y = system.forces(x, felt)[1]
+    swing = (u.yaw_rate - u.whole_spun) / time
+    force = (a * system.mass * f_y - system.yaw_inertia * swing) / length
     # The accelerometer as it speaks: no error of the law should be taken for an error of it.
-    load = system.mass * (GRAVITY * a + system.cg_height * u.a_x) / length
+    load = system.mass * (GRAVITY * a + system.cg_height * a_x) / length
     share = force / jnp.maximum(load, 0.2 * GRAVITY * system.mass * a / length)
     stiffness = system.stiffness * (jnp.exp(x.stiffening) if system.parts.adapts else 1.0)
     if system.parts.axle == "linear":
@@ -132,16 +172,13 @@ def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
 
 def lane(system: Navigator, x, u) -> dict[str, Any]:
     """Offset from the lane's middle (m, to the left) and heading against it (rad) when the camera saw them."""
-    lag = system.camera_lag
-    turned = u.camera_turned - lag * x.bias_yaw_rate
+    lag, turned = system.camera_lag, turned_since(system, x, u, "camera")
     along = lag * x.v_x * x.bend
     middle = x.lane_heading - 0.5 * (turned - along)
     then = x.lane_heading - (turned - along)
-    gains = (1.0, 1.0) if system.parts.three_more else system.gains(x)
-    ahead = x.v_x - 0.5 * (u.camera_gained_x - lag * x.bias_a_x) / gains[0]
-    aside = x.v_y - 0.5 * ((u.camera_gained_y - lag * x.bias_a_y) / gains[1] - lag * GRAVITY * x.bank)
-    # Of the velocity in the axes of now, by half the angle turned back: those of the middle of the lag.
-    ahead, aside = rotate(ahead, aside, -0.5 * turned)
+    before = velocity_then(system, x, u, "camera")
+    # The mean velocity, in the axes of the middle of the lag.
+    ahead, aside = rotate(0.5 * (x.v_x + before[0]), 0.5 * (x.v_y + before[1]), -0.5 * turned)
     gone = lag * (ahead * numerics.sin(middle) + aside * numerics.cos(middle))
     return {
         "lane_offset": x.lane_offset - gone + system.camera_x * numerics.sin(then),
@@ -171,11 +208,13 @@ def noise(system: Navigator, t, x, u) -> dict[str, Any]:
         slip = system.rolling_slip + system.slip_gradient * jnp.abs(system.forces(x, u)[1])
         std[ROLLS] = (0.02 + moving * slip) * lasting
     else:
-        angle, slope, share = axle_slip(system, x, u)
-        white = system.slip_noise / numerics.sqrt(jnp.maximum(u.step, 1e-4))
+        angle, slope, _ = axle_slip(system, x, u)
+        # Rows share most of the time over which they are averages.
+        shared = numerics.sqrt(system.axle_time / u.step)
+        force = numerics.hypot(system.force_noise * shared, u.rough / GRAVITY)
         # Of a force of which little is left to grow the law says less and less.
-        uncertain = numerics.sqrt(jnp.square(white) + jnp.square(system.force_noise * slope * (1.0 + jnp.abs(share))))
-        std[BALANCE] = 0.02 + jnp.abs(x.v_x) * (1.0 + jnp.square(numerics.tan(angle))) * uncertain
+        uncertain = numerics.hypot(system.slip_noise / numerics.sqrt(u.step), force * slope)
+        std[BALANCE] = 0.02 * shared + jnp.abs(x.v_x) * (1.0 + jnp.square(numerics.tan(angle))) * uncertain
     return {name: std[name] + 0.0 * x.v_x for name in channels_of(parts)}
 
 
@@ -204,7 +243,10 @@ def report(system: Navigator, t, x, u) -> Any:
     if system.parts.axle != "none":
         weight = system.mass * GRAVITY * system.front_axle_to_cg / system.wheelbase
         adapted = jnp.exp(x.stiffening) if system.parts.adapts else 1.0
-        shown |= {"slip_error": x.slip_error, "stiffness_rear": system.stiffness * weight * adapted}
+        shown |= {
+            "slip_error": x.slip_error * error_growth(system, axle_slip(system, x, u)[2]),
+            "stiffness_rear": system.stiffness * weight * adapted,
+        }
     if system.parts.camera:
         shown |= {"lane_offset": x.lane_offset, "lane_heading": x.lane_heading}
     return record_type("NavigationReport", shown)(*[value + 0.0 * x.v_x for value in shown.values()])

@@ -49,9 +49,10 @@ class Navigator(eqx.Module):
       acceleration, as a share of speed; `lean_error` (rad): of a body's roll by its springs.
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m); `stiffness` (1/rad) and `grip`
       (-): cornering stiffness and largest lateral force of the rear axle over its load, `shape` (-): how sharply the curve
-      between bends; `slip_noise` (rad sqrt s): the white part of the slip angle's error, `force_noise` (-): of the force over
-      load, a row. Where no law is taken, the slip angle is within `rolling_slip` (rad) and `slip_gradient` (rad s^2/m) times the
-      force over mass. `slip_time` (s): memory of errors that last, these, that of `slip_error`, and of how the body stands.
+      between bends; `axle_time` (s): over which force and slip are averaged; `slip_growth` (-): by how much the slip angle's
+      error grows with force over load; `slip_noise` (rad sqrt s): its white part, `force_noise` (-): of the averaged force over
+      load. Where no law is taken, the slip angle is within `rolling_slip` (rad) and `slip_gradient` (rad s^2/m) times the force
+      over mass. `slip_time` (s): memory of errors that last, these, that of `slip_error`, and of how the body stands.
     - `lane_error` (m), `lane_angle_error` (rad), `bend_time` (s): of the camera, and the memory of the lane's curvature;
       `camera_x` (m): where it says how far the lane's middle is away, ahead of the centre of gravity.
     """
@@ -81,6 +82,8 @@ class Navigator(eqx.Module):
     stiffness: jax.Array = positive("1/rad", default=16.0)
     grip: jax.Array = positive("-", default=1.0)
     shape: jax.Array = positive("-", default=2.5)
+    slip_growth: jax.Array = positive("-", default=3.0)
+    axle_time: jax.Array = positive("s", default=0.2)
     rolling_slip: jax.Array = positive("rad", default=0.002)
     slip_gradient: jax.Array = positive("rad s^2/m", default=0.006)
     slip_time: jax.Array = positive("s", default=1.5)
@@ -99,6 +102,22 @@ class Navigator(eqx.Module):
     def wheelbase(self) -> Any:
         """Distance of the axles, m."""
         return self.front_axle_to_cg + self.rear_axle_to_cg
+
+    @property
+    def lags(self) -> dict[str, Any]:
+        """By how much is looked back (s): to what satellites saw (`sky`), a `camera`, and to middle and begin of the time over
+        which the axle's force is averaged (`half`, `whole`)."""
+        lags = {"sky": self.lag}
+        if self.parts.camera:
+            lags["camera"] = self.camera_lag
+        if self.parts.axle != "none":
+            lags |= {"half": 0.5 * self.axle_time, "whole": self.axle_time}
+        return lags
+
+    @property
+    def longest_lag(self) -> Any:
+        """The longest of them, s."""
+        return jnp.max(jnp.stack(list(self.lags.values())))
 
     def forces(self, x, u) -> tuple[Any, Any]:
         """Forces on the car over its mass (m/s^2), forward and to the left: what accelerometers feel less their biases, and less
@@ -132,8 +151,8 @@ def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
     Speeds (m/s) and yaw (rad) at the centre of gravity; `bias_` of each axis (m/s^2, rad/s); `bank`, `grade` (rad) that the car
     stands on; `lean_gradient` (rad s^2/m): roll on its springs for each m/s^2; `lean`, `dip` (rad): roll and pitch on its
     springs; `wheel_scale` (-) of the rear wheels' speed, and their `wheel_slip` (s^2/m) for each m/s^2 of push; `slip_error`
-    (rad) of the axle's law, `stiffening`: the logarithm of its stiffness over the file's; `lane_offset` (m), `lane_heading` (rad)
-    against the lane, to the left, and its `bend` (1/m).
+    (rad) of the axle's law without a force, `stiffening`: the logarithm of its stiffness over the file's; `lane_offset` (m),
+    `lane_heading` (rad) against the lane, to the left, and its `bend` (1/m).
     """
     degree = jnp.pi / 180
     walk = lambda std, time: std * (2.0 / time) ** 0.5
@@ -159,7 +178,7 @@ def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
     if parts.wheels:
         states |= {"wheel_scale": (0.0, 0.01, 1e-4), "wheel_slip": (0.0, 0.01, 1e-5)}
     if parts.axle != "none":
-        states |= {"slip_error": (0.0, 0.0025, walk(0.0025, 1.5))}
+        states |= {"slip_error": (0.0, 0.002, walk(0.002, 1.5))}
     if parts.adapts:
         states |= {"stiffening": (0.0, 0.15, 0.01)}
     if parts.camera:
@@ -179,13 +198,14 @@ def state_type(parts: Parts) -> Any:
 def inputs_of(parts: Parts) -> tuple[str, ...]:
     """What `cleaning` makes of a log for the model.
 
-    Accelerations at the centre of gravity (m/s^2), rates (rad/s) and the `yaw_acceleration`, held where the unit is silent; the
-    `step` (s) that the row stands for; and of the satellites' lag, and the camera's (`camera_`), what `window.Past` says.
+    Accelerations at the centre of gravity (m/s^2) and rates (rad/s), held where the unit is silent; the `step` (s) that the row
+    stands for; how `rough` the lateral acceleration is (m/s^2); and of each of `Navigator.lags` what `window.Past` says, as
+    `sky_turned` and so on.
     """
-    past = ("turned", "gained_x", "gained_y", "spun", "rolled")
+    names = ("sky", *(("camera",) if parts.camera else ()), *(("half", "whole") if parts.axle != "none" else ()))
+    pasts = tuple(f"{name}_{what}" for name in names for what in ("turned", "gained_x", "gained_y", "spun", "rolled"))
     more = ("a_z", "roll_rate", "pitch_rate") if parts.three_more else ()
-    seen = ("camera_turned", "camera_gained_x", "camera_gained_y") if parts.camera else ()
-    return ("a_x", "a_y", "yaw_rate", "yaw_acceleration", "step", *past, *more, *seen)
+    return ("a_x", "a_y", "yaw_rate", "step", "rough", *pasts, *more)
 
 
 def transition(system: Navigator, t0, t1, x, u):
