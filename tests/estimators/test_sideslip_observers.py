@@ -186,6 +186,14 @@ def test_rows_without_a_channel_correct_nothing():
     np.testing.assert_allclose(found[3], np.linalg.matrix_power(np.asarray(F), 3) @ found[0], rtol=1e-4)
 
 
+def test_an_observer_that_has_spun_begins_anew():
+    model = linear_model()
+    rows, truth = drive(model, 4, straight, (0.0, 0.0))
+    found = errors_of(observers.ConstantPoles(POLES), model, rows, truth, (8.0, 2.0))
+    # At the first row already: no lateral velocity, and the yaw rate that was measured.
+    np.testing.assert_allclose(found, 0.0, atol=1e-9)
+
+
 def test_the_worst_case_makes_the_predicted_variance_larger_by_the_share_and_no_further():
     model = nonlinear_model()
     belief, _ = filters.Extended().init(model, _blank_row(model), None)

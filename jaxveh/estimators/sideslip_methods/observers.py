@@ -13,7 +13,17 @@ from jaxveh._core.errors import check
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import UNNAMED, check_parameters, positive, table
 from jaxveh.estimators.method import Filtered
-from jaxveh.estimators.sideslip_methods.common import A_Y, STEER, V_X, YAW_RATE, Guarded, guard, size_of, slowest_of
+from jaxveh.estimators.sideslip_methods.common import (
+    A_Y,
+    SLOWEST,
+    STEER,
+    V_X,
+    YAW_RATE,
+    Guarded,
+    guard,
+    size_of,
+    slowest_of,
+)
 from jaxveh.estimators.sideslip_methods.single_track import (
     YAW_RATE_NOISE,
     LateralReport,
@@ -45,6 +55,10 @@ alone tells nothing of v_y; the gain fades out there."""
 LINEAR_SHARE, BOUNDARY = 0.3, (0.02, 1.0)
 """Of the sliding observer's gain that is linear; and where its switch bends, rad/s and m/s^2: some ten of the sensors' noises."""
 
+LOST = 0.3
+"""rad/s, of a car of the usual wheelbase: an observer whose yaw rate is further from the measured one has spun, and no slope
+there leads back. It begins anew, with that yaw rate and no lateral velocity."""
+
 TINY = 1e-12
 
 
@@ -59,7 +73,7 @@ class AbstractPlaced(AbstractObserver):
     """An observer whose error, after each correction, obeys `(I - K H) F` with the poles `exp(poles dt)`; `poles` (2,), 1/s.
 
     F are the slopes of the step, H those of the observation, taken anew in each row. Where a channel is missing, nothing is
-    corrected.
+    corrected. Yaw rate is the first channel; one that is off by `LOST` or more begins anew.
     """
 
     poles: jax.Array = table("1/s")
@@ -99,7 +113,9 @@ class AbstractPlaced(AbstractObserver):
         z = jnp.exp(self.poles.astype(error.dtype) * (row.t - belief.t))
         K = self.gain(model, F, H, z, row)
         corrects = jnp.all(here) & moves
-        return jnp.where(corrects, self.change(K, error), 0.0), belief.memory
+        change = jnp.where(corrects, self.change(K, error), 0.0)
+        lost = here[0] & (jnp.abs(error[0]) > LOST * SLOWEST / model.system.slowest)
+        return jnp.where(lost, jnp.stack([-belief.vector[0], error[0]]), change), belief.memory
 
     def change(self, K: Any, error: Any) -> Any:
         """The correction (2,) of a gain and the channels' errors."""
