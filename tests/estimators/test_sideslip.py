@@ -368,6 +368,7 @@ USED = {
     "name": "a word",
     **dict.fromkeys(("track_front", "track_rear"), "one track"),
     **dict.fromkeys(("wheel_radius", "wheel_inertia", "rolling_resistance"), "wheels do not turn here"),
+    **dict.fromkeys(("roll_gradient", "roll_frequency", "roll_damping", "pitch_gradient"), "the body does not lean here"),
     **dict.fromkeys(("front_tyre", "rear_tyre"), "of a wheel: nobody opens them before a car on four wheels is built"),
 }  # fmt: skip
 """What of a car's file moves the estimate, or the score alone; and why the rest does neither."""
@@ -390,7 +391,8 @@ def test_what_a_cars_file_says_is_used_or_named(entry):
         "name": "another", "sensor_position": (0.1, 0.1, 0.0), "reference_position": (0.3, 0.0, 0.0), "front_tyre": "a.tir",
         "rear_tyre": "a.tir", "front": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0), "rear": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0),
         "front_drive": 0.7, "front_brake": 0.7, "steer_offset": 0.02, "rolling_resistance": 0.02,
-        **dict.fromkeys(("track_front", "track_rear", "wheel_radius"), 1.0),
+        **dict.fromkeys(("track_front", "track_rear", "wheel_radius", "roll_frequency"), 1.0),
+        **dict.fromkeys(("roll_gradient", "pitch_gradient"), 0.01), "roll_damping": 0.4,
     }.get(entry.name, 1.07 * (getattr(plain, entry.name) or 10.0))  # fmt: skip
     changed = dataclasses.replace(plain, **{entry.name: other})
     leaves = lambda car: [float(leaf) for leaf in jax.tree.leaves(car_of(car))]

@@ -38,12 +38,13 @@ Turning = record_type("TurningFit", ("stiffness", "inertia"))
 
 class LearnerMemory(NamedTuple):
     """The memory of the filter of roll and bank, the steering wheel (rad), the steer as late as
-    the yaw rate, low-passed steer (rad), yaw rate (rad/s), lateral
+    the yaw rate, the mean of its square, low-passed steer (rad), yaw rate (rad/s), lateral
     force (m/s^2) and lateral speed (m/s), the two fits, and what is reported."""
 
     leaning: Any
     wheel: Any
     late: Any
+    square: Any
     steer: Any
     turn: Any
     force: Any
@@ -72,8 +73,9 @@ class Learner(AbstractMethod):
     **Parameters**: the car's `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `wheelbase` (m), `front_stiffness`,
     `rear_stiffness` (N/rad), `steering_ratio` (-), `steer_offset` (rad, at the road wheels); how well they are known before:
     `ratio_spread`, `stiffness_spread`, `inertia_spread` (-), `offset_spread` (rad), `place_spread` (m); `steer_error` (rad at the
-    road wheels) and `moment_error` (of m g l), which last `lasting` (s); `time` (s) of the low-pass of both
-    sides; `late` (s): by how much the inertial unit is later than the steering sensor.
+    road wheels) and `moment_error` (of m g l), which last `lasting` (s); `play` (rad at the road wheels): half the sensor's play,
+    of which half stays in the offset, and in the ratio its share of the steer, however long one drives; `time` (s) of the
+    low-pass of both sides; `late` (s): by how much the inertial unit is later than the steering sensor.
     """
 
     leaning: Leaning
@@ -86,13 +88,14 @@ class Learner(AbstractMethod):
     steering_ratio: jax.Array = positive("-")
     steer_offset: jax.Array = parameter("rad", scale=1e-3)
     ratio_spread: jax.Array = positive("-", default=0.1)
-    offset_spread: jax.Array = positive("rad", default=7e-4)
+    offset_spread: jax.Array = positive("rad", default=6e-4)
     stiffness_spread: jax.Array = positive("-", default=0.2)
     place_spread: jax.Array = positive("m", default=0.15)
     inertia_spread: jax.Array = positive("-", default=0.3)
     steer_error: jax.Array = positive("rad", default=1.2e-3)
     moment_error: jax.Array = positive("-", default=0.015)
     lasting: jax.Array = positive("s", default=0.4)
+    play: jax.Array = positive("rad", default=5e-4)
     late: jax.Array = positive("s", default=0.025)
     time: jax.Array = positive("s", default=0.15)
 
@@ -110,7 +113,7 @@ class Learner(AbstractMethod):
         steering = normal_of(Steering, {"offset": self.steer_offset}, stds, t)
         turning = normal_of(Turning, {}, {"stiffness": self.stiffness_spread, "inertia": self.inertia_spread}, t)
         start = {name: getattr(self, name) + zero for name in UNITS}
-        memory = LearnerMemory(leaning, zero, zero, zero, zero, zero, zero, steering, turning, start, zero)
+        memory = LearnerMemory(leaning, zero, zero, zero, zero, zero, zero, zero, steering, turning, start, zero)
         return self._next(memory, leaning, said, zero, values)
 
     def next(self, memory, t, values):
@@ -136,6 +139,7 @@ class Learner(AbstractMethod):
         doubt = 1.0 + jnp.square(jnp.square(force / LINEAR)) + jnp.square(jnp.square(QUICK / fast))
         lasting = doubt * 2.0 * self.lasting / jnp.maximum(dt, 1e-3)
         curve = self.wheelbase * turn / fast
+        square = memory.square + dt / (LONG + dt) * (jnp.square(curve) - memory.square)
         start = self._understeer() * force - self.yaw_inertia * self._place_slope() / self.mass * rate
         off = lambda x: steer - x.offset - (1.0 + x.ratio) * (curve + start + x.understeer * force)
         calm = 1.0 + jnp.square(jnp.square(rate / CALM))
@@ -155,7 +159,10 @@ class Learner(AbstractMethod):
         )
         stays = jnp.square(self.front_stiffness * self.wheelbase / scale * wrong) * (STAYS / self.lasting)
         turning = correct(memory.turning, moment, (jnp.square(self.moment_error) + stays) * lasting, there, Turning)
-        means, stds = self._numbers(steering, turning, said.std.yaw_rate_bias / jnp.maximum(fast, QUICK))
+        heading = said.std.yaw_rate_bias / jnp.maximum(fast, QUICK)
+        # A play takes so much of every swing.
+        swing = self.play / numerics.sqrt(square + jnp.square(0.1 * self.play))
+        means, stds = self._numbers(steering, turning, heading, jnp.minimum(swing, self.ratio_spread))
         most = {name: RATES[name] * jnp.where(there, dt, 0.0) for name in UNITS}
         shown = {name: memory.shown[name] + _within(means[name] - memory.shown[name], most[name]) for name in UNITS}
         narrow = {
@@ -167,7 +174,8 @@ class Learner(AbstractMethod):
         known = {
             name: (stds[name] < narrow[name]) & (jnp.abs(means[name] - shown[name]) < narrow[name]) for name in UNITS
         }
-        memory = LearnerMemory(leaning, wheel, late, steer, turn, force, v_y, steering, turning, shown, memory.age + dt)
+        age = memory.age + dt
+        memory = LearnerMemory(leaning, wheel, late, square, steer, turn, force, v_y, steering, turning, shown, age)
         return memory, answer(shown, stds, known)
 
     def _understeer(self):
@@ -184,8 +192,9 @@ class Learner(AbstractMethod):
         of_tyres = self.mass * self.stiffness_spread * axles / self.wheelbase
         return numerics.hypot(of_tyres, self._place_slope() * self.place_spread)
 
-    def _numbers(self, steering: Normal, turning: Normal, heading: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-        """What the fits say of each number, and spreads, with that of the yaw rate's offset over the speed, `heading`."""
+    def _numbers(self, steering: Normal, turning: Normal, heading: Any, swing: Any) -> tuple[dict, dict]:
+        """What the fits say of each number, and spreads: with that of the yaw rate's offset over the speed, `heading`, and the
+        share of the steer that is play, `swing`."""
         fit, turn = Steering(*steering.mean), Turning(*turning.mean)
         std = Steering(*numerics.sqrt(jnp.diagonal(steering.covariance)))
         # Of the understeer's spread the tyres have a part, which no drive takes away from the place.
@@ -204,8 +213,8 @@ class Learner(AbstractMethod):
         stds = {
             "yaw_inertia": self.yaw_inertia * inertia,
             "front_axle_to_cg": numerics.sqrt(jnp.maximum(left, 1e-8)),
-            "steer_offset": numerics.hypot(std.offset, self.wheelbase * heading),
-            "steering_ratio": self.steering_ratio * std.ratio,
+            "steer_offset": numerics.hypot(numerics.hypot(std.offset, 0.5 * self.play), self.wheelbase * heading),
+            "steering_ratio": self.steering_ratio * numerics.hypot(std.ratio, swing),
         }
         return means, stds
 
@@ -215,6 +224,9 @@ def _within(change: Any, most: Any) -> Any:
     bound = jnp.where(most > 0, most, 1.0)
     return jnp.where(most > 0, bound * jnp.tanh(change / bound), 0.0)
 
+
+LONG = 60.0
+"""s: over which the size of the steer is averaged."""
 
 START = 2.0
 """s: until the low-passes have forgotten where they began."""
