@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles, slip_stiffness
 from jaxveh.estimators.speed.gaussian import (
@@ -23,128 +19,45 @@ from jaxveh.estimators.speed.gaussian import (
     update,
     update_by_each,
 )
+from jaxveh.estimators.speed.slip_state import (
+    FRONT,
+    HELD,
+    LEFT,
+    MAY_HELP,
+    PATIENCE,
+    RADII,
+    Memory,
+    Said,
+    SpeedState,
+    Spreads,
+    beyond,
+    front_rear,
+    own_radii,
+)
 from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
 from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
 
-LEFT = np.array([1, -1, 1, -1])
-FRONT = np.array([True, True, False, False])
-RADII = slice(6, 10)
-"""Where the radii are in the state."""
-
-HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in AT))
-"""What is held between two of its samples."""
-
-PATIENCE = 0.3
-"""s: for so long a sample is held, then the channel is silent."""
-
-
-class SpeedState(NamedTuple):
-    """`rolled`: what wheels without slip say on the mean, `(1 + radius) v_x` (m/s); `force`: what tyres and air push, over the
-    mass (m/s^2); `slope`: gravity along the road (m/s^2, uphill positive); `offset` (m/s^2) and `gain` (-) of the accelerometer;
-    `radius`: by how much the radii make all wheels' speeds too large (-), and each wheel's beyond that; how much softer than the
-    file says the tyres of an axle slip (-, on the logarithm).
-
-    With the wheels' speed as a state, not the car's, no wheel can tell what the wheels have in common. (A filter of v_x, linear
-    about a speed that moves, would soon think that it knows.)"""
-
-    rolled: Any
-    force: Any
-    slope: Any
-    offset: Any
-    gain: Any
-    radius: Any
-    radius_fl: Any
-    radius_fr: Any
-    radius_rl: Any
-    radius_rr: Any
-    softness_front: Any
-    softness_rear: Any
-
-    @property
-    def v_x(self) -> Any:
-        """The car's speed, m/s."""
-        return self.rolled / (1.0 + self.radius)
-
-
-class Spreads(eqx.Module):
-    """Standard deviations that the filter begins with, of its random walks, and of what is measured.
-
-    `slope_walk` and so on are per root second; a slope also falls back to level with `slope_time`, a softness to the file's with
-    `softness_time` (s), in which it forgets as much as it spreads. `wheel` (m/s) is what edges of
-    teeth leave, `wheel_share` (-) goes with the speed; `slip_share` (-) is of the slip that is expected, and `limit_slip` (-)
-    the slip that nobody knows at a force of the whole load, less with its fourth power. `turn` (m/s per rad/s) is of the wheels'
-    places.
-    """
-
-    slope: jax.Array = positive("m/s^2", default=0.3)
-    slope_time: jax.Array = positive("s", default=15.0)
-    slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.15)
-    offset: jax.Array = positive("m/s^2", default=0.12)
-    offset_walk: jax.Array = positive("m/s^2/sqrt(s)", default=2e-3)
-    gain: jax.Array = positive("-", default=0.012)
-    radius: jax.Array = positive("-", default=0.004)
-    radius_walk: jax.Array = positive("1/sqrt(s)", default=1e-4)
-    softness: jax.Array = positive("-", default=0.35)
-    softness_time: jax.Array = positive("s", default=300.0)
-    force_walk: jax.Array = positive("m/s^2/sqrt(s)", default=6.0)
-    speed_walk: jax.Array = positive("m/s/sqrt(s)", default=0.02)
-    a_x: jax.Array = positive("m/s^2", default=0.1)
-    wheel: jax.Array = positive("m/s", default=0.04)
-    wheel_share: jax.Array = positive("-", default=1e-3)
-    slip_share: jax.Array = positive("-", default=0.25)
-    peak_slip: jax.Array = positive("-", default=0.3)
-    limit_slip: jax.Array = positive("-", default=0.03)
-    suspicion_time: jax.Array = positive("s", default=0.4)
-    other_slip: jax.Array = positive("-", default=0.015)
-    repeats: jax.Array = positive("-", default=25.0)
-    turn: jax.Array = positive("m/s per rad/s", default=0.05)
-    satellite: jax.Array = positive("m/s", default=0.06)
-
-
-class Memory(NamedTuple):
-    """The belief and its time; what was heard last and when, by channel; each wheel's low-passed speed and trust; the car's
-    low-passed acceleration; since when no wheel was trusted, and since when all say zero."""
-
-    belief: Belief
-    t: Any
-    heard: dict[str, Any]
-    at: dict[str, Any]
-    smooth: Any
-    smooth_at: Any
-    trust: Any
-    suspicion: Any
-    rate: Any
-    lost: Any
-    zero: Any
-
-
-class Said(NamedTuple):
-    """What the wheels are expected to say, `speed`, and without slip, `rolling` (m/s); the `slip` in it and the force over load,
-    `share` (-), (4,) each."""
-
-    speed: Any
-    rolling: Any
-    slip: Any
-    share: Any
-
 
 class SlipAware(AbstractMethod):
-    """An error-state filter of [v_x, force, slope, accelerometer's offset and gain, four radii, slip softness of two axles].
+    """An error-state filter of what wheels say, force, slope, the accelerometer's offset and gain, radii and slip softness.
 
         dv_x/dt = force + v_y yaw_rate - slope,        a_x = (1 + gain) force + offset
         wheel   = (1 + radius) (1 + sink) (1 + slip) (the speed of the wheel's own place along its plane)
-        slip    = exp(softness) F / (K F_z),           F from the torques where the log has them, else from `force`
+        slip    = exp(softness) F / (K F_z) - f_r / K,      F from the torques where the log has them, else from `force`
 
-    `gain` is there because an accelerometer on the body pitches with it. Loads move with the force, and with them the radius
-    on which a tyre rolls (a third of its compression). Lateral speeds are those of a steady turn on the file's cornering
-    stiffnesses.
+    `gain` is there because an accelerometer on the body pitches with it: g times the file's `pitch_gradient`, or that of usual
+    cars. Loads move with the forces, and with them the radius on which a tyre rolls (a third of its `compression`, over the
+    radius). Lateral speeds are those of a steady turn on the file's cornering stiffnesses.
 
     **Trust**: a wheel counts by `(gate / |e|)^8` where its normalised innovation e is beyond `gate`, and likewise where its own
-    acceleration is further than `rate_gate` (m/s^2) from the car's; trust is lost at once and comes back within `memory` (s). A
-    wheel that slips is left out, all four if need be: then the accelerometer carries on, with an offset, gain and slope
-    that the drive before has told. Wheels that agree with the accelerometer's rate for `patience` (s) and are still not
-    trusted widen the belief until they are.
+    acceleration is further than `rate_gate` (m/s^2) from the car's (four times that without an accelerometer); trust is lost
+    at once and comes back within `memory` (s). Where wheels agree and have little force (`calm`, over load), the belief is
+    wrong rather than they: the gate is five times as wide. A wheel that slips is left out, all four if need be: then the
+    accelerometer carries on, with an offset, gain and slope that the drive before has told. While most wheels are at their limit
+    and the force is beyond `bound_force` (m/s^2), two wheels that are faster than a braking car, or slower than a driven
+    one, bound its speed. Wheels that agree with the accelerometer's rate for `patience` (s) and are still not trusted widen the
+    belief until they are.
 
     **Delays** (s, of the production car): `a_x_delay` of accelerometer and its low-pass, `wheel_delay` of wheel speeds, half a
     period included, `satellite_delay`. What is said is of now: the belief, moved on by its acceleration.
@@ -177,12 +90,7 @@ class SlipAware(AbstractMethod):
 
     @property
     def needs(self):
-        optional = (
-            ("a_x", "m/s^2"), ("a_y", "m/s^2"), ("yaw_rate", "rad/s"), ("steer", "rad"), ("steering_wheel", "rad"),
-            ("speed", "m/s"), ("drive_torque", "N m"), *[(f"brake_torque_{at}", "N m") for at in AT],
-            *[(f"torque_{at}", "N m") for at in AT],
-        )  # fmt: skip
-        return (*WHEEL_SPEEDS, *[Need(name, unit, optional=True) for name, unit in optional])
+        return (*WHEEL_SPEEDS, *MAY_HELP)
 
     def first(self, t, values):
         wheels = wheel_values(values)
@@ -196,7 +104,7 @@ class SlipAware(AbstractMethod):
             0.5 * s.radius, *[0.0 * s.radius] * 4, *[s.softness] * 2,
         )  # fmt: skip
         stack = lambda state: jnp.stack([jnp.asarray(one, t.dtype) for one in state])
-        belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + self._radii(s.radius))
+        belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + own_radii(s.radius))
         never = jnp.full_like(t, -jnp.inf)
         ones = jnp.ones_like(wheels)
         memory = Memory(
@@ -271,13 +179,8 @@ class SlipAware(AbstractMethod):
         slope_walk = jnp.where(felt, s.slope_walk, 0.0)
         # Of a wheel's own radius: below.
         walks = [wander, s.force_walk, slope_walk, s.offset_walk, none, 0.5 * s.radius_walk, *[none] * 4, soft, soft]
-        noise = jnp.diag(jnp.square(jnp.stack(walks))) + self._radii(s.radius_walk)
+        noise = jnp.diag(jnp.square(jnp.stack(walks))) + own_radii(s.radius_walk)
         return predict(memory.belief, move, step * noise)
-
-    def _radii(self, std):
-        """The covariance of four radii of equal spread `std`, less their mean, where the state has them."""
-        free = jnp.eye(4, dtype=std.dtype) - 0.25
-        return jnp.zeros((12, 12), std.dtype).at[RADII, RADII].set(free * jnp.square(std))
 
     def _smooth_rate(self, memory: Memory, belief: Belief, step):
         now = self._acceleration(memory, SpeedState(*belief.mean))
@@ -304,41 +207,41 @@ class SlipAware(AbstractMethod):
     def _gate(self, found, most):
         """1 within `most` standard deviations, and less with the eighth power of how far beyond."""
         far = numerics.sqrt(jnp.square(found.residual) / found.variance)
-        return _beyond(far / most)
+        return beyond(far / most)
 
     def _wheels(self, memory: Memory, mean) -> Said:
         """What the wheels would say of a mean (n,)."""
         x, car = SpeedState(*mean), self.car
         v_x = x.rolled - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
         yaw_rate, a_y, _ = self._lateral(memory, x)
-        along = v_x - LEFT.astype(v_x.dtype) * 0.5 * _front_rear(car.track_front, car.track_rear) * yaw_rate
+        along = v_x - LEFT.astype(v_x.dtype) * 0.5 * front_rear(car.track_front, car.track_rear) * yaw_rate
         steer = memory.heard["steer"]
         slip_angle = car.mass * car.rear_axle_to_cg / car.wheelbase * a_y / car.front_cornering_stiffness
         turned = along * numerics.cos(steer) + v_x * (steer - slip_angle) * numerics.sin(steer)
         along = jnp.where(FRONT, turned, along)
         share, load = self._shares_of_load(memory, x)
         front, rear = (slip_stiffness(c, n) for c, n in zip(car.cornering_stiffnesses, car.loads, strict=True))
-        softness = _front_rear(x.softness_front, x.softness_rear)
-        slip = jnp.exp(softness) * share / _front_rear(front, rear)
-        sink = self.compression / 3.0 * (load / _front_rear(*car.loads) - 1.0)
+        softness = front_rear(x.softness_front, x.softness_rear)
+        slip = jnp.exp(softness) * share / front_rear(front, rear)
+        sink = self.compression / 3.0 * (load / front_rear(*car.loads) - 1.0)
         rolling = along * (1.0 + mean[RADII] + sink)
         return Said(rolling + along * slip, rolling, slip, share)
 
     def _shares_of_load(self, memory: Memory, x: SpeedState):
         """Each wheel's longitudinal force over its load (-), and its load (N), (4,)."""
         car = self.car
-        at_rest = _front_rear(*car.loads)
+        at_rest = front_rear(*car.loads)
         pitched = 0.5 * car.mass * x.force * car.cg_height / car.wheelbase
         a_y = self._lateral(memory, x)[1]
         rolled = 2.0 * a_y / GRAVITY * car.cg_height / (0.5 * (car.track_front + car.track_rear))
         load = jnp.maximum(
-            at_rest * (1.0 - LEFT.astype(rolled.dtype) * rolled) + _front_rear(-pitched, pitched), 0.1 * at_rest
+            at_rest * (1.0 - LEFT.astype(rolled.dtype) * rolled) + front_rear(-pitched, pitched), 0.1 * at_rest
         )
         rolling = car.rolling_resistance * car.mass * GRAVITY
         push = car.mass * x.force + car.drag * x.rolled * jnp.abs(x.rolled) + rolling
-        force = _front_rear(*forces_of_axles(car, push))
+        force = front_rear(*forces_of_axles(car, push))
         brakes = [f"brake_torque_{place}" for place in AT]
-        drive = 0.5 * _front_rear(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
+        drive = 0.5 * front_rear(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
         by_torque = (drive - jnp.stack([memory.heard[name] for name in brakes])) / car.wheel_radius
         known = jnp.stack([self._speaks(memory, name) for name in brakes]) & self._speaks(memory, "drive_torque")
         return jnp.where(known, by_torque, force) / load - car.rolling_resistance, load
@@ -353,7 +256,7 @@ class SlipAware(AbstractMethod):
         rates = (jnp.where(there, wheels, smooth) - smooth) / self.smoothing
         # Without an accelerometer the car's rate is that of the wheels.
         gate = self.rate_gate * jnp.where(self._speaks(memory, "a_x"), 1.0, 4.0)
-        steady = _beyond((rates - memory.rate) / gate)
+        steady = beyond((rates - memory.rate) / gate)
         said = self._wheels(memory, belief.mean)
         suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
         most = jnp.sort(suspicion)[1]
@@ -404,7 +307,7 @@ class SlipAware(AbstractMethod):
         agree = jnp.clip(others - 0.5, 0.0, 1.0)
         calm = jnp.exp(-jnp.square(said.share / self.calm))
         far = numerics.sqrt(jnp.square(found.residual) / found.variance)
-        return _beyond(far / (self.gate * (1.0 + 4.0 * calm * agree)))
+        return beyond(far / (self.gate * (1.0 + 4.0 * calm * agree)))
 
     def _wheel_variances(self, memory: Memory, belief: Belief, said: Said):
         s, v_x = self.spreads, jnp.abs(belief.mean[0])
@@ -449,13 +352,3 @@ class SlipAware(AbstractMethod):
             {"v_x": std, "grade": stds[2] / GRAVITY, "a_x_offset": stds[3]},
             known,
         )
-
-
-def _front_rear(front: Any, rear: Any) -> Any:
-    return jnp.where(FRONT, front, rear)
-
-
-def _beyond(far: Any) -> Any:
-    """1 where |far| <= 1, else its inverse to the eighth power; safe for what is huge."""
-    size = jnp.clip(jnp.abs(far), 1.0, 1e3)
-    return 1.0 / jnp.square(jnp.square(jnp.square(size)))
