@@ -13,7 +13,8 @@ from jaxveh.estimators.speed.accelerometer import AccelerometerIntegral
 from jaxveh.estimators.speed.car_numbers import FORCE_KEYS, keys_of, speed_car
 from jaxveh.estimators.speed.forces import BrakeForces, MotorForces
 from jaxveh.estimators.speed.fuzzy import Fuzzy
-from jaxveh.estimators.speed.slip_aware import SlipAware, Spreads
+from jaxveh.estimators.speed.slip_aware import SlipAware
+from jaxveh.estimators.speed.slip_state import Spreads
 from jaxveh.estimators.speed.weighted import Weighted
 from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, Combined, FastestWheel, SlopeLimited, SlowestWheel
 from jaxveh.io import CarSpecification

@@ -8,7 +8,6 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
-from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles, slip_stiffness
 from jaxveh.estimators.speed.gaussian import (
@@ -20,10 +19,11 @@ from jaxveh.estimators.speed.gaussian import (
     update,
     update_by_each,
 )
-from jaxveh.estimators.speed.slip_aware_state import (
+from jaxveh.estimators.speed.slip_state import (
     FRONT,
     HELD,
     LEFT,
+    MAY_HELP,
     PATIENCE,
     RADII,
     Memory,
@@ -31,30 +31,33 @@ from jaxveh.estimators.speed.slip_aware_state import (
     SpeedState,
     Spreads,
     beyond,
-    of_axles,
-    wheel_loads,
-)  # fmt: skip
+    front_rear,
+    own_radii,
+)
 from jaxveh.estimators.speed.wheels import AT, WHEEL_SPEEDS, wheel_values
 from jaxveh.numerics import smooth_step
 from jaxveh.vehicles import GRAVITY
 
 
 class SlipAware(AbstractMethod):
-    """An error-state filter of [v_x, force, slope, accelerometer's offset and gain, four radii, slip softness of two axles].
+    """An error-state filter of what wheels say, force, slope, the accelerometer's offset and gain, radii and slip softness.
 
         dv_x/dt = force + v_y yaw_rate - slope,        a_x = (1 + gain) force + offset
         wheel   = (1 + radius) (1 + sink) (1 + slip) (the speed of the wheel's own place along its plane)
-        slip    = exp(softness) F / (K F_z),           F from the torques where the log has them, else from `force`
+        slip    = exp(softness) F / (K F_z) - f_r / K,      F from the torques where the log has them, else from `force`
 
-    `gain` is there because an accelerometer on the body pitches with it. Loads move with the force, and with them the radius
-    on which a tyre rolls (a third of its compression). Lateral speeds are those of a steady turn on the file's cornering
-    stiffnesses.
+    `gain` is there because an accelerometer on the body pitches with it: g times the file's `pitch_gradient`, or that of usual
+    cars. Loads move with the forces, and with them the radius on which a tyre rolls (a third of its `compression`, over the
+    radius). Lateral speeds are those of a steady turn on the file's cornering stiffnesses.
 
     **Trust**: a wheel counts by `(gate / |e|)^8` where its normalised innovation e is beyond `gate`, and likewise where its own
-    acceleration is further than `rate_gate` (m/s^2) from the car's; trust is lost at once and comes back within `memory` (s). A
-    wheel that slips is left out, all four if need be: then the accelerometer carries on, with an offset, gain and slope
-    that the drive before has told. Wheels that agree with the accelerometer's rate for `patience` (s) and are still not
-    trusted widen the belief until they are.
+    acceleration is further than `rate_gate` (m/s^2) from the car's (four times that without an accelerometer); trust is lost
+    at once and comes back within `memory` (s). Where wheels agree and have little force (`calm`, over load), the belief is
+    wrong rather than they: the gate is five times as wide. A wheel that slips is left out, all four if need be: then the
+    accelerometer carries on, with an offset, gain and slope that the drive before has told. While most wheels are at their limit
+    and the force is beyond `bound_force` (m/s^2), two wheels that are faster than a braking car, or slower than a driven
+    one, bound its speed. Wheels that agree with the accelerometer's rate for `patience` (s) and are still not trusted widen the
+    belief until they are.
 
     **Delays** (s, of the production car): `a_x_delay` of accelerometer and its low-pass, `wheel_delay` of wheel speeds, half a
     period included, `satellite_delay`. What is said is of now: the belief, moved on by its acceleration.
@@ -87,12 +90,7 @@ class SlipAware(AbstractMethod):
 
     @property
     def needs(self):
-        optional = (
-            ("a_x", "m/s^2"), ("a_y", "m/s^2"), ("yaw_rate", "rad/s"), ("steer", "rad"), ("steering_wheel", "rad"),
-            ("speed", "m/s"), ("drive_torque", "N m"), *[(f"brake_torque_{at}", "N m") for at in AT],
-            *[(f"torque_{at}", "N m") for at in AT],
-        )  # fmt: skip
-        return (*WHEEL_SPEEDS, *[Need(name, unit, optional=True) for name, unit in optional])
+        return (*WHEEL_SPEEDS, *MAY_HELP)
 
     def first(self, t, values):
         wheels = wheel_values(values)
@@ -106,7 +104,7 @@ class SlipAware(AbstractMethod):
             0.5 * s.radius, *[0.0 * s.radius] * 4, *[s.softness] * 2,
         )  # fmt: skip
         stack = lambda state: jnp.stack([jnp.asarray(one, t.dtype) for one in state])
-        belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + self._radii(s.radius))
+        belief = Belief(stack(mean), jnp.diag(jnp.square(stack(std))) + own_radii(s.radius))
         never = jnp.full_like(t, -jnp.inf)
         ones = jnp.ones_like(wheels)
         memory = Memory(
@@ -128,6 +126,8 @@ class SlipAware(AbstractMethod):
         memory = memory._replace(belief=belief, t=t)
         return memory, self._answer(memory)
 
+    # What was heard last.
+
     def _hear(self, memory: Memory, t, values):
         steer = values["steer"] - self.car.steer_offset
         wheel = values["steering_wheel"]
@@ -142,6 +142,8 @@ class SlipAware(AbstractMethod):
 
     def _speaks(self, memory: Memory, name: str):
         return memory.t - memory.at[name] <= PATIENCE
+
+    # The motion.
 
     def _lateral(self, memory: Memory, x: SpeedState):
         """Yaw rate (rad/s), lateral acceleration (m/s^2), and the lateral speed (m/s) of a steady turn."""
@@ -177,17 +179,14 @@ class SlipAware(AbstractMethod):
         slope_walk = jnp.where(felt, s.slope_walk, 0.0)
         # Of a wheel's own radius: below.
         walks = [wander, s.force_walk, slope_walk, s.offset_walk, none, 0.5 * s.radius_walk, *[none] * 4, soft, soft]
-        noise = jnp.diag(jnp.square(jnp.stack(walks))) + self._radii(s.radius_walk)
+        noise = jnp.diag(jnp.square(jnp.stack(walks))) + own_radii(s.radius_walk)
         return predict(memory.belief, move, step * noise)
-
-    def _radii(self, std):
-        """The covariance of four radii of equal spread `std`, less their mean, where the state has them."""
-        free = jnp.eye(4, dtype=std.dtype) - 0.25
-        return jnp.zeros((12, 12), std.dtype).at[RADII, RADII].set(free * jnp.square(std))
 
     def _smooth_rate(self, memory: Memory, belief: Belief, step):
         now = self._acceleration(memory, SpeedState(*belief.mean))
         return memory.rate + (1.0 - jnp.exp(-step / self.smoothing)) * (now - memory.rate)
+
+    # What is measured.
 
     def _felt(self, mean):
         x = SpeedState(*mean)
@@ -215,31 +214,39 @@ class SlipAware(AbstractMethod):
         x, car = SpeedState(*mean), self.car
         v_x = x.rolled - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
         yaw_rate, a_y, _ = self._lateral(memory, x)
-        along = v_x - LEFT.astype(v_x.dtype) * 0.5 * of_axles(car.track_front, car.track_rear) * yaw_rate
+        along = v_x - LEFT.astype(v_x.dtype) * 0.5 * front_rear(car.track_front, car.track_rear) * yaw_rate
         steer = memory.heard["steer"]
         slip_angle = car.mass * car.rear_axle_to_cg / car.wheelbase * a_y / car.front_cornering_stiffness
         turned = along * numerics.cos(steer) + v_x * (steer - slip_angle) * numerics.sin(steer)
         along = jnp.where(FRONT, turned, along)
         share, load = self._shares_of_load(memory, x)
         front, rear = (slip_stiffness(c, n) for c, n in zip(car.cornering_stiffnesses, car.loads, strict=True))
-        softness = of_axles(x.softness_front, x.softness_rear)
-        slip = jnp.exp(softness) * share / of_axles(front, rear)
-        sink = self.compression / 3.0 * (load / of_axles(*car.loads) - 1.0)
+        softness = front_rear(x.softness_front, x.softness_rear)
+        slip = jnp.exp(softness) * share / front_rear(front, rear)
+        sink = self.compression / 3.0 * (load / front_rear(*car.loads) - 1.0)
         rolling = along * (1.0 + mean[RADII] + sink)
         return Said(rolling + along * slip, rolling, slip, share)
 
     def _shares_of_load(self, memory: Memory, x: SpeedState):
         """Each wheel's longitudinal force over its load (-), and its load (N), (4,)."""
         car = self.car
-        load = wheel_loads(car, x.force, self._lateral(memory, x)[1])
+        at_rest = front_rear(*car.loads)
+        pitched = 0.5 * car.mass * x.force * car.cg_height / car.wheelbase
+        a_y = self._lateral(memory, x)[1]
+        rolled = 2.0 * a_y / GRAVITY * car.cg_height / (0.5 * (car.track_front + car.track_rear))
+        load = jnp.maximum(
+            at_rest * (1.0 - LEFT.astype(rolled.dtype) * rolled) + front_rear(-pitched, pitched), 0.1 * at_rest
+        )
         rolling = car.rolling_resistance * car.mass * GRAVITY
         push = car.mass * x.force + car.drag * x.rolled * jnp.abs(x.rolled) + rolling
-        force = of_axles(*forces_of_axles(car, push))
+        force = front_rear(*forces_of_axles(car, push))
         brakes = [f"brake_torque_{place}" for place in AT]
-        drive = 0.5 * of_axles(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
+        drive = 0.5 * front_rear(car.front_drive, 1.0 - car.front_drive) * memory.heard["drive_torque"]
         by_torque = (drive - jnp.stack([memory.heard[name] for name in brakes])) / car.wheel_radius
         known = jnp.stack([self._speaks(memory, name) for name in brakes]) & self._speaks(memory, "drive_torque")
         return jnp.where(known, by_torque, force) / load - car.rolling_resistance, load
+
+    # The wheels.
 
     def _use_wheels(self, memory: Memory, belief: Belief, t, step, wheels):
         there = ~jnp.isnan(wheels)

@@ -1,4 +1,4 @@
-"""What the recommended speed believes, remembers and hears."""
+"""What the recommended filter of speed remembers, and how sure it is of what."""
 
 from __future__ import annotations
 
@@ -10,18 +10,30 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.parameter import positive
-from jaxveh.estimators.speed.car_numbers import SpeedCar
+from jaxveh.estimators.contract import Need
 from jaxveh.estimators.speed.gaussian import Belief
 from jaxveh.estimators.speed.wheels import AT
-from jaxveh.vehicles import GRAVITY
 
 LEFT = np.array([1, -1, 1, -1])
+"""1 of wheels on the left, -1 of those on the right; front left first."""
+
 FRONT = np.array([True, True, False, False])
+"""Which of them are in front."""
+
 RADII = slice(6, 10)
 """Where the radii are in the state."""
 
 HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in AT))
 """What is held between two of its samples."""
+
+MAY_HELP = tuple(
+    Need(name, unit, optional=True)
+    for name, unit in (
+        ("a_x", "m/s^2"), ("a_y", "m/s^2"), ("yaw_rate", "rad/s"), ("steer", "rad"), ("steering_wheel", "rad"), ("speed", "m/s"),
+        ("drive_torque", "N m"), *[(f"brake_torque_{at}", "N m") for at in AT], *[(f"torque_{at}", "N m") for at in AT],
+    )
+)  # fmt: skip
+"""Channels that are read where a log has them."""
 
 PATIENCE = 0.3
 """s: for so long a sample is held, then the channel is silent."""
@@ -58,11 +70,15 @@ class SpeedState(NamedTuple):
 class Spreads(eqx.Module):
     """Standard deviations that the filter begins with, of its random walks, and of what is measured.
 
-    `slope_walk` and so on are per root second; a slope also falls back to level with `slope_time`, a softness to the file's with
-    `softness_time` (s), in which it forgets as much as it spreads. `wheel` (m/s) is what edges of
-    teeth leave, `wheel_share` (-) goes with the speed; `slip_share` (-) is of the slip that is expected, and `limit_slip` (-)
-    the slip that nobody knows at a force of the whole load, less with its fourth power. `turn` (m/s per rad/s) is of the wheels'
-    places.
+    `slope_walk` and so on are per root second; a slope falls back to level with `slope_time` (s), a softness to the file's with
+    `softness_time` (s), in which it forgets as much as it spreads. `radius` is of each wheel's own, and of what all have in
+    common half of it. `wheel` (m/s) is what edges of teeth leave, `wheel_share` (-) goes with the speed.
+
+    What follows lasts, so that `repeats` samples of it count as one: `slip_share` (-) of the slip that is expected; `peak_slip`
+    (-), the slip that nobody knows at a force of the whole load, less with its fourth power; `limit_slip` (-) of a wheel that has
+    been at its limit lately (it forgets with `suspicion_time`, s), which is expected to slip by as much more; `other_slip` (-)
+    of all wheels where one is at its limit, and the others' forces are not those of the shares; `turn` (m/s per rad/s) of
+    the wheels' places.
     """
 
     slope: jax.Array = positive("m/s^2", default=0.3)
@@ -91,8 +107,9 @@ class Spreads(eqx.Module):
 
 
 class Memory(NamedTuple):
-    """The belief and its time; what was heard last and when, by channel; each wheel's low-passed speed and trust; the car's
-    low-passed acceleration; since when no wheel was trusted, and since when all say zero."""
+    """The belief and its time; what was heard last and when, by channel; each wheel's low-passed speed, when that was heard, its
+    trust, and the suspicion that it is at its limit; the car's low-passed acceleration; since when no wheel was trusted, and
+    since when all say zero."""
 
     belief: Belief
     t: Any
@@ -117,7 +134,8 @@ class Said(NamedTuple):
     share: Any
 
 
-def of_axles(front: Any, rear: Any) -> Any:
+def front_rear(front: Any, rear: Any) -> Any:
+    """What the wheels of an axle have in common, (4,)."""
     return jnp.where(FRONT, front, rear)
 
 
@@ -127,11 +145,7 @@ def beyond(far: Any) -> Any:
     return 1.0 / jnp.square(jnp.square(jnp.square(size)))
 
 
-def wheel_loads(car: SpeedCar, force: Any, a_y: Any) -> Any:
-    """The wheels' loads, N, (4,), under a longitudinal force over the mass and a lateral acceleration (m/s^2); none lifts off."""
-    at_rest = of_axles(*car.loads)
-    pitched = 0.5 * car.mass * force * car.cg_height / car.wheelbase
-    rolled = 2.0 * a_y / GRAVITY * car.cg_height / (0.5 * (car.track_front + car.track_rear))
-    return jnp.maximum(
-        at_rest * (1.0 - LEFT.astype(rolled.dtype) * rolled) + of_axles(-pitched, pitched), 0.1 * at_rest
-    )
+def own_radii(std: Any) -> Any:
+    """The covariance of a state whose four radii have equal spreads `std`, less their mean, and nothing else one."""
+    free = jnp.eye(4, dtype=std.dtype) - 0.25
+    return jnp.zeros((12, 12), std.dtype).at[RADII, RADII].set(free * jnp.square(std))
