@@ -60,7 +60,7 @@ def channels_kept() -> tuple[str, ...]:
         for one in module.METHODS.values():
             with contextlib.suppress(InputError):
                 read |= {need.channel for need in one.make(told_cars()[0]).needs}
-    return tuple(sorted(shown | read | {"true.v_x"}))
+    return tuple(sorted(shown | read | {"true.v_x", "true.sideslip"}))
 
 
 def chapter_drives(
@@ -128,7 +128,8 @@ def race_methods(
 
 
 def _data(module: ModuleType, method: AbstractMethod, drives: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    wanted = {need.channel for need in method.needs} | {f"true.{name}" for name in module.SHOWN} | {"car", "true.v_x"}
+    wanted = {need.channel for need in method.needs} | {f"true.{name}" for name in module.SHOWN}
+    wanted |= {"car", "true.v_x", "true.sideslip"}
     return {name: drives[name] for name in sorted(wanted) if name in drives}
 
 
@@ -152,7 +153,11 @@ def _run(methods: list[AbstractMethod], conclude: Callable[[Any, dict], dict]):
 
 def _score(module: ModuleType, said: Any, drive: dict) -> dict[str, Any]:
     shown = [name for name in module.SHOWN if f"true.{name}" in drive]
-    return {name: metrics(getattr(said.mean, name), getattr(said.known, name), drive[f"true.{name}"]) for name in shown}
+    held = jnp.cumprod((jnp.abs(drive["true.sideslip"]) < LOST).astype(int)) > 0
+    return {
+        name: metrics(getattr(said.mean, name), getattr(said.known, name), drive[f"true.{name}"], held)
+        for name in shown
+    }
 
 
 STEP = 0.01
@@ -162,13 +167,17 @@ WARM_UP = 5.0
 """s: not scored."""
 
 
-def metrics(mean, known, truth) -> dict[str, Any]:
+LOST = np.radians(20.0)
+"""rad of sideslip: from there on a car has spun, and nothing of the drive is scored."""
+
+
+def metrics(mean, known, truth, held) -> dict[str, Any]:
     """Of one drive: root mean square of the error over the first and the second half (`early`, `late`), over all (`rmse`) and
     where the method says that it knows (`rmse_known`), the largest error (`worst`), the share of rows known (`known`), by how
-    many seconds it is late (`delay`), and whether it was finite throughout (`failed`)."""
+    many seconds it is late (`delay`), and whether it was not finite throughout (`failed`); of rows in which the car is `held`."""
     rows = jnp.arange(truth.shape[0])
-    warm, half = rows >= round(WARM_UP / STEP), rows.shape[0] // 2
-    finite = jnp.isfinite(mean)
+    warm, half = held & (rows >= round(WARM_UP / STEP)), rows.shape[0] // 2
+    finite = jnp.isfinite(mean) & held
     error = jnp.where(finite, mean - truth, 0.0)
     rms = lambda which: jnp.sqrt(jnp.sum(jnp.where(which, error**2, 0.0)) / jnp.sum(which).astype(error.dtype))
     return {
@@ -207,8 +216,10 @@ def _nothing(drives: Mapping[str, np.ndarray]) -> dict[tuple[str, str], dict[str
                 continue
             for name, values in guess.items():
                 if (quantity, name) in found:
-                    error = (np.asarray(values) - drives[f"true.{name}"][place])[round(WARM_UP / STEP) :]
-                    found[quantity, name]["rmse"][place] = np.sqrt(np.nanmean(error**2))
+                    error = np.asarray(values) - drives[f"true.{name}"][place]
+                    held = np.cumprod(np.abs(drives["true.sideslip"][place]) < LOST) > 0
+                    held[: round(WARM_UP / STEP)] = False
+                    found[quantity, name]["rmse"][place] = np.sqrt(np.nanmean(error[held] ** 2))
     return found
 
 

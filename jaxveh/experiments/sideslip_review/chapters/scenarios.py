@@ -38,14 +38,14 @@ class Scenario(NamedTuple):
 
 SCENARIOS = {
     "normal": Scenario(),
-    "limit": Scenario(steer=0.03),
+    "limit": Scenario(steer=0.022),
     "low mu": Scenario(friction=0.35, friction_later=0.35),
     "mu jump": Scenario(steer=0.016, friction_later=0.4),
     "split mu": Scenario(steer=0.02, split=0.6, drop=8.0),
     "bank": Scenario(bank=0.05),
     "grade": Scenario(grade=0.06),
     "ABS": Scenario(friction=0.35, friction_later=0.35, steer=0.006, drop=14.0),
-    "wheelspin": Scenario(friction=0.4, friction_later=0.4, steer=0.002, wheelspin=4.0),
+    "wheelspin": Scenario(friction=0.4, friction_later=0.4, steer=0.002, wheelspin=2.5),
     "sensor bias": Scenario(offsets=5.0),
     "satellite outage": Scenario(outage=20.0),
     "wrong stiffness": Scenario(stiffness=0.65),
