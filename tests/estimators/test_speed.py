@@ -262,6 +262,19 @@ def test_the_files_pitch_gradient_is_the_accelerometers_gain():
     assert method.spreads.gain < speed.METHODS["slip_aware"].make(CAR).spreads.gain
 
 
+def test_a_car_that_stops_with_locked_wheels_stands():
+    """All wheels say zero from 12 m/s on; the accelerometer says when the car stands."""
+    t = 0.01 * np.arange(2001)
+    true = np.clip(12.0 - 6.0 * (t - 12.0), 0.0, 12.0)
+    wheels = np.where(t < 12.0, true, 0.0)
+    a_x = np.where((t > 12.0) & (true > 0.0), -6.0 * 1.048, 0.0) + 0.1
+    none = np.full(len(t), np.nan)
+    said = speed.estimate(CAR, log_of("slip_aware", t, wheels, a_x=a_x, yaw_rate=none, speed=none))
+    v_x = np.asarray(said["v_x"])
+    assert np.abs(v_x - true)[t > 5.0].max() < 0.35
+    assert np.abs(v_x)[t > 15.0].max() < 0.05 and np.asarray(said.known.v_x)[t > 15.0].all()
+
+
 @pytest.mark.studies
 def test_a_car_under_its_anti_lock_system():
     """A sedan of seven degrees of freedom that brakes with all wheels at their limit; production sensors, radii off."""

@@ -109,7 +109,7 @@ class SlipAware(AbstractMethod):
         ones = jnp.ones_like(wheels)
         memory = Memory(
             belief, t, dict.fromkeys(HELD, zero), dict.fromkeys(HELD, never), jnp.where(there, wheels, v_x), t * ones, ones,
-            0.0 * ones, zero, t, t,
+            0.0 * ones, zero, t,
         )  # fmt: skip
         return memory, self._answer(memory)
 
@@ -284,15 +284,13 @@ class SlipAware(AbstractMethod):
         belief = update_by_each(belief, found, jnp.where(there, trust * lasts, 0.0))
         rolling = rolling._replace(residual=rolling.residual - rolling.slope @ (belief.mean - before))
         belief = self._bound(belief, rolling, there, white, most)
-        zero = jnp.where(jnp.all(jnp.where(there, wheels == 0.0, memory.smooth == 0.0)), memory.zero, t)
-        belief = self._stand(belief, t, zero)
-        strange = jnp.any(there & (steady < 0.5)) | (zero < t)
+        locked = jnp.all(jnp.where(there, wheels == 0.0, memory.smooth == 0.0))
+        strange = jnp.any(there & (steady < 0.5)) | locked
         return belief, memory._replace(
             smooth=jnp.where(there & (wheels == 0.0), 0.0, smooth),
             smooth_at=jnp.where(there, t, memory.smooth_at),
             trust=trust,
             suspicion=jnp.where(there, jnp.maximum(suspicion, 1.0 - now), suspicion),
-            zero=zero,
             lost=jnp.where(jnp.any(there & (trust > 0.5)) | strange, t, memory.lost),
         )
 
@@ -330,13 +328,6 @@ class SlipAware(AbstractMethod):
         one = Innovation(rolling.residual[second], slope @ belief.covariance @ slope + white, slope)
         sure = most * smooth_step(jnp.abs(force) - self.bound_force)
         return update(belief, one, jnp.where(over[second] > 0.0, sure, 0.0))
-
-    def _stand(self, belief: Belief, t, zero):
-        """Wheels that have all said zero for a while, in a car that does not slow down, stand."""
-        x = SpeedState(*belief.mean)
-        stands = (t - zero > 1.0) & (jnp.abs(x.force - x.slope) < 0.7)
-        found = innovation(belief, lambda mean: mean[0], jnp.zeros_like(t), jnp.square(self.spreads.wheel))
-        return update(belief, found, jnp.where(stands, 1.0, 0.0))
 
     def _answer(self, memory: Memory):
         mean, covariance = memory.belief

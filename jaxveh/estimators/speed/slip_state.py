@@ -108,8 +108,7 @@ class Spreads(eqx.Module):
 
 class Memory(NamedTuple):
     """The belief and its time; what was heard last and when, by channel; each wheel's low-passed speed, when that was heard, its
-    trust, and the suspicion that it is at its limit; the car's low-passed acceleration; since when no wheel was trusted, and
-    since when all say zero."""
+    trust, and the suspicion that it is at its limit; the car's low-passed acceleration; since when no wheel was trusted."""
 
     belief: Belief
     t: Any
@@ -121,7 +120,6 @@ class Memory(NamedTuple):
     suspicion: Any
     rate: Any
     lost: Any
-    zero: Any
 
 
 class Said(NamedTuple):
