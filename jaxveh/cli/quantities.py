@@ -94,9 +94,10 @@ def methods_of(text: str | None, what: tuple[str, ...]) -> tuple[str, ...] | Non
     """
     if text is None:
         return None
-    if len(what) > 1:
+    quantity, *others = what
+    if others:
         raise InputError(f"--methods is of one quantity: name one with --what, not {', '.join(what)}.")
-    return names_of(text, f"--methods of {what[0]}", tuple(QUANTITIES[what[0]].METHODS))
+    return names_of(text, f"--methods of {quantity}", tuple(QUANTITIES[quantity].METHODS))
 
 
 def estimate_quantities(asked: Asked, numbers: Path | None) -> None:
@@ -295,7 +296,8 @@ def _draw(asked: Asked, log: Path, recording: Recording, found: dict[str, Shown]
     """A figure a quantity: all its methods, and the truth."""
     from jaxveh import plots
 
-    out = asked.out if len(asked.logs) == 1 else asked.out / log.stem  # type: ignore[operator]
+    assert asked.out is not None  # who draws has a folder
+    out = asked.out if len(asked.logs) == 1 else asked.out / log.stem
     make_folder(out)
     paths = []
     for quantity, shown in found.items():

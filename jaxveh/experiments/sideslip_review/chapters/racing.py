@@ -179,11 +179,12 @@ def metrics(mean, known, truth, held) -> dict[str, Any]:
     warm, half = held & (rows >= round(WARM_UP / STEP)), rows.shape[0] // 2
     finite = jnp.isfinite(mean) & held
     error = jnp.where(finite, mean - truth, 0.0)
-    rms = lambda which: jnp.sqrt(jnp.sum(jnp.where(which, error**2, 0.0)) / jnp.sum(which).astype(error.dtype))
+    count = lambda which: jnp.sum(which.astype(error.dtype))
+    rms = lambda which: jnp.sqrt(jnp.sum(jnp.where(which, error**2, 0.0)) / count(which))
     return {
         "rmse": rms(warm & finite), "early": rms(warm & finite & (rows < half)), "late": rms(finite & (rows >= half)),
         "rmse_known": rms(warm & finite & known), "worst": jnp.max(jnp.where(warm & finite, jnp.abs(error), 0.0)),
-        "known": jnp.mean(jnp.where(warm, known, False)) * truth.shape[0] / jnp.sum(warm),
+        "known": count(warm & known) / count(warm),
         "delay": _delay(jnp.where(finite, mean, 0.0), truth), "failed": 1.0 - jnp.all(finite | ~warm).astype(error.dtype),
     }  # fmt: skip
 

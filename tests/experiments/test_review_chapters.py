@@ -1,0 +1,91 @@
+"""The review chapter by chapter: its cars and scenarios, what a drive is scored by, the conclusions' ratios; whole in the full
+run."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh import estimators
+from jaxveh.experiments.sideslip_review import chapters
+from jaxveh.experiments.sideslip_review.chapters import conclusions, fleet, racing, scenarios
+
+TIME = np.arange(0.0, 20.0, racing.STEP)
+
+
+def scored(mean, truth, known=True, held=True):
+    one = lambda value: jnp.broadcast_to(jnp.asarray(value), TIME.shape)
+    found = jax.jit(racing.metrics)(one(mean), one(known), one(truth), one(held))
+    return {name: float(value) for name, value in found.items()}
+
+
+def test_every_quantity_of_the_library_has_its_chapter_and_every_chapter_its_quantities():
+    there = {name for name in estimators.__all__ if hasattr(getattr(estimators, name), "METHODS")}
+    assert set(racing.quantities()) == there
+
+
+def test_an_error_is_scored_from_the_warm_up_until_the_car_is_lost():
+    error = np.where(TIME < racing.WARM_UP, 9.0, np.where(TIME < 10.0, 1.0, np.where(TIME < 15.0, 2.0, 7.0)))
+    held = TIME < 15.0
+    found = scored(error, 0.0, TIME >= 10.0, held)
+    assert found["early"] == pytest.approx(1.0) and found["late"] == pytest.approx(2.0)
+    assert found["rmse"] == pytest.approx(np.sqrt(2.5)) and found["rmse_known"] == pytest.approx(2.0)
+    assert found["worst"] == 2.0 and found["known"] == pytest.approx(0.5) and found["failed"] == 0.0
+    assert scored(np.where(TIME == 7.0, np.nan, error), 0.0, held=held)["failed"] == 1.0
+    assert scored(np.where(TIME == 17.0, np.nan, error), 0.0, held=held)["failed"] == 0.0
+
+
+def test_what_follows_late_is_late_by_as_much():
+    wave = lambda t: np.sin(1.3 * t) + 0.4 * np.sin(3.7 * t)
+    assert scored(wave(TIME - 0.25) + 3.0, wave(TIME))["delay"] == pytest.approx(0.25, abs=racing.STEP)
+    assert scored(wave(TIME + 0.1), wave(TIME))["delay"] == pytest.approx(-0.1, abs=racing.STEP)
+
+
+def test_files_say_every_number_that_the_methods_ask_for_or_the_reason_stands_in_the_table():
+    told = fleet.told_cars()
+    assert len(told) == len(fleet.CARS) == 3
+    asked = {
+        key
+        for module in racing.quantities().values()
+        for one in module.METHODS.values()
+        for key in estimators.kit.keys_asked(one)
+    }
+    assert not {key for key in asked if getattr(told[0], key) is None} - {"antenna_position", "camera_delay"}
+    for index, (_name, one) in enumerate(scenarios.SCENARIOS.items()):
+        looked = scenarios.scenario_at(index)
+        np.testing.assert_allclose([float(value) for value in looked], [float(value) for value in one])
+
+
+def raced(errors):
+    """Of two seeds, by method's key: the same error in every scenario, one a seed."""
+    count = len(scenarios.SCENARIOS)
+    found = {key: {"rmse": np.tile(np.asarray(values, float), (count, 1))} for key, values in errors.items()}
+    return chapters.ChaptersRaced({}, found, {}, {})
+
+
+def test_a_conclusion_is_a_ratio_of_errors_on_the_same_seeds():
+    one = conclusions.CONCLUSIONS[0]
+    found = conclusions.ratio(raced({one.follows: [1.0, 2.0, 3.0], one.does_not: [2.0, 4.0, 6.0]}), one)
+    assert found.value == pytest.approx(0.5) and found.low == pytest.approx(0.5)
+    table = chapters.conclusion_table(raced({one.follows: [1.0, 2.0], one.does_not: [2.0, 4.0]}))
+    assert len(table.rows) == len(conclusions.CONCLUSIONS)
+    assert table.rows[0][-1] == "supports" and table.rows[-1][-1] == "not raced"
+    assert {one.number for one in conclusions.CONCLUSIONS} == {1, 2, 3, 4}
+    for one in conclusions.CONCLUSIONS:
+        for quantity, method, shown in (one.follows, one.does_not):
+            module = getattr(estimators, quantity)
+            assert method in module.METHODS and shown in module.SHOWN
+
+
+@pytest.mark.full
+def test_every_method_is_raced_on_drives_that_are_driven():
+    drives = chapters.chapter_drives(2, jax.random.key(0), duration=20.0)
+    names = list(scenarios.SCENARIOS)
+    braked = drives["true.v_x"][names.index("ABS")]
+    assert (braked[:, -1] < braked[:, 900] - 8.0).all()
+    found = chapters.race_methods(drives, 2, jax.random.key(1))
+    assert {key[:2] for key in found.found} | set(found.left_out) == {
+        (quantity, method) for quantity, module in racing.quantities().items() for method in module.METHODS
+    }
+    for table in (*chapters.chapter_tables(found), chapters.conclusion_table(found)):
+        assert table.rows and all(len(row) == len(table.columns) for row in table.rows)
