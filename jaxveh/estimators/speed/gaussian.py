@@ -26,11 +26,11 @@ class Innovation(NamedTuple):
     slope: Any
 
 
-def predict(belief: Belief, move: Callable[[Any], Any], noise: Any) -> Belief:
-    """The belief after `move` of a mean (n,), with process noise of covariance `noise` (n, n)."""
-    slopes = jax.jacfwd(move)(belief.mean)
+def predict(belief: Belief, transition: Callable[[Any], Any], noise: Any) -> Belief:
+    """The belief after the `transition` of a mean (n,), with process noise of covariance `noise` (n, n)."""
+    slopes = jax.jacfwd(transition)(belief.mean)
     covariance = symmetric(slopes @ belief.covariance @ slopes.T) + noise
-    return Belief(move(belief.mean), covariance)
+    return Belief(transition(belief.mean), covariance)
 
 
 def innovation(belief: Belief, expect: Callable[[Any], Any], value: Any, variance: Any) -> Innovation:
