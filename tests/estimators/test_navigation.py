@@ -207,6 +207,17 @@ def test_the_axle_s_stiffness_is_found_where_the_file_is_wrong():
     assert errors[0] < 0.2 * DEGREE and errors[0] < 0.5 * errors[1], errors
 
 
+def test_a_wheel_in_the_air_is_not_believed(drive):
+    """One rear wheel spins up in an outage: its fellow contradicts it, so that neither is taken at its word."""
+    log = silent(drive.log("heading", seed=2), 15.0, 38.0, "speed", "course")
+    lifted = np.asarray(log["wheel_speed_rl"]) + np.where((log.time > 25.0) & (log.time < 28.0), 4.0, 0.0)
+    found = navigation.estimate(CAR, log.replace(wheel_speed_rl=lifted), method="rear_axle")
+    error = np.abs(np.asarray(found["v_x"]) - drive.at("v_x", log.time))
+    std = np.asarray(found.std.v_x)
+    out = slice(round(15.0 / STEP), round(38.0 / STEP))
+    assert error[out].max() < 0.5 and (error[out] < 4.0 * std[out]).all()
+
+
 def test_it_begins_with_the_first_fix_and_anew_after_the_unit_was_silent(drive):
     log = silent(drive.log("heading", seed=4), 0.0, 3.0, "speed", "course")
     log = silent(log, 20.0, 21.0, "a_x", "a_y", "yaw_rate")

@@ -94,6 +94,9 @@ class Cleaning(AbstractCleaning):
             past = pasts[name] = look_back(window, lag)
             cleaned |= {f"{name}_{what}": value for what, value in past._asdict().items()}
         cleaned |= self._measured(values, pasts, said)
+        if self.parts.wheels:
+            apart = values["wheel_speed_rr"] - values["wheel_speed_rl"] - self.system.track * held["yaw_rate"]
+            cleaned["wheels_apart"] = jnp.where(jnp.isnan(apart), 0.0, apart)
         cleaned["felt"] = t - spoke <= LONGEST_SILENCE
         return Felt(t, held, spoke, smooth, lately, rough, window), cleaned
 

@@ -19,6 +19,9 @@ aside; and than its force asks for. Both are measured to be nothing."""
 STANDS = "stands"
 """rad: how much more the body rolls and dips than its springs ask for, measured to be nothing as well."""
 
+WHEELS_APART = 5.0
+"""How much of the difference of two wheels is taken for an error of their mean, which lasts: for many rows it is one error."""
+
 SATURATED = 0.93
 """The share of the grip beyond which the force no longer tells the slip angle."""
 
@@ -203,7 +206,12 @@ def noise(system: Navigator, t, x, u) -> dict[str, Any]:
         f"{STANDS}_pitch": system.lean_error * lasting,
     }
     if parts.wheels:
-        std["wheel_speed"] = system.wheel_error + system.wheel_slip_error * jnp.abs(u.a_x) * moving
+        # One that is in the air, or locked, is told by the other.
+        std["wheel_speed"] = (
+            system.wheel_error
+            + system.wheel_slip_error * jnp.abs(u.a_x) * moving
+            + WHEELS_APART * numerics.hypot(u.wheels_apart, 1e-3)
+        )
     if parts.axle == "none":
         slip = system.rolling_slip + system.slip_gradient * jnp.abs(system.forces(x, u)[1])
         std[ROLLS] = (0.02 + moving * slip) * lasting

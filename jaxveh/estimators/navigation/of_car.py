@@ -17,6 +17,9 @@ SATELLITE_DELAY, CAMERA_DELAY, UNIT_DELAY = 0.15, 0.08, 0.01
 USUAL_LOW_PASS = 15.0
 """Hz: so is the low-pass in its inertial unit."""
 
+USUAL_TRACK = 1.5
+"""m: of the rear wheels, where a file does not say it."""
+
 USUAL_HEIGHT = 0.55
 """m: of a centre of gravity whose height a file does not say; it shifts load by acceleration, a correction."""
 
@@ -45,6 +48,7 @@ def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -
         "front_axle_to_cg": car.front_axle_to_cg,
         "mass": car.mass,
         "yaw_inertia": car.yaw_inertia,
+        "track": car.track_rear or USUAL_TRACK,
         "cg_height": car.cg_height or USUAL_HEIGHT,
     }
     if parts.axle != "none":

@@ -46,7 +46,8 @@ class Navigator(eqx.Module):
     - `bank_time`, `grade_time` (s): memories of the slow tilts, first-order Gauss-Markov.
     - `dip_gradient` (rad s^2/m): by how much the nose dips for each m/s^2 of braking.
     - `wheel_error` (m/s), `wheel_slip_error` (s^2/m): standard deviation of the rear wheels' speed, and what of it comes with
-      acceleration, as a share of speed; `lean_error` (rad): of a body's roll by its springs.
+      acceleration, as a share of speed; `track` (m), by which the two are known to agree; `lean_error` (rad): of a body's roll by
+      its springs.
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m); `stiffness` (1/rad) and `grip`
       (-): cornering stiffness and largest lateral force of the rear axle over its load, `shape` (-): how sharply the curve
       between bends; `axle_time` (s): over which force and slip are averaged; `slip_growth` (-): by how much the slip angle's
@@ -73,6 +74,7 @@ class Navigator(eqx.Module):
     dip_gradient: jax.Array = parameter("rad s^2/m", scale=0.003, default=0.004)
     wheel_error: jax.Array = positive("m/s", default=0.5)
     wheel_slip_error: jax.Array = positive("s^2/m", default=0.01)
+    track: jax.Array = positive("m", default=1.5)
     lean_error: jax.Array = positive("rad", default=0.01)
     mass: jax.Array = positive("kg", default=1500.0)
     yaw_inertia: jax.Array = positive("kg m^2", default=2500.0)
@@ -83,7 +85,8 @@ class Navigator(eqx.Module):
     grip: jax.Array = positive("-", default=1.0)
     shape: jax.Array = positive("-", default=2.5)
     slip_growth: jax.Array = positive("-", default=3.0)
-    axle_time: jax.Array = positive("s", default=0.2)
+    # No multiple of a usual step: whether the rows reach back so far should not hang on rounding.
+    axle_time: jax.Array = positive("s", default=0.19)
     rolling_slip: jax.Array = positive("rad", default=0.002)
     slip_gradient: jax.Array = positive("rad s^2/m", default=0.006)
     slip_time: jax.Array = positive("s", default=1.5)
@@ -199,12 +202,14 @@ def inputs_of(parts: Parts) -> tuple[str, ...]:
     """What `cleaning` makes of a log for the model.
 
     Accelerations at the centre of gravity (m/s^2) and rates (rad/s), held where the unit is silent; the `step` (s) that the row
-    stands for; how `rough` the lateral acceleration is (m/s^2); and of each of `Navigator.lags` what `window.Past` says, as
+    stands for; how `rough` the lateral acceleration is (m/s^2); how far the rear wheels' speeds are `wheels_apart` beyond what
+    turning makes of them (m/s); and of each of `Navigator.lags` what `window.Past` says, as
     `sky_turned` and so on.
     """
     names = ("sky", *(("camera",) if parts.camera else ()), *(("half", "whole") if parts.axle != "none" else ()))
     pasts = tuple(f"{name}_{what}" for name in names for what in ("turned", "gained_x", "gained_y", "spun", "rolled"))
     more = ("a_z", "roll_rate", "pitch_rate") if parts.three_more else ()
+    more += ("wheels_apart",) if parts.wheels else ()
     return ("a_x", "a_y", "yaw_rate", "step", "rough", *pasts, *more)
 
 
