@@ -13,9 +13,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh import Recording, estimators, sweeps
+from jaxveh import estimators, sweeps
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.progress import Progress, part, silent
+from jaxveh._core.recording import Recording
 from jaxveh.estimators import AbstractMethod, kit
 from jaxveh.experiments.sideslip_review.chapters.fleet import CARS, built_cars, told_cars
 from jaxveh.experiments.sideslip_review.chapters.fleet_drives import drive_once
