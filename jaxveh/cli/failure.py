@@ -71,21 +71,23 @@ def _leave(kind: str, error: object, exit_code: int) -> None:
     raise typer.Exit(exit_code)
 
 
+DAMAGE = "a program kept from an earlier start is damaged: it is compiled anew, and the next start all"
+
+
 @contextlib.contextmanager
 def _warnings_in_words() -> Iterator[None]:
     """jaxveh's own warnings as a line on stderr instead of Python's two with a path."""
     with warnings.catch_warnings():
-        usual = warnings.showwarning
+        usual, told = warnings.showwarning, []
 
         def show(message, category, *rest, **more):
             if issubclass(category, JaxvehWarning):
                 say("warning", "yellow", message)
             elif is_of_damage(str(message)):
-                say(
-                    "note",
-                    "yellow",
-                    "a program kept from an earlier start is damaged: it is compiled anew, and the next start all",
-                )
+                # jax says so for each program that it would keep.
+                if not told:
+                    say("note", "yellow", DAMAGE)
+                told.append(message)
             else:
                 usual(message, category, *rest, **more)
 

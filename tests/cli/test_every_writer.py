@@ -25,6 +25,8 @@ from jaxveh._core.names import record_type
 from jaxveh._core.parameter import resolve
 from jaxveh.cli import all_papers, estimate_report, output
 from jaxveh.cli.drives import Drive
+from jaxveh.estimators import geometry
+from jaxveh.estimators.geometry import learned
 from jaxveh.io import files
 
 resource = pytest.importorskip("resource")  # the size of files can be limited
@@ -97,6 +99,9 @@ WRITERS = {
     "write_text txt": lambda path: io.write_text("line\n" * 1000, path, **OVER),
     "write_report html": report,
     "write_calibration toml": calibration,
+    "write_learned toml": lambda path: geometry.write_learned(
+        geometry.Learned({name: learned.Entry(1.0, 0.1, True) for name in geometry.SHOWN}), path, **OVER
+    ),
     "save png": lambda path: plots.save(plots.recording(RECORDING), path),
     "write_numbers json": lambda path: output.write_numbers(path, {"x": [0.5] * 1000}, {}, 0),
 }
@@ -300,6 +305,10 @@ HANDED = {
     ("sweeps/store.py", "rename"): "a store that is complete, to its place, where nothing is",
     ("experiments/mass_grade_aukf/observed.py", "move"): "a state, to the next row",
     ("vehicles/fourteen_dof/car.py", "touch"): "of tyres and the road",
+    ("estimators/leaning.py", "move"): "a belief, to the next row",
+    ("estimators/pulling.py", "move"): "a belief, to the next row",
+    ("estimators/roll/six_axis.py", "move"): "a belief, to the next row",
+    ("estimators/sideslip_methods/observers.py", "move"): "a state, to the next row",
 }
 
 
