@@ -369,6 +369,8 @@ USED = {
     **dict.fromkeys(("track_front", "track_rear"), "one track"),
     **dict.fromkeys(("wheel_radius", "wheel_inertia", "rolling_resistance"), "wheels do not turn here"),
     **dict.fromkeys(("roll_gradient", "roll_frequency", "roll_damping", "pitch_gradient"), "the body does not lean here"),
+    **dict.fromkeys(("antenna_position", "satellite_delay", "inertial_delay", "camera_delay"), "of navigation"),
+    "brake_torque_per_pressure": "nobody brakes here",
     **dict.fromkeys(("front_tyre", "rear_tyre"), "of a wheel: nobody opens them before a car on four wheels is built"),
 }  # fmt: skip
 """What of a car's file moves the estimate, or the score alone; and why the rest does neither."""
@@ -392,7 +394,8 @@ def test_what_a_cars_file_says_is_used_or_named(entry):
         "rear_tyre": "a.tir", "front": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0), "rear": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0),
         "front_drive": 0.7, "front_brake": 0.7, "steer_offset": 0.02, "rolling_resistance": 0.02,
         **dict.fromkeys(("track_front", "track_rear", "wheel_radius", "roll_frequency"), 1.0),
-        **dict.fromkeys(("roll_gradient", "pitch_gradient"), 0.01), "roll_damping": 0.4,
+        **dict.fromkeys(("roll_gradient", "pitch_gradient"), 0.01), "roll_damping": 0.4, "antenna_position": (0.1, 0.0, 1.0),
+        **dict.fromkeys(("satellite_delay", "inertial_delay", "camera_delay"), 0.1), "brake_torque_per_pressure": 1e-3,
     }.get(entry.name, 1.07 * (getattr(plain, entry.name) or 10.0))  # fmt: skip
     changed = dataclasses.replace(plain, **{entry.name: other})
     leaves = lambda car: [float(leaf) for leaf in jax.tree.leaves(car_of(car))]

@@ -85,7 +85,9 @@ def train(
             numbers, memory = state
             which = jax.random.choice(key, count, (min(batch, count),), replace=False)
             value, slope = jax.value_and_grad(cost)(numbers, jax.tree.map(lambda leaf: leaf[which], pieces))
-            change, memory = search.update(slope, memory)
+            # Optax counts in integers, which the user's strict promotion would refuse.
+            with jax.numpy_dtype_promotion("standard"):
+                change, memory = search.update(slope, memory)
             return (optax.apply_updates(numbers, change), memory), value
 
         return jax.lax.scan(body, state, jax.random.split(key, min(TOLD, steps)))
