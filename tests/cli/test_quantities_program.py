@@ -72,6 +72,7 @@ def test_methods_stand_side_by_side_and_are_scored_blind(drive):
     assert (drive / "figs" / "speed.png").stat().st_size > 1000
 
 
+@pytest.mark.full
 def test_all_gives_what_can_be_had_and_says_why_not(drive):
     log = io.read_recording(drive / "drive.csv")
     (drive / "drive.csv").unlink()

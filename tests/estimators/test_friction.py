@@ -221,7 +221,7 @@ def test_a_file_without_wheels_has_lateral_methods_alone():
         friction.METHODS["aligning_torque"].make(dataclasses.replace(CAR, steering_ratio=None))
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_a_simulated_car_with_production_sensors_is_never_wrong_and_known_but_in_the_second_after_a_jump():
     car = vehicles.named_car("suv", "seven-dof")
     told = vehicles.specification_of(vehicles.kit.CARS["suv"]())

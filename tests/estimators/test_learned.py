@@ -64,9 +64,9 @@ def test_a_tyre_with_states_is_refused():
 
 
 def test_training_finds_what_a_fit_finds_and_tells_how_far_it_is():
-    """Two wrong stiffnesses, by the likelihood alone; another key draws other pieces and ends near."""
+    """Two wrong stiffnesses, by the likelihood alone."""
     log, told, ends = drive(on_brushes(), 1, 40), [], []
-    for seed in (0, 1):
+    for seed in (0,):
         found = learned.train(
             filters.Extended(), model_of(on_brushes(1.3, 0.8)), log, physics, prior=0.5, steps=75, learning_rate=0.05,
             key=jax.random.key(seed), progress=lambda done, total, stage: told.append(done / total),
@@ -93,7 +93,7 @@ def test_bad_arguments_are_named():
         go(log=log.rows(slice(0, 120)))
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_the_network_finds_a_curve_that_the_physics_cannot_form():
     """Truth: Magic Formulas that fall behind their peaks; the filter has brushes. Judged on drives that it has not seen."""
     made = [

@@ -396,7 +396,7 @@ def test_a_measured_course_wraps_in_a_state_space():
     assert estimators.state_space(car, sensors.esc()).angles == ()
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_a_simulated_van_with_a_series_car_s_sensors_is_followed_through_a_tunnel():
     """Seven degrees of freedom on a banked and hilly road, late and noisy sensors with offsets, an antenna off the centre."""
     place = (-0.6, 0.2, 0.0)
@@ -439,7 +439,7 @@ def test_a_simulated_van_with_a_series_car_s_sensors_is_followed_through_a_tunne
         assert abs(float(best[name][at]) - offset) < 3.0 * float(getattr(best.std, name)[at]), name
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_the_log_of_a_race_car_is_followed_from_a_course_that_its_reference_gives():
     """Five fixes a second, 0.15 s late, made of the reference's speeds and of the integrated yaw rate: no satellite was there.
 

@@ -91,7 +91,7 @@ def test_what_a_silent_accelerometer_leaves_is_not_known():
     assert found.known.roll[999] and not found.known.roll[1100:].any()
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_all_at_smoke_size_on_a_simulated_car():
     cases, truths, offsets, time = heard_of(("passenger_car",), (0, 1), 40.0, True)
     late = slice(1000, None)

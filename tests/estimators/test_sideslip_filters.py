@@ -14,7 +14,7 @@ from jaxveh.estimators import sideslip
 from jaxveh.estimators.sideslip_methods import four_wheels, kinematic, single_track
 from jaxveh.vehicles import GRAVITY
 
-pytestmark = pytest.mark.studies
+pytestmark = pytest.mark.full
 
 
 def derivative(f):

@@ -75,7 +75,7 @@ def test_the_error_of_two_channels_dies_out_with_the_placed_poles_at_any_row(kin
     np.testing.assert_allclose(found, [1e-3, 2e-3] * np.exp(np.asarray(POLES) * t), rtol=1e-3, atol=1e-8)
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_the_error_linearising_observer_s_error_obeys_its_linear_equation_where_the_tyres_bend():
     model = nonlinear_model()
     turning = lambda t: {"steer": 0.05 + 0.005 * jnp.sin(5.0 * t), "v_x": V + 0.0 * t}
@@ -174,7 +174,7 @@ def test_eq_9_has_its_slope_and_its_bounds_and_the_sliding_gain_is_the_placed_on
     np.testing.assert_allclose(sliding.change(K, far) - 0.25 * K @ far, 0.75 * np.pi / 2 * K @ edge, rtol=1e-3)
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_rows_without_a_channel_correct_nothing():
     model = linear_model()
     rows, truth = drive(model, 5, straight, (0.0, 0.0))
@@ -216,7 +216,7 @@ def _blank_row(model):
     return Row(jnp.asarray(0.0), u, _record("Measurements", model.channels, dict.fromkeys(model.channels, np.nan)))
 
 
-@pytest.mark.studies
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["adapted_stiffness", "adaptive"])
 def test_stiffnesses_that_are_wrong_are_found_and_sideslip_with_them(name):
     truth_of = stiffness.linear_model(CAR)
@@ -231,7 +231,7 @@ def test_stiffnesses_that_are_wrong_are_found_and_sideslip_with_them(name):
     assert adapted < 0.5 * fixed
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_a_moment_of_the_motors_turns_the_car_as_eq_10_says_and_the_filter_knows():
     model = motors.motor_model(CAR)
     none, torques = single_track.LateralState(jnp.asarray(0.0), jnp.asarray(0.0)), dict.fromkeys(

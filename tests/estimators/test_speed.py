@@ -276,7 +276,7 @@ def test_a_car_that_stops_with_locked_wheels_stands():
     assert np.abs(v_x)[t > 15.0].max() < 0.05 and np.asarray(said.known.v_x)[t > 15.0].all()
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_a_car_under_its_anti_lock_system():
     """A sedan of seven degrees of freedom that brakes with all wheels at their limit; production sensors, radii off."""
     numbers = vehicles.kit.CARS["sedan"]()
@@ -312,7 +312,7 @@ def test_a_car_under_its_anti_lock_system():
     assert np.sqrt(np.mean(np.square(naive / true - 1.0)[at_limit])) > 0.02
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_the_race_cars_log():
     """AV-21: wheel speeds 1.3 per cent too large, no accelerometer; told its speed for a minute, and left alone then.
 

@@ -80,7 +80,7 @@ def test_straight_ahead_nothing_is_known():
             assert not np.asarray(getattr(said.known, field)).any(), (name, field)
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_a_minute_of_ordinary_driving_shows_a_simulated_cars_stiffness_from_a_file_that_is_a_quarter_off():
     car = vehicles.named_car("suv", "seven-dof")
     told = vehicles.specification_of(vehicles.kit.CARS["suv"]())

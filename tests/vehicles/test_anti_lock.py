@@ -58,7 +58,7 @@ def test_what_has_no_brakes_is_refused():
         vehicles.AntiLock(car_of(vehicles.SevenDOF), slip_low=0.2, slip_high=0.1)
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_wheels_do_not_lock_on_a_slippery_road():
     car = vehicles.named_car("sedan", "seven-dof")
     drive = manoeuvres.mu_jump_braking(
