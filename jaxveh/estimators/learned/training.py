@@ -85,14 +85,18 @@ def train(
             numbers, memory = state
             which = jax.random.choice(key, count, (min(batch, count),), replace=False)
             value, slope = jax.value_and_grad(cost)(numbers, jax.tree.map(lambda leaf: leaf[which], pieces))
-            # Optax counts in integers, which the user's strict promotion would refuse.
-            with jax.numpy_dtype_promotion("standard"):
-                change, memory = search.update(slope, memory)
+            change, memory = _change(search, slope, memory)
             return (optax.apply_updates(numbers, change), memory), value
 
         return jax.lax.scan(body, state, jax.random.split(key, min(TOLD, steps)))
 
     return _walk(go_on, (start, search.init(start)), model, chosen, steps, key, progress)
+
+
+def _change(search: Any, slope: Any, memory: Any) -> tuple[Any, Any]:
+    """Optax counts in integers, which the user's strict promotion would refuse."""
+    with jax.numpy_dtype_promotion("standard"):
+        return search.update(slope, memory)
 
 
 def _check(**values: float) -> None:
