@@ -238,7 +238,7 @@ def test_tyre_files_of_a_cars_file_are_read(tmp_path):
         ),
         (lambda: CarNumbers("x", "y", 1.2, -1.5), r"x: rear_axle_to_cg = -1\.5: must be positive"),
         (lambda: CarNumbers("x", "y", 1.2, 1.5, front_drive=60.0), r"x: front_drive = 60\.0: must be between 0 and 1"),
-        (lambda: CarNumbers("x", "y", 1.2, 1.5).wheel_loads(), "x: the mass is missing, from which the loads follow; give it in kg"),
+        (lambda: CarNumbers("x", "y", 1.2, 1.5).wheel_loads(), "x: the mass is missing, from which the loads follow"),
         (lambda: TyreNumbers(-5.0), r"TyreNumbers\.cornering_stiffness = -5\.0"),
         (
             lambda: dataclasses.replace(sets.sedan().suspension, anti_roll_front=-1.0),
