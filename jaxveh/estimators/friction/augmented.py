@@ -37,9 +37,8 @@ class State(NamedTuple):
 
 
 def augmented_filter(car: PlanarCar) -> Filtered:
-    """An unscented filter of [v_y, yaw rate, ln mu]; friction walks by 0.05 of itself in a second. Below `LOWEST` the model
-    runs as
-    at that speed, and nothing is known. It knows no jumps: it follows one as fast as its walk lets it, and its spread, that of
+    """An unscented filter of [v_y, yaw rate, ln mu]; friction walks by 0.05 of itself in a second. Below `LOWEST` the model runs
+    as at that speed, and nothing is known. It knows no jumps: it follows one as fast as its walk lets it, and its spread, that of
     white noises, is too small by what its tyre curve lacks."""
     model = StateSpace(
         system=car, transition=_transition, observation=_observation, report=_report,

@@ -38,6 +38,9 @@ class Bank(NamedTuple):
 
 
 class BankMemory(NamedTuple):
+    """What the log has told last, the filters, and what the wheels' slips have said (None for a file without the wheels'
+    radius and inertia)."""
+
     told: Told
     bank: Bank
     along: Any

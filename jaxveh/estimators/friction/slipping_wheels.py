@@ -31,8 +31,7 @@ class WheelObserver(AbstractWheelMethod):
     Each wheel: `J domega/dt = T - R F(slip, mu) + gain J (omega - observed)`; friction follows the gradient,
     `d mu / dt = - rate sum e dF/dmu / F_z - leak (mu - usual)`, normalised, where the leak (sigma-modification) holds it while
     nothing is excited. Without a law `F = mu F_z phi(slip)`, phi the file's curve over its peak: linear in mu as [118] has it,
-    and
-    wrong where tyres keep their slope on slippery roads. With LuGre the bristles are taken as settled (they settle within
+    and wrong where tyres keep their slope on slippery roads. With LuGre the bristles are taken as settled (they settle within
     milliseconds), and mu is what multiplies their friction.
 
     `known`: the averaged `|F - slip dF/dslip| / F_z` of the wheel that has most of it is above `enough`. No spread is claimed.
@@ -99,6 +98,8 @@ class WheelObserver(AbstractWheelMethod):
 
 
 class SidesMemory(NamedTuple):
+    """What the wheels have told, the slips that they show without force, (4,), and the logarithm of friction on either side."""
+
     wheels: WheelMemory
     offset: Any
     left: LogFriction
@@ -107,8 +108,7 @@ class SidesMemory(NamedTuple):
 
 class SidesApart(AbstractWheelMethod):
     """Friction under the left and under the right wheels, each by a filter of ln mu on the forces and slips of its own wheels:
-    what
-    a road that is slippery on one side needs.
+    what a road that is slippery on one side needs.
 
     `friction` is the mean of both, weighed by load. The force of each wheel is compared with the curve along of its axle; what
     slip a wheel shows while it hardly pulls, an error of its radius, is learnt within `learning` (s) and taken off. Beside, slips

@@ -99,8 +99,7 @@ class SlipSlope(AbstractWheelMethod):
     **The slope is no friction.** Brush and Magic Formula have the same slope on every road; that measured slopes fall with
     friction is an observation on real tyres, whose size hangs on tyre, wear, temperature and pressure. `friction =
     (K / K_0)^exponent`, K_0 the file's, is that calibration: `exponent` and `calibration_spread` (of ln mu) are to be found on
-    the
-    car at hand, and the spread that is claimed holds both. `known` says that the slope is, within a tenth.
+    the car at hand, and the spread that is claimed holds both. `known` says that the slope is, within a tenth.
     """
 
     slips: WheelSlips
@@ -155,8 +154,7 @@ class SlipSlope(AbstractWheelMethod):
 
 class CurveMemory(NamedTuple):
     """The filtered slip and used friction of the car's wheels, the curve's slope, and the friction that it points at; how long
-    ago
-    the slope was measured (s)."""
+    ago the slope was measured (s)."""
 
     wheels: WheelMemory
     slip: Any

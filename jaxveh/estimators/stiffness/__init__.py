@@ -1,8 +1,7 @@
 """Cornering stiffness of both axles, as the linear single track has it: section 3.1.2.2 of the review (Chen, Gao, Xu 2013).
 
 It is the slope of an axle's lateral force over its slip angle at zero slip, with whatever else of the car goes with the force:
-camber
-thrust, compliance, roll steer. The car's file is where methods start from.
+camber thrust, compliance, roll steer. The car's file is where methods start from.
 """
 
 from __future__ import annotations

@@ -92,9 +92,8 @@ class AxleForces(AbstractMethod):
 
 
 class DerivativesMemory(NamedTuple):
-    """The signals; of front and rear, (2,): accelerations (m/s^2), filtered, slip rates (rad/s), filtered, and the mean over
-    the window
-    of their products and of the slip rates' squares."""
+    """The signals; of front and rear, (2,): accelerations (m/s^2), filtered, slip rates (rad/s), filtered, and the mean over the
+    window of their products and of the slip rates' squares."""
 
     signals: Signals
     felt: Any
@@ -112,14 +111,12 @@ class Derivatives(AbstractMethod):
 
     a_f is the front axle's acceleration (erratum: the print has slip angles there); exact for `J_z = m l_f l_r` at a constant
     speed. The rear's is the same without steer: `C_r = m l_f / l (d a_r / dt) / (r - a_r / v)`, a_r = a_y - l_r dr/dt. Single
-    quotients are useless where the denominator is near zero, so the paper holds the last value within epsilon; here the
-    quotient is
-    the least squares' over `memory` (s), numerator times denominator over denominator squared, and what is below `epsilon`
+    quotients are useless where the denominator is near zero, so the paper holds the last value within epsilon; here the quotient
+    is the least squares' over `memory` (s), numerator times denominator over denominator squared, and what is below `epsilon`
     (rad/s) hardly counts.
 
     No spread is claimed: noise in the denominator makes it too small by a bias that grows with the noise. `known`: the mean
-    square
-    of the denominators in the window is above `enough` times epsilon's.
+    square of the denominators in the window is above `enough` times epsilon's.
     """
 
     car: LinearCar

@@ -58,8 +58,7 @@ def linear_car(car: CarSpecification) -> LinearCar:
 
 class Signals(NamedTuple):
     """Time (s); what was measured last of speed (m/s), steer (rad), yaw rate (rad/s), a_y (m/s^2), the steer as late as these,
-    too;
-    the low-pass filtered ones; the oldest's age (s) and whether the car `moves` and all of them speak."""
+    too; the low-pass filtered ones; the oldest's age (s) and whether the car `moves` and all of them speak."""
 
     t: Any
     v_x: Any

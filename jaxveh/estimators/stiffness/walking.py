@@ -40,15 +40,12 @@ class WalkingStiffness(AbstractMethod):
     (s) later than the inertial sensors; what it has turned since is the integral of a_y / v. What would be taken for stiffness
     is a state of its own: offsets,
     and the lean of the body, by which an accelerometer shows more. Where tyres leave their linear range (`linear` m/s^2 of
-    lateral
-    acceleration), measurements count less and less. On a slippery road it is the slope at zero slip still that is told, as
-    long as
-    there is little lateral acceleration.
+    lateral acceleration), measurements count less and less. On a slippery road it is the slope at zero slip still that is told,
+    as long as there is little lateral acceleration.
 
     `spread` (-) of ln C before the drive, `walk` (1/sqrt(s)); `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5); `a_y_noise`
     (m/s^2), `yaw_rate_noise` (rad/s), `course_noise` (m/s across); `steer_noise` (rad/sqrt(s)): how the steer's offset walks,
-    play
-    included; `known_spread` (-).
+    play included; `known_spread` (-).
     """
 
     car: LinearCar
