@@ -15,7 +15,7 @@ from jaxveh._core.recording import TRUTH
 from jaxveh.cli.console import number, progress, results, spread, table
 from jaxveh.cli.drives import read_log
 from jaxveh.cli.output import check_product, check_products, check_report, make_folder, write_numbers
-from jaxveh.cli.quantity_options import QUANTITIES
+from jaxveh.cli.quantity_options import QUANTITIES, USUAL_FILTER, USUAL_PARTICLES
 from jaxveh.estimators import Answers, Compared, MethodScore
 from jaxveh.io import CarSpecification
 
@@ -54,16 +54,14 @@ class Shown(NamedTuple):
 
 
 def names_of(text: str, option: str, known: Sequence[str]) -> tuple[str, ...]:
-    """The names of an option's value, separated by commas; `all` is all that are known.
+    """The names of an option's value, separated by commas, each once; `all` among them is all that are known.
 
     **Raises** `InputError` for a name that is not known.
     """
-    if text == ALL:
-        return tuple(known)
-    names = tuple(name.strip() for name in text.split(","))
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
         check_one_of(option, name, (*known, ALL))
-    return names
+    return tuple(known) if ALL in names else names
 
 
 def quantities_asked(choice: Any, what: str, methods: str | None) -> Asked | None:
@@ -76,7 +74,8 @@ def quantities_asked(choice: Any, what: str, methods: str | None) -> Asked | Non
         return None
     others = {
         "--calibration": choice.calibration, "--calibrate": choice.calibrate, "--calibrate-on": choice.calibrate_on,
-        "--report": choice.report, "--as-told": choice.as_told,
+        "--report": choice.report, "--as-told": choice.as_told, "--filter": choice.filter.value != USUAL_FILTER,
+        "--particles": choice.particles != USUAL_PARTICLES,
     }  # fmt: skip
     given = [option for option, value in others.items() if value]
     if given:

@@ -17,6 +17,9 @@ QUANTITIES: dict[str, ModuleType] = {
 }
 """By the name that `--what` takes."""
 
+USUAL_FILTER, USUAL_PARTICLES = "ekf", 1000
+"""Of sideslip's own program; methods bring their filters with them."""
+
 What = Annotated[
     str,
     typer.Option(

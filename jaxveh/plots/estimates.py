@@ -181,7 +181,8 @@ def _one(ax: Any, shown: Shown, one: Any, name: str, label: str, shade: str, aga
             f"plots.estimate: truth {name} has shape {np.shape(against)}, {label} {time.shape}; must agree."
         )
     centre = in_unit.show(mean[name]) - against
-    if name in std:
+    # Who claims no spread says NaN, and has no band.
+    if name in std and not np.isnan(np.asarray(std[name])).all():
         bands(ax, time, centre, in_unit.show(std[name]), label, shade, half=len(shown.labelled) == 1)
     ax.plot(time, centre, color=shade, linewidth=1.1 * shown.fine, label=label)
 

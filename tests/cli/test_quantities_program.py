@@ -10,6 +10,7 @@ import pytest
 from programs import error_line, run
 
 from jaxveh import Recording, estimators, io
+from jaxveh.cli.quantities import names_of
 from jaxveh.cli.quantity_options import QUANTITIES
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "estimators"))
@@ -72,6 +73,11 @@ def test_methods_stand_side_by_side_and_are_scored_blind(drive):
     assert (drive / "figs" / "speed.png").stat().st_size > 1000
 
 
+def test_names_are_taken_once_and_all_of_them_by_all():
+    assert names_of("b, a,b", "--what", ("a", "b")) == ("b", "a")
+    assert names_of("all", "--what", ("a", "b")) == names_of("b,all", "--what", ("a", "b")) == ("a", "b")
+
+
 @pytest.mark.full
 def test_all_gives_what_can_be_had_and_says_why_not(drive):
     log = io.read_recording(drive / "drive.csv")
@@ -94,6 +100,8 @@ def test_what_is_asked_for_wrongly_is_said_in_a_line(drive):
     assert "--methods is of one quantity" in error_line(estimate(drive, "--what", "all", "--methods", "all"))
     assert "--truth = 'mass': must be one of" in error_line(estimate(drive, "--what", "speed", "--truth", "mass"))
     assert "--calibrate: of --what sideslip" in error_line(estimate(drive, "--what", "speed", "--calibrate", "0:5"))
+    assert "--filter: of --what sideslip" in error_line(estimate(drive, "--what", "speed", "--filter", "pf"))
+    assert "--particles: of --what sideslip" in error_line(estimate(drive, "--what", "speed", "--particles", "50"))
     missing = error_line(estimate(drive, "--what", "speed", "--truth", "true.v_x"))
     assert "has no such channel" in missing
     assert "--vehicle is missing" in error_line(

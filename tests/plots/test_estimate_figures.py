@@ -54,6 +54,13 @@ def test_several_estimates_show_their_wide_bands_alone():
     assert [band.get_label() for band in figure.axes[0].collections] == ["UKF, 95 % band", "APF, 95 % band"]
 
 
+def test_who_claims_no_spread_has_no_band():
+    silent = an_estimate(std={"v_y": np.full_like(TIME, np.nan)})
+    figure = plots.estimate({"UKF": an_estimate(), "formula": silent}, quantities=["v_y"], seconds=1e3)
+    assert [band.get_label() for band in figure.axes[0].collections] == ["UKF, 95 % band"]
+    assert line(figure.axes[0], "formula").get_visible()
+
+
 def test_a_long_log_is_shown_in_rows_of_about_a_minute_to_one_scale():
     truth = {"sideslip": 0.05 * WAVE - np.radians(0.5)}
     figure = plots.estimate(an_estimate(), truth, ["sideslip"], errors=True)
