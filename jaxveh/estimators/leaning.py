@@ -14,7 +14,7 @@ from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, away_from_zero, number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.sequential import Normal, correct, move, normal_of, spread_of
+from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -49,7 +49,7 @@ class Memory(NamedTuple):
     """What was heard, and what is believed."""
 
     motion: Any
-    belief: Normal
+    belief: Belief
 
 
 class Leaning(AbstractMethod):
@@ -108,7 +108,7 @@ class Leaning(AbstractMethod):
             "a_y_bias": self.a_y_offset_spread, "yaw_rate_bias": gyro, "roll_rate_bias": gyro, "slope_bias": 0.008,
             "rear_scale": scale, "roll_scale": scale,
         }  # fmt: skip
-        belief = normal_of(State, {"a_y_bias": self.a_y_offset}, stds, t)
+        belief = belief_of(State, {"a_y_bias": self.a_y_offset}, stds, t)
         return self._answer(memory, self._measured(belief, heard), heard)
 
     def next(self, memory, t, values):
@@ -116,7 +116,7 @@ class Leaning(AbstractMethod):
         belief = self._ahead(memory.belief, heard)
         return self._answer(motion, self._measured(belief, heard), heard)
 
-    def _ahead(self, belief: Normal, heard) -> Normal:
+    def _ahead(self, belief: Belief, heard) -> Belief:
         dt = heard["dt"]
         fast = self._passing(heard["v_x"])
         # The bank's law by the metre: a chain of two first-order lags, with this variance.
@@ -156,7 +156,7 @@ class Leaning(AbstractMethod):
             body_roll_rate=rate,
         )
 
-    def _measured(self, belief: Normal, heard) -> Normal:
+    def _measured(self, belief: Belief, heard) -> Belief:
         v_x, dt = heard["v_x"], heard["dt"]
         fast = away_from_zero(v_x)
 

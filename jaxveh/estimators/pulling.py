@@ -16,7 +16,7 @@ from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, away_from
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Filtered, answer
-from jaxveh.estimators.sequential import Normal, correct, move, normal_of, spread_of
+from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
 from jaxveh.filters import Extended
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
@@ -53,7 +53,7 @@ class PullingMemory(NamedTuple):
     """What was heard, and what is believed."""
 
     motion: Any
-    belief: Normal
+    belief: Belief
 
 
 class Pulling(AbstractMethod):
@@ -115,7 +115,7 @@ class Pulling(AbstractMethod):
             "v_x": 1.0, "grade": self.grade_spread, "grade_rate": 0.01, "a_x_bias": self.a_x_offset_spread,
             "log_mass": self.mass_spread, "rolling_bias": self.rolling_spread, "wheel_scale": 0.005, "slip": self.slip_spread,
         }  # fmt: skip
-        belief = normal_of(State, {"v_x": heard["v_x"], "a_x_bias": self.a_x_offset, "slip": self.slip}, stds, t)
+        belief = belief_of(State, {"v_x": heard["v_x"], "a_x_bias": self.a_x_offset, "slip": self.slip}, stds, t)
         return self._answer(motion, self._measured(belief, heard, values), heard)
 
     def next(self, memory, t, values):
@@ -123,7 +123,7 @@ class Pulling(AbstractMethod):
         belief = self._ahead(memory.belief, heard)
         return self._answer(motion, self._measured(belief, heard, values), heard)
 
-    def _ahead(self, belief: Normal, heard) -> Normal:
+    def _ahead(self, belief: Belief, heard) -> Belief:
         dt = heard["dt"]
         fast = jnp.maximum(jnp.abs(heard["v_x"]), SLOWEST)
         slow, quick = fast / self.grade_length, fast / self.grade_edge
@@ -151,7 +151,7 @@ class Pulling(AbstractMethod):
         v_y = self.rear_axle_to_cg * turn - v_x * slip
         return self._felt(x, heard) + v_y * turn - GRAVITY * numerics.sin(x.grade)
 
-    def _measured(self, belief: Normal, heard, values) -> Normal:
+    def _measured(self, belief: Belief, heard, values) -> Belief:
         v_x, dt = heard["v_x"], jnp.maximum(heard["dt"], 1e-3)
         drive, brake = values["drive_torque"], values["brake_torque"]
         pushed = ~(jnp.isnan(drive) | jnp.isnan(brake))
@@ -258,7 +258,7 @@ def joint_filter(car: CarSpecification, shown: tuple[str, ...]) -> Filtered:
     the spread of the mass is below `WIDEST_MASS` of it, of the grade below `WIDEST`; where the mass' logarithm is held by too few
     pedals, as the model's own documentation says, both are wide.
     """
-    model = mass_and_grade.model(car, v_x=0.03, a_x=0.15, a_x_bias=0.06, mass_spread=0.15, grade_rate_walk=0.01)
+    model = mass_and_grade.model(car, v_x=0.1, a_x=0.5, a_x_bias=0.06, mass_spread=0.15, grade_rate_walk=0.02)
     cleaning = Held(
         BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive), car.pitch_gradient or 0.0
     )

@@ -2,6 +2,8 @@
 
 The Gaussian filters of `jaxveh.filters` see a `StateSpace`, whose process noise is one law for all rows. A road changes by the
 metre and not by the second, so that here the noise is told with every step. A step is a few products of small matrices.
+
+`predict`, `innovation` and `update` are of vectors; `belief_of`, `move`, `correct` and `spread_of` the same of states with names.
 """
 
 from __future__ import annotations
@@ -15,61 +17,101 @@ import jax.numpy as jnp
 from jaxveh import numerics
 
 
-class Normal(NamedTuple):
-    """A belief: `mean` (n,) and `covariance` (n, n)."""
+class Belief(NamedTuple):
+    """Mean (n,) and covariance (n, n), in the order of the state's fields."""
 
     mean: Any
     covariance: Any
 
 
-def normal_of(state_type: Any, means: Mapping[str, Any], stds: Mapping[str, Any], like: Any) -> Normal:
+class Innovation(NamedTuple):
+    """What a number says beyond the belief: `residual`, its expected `variance`, and the slope (n,) of what was expected."""
+
+    residual: Any
+    variance: Any
+    slope: Any
+
+
+def predict(belief: Belief, transition: Callable[[Any], Any], noise: Any) -> Belief:
+    """The belief after the `transition` of a mean (n,), with process noise of covariance `noise` (n, n)."""
+    slopes = jax.jacfwd(transition)(belief.mean)
+    covariance = numerics.symmetric(slopes @ belief.covariance @ slopes.T) + noise
+    return Belief(transition(belief.mean), covariance)
+
+
+def innovation(belief: Belief, expect: Callable[[Any], Any], value: Any, variance: Any) -> Innovation:
+    """What `value`, measured with noise of `variance`, says beyond `expect(mean)`; nothing at all where it is NaN."""
+    expected, slope = jax.value_and_grad(expect)(belief.mean)
+    there = ~jnp.isnan(value)
+    residual = jnp.where(there, value, expected) - expected
+    slope = jnp.where(there, slope, 0.0)
+    return Innovation(residual, slope @ belief.covariance @ slope + variance, slope)
+
+
+def update(belief: Belief, found: Innovation, trust: Any = 1.0) -> Belief:
+    """The belief after an innovation whose expected variance is by `1 / trust` larger than told; 0 leaves it as it is.
+
+    What is added to the variance is noise, so that the gain is the Kalman gain times `trust`.
+    """
+    along = belief.covariance @ found.slope
+    gain = trust * along / found.variance
+    mean = belief.mean + gain * found.residual
+    return Belief(mean, numerics.symmetric(belief.covariance - jnp.outer(gain, along)))
+
+
+def innovations(belief: Belief, expect: Callable[[Any], Any], values: Any, variances: Any) -> Innovation:
+    """The same of several numbers (m,) at once, whose noises are independent: fields (m,), slopes (m, n)."""
+    expected, slopes = expect(belief.mean), jax.jacfwd(expect)(belief.mean)
+    there = ~jnp.isnan(values)
+    residuals = jnp.where(there, values, expected) - expected
+    slopes = jnp.where(there[:, None], slopes, 0.0)
+    return Innovation(residuals, jnp.sum(slopes @ belief.covariance * slopes, axis=1) + variances, slopes)
+
+
+def update_by_each(belief: Belief, found: Innovation, trusts: Any) -> Belief:
+    """The belief after `innovations`, one after the other, each of its trust; about one point, so that their order is nothing."""
+    start, noise = belief, found.variance - jnp.sum(found.slope @ belief.covariance * found.slope, axis=1)
+    for residual, own, slope, trust in zip(found.residual, noise, found.slope, trusts, strict=True):
+        left = residual - slope @ (belief.mean - start.mean)
+        belief = update(belief, Innovation(left, slope @ belief.covariance @ slope + own, slope), trust)
+    return belief
+
+
+def belief_of(state_type: Any, means: Mapping[str, Any], stds: Mapping[str, Any], like: Any) -> Belief:
     """Independent states with these means (0 where not named) and standard deviations, of the dtype of `like`."""
-    names = state_type._fields
     dtype = jnp.result_type(like)
-    stack = lambda values: jnp.stack([jnp.asarray(value, dtype) for value in values])
-    mean = stack([means.get(name, 0.0) for name in names])
-    return Normal(mean, jnp.diag(jnp.square(stack([stds[name] for name in names]))))
+    mean = _vector(means, state_type, dtype)
+    return Belief(mean, jnp.diag(jnp.square(_vector(stds, state_type, dtype))))
 
 
-def move(belief: Normal, step: Callable[[Any], Any], variances: Mapping[str, Any], state_type: Any) -> Normal:
+def move(belief: Belief, step: Callable[[Any], Any], variances: Mapping[str, Any], state_type: Any) -> Belief:
     """The belief after `step(state) -> state` with independent noise of these variances."""
-    function = lambda vector: jnp.stack(step(state_type(*vector)))
-    F = jax.jacfwd(function)(belief.mean)
-    dtype = belief.mean.dtype
-    Q = jnp.diag(jnp.stack([jnp.asarray(variances.get(name, 0.0), dtype) for name in state_type._fields]))
-    return Normal(function(belief.mean), F @ belief.covariance @ F.T + Q)
+    noise = jnp.diag(_vector(variances, state_type, belief.mean.dtype))
+    return predict(belief, lambda vector: jnp.stack(step(state_type(*vector))), noise)
 
 
 def correct(
-    belief: Normal, error_of: Callable[[Any], Any], variance: Any, here: Any, state_type: Any, gate: float | None = None
-) -> Normal:
-    """The belief after one measurement with this noise variance, where it is `here`; Joseph's form.
+    belief: Belief, error_of: Callable[[Any], Any], variance: Any, here: Any, state_type: Any, gate: float | None = None
+) -> Belief:
+    """The belief after one measurement with this noise variance, where it is `here`.
 
     `error_of(state)`: what was measured less what would be said; finite wherever the belief is. `gate`: an error of more than
     this many of its predicted spreads counts with so much less weight (Huber), None: all count alike.
     """
     error, slope = jax.value_and_grad(lambda vector: error_of(state_type(*vector)))(belief.mean)
-    h = -slope
-    Ph = belief.covariance @ h
-    spread = h @ Ph + variance
+    found = Innovation(error, slope @ belief.covariance @ slope + variance, -slope)
+    trust = jnp.ones_like(error)
     if gate is not None:
-        beyond = jnp.square(error) / (gate * gate * spread)
-        variance = variance + spread * (numerics.sqrt(jnp.maximum(beyond, 1.0)) - 1.0)
-        spread = h @ Ph + variance
-    gain = jnp.where(here, Ph / spread, 0.0)
-    left = jnp.eye(len(h), dtype=h.dtype) - jnp.outer(gain, h)
-    covariance = left @ belief.covariance @ left.T + variance * jnp.outer(gain, gain)
-    covariance = 0.5 * (covariance + covariance.T)
-    return Normal(belief.mean + gain * jnp.where(here, error, 0.0), jnp.where(here, covariance, belief.covariance))
+        trust = jax.lax.rsqrt(jnp.maximum(jnp.square(error) / (gate * gate * found.variance), 1.0))
+    return update(belief, found, jnp.where(here, trust, 0.0))
 
 
-def spreads(belief: Normal) -> Any:
-    """Standard deviations (n,)."""
-    return numerics.sqrt(jnp.maximum(jnp.diagonal(belief.covariance), 0.0))
-
-
-def spread_of(belief: Normal, weights: Mapping[str, Any], state_type: Any) -> Any:
+def spread_of(belief: Belief, weights: Mapping[str, Any], state_type: Any) -> Any:
     """The standard deviation of a weighted sum of states."""
-    dtype = belief.mean.dtype
-    h = jnp.stack([jnp.asarray(weights.get(name, 0.0), dtype) for name in state_type._fields])
+    h = _vector(weights, state_type, belief.mean.dtype)
     return numerics.sqrt(jnp.maximum(h @ belief.covariance @ h, 0.0))
+
+
+def _vector(values: Mapping[str, Any], state_type: Any, dtype: Any) -> Any:
+    """(n,) of what is named, 0 of what is not."""
+    return jnp.stack([jnp.asarray(values.get(name, 0.0), dtype) for name in state_type._fields])

@@ -14,7 +14,7 @@ from jaxveh.estimators.body_motion import SILENCE, away_from_zero, hold, number_
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.leaning import NEEDS, Leaning, leaning_filter
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.sequential import Normal, correct, normal_of
+from jaxveh.estimators.sequential import Belief, belief_of, correct
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -49,8 +49,8 @@ class LearnerMemory(NamedTuple):
     turn: Any
     force: Any
     v_y: Any
-    steering: Normal
-    turning: Normal
+    steering: Belief
+    turning: Belief
     shown: Any
     age: Any
 
@@ -110,8 +110,8 @@ class Learner(AbstractMethod):
         leaning, said = self.leaning.first(t, values)
         zero = jnp.zeros_like(t)
         stds = {"ratio": self.ratio_spread, "offset": self.offset_spread, "understeer": self._understeer_spread()}
-        steering = normal_of(Steering, {"offset": self.steer_offset}, stds, t)
-        turning = normal_of(Turning, {}, {"stiffness": self.stiffness_spread, "inertia": self.inertia_spread}, t)
+        steering = belief_of(Steering, {"offset": self.steer_offset}, stds, t)
+        turning = belief_of(Turning, {}, {"stiffness": self.stiffness_spread, "inertia": self.inertia_spread}, t)
         start = {name: getattr(self, name) + zero for name in UNITS}
         memory = LearnerMemory(leaning, zero, zero, zero, zero, zero, zero, zero, steering, turning, start, zero)
         return self._next(memory, leaning, said, zero, values)
@@ -192,7 +192,7 @@ class Learner(AbstractMethod):
         of_tyres = self.mass * self.stiffness_spread * axles / self.wheelbase
         return numerics.hypot(of_tyres, self._place_slope() * self.place_spread)
 
-    def _numbers(self, steering: Normal, turning: Normal, heading: Any, swing: Any) -> tuple[dict, dict]:
+    def _numbers(self, steering: Belief, turning: Belief, heading: Any, swing: Any) -> tuple[dict, dict]:
         """What the fits say of each number, and spreads: with that of the yaw rate's offset over the speed, `heading`, and the
         share of the steer that is play, `swing`."""
         fit, turn = Steering(*steering.mean), Turning(*turning.mean)

@@ -110,12 +110,16 @@ class AbstractRatio(AbstractMethod):
         mean_square = (residual + jnp.square(RESIDUAL)) / (memory.age + 1.0)
         variance = jnp.maximum(mean_square, jnp.square(RESIDUAL)) * 2.0 * self.lasting / (start + gathered)
         mass = product / square
-        std = mass * numerics.sqrt(variance)
+        std = mass * numerics.sqrt(variance + jnp.square(OF_THE_CAR))
         return memory, answer({"mass": mass}, {"mass": std}, known=std < WIDEST_MASS * mass)
 
 
 RESIDUAL = 0.05
 """m/s^2: by so much force over mass and acceleration differ at least, for a while."""
+
+
+OF_THE_CAR = 0.025
+"""By this share of itself a mass is wrong whose file is wrong by so much in the wheel's radius, or in the torques."""
 
 
 def beyond(rate: Any, gate: Any) -> Any:
@@ -139,7 +143,7 @@ class Gated(AbstractRatio):
     mass: jax.Array = positive("kg")
     gate: jax.Array = positive("m/s^2", default=0.6)
     memory: jax.Array = positive("s", default=300.0)
-    lasting: jax.Array = positive("s", default=0.5)
+    lasting: jax.Array = positive("s", default=1.2)
     prior_spread: jax.Array = positive("-", default=0.3)
 
     def pair(self, heard, force, memory):
@@ -154,7 +158,7 @@ class KinematicGrade(AbstractRatio):
     pull: Pull
     mass: jax.Array = positive("kg")
     memory: jax.Array = positive("s", default=300.0)
-    lasting: jax.Array = positive("s", default=0.5)
+    lasting: jax.Array = positive("s", default=1.2)
     prior_spread: jax.Array = positive("-", default=0.3)
 
     def pair(self, heard, force, memory):

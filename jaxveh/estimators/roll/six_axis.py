@@ -14,7 +14,7 @@ from jaxveh.estimators.body_motion import LATERAL, SILENCE, BodyMotion, hold
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.sequential import Normal, correct, move, normal_of, spread_of
+from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
@@ -34,7 +34,7 @@ class SixAxisMemory(NamedTuple):
     roll_rate: Any
     pitch_rate: Any
     silence: Any
-    belief: Normal
+    belief: Belief
 
 
 class SixAxis(AbstractMethod):
@@ -63,7 +63,7 @@ class SixAxis(AbstractMethod):
     def first(self, t, values):
         motion, heard = self.motion.first(t, values)
         stds = {"v_x": 1.0, "v_y": 0.3, "roll": 0.1, "pitch": 0.1}
-        belief = normal_of(State, {"v_x": heard["v_x"]}, stds, t)
+        belief = belief_of(State, {"v_x": heard["v_x"]}, stds, t)
         zero = jnp.zeros_like(t)
         return self._next(motion, heard, SixAxisMemory(motion, zero, zero, zero + SILENCE, belief))
 

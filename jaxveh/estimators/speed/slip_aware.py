@@ -9,8 +9,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles, slip_stiffness
-from jaxveh.estimators.speed.gaussian import (
+from jaxveh.estimators.sequential import (
     Belief,
     Innovation,
     innovation,
@@ -19,6 +18,7 @@ from jaxveh.estimators.speed.gaussian import (
     update,
     update_by_each,
 )
+from jaxveh.estimators.speed.car_numbers import SpeedCar, forces_of_axles, slip_stiffness
 from jaxveh.estimators.speed.slip_state import (
     FRONT,
     HELD,

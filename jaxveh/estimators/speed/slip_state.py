@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.speed.gaussian import Belief
+from jaxveh.estimators.sequential import Belief
 from jaxveh.estimators.speed.wheels import AT
 
 LEFT = np.array([1, -1, 1, -1])

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.method import answer
+from jaxveh.estimators.sequential import Belief, innovation, predict, update
 from jaxveh.estimators.speed.accelerometer import A_X, Felt, never_felt
-from jaxveh.estimators.speed.gaussian import Belief, innovation, predict, update
 from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, AbstractWheelMethod, Wheels
 from jaxveh.vehicles import GRAVITY
 

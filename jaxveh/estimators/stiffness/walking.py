@@ -11,23 +11,22 @@ from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.method import AbstractMethod, answer
+from jaxveh.estimators.sequential import Belief, innovation, update
 from jaxveh.estimators.stiffness.single_track import LATERAL, LEAN, LOWEST, Followed, LinearCar, Signals
 
 STATES = 10
 """v_y (m/s), yaw rate (rad/s), ln of both stiffnesses over the file's, offsets of steer (rad), a_y (m/s^2) and yaw rate
-(rad/s), and
-by which share of itself a_y shows more because the body leans, the yaw (rad), and how much
-later than `late` inertial sensors are than the steer (s)."""
+(rad/s), by which share of itself a_y shows more because the body leans, the yaw (rad), and how much later inertial sensors are
+than the steer (s)."""
 
 SATELLITE = (Need("course", "rad", optional=True),)
 
 
 class WalkMemory(NamedTuple):
-    """The signals; mean and covariance of the states; how fast the course turned of late, a_y / v (rad/s), low-pass filtered."""
+    """The signals; the belief about the states; how fast the course turned of late, a_y / v (rad/s), low-pass filtered."""
 
     signals: Signals
-    mean: Any
-    covariance: Any
+    belief: Belief
     turning: Any
 
 
@@ -36,9 +35,8 @@ class WalkingStiffness(AbstractMethod):
 
     The linear single track of the file's mass, inertia and lengths; measured are yaw rate and lateral acceleration and, where the
     log has it, the satellite's `course = yaw + v_y / v` (references [46, 47]), which alone sees the sideslip. It comes
-    `course_delay`
-    (s) later than the inertial sensors; what it has turned since is the integral of a_y / v. What would be taken for stiffness
-    is a state of its own: offsets,
+    `course_delay` (s) later than the inertial sensors; what it has turned since is the integral of a_y / v. What would be taken
+    for stiffness is a state of its own: offsets,
     and the lean of the body, by which an accelerometer shows more. Where tyres leave their linear range (`linear` m/s^2 of
     lateral acceleration), measurements count less and less. On a slippery road it is the slope at zero slip still that is told,
     as long as there is little lateral acceleration.
@@ -69,7 +67,7 @@ class WalkingStiffness(AbstractMethod):
     def first(self, t, values):
         signals = self.followed.start(t, values)
         mean = jnp.zeros((STATES,), self.spread.dtype).at[7].set(LEAN)
-        memory = WalkMemory(signals, mean, self._start(), jnp.zeros_like(t))
+        memory = WalkMemory(signals, Belief(mean, self._start()), jnp.zeros_like(t))
         return memory, self._answer(memory)
 
     def next(self, memory, t, values):
@@ -78,18 +76,21 @@ class WalkingStiffness(AbstractMethod):
         v_x = jnp.maximum(now.v_x, LOWEST)
         share = 1.0 - jnp.exp(-2.0 * dt / self.course_delay)
         turning = memory.turning + share * (now.a_y / (1.0 + LEAN) / v_x - memory.turning)
-        x, P = self._move(memory.mean, memory.covariance, now, dt)
+        belief = self._move(memory.belief, now, dt)
         rough = 1.0 + jnp.square(jnp.square(now.a_y / self.linear))
+        heard = lambda belief, value, expect, noise: update(
+            belief, innovation(belief, expect, value, jnp.square(noise) * rough)
+        )
+        belief = heard(belief, values["yaw_rate"], lambda x: x[1] + x[6], self.yaw_rate_noise)
         felt = lambda x: self._forces(x, now)[2] * (1.0 + x[7]) + x[5]
-        x, P = update(x, P, values["yaw_rate"], lambda x: x[1] + x[6], jnp.square(self.yaw_rate_noise) * rough)
-        x, P = update(x, P, values["a_y"], felt, jnp.square(self.a_y_noise) * rough)
+        belief = heard(belief, values["a_y"], felt, self.a_y_noise)
         seen = lambda x: x[8] + x[0] / v_x
+        ahead = seen(belief.mean)
         late = values["course"] + self.course_delay * turning
-        nearest = seen(x) + numerics.wrap_angle(late - seen(x))
-        x, P = update(x, P, nearest, seen, jnp.square(self.course_noise / v_x) * rough)
-        x = jnp.where(now.moves, x, memory.mean.at[:2].set(0.0))
-        P = jnp.where(now.moves, P, self._standing(memory.covariance))
-        after = WalkMemory(now, x, P, turning)
+        belief = heard(belief, ahead + numerics.wrap_angle(late - ahead), seen, self.course_noise / v_x)
+        x = jnp.where(now.moves, belief.mean, memory.belief.mean.at[:2].set(0.0))
+        P = jnp.where(now.moves, belief.covariance, self._standing(memory.belief.covariance))
+        after = WalkMemory(now, Belief(x, P), turning)
         return after, self._answer(after)
 
     def _start(self):
@@ -114,8 +115,8 @@ class WalkingStiffness(AbstractMethod):
         rear = -rear * (x[0] - car.rear_axle_to_cg * x[1]) / v_x
         return front, rear, (front + rear) / car.mass
 
-    def _move(self, x, P, now: Signals, dt):
-        car = self.car
+    def _move(self, belief: Belief, now: Signals, dt) -> Belief:
+        car, x = self.car, belief.mean
 
         def rates(x):
             front, rear, push = self._forces(x, now)
@@ -132,27 +133,14 @@ class WalkingStiffness(AbstractMethod):
             self.v_y_noise, self.yaw_noise, self.walk, self.walk, self.steer_noise, 0.002 + slow, 1e-5 + slow, 1e-4 + slow,
             2e-3 + slow, 1e-5 + slow,
         ])  # fmt: skip
-        return x.at[:2].add(dt * (inverse @ rate)).at[8].add(dt * x[1]), step @ P @ step.T + jnp.diag(
-            jnp.square(walks) * dt
-        )
+        moved = x.at[:2].add(dt * (inverse @ rate)).at[8].add(dt * x[1])
+        return Belief(moved, step @ belief.covariance @ step.T + jnp.diag(jnp.square(walks) * dt))
 
     def _answer(self, memory: WalkMemory):
-        now, x, P, _ = memory
+        now, (x, P), _ = memory
         std = jnp.sqrt(jnp.diagonal(P))[2:4]
         file = (self.car.front_cornering_stiffness, self.car.rear_cornering_stiffness)
         names = ("front_cornering_stiffness", "rear_cornering_stiffness")
         mean = {name: file[k] * jnp.exp(jnp.clip(x[2 + k], -1.6, 1.6)) for k, name in enumerate(names)}
         known = {name: now.moves & (std[k] < self.known_spread) for k, name in enumerate(names)}
         return answer(mean, {name: mean[name] * std[k] for k, name in enumerate(names)}, known)
-
-
-def update(x, P, measured, observation, variance):
-    """Kalman's update by one number, NaN where it is missing."""
-    here = ~jnp.isnan(measured)
-    expected, slope = observation(x), jax.grad(observation)(x)
-    across = P @ slope
-    gain = jnp.where(here, across / (slope @ across + variance), 0.0)
-    # Joseph's form, which stays positive definite in float32.
-    left = jnp.eye(len(x), dtype=x.dtype) - jnp.outer(gain, slope)
-    P = left @ P @ left.T + variance * jnp.outer(gain, gain)
-    return x + gain * (jnp.where(here, measured, expected) - expected), 0.5 * (P + P.T)
