@@ -5,7 +5,7 @@ from jaxveh.diagnostics import drive_channels, kit
 from jaxveh.diagnostics.braking_test import BrakingTest, braking_test
 from jaxveh.diagnostics.chi_squared import chi_squared_band, chi_squared_quantile, chi_squared_tails
 from jaxveh.diagnostics.consistency import Consistency, nees, nis, nis_by_channel
-from jaxveh.diagnostics.delays import delay
+from jaxveh.diagnostics.delays import delay, delay_of_rows
 from jaxveh.diagnostics.drive_numbers import Peaks, drive_numbers, peaks
 from jaxveh.diagnostics.frequency_response import FrequencyResponse, frequency_response
 from jaxveh.diagnostics.log_check import check_log
@@ -43,6 +43,7 @@ __all__ = [
     "chi_squared_quantile",
     "chi_squared_tails",
     "delay",
+    "delay_of_rows",
     "drive_channels",
     "drive_numbers",
     "frequency_response",

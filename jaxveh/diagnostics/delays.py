@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 LONGEST = 2.0
@@ -12,32 +14,53 @@ LONGEST = 2.0
 LIVELY = 1e-9
 """A truth whose spread is less than this share of its size does not move, so that nothing can be late."""
 
+FEWEST = 10
+"""Rows without which there is nothing to compare."""
+
 
 def delay(time: np.ndarray, mean: np.ndarray, truth: np.ndarray, *, longest: float = LONGEST) -> float:
     """The delay of `mean` behind `truth` (T,) along `time` (s): by which the truth must be shifted to be nearest to the estimate
     in the mean square, less the constant error; s, negative where the estimate is early.
 
-    Between rows by a parabola through the three nearest shifts. NaN where fewer than ten rows are finite, the truth does not
-    move, or no shift of up to `longest` (s) is nearest.
+    Both are read at even steps. NaN where fewer than ten rows are finite, the truth does not move, or no shift of up to `longest`
+    (s) is nearest.
     """
     time, mean, truth = (np.asarray(one, float) for one in (time, mean, truth))
     there = np.isfinite(mean) & np.isfinite(truth)
-    if there.sum() < 10 or np.std(truth[there]) <= LIVELY * max(np.abs(truth[there]).max(), 1e-300):
+    if there.sum() < FEWEST:
         return math.nan
     step = float(np.median(np.diff(time)))
-    count = round(min(longest, 0.25 * (time[-1] - time[0])) / step)
-    shifts = step * np.arange(-count, count + 1)
-    far = np.array([_error(time, mean, truth, there, shift) for shift in shifts])
-    best = int(np.argmin(far))
-    if best in (0, len(shifts) - 1):
-        return math.nan
-    before, here, after = far[best - 1 : best + 2]
+    even = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
+    read = lambda values: np.interp(even, time[there], values[there])
+    inside = np.interp(even, time, there.astype(float)) > 0.999
+    count = max(round(min(longest, 0.25 * (time[-1] - time[0])) / step), 1)
+    return float(step * _compiled(read(mean), read(truth), inside, count))
+
+
+def delay_of_rows(mean, truth, there, most: int):
+    """The same in rows of even steps, traced: of the rows that are `there` (T,), shifts of up to `most` rows either way.
+
+    Between rows by a parabola through the three nearest shifts.
+    """
+    rows = jnp.arange(truth.shape[0])
+    there = there & (rows >= most) & (rows < truth.shape[0] - most)
+    count = jnp.sum(there).astype(mean.dtype)
+    mean_of = lambda values: jnp.sum(jnp.where(there, values, 0.0)) / count
+    size, mean, truth = jnp.max(jnp.abs(truth)), mean - mean_of(mean), truth - mean_of(truth)
+
+    def left(shift):
+        error = mean - jnp.roll(truth, shift)
+        return mean_of(error**2) - mean_of(error) ** 2
+
+    shifts = jnp.arange(-most, most + 1)
+    far = jax.lax.map(left, shifts)
+    best = jnp.clip(jnp.argmin(far), 1, 2 * most - 1)
+    before, here, after = far[best - 1], far[best], far[best + 1]
     curve = before - 2.0 * here + after
-    return float(shifts[best] + (0.5 * step * (before - after) / curve if curve > 0.0 else 0.0))
+    found = shifts[best].astype(mean.dtype) + jnp.where(curve > 0.0, 0.5 * (before - after) / jnp.where(curve > 0.0, curve, 1.0), 0.0)
+    moves = jnp.sqrt(mean_of(truth**2)) > max(LIVELY, 100.0 * float(jnp.finfo(mean.dtype).eps)) * size
+    nearest = (here <= before) & (here <= after)
+    return jnp.where((count >= FEWEST) & moves & nearest, found, jnp.nan)
 
 
-def _error(time, mean, truth, there, shift: float) -> float:
-    """Mean square of what is left after the shift, over the rows whose truth lies inside the log whatever the shift."""
-    known = there & (time - abs(shift) >= time[0]) & (time + abs(shift) <= time[-1])
-    error = mean[known] - np.interp(time[known] - shift, time[np.isfinite(truth)], truth[np.isfinite(truth)])
-    return float(np.var(error))
+_compiled = jax.jit(delay_of_rows, static_argnums=3)

@@ -13,9 +13,9 @@ from jaxveh.experiments.sideslip_review.chapters import conclusions, fleet, raci
 TIME = np.arange(0.0, 20.0, racing.STEP)
 
 
-def scored(mean, truth, known=True, held=True):
+def scored(mean, truth, known=True, held=True, std=np.nan):
     one = lambda value: jnp.broadcast_to(jnp.asarray(value), TIME.shape)
-    found = jax.jit(racing.metrics)(one(mean), one(known), one(truth), one(held))
+    found = jax.jit(racing.metrics)(one(mean), one(std), one(known), one(truth), one(held))
     return {name: float(value) for name, value in found.items()}
 
 
@@ -33,6 +33,13 @@ def test_an_error_is_scored_from_the_warm_up_until_the_car_is_lost():
     assert found["worst"] == 2.0 and found["known"] == pytest.approx(0.5) and found["failed"] == 0.0
     assert scored(np.where(TIME == 7.0, np.nan, error), 0.0, held=held)["failed"] == 1.0
     assert scored(np.where(TIME == 17.0, np.nan, error), 0.0, held=held)["failed"] == 0.0
+
+
+def test_a_claimed_spread_is_scored_where_the_method_says_that_it_knows():
+    error = np.where(TIME < 10.0, 6.0, 2.0)
+    assert scored(error, 0.0, TIME >= 10.0, std=0.5)["nees"] == pytest.approx(16.0)
+    assert scored(error, 0.0, std=np.where(TIME < 10.0, np.nan, 1.0))["nees"] == pytest.approx(4.0)
+    assert np.isnan(scored(error, 0.0)["nees"])
 
 
 def test_what_follows_late_is_late_by_as_much():

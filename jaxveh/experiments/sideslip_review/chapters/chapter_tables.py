@@ -63,24 +63,30 @@ def _properties(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> T
         for key, values in raced.found.items():
             if key[0] != quantity or key[2] != shown:
                 continue
-            at = lambda metric, values=values, normal=normal: np.median(values[metric][normal])
+            at = lambda metric, values=values, normal=normal: _median(values[metric][normal])
             method = module.METHODS[key[1]]
             needs = method.make(told_cars()[0]).needs
             rows.append((
                 f"{shown} [{unit}]", _name(quantity, key[1]), f"{100.0 * at('known'):.0f} %", scale * at("rmse_known"),
-                scale * np.nanmax(values["worst"]), at("delay"), at("late") / max(at("early"), 1e-12), values["failed"].sum(),
+                scale * np.nanmax(values["worst"]), at("nees"), at("delay"), at("late") / max(at("early"), 1e-12), values["failed"].sum(),
                 ", ".join(_short([need.channel for need in needs if not need.optional])), method.source,
             ))  # fmt: skip
     rows += [
-        ("", f"{q}: {m}", "not raced", "", "", "", "", "", why, "")
+        ("", f"{q}: {m}", "not raced", "", "", "", "", "", "", why, "")
         for (q, m), why in raced.left_out.items()
         if q in names
     ]
     columns = (
-        "what", "method", "known, normal", "rmse of it known", "worst of all drives", "delay [s]", "late over early", "failed",
+        "what", "method", "known, normal", "rmse of it known", "worst of all drives", "NEES of it known", "delay [s]", "late over early", "failed",
         "needs", "from",
     )  # fmt: skip
     return Table(f"{chapter}: what the methods are like", columns, rows)
+
+
+def _median(values: np.ndarray) -> float:
+    """Over the seeds that have one."""
+    there = values[np.isfinite(values)]
+    return float(np.median(there)) if there.size else float("nan")
 
 
 def _short(channels: list[str]) -> list[str]:

@@ -17,6 +17,7 @@ from jaxveh import estimators, sweeps
 from jaxveh._core.errors import InputError, check_whole
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh._core.recording import Recording
+from jaxveh.diagnostics import delay_of_rows
 from jaxveh.estimators import AbstractMethod, kit
 from jaxveh.experiments.sideslip_review.chapters.fleet import CARS, built_cars, told_cars
 from jaxveh.experiments.sideslip_review.chapters.fleet_drives import drive_once
@@ -33,7 +34,7 @@ CHAPTERS = {
 }
 """The review's chapters, and the quantities of `jaxveh.estimators` that belong to each."""
 
-LATEST, EARLIEST = 100, 50
+LATEST = 100
 """Rows by which an estimate may be late or early, to be called so."""
 
 
@@ -155,10 +156,8 @@ def _run(methods: list[AbstractMethod], conclude: Callable[[Any, dict], dict]):
 def _score(module: ModuleType, said: Any, drive: dict) -> dict[str, Any]:
     shown = [name for name in module.SHOWN if f"true.{name}" in drive]
     held = jnp.cumprod((jnp.abs(drive["true.sideslip"]) < LOST).astype(int)) > 0
-    return {
-        name: metrics(getattr(said.mean, name), getattr(said.known, name), drive[f"true.{name}"], held)
-        for name in shown
-    }
+    of = lambda name: (getattr(part, name) for part in (said.mean, said.std, said.known))
+    return {name: metrics(*of(name), drive[f"true.{name}"], held) for name in shown}
 
 
 STEP = 0.01
@@ -172,34 +171,27 @@ LOST = np.radians(20.0)
 """rad of sideslip: from there on a car has spun, and nothing of the drive is scored."""
 
 
-def metrics(mean, known, truth, held) -> dict[str, Any]:
+def metrics(mean, std, known, truth, held) -> dict[str, Any]:
     """Of one drive: root mean square of the error over the first and the second half (`early`, `late`), over all (`rmse`) and
-    where the method says that it knows (`rmse_known`), the largest error (`worst`), the share of rows known (`known`), by how
-    many seconds it is late (`delay`), and whether it was not finite throughout (`failed`); of rows in which the car is `held`."""
+    where the method says that it knows (`rmse_known`), the largest error (`worst`), the share of rows known (`known`), the mean
+    square of the error over its claimed spread where it is known (`nees`, NaN where no spread is claimed), by how many seconds
+    it is late (`delay`), and whether it was not finite throughout (`failed`); of rows in which the car is `held`."""
     rows = jnp.arange(truth.shape[0])
     warm, half = held & (rows >= round(WARM_UP / STEP)), rows.shape[0] // 2
     finite = jnp.isfinite(mean) & held
     error = jnp.where(finite, mean - truth, 0.0)
     count = lambda which: jnp.sum(which.astype(error.dtype))
-    rms = lambda which: jnp.sqrt(jnp.sum(jnp.where(which, error**2, 0.0)) / count(which))
+    rms = lambda which, of=error: jnp.sqrt(jnp.sum(jnp.where(which, of**2, 0.0)) / count(which))
+    sure = warm & finite & known
+    claimed = sure & (std > 0.0)
+    late = delay_of_rows(jnp.where(finite, mean, 0.0), truth, warm & finite, LATEST)
     return {
         "rmse": rms(warm & finite), "early": rms(warm & finite & (rows < half)), "late": rms(finite & (rows >= half)),
-        "rmse_known": rms(warm & finite & known), "worst": jnp.max(jnp.where(warm & finite, jnp.abs(error), 0.0)),
+        "rmse_known": rms(sure), "worst": jnp.max(jnp.where(warm & finite, jnp.abs(error), 0.0)),
         "known": count(warm & known) / count(warm),
-        "delay": _delay(jnp.where(finite, mean, 0.0), truth), "failed": 1.0 - jnp.all(finite | ~warm).astype(error.dtype),
+        "nees": rms(claimed, error / jnp.where(claimed, std, 1.0)) ** 2,
+        "delay": STEP * late, "failed": 1.0 - jnp.all(finite | ~warm).astype(error.dtype),
     }  # fmt: skip
-
-
-def _delay(mean, truth):
-    """By which the truth must be shifted to be nearest to the estimate, constant errors aside, s, to the row."""
-    inner = slice(LATEST, truth.shape[0] - EARLIEST)
-
-    def left(shift):
-        moved = jnp.roll(truth, shift)[inner]
-        return jnp.var(mean[inner] - moved)
-
-    shifts = jnp.arange(-EARLIEST, LATEST + 1)
-    return STEP * shifts[jnp.argmin(jax.lax.map(left, shifts))].astype(mean.dtype)
 
 
 def _nothing(drives: Mapping[str, np.ndarray]) -> dict[tuple[str, str], dict[str, np.ndarray]]:
