@@ -57,7 +57,9 @@ def delay_of_rows(mean, truth, there, most: int):
     best = jnp.clip(jnp.argmin(far), 1, 2 * most - 1)
     before, here, after = far[best - 1], far[best], far[best + 1]
     curve = before - 2.0 * here + after
-    found = shifts[best].astype(mean.dtype) + jnp.where(curve > 0.0, 0.5 * (before - after) / jnp.where(curve > 0.0, curve, 1.0), 0.0)
+    bent = curve > 0.0
+    between = jnp.where(bent, 0.5 * (before - after) / jnp.where(bent, curve, 1.0), 0.0)
+    found = shifts[best].astype(mean.dtype) + between
     moves = jnp.sqrt(mean_of(truth**2)) > max(LIVELY, 100.0 * float(jnp.finfo(mean.dtype).eps)) * size
     nearest = (here <= before) & (here <= after)
     return jnp.where((count >= FEWEST) & moves & nearest, found, jnp.nan)

@@ -9,6 +9,7 @@ import pytest
 from jaxveh import estimators
 from jaxveh.experiments.sideslip_review import chapters
 from jaxveh.experiments.sideslip_review.chapters import conclusions, fleet, racing, scenarios
+from jaxveh.experiments.sideslip_review.chapters.chapter_figures import error_ratios
 
 TIME = np.arange(0.0, 20.0, racing.STEP)
 
@@ -82,6 +83,20 @@ def test_a_conclusion_is_a_ratio_of_errors_on_the_same_seeds():
         for quantity, method, shown in (one.follows, one.does_not):
             module = getattr(estimators, quantity)
             assert method in module.METHODS and shown in module.SHOWN
+
+
+def test_a_chapter_is_drawn_as_errors_over_those_of_doing_nothing():
+    found = raced({("sideslip", "ekf", "sideslip"): [1.0, 3.0], ("speed", "weighted", "v_x"): [2.0, 2.0]})
+    nothing = {
+        key: {"rmse": np.full((len(scenarios.SCENARIOS), 2), 4.0)}
+        for key in (("sideslip", "sideslip"), ("speed", "v_x"))
+    }
+    nothing["sideslip", "sideslip"]["rmse"][1] = [np.nan, 4.0]
+    found = found._replace(nothing=nothing)
+    labels, ratios = error_ratios(found, ("sideslip",))
+    assert labels == ["sideslip: ekf"] and ratios.shape == (1, len(scenarios.SCENARIOS))
+    assert ratios[0, 0] == pytest.approx(0.5) and ratios[0, 1] == pytest.approx(0.75)
+    assert set(chapters.chapter_figures(found)) == {"chapter_lateral_velocity", "chapter_longitudinal_speed"}
 
 
 @pytest.mark.full

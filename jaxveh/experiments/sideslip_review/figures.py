@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from jaxveh.experiments.sideslip_review.chapters import chapter_figures
 from jaxveh.experiments.sideslip_review.contestants import WHAT
 from jaxveh.experiments.sideslip_review.recorded import BEST, READY, Logged
 from jaxveh.experiments.sideslip_review.report import Reproduction
@@ -29,6 +30,8 @@ def figures(result: Reproduction) -> dict[str, Any]:
         "limit": drive_figure(result.raced, "limit"),
         "sensor_bias": drive_figure(result.raced, "sensor bias"),
     }
+    if result.chapters is not None:
+        found |= chapter_figures(result.chapters)
     return found if result.logged is None else found | {"log": log_figure(result.logged)}
 
 

@@ -26,7 +26,7 @@ def chapter_tables(raced: ChaptersRaced) -> list[Table]:
     return found
 
 
-def _shown(raced: ChaptersRaced, names: tuple[str, ...]):
+def shown_of(raced: ChaptersRaced, names: tuple[str, ...]):
     """(quantity, shown name, scale, unit) of a chapter, those that the drives know a truth of."""
     for quantity in names:
         for shown, unit in quantities()[quantity].SHOWN.items():
@@ -37,7 +37,7 @@ def _shown(raced: ChaptersRaced, names: tuple[str, ...]):
 
 def _errors(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table:
     rows = []
-    for quantity, shown, scale, unit in _shown(raced, names):
+    for quantity, shown, scale, unit in shown_of(raced, names):
         label = f"{shown} [{unit}]"
         idle = raced.nothing.get((quantity, shown))
         if idle is not None:
@@ -45,20 +45,21 @@ def _errors(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table
         for key, values in raced.found.items():
             if key[0] == quantity and key[2] == shown:
                 cells = [spread(scale * values["rmse"][i]) for i in range(len(NAMES))]
-                rows.append((label, _name(quantity, key[1]), *cells))
+                rows.append((label, starred(quantity, key[1]), *cells))
     return Table(
         f"{chapter}: RMSE, median over seeds [quartiles]; * is what we recommend", ("what", "method", *NAMES), rows
     )
 
 
-def _name(quantity: str, method: str) -> str:
+def starred(quantity: str, method: str) -> str:
+    """The method's name, with a star where we recommend it."""
     return f"{method} *" if method == quantities()[quantity].RECOMMENDED else method
 
 
 def _properties(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table:
     """On ordinary drives, and over all: what is known, the worst, the delay, a long run; what it needs."""
     rows = []
-    for quantity, shown, scale, unit in _shown(raced, names):
+    for quantity, shown, scale, unit in shown_of(raced, names):
         module, normal = quantities()[quantity], NAMES.index("normal")
         for key, values in raced.found.items():
             if key[0] != quantity or key[2] != shown:
@@ -67,8 +68,9 @@ def _properties(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> T
             method = module.METHODS[key[1]]
             needs = method.make(told_cars()[0]).needs
             rows.append((
-                f"{shown} [{unit}]", _name(quantity, key[1]), f"{100.0 * at('known'):.0f} %", scale * at("rmse_known"),
-                scale * np.nanmax(values["worst"]), at("nees"), at("delay"), at("late") / max(at("early"), 1e-12), values["failed"].sum(),
+                f"{shown} [{unit}]", starred(quantity, key[1]), f"{100.0 * at('known'):.0f} %", scale * at("rmse_known"),
+                scale * np.nanmax(values["worst"]), at("nees"), at("delay"),
+                at("late") / max(at("early"), 1e-12), values["failed"].sum(),
                 ", ".join(_short([need.channel for need in needs if not need.optional])), method.source,
             ))  # fmt: skip
     rows += [
@@ -77,8 +79,8 @@ def _properties(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> T
         if q in names
     ]
     columns = (
-        "what", "method", "known, normal", "rmse of it known", "worst of all drives", "NEES of it known", "delay [s]", "late over early", "failed",
-        "needs", "from",
+        "what", "method", "known, normal", "rmse of it known", "worst of all drives", "NEES of it known", "delay [s]",
+        "late over early", "failed", "needs", "from",
     )  # fmt: skip
     return Table(f"{chapter}: what the methods are like", columns, rows)
 

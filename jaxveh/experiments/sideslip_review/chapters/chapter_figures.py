@@ -1,0 +1,67 @@
+"""One picture a chapter: what every method makes of every scenario, against doing nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jaxveh.experiments.sideslip_review.chapters.chapter_tables import NAMES, shown_of, starred
+from jaxveh.experiments.sideslip_review.chapters.racing import CHAPTERS, ChaptersRaced
+from jaxveh.plots import kit, style
+
+STRONG = 8.0
+"""Ratio of errors at which a colour is full."""
+
+
+def chapter_figures(raced: ChaptersRaced) -> dict[str, Any]:
+    """By the stems of their files; a chapter that was not raced has none."""
+    found = {}
+    for chapter, names in CHAPTERS.items():
+        labels, ratios = error_ratios(raced, names)
+        if labels:
+            found[f"chapter_{chapter.replace(',', '').replace(' ', '_')}"] = _map(chapter, labels, ratios)
+    return found
+
+
+def error_ratios(raced: ChaptersRaced, names: tuple[str, ...]) -> tuple[list[str], np.ndarray]:
+    """Labels of methods, and medians over seeds of their RMSE over that of doing nothing (methods, scenarios), NaN where there is
+    none."""
+    labels, rows = [], []
+    for quantity, shown, _, _ in shown_of(raced, names):
+        nothing = raced.nothing[quantity, shown]["rmse"]
+        for key, values in raced.found.items():
+            if key[0] != quantity or key[2] != shown:
+                continue
+            ratio = np.where(nothing > 0.0, values["rmse"] / np.where(nothing > 0.0, nothing, 1.0), np.nan)
+            there = np.isfinite(ratio)
+            rows.append(
+                [np.median(row[here]) if here.any() else np.nan for row, here in zip(ratio, there, strict=True)]
+            )
+            labels.append(f"{shown}: {starred(quantity, key[1])}")
+    return labels, np.array(rows)
+
+
+def _map(chapter: str, labels: list[str], ratios: np.ndarray) -> Any:
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 1.4 + 0.16 * len(labels)), layout="constrained")
+    with style():
+        axes = figure.subplots()
+        with np.errstate(divide="ignore"):
+            levels = np.log2(ratios)
+        mesh = axes.pcolormesh(
+            np.ma.masked_invalid(levels), cmap="RdYlGn_r", vmin=-np.log2(STRONG), vmax=np.log2(STRONG)
+        )
+        for (row, column), ratio in np.ndenumerate(ratios):
+            if np.isfinite(ratio):
+                axes.text(column + 0.5, row + 0.5, f"{ratio:.2g}", ha="center", va="center", fontsize=5)
+        axes.set_yticks(np.arange(len(labels)) + 0.5, labels, fontsize=6)
+        axes.set_xticks(np.arange(len(NAMES)) + 0.5, NAMES, fontsize=6, rotation=35, ha="right")
+        axes.invert_yaxis()
+        axes.set_title(
+            f"{chapter}: RMSE over that of doing nothing, median over seeds; * is what we recommend", fontsize=8
+        )
+        ticks = (-3, -2, -1, 0, 1, 2, 3)
+        bar = figure.colorbar(mesh, ax=axes, ticks=ticks, pad=0.01, aspect=40)
+        bar.ax.set_yticklabels([f"{2.0**tick:g}" for tick in ticks], fontsize=6)
+        bar.set_label("ratio of RMSE [-]", fontsize=6)
+    return figure
