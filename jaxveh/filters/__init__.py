@@ -36,6 +36,7 @@ from jaxveh.filters.gaussian import (
     Unscented,
 )
 from jaxveh.filters.guided import Guided
+from jaxveh.filters.interleaved import Interleaved, Turn, interleave
 from jaxveh.filters.kernels import LiuWest, Regularised
 from jaxveh.filters.looking_ahead import AbstractLookahead, PointLookahead, PredictiveLikelihood
 from jaxveh.filters.marginalised import Marginalised, MarginalisedBelief
@@ -111,6 +112,7 @@ __all__ = [
     "Huber",
     "Info",
     "InteractingModels",
+    "Interleaved",
     "Iterated",
     "Kalman",
     "LiuWest",
@@ -138,10 +140,12 @@ __all__ = [
     "SquareRoot",
     "StrongTracking",
     "Transport",
+    "Turn",
     "Unscented",
     "VariationalBayes",
     "VaryingNoise",
     "export_filter",
+    "interleave",
     "kit",
     "load_belief",
     "log_likelihood_spread",

@@ -10,13 +10,10 @@ import pytest
 
 from jaxveh import Parameters, filters, sweeps
 from jaxveh._core.errors import InputError
-from jaxveh._core.names import record_type
 from jaxveh.diagnostics.observability import observability_at
 from jaxveh.experiments import federated_ckf as experiment
 from jaxveh.experiments.federated_ckf import contestants, criteria, drives, model, observed, printed, report, study
-from jaxveh.experiments.federated_ckf.interleaved import Member, Told, stays, take_turns
 from jaxveh.experiments.federated_ckf.settings import OTHER_START, PARAMETERS, PRINTED_START, Start
-from jaxveh.statespace import Gaussian, Prior, Row, StateSpace
 from jaxveh.tyres import Contact
 
 SMALL = experiment.Study(duration=6.0, settled=3.0, fault_at=3.5, fault_time=1.5)
@@ -114,28 +111,6 @@ def test_small_steer_says_nothing_of_friction(driven):
     spread = np.array([0.8, 0.4, 0.3, 0.1, 0.1, 0.1, 0.05, 0.3])
     bounds = observability_at(lambda z: jnp.asarray(large) @ z, jnp.zeros(8), PARAMETERS, spread, nuisance=4)
     assert bounds.unobservable() == ()
-
-
-def test_estimators_that_take_turns_believe_what_was_told_a_row_ago():
-    """Two levels whose sum is measured: each takes the other's last estimate for certain."""
-    kind = record_type("State", ("level",))
-    see = lambda told, t, x, u: record_type("Measurements", ("sum",))(x.level + told)
-    make = lambda: StateSpace(
-        transition=stays, observation=see, process_noise=None, measurement_noise=Gaussian({"sum": 1.0}),
-        prior=Prior(kind(0.0), {"level": 1.0}),
-    )  # fmt: skip
-    members = (
-        Member(filters.Cubature(), make(), lambda t: t.state, lambda mean, t: t._replace(car=mean.level)),
-        Member(filters.Cubature(), make(), lambda t: t.car, lambda mean, t: t._replace(state=mean.level)),
-    )
-    rows = Row(np.arange(3.0), record_type("Inputs", ())(), record_type("Measurements", ("sum",))(np.full(3, 2.0)))
-    told = Told(rows.t[0], rows.u, np.array(0.0), np.array(0.0))
-    (one, two), _, _ = jax.jit(lambda told, rows: take_turns(members, told, rows))(told, rows)
-    a = b = 0.0
-    for k in range(3):
-        gain = 1.0 / (k + 2.0)
-        a, b = a + gain * (2.0 - b - a), b + gain * (2.0 - a - b)
-        np.testing.assert_allclose([one[k, 0], two[k, 0]], [a, b], rtol=1e-9)
 
 
 def test_numbers_of_a_known_course():

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxveh import filters, numerics
 from jaxveh._core.names import record_type
 from jaxveh.experiments.federated_ckf.drives import WHEELS, Drive, times
-from jaxveh.experiments.federated_ckf.interleaved import Member, SeenThrough, Told, stays, take_turns
+from jaxveh.experiments.federated_ckf.interleaved import SeenThrough, Told, stays, vector_and_covariance
 from jaxveh.experiments.federated_ckf.model import (
     CHANNELS,
     State,
@@ -143,7 +143,12 @@ def _three(filter_: Any):
         )  # fmt: skip
         rows = rows_of(study, drive)
         told = Told(rows.t[0], jax.tree.map(lambda leaf: leaf[0], rows.u), car, states.prior.mean)
-        members = [Member(filter_, states, lambda told: told.car, lambda mean, told: told._replace(state=mean))]
+        turns = {
+            "state": filters.Turn(
+                filter_, states, lambda told: told.car,
+                lambda belief, row, told: told._replace(t=row.t, u=row.u, state=belief.mean),
+            )
+        }  # fmt: skip
         for names, put in ((BLOCKS[1], PUT_BODY), (BLOCKS[2], PUT_FRICTION)):
             kind = record_type("State", names)
             model = StateSpace(
@@ -153,9 +158,10 @@ def _three(filter_: Any):
                 prior=Prior(kind(*[jnp.log(getattr(car, name)) for name in names]), {n: spreads[n] for n in names}),
                 inputs=states.inputs, input_path="linear",
             )  # fmt: skip
-            tell = lambda mean, told, put=put: told._replace(car=put(told.car, mean))
-            members.append(Member(filter_, model, lambda told: told, tell))
-        (state, body, friction), (P, P_body, P_friction), _ = take_turns(tuple(members), told, rows)
+            tell = lambda belief, row, told, put=put: told._replace(car=put(told.car, belief.mean))
+            turns[names[0]] = filters.Turn(filter_, model, lambda told: told, tell)
+        kept = filters.interleave(turns, told, rows, keep=vector_and_covariance).kept
+        (state, P), (body, P_body), (friction, P_friction) = (kept[name] for name in turns)
         covariance = jnp.zeros((state.shape[0], 7, 7)).at[:, :3, :3].set(P)
         covariance = covariance.at[:, 3:4, 3:4].set(P_friction).at[:, 4:, 4:].set(P_body)
         return _result(jnp.concatenate([state, friction, body], axis=1), covariance)

@@ -13,7 +13,7 @@ from jaxveh import filters
 from jaxveh._core.names import record_type
 from jaxveh.experiments.federated_ckf.contestants import Found
 from jaxveh.experiments.federated_ckf.drives import WHEELS, Drive
-from jaxveh.experiments.federated_ckf.interleaved import Member, Told, stays, take_turns
+from jaxveh.experiments.federated_ckf.interleaved import Told, stays, vector_and_covariance
 from jaxveh.experiments.federated_ckf.model import INPUTS, State, planar, rows_of
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
 from jaxveh.statespace import Discrete, Gaussian, Prior, Row, StateSpace
@@ -53,11 +53,12 @@ def as_printed(study: Study, start: Any, drive: Drive) -> Found:
     car = eqx.tree_at(lambda c: c.friction, planar(study, start, measured_slip=True), kit.Wheels(*[start.friction] * 4))
     rows = _printed_rows(study, drive)
     filter_ = filters.Federated(filters.Cubature(form=filters.SingularValues()), (FIRST, SECOND), by_trace=True)
-    members = (_states(filter_, study), _friction(filter_, start), _body(filter_, start))
+    turns = {"state": _states(filter_, study), "friction": _friction(filter_, start), "body": _body(filter_, start)}
     zero = jnp.zeros_like(rows.t[0])
     state = State(zero + study.speed, zero, zero)
     told = Told(rows.t[0], jax.tree.map(lambda leaf: leaf[0], rows.u), car, state)
-    (x, mu, body), (P, P_mu, P_body), _ = take_turns(members, told, rows)
+    kept = filters.interleave(turns, told, rows, keep=vector_and_covariance).kept
+    (x, P), (mu, P_mu), (body, P_body) = (kept[name] for name in turns)
     mu_mean = jnp.mean(mu, axis=1, keepdims=True)
     parameters = jnp.concatenate([mu_mean, body], axis=1)
     # Relative errors stand for logarithms.
@@ -93,11 +94,15 @@ def _twice(a_x, a_y, yaw_rate) -> Any:
     return record_type("Measurements", (*FIRST, *SECOND))(*[said[name[:-2]] for name in (*FIRST, *SECOND)])
 
 
-def _states(filter_, study: Study) -> Member:
+def _states(filter_, study: Study) -> filters.Turn:
     start = (study.speed, 0.0, 0.0, 0.0, 0.0, 0.0)
     model = _model(STATE, start, STATE_P, STATE_Q, STATE_R, _six_states, _three_of_six, ALL_INPUTS)
-    tell = lambda mean, told: told._replace(state=State(mean.v_x, mean.v_y, mean.yaw_rate))
-    return Member(filter_, model, lambda told: told.car, tell)
+
+    def tell(belief, row, told):
+        mean = belief.mean
+        return told._replace(t=row.t, u=row.u, state=State(mean.v_x, mean.v_y, mean.yaw_rate))
+
+    return filters.Turn(filter_, model, lambda told: told.car, tell)
 
 
 def _six_states(car, t0, t1, x, u) -> Any:
@@ -144,15 +149,15 @@ def _put_body(car, x):
 SEE_FRICTION, SEE_BODY = _through(_put_friction), _through(_put_body)
 
 
-def _friction(filter_, start) -> Member:
+def _friction(filter_, start) -> filters.Turn:
     mean = [start.friction] * 4
     model = _model(MUS, mean, FRICTION_P, FRICTION_Q, FRICTION_R, stays, SEE_FRICTION, ALL_INPUTS)
-    return Member(
-        filter_, model, lambda told: told, lambda mean, told: told._replace(car=_put_friction(told.car, mean))
-    )
+    tell = lambda belief, row, told: told._replace(car=_put_friction(told.car, belief.mean))
+    return filters.Turn(filter_, model, lambda told: told, tell)
 
 
-def _body(filter_, start) -> Member:
+def _body(filter_, start) -> filters.Turn:
     mean = [getattr(start, name) for name in PARAMETERS[1:]]
     model = _model(BODY, mean, BODY_P, BODY_Q, BODY_R, stays, SEE_BODY, ALL_INPUTS)
-    return Member(filter_, model, lambda told: told, lambda mean, told: told._replace(car=_put_body(told.car, mean)))
+    tell = lambda belief, row, told: told._replace(car=_put_body(told.car, belief.mean))
+    return filters.Turn(filter_, model, lambda told: told, tell)
