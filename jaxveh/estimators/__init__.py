@@ -19,6 +19,7 @@ from jaxveh.estimators.calibration_file import read_calibration, write_calibrati
 from jaxveh.estimators.cleaning import clean
 from jaxveh.estimators.comparison import Compared, MethodScore, compare, score_answers
 from jaxveh.estimators.contract import Calibration, Span
+from jaxveh.estimators.exchange import Exchange
 from jaxveh.estimators.linear_baseline import open_loop, open_loop_of
 from jaxveh.estimators.live import Live, LiveAnswer, LiveBelief
 from jaxveh.estimators.method import AbstractMethod, Answer, Answers, Filtered, LiveMethod, MethodOfCar
@@ -34,6 +35,7 @@ __all__ = [
     "Answers",
     "Calibration",
     "Compared",
+    "Exchange",
     "Filtered",
     "Live",
     "LiveAnswer",
