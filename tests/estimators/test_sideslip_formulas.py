@@ -187,6 +187,23 @@ def test_the_switch_integrates_where_tyres_are_not_to_be_trusted_and_not_on_a_ba
     np.testing.assert_allclose(found[time > 1.0], 0.3, atol=1e-12)
 
 
+def test_fuzzy_rules_pull_to_the_model_in_gentle_driving_and_integrate_in_hard_and_not_on_a_bank():
+    time = np.linspace(0.0, 3.0, 301)
+    method = fusion.Fuzzy(saying(0.3), 0.2, 1.0)
+    drive = lambda a_y, rate: Recording(
+        time, {"v_x": V + 0 * time, "yaw_rate": (a_y - rate) / V + 0 * time, "a_y": a_y + 0 * time}
+    )
+    follow = lambda *one: np.asarray(kit.follow("x", method, drive(*one))["v_y"])
+    # Gentle: pulled with the time constant, so that an even rate leaves itself times it, less half a row.
+    np.testing.assert_allclose(follow(1.0, 0.1)[-1], 0.3 + 0.1 * 0.01 / np.expm1(0.01 / 0.2), rtol=1e-6)
+    # Beyond the upper bound: the integral, while the slow part is below its lower one.
+    np.testing.assert_allclose(follow(5.5, 0.25), 0.3 + 0.25 * time, atol=1e-9)
+    # In between, half as true: twice the time constant.
+    np.testing.assert_allclose(follow(3.5, 0.1)[-1], 0.3 + 0.1 * 0.01 / np.expm1(0.01 / 0.4), rtol=1e-2)
+    # What stays beyond the upper bound is a bank.
+    np.testing.assert_allclose(follow(5.5, 0.8)[-1], 0.3 + 0.8 * 0.01 / np.expm1(0.01 / 0.2), rtol=1e-6)
+
+
 def test_weights_are_the_inverse_variances():
     time = np.linspace(0.0, 0.1, 11)
     method = fusion.Weighted(saying(0.4, 0.1), saying(-0.2, 0.2))
@@ -206,6 +223,8 @@ def test_an_answer_is_known_where_the_car_is_fast_the_sensors_speak_and_the_spre
     wide = common.guard(CAR, saying(0.4, 1.2), (common.YAW_RATE,))
     found = sideslip.estimate(wide, log(time, wide, v_x=V, yaw_rate=0.0, a_y=0.0))
     assert not np.asarray(found.known.v_y).any() and (np.asarray(found.std.v_y) == 1.2).all()
+    spun = common.guard(CAR, saying(-2.1 * V, 0.5))
+    assert not np.asarray(sideslip.estimate(spun, log(time, spun, v_x=V, yaw_rate=0.0, a_y=0.0)).known.sideslip).any()
     silent = common.guard(CAR, saying(0.4, 0.5), claims=False)
     found = sideslip.estimate(silent, log(time, silent, v_x=V, yaw_rate=0.0, a_y=0.0))
     assert np.isnan(found.std.v_y).all() and np.asarray(found.known.v_y).all()

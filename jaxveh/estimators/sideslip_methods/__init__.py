@@ -5,10 +5,11 @@ from __future__ import annotations
 from jaxveh import filters
 from jaxveh.estimators.method import MethodOfCar
 from jaxveh.estimators.sideslip_methods.four_wheels import roll_3dof, roll_4dof, two_track
-from jaxveh.estimators.sideslip_methods.fusion import by_switch, pseudo_integration, weighted_mean
+from jaxveh.estimators.sideslip_methods.fusion import by_fuzzy_rules, by_switch, pseudo_integration, weighted_mean
 from jaxveh.estimators.sideslip_methods.integration import direct_integration, roll_compensated
 from jaxveh.estimators.sideslip_methods.kinematic import kinematic_kalman, six_axis
 from jaxveh.estimators.sideslip_methods.motors import motor_moment
+from jaxveh.estimators.sideslip_methods.network import neural_network
 from jaxveh.estimators.sideslip_methods.observers import (
     blind_to_front,
     error_linearising,
@@ -105,6 +106,14 @@ METHODS = {
     "h_infinity": MethodOfCar(h_infinity, "single track, worst case bounded", "section 1.4.4, [66, 67]"),
     "adaptive": MethodOfCar(
         adaptive, "linear tyres, both stiffnesses adapted by a law of Lyapunov's", "section 1.4.7, [77-79]"
+    ),
+    "fuzzy": MethodOfCar(
+        by_fuzzy_rules, "integration, pulled to the extended filter by fuzzy rules", "section 1.4.7, [80]"
+    ),
+    "neural_network": MethodOfCar(
+        neural_network,
+        "a network of what was measured and what was before, trained on simulated drives of five other cars",
+        "section 1.4.7, [56, 81]",
     ),
 }
 

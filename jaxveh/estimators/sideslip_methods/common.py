@@ -33,6 +33,10 @@ LONGEST_SILENCE = 0.3
 WIDEST = 0.05
 """rad: an answer whose own standard deviation of sideslip is larger is not known. A stability control acts on some 0.05."""
 
+FARTHEST = 2.0
+"""Lateral over longitudinal speed, 63 degrees of sideslip: an answer beyond is that of a car which has spun, or of a method that
+has."""
+
 LONG_AGO = 1e3
 """s: the age of what was never measured."""
 
@@ -50,7 +54,8 @@ class Guarded(AbstractMethod):
     """A method of sideslip whose answers say when they are known.
 
     That is where the car goes forward faster than `slowest` (m/s), each of the channels in `hears` was measured in the last
-    `LONGEST_SILENCE`, and the standard deviation of sideslip, where `inner` claims one, is at most `WIDEST`. `holds`: channels
+    `LONGEST_SILENCE`, sideslip is none of a car that has spun (`FARTHEST`), and its standard deviation, where `inner` claims one,
+    is at most `WIDEST`. `holds`: channels
     of which `inner` gets the last value where none was measured (0 before the first). `anew`: `inner` begins anew with the first
     row after such a silence, for an integral of what was not measured is worth nothing. `claims` False: no spread is passed on.
     """
@@ -97,6 +102,7 @@ class Guarded(AbstractMethod):
         told = v_x >= self.slowest
         for age in ages:
             told &= age <= LONGEST_SILENCE
+        told &= jnp.abs(said.mean.v_y) <= FARTHEST * jnp.abs(v_x)
         # A spread that is not claimed is NaN, and no spread is too wide then.
         told &= ~(said.std.sideslip > WIDEST)
         known = jax.tree.map(lambda one: one & told, said.known)

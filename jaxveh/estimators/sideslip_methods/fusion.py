@@ -1,14 +1,16 @@
-"""Kinematic and dynamic estimates joined: by a switch, by their covariances, by frequency (section 1.3.1)."""
+"""Kinematic and dynamic estimates joined: by a switch, by their covariances, by frequency (section 1.3.1), by rules."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from jaxveh import filters
 from jaxveh._core.parameter import check_parameters, positive
+from jaxveh.estimators.memberships import large
 from jaxveh.estimators.method import AbstractMethod
 from jaxveh.estimators.sideslip_methods.common import (
     A_X,
@@ -130,6 +132,38 @@ class Switched(AbstractFusion):
         return after, sideslip_answer(v_y, values["v_x"], said.known.v_y)
 
 
+class Fuzzy(AbstractFusion):
+    """S. Shi, H. Lupker et al. (the review's [80]): the integral is pulled to the dynamic estimate by fuzzy rules.
+
+        tyres are worked hard, or sideslip changes quickly, and the road does not look banked  -> integrate
+        else                                                                                    -> the dynamic estimate
+
+    Of |a_y| and of |a_y - v_x r|, now and over `bank_time` (s), large is linear between two bounds each (`hard`, `quick`,
+    `banked`, m/s^2); "and" is the product. With w the truth of the first rule, v_y is pulled with the time constant
+    `time / (1 - w)` (s). The review names the method alone; rules and bounds are ours.
+    """
+
+    time: jax.Array = positive("s", default=PSEUDO_TIME)
+    bank_time: jax.Array = positive("s", default=BANK_TIME)
+    hard: tuple[float, float] = eqx.field(static=True, default=(2.0, 5.0))
+    quick: tuple[float, float] = eqx.field(static=True, default=(0.5, 2.0))
+    banked: tuple[float, float] = eqx.field(static=True, default=(0.3, 0.7))
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    def next(self, memory, t, values):
+        inner, said = self.inner.next(memory.inner, t, values)
+        dt, rate, model, a_y = t - memory.t, self._rate(values, memory.rate), said.mean.v_y, values["a_y"]
+        slow = memory.slow + (1.0 - jnp.exp(-dt / self.bank_time)) * (rate - memory.slow)
+        worked = large(jnp.where(jnp.isnan(a_y), 0.0, a_y), *self.hard)
+        integrates = (1.0 - (1.0 - worked) * (1.0 - large(rate, *self.quick))) * (1.0 - large(slow, *self.banked))
+        integral = memory.v_y + 0.5 * dt * (memory.rate + rate)
+        pulled = 1.0 - jnp.exp(-(1.0 - integrates) * dt / self.time)
+        v_y = integral + pulled * (model - integral)
+        return FusionMemory(inner, v_y, rate, slow, model, t), sideslip_answer(v_y, values["v_x"], said.known.v_y)
+
+
 class Weighted(AbstractMethod):
     """H. Lee (the review's [41]): the kinematic and the dynamic estimate, weighed by the inverses of the variances that their
     filters state, as if their errors were independent (both read the same sensors)."""
@@ -173,6 +207,12 @@ def by_switch(car: CarSpecification) -> Guarded:
     steady = SteadySteer(**numbers(car), steer_offset=-(car.steer_offset or 0.0))
     inner = Switched(EXTENDED(car), steady, bank_time=BANK_TIME * size_of(car) ** 0.5)
     return guard(car, inner, SENSORS)
+
+
+def by_fuzzy_rules(car: CarSpecification) -> Guarded:
+    """Fuzzy rules with the extended filter of the single track, for a car's file."""
+    scale = size_of(car) ** 0.5
+    return guard(car, Fuzzy(EXTENDED(car), PSEUDO_TIME * scale, BANK_TIME * scale), SENSORS)
 
 
 def weighted_mean(car: CarSpecification) -> Guarded:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
+from jaxveh.estimators.memberships import large
 from jaxveh.estimators.speed.accelerometer import A_X, Felt, never_felt
 from jaxveh.estimators.speed.wheels import WHEEL_SPEEDS, AbstractWheelMethod, Wheels
 
@@ -81,10 +82,10 @@ class Fuzzy(AbstractWheelMethod):
         t = wheels.t
         both = own.across.speaks(t) & own.turns.speaks(t)
         aside = jnp.where(both, own.across.value - own.v_x * own.turns.value, 0.0)
-        swerve = _large(aside, self.swerve_low, self.swerve_high)
+        swerve = large(aside, self.swerve_low, self.swerve_high)
         spread = (wheels.fastest - wheels.slowest) / (jnp.abs(wheels.mean) + 1.0)
-        apart = _large(spread, self.spread_low, self.spread_high)
-        strange = _large(wheels.mean_rate - rate, self.rate_low, self.rate_high)
+        apart = large(spread, self.spread_low, self.spread_high)
+        strange = large(wheels.mean_rate - rate, self.rate_low, self.rate_high)
         slips = 1.0 - (1.0 - apart) * (1.0 - strange)
         brakes = jax.nn.sigmoid(-4.0 * rate)
         rest = 1.0 - swerve
@@ -108,8 +109,3 @@ class Fuzzy(AbstractWheelMethod):
         offset = own.offset + learns * (rate - wheels.mean_rate)
         alone = jnp.where((how.stable > 0.5) & wheels.spoke, 0.0, own.alone + step)
         return own._replace(v_x=v_x, offset=offset, alone=alone), v_x, (wheels.spoke | felt) & (alone <= self.patience)
-
-
-def _large(value: Any, low: Any, high: Any) -> jax.Array:
-    """The membership of large in size: 0 at `low`, 1 at `high`, linear between."""
-    return jnp.clip((jnp.abs(value) - low) / (high - low), 0.0, 1.0)

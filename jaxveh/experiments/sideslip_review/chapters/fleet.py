@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import vehicles
 from jaxveh.experiments.sideslip_review.chapters.scenarios import Scenario
 from jaxveh.io import CarSpecification
-from jaxveh.vehicles import AntiLock, FourteenDOF
+from jaxveh.vehicles import AbstractDrive, AntiLock, AxleDrive, FourteenDOF
 
 CARS = ("sedan", "van", "compact_car")
 """Measured cars of CommonRoad's vehicle models, with tyres of Magic Formula 5.2; one a seed, in turn."""
@@ -28,18 +28,21 @@ SPREADS = {"stiffness": 0.1, "grip": 0.05, "mass": 0.04, "yaw_inertia": 0.05, "p
 """By how much a true car differs from its file (standard deviations, relative; `place` in m): as in the race of observers."""
 
 
-def told_cars() -> list[CarSpecification]:
+def told_cars(names: tuple[str, ...] = CARS) -> list[CarSpecification]:
     """The files, each of a car as built: nobody's draw."""
     named = lambda name: vehicles.specification_of(vehicles.kit.CARS[name]())
-    return [dataclasses.replace(named(name), **KNOWN) for name in CARS]
+    return [dataclasses.replace(named(name), **KNOWN) for name in names]
 
 
-def built_cars() -> FourteenDOF:
-    """The cars as built, stacked: one array axis of `CARS` on each leaf."""
-    where = lambda car: (car.drag, car.rolling_resistance)
-    resists = (jnp.asarray(KNOWN["drag"]), jnp.asarray(KNOWN["rolling_resistance"]))
-    cars = [eqx.tree_at(where, vehicles.named_car(name, "fourteen-dof"), resists) for name in CARS]
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *cars)
+def built_cars(names: tuple[str, ...] = CARS) -> FourteenDOF:
+    """The cars as built, stacked: one array axis of `names` on each leaf. One with a motor a wheel has an engine here, so
+    that the drives of all have the same channels."""
+    where = lambda car: (car.drag, car.rolling_resistance, car.drive)
+    axle = lambda car: car.drive if isinstance(car.drive, AxleDrive) else AxleDrive()
+    resists = lambda car: (jnp.asarray(KNOWN["drag"]), jnp.asarray(KNOWN["rolling_resistance"]), axle(car))
+    cars = [vehicles.named_car(name, "fourteen-dof") for name in names]
+    built = [eqx.tree_at(where, car, resists(car), is_leaf=lambda v: isinstance(v, AbstractDrive)) for car in cars]
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *built)
 
 
 def true_car(built: FourteenDOF, scenario: Scenario, key) -> AntiLock:

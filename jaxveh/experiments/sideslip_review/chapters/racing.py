@@ -22,6 +22,7 @@ from jaxveh.estimators import AbstractMethod, kit
 from jaxveh.experiments.sideslip_review.chapters.fleet import CARS, built_cars, told_cars
 from jaxveh.experiments.sideslip_review.chapters.fleet_drives import drive_once
 from jaxveh.experiments.sideslip_review.chapters.scenarios import SCENARIOS, scenario_at
+from jaxveh.io import CarSpecification
 from jaxveh.sweeps import IN_MEMORY, Stores
 
 CHAPTERS = {
@@ -66,27 +67,38 @@ def channels_kept() -> tuple[str, ...]:
 
 
 def chapter_drives(
-    seeds: int, key, *, duration: float, progress: Progress = silent, stores: Stores = IN_MEMORY
+    seeds: int,
+    key,
+    *,
+    duration: float,
+    cars: tuple[str, ...] = CARS,
+    progress: Progress = silent,
+    stores: Stores = IN_MEMORY,
 ) -> Mapping[str, np.ndarray]:
     """Drives of all scenarios, one a seed: (scenarios, seeds, T) each. A seed steers alike in all, with one car; `car`
-    (scenarios, seeds): its index in `CARS`."""
+    (scenarios, seeds): its index in `cars`."""
     check_whole("seeds", seeds, 2)
-    built, wanted = built_cars(), channels_kept()
+    built, wanted = built_cars(cars), channels_kept()
 
     def run(point, key):
-        index = jax.random.randint(jax.random.fold_in(key, 1), (), 0, len(CARS))
+        index = jax.random.randint(jax.random.fold_in(key, 1), (), 0, len(cars))
         one = jax.tree.map(lambda leaf: leaf[index], built)
         made = drive_once(one, scenario_at(point.scenario), key, duration=duration)
         return {name: made[name] for name in wanted if name in made} | {"car": index}
 
     drives = stores.sweep("drives", run, _design(), seeds, key, progress=part(progress, 0.0, 0.9, "drives")).values
-    return {**drives, "v_x": _told_speed(drives, seeds, key, stores, part(progress, 0.9, 1.0, "speed"))}
+    return {
+        **drives,
+        "v_x": _told_speed(drives, told_cars(cars), seeds, key, stores, part(progress, 0.9, 1.0, "speed")),
+    }
 
 
-def _told_speed(drives: Mapping[str, np.ndarray], seeds: int, key, stores: Stores, progress: Progress) -> np.ndarray:
+def _told_speed(
+    drives: Mapping[str, np.ndarray], cars: list[CarSpecification], seeds: int, key, stores: Stores, progress: Progress
+) -> np.ndarray:
     """The speed that methods of other quantities are told: no car measures it, so it is our own estimate, looking back only."""
     module = estimators.speed
-    methods = [module.METHODS[module.RECOMMENDED].make(car) for car in told_cars()]
+    methods = [module.METHODS[module.RECOMMENDED].make(car) for car in cars]
     said = lambda answer, drive: {"v_x": answer.mean.v_x}
     run = _run(methods, said)
     data = _data(module, methods[0], drives)

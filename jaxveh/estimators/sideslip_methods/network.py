@@ -1,0 +1,140 @@
+"""Sideslip by a neural network that knows no tyre: section 1.4.7 of the review (its [56, 81])."""
+
+from __future__ import annotations
+
+import functools
+import importlib.resources
+from typing import Any, ClassVar, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxveh._core.parameter import check_parameters, parameter, positive
+from jaxveh.estimators.method import AbstractMethod
+from jaxveh.estimators.sideslip_methods.common import (
+    A_Y,
+    STEER,
+    V_X,
+    YAW_RATE,
+    Guarded,
+    guard,
+    sideslip_answer,
+    slowest_of,
+)
+from jaxveh.estimators.sideslip_methods.steady_state import numbers
+from jaxveh.io import CarSpecification
+from jaxveh.vehicles import GRAVITY
+
+TIMES = (0.1, 0.4, 1.5)
+"""s: the time constants of the low-passes through which the network remembers."""
+
+SIGNALS = 6
+"""What is low-passed: see `SideslipNetwork.signals`."""
+
+FILE = "network.npz"
+"""Weights and biases, layer by layer, beside this module."""
+
+
+class NetworkMemory(NamedTuple):
+    """The time of the last row (s), and the low-passed signals (len(TIMES), SIGNALS)."""
+
+    t: Any
+    slow: Any
+
+
+class SideslipNetwork(AbstractMethod):
+    """The slip angle of the rear axle by a network with two hidden layers, of what was measured and what was measured before.
+
+        beta = l_r r / v_x - slip,    slip and the logarithm of its spread = network(signals, low-passed signals, speed)
+
+    Signals have no size of a car in them, so that one network serves all: they are steer, the steer of a turn without slip, both
+    accelerations that a turn has, and what the linear axles of the car's file would have for slip. So the network learned on
+    some cars may be right on others, as far as these are like them (see `sideslip_review.network_training`, which says what it
+    was trained on).
+
+    **Parameters**: of the car `front_axle_to_cg`, `rear_axle_to_cg` (m), `front_compliance`, `rear_compliance`, slip angle per
+    lateral acceleration (rad/(m/s^2)), `steer_offset` (rad), `slowest` (m/s); `layers`: the network.
+    """
+
+    unit: ClassVar[float] = 0.05
+    """rad: of the slip that the network says."""
+    size: ClassVar[int] = SIGNALS * (1 + len(TIMES)) + 1
+    """How many numbers the network reads."""
+    layers: eqx.nn.MLP
+    front_axle_to_cg: jax.Array = positive("m")
+    rear_axle_to_cg: jax.Array = positive("m")
+    front_compliance: jax.Array = positive("rad/(m/s^2)")
+    rear_compliance: jax.Array = positive("rad/(m/s^2)")
+    slowest: jax.Array = positive("m/s", default=3.0)
+    steer_offset: jax.Array = parameter("rad", scale=0.02, default=0.0)
+
+    def __check_init__(self):
+        check_parameters(self)
+
+    @property
+    def needs(self):
+        return (V_X, STEER, YAW_RATE, A_Y)
+
+    def signals(self, values) -> jax.Array:
+        """(SIGNALS,), of about 1 each in ordinary driving."""
+        v_x = jnp.maximum(values["v_x"], self.slowest)
+        turn, push = values["yaw_rate"], values["a_y"]
+        rolling = (self.front_axle_to_cg + self.rear_axle_to_cg) * turn / v_x
+        return jnp.stack([
+            (values["steer"] + self.steer_offset) / self.unit, rolling / self.unit, push / (0.3 * GRAVITY),
+            turn * v_x / (0.3 * GRAVITY), self.front_compliance * push / self.unit, self.rear_compliance * push / self.unit,
+        ])  # fmt: skip
+
+    def first(self, t, values):
+        now = self.signals(values)
+        return self._answer(t, now, jnp.broadcast_to(now, (len(TIMES), SIGNALS)), values)
+
+    def next(self, memory, t, values):
+        now = self.signals(values)
+        share = 1.0 - jnp.exp(-(t - memory.t) / jnp.asarray(TIMES, now.dtype))
+        return self._answer(t, now, memory.slow + share[:, None] * (now - memory.slow), values)
+
+    def features(self, now, slow, v_x) -> jax.Array:
+        """(size,): the signals, by how much they are other than before, and the speed."""
+        return jnp.concatenate([now, (now - slow).reshape(-1), jnp.atleast_1d(v_x / 30.0)])
+
+    def _answer(self, t, now, slow, values):
+        v_x = jnp.maximum(values["v_x"], self.slowest)
+        slip, spread = self.layers(self.features(now, slow, v_x))
+        v_y = self.rear_axle_to_cg * values["yaw_rate"] - v_x * self.unit * slip
+        std = v_x * self.unit * jnp.exp(jnp.clip(spread, -6.0, 3.0))
+        return NetworkMemory(t, slow), sideslip_answer(v_y, v_x, std=std)
+
+
+def layers_of(arrays: list[np.ndarray]) -> eqx.nn.MLP:
+    """The network of weights and biases in turn."""
+    width, depth = arrays[0].shape[0], len(arrays) // 2 - 1
+    network = eqx.nn.MLP(SideslipNetwork.size, 2, width, depth, jnp.tanh, key=jax.random.key(0))
+    where = lambda one: [leaf for layer in one.layers for leaf in (layer.weight, layer.bias)]
+    return eqx.tree_at(where, network, [jnp.asarray(array) for array in arrays])
+
+
+@functools.cache
+def trained_arrays() -> tuple[np.ndarray, ...]:
+    """Weights and biases in turn, as `sideslip_review.network_training` left them."""
+    with importlib.resources.files(__package__).joinpath(FILE).open("rb") as file, np.load(file) as stored:
+        return tuple(np.asarray(stored[name], float) for name in sorted(stored.files))
+
+
+def sideslip_network(car: CarSpecification, layers: eqx.nn.MLP) -> SideslipNetwork:
+    """A network for a car's file."""
+    told = numbers(car)
+    wheelbase = told["front_axle_to_cg"] + told["rear_axle_to_cg"]
+    compliance = lambda other, stiffness: told["mass"] * told[other] / (wheelbase * told[stiffness])
+    return SideslipNetwork(
+        layers, told["front_axle_to_cg"], told["rear_axle_to_cg"], compliance("rear_axle_to_cg", "front_stiffness"),
+        compliance("front_axle_to_cg", "rear_stiffness"), slowest_of(car), -(car.steer_offset or 0.0),
+    )  # fmt: skip
+
+
+def neural_network(car: CarSpecification) -> Guarded:
+    """The trained network for a car's file."""
+    layers = layers_of(list(trained_arrays()))
+    return guard(car, sideslip_network(car, layers), (YAW_RATE, A_Y), (YAW_RATE, A_Y))

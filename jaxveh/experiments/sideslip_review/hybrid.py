@@ -1,0 +1,149 @@
+"""A network inside the filter against physics alone, by how much data there is to learn from.
+
+    python -m jaxveh.experiments.sideslip_review.hybrid --minutes 1,5 --cars passenger_car,sedan --seeds 2
+
+The truth is a single track on Magic Formulas that fall behind their peaks, which the brush tyres of the filter cannot form, and
+whose stiffnesses are wrong by 13 to 15 % before. Fitted on drives of so many minutes through the likelihood of an extended filter
+(`estimators.learned.train`): the brushes alone, and the brushes with a network each. Judged by an unscented filter's sideslip on
+drives that nothing was fitted on, beside what nobody fitted and the true law. Law and truth share all but the tyres: it is the
+best case for both. Some minutes for each line on two cores. Needs the extra `learn`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from jaxveh import filters, sensors, tyres, vehicles
+from jaxveh._core.progress import Progress, part, silent
+from jaxveh._core.recording import Recording
+from jaxveh.estimators import learned, state_space
+from jaxveh.manoeuvres import random_steering
+from jaxveh.simulation import simulate
+from jaxveh.statespace import StateSpace
+from jaxveh.sweeps import Table
+
+WRONG = (1.15, 0.87)
+"""Of the stiffnesses before the fit, front and rear, over the true ones."""
+
+SHAPE = {"C": 1.6, "E": -1.5}
+"""Of the true Magic Formulas: behind the peak, at 9 degrees, a tenth of the force is lost by 25."""
+
+SPEED, STEER, STEP, SETTLED = 25.0, 0.05, 0.02, 2.0
+"""m/s; rad, standard deviation at the road wheels; s between rows; s of a judged drive that do not count."""
+
+JUDGED, LENGTH = 2, 60.0
+"""Drives that judge, and s of each."""
+
+DEVICE = sensors.esc(yaw_rate=0.002, a_y=0.05)
+
+PRIOR = {
+    "cornering_stiffness": 0.3, "friction": 0.3, "v_y": 0.5, "yaw_rate": 0.5, "inner": 0.5, "bias": 1.0, "outer": 1.0,
+    "load_share": 1.0,
+}  # fmt: skip
+
+COLUMNS = ("car", "minutes", "seed", "nothing fitted", "physics", "with networks", "true law", "networks over physics")
+
+
+def true_and_told(name: str) -> tuple[Any, Any]:
+    """A car on the true tyres, and on the brushes that are told."""
+    car = vehicles.named_car(name, "single-track")
+    plain = vehicles.linear_single_track(car)
+    slopes = (plain.front_stiffness, plain.rear_stiffness)
+    formula = lambda slope, load: tyres.MagicFormula(B=slope / (SHAPE["C"] * load), D=load, **SHAPE)
+    brush = lambda slope, wrong: tyres.Brush(wrong * slope, wrong * slope, friction=1.0)
+    where = lambda c: (c.front, c.rear)
+    true = [formula(slope, load) for slope, load in zip(slopes, car.static_loads(), strict=True)]
+    told = [brush(slope, wrong) for slope, wrong in zip(slopes, WRONG, strict=True)]
+    return eqx.tree_at(where, car, tuple(true)), eqx.tree_at(where, car, tuple(told))
+
+
+def drive(car: Any, seconds: float, key: jax.Array) -> Recording:
+    """Random steering."""
+    steer_key, noise_key = jax.random.split(key)
+    wander = random_steering(SPEED, STEER, steer_key, lowest=0.1, highest=1.0, duration=seconds)
+    return simulate(car, wander, DEVICE, noise_key, dt=STEP)
+
+
+def model_of(car: Any) -> StateSpace:
+    """What the filters see."""
+    return state_space(car, DEVICE, process_noise={"v_y": 0.05, "yaw_rate": 0.02})
+
+
+def sideslip_errors(model: StateSpace, drives: Sequence[Recording]) -> float:
+    """Root mean square over the drives, degrees."""
+    first = round(SETTLED / STEP)
+    errors = []
+    for log in drives:
+        found = filters.run(filters.Unscented(), model, log, keep=("mean",))
+        errors.append((np.asarray(found.mean.sideslip) - np.asarray(log["true.sideslip"]))[first:])
+    return float(np.degrees(np.sqrt(np.mean(np.square(errors)))))
+
+
+def _brushes(model: StateSpace) -> tuple:
+    """What physics has to fit: both tyres and the process noise."""
+    car = model.system.vehicle
+    inner = [getattr(tyre, "tyre", tyre) for tyre in (car.front, car.rear)]
+    numbers = [getattr(tyre, name) for tyre in inner for name in ("cornering_stiffness", "friction")]
+    return (*numbers, *model.process_noise.law.std)
+
+
+def compared_on(name: str, minutes: float, seed: int, *, steps: int = 300, progress: Progress = silent) -> tuple:
+    """One line of the table."""
+    true, told = true_and_told(name)
+    fit_key, judge_key, net_key, walk_key = jax.random.split(jax.random.fold_in(jax.random.key(46), seed), 4)
+    log = drive(true, 60.0 * minutes, fit_key)
+    judged = [drive(true, LENGTH, key) for key in jax.random.split(judge_key, JUDGED)]
+    options = dict(prior=PRIOR, learning_rate=0.03, batch=8, key=walk_key)
+    physics = learned.train(
+        filters.Extended(),
+        model_of(told),
+        log,
+        _brushes,
+        steps=steps,
+        progress=part(progress, 0.0, 0.4, "physics"),
+        **options,
+    )
+    wide = model_of(learned.with_residual_tyres(told, net_key))
+    both = lambda model: (*_brushes(model), *learned.network_weights(model))
+    hybrid = learned.train(
+        filters.Extended(), wide, log, both, steps=steps, progress=part(progress, 0.4, 1.0, "networks"), **options
+    )
+    errors = [sideslip_errors(model, judged) for model in (model_of(told), physics.model, hybrid.model, model_of(true))]
+    return (name, minutes, seed, *errors, errors[2] / errors[1])
+
+
+def hybrid_table(
+    cars: Sequence[str], minutes: Sequence[float], seeds: int, *, steps: int = 300, progress: Progress = silent
+) -> Table:
+    """All of them."""
+    every = [(name, length, seed) for name in cars for length in minutes for seed in range(seeds)]
+    rows = []
+    for i, one in enumerate(every):
+        told = part(progress, i / len(every), (i + 1) / len(every), f"{one[0]}, {one[1]:g} min, seed {one[2]}")
+        rows.append(compared_on(*one, steps=steps, progress=told))
+    return Table("Sideslip RMSE [deg] on drives that nothing was fitted on, by minutes that were", COLUMNS, rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The module's docstring says what."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    listed = lambda text: tuple(text.split(","))
+    parser.add_argument("--minutes", type=lambda text: tuple(float(one) for one in text.split(",")), default=(1.0, 5.0))
+    parser.add_argument("--cars", type=listed, default=("passenger_car",))
+    parser.add_argument("--seeds", type=int, default=2)
+    given = parser.parse_args(arguments)
+    jax.config.update("jax_enable_x64", True)
+    for name in given.cars:
+        for length in given.minutes:
+            for row in hybrid_table((name,), (length,), given.seeds).rows:
+                print(dict(zip(COLUMNS, row, strict=True)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
