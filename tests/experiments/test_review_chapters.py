@@ -8,7 +8,7 @@ import pytest
 
 from jaxveh import estimators
 from jaxveh.experiments.sideslip_review import chapters
-from jaxveh.experiments.sideslip_review.chapters import conclusions, fleet, racing, scenarios
+from jaxveh.experiments.sideslip_review.chapters import conclusions, fleet, fleet_drives, racing, scenarios
 from jaxveh.experiments.sideslip_review.chapters.chapter_figures import error_ratios
 
 TIME = np.arange(0.0, 20.0, racing.STEP)
@@ -69,6 +69,13 @@ def raced(errors):
     count = len(scenarios.SCENARIOS)
     found = {key: {"rmse": np.tile(np.asarray(values, float), (count, 1))} for key, values in errors.items()}
     return chapters.ChaptersRaced({}, found, {}, {})
+
+
+def test_a_stiffness_is_the_slope_at_little_slip():
+    slip = jnp.linspace(-0.1, 0.1, 2001)
+    np.testing.assert_allclose(fleet_drives.slope_at_zero(8e4 * slip, slip), 8e4)
+    bent = fleet_drives.slope_at_zero(8e4 * slip * (1.0 - 10.0 * jnp.abs(slip)), slip)
+    np.testing.assert_allclose(bent, 8e4 * (1.0 - 7.5 * fleet_drives.SMALL), rtol=2e-2)
 
 
 def test_a_conclusion_is_a_ratio_of_errors_on_the_same_seeds():
