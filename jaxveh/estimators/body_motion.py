@@ -50,13 +50,24 @@ def speed_heard(values: dict[str, Any], front_share: Any) -> tuple[Any, Any]:
     """
     speeds = jnp.stack([values[need.channel] for need in SPEEDS[1:]])
     there = ~jnp.isnan(speeds)
-    share = jnp.asarray(front_share, speeds.dtype)
-    # A little of each, so that one axle alone is a speed, too.
-    weights = jnp.where(there, jnp.stack([1.02 - share, 1.02 - share, 0.02 + share, 0.02 + share]), 0.0)
+    front, rear = _axle_weights(jnp.asarray(front_share, speeds.dtype))
+    weights = jnp.where(there, jnp.stack([front, front, rear, rear]), 0.0)
     total = jnp.sum(weights)
     wheels = jnp.sum(weights * jnp.where(there, speeds, 0.0)) / jnp.where(total > 0, total, 1.0)
     given = values["v_x"]
     return jnp.where(jnp.isnan(given), wheels, given), ~jnp.isnan(given) | (total > 0)
+
+
+def driven_share(front_share: Any) -> Any:
+    """How much of the driving torque acts on an axle, in the mean over the axles as they count for the speed: nearly none where
+    one axle drives, a half where both do alike."""
+    front, rear = _axle_weights(front_share)
+    return (front * front_share + rear * (1.0 - front_share)) / (front + rear)
+
+
+def _axle_weights(front_share: Any) -> tuple[Any, Any]:
+    """A little of each, so that one axle alone is a speed, too."""
+    return 1.02 - front_share, 0.02 + front_share
 
 
 class MotionMemory(NamedTuple):

@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.estimators import mass_and_grade
-from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, away_from_zero, hold, number_of
+from jaxveh.estimators.body_motion import SILENCE, SPEEDS, BodyMotion, away_from_zero, driven_share, hold, number_of
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Filtered, answer
@@ -33,7 +33,7 @@ ALONG = (
 
 TORQUES = (Need("drive_torque", "N m", optional=True), Need("brake_torque", "N m", optional=True))
 
-SATELLITES = Need("speed", "m/s", optional=True)
+SATELLITES = (Need("speed", "m/s", optional=True), Need("climb_rate", "m/s", optional=True))
 
 State = record_type(
     "PullingState", ("v_x", "grade", "grade_rate", "a_x_bias", "log_mass", "rolling_bias", "wheel_scale", "slip")
@@ -65,15 +65,16 @@ class Pulling(AbstractMethod):
     The first is kinematics and knows no mass: a constant grade and the offset are one to it. The second, where there are torques,
     is what the car pushes: the offset is what the accelerometer says beside it, the mass how much it says for a torque. What
     rolling resistance and air are not as in the car's file is a further state, with a spread (`rolling_spread`), which is what
-    the offset can be known to; wheels that brake slip (`slip` of the speed per m/s^2, a state, too). Grades change by the metre
-    (`grade_length`, `grade_edge`). Brakes are trusted to `brake_doubt` of their torque. (A. Vahidi et al. 2005 and P. Lingman,
-    B. Schmidtbauer 2003, with an accelerometer and its offset.)
+    the offset can be known to; wheels that brake or drive slip (`slip` of the speed per m/s^2, a state, too). Grades change by
+    the metre (`grade_length`, `grade_edge`). Satellites that say how fast a car climbs say the grade itself, `v_x sin(grade)`,
+    late (H. Bae, J. Ryu, J. Gerdes 2001). Brakes are trusted to `brake_doubt` of their torque. (A. Vahidi et al. 2005 and P.
+    Lingman, B. Schmidtbauer 2003, with an accelerometer and its offset.)
 
     **Parameters**: of the car `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2), `drag` (N s^2/m^2),
     `rolling_resistance` (-), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`, `pitch_gradient`
     (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`, `rolling_spread`
-    (m/s^2); of the sensors `wheel_noise`, `satellite_noise` (m/s), `delay` of these (s), `force_noise` (m/s^2), which lasts
-    `force_time` (s).
+    (m/s^2); of the sensors `wheel_noise`, `satellite_noise`, `climb_noise` (m/s), `delay` of satellites (s), `force_noise`
+    (m/s^2), which lasts `force_time` (s).
     """
 
     motion: BodyMotion
@@ -95,6 +96,7 @@ class Pulling(AbstractMethod):
     rolling_spread: jax.Array = positive("m/s^2", default=0.025)
     wheel_noise: jax.Array = positive("m/s", default=0.012)
     satellite_noise: jax.Array = positive("m/s", default=0.06)
+    climb_noise: jax.Array = positive("m/s", default=0.12)
     delay: jax.Array = parameter("s", scale=0.1, default=0.14)
     force_noise: jax.Array = positive("m/s^2", default=0.05)
     force_time: jax.Array = positive("s", default=1.0)
@@ -107,7 +109,7 @@ class Pulling(AbstractMethod):
 
     @property
     def needs(self):
-        return (*ALONG, *TORQUES, SATELLITES)
+        return (*ALONG, *TORQUES, *SATELLITES)
 
     def first(self, t, values):
         motion, heard = self.motion.first(t, values)
@@ -171,14 +173,28 @@ class Pulling(AbstractMethod):
             ago = x.v_x - self.delay * self._speeds_up(x, heard)
             return jnp.where(satellites, said, 0.0) - ago
 
+        climbs = ~jnp.isnan(values["climb_rate"])
+
+        def climb(x):
+            ago = (x.v_x - self.delay * self._speeds_up(x, heard)) * numerics.sin(x.grade - self.delay * x.grade_rate)
+            return jnp.where(climbs, values["climb_rate"], 0.0) - ago
+
         slowing = brake / (self.wheel_radius * self.mass)
-        slips = jnp.square(self.wheel_noise) + jnp.square(0.002 * v_x * slowing)
+        # All wheels brake; of a car that drives both axles those whose speed counts drive, too.
+        pushing = drive * 2.0 * driven_share(self.motion.front_share) / (self.wheel_radius * self.mass)
+        slips = jnp.square(self.wheel_noise) + jnp.square(0.002 * v_x * (slowing + pushing))
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
         lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt)
         belief = correct(
-            belief, lambda x: v_x - x.v_x * (1.0 + x.wheel_scale - x.slip * slowing), slips, spoke, State, 3.0
+            belief,
+            lambda x: v_x - x.v_x * (1.0 + x.wheel_scale + x.slip * (pushing - slowing)),
+            slips,
+            spoke,
+            State,
+            3.0,
         )
         belief = correct(belief, satellite, jnp.square(self.satellite_noise), satellites & (v_x > 1.0), State, 3.0)
+        belief = correct(belief, climb, jnp.square(self.climb_noise), climbs, State, 3.0)
         there = (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
         return correct(belief, balance, lasting, pushed & there, State, 3.0)
 

@@ -18,7 +18,7 @@ class System(NamedTuple):
 
 
 def resolve_name(name: str) -> Any:
-    """What a name below `jaxveh` stands for: modules, attributes, and `mapping[key]`. **Raises** `LookupError` where it stands for
+    """What a name below `jaxveh` stands for: modules, attributes, `mapping[key]`. **Raises** `LookupError` where it stands for
     nothing."""
     plain, _, key = name.partition("[")
     found: Any = importlib.import_module("jaxveh")

@@ -27,6 +27,7 @@ CANONICAL: dict[str, CanonicalChannel] = {
         ("yaw", "rad", "heading, positive to the left, unwrapped"),
         ("course", "rad", "direction of the velocity over ground, positive to the left"),
         ("heading", "rad", "direction of the car over ground as two antennas tell it, positive to the left"),
+        ("climb_rate", "m/s", "vertical speed, positive upwards"),
         ("lane_offset", "m", "place beside the middle of the lane, positive to the left of it"),
         ("lane_heading", "rad", "direction of the car against that of the lane, positive to the left"),
         ("yaw_rate", "rad/s", "positive to the left"),

@@ -14,14 +14,14 @@ from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.sensors.device import AbstractInstrument
 from jaxveh.sensors.randomness import on_and_off, subkey, white
-from jaxveh.sensors.rigid_body import POSES, out_of_axes, velocity
+from jaxveh.sensors.rigid_body import POSES, out_of_axes, rise, velocity
 from jaxveh.sensors.sensor_set import Position
 from jaxveh.sensors.signal import Signal
 from jaxveh.sensors.spans import as_spans, check_spans, inside
 
-_ALONG, _ACROSS, _X, _Y, _OUTAGES, _HEADING = range(6)
+_ALONG, _ACROSS, _X, _Y, _OUTAGES, _HEADING, _CLIMB = range(7)
 _UNITS = {"speed": "m/s", "course": "rad", "x": "m", "y": "m"}
-_HEADING_UNITS = {"heading": "rad"}
+_MORE_UNITS = {"heading": "rad", "climb_rate": "m/s"}
 
 
 class GNSS(AbstractInstrument):
@@ -34,6 +34,8 @@ class GNSS(AbstractInstrument):
       Receivers' positions wander slowly: give it a `drift` and a `drift_time`. None: no position is said.
     - `antenna`: its `Position` from the centre of gravity. `heading`: a `Signal` with the errors (rad) of what a second antenna
       tells, the yaw, as `heading` within -pi to pi, at standstill too. None: there is no second antenna.
+    - `climb`: a `Signal` with the errors (m/s) of the vertical speed, `climb_rate`, positive upwards, of a car that follows its
+      road; of a car that says no `grade`, on a level one. None: it is not said.
     - `outages`: spans ((start, end), ...) in s in which nothing is said; `outage_rate` (1/s) and `outage_length`
       (mean, s) add random ones.
 
@@ -49,6 +51,7 @@ class GNSS(AbstractInstrument):
     outage_length: jax.Array | None = positive("s", default=None)
     outages: tuple[tuple[float, float], ...] = eqx.field(static=True, converter=as_spans, default=())
     heading: Signal | None = None
+    climb: Signal | None = None
 
     def __check_init__(self):
         check_parameters(self)
@@ -61,19 +64,22 @@ class GNSS(AbstractInstrument):
             raise InputError(f"GNSS.position = {self.position!r}: must be a Signal with the errors in m, or None.")
         if not (self.heading is None or isinstance(self.heading, Signal)):
             raise InputError(f"GNSS.heading = {self.heading!r}: must be a Signal with the errors in rad, or None.")
+        if not (self.climb is None or isinstance(self.climb, Signal)):
+            raise InputError(f"GNSS.climb = {self.climb!r}: must be a Signal with the errors in m/s, or None.")
         if not isinstance(self.antenna, Position):
             raise InputError(f"GNSS.antenna = {self.antenna!r}: must be a Position.")
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Speed and course, and the position and heading where it has them."""
+        """Speed and course, and the position, heading and vertical speed where it has them."""
         own = tuple(_UNITS)[: 2 if self.position is None else 4]
-        return own if self.heading is None else (*own, *_HEADING_UNITS)
+        more = {"heading": self.heading, "climb_rate": self.climb}
+        return (*own, *(name for name, signal in more.items() if signal is not None))
 
     @property
     def units(self) -> dict[str, str]:
         """m/s, rad, m."""
-        return {name: (_UNITS | _HEADING_UNITS)[name] for name in self.channels}
+        return {name: (_UNITS | _MORE_UNITS)[name] for name in self.channels}
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -82,8 +88,8 @@ class GNSS(AbstractInstrument):
 
     @property
     def may_use(self) -> tuple[str, ...]:
-        """How the body stands on the road, for the antenna."""
-        return POSES
+        """How the body stands on the road, for the antenna; the road in space."""
+        return POSES if self.climb is None else (*POSES, "grade", "bank")
 
     def say(self, times: jax.Array, outputs: Mapping[str, jax.Array], key: Any) -> dict[str, jax.Array]:
         """Speed, course and position; NaN in outages."""
@@ -93,6 +99,8 @@ class GNSS(AbstractInstrument):
         if self.heading is not None:
             told = self.heading.apply(outputs["yaw"], self.period, subkey(key, _HEADING))
             said["heading"] = numerics.wrap_angle(told)
+        if self.climb is not None:
+            said["climb_rate"] = self.climb.apply(rise(outputs), self.period, subkey(key, _CLIMB))
         silent = inside(times, self.outages)
         if self.outage_rate is not None and self.outage_length is not None:
             random = on_and_off(

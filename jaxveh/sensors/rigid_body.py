@@ -100,6 +100,14 @@ def velocity(outputs: Mapping[str, jax.Array], position: Any) -> tuple[Any, Any]
     return outputs["v_x"] + x, outputs["v_y"] + y
 
 
+def rise(outputs: Mapping[str, jax.Array]) -> jax.Array:
+    """The vertical speed of a car that follows its road, m/s, positive upwards."""
+    along, across = (numerics.tan(outputs.get(name, jnp.zeros_like(outputs["v_x"]))) for name in ("grade", "bank"))
+    run = numerics.sqrt(1.0 + along * along)
+    # As gravity lies in the road's plane: x in the vertical plane of the car's heading, y completes it.
+    return (outputs["v_x"] * along + outputs["v_y"] * across / numerics.sqrt(run * run + across * across)) / run
+
+
 def _normal_gravity(outputs: Mapping[str, jax.Array]) -> jax.Array:
     """Gravity's part normal to a road whose slopes are tan(grade) and tan(bank), positive."""
     zero = jnp.zeros_like(outputs["a_x"])

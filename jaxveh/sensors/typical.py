@@ -34,12 +34,12 @@ def production_car(
     - Wheel speeds, 50 Hz, 20 ms late, with `wheel_radius` (m, as the control unit stores it): 48 teeth, timed edges, zero
       below 1 km/h, steps of 1/64 km/h, radii off by up to 0.5 %: our choice.
     - Satellite navigation, 5 Hz, 0.15 s late: 0.05 m/s along and across (the velocity accuracy that receivers of the class
-      of u-blox M8 are sold with), no course below 1 m/s; delay and limit are our choice.
+      of u-blox M8 are sold with), 0.1 m/s upwards, no course below 1 m/s; delay, limit and the factor of two are our choice.
 
     `gnss` False leaves the last one out.
     """
     wheels = () if wheel_radius is None else (_wheels(wheel_radius),)
-    satellites = (GNSS(along=0.05, across=0.05, lowest=1.0, rate=5.0, delay=0.15),) if gnss else ()
+    satellites = (_satellites(),) if gnss else ()
     return Suite((_esc(), _steering(steering_ratio), *wheels, *satellites))
 
 
@@ -72,6 +72,10 @@ def proving_ground_car(
     optical = OpticalSideslip({"v_x": velocity, "v_y": velocity}, place, lowest=0.3, rate=250.0, delay=0.006)
     satellites = GNSS(along=0.02, across=0.02, lowest=0.3, position=Signal(noise=0.02), rate=20.0, delay=0.02)
     return Suite((inertial, optical, _steering(steering_ratio), satellites, *wheels))
+
+
+def _satellites() -> GNSS:
+    return GNSS(along=0.05, across=0.05, lowest=1.0, climb=Signal(noise=0.1), rate=5.0, delay=0.15)
 
 
 def _esc() -> IMU:

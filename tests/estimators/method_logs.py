@@ -69,6 +69,7 @@ def channels(speed=15.0, seed=0):
         "pitch_rate": noise(-rate(one["grade"]), 0.002),
         "x": satellite(np.cumsum(v_x * np.cos(yaw)) * STEP), "y": satellite(np.cumsum(v_x * np.sin(yaw)) * STEP),
         "speed": satellite(np.hypot(v_x, v_y)), "course": satellite(yaw + np.arctan2(v_y, v_x)), "heading": satellite(yaw),
+        "climb_rate": satellite(v_x * np.sin(one["grade"])),
         "lane_offset": satellite(np.cumsum(v_x * np.sin(yaw) + v_y * np.cos(yaw)) * STEP), "lane_heading": satellite(yaw),
         "steering_wheel": 16.0 * one["steer"], "steering_torque": front * 0.03 / 16.0,
         "brake_pressure": brake / 40.0 * 1e5 / 4.0, "throttle": np.clip(drive / 2000.0, 0.0, 1.0),

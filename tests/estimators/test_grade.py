@@ -7,6 +7,7 @@ from method_logs import CAR
 from steady_logs import G, pushed
 from winding_roads import SCORED, heard_of
 
+from jaxveh import Recording
 from jaxveh.estimators import grade
 
 
@@ -59,3 +60,19 @@ def test_on_unseen_cars_the_grade_is_known():
     assert np.mean((error / said.std.grade[:, 1000:]) ** 2) < 2.0
     off = said.mean.a_x_bias[:, -1000:].mean(1) - [one["a_x"] for one in offsets]
     assert np.sqrt(np.mean(off**2)) < 0.03
+
+
+def test_a_car_that_climbs_says_the_grade_whatever_its_accelerometer_says():
+    t = np.arange(0.0, 20.0, 0.02)
+    true = 0.05 * np.sin(0.3 * t)
+    fresh = np.arange(t.size) % 10 == 0
+    says = {"speed": np.where(fresh, 20.0, np.nan), "climb_rate": np.where(fresh, 20.0 * np.sin(true), np.nan)}
+    found = grade.estimate(CAR, Recording(t, says, {"speed": "m/s", "climb_rate": "m/s"}), method="climb")
+    known = np.asarray(found.known.grade)
+    assert known[5:].all()
+    # Late by the low-pass and half a satellite's step.
+    late = 0.05 * np.sin(0.3 * (t - 0.6))
+    np.testing.assert_allclose(np.asarray(found["grade"])[200:], late[200:], atol=2e-3)
+    silent = {name: np.where(t > 10.0, np.nan, values) for name, values in says.items()}
+    found = grade.estimate(CAR, Recording(t, silent, {"speed": "m/s", "climb_rate": "m/s"}), method="climb")
+    assert not np.asarray(found.known.grade)[t > 11.5].any()

@@ -109,7 +109,9 @@ def test_the_weighted_filter_finds_the_offset_and_counts_wheels_less_in_hard_bra
     said = speed.estimate(CAR, log_of("weighted", t, 25.0, a_x=0.3), method="weighted")
     found, std = (np.asarray(part.grade) * 9.80665 + np.asarray(part.a_x_offset) for part in (said.mean, said.std))
     np.testing.assert_allclose(found[-1], 0.3, atol=0.02)
-    assert np.all(np.diff(np.asarray(said.std.v_x)[:20]) < 0.0) and np.isfinite(std).all()
+    # Beside what the radii may be wrong.
+    own = np.square(said.std.v_x) - np.square(0.015 * np.asarray(said["v_x"]))
+    assert np.all(np.diff(own[:20]) < 0.0) and np.isfinite(std).all()
     true = np.where(t > 25.0, 25.0 - 4.0 * (t - 25.0), 25.0)
     slipping = np.where(t > 25.0, 0.95 * true, true)
     a_x = np.where(t > 25.0, -4.0, 0.0)

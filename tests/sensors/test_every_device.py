@@ -78,6 +78,7 @@ DEVICES = {
     ),
     "GNSS": Device(gnss, lambda d: d.along),
     "GNSS, two antennas": Device(lambda **c: sensors.GNSS(0.05, heading=SMOOTH, **c), lambda d: d.heading.bias),
+    "GNSS, vertical speed": Device(lambda **c: sensors.GNSS(0.05, climb=SMOOTH, **c), lambda d: d.climb.bias),
     "LaneCamera": Device(camera, lambda d: d.position.x),
     "OpticalSideslip": Device(optical, lambda d: d.position.x),
     "BrakeTorque": Device(lambda **c: sensors.BrakeTorque({"brake_torque": SMOOTH}, 0.1, **c), lambda d: d.lag),

@@ -108,3 +108,16 @@ def test_random_outages_come_with_the_key_and_take_all_channels():
 def test_bad_input_raises_by_name_value_and_range(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_the_vertical_speed_is_that_of_the_road_and_nothing_without_one():
+    uphill = heard(GNSS(climb=Signal(), rate=5.0), grade=0.1, bank=0.0)
+    np.testing.assert_allclose(uphill["climb_rate"], 19.0 * np.sin(0.1), rtol=1e-12)
+    across = heard(GNSS(climb=Signal(), rate=5.0), grade=0.0, bank=0.2)
+    np.testing.assert_allclose(across["climb_rate"], -2.0 * np.sin(0.2), rtol=1e-12)
+    assert (heard(GNSS(climb=Signal(), rate=5.0))["climb_rate"] == 0.0).all()
+    assert "climb_rate" not in heard(GNSS(rate=5.0))
+    noisy = heard(GNSS(climb=Signal(noise=0.1), rate=5.0), 20000, jax.random.key(1), grade=0.1)
+    np.testing.assert_allclose(noisy["climb_rate"].std(), 0.1, rtol=0.03)
+    with pytest.raises(InputError, match=r"GNSS.climb = 0.1: must be a Signal"):
+        GNSS(climb=0.1, rate=5.0)

@@ -25,6 +25,10 @@ SLOWEST = 0.3
 """Share of the car's speed: a wheel that turns more slowly is about to lock, and its brake's torque is not what it gives."""
 
 
+LEAST_SLIP = 0.02
+"""Of the speed: less slip than this may be an error of a wheel's radius or of the speed, and says nothing of friction's limit."""
+
+
 class WheelsTold(NamedTuple):
     """Of each wheel (4,): filtered `speed` (m/s) and `torque` (N m), what was measured of them last, and their `age` (s); the
     car's filtered `v_x` (m/s); the time `t` (s)."""

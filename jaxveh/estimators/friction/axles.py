@@ -18,6 +18,9 @@ from jaxveh.estimators.friction.scalar import Follower, LogFriction
 from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.vehicles import GRAVITY
 
+LEAST_FORCE = 0.15
+"""Of the axle's limit on dry road: a linear force below this does not tell whether the curve bends."""
+
 
 class AxlesTold(NamedTuple):
     """The motion and, low-pass filtered alike: steer (rad), yaw rate (rad/s), a_y (m/s^2); and what was measured last of yaw
@@ -75,6 +78,17 @@ class Axles(eqx.Module):
         rear = brush_curve.slip_of(forces[1], car.rear.stiffness, mu * car.rear.peak)
         return forces[0] - brush_curve.force(difference + rear, car.front.stiffness, mu * car.front.peak)
 
+    def bend(self, forces, difference, log_friction):
+        """The share (-) of a linear front force that is missing, in what is measured or in what this friction foretells,
+        whichever is more; 0 at little slip, where noise would be all of it."""
+        mu, car = jnp.exp(log_friction), self.car
+        rear = brush_curve.slip_of(forces[1], car.rear.stiffness, mu * car.rear.peak)
+        linear = car.front.stiffness * jnp.abs(difference + rear)
+        foretold = forces[0] - self.residual(forces, difference, log_friction)
+        least = jnp.minimum(jnp.abs(forces[0]), jnp.abs(foretold))
+        enough = linear > LEAST_FORCE * car.front.peak
+        return jnp.where(enough, 1.0 - least / jnp.where(enough, linear, 1.0), 0.0)
+
 
 class LateralCurve(AbstractMethod):
     """Friction by an axle's brush curve: the front force beside the front slip angle.
@@ -89,6 +103,7 @@ class LateralCurve(AbstractMethod):
     follower: Follower
     force_noise: jax.Array = positive("-", default=0.07)
     noise: jax.Array = positive("-", default=0.02)
+    knee: jax.Array = positive("-", default=0.2)
 
     @property
     def needs(self):
@@ -105,7 +120,8 @@ class LateralCurve(AbstractMethod):
         forces, difference = self.axles.forces(now), self.axles.slip_difference(now)
         noise = self.noise * self.axles.car.static_loads()[0] + self.force_noise * jnp.abs(forces[0])
         residual = lambda x: self.axles.residual(forces, difference, x)
-        here = now.told.moves & ~jnp.isnan(values["a_y"])
+        tells = self.axles.bend(forces, difference, state.mean) > self.knee
+        here = now.told.moves & ~jnp.isnan(values["a_y"]) & tells
         state = self.follower.next(state, dt, residual, noise, here)
         return (now, state), self._answer(now, state)
 
@@ -200,7 +216,9 @@ class HybridObserver(AbstractMethod):
         (now, state), _ = self.lateral.next(inner, t, values)
         axles = self.lateral.axles
         front, rear = axles.forces(now)
-        sample = (front, rear, axles.slip_difference(now), jnp.where(now.told.moves, 1.0, 0.0))
+        difference = axles.slip_difference(now)
+        tells = axles.bend((front, rear), difference, state.mean) > self.lateral.knee
+        sample = (front, rear, difference, jnp.where(now.told.moves & tells, 1.0, 0.0))
         # A little earlier, so that rounding does not choose the rows.
         due = t - window.time >= 0.95 * self.every
         push = lambda old, new: jnp.where(due, jnp.concatenate([old[1:], new[None]]), old)

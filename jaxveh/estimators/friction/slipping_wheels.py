@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
-from jaxveh.estimators.friction.along import Slips
+from jaxveh.estimators.friction.along import LEAST_SLIP, Slips
 from jaxveh.estimators.friction.scalar import Follower, LogFriction
 from jaxveh.estimators.friction.wheels import AbstractWheelMethod, WheelMemory, WheelSlips
 from jaxveh.estimators.method import answer
@@ -34,7 +34,8 @@ class WheelObserver(AbstractWheelMethod):
     and wrong where tyres keep their slope on slippery roads. With LuGre the bristles are taken as settled (they settle within
     milliseconds), and mu is what multiplies their friction.
 
-    `known`: the averaged `|F - slip dF/dslip| / F_z` of the wheel that has most of it is above `enough`. No spread is claimed.
+    `known`: the averaged `|F - slip dF/dslip| / F_z` of the wheel that has most of it, of those that slip more than
+    `LEAST_SLIP`, is above `enough`. No spread is claimed.
     """
 
     slips: WheelSlips
@@ -78,7 +79,8 @@ class WheelObserver(AbstractWheelMethod):
         _, stiff = jax.jvp(
             lambda slip: self._forces(seen._replace(slip=slip), wheels, memory.friction), (seen.slip,), (ones,)
         )
-        excited = jnp.max(jnp.where(seen.there, jnp.abs(force - seen.slip * stiff) / load, 0.0))
+        slips = seen.there & (jnp.abs(seen.slip) > LEAST_SLIP)
+        excited = jnp.max(jnp.where(slips, jnp.abs(force - seen.slip * stiff) / load, 0.0))
         excitation = memory.excitation + share * (excited - memory.excitation)
         after = ObserverMemory(wheels, observed, friction, excitation)
         return after, self._answer(after)
@@ -111,7 +113,8 @@ class SidesApart(AbstractWheelMethod):
     what a road that is slippery on one side needs.
 
     `friction` is the mean of both, weighed by load. The force of each wheel is compared with the curve along of its axle; what
-    slip a wheel shows while it hardly pulls, an error of its radius, is learnt within `learning` (s) and taken off. Beside, slips
+    slip a wheel shows while it hardly pulls, an error of its radius, is learnt within `learning` (s) and taken off; rows count
+    from `LEAST_SLIP` on. Beside, slips
     are known to `slip_noise` (-), forces to `force_noise` (-) of themselves and `load_noise` of the load.
     """
 
@@ -151,7 +154,8 @@ class SidesApart(AbstractWheelMethod):
             )
             residual = lambda x, c=curve, s=slip, f=force, n=load: f - c.force(s, jnp.exp(x), n)
             # Time passes twice for a side, once a wheel: what is forgotten is, too.
-            sides[k % 2] = self.follower.next(state, dt, residual, noise, seen.there[k])
+            tells = seen.there[k] & (jnp.abs(slip) > LEAST_SLIP)
+            sides[k % 2] = self.follower.next(state, dt, residual, noise, tells)
         after = SidesMemory(wheels, offset, *sides)
         return after, self._answer(after)
 

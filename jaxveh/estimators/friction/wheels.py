@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
-from jaxveh.estimators.friction.along import CORNERS, Slips, WheelForces, WheelsTold
+from jaxveh.estimators.friction.along import CORNERS, LEAST_SLIP, Slips, WheelForces, WheelsTold
 from jaxveh.estimators.friction.laws import PlanarCar, SimilarCurve
 from jaxveh.estimators.friction.motion import Told, next_told, start_told
 from jaxveh.estimators.method import AbstractMethod, answer
@@ -172,7 +172,8 @@ class Reconstruction(AbstractWheelMethod):
     where the slope is zero; before it, the brush's curve says how far away that is: with the slope's share `k` of the first one,
     `1 - g = sqrt(k)` and the peak is `mu / (1 - (1 - g)^3)`. Without a `lag` (s) on both, derivatives of noise would rule.
 
-    `known`: the slope is that of now and below `bent` of the first one, so that the curve has left the line. No spread is
+    `known`: the slope is that of now and below `bent` of the first one, at more than `LEAST_SLIP`, so that the curve has left the
+    line. No spread is
     claimed. **With the wheel speeds of a series car this rule does not hold**: an error of half a per cent of a radius and the
     sensor's noise bend the curve at slips of a per cent, and what is called known is far too small.
     """
@@ -217,5 +218,5 @@ class Reconstruction(AbstractWheelMethod):
 
     def _answer(self, memory: CurveMemory):
         bends = (memory.slope < self.bent * self._steepest()) & (memory.age < self.memory)
-        known = memory.wheels.told.moves & bends & (memory.used > 0.1)
+        known = memory.wheels.told.moves & bends & (memory.slip > LEAST_SLIP)
         return answer({"friction": memory.friction}, known=known)

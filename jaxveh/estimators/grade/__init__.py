@@ -1,7 +1,7 @@
 """The slope of the road along the car, positive uphill: section 3.1.2.3 of the review (Chen, Gao, Xu 2013), and paper 004's.
 
 An accelerometer feels `d v_x/dt - v_y r + g sin(grade)`. What it feels beside the speed's rate is the grade and its own offset:
-0.1 m/s^2 is 0.58 degrees. What the torques at the wheels push tells the two apart.
+0.1 m/s^2 is 0.58 degrees. What the torques at the wheels push tells the two apart, and satellites that say how fast a car climbs.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.recording import Recording
-from jaxveh.estimators.grade.kinematic import kinematic_of, satellite_of
+from jaxveh.estimators.grade.kinematic import Climb, kinematic_of, satellite_of
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.estimators.pulling import joint_filter, pulling_filter
 from jaxveh.io import CarSpecification
@@ -26,6 +26,11 @@ METHODS = {
     ),
     "satellite": MethodOfCar(
         satellite_of, "what the accelerometer feels beside the rate of the satellites' speed", "3.1.2.3 [128]"
+    ),
+    "climb": MethodOfCar(
+        lambda car: Climb(),
+        "the satellites' vertical speed over the horizontal one",
+        "3.1.2.3 [128], as H. Bae et al. 2001",
     ),
     "joint": MethodOfCar(
         lambda car: joint_filter(car, ("grade",)),

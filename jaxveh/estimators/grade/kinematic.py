@@ -7,14 +7,18 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jaxveh import numerics
 from jaxveh._core.parameter import parameter, positive
 from jaxveh.estimators.body_motion import SILENCE, BodyMotion, arcsin_of, hold
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.lateral import motion_of
 from jaxveh.estimators.method import AbstractMethod, answer
-from jaxveh.estimators.pulling import ALONG
+from jaxveh.estimators.pulling import ALONG, SLOWEST
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
+
+LONG_AGO = 1e3
+"""s: since satellites that have not spoken yet."""
 
 
 class KinematicMemory(NamedTuple):
@@ -71,7 +75,7 @@ class SatelliteMemory(NamedTuple):
 
 class Satellite(AbstractMethod):
     """`grade = arcsin((a_x / (1 + g P) - d speed/dt) / g)`, the speed of satellites, which slips with no wheel (P. Sahlholm, K.
-    Johansson 2008, whose vertical speed is no channel here). Both through a low-pass of `time` (s), the accelerometer through
+    Johansson 2008). Both through a low-pass of `time` (s), the accelerometer through
     another of the satellites' `delay` (s). In bends the speed over ground is not v_x, by little."""
 
     motion: BodyMotion
@@ -114,6 +118,43 @@ class Satellite(AbstractMethod):
         known = there & (age > 3.0 * self.time)
         memory = SatelliteMemory(motion, speed, slow, since, started, late, gathered, felt, age)
         return memory, answer({"grade": grade}, known=known)
+
+
+class ClimbMemory(NamedTuple):
+    """The time of the last row (s), for how long satellites have been silent (s), and vertical and horizontal speed, low-passed
+    (m/s)."""
+
+    t: Any
+    silent: Any
+    rise: Any
+    speed: Any
+
+
+class Climb(AbstractMethod):
+    """`grade = arctan(climb_rate / speed)` of satellites' vertical and horizontal speed (H. Bae, J. Ryu, J. Gerdes 2001), both
+    through a low-pass of `time` (s). No offset is in it, and it is late. Known above `slowest` (m/s)."""
+
+    time: jax.Array = positive("s", default=0.5)
+    slowest: jax.Array = positive("m/s", default=SLOWEST)
+
+    @property
+    def needs(self):
+        return (Need("speed", "m/s"), Need("climb_rate", "m/s"))
+
+    def first(self, t, values):
+        zero = jnp.zeros_like(t)
+        return self.next(ClimbMemory(t, zero + LONG_AGO, zero, zero), t, values)
+
+    def next(self, memory, t, values):
+        spoke = ~(jnp.isnan(values["speed"]) | jnp.isnan(values["climb_rate"]))
+        since = memory.silent + (t - memory.t)
+        share = jnp.where(spoke, since / (self.time + since), 0.0)
+        low = lambda last, value: last + share * (jnp.where(spoke, value, last) - last)
+        rise, speed = low(memory.rise, values["climb_rate"]), low(memory.speed, values["speed"])
+        silent = jnp.where(spoke, 0.0, since)
+        known = (silent < 2.0 * SILENCE) & (speed > self.slowest)
+        grade = jnp.where(speed > 0.0, numerics.arctan(rise / jnp.where(speed > 0.0, speed, 1.0)), 0.0)
+        return ClimbMemory(t, silent, rise, speed), answer({"grade": grade}, known=known)
 
 
 def kinematic_of(car: CarSpecification) -> Kinematic:

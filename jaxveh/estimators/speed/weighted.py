@@ -34,7 +34,8 @@ class Weighted(AbstractWheelMethod):
     wanders with `unfelt_walk`.
 
     Known where its standard deviation is below `agreement` of the speed and `agreement_speed` together. The slope and the offset
-    are told apart by how fast they change only. The band knows nothing of wheels that slip alike: it is too narrow then.
+    are told apart by how fast they change only. The band holds `radius` (-) of the speed beside, what the radii of all wheels
+    together are wrong; it knows nothing of wheels that slip alike, and is too narrow then.
 
     Chen, Gao, Xu 2013, section 2.1, refs 90 to 92.
     """
@@ -50,6 +51,7 @@ class Weighted(AbstractWheelMethod):
     slope: jax.Array = positive("m/s^2", default=0.3)
     slope_time: jax.Array = positive("s", default=15.0)
     slope_walk: jax.Array = positive("m/s^2/sqrt(s)", default=0.1)
+    radius: jax.Array = positive("-", default=0.015)
 
     @property
     def needs(self):
@@ -95,7 +97,11 @@ class Weighted(AbstractWheelMethod):
     def _with_bands(self, own: Weighed, said: Any):
         belief = own.belief
         mean = {"v_x": belief.mean[0], "grade": numerics.arctan(belief.mean[2] / GRAVITY), "a_x_offset": belief.mean[1]}
-        std = {"v_x": _std(belief, 0), "grade": _std(belief, 2) / GRAVITY, "a_x_offset": _std(belief, 1)}
+        std = {
+            "v_x": numerics.hypot(_std(belief, 0), self.radius * mean["v_x"]),
+            "grade": _std(belief, 2) / GRAVITY,
+            "a_x_offset": _std(belief, 1),
+        }
         return answer(mean, std, said.known.v_x)
 
 
