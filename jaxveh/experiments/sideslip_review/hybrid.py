@@ -28,6 +28,12 @@ from jaxveh.simulation import simulate
 from jaxveh.statespace import StateSpace
 from jaxveh.sweeps import Table
 
+SLOPES = (12.0, 17.0)
+"""Cornering stiffness over load of the true axles, front and rear, 1/rad."""
+
+GRIP = (0.85, 1.05)
+"""Largest lateral force over load of the true axles: the front one slides first, so that the car does not spin."""
+
 WRONG = (1.15, 0.87)
 """Of the stiffnesses before the fit, front and rear, over the true ones."""
 
@@ -53,12 +59,12 @@ COLUMNS = ("car", "minutes", "seed", "nothing fitted", "physics", "with networks
 def true_and_told(name: str) -> tuple[Any, Any]:
     """A car on the true tyres, and on the brushes that are told."""
     car = vehicles.named_car(name, "single-track")
-    plain = vehicles.linear_single_track(car)
-    slopes = (plain.front_stiffness, plain.rear_stiffness)
-    formula = lambda slope, load: tyres.MagicFormula(B=slope / (SHAPE["C"] * load), D=load, **SHAPE)
+    slopes = [slope * load for slope, load in zip(SLOPES, car.static_loads(), strict=True)]
+    formula = lambda slope, most: tyres.MagicFormula(B=slope / (SHAPE["C"] * most), D=most, **SHAPE)
     brush = lambda slope, wrong: tyres.Brush(wrong * slope, wrong * slope, friction=1.0)
     where = lambda c: (c.front, c.rear)
-    true = [formula(slope, load) for slope, load in zip(slopes, car.static_loads(), strict=True)]
+    most = [grip * load for grip, load in zip(GRIP, car.static_loads(), strict=True)]
+    true = [formula(slope, one) for slope, one in zip(slopes, most, strict=True)]
     told = [brush(slope, wrong) for slope, wrong in zip(slopes, WRONG, strict=True)]
     return eqx.tree_at(where, car, tuple(true)), eqx.tree_at(where, car, tuple(told))
 
