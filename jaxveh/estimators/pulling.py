@@ -73,8 +73,8 @@ class Pulling(AbstractMethod):
     **Parameters**: of the car `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2), `drag` (N s^2/m^2),
     `rolling_resistance` (-), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`, `pitch_gradient`
     (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`, `rolling_spread`
-    (m/s^2); of the sensors `wheel_noise`, `satellite_noise`, `climb_noise` (m/s), `delay` of satellites (s), `force_noise`
-    (m/s^2), which lasts `force_time` (s).
+    (m/s^2); of the sensors `wheel_noise`, `satellite_noise`, `climb_noise` (m/s), `wheel_delay` and satellites' `delay` (s),
+    `force_noise` (m/s^2), which lasts `force_time` (s).
     """
 
     motion: BodyMotion
@@ -95,6 +95,7 @@ class Pulling(AbstractMethod):
     a_x_offset_spread: jax.Array = positive("m/s^2", default=0.06)
     rolling_spread: jax.Array = positive("m/s^2", default=0.025)
     wheel_noise: jax.Array = positive("m/s", default=0.012)
+    wheel_delay: jax.Array = parameter("s", scale=0.02, default=0.02)
     satellite_noise: jax.Array = positive("m/s", default=0.06)
     climb_noise: jax.Array = positive("m/s", default=0.12)
     delay: jax.Array = parameter("s", scale=0.1, default=0.14)
@@ -185,14 +186,12 @@ class Pulling(AbstractMethod):
         slips = jnp.square(self.wheel_noise) + jnp.square(0.002 * v_x * (slowing + pushing))
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
         lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt)
-        belief = correct(
-            belief,
-            lambda x: v_x - x.v_x * (1.0 + x.wheel_scale + x.slip * (pushing - slowing)),
-            slips,
-            spoke,
-            State,
-            3.0,
-        )
+
+        def wheels(x):
+            ago = x.v_x - self.wheel_delay * self._speeds_up(x, heard)
+            return v_x - ago * (1.0 + x.wheel_scale + x.slip * (pushing - slowing))
+
+        belief = correct(belief, wheels, slips, spoke, State, 3.0)
         belief = correct(belief, satellite, jnp.square(self.satellite_noise), satellites & (v_x > 1.0), State, 3.0)
         belief = correct(belief, climb, jnp.square(self.climb_noise), climbs, State, 3.0)
         there = (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)

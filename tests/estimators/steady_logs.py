@@ -55,11 +55,13 @@ def pushed(needs, *, mass=1500.0, grade=0.03, offset=0.0, swing=1.5, speed=20.0,
     torque = force * CAR.wheel_radius
     noise = lambda std: std * rng.normal(size=rows)
     satellite = np.where(np.arange(rows) % 20 == 0, np.interp(time - 0.14, time, v_x) + noise(0.05), np.nan)
+    climb = np.interp(time - 0.14, time, v_x) * np.sin(grade) + noise(0.1)
     return log(
         needs,
         {
             "a_x": felt * (1.0 + G * CAR.pitch_gradient) + offset + noise(0.05), "a_y": 0.0, "yaw_rate": 0.0,
             **{name: v_x + noise(0.02) for name in WHEELS}, "speed": satellite,
+            "climb_rate": np.where(np.isnan(satellite), np.nan, climb),
             "drive_torque": np.maximum(torque, 0.0) if brakes else torque, "brake_torque": np.maximum(-torque, 0.0) * brakes,
         },
         rows,

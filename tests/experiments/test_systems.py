@@ -1,5 +1,7 @@
-"""Every system that a paper has is somewhere here, or the reason stands beside it; `python tests/experiments/test_systems.py` writes
-the page anew."""
+"""Every system that a paper has is somewhere here, or the reason stands beside it.
+
+`python tests/experiments/test_systems.py` writes the page anew.
+"""
 
 import importlib
 from pathlib import Path
@@ -12,8 +14,9 @@ from jaxveh.experiments.systems import resolve_name, systems_page
 PAGE = Path(__file__).parents[2] / "notebooks" / "pages" / "papers.md"
 HEAD = """# The papers' systems
 
-What each of the five papers has, models, methods, tables, figures and claims, and which names below `jaxveh` have it. Where nothing is
-named the last column says why. This page is made of what the experiments declare; a test holds it to that, and that each name exists.
+What each of the five papers has, models, methods, tables, figures and claims, and which names below `jaxveh` have it. Where
+nothing is named the last column says why. This page is made of what the experiments declare; a test holds it to that, and that
+each name exists.
 
 """
 TITLES = {
