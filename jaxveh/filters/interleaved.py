@@ -43,8 +43,8 @@ class Interleaved(NamedTuple):
 
 def interleave(
     turns: Mapping[str, Turn],
+    recording: Recording | Row,
     told: Any,
-    data: Recording | Row,
     *,
     key: Any = None,
     keep: Callable[[Any], Any] | None = None,
@@ -55,7 +55,7 @@ def interleave(
             "state": Turn(Cubature(), states, lambda told: told["car"], lambda belief, row, told: told | {"v": belief.mean.v_y}),
             "mass": Turn(Unscented(), mass, lambda told: told, lambda belief, row, told: told | {"car": put(belief.mean)}),
         }
-        found = interleave(turns, {"car": car, "v": 0.0}, recording)
+        found = interleave(turns, recording, {"car": car, "v": 0.0})
         found.mean["mass"].mass
 
     Three small filters cost less than one of all states, and each can be written, tuned and switched off by itself (paper 002).
@@ -63,22 +63,27 @@ def interleave(
     other is lost. The joint filter (`statespace.with_parameters`) is better wherever it is stable; `Consider` and `Dual` lie
     between.
 
-    **Arguments**: `turns` by name; `told`: what is known before the first row; `data`: a recording, of which each model takes its
-    own inputs and channels, or rows that all take; `key`: for particle filters; `keep(belief)`: further values of each row.
+    **Arguments**: `turns` by name; `recording`: of which each model takes its own inputs and channels, or `Row`s that all take;
+    `told`: what is known before the first row; `key`: for particle filters; `keep(belief)`: further values of each row.
     Everything can be jitted, batched and differentiated; steps are checkpointed.
 
     **Raises** `InputError` where a filter, its model and the recording do not go together, and where what is told after a row has
     not the structure, shapes and dtypes of what was told before it.
     """
-    if not turns:
-        raise InputError("interleave: turns is empty: must name at least one Turn.")
-    for name, turn in turns.items():
-        if not isinstance(turn, Turn):
-            raise InputError(f"interleave: turns[{name!r}] = {type(turn).__name__}: must be a filters.Turn.")
-        turn.filter.check(turn.model)
-    rows = {name: data if isinstance(data, Row) else turn.model.rows(data) for name, turn in turns.items()}
+    _check_turns(turns)
+    rows = {
+        name: recording if isinstance(recording, Row) else turn.model.rows(recording) for name, turn in turns.items()
+    }
     told = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.result_type(leaf)), told)
     keys = {name: None if key is None else jax.random.fold_in(key, i) for i, name in enumerate(turns)}
+    shown, tolds = _scan(turns, told, rows, keys, keep)
+    of = lambda place: {name: shown[name][place] for name in turns}
+    first_of = lambda place: {name: first_failure(codes)[place] for name, codes in of(3).items()}
+    return Interleaved(of(0), of(1), of(2), tolds, first_of(0), first_of(1))
+
+
+def _scan(turns: Mapping[str, Turn], told: Any, rows: dict[str, Row], keys: dict[str, Any], keep: Callable | None):
+    """Means, spreads, what was kept and codes by the turns' names, and what was told, of all rows."""
     at = lambda place: jax.tree.map(lambda leaf: leaf[place], rows)
 
     def after(stepped: dict, told: Any, row: dict) -> tuple[Any, Any, Any]:
@@ -104,16 +109,20 @@ def interleave(
     _check_alike(told, later)
     _, rest = jax.lax.scan(jax.checkpoint(step), (later, beliefs), at(slice(1, None)))
     join = lambda one, many: jnp.concatenate([jnp.asarray(one)[None], many])
-    shown, tolds = jax.tree.map(join, (shown, later), rest)
-    of = lambda place: {name: shown[name][place] for name in turns}
-    failures = {name: first_failure(codes) for name, codes in of(3).items()}
-    return Interleaved(
-        of(0), of(1), of(2), tolds, *({name: one[place] for name, one in failures.items()} for place in (0, 1))
-    )
+    return jax.tree.map(join, (shown, later), rest)
 
 
 def _with_system(turn: Turn, told: Any) -> StateSpace:
     return eqx.tree_at(lambda m: m.system, turn.model, turn.listen(told), is_leaf=lambda v: v is None)
+
+
+def _check_turns(turns: Mapping[str, Turn]) -> None:
+    if not turns:
+        raise InputError("interleave: turns is empty: must name at least one Turn.")
+    for name, turn in turns.items():
+        if not isinstance(turn, Turn):
+            raise InputError(f"interleave: turns[{name!r}] = {type(turn).__name__}: must be a filters.Turn.")
+        turn.filter.check(turn.model)
 
 
 def _check_alike(before: Any, after: Any) -> None:

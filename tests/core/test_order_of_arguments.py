@@ -5,7 +5,7 @@ import inspect
 
 import pytest
 
-READERS = {"filter", "model", "law", "car", "source", "estimate", "estimates", "found", "fit"}
+READERS = {"filter", "model", "law", "car", "source", "estimate", "estimates", "found", "fit", "turns"}
 READ = {"recording", "recordings", "schedule", "segments", "rig"}
 ORDER = (READERS, READ, {"where"}, {"key"})
 """Names by their place; a function takes any of them in this order, and behind them whatever else it takes."""

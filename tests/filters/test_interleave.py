@@ -50,7 +50,7 @@ def by_hand(sums):
 
 
 def test_all_see_what_was_told_after_the_row_before_and_keep_their_names():
-    found = filters.interleave(TURNS, {"a": 0.0, "b": 0.0}, LOG, keep=lambda belief: belief.covariance)
+    found = filters.interleave(TURNS, LOG, {"a": 0.0, "b": 0.0}, keep=lambda belief: belief.covariance)
     a, b, std = by_hand(LOG["sum"])
     assert list(found.mean) == ["second", "first"]
     np.testing.assert_allclose(found.mean["second"].level, a, rtol=1e-9)
@@ -64,7 +64,7 @@ def test_all_see_what_was_told_after_the_row_before_and_keep_their_names():
 def test_one_turn_alone_is_the_filter():
     noise = Continuous(Gaussian({"level": 0.3}))
     alone = {"only": filters.Turn(filters.Extended(), level(noise), lambda told: told, lambda belief, row, told: told)}
-    found = filters.interleave(alone, 0.5, LOG)
+    found = filters.interleave(alone, LOG, 0.5)
     model = eqx.tree_at(lambda m: m.system, level(noise), jnp.asarray(0.5), is_leaf=lambda v: v is None)
     plain = filters.run(filters.Extended(), model, LOG)
     np.testing.assert_allclose(found.mean["only"].level, plain["level"], rtol=1e-12)
@@ -72,13 +72,13 @@ def test_one_turn_alone_is_the_filter():
 
 
 def test_it_is_differentiated_batched_and_takes_particles():
-    last = lambda start: filters.interleave(TURNS, {"a": start, "b": 0.0}, LOG).mean["first"].level[-1]
+    last = lambda start: filters.interleave(TURNS, LOG, {"a": start, "b": 0.0}).mean["first"].level[-1]
     here = jnp.asarray(0.3)
     slope = jax.jit(jax.grad(last))(here)
     np.testing.assert_allclose(slope, (last(here + 1e-4) - last(here - 1e-4)) / 2e-4, rtol=1e-6)
     np.testing.assert_allclose(jax.vmap(last)(jnp.array([0.0, 0.3])), [last(jnp.asarray(0.0)), last(here)], rtol=1e-9)
     mixed = TURNS | {"first": turn("b", "a", filters.ParticleFilter(4000))}
-    found = filters.interleave(mixed, {"a": 0.0, "b": 0.0}, LOG, key=jax.random.key(0))
+    found = filters.interleave(mixed, LOG, {"a": 0.0, "b": 0.0}, key=jax.random.key(0))
     np.testing.assert_allclose(found.mean["first"].level, by_hand(LOG["sum"])[1], atol=0.08)
 
 
@@ -86,17 +86,17 @@ def test_a_filter_that_fails_says_where():
     broken = TURNS | {"first": filters.Turn(
         filters.Cubature(), level(), lambda told: jnp.where(told["a"] > 0.0, jnp.inf, 0.0), TURNS["first"].tell
     )}  # fmt: skip
-    found = filters.interleave(broken, {"a": 0.0, "b": 0.0}, LOG)
+    found = filters.interleave(broken, LOG, {"a": 0.0, "b": 0.0})
     assert int(found.result["first"]) != 0 and int(found.failed_at["first"]) == 1
 
 
 def test_what_does_not_go_together_is_said():
     with pytest.raises(InputError, match="turns is empty"):
-        filters.interleave({}, 0.0, LOG)
+        filters.interleave({}, LOG, 0.0)
     with pytest.raises(InputError, match=r"turns\['one'\] = Cubature: must be a filters.Turn"):
-        filters.interleave({"one": filters.Cubature()}, 0.0, LOG)
+        filters.interleave({"one": filters.Cubature()}, LOG, 0.0)
     grows = {"one": TURNS["second"]._replace(tell=lambda belief, row, told: told | {"b": jnp.zeros(2)})}
     with pytest.raises(InputError, match=r"told\['b'\] was float64\[\] and is float64\[2\] after a row"):
-        filters.interleave(grows, {"a": 0.0, "b": 0.0}, LOG)
+        filters.interleave(grows, LOG, {"a": 0.0, "b": 0.0})
     with pytest.raises(InputError, match="sum"):
-        filters.interleave(TURNS, {"a": 0.0, "b": 0.0}, Recording(np.arange(3.0), {"other": np.zeros(3)}))
+        filters.interleave(TURNS, Recording(np.arange(3.0), {"other": np.zeros(3)}), {"a": 0.0, "b": 0.0})

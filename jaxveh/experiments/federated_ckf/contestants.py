@@ -160,7 +160,7 @@ def _three(filter_: Any):
             )  # fmt: skip
             tell = lambda belief, row, told, put=put: told._replace(car=put(told.car, belief.mean))
             turns[names[0]] = filters.Turn(filter_, model, lambda told: told, tell)
-        kept = filters.interleave(turns, told, rows, keep=vector_and_covariance).kept
+        kept = filters.interleave(turns, rows, told, keep=vector_and_covariance).kept
         (state, P), (body, P_body), (friction, P_friction) = (kept[name] for name in turns)
         covariance = jnp.zeros((state.shape[0], 7, 7)).at[:, :3, :3].set(P)
         covariance = covariance.at[:, 3:4, 3:4].set(P_friction).at[:, 4:, 4:].set(P_body)

@@ -57,7 +57,7 @@ def as_printed(study: Study, start: Any, drive: Drive) -> Found:
     zero = jnp.zeros_like(rows.t[0])
     state = State(zero + study.speed, zero, zero)
     told = Told(rows.t[0], jax.tree.map(lambda leaf: leaf[0], rows.u), car, state)
-    kept = filters.interleave(turns, told, rows, keep=vector_and_covariance).kept
+    kept = filters.interleave(turns, rows, told, keep=vector_and_covariance).kept
     (x, P), (mu, P_mu), (body, P_body) = (kept[name] for name in turns)
     mu_mean = jnp.mean(mu, axis=1, keepdims=True)
     parameters = jnp.concatenate([mu_mean, body], axis=1)

@@ -96,10 +96,11 @@ def _brushes(model: StateSpace) -> tuple:
     car = model.system.vehicle
     inner = [getattr(tyre, "tyre", tyre) for tyre in (car.front, car.rear)]
     numbers = [getattr(tyre, name) for tyre in inner for name in ("cornering_stiffness", "friction")]
-    return (*numbers, *model.process_noise.law.std)
+    noise: Any = model.process_noise
+    return (*numbers, *noise.law.std)
 
 
-def compared_on(name: str, minutes: float, seed: int, *, steps: int = 300, progress: Progress = silent) -> tuple:
+def compare_networks(name: str, minutes: float, seed: int, *, steps: int = 300, progress: Progress = silent) -> tuple:
     """One line of the table."""
     true, told = true_and_told(name)
     fit_key, judge_key, net_key, walk_key = jax.random.split(jax.random.fold_in(jax.random.key(46), seed), 4)
@@ -132,7 +133,7 @@ def hybrid_table(
     rows = []
     for i, one in enumerate(every):
         told = part(progress, i / len(every), (i + 1) / len(every), f"{one[0]}, {one[1]:g} min, seed {one[2]}")
-        rows.append(compared_on(*one, steps=steps, progress=told))
+        rows.append(compare_networks(*one, steps=steps, progress=told))
     return Table("Sideslip RMSE [deg] on drives that nothing was fitted on, by minutes that were", COLUMNS, rows)
 
 

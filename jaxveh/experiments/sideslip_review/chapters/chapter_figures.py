@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxveh.experiments.sideslip_review.chapters.chapter_tables import NAMES, shown_of, starred
+from jaxveh.experiments.sideslip_review.chapters.chapter_tables import NAMES, method_label, names_and_units
 from jaxveh.experiments.sideslip_review.chapters.racing import CHAPTERS, ChaptersRaced
 from jaxveh.plots import kit, style
 
@@ -28,7 +28,7 @@ def error_ratios(raced: ChaptersRaced, names: tuple[str, ...]) -> tuple[list[str
     """Labels of methods, and medians over seeds of their RMSE over that of doing nothing (methods, scenarios), NaN where there is
     none."""
     labels, rows = [], []
-    for quantity, shown, _, _ in shown_of(raced, names):
+    for quantity, shown, _, _ in names_and_units(raced, names):
         nothing = raced.nothing[quantity, shown]["rmse"]
         for key, values in raced.found.items():
             if key[0] != quantity or key[2] != shown:
@@ -38,7 +38,7 @@ def error_ratios(raced: ChaptersRaced, names: tuple[str, ...]) -> tuple[list[str
             rows.append(
                 [np.median(row[here]) if here.any() else np.nan for row, here in zip(ratio, there, strict=True)]
             )
-            labels.append(f"{shown}: {starred(quantity, key[1])}")
+            labels.append(f"{shown}: {method_label(quantity, key[1])}")
     return labels, np.array(rows)
 
 

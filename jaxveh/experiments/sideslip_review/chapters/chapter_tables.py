@@ -26,7 +26,7 @@ def chapter_tables(raced: ChaptersRaced) -> list[Table]:
     return found
 
 
-def shown_of(raced: ChaptersRaced, names: tuple[str, ...]):
+def names_and_units(raced: ChaptersRaced, names: tuple[str, ...]):
     """(quantity, shown name, scale, unit) of a chapter, those that the drives know a truth of."""
     for quantity in names:
         for shown, unit in quantities()[quantity].SHOWN.items():
@@ -37,7 +37,7 @@ def shown_of(raced: ChaptersRaced, names: tuple[str, ...]):
 
 def _errors(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table:
     rows = []
-    for quantity, shown, scale, unit in shown_of(raced, names):
+    for quantity, shown, scale, unit in names_and_units(raced, names):
         label = f"{shown} [{unit}]"
         idle = raced.nothing.get((quantity, shown))
         if idle is not None:
@@ -45,13 +45,13 @@ def _errors(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table
         for key, values in raced.found.items():
             if key[0] == quantity and key[2] == shown:
                 cells = [spread(scale * values["rmse"][i]) for i in range(len(NAMES))]
-                rows.append((label, starred(quantity, key[1]), *cells))
+                rows.append((label, method_label(quantity, key[1]), *cells))
     return Table(
         f"{chapter}: RMSE, median over seeds [quartiles]; * is what we recommend", ("what", "method", *NAMES), rows
     )
 
 
-def starred(quantity: str, method: str) -> str:
+def method_label(quantity: str, method: str) -> str:
     """The method's name, with a star where we recommend it."""
     return f"{method} *" if method == quantities()[quantity].RECOMMENDED else method
 
@@ -59,7 +59,7 @@ def starred(quantity: str, method: str) -> str:
 def _properties(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> Table:
     """On ordinary drives, and over all: what is known, the worst, the delay, a long run; what it needs."""
     rows = []
-    for quantity, shown, scale, unit in shown_of(raced, names):
+    for quantity, shown, scale, unit in names_and_units(raced, names):
         module, normal = quantities()[quantity], NAMES.index("normal")
         for key, values in raced.found.items():
             if key[0] != quantity or key[2] != shown:
@@ -68,7 +68,7 @@ def _properties(raced: ChaptersRaced, chapter: str, names: tuple[str, ...]) -> T
             method = module.METHODS[key[1]]
             needs = method.make(told_cars()[0]).needs
             rows.append((
-                f"{shown} [{unit}]", starred(quantity, key[1]), f"{100.0 * at('known'):.0f} %", scale * at("rmse_known"),
+                f"{shown} [{unit}]", method_label(quantity, key[1]), f"{100.0 * at('known'):.0f} %", scale * at("rmse_known"),
                 scale * np.nanmax(values["worst"]), at("nees"), at("delay"),
                 at("late") / max(at("early"), 1e-12), values["failed"].sum(),
                 ", ".join(_short([need.channel for need in needs if not need.optional])), method.source,

@@ -168,8 +168,12 @@ def _run(methods: list[AbstractMethod], conclude: Callable[[Any, dict], dict]):
 def _score(module: ModuleType, said: Any, drive: dict) -> dict[str, Any]:
     shown = [name for name in module.SHOWN if f"true.{name}" in drive]
     held = jnp.cumprod((jnp.abs(drive["true.sideslip"]) < LOST).astype(int)) > 0
-    of = lambda name: (getattr(part, name) for part in (said.mean, said.std, said.known))
-    return {name: metrics(*of(name), drive[f"true.{name}"], held) for name in shown}
+    return {
+        name: metrics(
+            getattr(said.mean, name), getattr(said.std, name), getattr(said.known, name), drive[f"true.{name}"], held
+        )
+        for name in shown
+    }
 
 
 STEP = 0.01
