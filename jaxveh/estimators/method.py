@@ -167,7 +167,7 @@ def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: s
         raise InputError(
             f"{who}: source = {type(source).__name__}: must be an io.CarSpecification, which io.read_car reads, or a method."
         )
-    method = methods[name].make(source)
+    method = methods[name].make(source.with_front_steering())
     if any(need.channel in TURNING for need in method.needs):
         io.check_front_steered(source, f"{who}: {name}")
     return method

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -188,6 +188,12 @@ class CarSpecification:
     def steers_front_alone(self) -> bool:
         """Whether no rear wheel is steered."""
         return self.steering in (None, "front", "ackermann")
+
+    def with_front_steering(self) -> CarSpecification:
+        """The same car, its rear wheels straight if they are steered."""
+        if self.steers_front_alone:
+            return self
+        return replace(self, steering=None, rear_steer_ratio=None, rear_steer_ratio_fast=None)
 
 
 def read_car(path: str | os.PathLike) -> CarSpecification:

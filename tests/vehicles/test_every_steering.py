@@ -356,3 +356,30 @@ BAD = {
 def test_what_is_no_steering_raises(message):
     with pytest.raises(InputError, match=message):
         BAD[message]()
+
+
+SAID = {"four-wheel": {"rear_steer_ratio": -0.2, "rear_steer_ratio_fast": 0.1, "rear_steer_speed": 15.0}}
+"""What a car's file says beside the name of a steering."""
+
+
+@pytest.mark.parametrize("name", kit.STEERINGS)
+def test_a_car_s_file_makes_and_remembers_every_steering(name):
+    plain = vehicles.specification_of(vehicles.sets.sedan())
+    said = dataclasses.replace(plain, steering=name, **SAID.get(name, {}))
+    numbers = vehicles.numbers_of(said)
+    for fidelity, kind in kit.FIDELITIES.items():
+        if fidelity in ("kinematic-trailer", "longitudinal", "roll-3dof", "roll-4dof", "fourteen-dof"):
+            continue  # no trailer, no wheels, and no suspension in a file
+        car = vehicles.specified_car(said, fidelity)
+        assert type(car) is kind and type(car.steering) is kit.STEERINGS[name]
+        leaves = [float(leaf) for leaf in jax.tree.leaves(car.steering)]
+        np.testing.assert_allclose(leaves, {"four-wheel": [-0.2, 0.1, 15.0], "ackermann": [1.0]}.get(name, []))
+    again = vehicles.specification_of(numbers)
+    assert again.steering == (None if name == "front" else name)
+    assert [getattr(again, key) for key in SAID["four-wheel"]] == [getattr(said, key) for key in SAID["four-wheel"]]
+
+
+def test_a_steering_that_no_file_can_say_is_refused():
+    numbers = dataclasses.replace(vehicles.sets.sedan(), steering=vehicles.Ackermann(0.5))
+    with pytest.raises(InputError, match=r"a car's file cannot say this steering; it knows front, ackermann"):
+        vehicles.specification_of(numbers)
