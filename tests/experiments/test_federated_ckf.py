@@ -141,7 +141,7 @@ def test_estimators_that_take_turns_believe_what_was_told_a_row_ago():
 def test_numbers_of_a_known_course():
     rows, right = 301, study.truth(SMALL)
     zeros = np.zeros(rows)
-    drive = drives.Drive(*(zeros,) * 10)._replace(true_v_x=zeros + 5.0)
+    drive = drives.Drive(*(zeros,) * 11)._replace(true_v_x=zeros + 5.0)
     off = np.log(right) + np.log([1.0, 1.02, 1.0, 1.0])
     vector = np.tile(np.concatenate([[5.0, 5.0 * np.tan(0.01), 0.0], off]), (rows, 1))
     covariance = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4, 1e-4]), (rows, 1, 1))

@@ -79,7 +79,7 @@ def drive_figure(raced: Raced, seed: int = 0) -> Any:
     with style():
         panels = figure.subplots(5, 1, sharex=True, height_ratios=(1, 1, 1, 1, 2))
         panels[2].plot(time, drive.a_y, color=COLOURS["prior"], linewidth=0.5, label="measured")
-        truths = (np.rad2deg(drive.steer), 3.6 * drive.true_v_x, None, true)
+        truths = (np.rad2deg(drive.steer[:, 0]), 3.6 * drive.true_v_x, None, true)
         for axes, values in zip(panels, truths, strict=False):
             if values is not None:
                 axes.plot(time, values, color=COLOURS["truth"])

@@ -11,13 +11,22 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import positive
-from jaxveh.experiments.federated_ckf.drives import PULLS, WHEELS, Drive, dugoff, felt_accelerations, times, wheel_rates
+from jaxveh.experiments.federated_ckf.drives import (
+    PULLS,
+    STEERS,
+    WHEELS,
+    Drive,
+    dugoff,
+    felt_accelerations,
+    times,
+    wheel_rates,
+)
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
 from jaxveh.statespace import Continuous, Gaussian, Prior, Propagate, RolledRK4, Row, StateSpace, with_parameters
 from jaxveh.tyres import Dugoff, Forces
 from jaxveh.vehicles import GRAVITY, kit, sets
 
-INPUTS = ("steer", "a_x_felt", "a_y_felt", *PULLS)
+INPUTS = (*STEERS, "a_x_felt", "a_y_felt", *PULLS)
 CHANNELS = ("a_x", "a_y", "yaw_rate", *WHEELS)
 
 TURNS = 3
@@ -83,8 +92,8 @@ class Planar(eqx.Module):
         return kit.corners(self.front_axle_to_cg, self.rear_axle_to_cg, self.track_front, self.track_rear)
 
     def push(self, x: State, u: Any) -> Pushed:
-        """What the wheels do to the car in the state x with the inputs u (`steer`, `pull_fl` ...)."""
-        moves = kit.rolling_wheels(self.places, x.v_x, x.v_y, x.yaw_rate, u.steer)
+        """What the wheels do to the car in the state x with the inputs u (`steer_fl` ..., `pull_fl` ...; eqs 1-9)."""
+        moves = kit.rolling_wheels(self.places, x.v_x, x.v_y, x.yaw_rate, kit.wheels_of(u, "steer"))
         pulls = kit.wheels_of(u, "pull")
         loads = kit.planar_loads(self, u.a_x_felt, u.a_y_felt, -GRAVITY)
         pulls = kit.each_wheel(lambda pull, load: pull - self.rolling_resistance * load, pulls, loads)
@@ -216,6 +225,6 @@ def rows_of(study: Study, drive: Drive) -> Row:
     car = sets.ev()
     assert car.wheel_inertia is not None and car.wheel_radius is not None
     pulls = (drive.torque - car.wheel_inertia * wheel_rates(study, drive)) / car.wheel_radius
-    u = record_type("Inputs", INPUTS)(drive.steer, *felt_accelerations(study, drive), *pulls.T)
+    u = record_type("Inputs", INPUTS)(*drive.steer.T, *felt_accelerations(study, drive), *pulls.T)
     y = record_type("Measurements", CHANNELS)(drive.a_x, drive.a_y, drive.yaw_rate, *drive.omega.T)
     return Row(times(study), u, y)
