@@ -12,7 +12,7 @@ from jaxveh import numerics
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.parameter import positive
-from jaxveh.manoeuvres.base import AbstractManoeuvre, DriverInputs, PedalInputs
+from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs
 from jaxveh.manoeuvres.driver import AbstractDriver, Motion, as_driver, driver_state
 from jaxveh.numerics import smooth_clip, smooth_ramp, smooth_step
 from jaxveh.vehicles import GRAVITY, kit
@@ -86,10 +86,9 @@ class SpeedControl(AbstractDriver):
         torque, edge = self.mass * self.wheel_radius * wanted + own, self.mass * self.wheel_radius * _EDGE
         pedals = smooth_ramp(torque, edge), smooth_ramp(-torque, edge)
         angles = {name: getattr(u, name) for name in kit.STEER_UNITS if name != "steer" and hasattr(u, name)}
-        if not angles:
-            return PedalInputs(u.steer, u.v_x, u.v_x_rate, *pedals)
-        own = {name: getattr(u, name) for name in DriverInputs._fields if hasattr(u, name)}
-        return record("PedalInputs", own | angles | dict(zip(PedalInputs._fields[3:], pedals, strict=True)))
+        v_x_rate = u.v_x_rate if hasattr(u, "v_x_rate") else 0.0 * u.v_x
+        known = PedalInputs(u.steer, u.v_x, v_x_rate, *pedals)
+        return record("PedalInputs", known._asdict() | angles) if angles else known
 
     def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
         u, _, cut = self._pedal_inputs(t, motion, state)

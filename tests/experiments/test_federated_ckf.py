@@ -183,7 +183,7 @@ def test_what_another_tyre_does_stands_beside_the_truths_own():
     known = dataclasses.make_dataclass("Known", ("bounds", "spread"))(
         Parameters({"friction": np.inf}), Parameters({"friction": 0.8})
     )
-    checks = report.check(report.Reproduction(2, raced, (3.0,), (0.0,), None, {"known": [[known]]}))
+    checks = report.check(report.Reproduction(2, raced, (3.0,), (0.0,), None, {"known": [[known]]}, None))
     found = {check.name: check for check in checks}
     own, other = (found[criteria.final(case, "friction")] for case in ("nearer start", criteria.OTHER))
     assert (own.value, own.status, own.original) == (pytest.approx(0.1), "met", "")

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -60,3 +61,16 @@ def test_a_kinematic_car_with_a_steered_rear_axle_goes_on_its_circle():
     expected = 3.0 * (np.tan(0.2) - np.tan(-0.1)) / 2.7
     np.testing.assert_allclose(drive["true.yaw_rate"][-1], expected, rtol=1e-6)
     np.testing.assert_allclose(np.tan(drive["true.sideslip"][-1]), np.tan(-0.1) + 1.5 * expected / 3.0, rtol=1e-6)
+
+
+def test_pedals_hand_on_the_angles_of_other_wheels():
+    """Of a driver who says them; a plain one's inputs are `PedalInputs` as before."""
+    time = np.linspace(0.0, 1.0, 11)
+    channels = {"steer": 0.1 * time, "steer_rear": -0.05 * time, "v_x": np.full(11, 10.0)}
+    moves = vehicles.Motion(*[jnp.asarray(value) for value in (0.0, 0.0, 0.0, 9.0, 0.0, 0.0)])
+    for names in (("steer", "v_x"), ("steer", "v_x", "steer_rear")):
+        control = manoeuvres.SpeedControl(replay(Recording(time, channels), names), 1500.0)
+        u = control.inputs(0.5, moves, control.start(0.0, moves))
+        assert float(u.drive_torque) > 100.0 and ("steer_rear" in u._fields) == ("steer_rear" in names)
+        np.testing.assert_allclose(u.steer, 0.05, rtol=1e-12)
+    np.testing.assert_allclose(u.steer_rear, -0.025, rtol=1e-12)

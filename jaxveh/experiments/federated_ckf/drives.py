@@ -66,7 +66,7 @@ class Slalom(AbstractManoeuvre):
         return with_four_angles(DriverInputs(steer=self.steer * wave, v_x=v_x, v_x_rate=v_x_rate), self.rear)
 
 
-def with_four_angles(u: DriverInputs, rear: float) -> Any:
+def with_four_angles(u: DriverInputs, rear: Any) -> Any:
     """A driver's inputs with the angle of each wheel, that of the rear ones `rear` (-) times that of the front ones."""
     angles = (u.steer, u.steer, rear * u.steer, rear * u.steer)
     return record("DriverInputs", u._asdict() | dict(zip(STEERS, angles, strict=True)))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh.experiments.federated_ckf.report import SHORT, Reproduction
+from jaxveh.experiments.federated_ckf.road_figures import friction_figure, speeds_figure
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS
 from jaxveh.experiments.federated_ckf.study import Raced, truth
 from jaxveh.plots import COLOURS, kit, style
@@ -33,6 +34,8 @@ def figures(result: Reproduction) -> dict[str, Any]:
         "drive": drive_figure(result.raced),
         "fault": fault_figure(result.raced),
         "line": line_figure(result),
+        "speeds": speeds_figure(result.raced, _those(result.raced, SHOWN)),
+        "friction": friction_figure(result.roads),
     }
 
 

@@ -62,7 +62,7 @@ class Planar(eqx.Module):
     A wheel's longitudinal force is known from its motor, `F_x = (T - J_w domega/dt) / r` (eq 10), less rolling resistance; its
     lateral force is Dugoff's at the slip ratio that gives this F_x, or with `measured_slip` at that of the measured wheel speeds
     (eq 14; inputs `omega_fl` ...), which shake. Loads follow the measured accelerations (eq 9). `friction` may
-    be one number or one a wheel (`Wheels`).
+    be one number or one a wheel (`Wheels`), or is told by the inputs `friction_fl` ....
     """
 
     friction: Any = positive("-")
@@ -97,12 +97,19 @@ class Planar(eqx.Module):
         pulls = kit.wheels_of(u, "pull")
         loads = kit.planar_loads(self, u.a_x_felt, u.a_y_felt, -GRAVITY)
         pulls = kit.each_wheel(lambda pull, load: pull - self.rolling_resistance * load, pulls, loads)
-        friction = self.friction if isinstance(self.friction, kit.Wheels) else kit.Wheels(*[self.friction] * 4)
-        found = self._wheels(moves, loads, pulls, friction, self._slips(moves, u) if self.measured_slip else None)
+        found = self._wheels(
+            moves, loads, pulls, self._frictions(u), self._slips(moves, u) if self.measured_slip else None
+        )
         push = kit.body_forces(self.places, moves, kit.each_wheel(lambda wheel: wheel[0], found))
         omega = kit.each_wheel(lambda move, wheel: move.along * (1.0 + wheel[1]) / self.wheel_radius, moves, found)
         drag = kit.air_drag(self.drag, x.v_x)
         return Pushed((push.F_x - drag) / self.mass, push.F_y / self.mass, push.M_z, omega)
+
+    def _frictions(self, u: Any) -> kit.Wheels:
+        """The friction under each wheel: that which is told, where it is an input, else the car's."""
+        if hasattr(u, "friction_fl"):
+            return kit.wheels_of(u, "friction")
+        return self.friction if isinstance(self.friction, kit.Wheels) else kit.Wheels(*[self.friction] * 4)
 
     def _slips(self, moves: kit.Wheels, u: Any) -> kit.Wheels:
         """Slip ratios of the measured wheel speeds (eq 14)."""
@@ -193,7 +200,7 @@ def noise_levels(study: Study) -> dict[str, float]:
     return own | dict.fromkeys(WHEELS, study.wheel_speed)
 
 
-def states_model(study: Study, car: Planar, drive: Drive) -> StateSpace:
+def states_model(study: Study, car: Planar, drive: Drive, inputs: tuple[str, ...] = INPUTS) -> StateSpace:
     """Three states, the car's parameters known."""
     v_x = jnp.mean(drive.omega[0, 2:]) * car.wheel_radius
     return StateSpace(
@@ -206,7 +213,7 @@ def states_model(study: Study, car: Planar, drive: Drive) -> StateSpace:
         ),
         measurement_noise=Gaussian(noise_levels(study)),
         prior=Prior(State(v_x, jnp.zeros_like(v_x), jnp.zeros_like(v_x)), {"v_x": 0.1, "v_y": 0.1, "yaw_rate": 0.05}),
-        inputs=INPUTS,
+        inputs=inputs,
         input_path="linear",
     )
 
