@@ -149,6 +149,8 @@ def test_numbers_of_a_known_course():
     seen = jax.jit(lambda *given: contestants.metrics(SMALL, *given))(found, drive, right)
     np.testing.assert_allclose(seen["mass_error"], 0.02, rtol=1e-9)
     np.testing.assert_allclose(seen["sideslip_rmse"], np.rad2deg(0.01), rtol=1e-6)
+    off = contestants.metrics(SMALL, found, drive._replace(true_v_x=zeros + 4.9, true_v_y=zeros + 0.02), right)
+    np.testing.assert_allclose([off["v_x_rmse"], off["v_y_rmse"]], [0.1, 5.0 * np.tan(0.01) - 0.02], rtol=1e-6)
     np.testing.assert_allclose(seen["nees"], (np.log(1.02) / 0.01) ** 2 / 4, rtol=1e-6)
     every = (np.log(1.02) / 0.01) ** 2 + (5.0 * np.tan(0.01)) ** 2
     np.testing.assert_allclose(seen["nees_all"], every / 7, rtol=1e-6)
