@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from jaxveh.experiments.federated_ckf.contestants import contestants
 from jaxveh.experiments.federated_ckf.road_drives import road_cases
-from jaxveh.experiments.federated_ckf.road_filters import RacedOnRoads, road_contestants
+from jaxveh.experiments.federated_ckf.road_filters import ROAD_START, RacedOnRoads, road_contestants
 from jaxveh.experiments.federated_ckf.study import Raced
 from jaxveh.experiments.report import spread
 from jaxveh.sweeps import Table
@@ -40,7 +40,7 @@ def road_tables(raced: RacedOnRoads) -> list[Table]:
             rows.append((name, *speeds, *sides, nees, at("mass_error", scale=100.0), whats[name].what))
         found.append(
             Table(
-                f"{case.capitalize()} ({about.what}), from mu 0.5: median [quartiles] over {raced.found.seeds} seeds",
+                f"{case.capitalize()} ({about.what}), from mu {ROAD_START.friction:g}: median [quartiles] over {raced.found.seeds} seeds",
                 (
                     "estimator", "v_x RMSE, m/s", "v_y RMSE, m/s", "sideslip RMSE, degrees", "ln mu left, %", "ln mu right, %",
                     "NEES of mu", "m, %", "what it knows",
