@@ -28,7 +28,7 @@ def speed_table(raced: Raced, cases: tuple[str, ...]) -> Table:
 
 def road_tables(raced: RacedOnRoads) -> list[Table]:
     """A table a road: errors of speeds, friction on both sides and mass, and whether the friction's spread is believable."""
-    whats = road_contestants(raced.study)
+    whats, begun = road_contestants(raced.study), f"from mu {ROAD_START.friction:g}"
     found = []
     for case, about in road_cases(raced.study).items():
         rows = []
@@ -40,7 +40,7 @@ def road_tables(raced: RacedOnRoads) -> list[Table]:
             rows.append((name, *speeds, *sides, nees, at("mass_error", scale=100.0), whats[name].what))
         found.append(
             Table(
-                f"{case.capitalize()} ({about.what}), from mu {ROAD_START.friction:g}: median [quartiles] over {raced.found.seeds} seeds",
+                f"{case.capitalize()} ({about.what}), {begun}: median [quartiles] over {raced.found.seeds} seeds",
                 (
                     "estimator", "v_x RMSE, m/s", "v_y RMSE, m/s", "sideslip RMSE, degrees", "ln mu left, %", "ln mu right, %",
                     "NEES of mu", "m, %", "what it knows",
