@@ -10,7 +10,7 @@ from jaxveh.diagnostics.log_samples import check_samples
 from jaxveh.diagnostics.log_sampling import check_sampling
 from jaxveh.diagnostics.log_signs import check_signs, check_units, check_wheel_speeds
 from jaxveh.diagnostics.log_steering import check_steering
-from jaxveh.io import CarSpecification, with_road_steer
+from jaxveh.io import CarSpecification, kit, with_road_steer
 
 CHECKS = (
     check_sampling,
@@ -35,6 +35,10 @@ def check_log(recording: Recording, *, car: CarSpecification | None = None) -> l
     Rates, jitter, gaps and missing samples; repeated, frozen and coarse values and spikes; magnitudes; signs and units
     by what channels must agree on; delays by cross-correlation; steering scale and offset; grip and the car's own numbers.
     Host side, in NumPy; nothing is changed. Simulated truth (`true.` channels) is not looked at.
+
+    **Raises** `InputError` for a car whose rear wheels are steered: nothing here knows their angles.
     """
+    if car is not None:
+        kit.check_front_steered(car, "check_log")
     log = LogView.of(recording if car is None else with_road_steer(car, recording), car)
     return [finding for check in CHECKS for finding in check(log)]

@@ -13,7 +13,8 @@ from jaxveh.io import AxleTyre, CarSpecification
 FULL_CAR = CarSpecification(
     mass=1500.0, yaw_inertia=2500.0, front_axle_to_cg=1.2, rear_axle_to_cg=1.5, front_cornering_stiffness=1.1e5,
     rear_cornering_stiffness=1.3e5, name="every key", cg_height=0.55, track_front=1.5, track_rear=1.5, steering_ratio=16.0,
-    steer_offset=0.0, sensor_position=(0.0, 0.0, 0.0), reference_position=(0.0, 0.0, 0.0), low_pass=20.0, wheel_radius=0.32,
+    steer_offset=0.0, steering="front", rear_steer_ratio=0.0, rear_steer_ratio_fast=0.0, rear_steer_speed=20.0,
+    sensor_position=(0.0, 0.0, 0.0), reference_position=(0.0, 0.0, 0.0), low_pass=20.0, wheel_radius=0.32,
     wheel_inertia=1.2, drag=0.4, rolling_resistance=0.012, front_drive=1.0, front_brake=0.65, brake_torque_per_pressure=1.6e-3,
     antenna_position=(-0.5, 0.0, 0.9), satellite_delay=0.15, inertial_delay=0.01, camera_delay=0.08,
     roll_gradient=0.006, roll_frequency=1.6, roll_damping=0.3, pitch_gradient=0.004,

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import numerics
+from jaxveh._core.errors import InputError
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
 from jaxveh.io import CarSpecification, with_road_steer
@@ -26,8 +27,14 @@ def open_loop(car: SingleTrack, recording: Recording) -> dict[str, np.ndarray]:
     """What a linear single track makes of `steer` (rad) and `v_x` (m/s) alone, from straight running at the first row.
 
     The car's own cornering stiffnesses at its static loads, without load transfer. **Returns** by name, (T,) each: `v_y`
-    (m/s), `yaw_rate` (rad/s), `sideslip` (rad). **Raises** `InputError` for missing channels.
+    (m/s), `yaw_rate` (rad/s), `sideslip` (rad). **Raises** `InputError` for missing channels, or a car that needs more than
+    `steer`.
     """
+    if car.steering.inputs != ("steer",):
+        raise InputError(
+            f"open_loop: car.steering = {type(car.steering).__name__}: needs {', '.join(car.steering.inputs)}; must be one by "
+            "steer alone."
+        )
     found = open_loop_of(car, recording.time, recording["steer"], recording["v_x"])
     return {name: np.asarray(values) for name, values in found.items()}
 

@@ -30,6 +30,7 @@ from jaxveh._core.result import Result, code
 from jaxveh.estimators.contract import Need, check_needs
 from jaxveh.estimators.live import AbstractCleaning, AsItIs
 from jaxveh.io import CarSpecification
+from jaxveh.io import kit as io
 from jaxveh.numerics import apart
 from jaxveh.statespace import AbstractFilter, Row, StateSpace, kit
 
@@ -152,8 +153,13 @@ class Filtered(AbstractMethod):
         return said._replace(result=jnp.where(well, said.result, info.result))
 
 
+TURNING = ("steer", "steering_wheel", "steering_torque", "yaw_rate", "a_y")
+"""Channels that say how a car turns."""
+
+
 def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: str) -> AbstractMethod:
-    """A method as it is, or the one of a name for a car's file. **Raises** `InputError` for a name that is not there."""
+    """A method as it is, or the one of a name for a car's file. **Raises** `InputError` for a name that is not there, and for a
+    car whose rear wheels are steered unless the method reads nothing of how the car turns."""
     if isinstance(source, AbstractMethod):
         return source
     check_one_of(f"{who}: method", name, methods)
@@ -161,7 +167,10 @@ def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: s
         raise InputError(
             f"{who}: source = {type(source).__name__}: must be an io.CarSpecification, which io.read_car reads, or a method."
         )
-    return methods[name].make(source)
+    method = methods[name].make(source.with_front_steering())
+    if any(need.channel in TURNING for need in method.needs):
+        io.check_front_steered(source, f"{who}: {name}")
+    return method
 
 
 def follow(who: str, method: AbstractMethod, recording: Recording) -> Answers:

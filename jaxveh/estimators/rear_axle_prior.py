@@ -7,6 +7,7 @@ from typing import Any
 from jaxveh._core.errors import InputError
 from jaxveh.estimators.rear_axle import USUAL_WHEELBASE, RearAxle
 from jaxveh.io import CarSpecification
+from jaxveh.io import kit as io
 from jaxveh.sensors import LowPass
 from jaxveh.vehicles import GRAVITY
 
@@ -54,6 +55,7 @@ def car_of(car: CarSpecification | RearAxle) -> RearAxle:
     """The rear axle of a car's file taken at its word; what it leaves out goes with the car's size."""
     if isinstance(car, RearAxle):
         return car
+    io.check_front_steered(car, "sideslip")
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     load = car.mass * GRAVITY * a / (a + b)
     size = (a + b) / USUAL_WHEELBASE

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jaxveh._core.errors import InputError, check
+from jaxveh._core.errors import InputError, check, check_one_of
 from jaxveh.io.files import write_text
 from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
 
@@ -30,6 +30,10 @@ track_front = 1.55                   # m
 track_rear = 1.56                    # m
 steering_ratio = 15.0                # steering wheel angle over road wheel angle
 steer_offset = 0.002                 # rad: what the steer channel shows (at the road wheels) when the car runs straight
+steering = "front"                   # or "ackermann", "rear", "four-wheel", "independent": which wheels turn
+rear_steer_ratio = 0.0               # rear over front angle of "four-wheel", at standstill where the next is given
+rear_steer_ratio_fast = 0.0          # rear over front angle at high speed
+rear_steer_speed = 20.0              # m/s: at this speed the ratio is halfway between both
 sensor_position = [0.1, 0.0, 0.3]    # m from the centre of gravity: forward, left, up
 reference_position = [0.0, 0.0, 0.0] # m from the centre of gravity: where a reference's v_y or sideslip is measured
 low_pass = 20.0                      # Hz, cutoff of the low-pass in the accelerometers and the gyroscope
@@ -70,6 +74,10 @@ E = 0.2
 """The file's schema as a commented example that reads, for programs to print."""
 
 
+STEERINGS = ("front", "ackermann", "rear", "four-wheel", "independent")
+"""What may steer: the front wheels (alike, or about one point); a rear axle with an angle of its own; rear wheels by a ratio
+of the front ones; each wheel by itself."""
+
 PLACES = ("sensor_position", "reference_position", "antenna_position")
 """Keys whose values are [x, y, z]."""
 
@@ -104,12 +112,14 @@ class CarSpecification:
     """What a car file says: plain floats in SI units, None where the file is silent. See `car.CAR_SCHEMA`.
 
     Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
-    `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `sensor_position`,
-    `reference_position`: x, y, z in metres from the centre of gravity of the accelerometer and of a reference for sideslip.
-    `antenna_position`: likewise of the satellites' antenna; `satellite_delay`, `inertial_delay`, `camera_delay` in seconds: how
-    late these speak, an inertial unit's low-pass left out. `low_pass`: cutoff in hertz, of second order. `roll_gradient`,
-    `pitch_gradient`: of the body over the road, for what an accelerometer in the road's axes shows. `front_tyre`, `rear_tyre`:
-    paths of the tyre property files of a wheel, which nobody opens before a car on four wheels is built.
+    `steer_offset`: what a steer channel at the road wheels shows when the car runs straight. `steering`: one of
+    `car.STEERINGS`, front wheels where None; the ratios are of rear over front angle (see `vehicles.FourWheelSteering`).
+    `sensor_position`, `reference_position`: x, y, z in metres from the centre of gravity of the accelerometer and of a
+    reference for sideslip. `antenna_position`: likewise of the satellites' antenna; `satellite_delay`, `inertial_delay`,
+    `camera_delay` in seconds: how late these speak, an inertial unit's low-pass left out. `low_pass`: cutoff in hertz, of
+    second order. `roll_gradient`, `pitch_gradient`: of the body over the road, for what an accelerometer in the road's axes
+    shows. `front_tyre`, `rear_tyre`: paths of the tyre property files of a wheel, which nobody opens before a car on four
+    wheels is built.
 
     **Raises** `InputError` with name, value and allowed range for what no car has, such as a negative mass.
     """
@@ -126,6 +136,10 @@ class CarSpecification:
     track_rear: float | None = _number(1e-3, 10.0, "m", default=None)
     steering_ratio: float | None = _number(0.1, 200.0, default=None)
     steer_offset: float | None = _number(-0.5, 0.5, "rad", default=None)
+    steering: str | None = None
+    rear_steer_ratio: float | None = _number(-5.0, 5.0, default=None)
+    rear_steer_ratio_fast: float | None = _number(-5.0, 5.0, default=None)
+    rear_steer_speed: float | None = _number(0.1, 1e3, "m/s", default=None)
     sensor_position: tuple[float, float, float] | None = _number(-30.0, 30.0, "m", default=None)
     reference_position: tuple[float, float, float] | None = _number(-30.0, 30.0, "m", default=None)
     low_pass: float | None = _number(1e-3, 1e6, "Hz", default=None)
@@ -157,6 +171,7 @@ class CarSpecification:
                 if len(place) != 3:
                     raise InputError(f"{name} = {list(place)}: must be [x, y, z].")
         _check_numbers(self)
+        _check_steering(self)
         for axle in ("front", "rear"):
             key, tyre = f"{axle}_cornering_stiffness", getattr(self, axle)
             if getattr(self, key) is None:
@@ -168,6 +183,17 @@ class CarSpecification:
     def wheelbase(self) -> float:
         """Distance of the axles in metres."""
         return self.front_axle_to_cg + self.rear_axle_to_cg
+
+    @property
+    def steers_front_alone(self) -> bool:
+        """Whether no rear wheel is steered."""
+        return self.steering in (None, "front", "ackermann")
+
+    def with_front_steering(self) -> CarSpecification:
+        """The same car, its rear wheels straight if they are steered."""
+        if self.steers_front_alone:
+            return self
+        return replace(self, steering=None, rear_steer_ratio=None, rear_steer_ratio_fast=None)
 
 
 def read_car(path: str | os.PathLike) -> CarSpecification:
@@ -230,7 +256,7 @@ def _value(key: str, value: Any, folder: Path) -> Any:
             return _build(AxleTyre, {name: toml_number(name, item) for name, item in value.items()})
         except InputError as error:
             raise InputError(f"[{key}]: {error}") from error
-    if key == "name":
+    if key in ("name", "steering"):
         return toml_text(key, value)
     if key in ("front_tyre", "rear_tyre"):
         return str(folder / toml_text(key, value))
@@ -251,6 +277,23 @@ def _build(kind: type, values: Mapping[str, Any]) -> Any:
 
 def _is_required(entry: Any) -> bool:
     return entry.default is MISSING
+
+
+def _check_steering(car: CarSpecification) -> None:
+    """Raise `InputError` for a steering that is not there, one without its ratio, and for a ratio that would be of no use."""
+    if car.steering is not None:
+        check_one_of("steering", car.steering, STEERINGS)
+    if car.steering == "four-wheel":
+        if car.rear_steer_ratio is None:
+            raise InputError(
+                'rear_steer_ratio is missing: a car of steering = "four-wheel" needs it (rear over front angle).'
+            )
+        return
+    for name in ("rear_steer_ratio", "rear_steer_ratio_fast"):
+        if getattr(car, name):
+            raise InputError(
+                f'{name} = {getattr(car, name)}: is of steering = "four-wheel" alone; say so, or leave it out.'
+            )
 
 
 def _check_numbers(values: Any) -> None:

@@ -1,12 +1,13 @@
 """What those who read and write further files build with."""
 
-from jaxveh.io.car import CAR_SCHEMA, car_lines, car_of_toml
+from jaxveh.io.car import CAR_SCHEMA, STEERINGS, car_lines, car_of_toml
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
 from jaxveh.io.mcap_log import MCAP_SUFFIX
 from jaxveh.io.naming import check_known
 from jaxveh.io.optional import require
 from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
 from jaxveh.io.rig_table import RIG_CHANNELS
+from jaxveh.io.steering import check_front_steered
 from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
 from jaxveh.io.units import is_unit, same_unit
 
@@ -16,9 +17,11 @@ __all__ = [
     "MCAP_SUFFIX",
     "PROPERTY_UNITS",
     "RIG_CHANNELS",
+    "STEERINGS",
     "Entry",
     "car_lines",
     "car_of_toml",
+    "check_front_steered",
     "check_keys",
     "check_known",
     "is_unit",

@@ -13,6 +13,7 @@ from jaxveh._core.errors import InputError, is_concrete
 from jaxveh._core.names import check_names, record_type
 from jaxveh._core.recording import Recording
 from jaxveh.manoeuvres.base import AbstractManoeuvre
+from jaxveh.vehicles import kit
 
 
 class Replay(AbstractManoeuvre):
@@ -36,13 +37,15 @@ class Replay(AbstractManoeuvre):
 
 
 def replay(recording: Recording, channels: tuple[str, ...] | None = None) -> Replay:
-    """Replay the inputs of a recording: `channels`, by default `steer`, `v_x` and, where there is one, `a_x`.
+    """Replay the inputs of a recording: `channels`, by default `steer`, `v_x` and, where there are any, `a_x`, `steer_rear` and
+    `steer_fl` ... of cars that steer other wheels, too.
 
     **Raises** `InputError` for a missing channel, fewer than two rows, or a channel that is not finite throughout
     (host side: fill its gaps first).
     """
     if channels is None:
-        channels = ("steer", "v_x", "a_x") if "a_x" in recording else ("steer", "v_x")
+        more = ("a_x", *(name for name in kit.STEER_UNITS if name != "steer"))
+        channels = ("steer", "v_x", *(name for name in more if name in recording))
     check_names("replay", channels, recording.names)
     if len(recording) < 2:
         raise InputError(f"replay: the recording has {len(recording)} row(s); at least 2 are needed.")

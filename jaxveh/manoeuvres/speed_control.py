@@ -10,11 +10,12 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.errors import InputError
+from jaxveh._core.names import record
 from jaxveh._core.parameter import positive
 from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs
 from jaxveh.manoeuvres.driver import AbstractDriver, Motion, as_driver, driver_state
 from jaxveh.numerics import smooth_clip, smooth_ramp, smooth_step
-from jaxveh.vehicles import GRAVITY
+from jaxveh.vehicles import GRAVITY, kit
 
 AIR_DENSITY = 1.2
 """kg/m^3, at 20 degrees Celsius near sea level."""
@@ -78,11 +79,16 @@ class SpeedControl(AbstractDriver):
     def start(self, t: Any, motion: Motion) -> Any:
         return driver_state(self.state_names)(*self.driver.start(t, motion), 0.0 * motion.v_x)
 
-    def inputs(self, t: Any, motion: Motion, state: Any) -> PedalInputs:
+    def inputs(self, t: Any, motion: Motion, state: Any) -> Any:
+        """`PedalInputs`; of a driver who says the angles of other wheels (`steer_rear`, `steer_fl` ...) these, too."""
         u, wanted, _ = self._pedal_inputs(t, motion, state)
         own = getattr(u, "drive_torque", 0.0) - getattr(u, "brake_torque", 0.0)
         torque, edge = self.mass * self.wheel_radius * wanted + own, self.mass * self.wheel_radius * _EDGE
-        return PedalInputs(u.steer, u.v_x, u.v_x_rate, smooth_ramp(torque, edge), smooth_ramp(-torque, edge))
+        pedals = smooth_ramp(torque, edge), smooth_ramp(-torque, edge)
+        angles = {name: getattr(u, name) for name in kit.STEER_UNITS if name != "steer" and hasattr(u, name)}
+        v_x_rate = u.v_x_rate if hasattr(u, "v_x_rate") else 0.0 * u.v_x
+        known = PedalInputs(u.steer, u.v_x, v_x_rate, *pedals)
+        return record("PedalInputs", known._asdict() | angles) if angles else known
 
     def derivatives(self, t: Any, motion: Motion, state: Any) -> Any:
         u, _, cut = self._pedal_inputs(t, motion, state)

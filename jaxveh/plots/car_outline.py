@@ -89,18 +89,18 @@ def rotate(points: Any, angle: float) -> np.ndarray:
     return np.asarray(points) @ np.array([[cosine, sine], [-sine, cosine]])
 
 
+ANGLES = {"fl": ("steer_left",), "fr": ("steer_right",)}
+"""What logs call a front wheel's own angle, too."""
+
+
 def wheel_angles(recording: Recording, footprint: Footprint) -> dict[str, np.ndarray]:
-    """How far each wheel is turned against the car, (T,), rad: front wheels by the steer (their own, where known)."""
-    straight = np.zeros(len(recording))
+    """How far each wheel is turned against the car, (T,), rad: by its own angle where that is known, else the front wheels by the
+    steer, and rear ones not at all."""
     found = {}
     for name in footprint.wheels:
-        own = {"fl": "steer_left", "fr": "steer_right"}.get(name, "steer")
-        front = name[0] == "f"
-        found[name] = (
-            drive_channels.channel(recording, own if drive_channels.has(recording, own) else "steer")
-            if front and drive_channels.has(recording, "steer")
-            else straight
-        )
+        asked = (f"steer_{name}", *ANGLES.get(name, ()), "steer" if name[0] == "f" else "steer_rear")
+        there = [channel for channel in asked if drive_channels.has(recording, channel)]
+        found[name] = drive_channels.channel(recording, there[0]) if there else np.zeros(len(recording))
     return found
 
 

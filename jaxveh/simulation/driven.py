@@ -62,10 +62,10 @@ class Driven(eqx.Module):
 
     def _inputs(self, t, x: DrivenState):
         vehicle, _ = self.car.split(x.car)
-        moves = self.car.vehicle.motion(vehicle, _Unknown()) if not self._told_speed else None
+        moves = self.car.vehicle.motion(vehicle, _unknown_inputs(self.car.vehicle)) if not self._told_speed else None
         if moves is None:
             # A car that is told its speed moves as its driver says; the driver says it without looking at the speed.
-            blind = self.car.vehicle.motion(vehicle, _Unknown())
+            blind = self.car.vehicle.motion(vehicle, _unknown_inputs(self.car.vehicle))
             given = self.driver.inputs(t, blind, x.driver)
             moves = blind._replace(v_x=given.v_x)
         return self._driver_inputs(t, moves, x.driver), moves
@@ -78,17 +78,16 @@ class Driven(eqx.Module):
         return adapt_inputs(self.car.vehicle, self.driver.inputs(t, moves, driver), moves)
 
 
-class _Unknown(NamedTuple):
-    """Inputs of which only a speed that nobody knows yet is asked."""
-
-    v_x: Any = 0.0
-    steer: Any = 0.0
+def _unknown_inputs(vehicle: AbstractVehicle) -> Any:
+    """Inputs that nobody knows yet, of which a motion asks no more than the speed and the wheels' angles."""
+    return record("Unknown", dict.fromkeys(("v_x", "steer", *vehicle.inputs), 0.0))
 
 
 def adapt_inputs(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
     """The driver's inputs with those that the car needs and that follow from them.
 
-    `steering_wheel` from `steer` by the car's steering ratio; a quarter of the torques for each of four motors. The
+    `steering_wheel` from `steer` by the car's steering ratio; a quarter of the torques for each of four motors; of wheels with
+    angles of their own, which a manoeuvre does not say, the front ones turn by `steer` and the rear ones stay straight. The
     acceleration `a_x` the car makes of `v_x_rate` by itself.
     """
     missing = [name for name in vehicle.inputs if name not in given._fields]
@@ -98,6 +97,8 @@ def adapt_inputs(vehicle: AbstractVehicle, given: Any, moves: Motion) -> Any:
             found[name] = given.steer * steering_ratio(vehicle)
         elif name in vehicles_kit.wheel_names("torque") and "drive_torque" in given._fields:
             found[name] = 0.25 * (given.drive_torque - given.brake_torque * vehicles_kit.travel_direction(moves.v_x))
+        elif name in vehicles_kit.STEER_UNITS and "steer" in given._fields:
+            found[name] = given.steer if name in ("steer_fl", "steer_fr") else 0.0 * given.steer
     return record("DriverInputs", {**given._asdict(), **found}) if found else given
 
 

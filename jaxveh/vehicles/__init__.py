@@ -47,6 +47,15 @@ from jaxveh.vehicles.single_track import SingleTrack, SingleTrackOutputs, Single
 from jaxveh.vehicles.single_track_3dof import SingleTrack3DOF
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
 from jaxveh.vehicles.steered import Steered
+from jaxveh.vehicles.steering import (
+    AbstractSteering,
+    Ackermann,
+    FourWheelSteering,
+    FrontSteering,
+    IndependentSteering,
+    RearSteering,
+    steering_without_sideslip,
+)
 from jaxveh.vehicles.travelling import Travelling
 from jaxveh.vehicles.two_track_2dof import TwoTrack2DOF
 from jaxveh.vehicles.two_track_3dof import TwoTrack3DOF
@@ -55,14 +64,19 @@ __all__ = [
     "GRAVITY",
     "AbstractDrive",
     "AbstractLoadTransfer",
+    "AbstractSteering",
     "AbstractVehicle",
     "AccelerationLimits",
+    "Ackermann",
     "AntiLock",
     "AxleDrive",
     "CarNumbers",
     "Commanded",
     "FourMotors",
+    "FourWheelSteering",
     "FourteenDOF",
+    "FrontSteering",
+    "IndependentSteering",
     "Kinematic",
     "KinematicCrawl",
     "KinematicOutputs",
@@ -81,6 +95,7 @@ __all__ = [
     "MeasuredLoads",
     "Motion",
     "QuasiStatic",
+    "RearSteering",
     "Roll3DOF",
     "Roll4DOF",
     "SevenDOF",
@@ -113,4 +128,5 @@ __all__ = [
     "slip_angle",
     "specification_of",
     "specified_car",
+    "steering_without_sideslip",
 ]

@@ -32,7 +32,7 @@ class AbstractToldSpeed(AbstractLoadedTwoTrack):
 
     @property
     def inputs(self):
-        return ("steer", "v_x", *self.load_transfer.inputs)
+        return (*self.steering.inputs, "v_x", *self.load_transfer.inputs)
 
     def steady_a_x(self, x, u, ground: Ground, g: tuple[Any, Any, Any]):
         del ground

@@ -9,8 +9,9 @@ import jax
 from jaxveh import numerics
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.vehicles.base import OVER_GROUND, AbstractVehicle, Motion, given_or_zero, over_ground, with_batch_shape
-from jaxveh.vehicles.wheels import gravity
+from jaxveh.vehicles.base import OVER_GROUND, Motion, given_or_zero, over_ground, with_batch_shape
+from jaxveh.vehicles.steering import STEER_UNITS, AbstractSteeredByRoadWheels, axle_angles
+from jaxveh.vehicles.wheels import gravity, is_straight
 
 
 class KinematicState(NamedTuple):
@@ -23,8 +24,8 @@ class KinematicOutputs(NamedTuple):
     """What can be said without forces, at the reference point: speeds m/s, angles rad, rates rad/s, accelerations m/s^2.
 
     `a_x` and `a_y` are those of an ideal accelerometer in a turn of constant speed and steer; `sideslip` is that of the steer,
-    forwards and backwards alike, at standstill too; `curvature` (1/m) is that of the rear axle's path; `speed` and `course` are
-    over ground.
+    forwards and backwards alike, at standstill too; `curvature` (1/m) is the yaw rate over `v_x`, that of the rear axle's path
+    where the rear axle is not steered; `speed` and `course` are over ground.
     """
 
     v_x: Any
@@ -42,14 +43,15 @@ class KinematicOutputs(NamedTuple):
 UNITS = {
     **dict.fromkeys(("v_x", "v_y"), "m/s"),
     **dict.fromkeys(("a_x", "a_y"), "m/s^2"),
-    **dict.fromkeys(("steer", "yaw", "sideslip"), "rad"),
+    **dict.fromkeys(("yaw", "sideslip"), "rad"),
     "yaw_rate": "rad/s",
     "curvature": "1/m",
     **OVER_GROUND,
+    **STEER_UNITS,
 }
 
 
-class AbstractKinematic(AbstractVehicle):
+class AbstractKinematic(AbstractSteeredByRoadWheels):
     """A car whose wheels do not slip, steered at a given speed.
 
     **Raises** `InputError` for parameters outside their domain.
@@ -62,25 +64,36 @@ class AbstractKinematic(AbstractVehicle):
 
     @property
     def inputs(self):
-        return ("steer", "v_x")
+        return (*self.steering.inputs, "v_x")
 
     def curvature(self, u: Any) -> Any:
-        """That of the rear axle's path, 1/m."""
-        return numerics.tan(u.steer) / self.wheelbase
+        """Yaw rate over `v_x`, 1/m: that of the rear axle's path where this axle is not steered."""
+        front, rear = self._tangents(u)
+        return (front if is_straight(rear) else front - rear) / self.wheelbase
+
+    def rear_aside(self, u: Any) -> Any:
+        """Lateral over forward speed at the rear axle (-); 0.0 where it is not steered."""
+        return self._tangents(u)[1]
+
+    def _tangents(self, u: Any) -> tuple[Any, Any]:
+        front, rear = axle_angles(self.steering.angles(self, u, u.v_x))
+        return numerics.tan(front), rear if is_straight(rear) else numerics.tan(rear)
 
 
 class Kinematic(AbstractKinematic):
     """A single track whose wheels do not slip: true at walking speed, and the usual car of path planning.
 
-    With delta the steer, L the wheelbase and d how far the reference point lies ahead of the rear axle (R. Rajamani, Vehicle
-    Dynamics and Control, 2nd ed., sec. 2.2, with v_x along the car instead of the speed along the path):
+    With delta_f and delta_r the angles of the axles, L the wheelbase and d how far the reference point lies ahead of the rear
+    axle (R. Rajamani, Vehicle Dynamics and Control, 2nd ed., sec. 2.2, with v_x along the car instead of the speed along the
+    path):
 
-        dyaw/dt = v_x tan(delta) / L,    v_y = d dyaw/dt,    sideslip = atan(d tan(delta) / L)
+        dyaw/dt = v_x (tan(delta_f) - tan(delta_r)) / L,    v_y = v_x tan(delta_r) + d dyaw/dt,    sideslip = atan(v_y / v_x)
 
     **Parameters**: `wheelbase` (m), `rear_axle_to_reference` d (m): the point that position and speeds belong to, 0 for the rear
     axle, the distance of the axle from the centre of gravity for the latter.
 
-    **Inputs**: `steer` (rad at the road wheels) and `v_x` (m/s), the same at every point of the car's middle.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels) and `v_x` (m/s), the same at every point of the car's
+    middle.
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -106,12 +119,14 @@ class Kinematic(AbstractKinematic):
 
     def motion(self, x, u):
         yaw_rate = u.v_x * self.curvature(u)
-        return Motion(0.0, 0.0, x.yaw, u.v_x, self.rear_axle_to_reference * yaw_rate, yaw_rate)
+        turning, aside = self.rear_axle_to_reference * yaw_rate, self.rear_aside(u)
+        return Motion(0.0, 0.0, x.yaw, u.v_x, turning if is_straight(aside) else turning + u.v_x * aside, yaw_rate)
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
         g_x, g_y, _ = gravity(ground)
-        moves, curvature = self.motion(x, u), self.curvature(u)
+        moves, curvature, aside = self.motion(x, u), self.curvature(u), self.rear_aside(u)
+        lean = self.rear_axle_to_reference * curvature
         outputs = KinematicOutputs(
             v_x=u.v_x,
             v_y=moves.v_y,
@@ -119,7 +134,7 @@ class Kinematic(AbstractKinematic):
             yaw_rate=moves.yaw_rate,
             a_x=-moves.v_y * moves.yaw_rate - g_x,
             a_y=u.v_x * moves.yaw_rate - g_y,
-            sideslip=numerics.arctan(self.rear_axle_to_reference * curvature),
+            sideslip=numerics.arctan(lean if is_straight(aside) else lean + aside),
             curvature=curvature,
             **over_ground(x.yaw, u.v_x, moves.v_y),
         )

@@ -29,7 +29,8 @@ class KinematicCrawl(AbstractVehicle):
 
     **Inputs**: those of the vehicle, `steer_rate` (rad/s) and `v_x_rate` (m/s^2).
 
-    **Raises** `InputError` for another vehicle than `LinearSingleTrack`, or a speed that is not positive.
+    **Raises** `InputError` for another vehicle than `LinearSingleTrack`, one whose rear wheels are steered, or a speed that is
+    not positive.
     """
 
     vehicle: LinearSingleTrack
@@ -38,6 +39,11 @@ class KinematicCrawl(AbstractVehicle):
     def __check_init__(self):
         if not isinstance(self.vehicle, LinearSingleTrack):
             raise InputError(f"KinematicCrawl.vehicle = {type(self.vehicle).__name__}: must be a LinearSingleTrack.")
+        if not self.vehicle.steering.front_alone:
+            raise InputError(
+                f"KinematicCrawl.vehicle.steering = {type(self.vehicle.steering).__name__}: must steer the front wheels alone. "
+                "Take the vehicle as it is, whose own crawl_speed serves any steering."
+            )
         check_positive("KinematicCrawl.below", self.below, "m/s")
 
     @property

@@ -15,7 +15,8 @@ from jaxveh._core.parameter import parameter, positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.base import OVER_GROUND, Motion, given_or_zero, over_ground, with_batch_shape
 from jaxveh.vehicles.kinematic import AbstractKinematic
-from jaxveh.vehicles.wheels import gravity
+from jaxveh.vehicles.steering import STEER_UNITS
+from jaxveh.vehicles.wheels import gravity, is_straight
 
 
 class KinematicTrailerState(NamedTuple):
@@ -48,26 +49,30 @@ class KinematicTrailerOutputs(NamedTuple):
 UNITS = {
     **dict.fromkeys(("v_x", "v_y", "trailer_v_x"), "m/s"),
     **dict.fromkeys(("a_x", "a_y"), "m/s^2"),
-    **dict.fromkeys(("steer", "yaw", "sideslip", "hitch_angle", "trailer_yaw"), "rad"),
+    **dict.fromkeys(("yaw", "sideslip", "hitch_angle", "trailer_yaw"), "rad"),
     **dict.fromkeys(("yaw_rate", "hitch_rate"), "rad/s"),
     **OVER_GROUND,
+    **STEER_UNITS,
 }
 
 
 class KinematicTrailer(AbstractKinematic):
     """A kinematic single track with a trailer of one axle; no wheel slips. Position and speeds are those of the rear axle.
 
-    With r the yaw rate, alpha the hitch angle, c the hitch's distance behind the rear axle and l the trailer's length from the
-    hitch to its axle (S. M. LaValle, Planning Algorithms, 2006, sec. 13.1.2, and CommonRoad's KST model for c = 0):
+    With delta the steer, r the yaw rate, alpha the hitch angle, c the hitch's distance behind the rear axle and l the trailer's
+    length from the hitch to its axle (S. M. LaValle, Planning Algorithms, 2006, sec. 13.1.2, and CommonRoad's KST model for c =
+    0):
 
         dyaw/dt   = v_x tan(delta) / L
         dalpha/dt = -(v_x sin(alpha) + c r cos(alpha)) / l - r
 
-    At `hitch_limit` (rad either way, a right angle by default) the trailer touches the car: the angle does not grow.
+    A rear axle that is steered by delta_r moves to the left with v_y = v_x tan(delta_r): the yaw rate is that of `Kinematic`,
+    and c r - v_y stands in the place of c r. At `hitch_limit` (rad either way, a right angle by default) the trailer touches
+    the car: the angle does not grow.
 
     **Parameters**: `wheelbase` L, `trailer_length` l, `hitch_behind_axle` c (m; 0: the hitch sits on the rear axle).
 
-    **Inputs**: `steer` (rad at the road wheels) and `v_x` (m/s).
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels) and `v_x` (m/s).
 
     **Raises** `InputError` for parameters outside their domain.
     """
@@ -98,7 +103,9 @@ class KinematicTrailer(AbstractKinematic):
 
     def motion(self, x, u):
         yaw_rate = u.v_x * self.curvature(u)
-        return Motion(0.0, 0.0, x.yaw, u.v_x, jnp.zeros_like(yaw_rate), yaw_rate)
+        aside = self.rear_aside(u)
+        v_y = jnp.zeros_like(yaw_rate) if is_straight(aside) else u.v_x * aside
+        return Motion(0.0, 0.0, x.yaw, u.v_x, v_y, yaw_rate)
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
@@ -106,8 +113,11 @@ class KinematicTrailer(AbstractKinematic):
         moves = self.motion(x, u)
         yaw_rate = moves.yaw_rate
         sine, cosine = numerics.sin(x.hitch_angle), numerics.cos(x.hitch_angle)
-        # The hitch moves with (v_x, -c r) in the car's directions; across the trailer that is l times the trailer's yaw rate.
+        # The hitch moves with (v_x, v_y - c r) in the car's directions; across the trailer that is l times the trailer's yaw
+        # rate.
+        aside = self.rear_aside(u)
         swing = self.hitch_behind_axle * yaw_rate
+        swing = swing if is_straight(aside) else swing - moves.v_y
         turning = -(u.v_x * sine + swing * cosine) / self.trailer_length - yaw_rate
         outwards = turning * jnp.sign(x.hitch_angle) > 0
         hitch_rate = jnp.where((jnp.abs(x.hitch_angle) >= self.hitch_limit) & outwards, 0.0, turning)
@@ -116,9 +126,9 @@ class KinematicTrailer(AbstractKinematic):
             v_y=moves.v_y,
             yaw=x.yaw,
             yaw_rate=yaw_rate,
-            a_x=-g_x,
+            a_x=-g_x if is_straight(aside) else -moves.v_y * yaw_rate - g_x,
             a_y=u.v_x * yaw_rate - g_y,
-            sideslip=0.0,
+            sideslip=aside if is_straight(aside) else numerics.arctan(aside),
             hitch_angle=x.hitch_angle,
             hitch_rate=hitch_rate,
             trailer_yaw=x.yaw + x.hitch_angle,

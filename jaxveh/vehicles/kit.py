@@ -13,6 +13,7 @@ from jaxveh.vehicles.shared import (
     AbstractPlaneBody,
     AbstractTwoAxle,
 )
+from jaxveh.vehicles.steering import STEER_UNITS, STEERINGS, AbstractSteeredByRoadWheels, axle_angles
 from jaxveh.vehicles.traction import AbstractSpinless
 from jaxveh.vehicles.two_track import AbstractLoadedTwoTrack, AbstractTwoTrack, air_drag, rolling_wheels
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
@@ -21,6 +22,8 @@ from jaxveh.vehicles.wheels import Wheels, body_forces, corners, each_wheel, tra
 __all__ = [
     "CARS",
     "FIDELITIES",
+    "STEERINGS",
+    "STEER_UNITS",
     "AbstractDriven",
     "AbstractLoadedTwoTrack",
     "AbstractOnAxleTyres",
@@ -30,12 +33,14 @@ __all__ = [
     "AbstractRollingTwoTrack",
     "AbstractShiftingLoads",
     "AbstractSpinless",
+    "AbstractSteeredByRoadWheels",
     "AbstractToldSpeed",
     "AbstractTwoAxle",
     "AbstractTwoTrack",
     "AbstractUprightTwoTrack",
     "Wheels",
     "air_drag",
+    "axle_angles",
     "body_forces",
     "corners",
     "each_wheel",

@@ -17,7 +17,8 @@ from jaxveh.vehicles.lateral_system import LateralSystem
 from jaxveh.vehicles.shared import AbstractOneTrack
 from jaxveh.vehicles.single_track import UNITS, SingleTrackOutputs
 from jaxveh.vehicles.slip import regularised_speed
-from jaxveh.vehicles.wheels import gravity
+from jaxveh.vehicles.steering import axle_angles
+from jaxveh.vehicles.wheels import gravity, is_straight
 
 
 class LinearSingleTrackState(NamedTuple):
@@ -37,16 +38,19 @@ class LinearSingleTrack(AbstractOneTrack):
         m v (dbeta/dt + r) = F_f + F_r,      J_z dr/dt = a F_f - b F_r
         F_f = C_f (delta - beta - a r / v),  F_r = C_r (-beta + b r / v)
 
-    For small angles the speed along the car is that along the path: `v_x` is taken as the latter, so that the velocity has the
-    components `v cos(beta)` and `v sin(beta)`. Backwards (v < 0) the slip angles reverse sign, as the tyres' forces do. Below
-    `crawl_speed` (m/s, 3 by default) |v| in the denominators is `regularised_speed`, so that standstill is an ordinary point.
-    A road's bank pushes by `m g_y`; its friction does not count, as always in a linear law.
+    A rear axle that is steered by delta_r has the force `C_r (delta_r - beta + b r / v)`; gains and responses are those to
+    `steer`, with the rear angle that `steering` makes of it. For small angles the speed along the car is that along the path:
+    `v_x` is taken as the latter, so that the velocity has the components `v cos(beta)` and `v sin(beta)`. Backwards (v < 0) the
+    slip angles reverse sign, as the tyres' forces do. Below `crawl_speed` (m/s, 3 by default) |v| in the denominators is
+    `regularised_speed`, so that standstill is an ordinary point. A road's bank pushes by `m g_y`; its friction does not count,
+    as always in a linear law.
 
     **Parameters**: `front_stiffness`, `rear_stiffness` (N/rad, of the axle at rest on a level road), `cg_height` (m; None:
     stiffnesses stay). With a height the stiffnesses are proportional to the axles' loads, which move by `m a_x h / (a + b)` to
     the rear, as in CommonRoad's ST model.
 
-    **Inputs**: `steer` (rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, `v_x_rate = dv_x/dt` (m/s^2).
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, `v_x_rate = dv_x/dt`
+    (m/s^2).
 
     **Raises** `InputError` for parameters that are not positive.
     """
@@ -58,7 +62,8 @@ class LinearSingleTrack(AbstractOneTrack):
 
     @property
     def inputs(self):
-        return ("steer", "v_x") if self.cg_height is None else ("steer", "v_x", "v_x_rate")
+        told = (*self.steering.inputs, "v_x")
+        return told if self.cg_height is None else (*told, "v_x_rate")
 
     @property
     def state_type(self):
@@ -81,8 +86,10 @@ class LinearSingleTrack(AbstractOneTrack):
         speed = regularised_speed(u.v_x, self.crawl_speed)
         way = u.v_x / speed
         front, rear = self.load_shares(u, ground)
-        slip_front = way * (u.steer - x.sideslip) - a * x.yaw_rate / speed
-        slip_rear = -way * x.sideslip + b * x.yaw_rate / speed
+        steer, steer_rear = axle_angles(self.steering.angles(self, u, u.v_x))
+        slip_front = way * (steer - x.sideslip) - a * x.yaw_rate / speed
+        aside = -way * x.sideslip if is_straight(steer_rear) else way * (steer_rear - x.sideslip)
+        slip_rear = aside + b * x.yaw_rate / speed
         F_yf = front * self.front_stiffness * slip_front
         F_yr = rear * self.rear_stiffness * slip_rear
         g_x, g_y, _ = gravity(ground)
@@ -123,19 +130,21 @@ class LinearSingleTrack(AbstractOneTrack):
 
     def system(self, speed: Any) -> LateralSystem:
         """The matrices at a constant forward `speed` (m/s, any shape, above the crawl speed to agree with `evaluate`), on a level
-        road. **Raises** `InputError` for a speed that is not positive."""
+        road. **Raises** `InputError` for a speed that is not positive, or a `steering` without the input `steer`."""
         check_positive("LinearSingleTrack.system: speed", speed, "m/s")
         v = speed
         m, J, a, b = self.mass, self.yaw_inertia, self.front_axle_to_cg, self.rear_axle_to_cg
         C_f, C_r = self.front_stiffness, self.rear_stiffness
         leverage = a * C_f - b * C_r
+        _, behind = self.steering.axle_gains(v)
+        push, moment = (C_f, a * C_f) if is_straight(behind) else (C_f + C_r * behind, a * C_f - b * C_r * behind)
         return LateralSystem(
             a_11=-(C_f + C_r) / (m * v),
             a_12=-leverage / (m * v * v) - 1.0,
             a_21=-leverage / J + 0.0 * v,
             a_22=-(a * a * C_f + b * b * C_r) / (J * v),
-            b_1=C_f / (m * v),
-            b_2=a * C_f / J + 0.0 * v,
+            b_1=push / (m * v),
+            b_2=moment / J + 0.0 * v,
             speed=v,
         )
 
@@ -162,18 +171,25 @@ class LinearSingleTrack(AbstractOneTrack):
         return _speed(self.wheelbase, -self.understeer_gradient)
 
     def yaw_rate_gain(self, speed: Any) -> Any:
-        """Steady yaw rate over steer, v / (L + K v^2), 1/s."""
-        return speed / self._steadiness(speed)
+        """Steady yaw rate over steer, (1 - k) v / (L + K v^2), 1/s, with the ratio k of rear to front angle."""
+        return self._turning(speed) * speed / self._steadiness(speed)
 
     def lateral_acceleration_gain(self, speed: Any) -> Any:
-        """Steady lateral acceleration over steer, v^2 / (L + K v^2), m/s^2 a rad."""
-        return speed * speed / self._steadiness(speed)
+        """Steady lateral acceleration over steer, (1 - k) v^2 / (L + K v^2), m/s^2 a rad."""
+        return self._turning(speed) * speed * speed / self._steadiness(speed)
 
     def sideslip_gain(self, speed: Any) -> Any:
-        """Steady sideslip over steer, (b - a m v^2 / (L C_r)) / (L + K v^2) (-): positive at low speed, where the rear runs on a
-        smaller circle, negative at high speed (Mitschke & Wallentowitz, the same chapter)."""
+        """Steady sideslip over steer, k + (1 - k) (b - a m v^2 / (L C_r)) / (L + K v^2) (-): with a rear axle that is not steered
+        positive at low speed, where the rear runs on a smaller circle, negative at high speed (Mitschke & Wallentowitz, the
+        same chapter)."""
         pushed = self.front_axle_to_cg * self.mass * speed * speed / (self.wheelbase * self.rear_stiffness)
-        return (self.rear_axle_to_cg - pushed) / self._steadiness(speed)
+        trailing = (self.rear_axle_to_cg - pushed) / self._steadiness(speed)
+        _, behind = self.steering.axle_gains(speed)
+        return trailing if is_straight(behind) else behind + (1.0 - behind) * trailing
+
+    def _turning(self, speed):
+        """The part of the steer that turns the car (-): what the axles do not turn alike."""
+        return 1.0 - self.steering.axle_gains(speed)[1]
 
     def _steadiness(self, speed):
         return self.wheelbase + self.understeer_gradient * speed * speed

@@ -11,6 +11,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.linear_handling import LinearSingleTrack
+from jaxveh.vehicles.steering import FrontSteering
 
 SPEED = 20.0
 """m/s: what tyres that ask for a speed are told."""
@@ -19,9 +20,10 @@ SPEED = 20.0
 def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack:
     """The linear single track with the mass, inertia and geometry of `car` and the slopes of its tyres at rest.
 
-    `car` is a single track, whose tyres are the axles', or a car with tracks, whose tyres are the wheels': an axle's stiffness is
-    then twice that of a wheel that carries half its load. The slope is that of the lateral force over slip angle at zero slip (of
-    the settled force, for a tyre with states). `cg_height` (m) makes stiffness proportional to load; see `LinearSingleTrack`.
+    `car` is a single track, whose tyres are the axles', or a car with tracks, whose tyres are the wheels': an axle's stiffness
+    is then twice that of a wheel that carries half its load. Its `steering` is the car's. The slope is that of the lateral
+    force over slip angle at zero slip (of the settled force, for a tyre with states). `cg_height` (m) makes stiffness
+    proportional to load; see `LinearSingleTrack`.
 
     **Raises** `InputError` for a car without mass, yaw inertia, axle distances or tyres.
     """
@@ -40,6 +42,7 @@ def linear_single_track(car: Any, *, cg_height: Any = None) -> LinearSingleTrack
         front_stiffness=wheels * settled_stiffness(car.front, weight * b / wheels),
         rear_stiffness=wheels * settled_stiffness(car.rear, weight * a / wheels),
         cg_height=cg_height,
+        steering=getattr(car, "steering", FrontSteering()),
     )
 
 

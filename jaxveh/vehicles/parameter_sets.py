@@ -10,6 +10,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.tyres import AbstractTyre, Contact, Linear, MagicFormula, cornering_stiffness, kit
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.single_track import SingleTrack
+from jaxveh.vehicles.steering import steering_of
 
 
 def passenger_car() -> SingleTrack:
@@ -78,6 +79,7 @@ def from_specification(spec) -> SingleTrack:
     - `cg_height` (m) or None: with one, axle loads follow the longitudinal acceleration, which becomes an input.
     - `steer_offset` (rad) or None: what the steer channel shows when the car runs straight, so that the car's own
       `steer_offset`, which is added to the channel, is the negative of it.
+    - `steering`, `rear_steer_ratio`, `rear_steer_ratio_fast`, `rear_steer_speed` or None: what turns which wheels.
 
     **Raises** `InputError` where an axle has neither, and as `SingleTrack` and `MagicFormula` do.
     """
@@ -92,6 +94,7 @@ def from_specification(spec) -> SingleTrack:
         rear=_axle(spec, "rear", static["rear"]),
         cg_height=spec.cg_height,
         steer_offset=0.0 if spec.steer_offset is None else -spec.steer_offset,
+        steering=steering_of(spec),
     )
 
 

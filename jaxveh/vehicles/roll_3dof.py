@@ -7,6 +7,7 @@ from typing import ClassVar
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.given_speed import AbstractToldSpeed, longitudinal_acceleration
 from jaxveh.vehicles.rolling_body import AbstractRollingTwoTrack, roll_accelerations, roll_outputs
+from jaxveh.vehicles.steering import steer_outputs
 from jaxveh.vehicles.two_track import body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import body_forces, gravity
 
@@ -29,8 +30,8 @@ class Roll3DOF(AbstractToldSpeed, AbstractRollingTwoTrack):
     are `rolling_body.swing` ahead of those of the axis, `a_x` and `a_y` what an accelerometer there says. Wheels neither steer
     nor tilt with roll. Wheel loads are those of `rolling_body.roll_loads`.
 
-    **Inputs**: `steer` (rad at the road wheels), `v_x` (m/s), those of `load_transfer`, and if there is one the longitudinal
-    acceleration, `a_x` (of an ideal accelerometer) or `v_x_rate`; without, the speed counts as constant.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s), those of `load_transfer`, and if there is
+    one the longitudinal acceleration, `a_x` (of an ideal accelerometer) or `v_x_rate`; without, the speed counts as constant.
 
     **Raises** `InputError` for parameters outside their domain (a body that its springs cannot hold upright is), or a tyre that
     is none.
@@ -50,6 +51,7 @@ class Roll3DOF(AbstractToldSpeed, AbstractRollingTwoTrack):
             found.a_y + g_y - self.wheel_speed(x, u) * x.yaw_rate, x.yaw_rate, found.yaw, x.roll_rate, found.roll,
             *self.load_transfer.rates(x, a_x, a_y), *road.tyre_rates,
         )  # fmt: skip
-        shown = body_outputs(centre, a_x, a_y, found.yaw, u.steer, push)
+        steers = steer_outputs(self.steering, road.steers)
+        shown = body_outputs(centre, a_x, a_y, found.yaw, steers, push)
         shown |= roll_outputs(x, found.roll) | wheel_outputs(road.contacts, road.forces)
         return self.rates_and_outputs(rates, shown)

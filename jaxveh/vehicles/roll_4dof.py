@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.rolling_body import AbstractRollingTwoTrack, roll_accelerations, roll_outputs
+from jaxveh.vehicles.steering import steer_outputs
 from jaxveh.vehicles.traction import AbstractSpinless, drive_over_road, drive_power
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import gravity
@@ -27,7 +28,7 @@ class Roll4DOF(AbstractSpinless, AbstractRollingTwoTrack):
     `a_x` and `a_y` what an accelerometer there says. Wheels neither steer nor tilt with roll.
     Wheel loads are those of `rolling_body.roll_loads`, wheel forces those of the torques as in `TwoTrack3DOF`.
 
-    **Inputs**: `steer` (rad at the road wheels) and those of `drive` and `load_transfer`.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `drive` and `load_transfer`.
 
     **Raises** `InputError` for parameters outside their domain (a body that its springs cannot hold upright is), or a tyre that
     is none.
@@ -47,7 +48,8 @@ class Roll4DOF(AbstractSpinless, AbstractRollingTwoTrack):
             x.roll_rate, found.roll,
             *self.load_transfer.rates(x, push.F_x / self.mass, a_y), *road.tyre_rates,
         )  # fmt: skip
-        shown = body_outputs(self.motion(x, u), a_x, a_y, found.yaw, u.steer, push)
+        steers = steer_outputs(self.steering, road.steers)
+        shown = body_outputs(self.motion(x, u), a_x, a_y, found.yaw, steers, push)
         shown |= roll_outputs(x, found.roll) | wheel_outputs(road.contacts, forces)
         shown["drive_power"] = drive_power(self, drive, road.moves)
         return self.rates_and_outputs(rates, shown)

@@ -10,6 +10,7 @@ import jax
 from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.drive import AbstractDriven
+from jaxveh.vehicles.steering import steer_outputs
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
 from jaxveh.vehicles.wheels import (
@@ -37,14 +38,14 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
         I_z dr/dt           = sum (x_i Y_i - y_i X_i + M_z,i)
         J_w domega_i/dt     = T_i - r_e (F_x,i + f_r F_z,i) - brakes
 
-    Both front wheels turn by the steer. Loads follow `load_transfer`. Slips are those of `wheels.contact`; brakes and
+    Loads follow `load_transfer`. Slips are those of `wheels.contact`; brakes and
     rolling resistance reverse smoothly about 0.5 m/s, so that standstill is an ordinary point. The spins are stiff: their poles
     are about `-C_x r_e^2 / (J_w |v|)`, 200 1/s at 20 m/s and thousands at walking speed, which `simulate` looks at when it
     chooses its solver.
 
     **Parameters**: `wheel_inertia` (kg m^2, of one wheel).
 
-    **Inputs**: `steer` (rad at the road wheels) and those of `drive` and `load_transfer`.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `drive` and `load_transfer`.
 
     **Raises** `InputError` for parameters outside their domain, or a tyre that is none.
     """
@@ -55,7 +56,7 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
 
     @property
     def inputs(self):
-        return ("steer", *self.drive.inputs, *self.load_transfer.inputs)
+        return (*self.steering.inputs, *self.drive.inputs, *self.load_transfer.inputs)
 
     def at_rest(self, v_x):
         """Wheels that roll freely."""
@@ -78,7 +79,8 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
             a_x + g_x + x.v_y * x.yaw_rate, a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration, *spins,
             *self.load_transfer.rates(x, push.F_x * inverse_mass, a_y), *road.tyre_rates,
         )  # fmt: skip
-        shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, u.steer, push)
+        steers = steer_outputs(self.steering, road.steers)
+        shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, steers, push)
         shown |= wheel_outputs(road.contacts, road.forces, omegas)
         shown["drive_power"] = sum_of_wheels(each_wheel(lambda torque, omega: torque * omega, drive, omegas))
         return self.rates_and_outputs(rates, shown)

@@ -17,6 +17,7 @@ from jaxveh.roads import LEVEL, Ground
 from jaxveh.tyres import AbstractTyre
 from jaxveh.vehicles.axles import AxleTyres
 from jaxveh.vehicles.base import AbstractVehicle, with_batch_shape
+from jaxveh.vehicles.steering import AbstractSteeredByRoadWheels
 
 
 class AbstractPlaneBody(AbstractVehicle):
@@ -30,7 +31,7 @@ class AbstractPlaneBody(AbstractVehicle):
     yaw_inertia: jax.Array = positive("kg m^2")
 
 
-class AbstractTwoAxle(AbstractVehicle):
+class AbstractTwoAxle(AbstractSteeredByRoadWheels):
     """A car on two axles.
 
     **Parameters** of the axles: `front_axle_to_cg`, `rear_axle_to_cg` (m, from the centre of gravity); slips are regularised
@@ -111,7 +112,8 @@ class AbstractOnTyres(AbstractTwoAxle):
         check_names("start", values, self.state_type._fields)
         dtype = jnp.result_type(self.front_axle_to_cg)
         given = {name: jnp.asarray(value, dtype) for name, value in values.items()}
-        zero = jnp.zeros(jnp.broadcast_shapes(jnp.shape(u.steer), jnp.shape(getattr(u, "v_x", 0.0))), dtype)
+        told = [jnp.shape(getattr(u, name)) for name in self.steering.inputs]
+        zero = jnp.zeros(jnp.broadcast_shapes(*told, jnp.shape(getattr(u, "v_x", 0.0))), dtype)
         rest = self.at_rest(given.get("v_x", zero))
         x = record("Own", {name: given.get(name, zero + rest.get(name, 0.0)) for name in self.own_states})
         settled = self.tyres.start(self.contacts(x, u)) if self.tyres.state_names else ()

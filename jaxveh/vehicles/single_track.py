@@ -13,12 +13,13 @@ from jaxveh._core.errors import InputError, check
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import check_parameters, parameter, positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.tyres import Contact
+from jaxveh.tyres import Contact, Forces
 from jaxveh.vehicles.base import GRAVITY, OVER_GROUND, Motion, over_ground, with_batch_shape
 from jaxveh.vehicles.given_speed import longitudinal_acceleration
 from jaxveh.vehicles.shared import AbstractOnAxleTyres
 from jaxveh.vehicles.slip import regularised_speed, slip_angle
-from jaxveh.vehicles.wheels import gravity, travel_direction
+from jaxveh.vehicles.steering import STEER_UNITS, axle_angles
+from jaxveh.vehicles.wheels import gravity, is_straight, travel_direction
 
 
 class SingleTrackState(NamedTuple):
@@ -57,31 +58,32 @@ class SingleTrackOutputs(NamedTuple):
 UNITS = {
     **dict.fromkeys(("v_x", "v_y"), "m/s"),
     **dict.fromkeys(("a_x", "a_y", "v_x_rate"), "m/s^2"),
-    **dict.fromkeys(("steer", "yaw", "sideslip", "slip_angle_front", "slip_angle_rear"), "rad"),
+    **dict.fromkeys(("yaw", "sideslip", "slip_angle_front", "slip_angle_rear"), "rad"),
     "yaw_rate": "rad/s",
     "yaw_acceleration": "rad/s^2",
     **dict.fromkeys(("F_yf", "F_yr", "load_front", "load_rear"), "N"),
     **OVER_GROUND,
+    **STEER_UNITS,
 }
 
 
 class SingleTrack(AbstractOnAxleTyres):
     """A vehicle on one track: two axles, a given forward speed, no roll.
 
-    In the body's axes, with delta the steer at the road wheels, a and b the distances of the axles from the centre of
+    In the body's axes, with delta the angle of the front road wheels, a and b the distances of the axles from the centre of
     gravity, F the axles' lateral forces (paper of Bao, Sabbioni et al. 2015, in the body frame with v_x given):
 
         m (dv_y/dt + v_x r) = F_f cos(delta) + F_r
         J_z dr/dt           = a F_f cos(delta) - b F_r
         alpha_f = delta - atan2(v_y + a r, v_x),   alpha_r = -atan2(v_y - b r, v_x)
 
-    Longitudinal forces and moments enter where a tyre law gives them. Slip angles are those of `slip_angle`, regularised so that
-    standstill is an ordinary point.
+    Rear wheels that are steered enter in the same way. Longitudinal forces and moments enter where a tyre law gives them. Slip
+    angles are those of `slip_angle`, regularised so that standstill is an ordinary point.
 
-    **Parameters**: `cg_height` (m; None: axle loads stay static), `steer_offset` (rad: the road wheels stand at
+    **Parameters**: `cg_height` (m; None: axle loads stay static), `steer_offset` (rad: the front road wheels stand at
     `u.steer + steer_offset`).
 
-    **Inputs** u: `steer` (rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, the longitudinal
+    **Inputs** u: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s) and, with a `cg_height`, the longitudinal
     acceleration: either `a_x`, what an ideal accelerometer at the centre of gravity says, or `v_x_rate = dv_x/dt`,
     from which `a_x = v_x_rate - v_y r`. Load moves by `m a_x h / (a + b)` from the front to the rear axle.
 
@@ -103,7 +105,8 @@ class SingleTrack(AbstractOnAxleTyres):
 
     @property
     def inputs(self):
-        return ("steer", "v_x") if self.cg_height is None else ("steer", "v_x", "a_x")
+        told = (*self.steering.inputs, "v_x")
+        return told if self.cg_height is None else (*told, "a_x")
 
     @property
     def state_type(self):
@@ -125,13 +128,12 @@ class SingleTrack(AbstractOnAxleTyres):
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        cosine, sine = self._steer_direction(u)
-        contacts = self._contacts(x, u, cosine, sine, ground)
+        front_turn, rear_turn = self._directions(u)
+        contacts = self._contacts(x, u, front_turn, rear_turn, ground)
         tyres = self.tyres
         states = tyres.states(x)
         front, rear = tyres.forces(contacts, states)
-        F_f = front.F_y * cosine + front.F_x * sine
-        F_r = rear.F_y
+        F_f, F_r = _across(front, front_turn), _across(rear, rear_turn)
         moment = self.front_axle_to_cg * F_f - self.rear_axle_to_cg * F_r + (front.M_z + rear.M_z)
         a_y = (F_f + F_r) / self.mass
         yaw_acceleration = moment / self.yaw_inertia
@@ -174,31 +176,37 @@ class SingleTrack(AbstractOnAxleTyres):
 
     def contacts(self, x, u, ground: Ground = LEVEL) -> tuple[Contact, Contact]:
         """How the front and the rear axle touch the road: slip angles, loads, speeds."""
-        return self._contacts(x, u, *self._steer_direction(u), ground)
+        return self._contacts(x, u, *self._directions(u), ground)
 
-    def _steer_direction(self, u):
-        steer = u.steer + self.steer_offset
-        return numerics.cos(steer), numerics.sin(steer)
+    def _directions(self, u) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+        """(cosine, sine) of each axle's angle; of a rear axle that is not steered (1.0, 0.0)."""
+        front, rear = axle_angles(self.steering.angles(self, u, u.v_x))
+        front = front + self.steer_offset
+        turned = (1.0, 0.0) if is_straight(rear) else (numerics.cos(rear), numerics.sin(rear))
+        return (numerics.cos(front), numerics.sin(front)), turned
 
-    def _contacts(self, x, u, cosine, sine, ground: Ground) -> tuple[Contact, Contact]:
+    def _contacts(self, x, u, front_turn, rear_turn, ground: Ground) -> tuple[Contact, Contact]:
         front_load, rear_load = self.loads(x, u, ground)
-        across = x.v_y + self.front_axle_to_cg * x.yaw_rate
-        along_wheel = u.v_x * cosine + across * sine
-        across_wheel = across * cosine - u.v_x * sine
-        front = Contact(
-            slip_angle=slip_angle(along_wheel, across_wheel, self.crawl_speed),
-            load=front_load,
-            friction=0.5 * (ground.friction_fl + ground.friction_fr),
-            speed=jnp.abs(along_wheel),
-            slip_speed=regularised_speed(along_wheel, self.crawl_speed),
-            direction=travel_direction(along_wheel),
-        )
-        rear = Contact(
-            slip_angle=slip_angle(u.v_x, x.v_y - self.rear_axle_to_cg * x.yaw_rate, self.crawl_speed),
-            load=rear_load,
-            friction=0.5 * (ground.friction_rl + ground.friction_rr),
-            speed=jnp.abs(u.v_x),
-            slip_speed=regularised_speed(u.v_x, self.crawl_speed),
-            direction=travel_direction(u.v_x),
-        )
+        friction = 0.5 * (ground.friction_fl + ground.friction_fr)
+        front = self._contact(u.v_x, x.v_y + self.front_axle_to_cg * x.yaw_rate, front_turn, front_load, friction)
+        friction = 0.5 * (ground.friction_rl + ground.friction_rr)
+        rear = self._contact(u.v_x, x.v_y - self.rear_axle_to_cg * x.yaw_rate, rear_turn, rear_load, friction)
         return front, rear
+
+    def _contact(self, v_x, v_y, turn: tuple[Any, Any], load, friction) -> Contact:
+        cosine, sine = turn
+        along, across = (v_x, v_y) if is_straight(sine) else (v_x * cosine + v_y * sine, v_y * cosine - v_x * sine)
+        return Contact(
+            slip_angle=slip_angle(along, across, self.crawl_speed),
+            load=load,
+            friction=friction,
+            speed=jnp.abs(along),
+            slip_speed=regularised_speed(along, self.crawl_speed),
+            direction=travel_direction(along),
+        )
+
+
+def _across(forces: Forces, turn: tuple[Any, Any]) -> Any:
+    """Lateral force of an axle in the car's axes, N."""
+    cosine, sine = turn
+    return forces.F_y if is_straight(sine) else forces.F_y * cosine + forces.F_x * sine

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -10,13 +11,14 @@ import jax
 from jaxveh import numerics
 from jaxveh._core.parameter import positive
 from jaxveh.roads import LEVEL, Ground
-from jaxveh.tyres import Contact
+from jaxveh.tyres import Contact, Forces
 from jaxveh.vehicles import two_track
 from jaxveh.vehicles.base import Motion, over_ground
 from jaxveh.vehicles.load_transfer import AbstractLoadTransfer, QuasiStatic, axle_loads
 from jaxveh.vehicles.shared import AbstractOnAxleTyres
+from jaxveh.vehicles.steering import axle_angles
 from jaxveh.vehicles.traction import AbstractSpinless, driven_forces
-from jaxveh.vehicles.wheels import contact, gravity, rolling
+from jaxveh.vehicles.wheels import WheelMotion, contact, gravity, is_straight, rolling
 
 STATES = ("v_x", "v_y", "yaw", "yaw_rate")
 
@@ -44,7 +46,8 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
 
     **Parameters**: `cg_height` (m). Torques of an axle's wheels are added.
 
-    **Inputs**: `steer` (rad at the road wheels) and those of `drive` and `load_transfer`.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `drive` and `load_transfer`. **Outputs** have `steer_rear`
+    where the rear axle is steered.
 
     **Raises** `InputError` for parameters outside their domain, or a tyre that is none.
     """
@@ -66,12 +69,12 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
         return Motion(0.0, 0.0, x.yaw, x.v_x, x.v_y, x.yaw_rate)
 
     def contacts(self, x, u, ground: Ground = LEVEL) -> tuple[Contact, Contact]:
-        return self._contacts_and_motions(x, u, ground)[0]
+        return self._stand(x, u, ground)[1]
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
         tyres, (drive, brake) = self.tyres, self.drive.torques(u)
-        contacts, moves = self._contacts_and_motions(x, u, ground)
+        steers, contacts, moves = self._stand(x, u, ground)
         states = tyres.states(x)
         pushing, slowing = (drive.fl + drive.fr, drive.rl + drive.rr), (brake.fl + brake.fr, brake.rl + brake.rr)
         front, rear = (
@@ -80,12 +83,12 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
                 tyres.forces(contacts, states), contacts, moves, pushing, slowing, strict=True
             )
         )
-        X = front.F_x * moves[0].cosine - front.F_y * moves[0].sine + rear.F_x
-        Y_f = front.F_x * moves[0].sine + front.F_y * moves[0].cosine
-        M_z = self.front_axle_to_cg * Y_f - self.rear_axle_to_cg * rear.F_y + (front.M_z + rear.M_z)
+        (X_f, Y_f), (X_r, Y_r) = (turn_forces(*axle) for axle in zip((front, rear), moves, strict=True))
+        X = X_f + X_r
+        M_z = self.front_axle_to_cg * Y_f - self.rear_axle_to_cg * Y_r + (front.M_z + rear.M_z)
         g_x, g_y, _ = gravity(ground)
         a_x = (X - two_track.air_drag(self.drag, x.v_x)) / self.mass
-        a_y = (Y_f + rear.F_y) / self.mass
+        a_y = (Y_f + Y_r) / self.mass
         yaw_acceleration = M_z / self.yaw_inertia
         rates = (
             a_x + g_x + x.v_y * x.yaw_rate, a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration,
@@ -101,7 +104,8 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
             "a_y": a_y,
             "sideslip": numerics.arctan2(x.v_y, x.v_x),
             **over_ground(x.yaw, x.v_x, x.v_y),
-            "steer": u.steer,
+            "steer": steers[0],
+            **({} if is_straight(steers[1]) else {"steer_rear": steers[1]}),
             "slip_angle_front": contacts[0].slip_angle,
             "slip_angle_rear": contacts[1].slip_angle,
             "load_front": contacts[0].load,
@@ -115,16 +119,24 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
         }
         return self.rates_and_outputs(rates, shown)
 
-    def _contacts_and_motions(self, x, u, ground: Ground):
-        """Contacts and motions of the axles."""
+    def _stand(self, x, u, ground: Ground):
+        """Angles, contacts and motions of the axles."""
         g = _, g_y, g_z = gravity(ground)
         steady = self.steady_a_x(x, u, ground, g), x.v_x * x.yaw_rate - g_y
         loads = axle_loads(self, self.load_transfer.felt_accelerations(x, u, steady)[0], g_z)
         friction = 0.5 * (ground.friction_fl + ground.friction_fr), 0.5 * (ground.friction_rl + ground.friction_rr)
-        turned = (numerics.cos(u.steer), numerics.sin(u.steer)), (1.0, 0.0)
+        steers = axle_angles(self.steering.angles(self, u, x.v_x))
+        turned = [(1.0, 0.0) if is_straight(one) else (numerics.cos(one), numerics.sin(one)) for one in steers]
         places = self.wheel_positions[::2]
         moves = [rolling(p, x.v_x, x.v_y, x.yaw_rate, *turn) for p, turn in zip(places, turned, strict=True)]
         front, rear = (
             contact(move, load, mu, self.crawl_speed) for move, load, mu in zip(moves, loads, friction, strict=True)
         )
-        return (front, rear), moves
+        return steers, (front, rear), moves
+
+
+def turn_forces(forces: Forces, move: WheelMotion) -> tuple[Any, Any]:
+    """Forces of an axle along and across the car, N."""
+    if is_straight(move.sine):
+        return forces.F_x, forces.F_y
+    return forces.F_x * move.cosine - forces.F_y * move.sine, forces.F_x * move.sine + forces.F_y * move.cosine

@@ -103,7 +103,8 @@ class Steered(AbstractVehicle):
         inner_x, inner_u = self._inner(x, u)
         rates, outputs = self.vehicle.evaluate(t, inner_x, inner_u, ground)
         moment = _aligning_moment(outputs, self.trail)
-        shown = outputs._asdict() | {"steering_wheel": u.steering_wheel, "steer": inner_u.steer}
+        shown = outputs._asdict() | {"steering_wheel": u.steering_wheel}
+        shown.setdefault("steer", inner_u.steer)
         own = ()
         if self.own_states:
             if moment is None:

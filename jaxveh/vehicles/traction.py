@@ -68,7 +68,7 @@ class AbstractSpinless(AbstractDriven, AbstractShiftingLoads):
 
     @property
     def inputs(self):
-        return ("steer", *self.drive.inputs, *self.load_transfer.inputs)
+        return (*self.steering.inputs, *self.drive.inputs, *self.load_transfer.inputs)
 
     def steady_a_x(self, x: Any, u: Any, ground: Ground, g: tuple[Any, Any, Any]) -> Any:
         """a_x, m/s^2, that the torques make, as far as grip allows: what loads can follow without knowing a force."""

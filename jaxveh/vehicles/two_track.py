@@ -16,6 +16,7 @@ from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.base import OVER_GROUND, Motion, over_ground
 from jaxveh.vehicles.load_transfer import AbstractShiftingLoads
 from jaxveh.vehicles.shared import AbstractOnTyres
+from jaxveh.vehicles.steering import STEER_UNITS
 from jaxveh.vehicles.wheels import (
     BodyForces,
     Tyres,
@@ -25,6 +26,7 @@ from jaxveh.vehicles.wheels import (
     each_wheel,
     frictions,
     gravity,
+    is_straight,
     rolling,
     wheel_names,
 )
@@ -32,7 +34,7 @@ from jaxveh.vehicles.wheels import (
 UNITS = {
     **dict.fromkeys(("v_x", "v_y"), "m/s"),
     **dict.fromkeys(("a_x", "a_y", "a_x_felt", "a_y_felt", "v_x_rate"), "m/s^2"),
-    **dict.fromkeys(("steer", "yaw", "roll", "sideslip", *wheel_names("slip_angle")), "rad"),
+    **dict.fromkeys(("yaw", "roll", "sideslip", *wheel_names("slip_angle")), "rad"),
     **dict.fromkeys(("yaw_rate", "roll_rate", *wheel_names("omega")), "rad/s"),
     **dict.fromkeys(("yaw_acceleration", "roll_acceleration"), "rad/s^2"),
     **dict.fromkeys(wheel_names("slip_ratio"), "-"),
@@ -40,6 +42,7 @@ UNITS = {
     **dict.fromkeys(("M_z", "drive_torque", "brake_torque", *wheel_names("torque"), *wheel_names("M_z")), "N m"),
     "drive_power": "W",
     **OVER_GROUND,
+    **STEER_UNITS,
 }
 """Units of what two-track cars have as states, inputs and outputs."""
 
@@ -76,9 +79,10 @@ class AbstractTwoTrack(AbstractOnTyres):
 
 
 class OnRoad(NamedTuple):
-    """How a car's wheels touch the road and move over it, what the road does to them in their axes, and the rates of dynamic
-    tyres' states."""
+    """How a car's wheels are turned (rad), touch the road and move over it, what the road does to them in their axes, and the
+    rates of dynamic tyres' states."""
 
+    steers: Wheels
     contacts: Wheels
     moves: Wheels
     forces: Wheels
@@ -120,30 +124,35 @@ class AbstractLoadedTwoTrack(AbstractTwoTrack, AbstractShiftingLoads):
         return Wheels(None, None, None, None)
 
     def contacts(self, x, u, ground: Ground = LEVEL) -> Wheels:
-        return self._contacts_and_motions(x, u, ground)[0]
+        return self._stand(x, u, ground)[1]
 
     def on_road(self, x: Any, u: Any, ground: Ground) -> OnRoad:
         """What the road does to the wheels."""
-        contacts, moves = self._contacts_and_motions(x, u, ground)
+        steers, contacts, moves = self._stand(x, u, ground)
         tyres = self.tyres
         states = tyres.states(x)
-        return OnRoad(contacts, moves, tyres.forces(contacts, states), tyres.rates(contacts, states))
+        return OnRoad(steers, contacts, moves, tyres.forces(contacts, states), tyres.rates(contacts, states))
 
-    def _contacts_and_motions(self, x, u, ground: Ground) -> tuple[Wheels, Wheels]:
-        """Contacts and motions of the wheels."""
-        moves = rolling_wheels(self.places, self.wheel_speed(x, u), x.v_y, x.yaw_rate, u.steer)
+    def _stand(self, x, u, ground: Ground) -> tuple[Wheels, Wheels, Wheels]:
+        """Angles, contacts and motions of the wheels."""
+        steers = self.steering.angles(self, u, self.told_or_own_speed(x, u))
+        moves = rolling_wheels(self.places, self.wheel_speed(x, u), x.v_y, x.yaw_rate, steers)
         g = _, g_y, g_z = gravity(ground)
         steady = self.steady_a_x(x, u, ground, g), self.told_or_own_speed(x, u) * x.yaw_rate - g_y
         loads = self.loads(x, *self.load_transfer.felt_accelerations(x, u, steady), g_z)
         touching = lambda move, load, mu, speed: contact(move, load, mu, self.crawl_speed, speed)
-        return each_wheel(touching, moves, loads, frictions(ground), self.rim_speeds(x)), moves
+        return steers, each_wheel(touching, moves, loads, frictions(ground), self.rim_speeds(x)), moves
 
 
-def rolling_wheels(places: Wheels, v_x: Any, v_y: Any, yaw_rate: Any, steer: Any) -> Wheels:
-    """How wheels at `places` ((x, y), m) move over the road; both front wheels turn by the steer (rad)."""
-    turn = _cosine_and_sine(steer)
-    turned = Wheels(turn, turn, (1.0, 0.0), (1.0, 0.0))
-    return each_wheel(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), places, turned)
+def rolling_wheels(places: Wheels, v_x: Any, v_y: Any, yaw_rate: Any, steers: Wheels) -> Wheels:
+    """How wheels at `places` ((x, y), m) that are turned by `steers` (rad) move over the road."""
+    return each_wheel(lambda at, one: rolling(at, v_x, v_y, yaw_rate, *one), places, directions(steers))
+
+
+def directions(steers: Wheels) -> Wheels:
+    """(cosine, sine) of each wheel's angle, once for wheels that share it; (1.0, 0.0) of one that is never steered."""
+    found = {id(angle): (1.0, 0.0) if is_straight(angle) else _cosine_and_sine(angle) for angle in steers}
+    return each_wheel(lambda angle: found[id(angle)], steers)
 
 
 @numerics.fence_results
@@ -166,9 +175,9 @@ def wheel_outputs(contacts: Wheels, forces: Wheels, omegas: Wheels | None = None
     return shown if omegas is None else shown | dict(zip(wheel_names("omega"), omegas, strict=True))
 
 
-def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steer: Any, push: BodyForces) -> dict:
-    """What the body says: speeds, accelerations (of an ideal accelerometer), sideslip, speed and course over ground, and the
-    wheels' forces on it."""
+def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steers: dict, push: BodyForces) -> dict:
+    """What the body says: speeds, accelerations (of an ideal accelerometer), sideslip, speed and course over ground, how the
+    wheels are turned (`steers`: `steer_outputs`), and their forces on it."""
     return {
         "v_x": moves.v_x,
         "v_y": moves.v_y,
@@ -179,7 +188,7 @@ def body_outputs(moves: Motion, a_x: Any, a_y: Any, yaw_acceleration: Any, steer
         "a_y": a_y,
         "sideslip": numerics.arctan2(moves.v_y, moves.v_x),
         **over_ground(moves.yaw, moves.v_x, moves.v_y),
-        "steer": steer,
+        **steers,
         "F_x": push.F_x,
         "F_y": push.F_y,
         "M_z": push.M_z,

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from jaxveh.roads import LEVEL, Ground
 from jaxveh.vehicles.given_speed import AbstractToldSpeed, longitudinal_acceleration
+from jaxveh.vehicles.steering import steer_outputs
 from jaxveh.vehicles.two_track import body_outputs, wheel_outputs
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
 from jaxveh.vehicles.wheels import body_forces, gravity
@@ -20,10 +21,10 @@ class TwoTrack2DOF(AbstractToldSpeed, AbstractUprightTwoTrack):
         m (dv_y/dt + v_x r) = sum Y_i + m g_y
         I_z dr/dt           = sum (x_i Y_i - y_i X_i + M_z,i)
 
-    Both front wheels turn by the steer. Loads follow `load_transfer`.
+    Loads follow `load_transfer`.
 
-    **Inputs**: `steer` (rad at the road wheels), `v_x` (m/s), those of `load_transfer`, and if there is one the longitudinal
-    acceleration, `a_x` (of an ideal accelerometer) or `v_x_rate`; without, the speed counts as constant.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `v_x` (m/s), those of `load_transfer`, and if there is
+    one the longitudinal acceleration, `a_x` (of an ideal accelerometer) or `v_x_rate`; without, the speed counts as constant.
 
     **Raises** `InputError` for parameters outside their domain, or a tyre that is none.
     """
@@ -41,5 +42,6 @@ class TwoTrack2DOF(AbstractToldSpeed, AbstractUprightTwoTrack):
             a_y + g_y - u.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration,
             *self.load_transfer.rates(x, a_x, a_y), *road.tyre_rates,
         )  # fmt: skip
-        shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, u.steer, push)
+        steers = steer_outputs(self.steering, road.steers)
+        shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, steers, push)
         return self.rates_and_outputs(rates, shown | wheel_outputs(road.contacts, road.forces))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from jaxveh.roads import LEVEL, Ground
+from jaxveh.vehicles.steering import steer_outputs
 from jaxveh.vehicles.traction import AbstractSpinless, drive_over_road, drive_power
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.upright_body import AbstractUprightTwoTrack
@@ -26,7 +27,7 @@ class TwoTrack3DOF(AbstractSpinless, AbstractUprightTwoTrack):
     spins the wheels up is left out (4 J / r^2 beside the mass: about 3 %). Loads follow `load_transfer`; brakes and
     rolling resistance change sign smoothly about 0.5 m/s.
 
-    **Inputs**: `steer` (rad at the road wheels) and those of `drive` and `load_transfer`.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels), `drive` and `load_transfer`.
 
     **Raises** `InputError` for parameters outside their domain, or a tyre that is none.
     """
@@ -44,7 +45,8 @@ class TwoTrack3DOF(AbstractSpinless, AbstractUprightTwoTrack):
             a_x + g_x + x.v_y * x.yaw_rate, a_y + g_y - x.v_x * x.yaw_rate, x.yaw_rate, yaw_acceleration,
             *self.load_transfer.rates(x, push.F_x / self.mass, a_y), *road.tyre_rates,
         )  # fmt: skip
-        shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, u.steer, push)
+        steers = steer_outputs(self.steering, road.steers)
+        shown = body_outputs(self.motion(x, u), a_x, a_y, yaw_acceleration, steers, push)
         shown |= wheel_outputs(road.contacts, forces)
         shown["drive_power"] = drive_power(self, drive, road.moves)
         return self.rates_and_outputs(rates, shown)

@@ -92,11 +92,16 @@ class WheelMotion(NamedTuple):
     sine: Any
 
 
+def is_straight(angle: Any) -> bool:
+    """Whether an angle, or its sine, is the Python number 0.0: that of a wheel which is never steered."""
+    return isinstance(angle, float) and angle == 0.0
+
+
 def rolling(position: tuple[Any, Any], v_x: Any, v_y: Any, yaw_rate: Any, cosine: Any, sine: Any) -> WheelMotion:
     """The contact point's motion of a wheel at `position` (m) that is turned by an angle of this cosine and sine."""
     x, y = position
     u, v = v_x - yaw_rate * y, v_y + yaw_rate * x
-    if isinstance(sine, float) and sine == 0.0:
+    if is_straight(sine):
         return WheelMotion(u, v, 1.0, 0.0)
     return WheelMotion(u * cosine + v * sine, v * cosine - u * sine, cosine, sine)
 

@@ -6,7 +6,7 @@ import math
 import jax
 import numpy as np
 import pytest
-from programs import error_line, run, write_car
+from programs import CAR, error_line, run, write_car
 
 from jaxveh import InputError, Recording, io, roads, simulation, vehicles
 from jaxveh.cli.drive_report import numbers_of, print_numbers, steer_at_03g
@@ -74,6 +74,21 @@ def test_what_the_manoeuvre_wants_of_the_car_comes_from_the_car():
     assert course_of(path).lanes[0].left == pytest.approx((1.1 * 2 + 0.25) / 2)
     slalom = parse_manoeuvre("slalom-course", None, None, None, ("count=4", "spacing=20"), car)
     assert slalom.options["count"] == 4 and [lane.start for lane in course_of(slalom).lanes] == [60, 80, 100, 120]
+
+
+def test_a_car_s_file_says_which_wheels_are_steered(tmp_path):
+    """With a rear angle of a fifth of the front's it turns by four fifths as much; each wheel has its angle."""
+    turned = {}
+    for name, more in (("front", ""), ("four-wheel", 'steering = "four-wheel"\nrear_steer_ratio = 0.2\n')):
+        car = write_car(tmp_path, more + CAR)
+        assert simulate(*LINEAR, "--vehicle", car, "-o", tmp_path / f"{name}.csv").exit_code == 0
+        turned[name] = io.read_recording(tmp_path / f"{name}.csv")["true.yaw_rate"][-1]
+    np.testing.assert_allclose(turned["four-wheel"], 0.8 * turned["front"], rtol=0.01)
+    car = write_car(tmp_path, 'steering = "rear"\n' + CAR)
+    assert simulate(*QUICK, "--vehicle", car, "-o", tmp_path / "rear.csv").exit_code == 0
+    drive = io.read_recording(tmp_path / "rear.csv")
+    assert np.ptp(drive["steer"]) > 0.01 and not np.any(drive["steer_rear"])
+    assert drive.unit("steer_rear") == "rad"
 
 
 def straight_drive():

@@ -4,6 +4,7 @@ Models are traced only: what a filter does with them is that of `transition`, `o
 which an error would come up.
 """
 
+import dataclasses
 import inspect
 
 import diffrax
@@ -28,11 +29,23 @@ def named(fidelity):
     raise AssertionError(fidelity)
 
 
+def steered(fidelity, name):
+    """A car of a steering by name."""
+    ratio = {"rear_ratio": 0.2} if name == "four-wheel" else {}
+    return dataclasses.replace(named(fidelity), steering=vehicles.kit.STEERINGS[name](**ratio))
+
+
 CARS = {fidelity: (lambda fidelity=fidelity: named(fidelity)) for fidelity in vehicles.sets.FIDELITIES} | {
     "anti-lock": lambda: vehicles.AntiLock(named("seven-dof")),
     "commanded": lambda: vehicles.Commanded(vehicles.passenger_car()),
     "crawling": lambda: vehicles.KinematicCrawl(named("linear")),
     "steered": lambda: vehicles.Steered(named("two-track-3dof"), 16.0, 2e-5, trail=0.02),
+    **{
+        f"{fidelity}, {name}": lambda fidelity=fidelity, name=name: steered(fidelity, name)
+        for fidelity in ("kinematic", "single-track", "two-track-3dof")
+        for name in vehicles.kit.STEERINGS
+        if name != "front"
+    },
     "travelling": lambda: vehicles.Travelling(named("seven-dof")),
     "relaxed": lambda: eqx.tree_at(
         lambda c: c.front, vehicles.passenger_car(), tyres.Relaxed(tyres.Linear(8e4), None, 0.4)
@@ -139,6 +152,25 @@ def test_a_car_of_seven_degrees_of_freedom_is_followed():
     np.testing.assert_allclose(found.mean.yaw_rate, truth.yaw_rate, atol=2e-3)
     np.testing.assert_allclose(found.mean.v_x, truth.v_x, atol=0.02)
     np.testing.assert_allclose(found.mean.sideslip, np.arctan2(truth.v_y, truth.v_x), atol=2e-3)
+
+
+def test_a_filter_hears_the_angle_of_the_rear_wheels():
+    """A crab: told both angles it knows that the car goes aside; told the front one alone it believes in a turn."""
+    car = dataclasses.replace(vehicles.passenger_car(), steering=vehicles.RearSteering())
+    rows, dt, angle = 40, 0.05, 0.02
+    time, some = dt * np.arange(rows), np.full(rows, angle)
+    told = {"steer": some, "steer_rear": some, "v_x": np.full(rows, 15.0)}
+    seen = {"yaw_rate": np.zeros(rows)}
+    drive, found = Recording(time, {**told, **seen}), {}
+    for name, own in (("both", car), ("front", vehicles.passenger_car())):
+        model = estimators.state_space(own, sensors.esc(yaw_rate=0.005, a_y=None), process_noise={"yaw_rate": 1e-4})
+        assert model.inputs == (*own.steering.inputs, "v_x")
+        found[name] = filters.run(filters.Extended(), model, drive).mean
+    np.testing.assert_allclose(found["both"].sideslip[-1], angle, rtol=1e-2)
+    assert abs(float(found["front"].sideslip[-1]) - angle) > 0.01
+    model = estimators.state_space(car, sensors.esc(yaw_rate=0.005, a_y=None))
+    with pytest.raises(InputError, match="steer_rear"):
+        filters.run(filters.Extended(), model, drive.without("steer_rear"))
 
 
 def test_a_sensor_that_is_worse_in_slip():

@@ -116,7 +116,7 @@ def test_small_steer_says_nothing_of_friction(driven):
 def test_numbers_of_a_known_course():
     rows, right = 301, study.truth(SMALL)
     zeros = np.zeros(rows)
-    drive = drives.Drive(*(zeros,) * 10)._replace(true_v_x=zeros + 5.0)
+    drive = drives.Drive(*(zeros,) * 11)._replace(true_v_x=zeros + 5.0)
     off = np.log(right) + np.log([1.0, 1.02, 1.0, 1.0])
     vector = np.tile(np.concatenate([[5.0, 5.0 * np.tan(0.01), 0.0], off]), (rows, 1))
     covariance = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4, 1e-4]), (rows, 1, 1))
@@ -124,6 +124,8 @@ def test_numbers_of_a_known_course():
     seen = jax.jit(lambda *given: contestants.metrics(SMALL, *given))(found, drive, right)
     np.testing.assert_allclose(seen["mass_error"], 0.02, rtol=1e-9)
     np.testing.assert_allclose(seen["sideslip_rmse"], np.rad2deg(0.01), rtol=1e-6)
+    off = contestants.metrics(SMALL, found, drive._replace(true_v_x=zeros + 4.9, true_v_y=zeros + 0.02), right)
+    np.testing.assert_allclose([off["v_x_rmse"], off["v_y_rmse"]], [0.1, 5.0 * np.tan(0.01) - 0.02], rtol=1e-6)
     np.testing.assert_allclose(seen["nees"], (np.log(1.02) / 0.01) ** 2 / 4, rtol=1e-6)
     every = (np.log(1.02) / 0.01) ** 2 + (5.0 * np.tan(0.01)) ** 2
     np.testing.assert_allclose(seen["nees_all"], every / 7, rtol=1e-6)
@@ -158,7 +160,7 @@ def test_what_another_tyre_does_stands_beside_the_truths_own():
     known = dataclasses.make_dataclass("Known", ("bounds", "spread"))(
         Parameters({"friction": np.inf}), Parameters({"friction": 0.8})
     )
-    checks = report.check(report.Reproduction(2, raced, (3.0,), (0.0,), None, {"known": [[known]]}))
+    checks = report.check(report.Reproduction(2, raced, (3.0,), (0.0,), None, {"known": [[known]]}, None))
     found = {check.name: check for check in checks}
     own, other = (found[criteria.final(case, "friction")] for case in ("nearer start", criteria.OTHER))
     assert (own.value, own.status, own.original) == (pytest.approx(0.1), "met", "")

@@ -35,7 +35,7 @@ def test_plain_car(toml):
     assert car.wheelbase == pytest.approx(2.7)
     assert (car.front_cornering_stiffness, car.rear_cornering_stiffness) == (9e4, 1.1e5)
     optional = [entry.name for entry in dataclasses.fields(car)][6:]
-    assert len(optional) == 28
+    assert len(optional) == 32
     assert all(getattr(car, name) is None for name in optional)
 
 
@@ -110,6 +110,24 @@ BROKEN = {
     ),
     "name": ("name = 3" + PLAIN, r"name = 3: must be a string"),
     "tyre path": ("front_tyre = 3" + PLAIN, r"front_tyre = 3: must be a string"),
+    "steering": (
+        "steering = 'back'" + PLAIN,
+        r"steering = 'back': must be one of 'front', 'ackermann', 'rear', 'four-wheel'",
+    ),
+    "steering number": ("steering = 3" + PLAIN, r"steering = 3: must be a string"),
+    "no ratio": (
+        "steering = 'four-wheel'" + PLAIN,
+        r"rear_steer_ratio is missing: a car of steering = \"four-wheel\" needs it",
+    ),
+    "ratio alone": ("rear_steer_ratio = 0.2" + PLAIN, r"rear_steer_ratio = 0.2: is of steering = \"four-wheel\" alone"),
+    "ratio of others": (
+        "steering = 'rear'\nrear_steer_ratio_fast = 0.2" + PLAIN,
+        r"rear_steer_ratio_fast = 0.2: is of steering = \"four-wheel\" alone",
+    ),
+    "ratio": (
+        "steering = 'four-wheel'\nrear_steer_ratio = 20" + PLAIN,
+        r"rear_steer_ratio = 20.0: must be between -5 and 5",
+    ),
     "share": ("front_drive = 60" + PLAIN, r"front_drive = 60.0: must be between 0 and 1"),
 }
 
@@ -120,6 +138,24 @@ def test_broken_cars(toml, case):
     with pytest.raises(InputError, match=message) as caught:
         io.read_car(toml(text))
     assert "car.toml" in str(caught.value)
+
+
+def test_who_steers_is_said_by_the_file(toml, tmp_path):
+    car = io.read_car(toml(PLAIN + 'steering = "four-wheel"\nrear_steer_ratio = -0.2\nrear_steer_ratio_fast = 0.1\n'))
+    assert (car.steering, car.rear_steer_ratio, car.rear_steer_ratio_fast, car.rear_steer_speed) == (
+        "four-wheel",
+        -0.2,
+        0.1,
+        None,
+    )
+    assert not car.steers_front_alone
+    io.write_car(car, tmp_path / "again.toml")
+    assert io.read_car(tmp_path / "again.toml") == car
+    alone = [
+        dataclasses.replace(io.read_car(toml(PLAIN)), steering=kind).steers_front_alone
+        for kind in (None, "ackermann", "rear")
+    ]
+    assert alone == [True, True, False]
 
 
 def test_a_car_made_in_python_is_checked_too():

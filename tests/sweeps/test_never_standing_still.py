@@ -119,8 +119,8 @@ ESTIMATORS = """
     noise = np.random.default_rng(0).normal(size=(1, 4, T, 4))
     still = 0.05 * noise[..., 0]
     drives = Drive(
-        still, still, 1e-3 * noise[..., 1], rolling + 0.02 * noise, 0.01 * noise[..., 2], 0.0 * noise,
-        study.speed + still, still, still, 0.01 * still,
+        still, still, 1e-3 * noise[..., 1], rolling + 0.02 * noise, 0.01 * noise, 0.0 * noise,
+        study.speed + still, still, still, 0.01 * still, 0.2 + 0.0 * noise,
     )
     found = race(study, drives, ("printed start",), only=("first guess",)).found
     print(found["sideslip_rmse"].shape)

@@ -164,10 +164,10 @@ STEPS = {
 """By how much states and inputs are stirred, by unit."""
 
 ODD = (
-    "y", "v_y", "yaw", "course", "yaw_rate", "yaw_acceleration", "a_y", "a_y_felt", "sideslip", "steer", "steering_wheel", "F_y",
-    "M_z", "M_x", "roll", "roll_rate", "roll_acceleration", "bank", "slip_angle", "steering_torque", "steer_rate", "F_yf", "F_yr",
-    "slip_angle_front", "slip_angle_rear", "curvature", "hitch_angle", "hitch_rate", "trailer_yaw", "M_zf", "M_zr",
-    "front_deflection_y", "rear_deflection_y", "camber",
+    "y", "v_y", "yaw", "course", "yaw_rate", "yaw_acceleration", "a_y", "a_y_felt", "sideslip", "steer", "steer_rear",
+    "steering_wheel", "F_y", "M_z", "M_x", "roll", "roll_rate", "roll_acceleration", "bank", "slip_angle", "steering_torque",
+    "steer_rate", "F_yf", "F_yr", "slip_angle_front", "slip_angle_rear", "curvature", "hitch_angle", "hitch_rate",
+    "trailer_yaw", "M_zf", "M_zr", "front_deflection_y", "rear_deflection_y", "camber",
 )  # fmt: skip
 """What changes sign in the mirror; what a wheel has for itself also changes sides. Tyre states of a wheel (`fl_<name>`) are
 kept in the frame of the wheel that is mirrored, so they only change sides."""

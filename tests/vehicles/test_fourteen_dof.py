@@ -11,7 +11,7 @@ from jaxveh import InputError, tyres
 from jaxveh.roads import Ground
 from jaxveh.vehicles import GRAVITY, FourMotors, Travelling
 from jaxveh.vehicles.fourteen_dof.tyre_contact import axles
-from jaxveh.vehicles.wheels import wheel_names
+from jaxveh.vehicles.wheels import Wheels, wheel_names
 
 OTHER_SIDE = {"fl": "fr", "fr": "fl", "rl": "rr", "rr": "rl"}
 SMALL = 1e-9
@@ -172,10 +172,11 @@ def test_rolling_resistance_slows_in_both_directions():
 
 def test_ackermann_turns_all_wheels_about_one_point():
     car = make(ackermann=1.0)
-    found = axles(car, jnp.asarray(0.25))
+    both = Wheels(jnp.asarray(0.25), jnp.asarray(0.25), 0.0, 0.0)
+    found = axles(car, both)
     left, right = (np.arctan2(-e.x, e.y) for e in (found.fl, found.fr))
     np.testing.assert_allclose(1 / np.tan(right) - 1 / np.tan(left), 1.54 / (1.11 + 1.57), rtol=1e-12)
-    parallel = axles(make(toe_front=0.01, camber_front=0.03), jnp.asarray(0.25))
+    parallel = axles(make(toe_front=0.01, camber_front=0.03), both)
     np.testing.assert_allclose([np.arctan2(-e.x, e.y) for e in (parallel.fl, parallel.fr)], [0.24, 0.26], rtol=1e-12)
     np.testing.assert_allclose([parallel.fl.z, parallel.fr.z], [-np.sin(0.03), np.sin(0.03)], rtol=1e-12)
     assert float(parallel.rl.x) == 0

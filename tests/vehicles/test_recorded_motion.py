@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 from planar_cars import MAKERS, point
 from recorded_numbers import check_declared, check_recorded, classes_of, declared_names
+from test_every_steering import STEERINGS
+from test_every_steering import made as steered
+from test_every_steering import stirred as steered_point
 from test_every_vehicle import CARS, ROUGH, made, seven, shifted_mf, start, stirred
 
 from jaxveh import InputError, vehicles
@@ -62,6 +65,16 @@ def test_long_laws_with_other_numbers_behind_move_as_recorded():
         found[what] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
     assert abs(found["even"]["rates"]["yaw_rate"] - found["weaker behind"]["rates"]["yaw_rate"]) > 0.01
     check_recorded(__file__, "SevenDOF on MF-Tyres", found)
+
+
+@pytest.mark.parametrize("steering", STEERINGS)
+def test_motion_of_steered_cars_is_that_recorded(steering):
+    found = {}
+    for kind in ("Kinematic", "LinearSingleTrack", "SingleTrack", "TwoTrack3DOF", "FourteenDOF"):
+        x, u = steered_point(kind, steering)
+        rates, outputs = steered(kind, steering).evaluate(0.0, x, u, ROUGH)
+        found[kind] = {"rates": rates._asdict(), "outputs": outputs._asdict()}
+    check_recorded(__file__, f"steering: {steering}", found)
 
 
 def uneven(car):

@@ -172,13 +172,15 @@ def _three(filter_: Any):
 def metrics(study: Study, found: Found, drive: Drive, truth: Any) -> dict[str, Any]:
     """Errors of a run: `<parameter>_error` (shares, at the end), `sideslip_rmse` (degrees, from `settled` on) and
     `sideslip_rmse_fault` (during the fault), `nees` of the parameters at the end and `nees_all` of states and parameters
-    (mean from `settled` on), over their dimensions; the estimates, ten a second.
+    (mean from `settled` on), over their dimensions; `v_x_rmse` and `v_y_rmse` (m/s, from `settled` on); the estimates, ten a
+    second.
     """
     t = times(study)
     later, wrong = t >= study.settled, (t >= study.fault_at) & (t < study.fault_at + study.fault_time)
     sideslip = numerics.arctan2(found.v_y, found.v_x)
     off = jnp.rad2deg(sideslip - drive.true_sideslip)
     rms = lambda rows: jnp.sqrt(jnp.sum(jnp.where(rows, off**2, 0.0)) / _count(rows))
+    speed = lambda error: jnp.sqrt(jnp.sum(jnp.where(later, error**2, 0.0)) / _count(later))
     true = jnp.stack([drive.true_v_x, drive.true_v_y, drive.true_yaw_rate], axis=1)
     error = found.vector - jnp.concatenate([true, jnp.broadcast_to(jnp.log(truth), (t.shape[0], 4))], axis=1)
     nees = _squared_distance(error[-1, 3:], found.covariance[-1, 3:, 3:]) / 4.0
@@ -189,12 +191,15 @@ def metrics(study: Study, found: Found, drive: Drive, truth: Any) -> dict[str, A
         **{f"{name}_error": share[i] for i, name in enumerate(PARAMETERS)},
         "sideslip_rmse": rms(later),
         "sideslip_rmse_fault": rms(wrong),
-        "v_x_rmse": jnp.sqrt(jnp.sum(jnp.where(later, (found.v_x - drive.true_v_x) ** 2, 0.0)) / _count(later)),
+        "v_x_rmse": speed(found.v_x - drive.true_v_x),
+        "v_y_rmse": speed(found.v_y - drive.true_v_y),
         "nees": nees,
         "spread": jnp.sqrt(jnp.diagonal(found.covariance[-1, 3:, 3:])),
         "nees_each": error[-1, 3:] ** 2 / jnp.diagonal(found.covariance[-1, 3:, 3:]),
         "nees_all": jnp.sum(jnp.where(later, every, 0.0)) / _count(later),
         "sideslip": sideslip[seen],
+        "v_x": found.v_x[seen],
+        "v_y": found.v_y[seen],
         "parameters": found.parameters[seen],
     }
 

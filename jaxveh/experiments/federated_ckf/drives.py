@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -10,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import manoeuvres, numerics, roads, tyres, vehicles
+from jaxveh._core.names import record
 from jaxveh._core.parameter import parameter
 from jaxveh.experiments.federated_ckf.settings import Study
 from jaxveh.manoeuvres import AbstractManoeuvre, AbstractSpeed, DriverInputs
@@ -22,14 +24,16 @@ from jaxveh.vehicles import kit as vehicles_kit
 
 WHEELS = vehicles_kit.wheel_names("omega")
 PULLS = vehicles_kit.wheel_names("pull")
+FRICTIONS = vehicles_kit.wheel_names("friction")
+STEERS = vehicles_kit.wheel_names("steer")
 
 
 class Drive(NamedTuple):
     """What filters may see, (T,) each, and the truth.
 
     Measured: `a_x`, `a_y` (m/s^2), `yaw_rate` (rad/s), `omega` of the wheels (rad/s; (T, 4): front left, front right, rear left,
-    rear right). Known: `steer` (rad), `torque` of the motors (N m, (T, 4)). Truth: `true_v_x`, `true_v_y` (m/s),
-    `true_yaw_rate` (rad/s), `true_sideslip` (rad).
+    rear right). Known: `steer` of the wheels (rad, (T, 4)), `torque` of the motors (N m, (T, 4)). Truth: `true_v_x`, `true_v_y`
+    (m/s), `true_yaw_rate` (rad/s), `true_sideslip` (rad), `true_friction` under each wheel (-, (T, 4)).
     """
 
     a_x: Any
@@ -42,21 +46,30 @@ class Drive(NamedTuple):
     true_v_y: Any
     true_yaw_rate: Any
     true_sideslip: Any
+    true_friction: Any
 
 
 class Slalom(AbstractManoeuvre):
-    """A sine of `steer` (rad) and `frequency` (Hz) at a speed that varies; the first second is faded in."""
+    """A sine of `steer` (rad) and `frequency` (Hz) at a speed that varies; the first second is faded in. The rear wheels turn by
+    `rear` (-) times as much: it says all four angles."""
 
     speed: AbstractSpeed
     duration: float = eqx.field(static=True)
     frequency: float = eqx.field(static=True)
     steer: jax.Array = parameter("rad", scale=0.1)
+    rear: float = eqx.field(static=True, default=0.0)
 
-    def inputs(self, t: Any) -> DriverInputs:
+    def inputs(self, t: Any) -> Any:
         t = manoeuvres_kit.as_time(t, self.steer)
         v_x, v_x_rate = self.speed.at(t)
         wave = numerics.sin(2.0 * np.pi * self.frequency * t) * numerics.smooth_step(t)
-        return DriverInputs(steer=self.steer * wave, v_x=v_x, v_x_rate=v_x_rate)
+        return with_four_angles(DriverInputs(steer=self.steer * wave, v_x=v_x, v_x_rate=v_x_rate), self.rear)
+
+
+def with_four_angles(u: DriverInputs, rear: Any) -> Any:
+    """A driver's inputs with the angle of each wheel, that of the rear ones `rear` (-) times that of the front ones."""
+    angles = (u.steer, u.steer, rear * u.steer, rear * u.steer)
+    return record("DriverInputs", u._asdict() | dict(zip(STEERS, angles, strict=True)))
 
 
 def times(study: Study) -> jax.Array:
@@ -83,18 +96,26 @@ def peaked_tyre() -> Similarity:
 def truth_of(study: Study, magic_formula: bool = False) -> SevenDOF:
     """The true car: on Dugoff's tyres, or on others of the same stiffness and peak friction, but with a peak."""
     tyre = peaked_tyre() if magic_formula else dugoff(study)
-    return vehicles.build(sets.ev(), SevenDOF, front=tyre, rear=tyre)
+    return vehicles.build(sets.ev(), SevenDOF, front=tyre, rear=tyre, steering=vehicles.IndependentSteering())
 
 
 def drive_once(study: Study, steer, speed_std, key, *, magic_formula: bool = False) -> Drive:
     """One drive with a steer amplitude (rad) and a spread of the speed (m/s); a pure function, for `vmap`."""
+    slalom = lambda speed: Slalom(speed=speed, duration=study.duration, frequency=study.steer_frequency, steer=steer)
+    return drive_on(study, roads.Level(study.friction), slalom, speed_std, key, magic_formula=magic_formula)
+
+
+def drive_on(
+    study: Study, road: roads.AbstractRoad, driver: Callable[[AbstractSpeed], Any], speed_std, key,
+    *, magic_formula: bool = False,
+) -> Drive:  # fmt: skip
+    """One drive on a road, `driver` making who steers of the speed, which wavers about the study's by `speed_std` (m/s)."""
     speed_key, sensor_key = jax.random.split(key)
     speed = manoeuvres.wavering_speed(
         study.speed, speed_std, speed_key, time=study.speed_time, fastest=study.speed_fastest, count=20
     )
-    slalom = Slalom(speed=speed, duration=study.duration, frequency=study.steer_frequency, steer=steer)
     found = simulate(
-        truth_of(study, magic_formula), slalom, road=roads.Level(study.friction), dt=study.dt,
+        truth_of(study, magic_formula), driver(speed), road=road, dt=study.dt,
         max_step=study.max_step, start={"v_x": speed.at(0.0)[0]}, solver=RolledRK4(), throw=False,
     )  # fmt: skip
     levels = {"a_x": study.a_x, "a_y": study.a_y, "yaw_rate": study.yaw_rate} | dict.fromkeys(WHEELS, study.wheel_speed)
@@ -105,12 +126,13 @@ def drive_once(study: Study, steer, speed_std, key, *, magic_formula: bool = Fal
         a_y=said["a_y"],
         yaw_rate=said["yaw_rate"],
         omega=jnp.stack([said[name] for name in WHEELS], axis=-1),
-        steer=found["steer"],
+        steer=jnp.stack([found[name] for name in STEERS], axis=-1),
         torque=jnp.stack([found[name] for name in vehicles_kit.wheel_names("torque")], axis=-1),
         true_v_x=found["true.v_x"],
         true_v_y=found["true.v_y"],
         true_yaw_rate=found["true.yaw_rate"],
         true_sideslip=found["true.sideslip"],
+        true_friction=jnp.stack([found[f"true.{name}"] for name in FRICTIONS], axis=-1),
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh.experiments.federated_ckf.report import SHORT, Reproduction
+from jaxveh.experiments.federated_ckf.road_figures import friction_figure, speeds_figure
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS
 from jaxveh.experiments.federated_ckf.study import Raced, truth
 from jaxveh.plots import COLOURS, kit, style
@@ -33,6 +34,8 @@ def figures(result: Reproduction) -> dict[str, Any]:
         "drive": drive_figure(result.raced),
         "fault": fault_figure(result.raced),
         "line": line_figure(result),
+        "speeds": speeds_figure(result.raced, _those(result.raced, SHOWN)),
+        "friction": friction_figure(result.roads),
     }
 
 
@@ -79,7 +82,7 @@ def drive_figure(raced: Raced, seed: int = 0) -> Any:
     with style():
         panels = figure.subplots(5, 1, sharex=True, height_ratios=(1, 1, 1, 1, 2))
         panels[2].plot(time, drive.a_y, color=COLOURS["prior"], linewidth=0.5, label="measured")
-        truths = (np.rad2deg(drive.steer), 3.6 * drive.true_v_x, None, true)
+        truths = (np.rad2deg(drive.steer[:, 0]), 3.6 * drive.true_v_x, None, true)
         for axes, values in zip(panels, truths, strict=False):
             if values is not None:
                 axes.plot(time, values, color=COLOURS["truth"])

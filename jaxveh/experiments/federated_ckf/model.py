@@ -11,13 +11,22 @@ import jax.numpy as jnp
 from jaxveh import numerics
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import positive
-from jaxveh.experiments.federated_ckf.drives import PULLS, WHEELS, Drive, dugoff, felt_accelerations, times, wheel_rates
+from jaxveh.experiments.federated_ckf.drives import (
+    PULLS,
+    STEERS,
+    WHEELS,
+    Drive,
+    dugoff,
+    felt_accelerations,
+    times,
+    wheel_rates,
+)
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Study
 from jaxveh.statespace import Continuous, Gaussian, Prior, Propagate, RolledRK4, Row, StateSpace, with_parameters
 from jaxveh.tyres import Dugoff, Forces
 from jaxveh.vehicles import GRAVITY, kit, sets
 
-INPUTS = ("steer", "a_x_felt", "a_y_felt", *PULLS)
+INPUTS = (*STEERS, "a_x_felt", "a_y_felt", *PULLS)
 CHANNELS = ("a_x", "a_y", "yaw_rate", *WHEELS)
 
 TURNS = 3
@@ -53,7 +62,7 @@ class Planar(eqx.Module):
     A wheel's longitudinal force is known from its motor, `F_x = (T - J_w domega/dt) / r` (eq 10), less rolling resistance; its
     lateral force is Dugoff's at the slip ratio that gives this F_x, or with `measured_slip` at that of the measured wheel speeds
     (eq 14; inputs `omega_fl` ...), which shake. Loads follow the measured accelerations (eq 9). `friction` may
-    be one number or one a wheel (`Wheels`).
+    be one number or one a wheel (`Wheels`), or is told by the inputs `friction_fl` ....
     """
 
     friction: Any = positive("-")
@@ -83,17 +92,24 @@ class Planar(eqx.Module):
         return kit.corners(self.front_axle_to_cg, self.rear_axle_to_cg, self.track_front, self.track_rear)
 
     def push(self, x: State, u: Any) -> Pushed:
-        """What the wheels do to the car in the state x with the inputs u (`steer`, `pull_fl` ...)."""
-        moves = kit.rolling_wheels(self.places, x.v_x, x.v_y, x.yaw_rate, u.steer)
+        """What the wheels do to the car in the state x with the inputs u (`steer_fl` ..., `pull_fl` ...; eqs 1-9)."""
+        moves = kit.rolling_wheels(self.places, x.v_x, x.v_y, x.yaw_rate, kit.wheels_of(u, "steer"))
         pulls = kit.wheels_of(u, "pull")
         loads = kit.planar_loads(self, u.a_x_felt, u.a_y_felt, -GRAVITY)
         pulls = kit.each_wheel(lambda pull, load: pull - self.rolling_resistance * load, pulls, loads)
-        friction = self.friction if isinstance(self.friction, kit.Wheels) else kit.Wheels(*[self.friction] * 4)
-        found = self._wheels(moves, loads, pulls, friction, self._slips(moves, u) if self.measured_slip else None)
+        found = self._wheels(
+            moves, loads, pulls, self._frictions(u), self._slips(moves, u) if self.measured_slip else None
+        )
         push = kit.body_forces(self.places, moves, kit.each_wheel(lambda wheel: wheel[0], found))
         omega = kit.each_wheel(lambda move, wheel: move.along * (1.0 + wheel[1]) / self.wheel_radius, moves, found)
         drag = kit.air_drag(self.drag, x.v_x)
         return Pushed((push.F_x - drag) / self.mass, push.F_y / self.mass, push.M_z, omega)
+
+    def _frictions(self, u: Any) -> kit.Wheels:
+        """The friction under each wheel: that which is told, where it is an input, else the car's."""
+        if hasattr(u, "friction_fl"):
+            return kit.wheels_of(u, "friction")
+        return self.friction if isinstance(self.friction, kit.Wheels) else kit.Wheels(*[self.friction] * 4)
 
     def _slips(self, moves: kit.Wheels, u: Any) -> kit.Wheels:
         """Slip ratios of the measured wheel speeds (eq 14)."""
@@ -184,7 +200,7 @@ def noise_levels(study: Study) -> dict[str, float]:
     return own | dict.fromkeys(WHEELS, study.wheel_speed)
 
 
-def states_model(study: Study, car: Planar, drive: Drive) -> StateSpace:
+def states_model(study: Study, car: Planar, drive: Drive, inputs: tuple[str, ...] = INPUTS) -> StateSpace:
     """Three states, the car's parameters known."""
     v_x = jnp.mean(drive.omega[0, 2:]) * car.wheel_radius
     return StateSpace(
@@ -197,7 +213,7 @@ def states_model(study: Study, car: Planar, drive: Drive) -> StateSpace:
         ),
         measurement_noise=Gaussian(noise_levels(study)),
         prior=Prior(State(v_x, jnp.zeros_like(v_x), jnp.zeros_like(v_x)), {"v_x": 0.1, "v_y": 0.1, "yaw_rate": 0.05}),
-        inputs=INPUTS,
+        inputs=inputs,
         input_path="linear",
     )
 
@@ -216,6 +232,6 @@ def rows_of(study: Study, drive: Drive) -> Row:
     car = sets.ev()
     assert car.wheel_inertia is not None and car.wheel_radius is not None
     pulls = (drive.torque - car.wheel_inertia * wheel_rates(study, drive)) / car.wheel_radius
-    u = record_type("Inputs", INPUTS)(drive.steer, *felt_accelerations(study, drive), *pulls.T)
+    u = record_type("Inputs", INPUTS)(*drive.steer.T, *felt_accelerations(study, drive), *pulls.T)
     y = record_type("Measurements", CHANNELS)(drive.a_x, drive.a_y, drive.yaw_rate, *drive.omega.T)
     return Row(times(study), u, y)

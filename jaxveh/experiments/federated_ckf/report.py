@@ -25,6 +25,9 @@ from jaxveh.experiments.federated_ckf.criteria import (
 )
 from jaxveh.experiments.federated_ckf.drives import Drive
 from jaxveh.experiments.federated_ckf.observed import observability_of_drives
+from jaxveh.experiments.federated_ckf.road_drives import drives_on_roads, road_cases
+from jaxveh.experiments.federated_ckf.road_filters import ROAD_START, RacedOnRoads, race_on_roads
+from jaxveh.experiments.federated_ckf.road_tables import road_tables, speed_table
 from jaxveh.experiments.federated_ckf.settings import PARAMETERS, Start, Study
 from jaxveh.experiments.federated_ckf.study import Raced, cases, drives_by_case, drives_of, race, race_over, truth
 from jaxveh.experiments.report import Check, above, at_most, interval, spread, with_terms
@@ -42,7 +45,8 @@ LIMITS = {"friction": 1.0, "mass": 2.0, "yaw_inertia": 5.0, "front_axle_to_cg": 
 
 class Reproduction(NamedTuple):
     """Everything the experiment found: `raced`, all estimators in all cases; over `steers` (degrees) and `spreads` (m/s) the
-    joint filter's errors `over`, and what the first seed's drive can tell, `seen`, by what is known of the rolling resistance."""
+    joint filter's errors `over`, and what the first seed's drive can tell, `seen`, by what is known of the rolling resistance;
+    `roads`: one friction and four where the road has several, and rear wheels that turn."""
 
     seeds: int
     raced: Raced
@@ -50,6 +54,7 @@ class Reproduction(NamedTuple):
     spreads: tuple[float, ...]
     over: Swept
     seen: dict[str, list[list[Observability]]]
+    roads: RacedOnRoads
 
 
 def run(
@@ -73,20 +78,30 @@ def run(
     known = Drive(*(leaf[own] for leaf in grid))
     told = part(progress, 0.08, 0.15, "other tyres")
     drives = drives_by_case(study, names, seeds, key, known=known, progress=told, stores=stores)
-    raced = race(study, drives, names, progress=part(progress, 0.15, 0.9, "estimators"), stores=stores)
+    raced = race(study, drives, names, progress=part(progress, 0.15, 0.65, "estimators"), stores=stores)
+    told = part(progress, 0.65, 0.7, "roads")
+    rough = drives_on_roads(study, seeds, jax.random.fold_in(key, 1), progress=told, stores=stores)
+    told = part(progress, 0.7, 0.9, "estimators on roads")
+    on_roads = race_on_roads(study, rough, progress=told, stores=stores)
     told = part(progress, 0.9, 0.96, "steer and speed")
     over = race_over(study, grid, steers, speeds, progress=told, stores=stores)
     progress(0.96, 1.0, "observability")
     seen = observability_of_drives(study, Start(*truth(study)), Drive(*(leaf[:, :, 0] for leaf in grid)))
     progress(1.0, 1.0, "done")
-    return Reproduction(seeds, raced, tuple(np.degrees(steers).tolist()), speeds, over, seen)
+    return Reproduction(seeds, raced, tuple(np.degrees(steers).tolist()), speeds, over, seen, on_roads)
 
 
 def settings(result: Reproduction) -> dict:
     """The study, for a manifest."""
     study = result.raced.study
     own = {name: case._replace(start=dataclasses.asdict(case.start))._asdict() for name, case in cases(study).items()}
-    return {"study": dataclasses.asdict(study), "cases": own}
+    roads = {name: case._asdict() for name, case in road_cases(study).items()}
+    return {
+        "study": dataclasses.asdict(study),
+        "cases": own,
+        "roads": roads,
+        "road_start": dataclasses.asdict(ROAD_START),
+    }
 
 
 def _median(values) -> float:
@@ -124,7 +139,8 @@ def tables(result: Reproduction) -> list[Table]:
     """The tables, the do-nothing first guess in each of the estimators'."""
     raced = result.raced
     found = [race_table(raced, case) for case in (*STARTS, OTHER)]
-    return [*found, _paired_table(raced), _fault_table(raced), _line_table(result)]
+    speeds = speed_table(raced, (*STARTS, OTHER))
+    return [*found, speeds, _paired_table(raced), _fault_table(raced), _line_table(result), *road_tables(result.roads)]
 
 
 TITLES = {

@@ -52,6 +52,10 @@ class Study:
 
     Fault: the yaw rate is off by `bias` (rad/s) from `fault_at` (s) for `fault_time` (s). Errors count from `settled` (s) on.
 
+    Other roads: `other_friction`, on the right side or before `jump_at` (m), where it becomes `friction`; the slalom in a lane
+    has `lane_frequency` (Hz), so fast that the wheels keep to their sides; `rear_steer`: the rear wheels' angle over the front
+    ones', where they turn; `friction_walk` (relative, per sqrt(s)): of filters that are told that the friction changes.
+
     Filters: spreads of the prior's logarithms, `friction_spread` to `cg_spread`: two of them reach from a dry road to an icy one,
     from an empty car to twice its load, and over a fifth of the place of the centre of gravity. (With a friction's of 1.0 the
     joint filter loses one drive in 40 before the first turn: points then lie a factor of 14 apart.) `speed_noise`
@@ -91,3 +95,8 @@ class Study:
     walk: float = 3e-4
     isolate: float = 5.0
     gate: float = 5.0
+    other_friction: float = 0.3
+    jump_at: float = 80.0
+    lane_frequency: float = 0.35
+    rear_steer: float = -0.3
+    friction_walk: float = 0.1

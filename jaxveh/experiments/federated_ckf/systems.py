@@ -10,7 +10,7 @@ SYSTEMS = (
         "eqs 1-9",
         ("vehicles.TwoTrack3DOF", "vehicles.FourMotors", "experiments.federated_ckf.model.Planar"),
     ),
-    System("four steer angles", "eqs 1-9", ("vehicles.FourWheelSteering",)),
+    System("four steer angles", "eqs 1-9", ("vehicles.IndependentSteering",)),
     System(
         "longitudinal force of a motor",
         "eq 10",

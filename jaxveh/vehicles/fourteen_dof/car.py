@@ -25,6 +25,7 @@ from jaxveh.vehicles.fourteen_dof.suspension import (
 )
 from jaxveh.vehicles.fourteen_dof.tyre_contact import ROLLING_SHARE, Touch, axles, reaction, touch
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, dot, minus, times
+from jaxveh.vehicles.steering import steer_outputs
 from jaxveh.vehicles.two_track import air_drag, body_outputs, wheel_outputs
 from jaxveh.vehicles.wheels import (
     Wheels,
@@ -70,7 +71,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
     Equations: d'Alembert's principle, see `dynamics.accelerations`. The degrees of freedom are those of T. Shim and C. Ghike,
     Vehicle System Dynamics 45 (2007) 191, with joints inclined for the roll centres and nothing linearised.
 
-    **Inputs**: `steer` (rad at the road wheels) and those of `drive`.
+    **Inputs**: those of `steering` (`steer`, rad at the road wheels) and of `drive`.
 
     **Outputs** beside those of `SevenDOF`: `z`, `v_z`, `roll`, `pitch`, their rates and accelerations, `a_z`, `camber_fl`,
     `travel_fl` (m, up), `travel_rate_fl`, `suspension_force_fl` (N), `omega_to_body_fl` (rad/s), `M_x_fl`, `M_y_fl` ..., and the
@@ -92,7 +93,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
 
     @property
     def inputs(self):
-        return ("steer", *self.drive.inputs)
+        return (*self.steering.inputs, *self.drive.inputs)
 
     @property
     def own_states(self):
@@ -112,11 +113,16 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         return {"z": self.cg_height, **dict(zip(SPINS, spins, strict=True))}
 
     def contacts(self, x, u, ground: Ground = LEVEL) -> Wheels:
-        return self._stand(x, u, ground).contacts
+        return self._stand(x, self._steers(x, u), ground).contacts
+
+    def _steers(self, x, u) -> Wheels:
+        """Angles of the wheels, rad, before `ackermann` and toe."""
+        return self.steering.angles(self, u, x.v_x)
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
         del t
-        tyres, stand, omegas = self.tyres, self._stand(x, u, ground), wheels_of(x, "omega")
+        steers, tyres, omegas = self._steers(x, u), self.tyres, wheels_of(x, "omega")
+        stand = self._stand(x, steers, ground)
         body, states, g = stand.body, tyres.states(x), Vector(*gravity(ground))
         forces = tyres.forces(stand.contacts, states)
         roads = each_wheel(
@@ -143,7 +149,7 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
             each_wheel(lambda how: how.moves, stand.touches),
             forces,
         )
-        shown = body_outputs(self.motion(x, u), felt.x, felt.y, yaw, u.steer, push)
+        shown = body_outputs(self.motion(x, u), felt.x, felt.y, yaw, steer_outputs(self.steering, steers), push)
         shown |= attitude_outputs(x, roll, pitch, felt.z)
         shown |= wheel_outputs(stand.contacts, forces, omegas) | moments(forces)
         shown |= by_wheel(
@@ -163,14 +169,14 @@ class FourteenDOF(AbstractSuspendedTwoTrack):
         return self.rates_and_outputs(rates, shown)
 
     @numerics.fence_results
-    def _stand(self, x, u, ground: Ground) -> Stand:
+    def _stand(self, x, steers: Wheels, ground: Ground) -> Stand:
         """How the car stands on the road, before any tyre force."""
         body = body_of(x)
         wheels = each_wheel(
             lambda joint, travel, rate: wheel_at(joint, travel, rate, body),
             joints(self), wheels_of(x, "travel"), wheels_of(x, "travel_rate"),
         )  # fmt: skip
-        turned = axles(self, u.steer)
+        turned = axles(self, steers)
         both = each_wheel(
             lambda wheel, axis, omega, mu, road: touch(self, body, wheel, axis, omega, mu, road),
             wheels, turned, wheels_of(x, "omega"), frictions(ground), heights(ground),

@@ -7,6 +7,7 @@ import numpy as np
 from jaxveh._core.errors import check, check_at_least, is_concrete
 from jaxveh.vehicles.fourteen_dof.parameters import AbstractSuspendedTwoTrack
 from jaxveh.vehicles.fourteen_dof.suspension import static_loads
+from jaxveh.vehicles.steering import Ackermann, IndependentSteering
 
 NOT_NEGATIVE = (
     "damper_front", "damper_rear", "anti_roll_front", "anti_roll_rear", "tyre_damping", "drag", "rolling_resistance",
@@ -14,8 +15,12 @@ NOT_NEGATIVE = (
 
 
 def check_fourteen_dof(car: AbstractSuspendedTwoTrack) -> None:
-    """Raise `InputError` unless the inertia is positive definite and the tyres carry the car."""
+    """Raise `InputError` unless the inertia is positive definite, the tyres carry the car, and the front wheels' angles are those
+    of the steering or of `ackermann`, not of both."""
     kind = type(car).__name__
+    if isinstance(car.steering, Ackermann | IndependentSteering):
+        told = f"0 with {type(car.steering).__name__}, which says each front wheel's own angle"
+        check(f"{kind}.ackermann", car.ackermann, lambda v: v == 0, told)
     for name in NOT_NEGATIVE:
         check_at_least(f"{kind}.{name}", getattr(car, name), 0)
     if is_concrete(car.roll_inertia, car.yaw_inertia):

@@ -12,31 +12,32 @@ from jaxveh.vehicles.fourteen_dof.kinematics import Body, to_body, to_road
 from jaxveh.vehicles.fourteen_dof.parameters import AbstractSuspendedTwoTrack
 from jaxveh.vehicles.fourteen_dof.suspension import LEFT, Wheel
 from jaxveh.vehicles.fourteen_dof.vectors import Vector, add, cross, dot, minus, times
+from jaxveh.vehicles.steering import about_one_point
 from jaxveh.vehicles.wheels import WheelMotion, Wheels, contact, each_wheel, front_rear, travel_direction
 
 ROLLING_SHARE = 1.0 / 3.0
 """Of a tyre's compression the part by which its effective rolling radius shrinks: a belt that hardly stretches."""
 
 
-def axles(car: AbstractSuspendedTwoTrack, steer: Any) -> Wheels:
+def axles(car: AbstractSuspendedTwoTrack, steers: Wheels) -> Wheels:
     """The axis about which each wheel spins, pointing to the left, in the body's axes.
 
-    The front wheels turn about the body's z axis: by the steer, and as far as `ackermann` says by the angle with which
-    all wheels would turn about one point on the rear axle's line. Toe is positive inwards, camber where the tops lean out.
+    The wheels turn about the body's z axis by `steers` (rad), and the front ones as far as `ackermann` says by the angle with
+    which all wheels would turn about one point on the rear axle's line. Toe is positive inwards, camber where the tops lean out.
     """
-    base, half = car.front_axle_to_cg + car.rear_axle_to_cg, 0.5 * car.track_front
-    s, c = numerics.sin(steer), numerics.cos(steer)
-
-    def front(side):
-        return (1.0 - car.ackermann) * steer + car.ackermann * numerics.arctan2(base * s, base * c - side * half * s)
+    length, half = car.front_axle_to_cg + car.rear_axle_to_cg, 0.5 * car.track_front
 
     def one(side, angle, toe, camber):
         angle, lean = angle - side * toe, numerics.cos(camber)
         return Vector(-lean * numerics.sin(angle), lean * numerics.cos(angle), -side * numerics.sin(camber))
 
-    steers = Wheels(front(1.0), front(-1.0), 0.0, 0.0)
+    fl, fr = about_one_point(steers.fl, steers.fr, car.ackermann, length, half)
     return each_wheel(
-        one, LEFT, steers, front_rear(car.toe_front, car.toe_rear), front_rear(car.camber_front, car.camber_rear)
+        one,
+        LEFT,
+        Wheels(fl, fr, steers.rl, steers.rr),
+        front_rear(car.toe_front, car.toe_rear),
+        front_rear(car.camber_front, car.camber_rear),
     )
 
 

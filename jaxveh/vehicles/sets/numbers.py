@@ -8,6 +8,7 @@ from typing import Any
 
 from jaxveh._core.errors import InputError, check, check_finite, check_positive
 from jaxveh.vehicles.base import GRAVITY
+from jaxveh.vehicles.steering import AbstractSteering
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,8 @@ class CarNumbers:
     `yaw_inertia` kg m^2, `wheel_inertia` kg m^2 (of one wheel), `drag` N s^2/m^2, `rolling_resistance` (-), the front axle's
     shares of driving and braking (-), `four_motors`: each wheel has its own; tyres of one wheel on the front and the rear axle;
     `cg_height` stays out of cars for which it is an option (`build`). `trailer_length` (m): from the hitch to the trailer's axle.
-    `steer_offset` (rad) is added to the steer.
+    `steer_offset` (rad) is added to the steer. `steering`: what turns which wheels (`AbstractSteering`), None for front
+    wheels alone.
 
     **Raises** `InputError` for what no car has.
     """
@@ -105,6 +107,7 @@ class CarNumbers:
     suspension: SuspensionNumbers | None = None
     trailer_length: float | None = None
     steer_offset: float = 0.0
+    steering: AbstractSteering | None = None
 
     def __post_init__(self):
         for name in (

@@ -10,6 +10,7 @@ from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.vehicles.base import GRAVITY
 from jaxveh.vehicles.sets.numbers import NAMED_ALIKE, SHARES, CarNumbers, TyreNumbers, named_alike
 from jaxveh.vehicles.sets.tyres import axle_tyre
+from jaxveh.vehicles.steering import specification_of_steering, steering_of
 
 
 def numbers_of(specification: Any) -> CarNumbers:
@@ -35,6 +36,7 @@ def numbers_of(specification: Any) -> CarNumbers:
         drag=s.drag,
         rolling_resistance=s.rolling_resistance,
         steer_offset=0.0 if s.steer_offset is None else -s.steer_offset,
+        steering=steering_of(s),
     )
 
 
@@ -52,7 +54,8 @@ def specification_of(numbers: CarNumbers) -> CarSpecification:
     A file knows of a suspension how the body leans (`leaning_numbers`), nothing of trailers, and of four motors no more than the
     front axle's share.
 
-    **Raises** `InputError` for a car without mass, yaw inertia or tyres, which no file can leave out.
+    **Raises** `InputError` for a car without mass, yaw inertia or tyres, which no file can leave out, or a steering that none can
+    say.
     """
     missing = [name for name in ("mass", "yaw_inertia", "front", "rear") if getattr(numbers, name) is None]
     if missing:
@@ -60,7 +63,7 @@ def specification_of(numbers: CarNumbers) -> CarSpecification:
     loads = {axle: 2.0 * load for axle, load in zip(("front", "rear"), numbers.wheel_loads(), strict=True)}
     tyres = {axle: axle_tyre(getattr(numbers, axle), load) for axle, load in loads.items()}
     optional = ("cg_height", "drag", "rolling_resistance")
-    told: dict[str, Any] = leaning_numbers(numbers)
+    told: dict[str, Any] = leaning_numbers(numbers) | specification_of_steering(numbers.steering)
     return CarSpecification(
         name=numbers.name,
         **{name: getattr(numbers, name) for name in (*NAMED_ALIKE, *SHARES, *optional)},
