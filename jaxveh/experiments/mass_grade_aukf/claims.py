@@ -8,11 +8,8 @@ import numpy as np
 
 from jaxveh.experiments.mass_grade_aukf.settings import GATE
 from jaxveh.experiments.mass_grade_aukf.study import Raced
-from jaxveh.experiments.report import FAILED, MET, OPEN, interval, spread
+from jaxveh.experiments.report import BETTER, FAILED, MET, OPEN, interval, judge_ratio, spread
 from jaxveh.sweeps import Table, compare
-
-BETTER = 0.95
-"""An error that is smaller by less than a twentieth is no smaller error."""
 
 NOTHING = "first guess"
 """The estimator that does nothing."""
@@ -69,13 +66,6 @@ def claims_table(*raced: Raced) -> Table:
         rows,
         2,
     )
-
-
-def judge_ratio(found) -> str:
-    """Whether a ratio is below `BETTER`; open where its interval has that inside."""
-    if found.low > BETTER or not np.isfinite(found.value):
-        return FAILED
-    return MET if found.high <= BETTER else OPEN
 
 
 def _judge_quartiles(values: np.ndarray, bound: float) -> str:

@@ -142,7 +142,9 @@ def grade_of_force(study: Study, mass, drive: Drive):
 
 def _from_the_start(values, rows: int, first):
     """Values of the last rows, with the `first` before them, (rows,)."""
-    return jnp.concatenate([jnp.full(rows - values.shape[0], first), values])
+    n = rows - values.shape[0]
+    # Of `jnp.concatenate` here XLA 0.10's program for many drives on a CPU reads beside its memory, and dies.
+    return jnp.where(jnp.arange(rows) < n, first, jnp.pad(values, (n, 0), mode="edge"))
 
 
 def _stay(system, t0, t1, x, u):
