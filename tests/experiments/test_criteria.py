@@ -95,8 +95,8 @@ def test_a_criterion_holds_by_its_number(make, value, bound, status):
 
 
 @pytest.mark.parametrize(("found", "status"), [
-    ((0.8, 0.7, 0.9), MET), ((1.1, 1.0, 1.2), FAILED), ((0.9, 0.8, 1.0), OPEN), ((np.nan, 0.7, 0.9), FAILED), ((0.3, 0.2, 0.4), FAILED),
-    ((0.5, 0.4, 0.6), OPEN),
+    ((0.8, 0.7, 0.9), MET), ((1.1, 1.0, 1.2), FAILED), ((0.9, 0.8, 1.0), OPEN), ((0.3, 0.2, 0.4), FAILED),
+    ((0.5, 0.4, 0.6), OPEN), ((np.nan, 0.7, 0.9), FAILED),
 ])  # fmt: skip
 def test_a_ratio_is_judged_by_its_interval(found, status):
     assert judge_ratio(ConfidenceInterval(*found), 0.5, 0.95) == status

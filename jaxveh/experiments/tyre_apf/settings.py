@@ -93,9 +93,10 @@ class Study:
 
     `speed` m/s; `steer` rad at the road wheels; `duration` s; `rate` Hz; `yaw_rate_std` rad/s and `a_y_std` m/s^2 the
     sensors' noise; `prior` the relative spread of the parameters (E: times 2, so 0.2); `particles`; `window` s of the
-    multiple shooting; `low_pass` Hz of the sensors in the variants that have one. `gaussian`: the noise of UKF and MAP, `particle`: that of PF and APF, both chosen by the filters'
-    own likelihood on drives of other seeds (`noise.choose`), so that the truth has no part in them. `saturated`: that
-    of the UKF where both axles pass their peak: next to nothing, since inputs run linearly there and the model is the truth's.
+    multiple shooting; `low_pass` Hz of the sensors in the variants that have one. `gaussian`: the noise of UKF and MAP,
+    `particle`: that of PF and APF, both chosen by the filters' own likelihood on drives of other seeds (`noise.choose`), so
+    that the truth has no part in them. `saturated`: that of the UKF where both axles pass their peak: next to nothing, since
+    inputs run linearly there and the model is the truth's.
     """
 
     speed: float = 25.0

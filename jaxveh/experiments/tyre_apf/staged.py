@@ -50,8 +50,8 @@ class Seconds(NamedTuple):
 class Staged(NamedTuple):
     """The study's result and how it came about. Leaves have the seeds in front.
 
-    `outcome`: each seed's; `steps`: errors of step steers by angle, and `first_step`: the course of the first of them by name, the
-    truth among them, (seeds, outputs, T). `estimates`: the filters' `Estimate` by name;
+    `outcome`: each seed's; `steps`: errors of step steers by angle, and `first_step`: the course of the first of them by name,
+    the truth among them, (seeds, outputs, T). `estimates`: the filters' `Estimate` by name;
     `fit`: the MAP's `fitting.Fit`. `open_loop`: mapping from each estimator to the states that its tyres give without any
     measurement. `observability`: what the drive can tell of the eight parameters at all, at the truth. `seconds`: by stage.
     """
