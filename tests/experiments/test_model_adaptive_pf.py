@@ -141,7 +141,7 @@ def test_what_knows_outliers_beats_what_does_not(drives):
     assert error(TOLD, "both", "sideslip") < error(REDESIGNED, "both", "sideslip")
     assert (raced.found["result"] == 0).all()
     assert raced.of("course", PLAIN, "both").shape == (3, 251)
-    assert experiment.settings(experiment.Reproduction(3, raced, raced, raced, raced))["cases"]["both"]["level"] == 6.0
+    assert experiment.settings(experiment.Reproduction(3, *[raced] * 6))["cases"]["both"]["level"] == 6.0
 
 
 def test_who_is_told_weighs_by_the_true_noise_and_leaves_out_what_is_wild(drives):
@@ -289,6 +289,8 @@ def test_criteria_are_asked_of_the_first_contestant_that_knows_nothing():
         pressed=None,
         unaware=made_up(cases, both={ADAPTIVE: 0.90, REDESIGNED: 0.77, STUDENT: 0.95, ROBUST: 0.80}),
         misled=made_up(wrong, **{"both, half": {ADAPTIVE: 0.6}, "both, double": {ADAPTIVE: 0.81, PLAIN: 0.9}}),
+        beside=None,
+        slow=None,
     )
     checks = report.check(result)
     found = {(check.name.split(";")[0].split(": ")[1], check.name.split("; ")[1]): check for check in checks[:6]}

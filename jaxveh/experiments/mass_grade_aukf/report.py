@@ -210,10 +210,9 @@ def _race_table(raced: Raced, title: str) -> Table:
             spread(_of(raced, "settled", name), lost="never"),
             spread(_of(raced, "mass_rmse", name), scale=100.0),
             spread(_of(raced, "grade_rmse", name)),
-            spread(_of(raced, "grade_rmse_later", name)),
         ]
-        cells.insert(4, printed.get(name.removesuffix(" as printed"), ""))
-        rows.append((name, *cells, contestant.what))
+        paper, later = printed.get(name.removesuffix(" as printed"), ""), spread(_of(raced, "grade_rmse_later", name))
+        rows.append((name, *cells, paper, later, contestant.what))
     guesses, seeds = _of(raced, "mass_error", rows[0][0]).shape
     return Table(
         f"{title}, pedals {raced.pedals[-1]:g} m/s^2: median [quartiles] over {seeds} seeds and {guesses} guess(es)",

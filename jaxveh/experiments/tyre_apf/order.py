@@ -81,7 +81,7 @@ def _model(study: Study, car, order, solver) -> Any:
     """As `study.model_of`, with tyres that are unknown or taken at their word, and another solver."""
     devices, noise = sensors.esc(yaw_rate=study.yaw_rate_std, a_y=study.a_y_std), study.particle
     process = {"v_y": noise.v_y, "yaw_rate": noise.yaw_rate}
-    unknown = {} if order is None else {"estimate": order, "prior": study.prior, "walk": noise.walk}
+    unknown: dict[str, Any] = {} if order is None else {"estimate": order, "prior": study.prior, "walk": noise.walk}
     return estimators.state_space(car, devices, process_noise=process, solver=solver, **unknown)
 
 

@@ -103,7 +103,7 @@ def drives_by_name(study: Study) -> dict[str, Callable[[Any], Recording]]:
 def model_by_name(study: Study, name: str, guess: SingleTrack, noise: StudyNoise) -> StateSpace:
     """What a filter knows: the study's single track (`plain`), with the sensors' `low-pass`, or `driven` by its torques."""
     process = {"v_y": noise.v_y, "yaw_rate": noise.yaw_rate}
-    told = dict(estimate=tyres, prior=study.prior, walk=noise.walk)
+    told: dict[str, Any] = dict(estimate=tyres, prior=study.prior, walk=noise.walk)
     if name == "driven":
         return estimators.state_space(
             driven_car(guess), _devices(study, a_x=A_X_NOISE, v_x=SPEED_NOISE), start={"v_x": study.speed},
