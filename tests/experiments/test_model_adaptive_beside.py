@@ -61,7 +61,7 @@ def test_wheels_spin_up_by_what_the_torque_has_over_the_tyres_force():
     """`J_w dw = T - r_e F_x`, `S = (r_e w - u) / u`, `F_x = C_s S`: at no torque a wheel that rolls freely is at rest."""
     still = dataclasses.replace(STUDY, rolling_resistance=0.0)
     car = own_drives.spinning_car(still, own_drives.fiala(still))
-    model = models.spinning(still, car, jnp.asarray(14.0))
+    model = models.spinning_model(still, car, jnp.asarray(14.0))
     assert model.states == ("v_x", "v_y", "yaw_rate", *(f"omega_{at}" for at in own_drives.WHEELS))
     assert model.channels == (*still.stds, *models.RIMS)
     x = model.prior.mean

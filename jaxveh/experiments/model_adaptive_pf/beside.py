@@ -13,7 +13,7 @@ from jaxveh.experiments.model_adaptive_pf.models import (
     matrix_autoregression,
     mixture,
     rows_of,
-    spinning,
+    spinning_model,
     spinning_rows_of,
 )
 from jaxveh.experiments.model_adaptive_pf.settings import Study
@@ -78,7 +78,7 @@ def _heavy_filter(filter_) -> Run:
 
 def _spinning_filter(filter_) -> Run:
     def run(study, car, drive, key):
-        model = spinning(study, spinning_car(study, car.front), drive.v_x[0])
+        model = spinning_model(study, spinning_car(study, car.front), drive.v_x[0])
         return filters.scan(filter_, model, spinning_rows_of(study, drive), key)
 
     return run

@@ -116,7 +116,7 @@ def matrix_autoregression(study: Study, car: TwoTrack3DOF, start_speed, law: Abs
     )  # fmt: skip
 
 
-def spinning(study: Study, car: SevenDOF, start_speed) -> StateSpace:
+def spinning_model(study: Study, car: SevenDOF, start_speed) -> StateSpace:
     """The paper's seven degrees of freedom (eqs 1 to 8): the wheels' spins are states, and their rims' speeds are measured.
 
     The spins' poles are some 400 1/s at 50 km/h: two steps of Runge-Kutta in a row of 0.01 s. No tyre relaxes.
@@ -179,17 +179,17 @@ def spinning_rows_of(study: Study, drive: Drive) -> Row:
     return rows._replace(y=y)
 
 
-def _whole(car: TwoTrack3DOF, x: Any):
+def _whole(car: TwoTrack3DOF | SevenDOF, x: Any):
     """The car's state; of its yaw nothing depends."""
     return car.state_type(**{"yaw": 0.0 * x.yaw_rate, **x._asdict()})
 
 
-def _rates(car: TwoTrack3DOF, t, x, u):
+def _rates(car: TwoTrack3DOF | SevenDOF, t, x, u):
     rates = car.derivatives(t, _whole(car, x), u)
     return type(x)(*(getattr(rates, name) for name in x._fields))
 
 
-def _observation(car: TwoTrack3DOF, t, x, u):
+def _observation(car: TwoTrack3DOF | SevenDOF, t, x, u):
     a_y = car.outputs(t, _whole(car, x), u).a_y
     return record_type("BodyOutputs", ("v_x", "a_y", "yaw_rate"))(x.v_x, a_y, x.yaw_rate)
 
