@@ -33,7 +33,8 @@ def figures(result: Reproduction) -> dict[str, Any]:
     return {
         "measured": measured_figure(raced),
         "sideslip": sideslip_figure(raced),
-        "six_states": six_figure(raced),
+        "six_states": six_figure(raced, "constant"),
+        "six_states_in_noise": six_figure(raced, "both"),
         "ablation": ablation_figure(raced),
         "gain": gain_figure(raced),
         "process_noise": pressed_figure(result.pressed),
@@ -112,6 +113,7 @@ def six_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = No
             axes.set(ylabel=label, ylim=(truth.mean() - reach, truth.mean() + reach))
         for axes in every[-1]:
             axes.set(xlabel="time [s]")
+        every[0, 0].set_title(f"One drive of '{case}'")
         figure.align_ylabels()
         figure.legend(*every[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=4)
     return figure

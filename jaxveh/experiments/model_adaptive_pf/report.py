@@ -132,7 +132,7 @@ def tables(result: Reproduction) -> list[Table]:
     return [
         _ablation(raced, "both"),
         *(_errors_table(raced, "both", error) for error in ("v_y", "yaw_rate")),
-        six_table(raced),
+        *(six_table(raced, case) for case in SWERVE),
         beside_table(raced, result.beside),
         slow_table(result.slow),
         _ratios(raced, CASES, "Sideslip RMSE over the plain particle filter's, by noise"),
