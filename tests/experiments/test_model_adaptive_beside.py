@@ -142,7 +142,7 @@ def test_the_tables_compare_each_with_its_rival():
     own = made_up_race(tuple(beside.RIVALS), SWERVE)
     rows = {row[0]: row for row in beside.beside_table(raced, own).rows}
     assert rows["AAR, matrix"][1] == "AAR" and rows["AAR, matrix"][3].startswith("2 ")
-    assert rows[beside.SEVEN][1] == "CKF" and rows[beside.SEVEN][3].startswith("1 ")
+    assert rows[beside.SEVEN][1] == "PF, no relaxation" and rows[beside.SEVEN][3].startswith("1 ")
     assert rows["open loop"][1] == PLAIN and rows["open loop"][-1] == "does nothing"
     table = beside.six_table(raced)
     assert table.columns[2:] == (
