@@ -144,6 +144,9 @@ def test_the_tables_compare_each_with_its_rival():
     assert rows["AAR, matrix"][1] == "AAR" and rows["AAR, matrix"][3].startswith("2 ")
     assert rows[beside.SEVEN][1] == "PF, no relaxation" and rows[beside.SEVEN][3].startswith("1 ")
     assert rows["open loop"][1] == PLAIN and rows["open loop"][-1] == "does nothing"
+    slow = made_up_race(beside.SLOWLY, SLOW, AAR=3.0)
+    last = beside.slow_table(raced, slow).rows[2]
+    assert last[0] == "AAR" and last[1].startswith("0.5 ") and last[2].startswith("3 ") and "; 3 " in last[2]
     table = beside.six_table(raced)
     assert table.columns[2:] == (
         "v_x, m/s", "v_y, m/s", "a_x, m/s^2", "a_y, m/s^2", "yaw rate, degrees/s", "sideslip, degrees"

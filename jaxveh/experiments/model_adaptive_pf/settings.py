@@ -173,12 +173,11 @@ LIMIT = {
 _LOOSE = Case(steer=6.0, level=8.0, outliers=0.03, speed=30.0 / 50.4, friction=0.4)
 
 SLOW = {
-    "50 km/h, dry": CASES["both"],
     "30 km/h, dry": CASES["both"]._replace(speed=_LOOSE.speed),
     "30 km/h, friction 0.4, told": _LOOSE._replace(told=0.4),
     "30 km/h, friction 0.4, not told": _LOOSE,
 }
-"""Both ends of the paper's 30 to 50 km/h, and a loose road, whose friction filters are told or not."""
+"""The lower end of the paper's 30 to 50 km/h, and a loose road there, whose friction filters are told or not."""
 
 SWERVE = {name: CASES[name] for name in ("constant", "both")}
 """The noise under which the paper's own filter of seven degrees of freedom and others are tried."""
