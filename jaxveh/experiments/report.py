@@ -13,6 +13,9 @@ from jaxveh.sweeps import ConfidenceInterval
 MET, FAILED, OPEN = "met", "failed", "open"
 """What becomes of a criterion: it is met, it is not, or what was found cannot decide."""
 
+BETTER = 0.95
+"""An error that is smaller by less than a twentieth is no smaller error."""
+
 
 class Terms(NamedTuple):
     """What a criterion rests on, written down before anything runs.
@@ -109,6 +112,13 @@ def tally(checks: Iterable[Check]) -> Tally:
 def number_asked(criteria: Criteria) -> int:
     """How many criteria there are as they were asked."""
     return sum(not terms.original for terms in criteria.values())
+
+
+def judge_ratio(found: ConfidenceInterval, low: float = 0.0, high: float = BETTER) -> str:
+    """Whether a ratio is within bounds: met or failed where its interval is inside or outside of them, else open."""
+    if not np.isfinite(found.value) or found.low > high or found.high < low:
+        return FAILED
+    return MET if found.low >= low and found.high <= high else OPEN
 
 
 def interval(found: ConfidenceInterval, digits: int = 3) -> str:

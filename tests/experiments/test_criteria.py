@@ -18,11 +18,13 @@ from jaxveh.experiments.report import (
     above,
     at_least,
     at_most,
+    judge_ratio,
     leave_open,
     number_asked,
     tally,
     with_terms,
 )
+from jaxveh.sweeps import ConfidenceInterval
 
 README = Path(__file__).parents[2] / "README.md"
 LARGE, NONE = np.float64(3.0), np.float64("nan")
@@ -90,6 +92,14 @@ def test_a_criterion_holds_by_its_number(make, value, bound, status):
     check = make("a", value, bound)
     assert (check.status, check.holds) == (status, status == MET)
     assert not leave_open(check).holds and leave_open(check).status == OPEN
+
+
+@pytest.mark.parametrize(("found", "status"), [
+    ((0.8, 0.7, 0.9), MET), ((1.1, 1.0, 1.2), FAILED), ((0.9, 0.8, 1.0), OPEN), ((0.3, 0.2, 0.4), FAILED),
+    ((0.5, 0.4, 0.6), OPEN), ((np.nan, 0.7, 0.9), FAILED),
+])  # fmt: skip
+def test_a_ratio_is_judged_by_its_interval(found, status):
+    assert judge_ratio(ConfidenceInterval(*found), 0.5, 0.95) == status
 
 
 def test_what_is_open_and_what_stands_beside_is_not_counted_as_held():

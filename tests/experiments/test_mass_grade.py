@@ -11,8 +11,13 @@ from jaxveh import Parameters, sweeps
 from jaxveh.experiments import mass_grade_aukf as experiment
 from jaxveh.experiments.mass_grade_aukf import criteria
 from jaxveh.experiments.mass_grade_aukf import drives as own_drives
-from jaxveh.experiments.mass_grade_aukf.contestants import WALK, Found, contestants, metrics, pausing_name
+from jaxveh.experiments.mass_grade_aukf.claims import claims_table, drives_table
+from jaxveh.experiments.mass_grade_aukf.contestants import WALK, contestants, pausing_name
+from jaxveh.experiments.mass_grade_aukf.found import Found, metrics
+from jaxveh.experiments.mass_grade_aukf.least_squares import OVER, grade_of_force
 from jaxveh.experiments.mass_grade_aukf.observed import KNOT, Known, bound_of_mass, known_of_mass, predictions
+from jaxveh.experiments.report import FAILED, MET
+from jaxveh.vehicles import GRAVITY
 
 PEDALS = (0.0, 0.2)
 SMALL = experiment.truck(duration=60.0, dt=0.1, max_step=0.01, guesses=(4000.0,))
@@ -113,7 +118,8 @@ def made_up(study, **errors):
     """A race of two seeds in which every estimator has the `mass_error` 0.001, or that of `errors`."""
     names = tuple(contestants(study))
     shape = (len(names), 1, len(study.guesses), 2)
-    values = {name: np.full(shape, value) for name, value in (("grade_rmse", 0.05), ("settled", 5.0))}
+    usual = dict(grade_rmse=0.05, grade_rmse_later=0.05, mass_rmse=0.01, mass_rmse_later=0.01, settled=5.0)
+    values = {name: np.full(shape, value) for name, value in usual.items()}
     values["mass_error"] = np.stack([np.full(shape[1:], errors.get(name, 0.001)) for name in names])
     design = sweeps.Design(estimator=dict.fromkeys(names), pedals=(0.1,), guess=study.guesses)
     return experiment.Raced(study, (0.1,), None, sweeps.Swept(design, 2, values))
@@ -157,6 +163,8 @@ def test_numbers_of_a_known_course():
     of = jax.jit(lambda found: metrics(SMALL, found, drive))
     mass = np.where(np.arange(601) < 200, 5000.0, 1.01 * SMALL.mass)
     found = of(Found(mass, np.full(601, 0.01), np.int32(0)))
+    np.testing.assert_allclose(found["mass_rmse"], np.sqrt(np.mean((mass / SMALL.mass - 1.0) ** 2)), rtol=1e-9)
+    np.testing.assert_allclose(found["mass_rmse_later"], 0.01, rtol=1e-9)
     np.testing.assert_allclose(found["mass_error"], 0.01, rtol=1e-9)
     np.testing.assert_allclose(found["settled"], 20.0)
     np.testing.assert_allclose(found["grade_rmse"], np.rad2deg(0.01))
@@ -208,7 +216,11 @@ EVERY = list(contestants(SMALL))
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n in ("UKF", "accelerometer", "RLS") else pytest.mark.full) for n in EVERY]
+    "name",
+    [
+        pytest.param(n, marks=[] if n in ("UKF", "accelerometer", "RLS", "high-pass") else pytest.mark.full)
+        for n in EVERY
+    ],
 )
 def test_no_contestant_looks_ahead(name):
     """What comes after a row, a touch of the brake in the very next one too, changes nothing up to it."""
@@ -237,3 +249,78 @@ def test_no_contestant_looks_ahead(name):
     assert any(moved) or name == "first guess"
     np.testing.assert_allclose(changed.mass[: last + 1], found.mass[: last + 1], rtol=1e-9)
     np.testing.assert_allclose(changed.grade[: last + 1], found.grade[: last + 1], atol=1e-9)
+
+
+def made_up_drive(study, rows, rate=0.0, slope=0.0, braking=0.0):
+    """A drive that speeds up at a `rate` (m/s^2) on a constant `slope` (rad), by the filter's own car."""
+    car, t = own_drives.model_car(study), study.dt * np.arange(rows)
+    v, turning = 15.0 + rate * t, 4.0 * car.wheel_inertia / car.wheel_radius**2
+    pulls = study.mass * GRAVITY * (np.sin(slope) + car.rolling_resistance) + car.drag * v**2
+    torque = car.wheel_radius * ((study.mass + turning) * rate + pulls)
+    # The brake's force is in the speed, not in the torque that is told.
+    touched = braking * np.ones(rows)
+    felt = np.full(rows, rate + GRAVITY * np.sin(slope))
+    return own_drives.Drive(v, felt, torque, touched, v, np.full(rows, slope), felt)
+
+
+def test_the_grade_that_a_force_leaves_over_is_the_roads():
+    drive = made_up_drive(SMALL, 41, rate=0.2, slope=0.03)
+    of = jax.jit(lambda drive, mass: grade_of_force(SMALL, jnp.full(41, mass), drive))
+    found = np.asarray(of(drive, SMALL.mass))
+    past = round(OVER / SMALL.dt)
+    np.testing.assert_allclose(found[past:], 0.03, atol=2e-4)
+    np.testing.assert_array_equal(found[:past], 0.0)
+    # A tenth too heavy, the same force is worth less.
+    assert np.all(of(drive, 1.1 * SMALL.mass)[past:] < 0.03 - 0.003)
+    # While the brake is touched, and as long as the averages remember it, the grade stays.
+    touched = np.where((np.arange(41) >= 20) & (np.arange(41) < 23), 1.0, 0.0)
+    held = np.asarray(of(drive._replace(braking=touched, v_x=drive.v_x - 0.5 * np.cumsum(touched)), SMALL.mass))
+    np.testing.assert_allclose(held[20 : 23 + past], held[19], rtol=1e-12)
+
+
+def test_a_gate_keeps_the_first_guess_on_a_gentle_drive_and_opens_on_a_lively_one():
+    """Of the library's method of reference 8, which the paper's drives leave with nothing to do."""
+    of = jax.jit(lambda drive: contestants(SMALL)["gated"].run(SMALL, jnp.asarray(4000.0), drive))
+    gentle, lively = (of(made_up_drive(SMALL, 201, rate=rate)) for rate in (0.3, 1.0))
+    np.testing.assert_allclose(gentle.mass, 4000.0, rtol=1e-9)
+    np.testing.assert_allclose(lively.mass[-1], SMALL.mass, rtol=0.01)
+
+
+def test_claims_are_judged_by_intervals_and_shown_beside_doing_nothing():
+    raced = made_up(SMALL, **{"AUKF": 0.02, "UKF": 0.01, "gated": 0.3, "first guess": 0.4})
+    rows = {claim: rest for _, claim, *rest in claims_table(raced).rows}
+    better, gate, worst = (
+        next(row for claim, row in rows.items() if what in claim) for what in ("ends", "stops", "final")
+    )
+    assert better[0].startswith("2 ") and better[2].startswith("0.05 ") and better[-1] == FAILED
+    assert gate[0].startswith("0.0667") and gate[-1] == MET
+    assert worst[0].startswith("2 ") and worst[2].startswith("40 ") and worst[-1] == MET
+
+
+def test_the_table_of_the_drives_measures_them():
+    drive = jax.tree.map(lambda leaf: np.stack([leaf, leaf])[None], made_up_drive(SMALL, 201, rate=0.5, slope=0.02))
+    rows = {name: cells for name, *cells in drives_table(made_up(SMALL)._replace(drives=drive)).rows}
+    assert rows["highest speed, km/h"][0].startswith("90 ") and rows["highest speed, km/h"][1] == "85"
+    assert rows["mean |dv/dt|, m/s^2"][0].startswith("0.5 ")
+    # The accelerometer feels the slope, too: above the gate, where the speed's rate is below it.
+    share = [rows[name][0] for name in rows if name.startswith("time above 0.6")]
+    assert share[0].startswith("0 ") and share[1].startswith("100 ")
+
+
+def test_the_figure_of_the_car_shows_the_brake_and_whether_the_filter_goes_on():
+    from jaxveh.experiments.mass_grade_aukf.figures import drive_figure
+
+    study = dataclasses.replace(SMALL, touches=1)
+    touched = np.where((np.arange(61) >= 20) & (np.arange(61) < 40), 1.0, 0.0)
+    drive = made_up_drive(study, 61)._replace(braking=touched)
+    run = jax.jit(lambda drive: metrics(study, contestants(study)["UKF"].run(study, jnp.asarray(4000.0), drive), drive))
+    raced = made_up(study)
+    raced.found.values["moves"] = np.broadcast_to(run(drive)["moves"], (len(contestants(study)), 1, 1, 2, 61))
+    drives = jax.tree.map(lambda leaf: np.asarray(leaf)[None, None], drive)
+    axes = drive_figure(raced._replace(drives=drives)).axes
+    labels = [one.get_ylabel().replace("\n", " ") for one in axes]
+    assert labels[1:3] == ["force at the wheels [kN]", "acceleration [m/s²]"] and axes[-1].get_xlabel() == "time [s]"
+    brake, state = (one.lines[0].get_ydata() for one in axes[3:])
+    # The time up to a pause's first row is predicted still.
+    np.testing.assert_array_equal(state[1:], 1.0 - brake[1:] * brake[:-1])
+    np.testing.assert_array_equal(brake, touched)

@@ -141,7 +141,7 @@ def test_what_knows_outliers_beats_what_does_not(drives):
     assert error(TOLD, "both", "sideslip") < error(REDESIGNED, "both", "sideslip")
     assert (raced.found["result"] == 0).all()
     assert raced.of("course", PLAIN, "both").shape == (3, 251)
-    assert experiment.settings(experiment.Reproduction(3, raced, raced, raced, raced))["cases"]["both"]["level"] == 6.0
+    assert experiment.settings(experiment.Reproduction(3, *[raced] * 6))["cases"]["both"]["level"] == 6.0
 
 
 def test_who_is_told_weighs_by_the_true_noise_and_leaves_out_what_is_wild(drives):
@@ -259,12 +259,12 @@ def test_filters_are_told_the_relaxation_length_that_the_case_says():
 
     def run(study, car, drive, key):
         told_lengths.append(float(study.relaxation))
-        kind = models.record_type("Report", ("v_x", "v_y", "yaw_rate", "sideslip"))
+        kind = models.record_type("Report", models.SIX)
         return dataclasses.make_dataclass("Found", ("mean", "log_likelihood", "result"))(
-            kind(*[jnp.zeros(3)] * 4), 0.0, 0
+            kind(*[jnp.zeros(3)] * len(models.SIX)), 0.0, 0
         )
 
-    drive = own_drives.Drive(*[jnp.zeros(3)] * len(own_drives.Drive._fields))
+    drive = own_drives.Drive(*[jnp.zeros(3)] * len(own_drives.Drive._fields))._replace(true_rims=jnp.zeros((3, 4)))
     point = of_a_point(SMALL, Contestant(run, ""), quick_tyre)
     for case in (experiment.Case(), experiment.Case(relaxation=0.5)):
         point(None, None, (case, drive))
@@ -289,6 +289,8 @@ def test_criteria_are_asked_of_the_first_contestant_that_knows_nothing():
         pressed=None,
         unaware=made_up(cases, both={ADAPTIVE: 0.90, REDESIGNED: 0.77, STUDENT: 0.95, ROBUST: 0.80}),
         misled=made_up(wrong, **{"both, half": {ADAPTIVE: 0.6}, "both, double": {ADAPTIVE: 0.81, PLAIN: 0.9}}),
+        beside=None,
+        slow=None,
     )
     checks = report.check(result)
     found = {(check.name.split(";")[0].split(": ")[1], check.name.split("; ")[1]): check for check in checks[:6]}
@@ -410,11 +412,13 @@ def test_the_printed_tyre_jumps():
 
 def test_numbers_of_a_known_course(drives):
     drive = own_drives.Drive(*(jnp.asarray(leaf[0, 0]) for leaf in drives))
-    kind = models.record_type("Report", ("v_x", "v_y", "yaw_rate", "sideslip"))
-    mean = kind(drive.true_v_x, drive.true_v_y + 0.1, drive.true_yaw_rate, drive.true_sideslip + jnp.deg2rad(0.5))
+    truth = {name: getattr(drive, f"true_{name}") for name in models.SIX}
+    wrong = {"v_y": truth["v_y"] + 0.1, "sideslip": truth["sideslip"] + jnp.deg2rad(0.5), "a_y": truth["a_y"] - 0.3}
+    mean = models.record_type("Report", models.SIX)(**{**truth, **wrong})
     found = dataclasses.make_dataclass("Found", ("mean", "log_likelihood", "result"))(mean, 0.0, 0)
     numbers = metrics(found, drive)
-    np.testing.assert_allclose([numbers["sideslip"], numbers["v_y"], numbers["yaw_rate"]], [0.5, 0.1, 0.0], atol=1e-12)
+    said = [numbers[name] for name in ("sideslip", "v_y", "yaw_rate", "a_y", "a_x")]
+    np.testing.assert_allclose(said, [0.5, 0.1, 0.0, 0.3, 0.0], atol=1e-12)
 
 
 def test_every_contestant_says_what_it_is():

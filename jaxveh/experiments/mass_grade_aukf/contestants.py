@@ -3,38 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 
-from jaxveh import filters, observers
+from jaxveh import filters
 from jaxveh._core.bijectors import Real
 from jaxveh._core.names import record_type
 from jaxveh.estimators import mass_and_grade
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, model_car, times
+from jaxveh.experiments.mass_grade_aukf.found import Contestant, Found
+from jaxveh.experiments.mass_grade_aukf.least_squares import of_library, recursive_least_squares
 from jaxveh.experiments.mass_grade_aukf.settings import Study
 from jaxveh.filters import kit as filters_kit
-from jaxveh.statespace import Gaussian, Prior, Row, StateSpace
+from jaxveh.statespace import Row, StateSpace
 from jaxveh.statespace import kit as statespace_kit
-from jaxveh.vehicles import GRAVITY
-
-
-class Found(NamedTuple):
-    """Estimates over time: `mass` (kg) and `grade` (rad), (T,); `result`, the first failing code."""
-
-    mass: Any
-    grade: Any
-    result: Any
-
-
-class Contestant(NamedTuple):
-    """`run(study, guess, drive) -> Found`, and what it is, in words."""
-
-    run: Callable[[Study, Any, Drive], Found]
-    what: str
-
 
 WALK = 2e-3
 """How far a grade that walks goes, rad per root second: some 4 degrees in ten minutes' changes, 0.1 degree in a second."""
@@ -48,7 +32,22 @@ def contestants(study: Study) -> dict[str, Contestant]:
         "UKF, timid": Contestant(_walking_grade(spread=0.05), "the same, sure of its first guess by 5 %"),
         "AUKF as printed": Contestant(_adaptive(freeze=True), "eqs 22 to 25 around additive mass"),
         "AUKF": Contestant(_adaptive(freeze=False), "eqs 22 to 24: without the scaled covariance of eq 25"),
-        "RLS": Contestant(_least_squares, "two forgetting factors on differences over a second (Vahidi et al. 2005)"),
+        "EKF": Contestant(_walking_grade(spread=0.4, kind=filters.Extended), "as the UKF, linearised (refs 9, 10)"),
+        "RLS": Contestant(
+            recursive_least_squares, "two forgetting factors on differences over a second (Vahidi et al. 2005)"
+        ),
+        "gated": Contestant(
+            of_library("gated"), "least squares above 0.6 m/s^2 as felt (ref. 8); the grade is what is left"
+        ),
+        "high-pass": Contestant(
+            of_library("high_pass"), "least squares of what is faster than 4 s (ref. 11); the grade is what is left"
+        ),
+        "kinematic grade": Contestant(
+            of_library("kinematic_grade"), "grade by accelerometer and speed, then least squares (refs 12, 13)"
+        ),
+        "library's filter": Contestant(
+            of_library("filter"), "what `jaxveh.estimators.mass` recommends: accelerometer, offset, slip"
+        ),
         "grade rate": Contestant(_smooth(), "the grade's rate walks: what is fast is the mass's"),
         "accelerometer": Contestant(_smooth(aided=True), "grade rate and accelerometer"),
         "accelerometer with bias": Contestant(_smooth(aided=True, bias=0.02), "the same, its offset a state"),
@@ -107,10 +106,10 @@ def _guess(study: Study, guess, drive: Drive) -> Found:
     return _run_filter(filters.Unscented(), model, study, drive)
 
 
-def _walking_grade(spread: float):
+def _walking_grade(spread: float, kind: Callable[[], Any] = filters.Unscented):
     def run(study, guess, drive):
         model = _model(study, guess, drive, mass_spread=spread, grade_walk=WALK, grade_rate_walk=None)
-        return _run_filter(filters.Unscented(), model, study, drive)
+        return _run_filter(kind(), model, study, drive)
 
     return run
 
@@ -149,83 +148,3 @@ class Frozen(filters_kit.AbstractStateless):
         form = statespace_kit.innermost(self).form
         inside = filters_kit.with_spread(after.inside, after.inside.vector, form.start(P * scales))
         return filters_kit.Remembering(inside, after.memory), info
-
-
-OVER = 1.0
-"""s over which speeds are differenced and torques averaged for the least squares."""
-
-
-def _least_squares(study: Study, guess, drive: Drive) -> Found:
-    """(dv/dt + air / m0) = F / m - g (sin grade + f_r): linear in 1 / m and the sum of grade and rolling resistance.
-
-    The air's drag and the turning wheels count with the first guess' mass; they are a few per cent.
-    """
-    car = model_car(study)
-    n = round(OVER / study.dt)
-    # Trapezia between the rows whose speeds are differenced.
-    running = lambda x: jnp.concatenate([jnp.zeros(1), jnp.cumsum(0.5 * (x[1:] + x[:-1]))])
-    mean = lambda x: (running(x)[n:] - running(x)[:-n]) / n
-    rate = (drive.v_x[n:] - drive.v_x[:-n]) / OVER
-    force = mean(drive.torque / car.wheel_radius - car.drag * drive.v_x**2)
-    braked = mean(drive.braking) > 1e-9
-    wheels = 4.0 * car.wheel_inertia / car.wheel_radius**2
-    fields = record_type("LeastSquaresState", ("per_tonne", "pull"))
-    model = StateSpace(
-        transition=_stay, observation=_acceleration, process_noise=None,
-        measurement_noise=Gaussian({"rate": study.v_x * 2**0.5 / OVER}),
-        prior=Prior(fields(1000.0 / (guess + wheels), 0.0), {"per_tonne": 0.4 * 1000.0 / 5758.0 * 2, "pull": 0.5}),
-        inputs=("kilonewton",),
-    )  # fmt: skip
-    time = times(study, rate.shape[0] + n)[n:]
-    u = record_type("Inputs", ("kilonewton",))(force / 1000.0)
-    # Averages overlap: every n-th row alone is new.
-    fresh = (jnp.arange(rate.shape[0]) % n == 0) & ~braked
-    y = record_type("Measurements", ("rate",))(jnp.where(fresh, rate, jnp.nan))
-    method = observers.RecursiveLeastSquares(np.array([1.0, 0.8]), separate=True)
-    estimate = filters.scan(method, model, Row(time, u, y))
-    # Never negative, which the reciprocal would make of a wild first row.
-    mass = 1000.0 / jnp.maximum(estimate.mean.per_tonne, 0.02) - wheels
-    grade = estimate.mean.pull / GRAVITY - car.rolling_resistance
-    first = lambda x, value: jnp.where(jnp.arange(n + x.shape[0]) < n, value, jnp.pad(x, (n, 0), mode="edge"))
-    return Found(first(mass, guess), first(grade, 0.0), estimate.result)
-
-
-def _stay(system, t0, t1, x, u):
-    return x
-
-
-def _acceleration(system, t, x, u):
-    return record_type("Outputs", ("rate",))(x.per_tonne * u.kilonewton - x.pull)
-
-
-def metrics(study: Study, found: Found, drive: Drive) -> dict[str, Any]:
-    """Final mass error (share), when it settled within 3 % (s; infinite: never), grade RMSE (degrees) over the whole drive and
-    after its first minute (brake touches left out), the errors over time, and the result."""
-    error = jnp.abs(found.mass / study.mass - 1.0)
-    time = times(study, error.shape[0])
-    # The last row outside ends the wait.
-    outside = (error > 0.03) | ~jnp.isfinite(error)
-    last = jnp.max(jnp.where(outside, time, -study.dt))
-    settled = jnp.where(outside[-1], jnp.inf, last + study.dt)
-    wrong = jnp.rad2deg(found.grade - drive.true_grade)
-    rms = lambda rows: jnp.sqrt(jnp.sum(jnp.where(rows, wrong**2, 0.0)) / jnp.sum(rows.astype(wrong.dtype)))
-    free = drive.braking < 0.5
-    every = round(1.0 / study.dt)
-    return {
-        "mass_error": error[-1],
-        "settled": settled,
-        "grade_rmse": rms(free),
-        "grade_rmse_later": rms(free & (time >= min(60.0, 0.5 * study.duration))),
-        "mass": found.mass[::every],
-        "grade": found.grade[::every],
-        "result": found.result,
-    }
-
-
-def of_a_point(study: Study, contestant: Contestant) -> Callable[[Any, Drive], dict[str, Any]]:
-    """The contestant's run of a design's point: `run(point, drive)`, as `sweeps.sweep` calls it."""
-
-    def run(point, drive):
-        return metrics(study, contestant.run(study, point.guess, drive), drive)
-
-    return run

@@ -1,4 +1,4 @@
-"""The study's pictures: the mass over time, the grade of one drive, what pedals are worth."""
+"""The study's pictures: the drive, the mass over time, the grade of one drive and its error, what pedals are worth."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from jaxveh.experiments.mass_grade_aukf.drives import model_car
 from jaxveh.experiments.mass_grade_aukf.report import Reproduction
+from jaxveh.experiments.mass_grade_aukf.settings import GATE
 from jaxveh.experiments.mass_grade_aukf.study import Raced
 from jaxveh.plots import COLOURS, kit, style
 
@@ -20,6 +22,7 @@ def figures(result: Reproduction) -> dict[str, Any]:
     """Every figure by the name of its file."""
     drawn = {}
     for raced in (result.truck, result.car):
+        drawn[f"{raced.study.name}_drive"] = drive_figure(raced)
         drawn[f"{raced.study.name}_mass"] = mass_figure(raced)
         drawn[f"{raced.study.name}_grade"] = grade_figure(raced)
     return drawn | {"pedals": activity_figure(result.gentle, result.truck)}
@@ -29,6 +32,40 @@ def _names_and_colours(raced: Raced) -> list[tuple[str, str]]:
     """Names and colours of the estimators of the figures that were in this race."""
     there = raced.found.design.axis("estimator").labels
     return [(name, colour) for name, colour in zip(SHOWN, SPELLS, strict=True) if name in there]
+
+
+def drive_figure(raced: Raced, seed: int = 0, guess: int = 0, figure: Any = None) -> Any:
+    """One drive, as figures 3, 4 and 8 of the paper for the truck and 12, 13 and 15 to 17 for the car: speed, force at the
+    wheels, acceleration; where brakes are touched, the brake's signal and whether a UKF that pauses goes on."""
+    study = raced.study
+    panels = 5 if study.touches else 3
+    figure = (
+        kit.Figure(figsize=(kit.PAGE_WIDTH, 1.3 * panels + 0.4), layout="constrained") if figure is None else figure
+    )
+    speed, torque, braking = (x[-1, seed] for x in (raced.drives.true_v_x, raced.drives.torque, raced.drives.braking))
+    time = study.dt * np.arange(len(speed))
+    rate = np.gradient(speed, study.dt)
+    drawn = [
+        ("speed [km/h]", 3.6 * speed),
+        ("force at the\nwheels [kN]", torque / float(model_car(study).wheel_radius) / 1000.0),
+        ("acceleration\n[m/s²]", rate),
+    ]
+    if study.touches:
+        moves = raced.found.at("moves", estimator="UKF", pedals=raced.pedals[-1])[guess, seed]
+        drawn += [("brake touched\n[0 or 1]", braking), ("UKF goes on\n[0 or 1]", moves)]
+    with style():
+        axes = figure.subplots(panels, 1, sharex=True)
+        for one, (label, values) in zip(axes, drawn, strict=True):
+            one.plot(time, values, color=COLOURS["truth"], drawstyle="steps-post" if label[-3:] == "1]" else "default")
+            one.set(ylabel=label)
+        for one in axes[3:]:
+            one.set(ylim=(-0.15, 1.15), yticks=(0, 1))
+        for gate in (-GATE, GATE):
+            axes[2].axhline(gate, color="#444444", linewidth=0.6, linestyle=":")
+        axes[0].set(title=f"{study.name}, one drive; dotted: {GATE:g} m/s², below which reference 8 does not estimate")
+        axes[-1].set(xlabel="time [s]")
+        figure.align_ylabels()
+    return figure
 
 
 def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
@@ -54,20 +91,24 @@ def mass_figure(raced: Raced, guess: int = 0, figure: Any = None) -> Any:
 
 
 def grade_figure(raced: Raced, seed: int = 0, guess: int = 0, figure: Any = None) -> Any:
-    """True and estimated grade of one drive, and the speed above it."""
-    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 4.4), layout="constrained") if figure is None else figure
+    """True and estimated grade of one drive, as figures 9 and 18 of the paper, and the error as 10 and 19; the speed above."""
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 6.0), layout="constrained") if figure is None else figure
     every = round(1.0 / raced.study.dt)
     with style():
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
-        speed = raced.drives.true_v_x[-1, seed, ::every]
+        above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 2, 2))
+        speed, truth = (x[-1, seed, ::every] for x in (raced.drives.true_v_x, raced.drives.true_grade))
         time = np.arange(len(speed))
         above.plot(time, 3.6 * speed, color=COLOURS["truth"])
         above.set(ylabel="speed [km/h]", title=f"{raced.study.name}, one drive from {raced.study.guesses[guess]:g} kg")
-        below.plot(time, np.rad2deg(raced.drives.true_grade[-1, seed, ::every]), color=COLOURS["truth"], label="truth")
+        middle.plot(time, np.rad2deg(truth), color=COLOURS["truth"], label="truth")
         for name, colour in [pair for pair in _names_and_colours(raced) if pair[0] in SHOWN[1:4]]:
             grade = raced.found.at("grade", estimator=name, pedals=raced.pedals[-1])[guess, seed]
-            below.plot(time, np.rad2deg(grade), color=colour, label=name)
-        below.set(xlabel="time [s]", ylabel="grade [°]")
+            middle.plot(time, np.rad2deg(grade), color=colour, label=name)
+            below.plot(time, np.rad2deg(grade - truth), color=colour)
+        middle.set(ylabel="grade [°]")
+        below.axhline(0.0, color=COLOURS["truth"], linewidth=0.6)
+        below.set(xlabel="time [s]", ylabel="error of the\ngrade [°]", ylim=(-1.0, 1.0))
+        figure.align_ylabels()
         figure.legend(loc="outside upper left", ncols=4)
     return figure
 

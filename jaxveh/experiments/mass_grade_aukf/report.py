@@ -12,6 +12,7 @@ import numpy as np
 from jaxveh._core.progress import Progress, part, silent
 from jaxveh.diagnostics import Observability
 from jaxveh.experiments.mass_grade_aukf import criteria as named
+from jaxveh.experiments.mass_grade_aukf.claims import claims_table, drives_table
 from jaxveh.experiments.mass_grade_aukf.contestants import contestants, pausing_name
 from jaxveh.experiments.mass_grade_aukf.criteria import AIDED, BIASED, CRITERIA, RATE, STILL
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, disturb, drive_once
@@ -189,10 +190,12 @@ def check(result: Reproduction) -> list[Check]:
 def tables(result: Reproduction) -> list[Table]:
     """The tables, the do-nothing first guess in each."""
     return [
+        drives_table(result.truck, result.car),
         _race_table(result.truck, "Truck"),
         _activity_table(result),
         _guess_table(result),
         _race_table(result.car, "Car with brake touches"),
+        claims_table(result.truck, result.car),
         _disturbed_table(result),
         _observed_table(result),
     ]
@@ -205,15 +208,18 @@ def _race_table(raced: Raced, title: str) -> Table:
         cells = [
             spread(_of(raced, "mass_error", name), scale=100.0),
             spread(_of(raced, "settled", name), lost="never"),
+            spread(_of(raced, "mass_rmse", name), scale=100.0),
             spread(_of(raced, "grade_rmse", name)),
         ]
-        rows.append((name, *cells, printed.get(name.removesuffix(" as printed"), ""), contestant.what))
+        paper, later = printed.get(name.removesuffix(" as printed"), ""), spread(_of(raced, "grade_rmse_later", name))
+        rows.append((name, *cells, paper, later, contestant.what))
     guesses, seeds = _of(raced, "mass_error", rows[0][0]).shape
     return Table(
         f"{title}, pedals {raced.pedals[-1]:g} m/s^2: median [quartiles] over {seeds} seeds and {guesses} guess(es)",
-        ("estimator", "final mass error, %", "within 3 % from, s", "grade RMSE, degrees", "paper's", "what it is"),
+        ("estimator", "final mass error, %", "within 3 % from, s", "mass RMSE, %", "grade RMSE, degrees", "paper's",
+         "after a minute", "what it is"),
         rows,
-    )
+    )  # fmt: skip
 
 
 def _activity_table(result: Reproduction) -> Table:

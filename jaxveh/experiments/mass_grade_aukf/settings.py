@@ -22,6 +22,9 @@ CAR = {"UKF": 1614.0, "AUKF": 1694.0}
 GRADE_RMSE = {"truck": {"AUKF": 0.38, "UKF": 0.51}, "car": {"AUKF": 0.16, "UKF": 0.29}}
 """Degrees, as printed."""
 
+GATE = 0.6
+"""m/s^2 below which reference 8 of the paper stops to estimate."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Study:

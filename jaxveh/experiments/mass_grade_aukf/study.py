@@ -10,8 +10,9 @@ import numpy as np
 from jaxveh import sweeps
 from jaxveh._core.errors import check_whole
 from jaxveh._core.progress import Progress, silent
-from jaxveh.experiments.mass_grade_aukf.contestants import contestants, of_a_point
+from jaxveh.experiments.mass_grade_aukf.contestants import contestants
 from jaxveh.experiments.mass_grade_aukf.drives import Drive, drive_once
+from jaxveh.experiments.mass_grade_aukf.found import of_a_point
 from jaxveh.experiments.mass_grade_aukf.settings import Study
 from jaxveh.sweeps import IN_MEMORY, Stores
 

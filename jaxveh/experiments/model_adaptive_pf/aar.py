@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.errors import check_whole
 from jaxveh.experiments.model_adaptive_pf.models import BodyState
 from jaxveh.filters import kit
 from jaxveh.statespace import AbstractFilter, AbstractWrapper, StateSpace
@@ -68,3 +69,58 @@ class AutoRegressive(AbstractWrapper):
 
 def _with_memory(model: StateSpace, memory: Learned) -> Any:
     return eqx.tree_at(lambda m: m.system.keeps, model, memory.keeps)
+
+
+class Fitted(NamedTuple):
+    """`coefficients` [A_1, ..., A_p] (3, 3 p) and the `spread` P (3 p, 3 p) of least squares, and `past`: the last p means, the
+    newest first (3 p,); all in units of `first`."""
+
+    coefficients: Any
+    spread: Any
+    past: Any
+
+
+class MatrixAutoRegressive(AbstractWrapper):
+    """`inner` of a `matrix_autoregression` model: eqs 20 to 25 of order `order`, each state by all states of the last p rows.
+
+    With phi the means of these rows, e = X_t - A phi and U = `update`, least squares with forgetting, corrected as
+    `AutoRegressive` is: `k = P phi / (1 - U + phi' P phi)`, `A += e k'`, `P = (P - k phi' P) / (1 - U)`. It starts at A_1 = I,
+    the rest at nothing, and P = I in units of `first` (m/s, m/s, rad/s). Rows before the last are the filter's means, not each
+    particle's own past.
+    """
+
+    inner: AbstractFilter
+    order: int = eqx.field(static=True, default=1)
+    update: float = eqx.field(static=True, default=0.02)
+    first: tuple[float, float, float] = eqx.field(static=True, default=(10.0, 0.1, 0.1))
+
+    def __check_init__(self):
+        check_whole("MatrixAutoRegressive.order", self.order)
+
+    def check(self, model):
+        self.inner.check(model)
+
+    def _init(self, model, row, key):
+        inside, info = self.inner._init(model, row, key)
+        now, n = self._scaled(inside.mean), 3 * self.order
+        return kit.Remembering(inside, Fitted(jnp.eye(3, n), jnp.eye(n), jnp.tile(now, self.order))), info
+
+    def _step(self, model, belief, row):
+        memory, sizes = belief.memory, jnp.asarray(self.first)
+        own = memory.coefficients[:, :3] * sizes[:, None] / sizes
+        added = sizes * (memory.coefficients[:, 3:] @ memory.past[3:])
+        where = lambda m: (m.system.own, m.system.offset)
+        inside, info = self.inner._step(eqx.tree_at(where, model, (own, BodyState(*added))), belief.inside, row)
+        return kit.Remembering(inside, self.learn(memory, self._scaled(inside.mean))), info
+
+    def learn(self, memory: Fitted, now: Any) -> Fitted:
+        """What is known after the mean `now` (3,)."""
+        U, phi = self.update, memory.past
+        k = memory.spread @ phi / (1.0 - U + phi @ memory.spread @ phi)
+        A = memory.coefficients + jnp.outer(now - memory.coefficients @ phi, k)
+        P = (memory.spread - jnp.outer(k, phi @ memory.spread)) / (1.0 - U)
+        return Fitted(A, 0.5 * (P + P.T), jnp.concatenate([now, phi[:-3]]))
+
+    def _scaled(self, mean: Any):
+        """The body's mean in units of `first`, (3,)."""
+        return jnp.stack(list(mean)[:3]) / jnp.asarray(self.first)

@@ -14,6 +14,8 @@ from jaxveh._core.names import record_type
 from jaxveh.experiments.model_adaptive_pf.aar import AutoRegressive
 from jaxveh.experiments.model_adaptive_pf.drives import Drive, fiala, model_car
 from jaxveh.experiments.model_adaptive_pf.models import (
+    RIMS,
+    SIX,
     autoregression,
     dynamics,
     gaussian,
@@ -166,15 +168,34 @@ def _open_loop(lags: bool) -> Run:
     return run
 
 
+EVERY = 5
+"""Rows between those that are kept of six states."""
+
+
+def _slip_error(found: Estimate, drive: Drive) -> jax.Array:
+    """RMSE of `S = (r_e w - v_x) / v_x` (eq 7, with the car's own v_x) over all wheels; who knows of no spin says zero."""
+    slip = lambda rims, v_x: rims / v_x[:, None] - 1.0
+    true = slip(drive.true_rims, drive.true_v_x)
+    said = jnp.zeros_like(true)
+    if hasattr(found.mean, RIMS[0]):
+        said = slip(jnp.stack([getattr(found.mean, name) for name in RIMS], axis=-1), found.mean.v_x)
+    return jnp.sqrt(jnp.mean((said - true) ** 2))
+
+
 def metrics(found: Estimate, drive: Drive) -> dict[str, Any]:
-    """Root mean squares over the drive of the errors of `sideslip` (degrees), `v_y` (m/s), `yaw_rate` (degrees/s) and `v_x`
-    (m/s); the sideslip over time (rad), and the result's code."""
+    """Root mean squares over the drive of the errors of `sideslip` (degrees), `v_y` (m/s), `yaw_rate` (degrees/s), `v_x` (m/s),
+    `a_x` and `a_y` (m/s^2), and of the wheels' slips (%, where they spin; of other filters: of none); the sideslip over time
+    (rad), all six every `EVERY` rows, and the result's code."""
     rms = lambda name: jnp.sqrt(jnp.mean((getattr(found.mean, name) - getattr(drive, f"true_{name}")) ** 2))
     return {
         "sideslip": jnp.rad2deg(rms("sideslip")),
         "v_y": rms("v_y"),
         "yaw_rate": jnp.rad2deg(rms("yaw_rate")),
         "v_x": rms("v_x"),
+        "a_x": rms("a_x"),
+        "a_y": rms("a_y"),
+        "slip": 100.0 * _slip_error(found, drive),
+        "six": jnp.stack([getattr(found.mean, name)[::EVERY] for name in SIX]),
         "course": found.mean.sideslip,
         "log_likelihood": found.log_likelihood,
         "result": found.result,
@@ -191,7 +212,9 @@ def of_a_point(
         del point
         case, drive = data
         noises = {name: case.process * getattr(study, name) for name in ("v_x_noise", "v_y_noise", "yaw_noise")}
-        own = dataclasses.replace(study, relaxation=case.relaxation * study.relaxation, **noises)
+        own = dataclasses.replace(
+            study, relaxation=case.relaxation * study.relaxation, friction=case.told * study.friction, **noises
+        )
         return metrics(contestant.run(own, model_car(own, tyre(own, case.tyre)), drive, key), drive)
 
     return run

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh import manoeuvres, numerics, roads, vehicles
+from jaxveh._core.recording import Recording
 from jaxveh.experiments.model_adaptive_pf.settings import Case, Study
 from jaxveh.simulation import simulate
 from jaxveh.statespace import RolledRK4
@@ -23,12 +24,17 @@ START = 1.0
 HARMONICS = 20
 """Of which slopes are made."""
 
+WHEELS = ("fl", "fr", "rl", "rr")
+"""In the order of the rims."""
+
 
 class Drive(NamedTuple):
     """What filters may see, (T,) each, and the truth.
 
     `steer` (rad), `drive_torque`, `brake_torque` (N m) exact; `v_x` (m/s), `a_y` (m/s^2), `yaw_rate` (rad/s) measured, and the
-    noise's `level` over the data sheet's; `true_v_x`, `true_v_y` (m/s), `true_yaw_rate`, `true_a_y`, `true_sideslip` (rad).
+    noise's `level` over the data sheet's; `true_v_x`, `true_v_y` (m/s), `true_yaw_rate`, `true_a_y`, `true_sideslip` (rad),
+    `true_a_x` (m/s^2). `rims` (m/s, (T, 4)): each wheel's spin times its radius as measured, and `true_rims`; NaN of a truth
+    whose wheels do not spin.
     """
 
     steer: Any
@@ -43,6 +49,9 @@ class Drive(NamedTuple):
     true_yaw_rate: Any
     true_a_y: Any
     true_sideslip: Any
+    true_a_x: Any
+    rims: Any
+    true_rims: Any
 
 
 def times(study: Study) -> jax.Array:
@@ -83,6 +92,11 @@ def fiala(study: Study, tyre=1.0, **changes) -> AbstractTyre:
     return FialaPolynomial(**(numbers | changes))
 
 
+def spinning_car(study: Study, tyre: AbstractTyre) -> SevenDOF:
+    """The paper's own car of a filter: seven degrees of freedom on these tyres."""
+    return vehicles.build(numbers_of(study), SevenDOF, front=tyre, rear=tyre, load_transfer=QuasiStatic())
+
+
 def model_car(study: Study, tyre: AbstractTyre) -> TwoTrack3DOF:
     """What a filter knows: the same car on these tyres, its spins and load transfer following at once."""
     return vehicles.build(
@@ -95,7 +109,7 @@ def drive_once(study: Study, case: Case, key) -> Drive:
     driver_key, sensor_key, road_key = jax.random.split(key, 3)
     speed, steer = jax.random.normal(driver_key, (2,))
     manoeuvre = manoeuvres.slalom(
-        study.speed * (1.0 + study.speed_spread * speed),
+        study.speed * case.speed * (1.0 + study.speed_spread * speed),
         case.steer * (math.pi / 180.0) * (1.0 + study.steer_spread * steer),
         frequency=study.frequency, periods=study.periods, start=START, duration=study.duration,
     )  # fmt: skip
@@ -103,14 +117,26 @@ def drive_once(study: Study, case: Case, key) -> Drive:
         true_car(study), manoeuvre, None, road=road_of(study, case, road_key), dt=study.dt, max_step=study.max_step,
         start={"v_x": manoeuvre.speed}, throw=False, solver=RolledRK4(),
     )  # fmt: skip
-    truth = {name: found[f"true.{name}"] for name in ("v_x", "v_y", "yaw_rate", "a_y", "sideslip")}
+    truth = {name: found[f"true.{name}"] for name in ("v_x", "v_y", "yaw_rate", "a_y", "sideslip", "a_x")}
+    rims = _rims(study, found)
+    rattle = jax.random.normal(jax.random.fold_in(sensor_key, 1), rims.shape)
     noise, level = noise_of(study, case, sensor_key)
     return Drive(
         **{name: found[name] for name in ("steer", "drive_torque", "brake_torque")},
         **{name: truth[name] + noise[name] for name in study.stds},
         level=level,
+        rims=rims + study.rim * level[:, None] * rattle,
+        true_rims=rims,
         **{f"true_{name}": value for name, value in truth.items()},
     )
+
+
+def _rims(study: Study, found: Recording) -> jax.Array:
+    """Speeds of the wheels' rims (T, 4), m/s."""
+    names = [f"true.omega_{at}" for at in WHEELS]
+    if names[0] not in found.names:
+        return jnp.full((len(found), len(WHEELS)), jnp.nan)
+    return study.wheel_radius * jnp.stack([found[name] for name in names], axis=-1)
 
 
 def road_of(study: Study, case: Case, key) -> roads.RandomRoad:
@@ -119,7 +145,7 @@ def road_of(study: Study, case: Case, key) -> roads.RandomRoad:
     std = study.slope * jnp.maximum(case.slope, 1e-6)
     make = lambda k: roads.gauss_markov(std, study.slope_length, k, count=HARMONICS)
     bank_key, grade_key = jax.random.split(key)
-    return roads.RandomRoad(grade=make(grade_key), bank=make(bank_key))
+    return roads.RandomRoad(grade=make(grade_key), bank=make(bank_key), friction=case.friction)
 
 
 def noise_of(study: Study, case: Case, key) -> tuple[dict[str, jax.Array], jax.Array]:

@@ -7,8 +7,9 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh.experiments.model_adaptive_pf.contestants import CUBATURE, PLAIN, REDESIGNED, ROBUST, TOLD
+from jaxveh.experiments.model_adaptive_pf.contestants import CUBATURE, EVERY, PLAIN, REDESIGNED, ROBUST, TOLD
 from jaxveh.experiments.model_adaptive_pf.drives import Drive, fiala, numbers_of, times, true_car
+from jaxveh.experiments.model_adaptive_pf.models import SIX
 from jaxveh.experiments.model_adaptive_pf.printed import printed_tyre
 from jaxveh.experiments.model_adaptive_pf.report import Reproduction, against
 from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, Study
@@ -32,6 +33,8 @@ def figures(result: Reproduction) -> dict[str, Any]:
     return {
         "measured": measured_figure(raced),
         "sideslip": sideslip_figure(raced),
+        "six_states": six_figure(raced, "constant"),
+        "six_states_in_noise": six_figure(raced, "both"),
         "ablation": ablation_figure(raced),
         "gain": gain_figure(raced),
         "process_noise": pressed_figure(result.pressed),
@@ -84,6 +87,35 @@ def sideslip_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any
         above.set(ylim=(1.8 * truth.min(), 1.8 * truth.max()))
         below.set(xlabel="time [s]", ylabel="error [°]", ylim=(-1.0, 1.0))
         figure.legend(loc="outside upper left", ncols=3)
+    return figure
+
+
+def six_figure(raced: Raced, case: str = "both", seed: int = 0, figure: Any = None) -> Any:
+    """The six states of the paper's figure 4 on one drive, by its three methods."""
+    figure = kit.Figure(figsize=(kit.PAGE_WIDTH, 6.0), layout="constrained") if figure is None else figure
+    drive, t = _drive(raced, case, seed), np.asarray(times(raced.study))
+    degrees = 180.0 / np.pi
+    labels = {
+        "v_x": ("v_x [m/s]", 1.0), "v_y": ("v_y [m/s]", 1.0), "a_x": ("a_x [m/s²]", 1.0), "a_y": ("a_y [m/s²]", 1.0),
+        "yaw_rate": ("yaw rate [°/s]", degrees), "sideslip": ("sideslip [°]", degrees),
+    }  # fmt: skip
+    colours = {"strong tracking": "#e0c8b8", PLAIN: kit.CYCLE[0], "AAR": kit.CYCLE[3]}
+    with style():
+        every = figure.subplots(3, 2, sharex=True)
+        for axes, (name, (label, unit)) in zip(every.ravel(), labels.items(), strict=True):
+            truth = unit * getattr(drive, f"true_{name}")
+            for one, colour in colours.items():
+                course = unit * raced.of("six", one, case)[seed, SIX.index(name)]
+                axes.plot(t[::EVERY], course, color=colour, label=one)
+            axes.plot(t, truth, color=COLOURS["truth"], label="truth", linestyle="--")
+            # What outliers do to a filter that knows of none leaves the picture.
+            reach = 1.5 * np.max(np.abs(truth - truth.mean()))
+            axes.set(ylabel=label, ylim=(truth.mean() - reach, truth.mean() + reach))
+        for axes in every[-1]:
+            axes.set(xlabel="time [s]")
+        every[0, 0].set_title(f"One drive of '{case}'")
+        figure.align_ylabels()
+        figure.legend(*every[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=4)
     return figure
 
 

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from jaxveh._core.progress import Progress, part, silent
+from jaxveh.experiments.model_adaptive_pf.beside import FEW, SLOWLY, beside_table, entrants, six_table, slow_table
 from jaxveh.experiments.model_adaptive_pf.contestants import (
     JUDGED,
     PLAIN,
@@ -19,7 +20,7 @@ from jaxveh.experiments.model_adaptive_pf.contestants import (
 )
 from jaxveh.experiments.model_adaptive_pf.criteria import ASKED, CRITERIA, NOTHING, TOLD_LENGTH, Asked
 from jaxveh.experiments.model_adaptive_pf.drives import Drive
-from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, PROCESS, WRONG_LENGTHS, Study
+from jaxveh.experiments.model_adaptive_pf.settings import CASES, LIMIT, PROCESS, SLOW, SWERVE, WRONG_LENGTHS, Study
 from jaxveh.experiments.model_adaptive_pf.study import Raced, drives_of, race
 from jaxveh.experiments.report import Check, at_most, interval, spread, with_terms
 from jaxveh.sweeps import IN_MEMORY, Comparison, Stores, Table, compare
@@ -36,13 +37,16 @@ DENSITIES = (PLAIN, REDESIGNED, ROBUST)
 
 class Reproduction(NamedTuple):
     """Everything the experiment found: `raced`, every case and estimator; `pressed`, some by their process noise; of those that
-    the criteria speak of: on tyres without relaxation, `unaware`, and told half or twice its length, `misled`."""
+    the criteria speak of: on tyres without relaxation, `unaware`, and told half or twice its length, `misled`; what the
+    paper has beside, `beside`, and at 30 km/h and on a loose road, `slow`."""
 
     seeds: int
     raced: Raced
     pressed: Raced
     unaware: Raced
     misled: Raced
+    beside: Raced
+    slow: Raced
 
 
 def run(
@@ -57,10 +61,20 @@ def run(
     study = study or Study()
     # Other drives than those on which the noises were chosen, whose key was another.
     drive_key, filter_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 1))
-    cases = {**CASES, **LIMIT}
+    cases = {**CASES, **LIMIT, **SLOW}
     drives = drives_of(study, cases, seeds, drive_key, progress=part(progress, 0.0, 0.15, "drives"), stores=stores)
-    raced = race(study, cases, drives, filter_key, progress=part(progress, 0.15, 0.7, "filters"), stores=stores)
     on = lambda *names: _drives_on(drives, cases, names)
+    own = {name: cases[name] for name in (*CASES, *LIMIT)}
+    raced = race(study, own, on(*own), filter_key, progress=part(progress, 0.15, 0.6, "filters"), stores=stores)
+    first = lambda *names: jax.tree.map(lambda leaf: leaf[:, :FEW], on(*names))
+    beside = race(
+        study, SWERVE, first(*SWERVE), filter_key, entrants=entrants(study),
+        progress=part(progress, 0.6, 0.65, "what the paper has beside"), stores=stores.under("beside"),
+    )  # fmt: skip
+    slow = race(
+        study, SLOW, first(*SLOW), filter_key, only=SLOWLY, progress=part(progress, 0.65, 0.7, "30 km/h"),
+        stores=stores.under("slow"),
+    )  # fmt: skip
     pressed = race(
         study, PROCESS, on(*["both"] * len(PROCESS)), filter_key, only=PRESSED,
         progress=part(progress, 0.7, 0.8, "process noise"), stores=stores.under("process-noise"),
@@ -75,7 +89,7 @@ def run(
         progress=part(progress, 0.9, 1.0, "wrong relaxation lengths"), stores=stores.under("wrong-lengths"),
     )  # fmt: skip
     progress(1.0, 1.0, "done")
-    return Reproduction(seeds, raced, pressed, unaware, misled)
+    return Reproduction(seeds, raced, pressed, unaware, misled, beside, slow)
 
 
 def _drives_on(drives: Drive, cases: dict[str, Any], names: tuple[str, ...]) -> Drive:
@@ -119,6 +133,9 @@ def tables(result: Reproduction) -> list[Table]:
     return [
         _ablation(raced, "both"),
         *(_errors_table(raced, "both", error) for error in ("v_y", "yaw_rate")),
+        *(six_table(raced, case) for case in SWERVE),
+        beside_table(raced, result.beside),
+        slow_table(raced, result.slow),
         _ratios(raced, CASES, "Sideslip RMSE over the plain particle filter's, by noise"),
         _knowledge(result, "both"),
         _knowledge(result, "constant"),
@@ -226,6 +243,11 @@ def settings(result: Reproduction) -> dict[str, Any]:
         "study": dataclasses.asdict(raced.study),
         "cases": {
             name: case._asdict()
-            for name, case in {**raced.cases, **result.pressed.cases, **result.misled.cases}.items()
+            for name, case in {
+                **raced.cases,
+                **result.pressed.cases,
+                **result.misled.cases,
+                **result.slow.cases,
+            }.items()
         },
     }

@@ -28,7 +28,7 @@ class Case(NamedTuple):
     """One scenario: peak `steer` (degrees at the road wheels), the `level` that the noise rises to (times the data sheet's),
     the share of `outliers`, the filter's `tyre` over the true one (stiffness and friction), the road's `slope` over the
     study's, the `process` noise of the dynamics over the study's, and the `relaxation` length that filters are told over the
-    true one."""
+    true one; the `speed` over the study's; the road's `friction`, and what filters are `told` of it."""
 
     steer: float = 3.0
     level: float = 1.0
@@ -37,6 +37,9 @@ class Case(NamedTuple):
     slope: float = 1.0
     process: float = 1.0
     relaxation: float = 1.0
+    speed: float = 1.0
+    friction: float = 1.0
+    told: float = 1.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +58,9 @@ class Study:
     `frequency` Hz. Each seed has its own speed and peak steer, spread by `speed_spread` and `steer_spread` (shares), and its own
     uneven road (the paper's real car ran on a sloping sandy one): bank and grade of `slope` rad over `slope_length` m.
 
-    Sensors: standard deviations `v_x` m/s, `a_y` m/s^2, `yaw_rate` rad/s of the data sheet, those of `sensors.esc()`; where the
+    Sensors: standard deviations `v_x` m/s, `a_y` m/s^2, `yaw_rate` rad/s of the data sheet, those of `sensors.esc()`, and of
+    wheel speeds at the `rim` (m/s), for the filters of seven degrees of freedom alone, whose spins walk by `spin_noise` (rad/s
+    per root second; ours, as much as `v_x_noise` at the rim, and chosen by nobody); where the
     noise varies it rises to a multiple and falls again within `level_period` s, to 0.8 m/s^2 and 2.3 degrees/s as on an unpaved
     road. An outlier is a normal number of `outlier_size` times the data sheet's standard deviation, added: of the size of the
     sensors' range, 10 m/s^2 and 29 degrees/s, which makes the fixed-R cubature filter four to five times worse than the
@@ -104,6 +109,7 @@ class Study:
     v_x: float = 0.05
     a_y: float = 0.1
     yaw_rate: float = 0.005
+    rim: float = 0.05
     level_period: float = 5.0
     outlier_size: float = 100.0
 
@@ -122,6 +128,7 @@ class Study:
     v_x_noise: float = 0.1
     v_y_noise: float = 0.08
     yaw_noise: float = 0.04
+    spin_noise: float = 0.3
     walk_v_x: float = 0.01
     walk_v_y: float = 0.02
     walk_yaw: float = 0.01
@@ -162,3 +169,15 @@ LIMIT = {
     "15 % too strong": Case(steer=5.0, level=8.0, outliers=0.03, tyre=1.15),
 }
 """Near the limit, with both: what an error of the filter's tyre does."""
+
+_LOOSE = Case(steer=6.0, level=8.0, outliers=0.03, speed=30.0 / 50.4, friction=0.4)
+
+SLOW = {
+    "30 km/h, dry": CASES["both"]._replace(speed=_LOOSE.speed),
+    "30 km/h, friction 0.4, told": _LOOSE._replace(told=0.4),
+    "30 km/h, friction 0.4, not told": _LOOSE,
+}
+"""The lower end of the paper's 30 to 50 km/h, and a loose road there, whose friction filters are told or not."""
+
+SWERVE = {name: CASES[name] for name in ("constant", "both")}
+"""The noise under which the paper's own filter of seven degrees of freedom and others are tried."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxveh import numerics, plots, vehicles
 from jaxveh._core.parameter import pick, prior_spread, put, resolve
+from jaxveh.experiments.tyre_apf.course_figures import lane_change_figure, step_figure, tracks_figure
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.settings import Study, tyres
 from jaxveh.experiments.tyre_apf.staged import Staged
@@ -28,6 +29,9 @@ def figures(result: Reproduction) -> dict[str, Any]:
         "parameters": parameters_figure(result.outcome, result.study),
         "beyond_the_peak": saturated_figure(result.saturated),
         "sharpness": sharpness_figure(result.sharpness),
+        "tracks": tracks_figure(result.tracks, truth()),
+        "lane_change": lane_change_figure(result),
+        "step_steer": step_figure(result),
     }
 
 

@@ -16,6 +16,7 @@ from jaxveh._core.progress import Progress, part, silent
 from jaxveh.diagnostics import Observability, kit
 from jaxveh.experiments.report import Check, above, at_least, at_most, with_terms
 from jaxveh.experiments.tyre_apf.criteria import AHEAD, CRITERIA, WHERE
+from jaxveh.experiments.tyre_apf.order import run_order
 from jaxveh.experiments.tyre_apf.printed import Printed, closest_share, run_printed
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.saturated import SWEEP, over_bound, run_saturated
@@ -30,6 +31,8 @@ from jaxveh.experiments.tyre_apf.sharpness import (
 from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
 from jaxveh.experiments.tyre_apf.study import FIELDS
 from jaxveh.experiments.tyre_apf.tables import tables_as_printed
+from jaxveh.experiments.tyre_apf.tracks import Tracks, tracks_of
+from jaxveh.experiments.tyre_apf.variants import run_variants
 from jaxveh.simulation import simulate
 from jaxveh.sweeps import IN_MEMORY, Stores, Table
 
@@ -61,13 +64,27 @@ def run(
         study, seeds, sharp_key, counts=(PAPERS_PARTICLES,), kinds=PREDICTIVE, levels=LOOKING_AHEAD,
         progress=part(progress, 0.84, 0.92, "looking ahead with the noise"), stores=stores.under("ahead"),
     )  # fmt: skip
-    progress(0.92, 1.0, "printed settings")
+    other_key, order_key = jax.random.split(jax.random.fold_in(jax.random.key(seed), 3))
+    told = part(progress, 0.92, 0.96, "other drives")
+    others = run_variants(study, seeds, other_key, progress=told, stores=stores.under("variants"))
+    told = part(progress, 0.96, 0.98, "order")
+    order = run_order(study, printed, seeds, order_key, progress=told, stores=stores.under("order"))
+    progress(0.98, 1.0, "printed settings")
     found = jax.block_until_ready(run_printed(printed, seeds, printed_key, stores=stores))
     progress(1.0, 1.0, "done")
     return Reproduction(
         study, seeds, staged.outcome, staged.steps, lane_change, saturated, sharpness, ahead, found, printed,
-        looked_at_the_truth(staged, printed),
+        looked_at_the_truth(staged, printed), staged.first_step, staged.open_loop, tracks_of_study(staged, study), others,
+        order,
     )  # fmt: skip
+
+
+def tracks_of_study(staged: Staged, study: Study) -> Tracks:
+    """The honest filters' parameters over time, and the prior's."""
+    outcome = staged.outcome
+    return tracks_of(
+        outcome.drive.time, staged.estimates, outcome.parameters["prior"], outcome.spread["prior"], study.particles
+    )
 
 
 def looked_at_the_truth(staged: Staged, printed: Printed) -> dict[str, np.ndarray]:

@@ -39,6 +39,12 @@ TABLE_3 = {  # RMSE of the particle filter -> of the auxiliary particle filter, 
 STEP_STEER = {10: (0.031, 0.015), 15: (0.052, 0.026)}
 """Degrees of step steer: RMSE of yaw (rad) and yaw rate (rad/s), as printed."""
 
+STEPS = (5, *STEP_STEER)
+"""Degrees of step steer, that of the paper's figures 19 to 23 first, of which no number is printed."""
+
+STEP_OUTPUTS = {"yaw": "rad", "yaw_rate": "rad/s", "v_y": "m/s", "F_yf": "N", "F_yr": "N"}
+"""What is shown of a step steer, with units."""
+
 
 def tyres(car):
     """The eight parameters of the paper: B, C, D and E of both axles."""
@@ -87,9 +93,10 @@ class Study:
 
     `speed` m/s; `steer` rad at the road wheels; `duration` s; `rate` Hz; `yaw_rate_std` rad/s and `a_y_std` m/s^2 the
     sensors' noise; `prior` the relative spread of the parameters (E: times 2, so 0.2); `particles`; `window` s of the
-    multiple shooting. `gaussian`: the noise of UKF and MAP, `particle`: that of PF and APF, both chosen by the filters'
-    own likelihood on drives of other seeds (`noise.choose`), so that the truth has no part in them. `saturated`: that
-    of the UKF where both axles pass their peak: next to nothing, since inputs run linearly there and the model is the truth's.
+    multiple shooting; `low_pass` Hz of the sensors in the variants that have one. `gaussian`: the noise of UKF and MAP,
+    `particle`: that of PF and APF, both chosen by the filters' own likelihood on drives of other seeds (`noise.choose`), so
+    that the truth has no part in them. `saturated`: that of the UKF where both axles pass their peak: next to nothing, since
+    inputs run linearly there and the model is the truth's.
     """
 
     speed: float = 25.0
@@ -104,3 +111,4 @@ class Study:
     particle: StudyNoise = StudyNoise(v_y=0.02, yaw_rate=0.005, walk=0.05)
     saturated: StudyNoise = StudyNoise(v_y=0.0005, yaw_rate=0.0002, walk=0.0)
     window: float = 0.5
+    low_pass: float = 20.0

@@ -85,7 +85,7 @@ def contestants(count: int, kinds: Kinds | None = None) -> dict[str, filters.Abs
     return chosen
 
 
-def _errors(study: Study, values):
+def errors_of(study: Study, values):
     """The values' (..., 8) errors in prior standard deviations."""
     car = vehicles.passenger_car()
     chosen = resolve(car, tyres)
@@ -106,7 +106,7 @@ def _prior(study: Study):
     def run(level, key):
         guess = guess_once(study, jax.random.fold_in(key, 2))
         values = jnp.stack(pick(guess, resolve(guess, tyres)))
-        return {"error": _rms(_errors(study, values)), "likelihood_spread": jnp.nan * level, "result": jnp.int32(0)}
+        return {"error": _rms(errors_of(study, values)), "likelihood_spread": jnp.nan * level, "result": jnp.int32(0)}
 
     return run
 
@@ -121,7 +121,7 @@ def _passes(study: Study, filter_, again: int, levels: Sequence[NoiseLevel]):
         last, likelihood, result = several_passes(study, filter_, chosen, again, key)
         low, high = jnp.quantile(likelihood, jnp.asarray([0.25, 0.75]))
         return {
-            "error": _rms(_errors(study, last)),
+            "error": _rms(errors_of(study, last)),
             "likelihood_spread": high - low,
             "result": jnp.max(result).astype(jnp.int32),
         }

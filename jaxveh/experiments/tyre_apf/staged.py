@@ -18,7 +18,7 @@ from jaxveh._core.parameter import pick, prior_spread, resolve
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import Observability
-from jaxveh.experiments.tyre_apf.settings import STEP_STEER, Study, tyres
+from jaxveh.experiments.tyre_apf.settings import STEP_OUTPUTS, STEPS, Study, tyres
 from jaxveh.experiments.tyre_apf.study import (
     ESTIMATORS,
     FIELDS,
@@ -50,13 +50,15 @@ class Seconds(NamedTuple):
 class Staged(NamedTuple):
     """The study's result and how it came about. Leaves have the seeds in front.
 
-    `outcome`: each seed's; `steps`: errors of step steers by angle. `estimates`: the filters' `Estimate` by name;
-    `fit`: the MAP's `fitting.Fit`. `open_loop`: mapping from `prior` and `MAP` to the states that those tyres give without any
+    `outcome`: each seed's; `steps`: errors of step steers by angle, and `first_step`: the course of the first of them by name,
+    the truth among them, (seeds, outputs, T). `estimates`: the filters' `Estimate` by name;
+    `fit`: the MAP's `fitting.Fit`. `open_loop`: mapping from each estimator to the states that its tyres give without any
     measurement. `observability`: what the drive can tell of the eight parameters at all, at the truth. `seconds`: by stage.
     """
 
     outcome: Outcome
     steps: dict
+    first_step: dict
     estimates: dict
     fit: Any
     open_loop: dict
@@ -86,7 +88,7 @@ def run_staged(study: Study, seeds: int, key, *, progress: Progress = silent, st
     fit, estimates = done["MAP"], {name: done[name] for name in FILTERS}
     values, spread = _parameters(study, guess, estimates, fit)
     stacked = jnp.stack([values[name] for name in ESTIMATORS], axis=1)
-    curves, states, loops, steps = clock.run("errors and step steers", stacked, drive)
+    curves, states, loops, steps, first = clock.run("errors and step steers", stacked, drive)
     by_name = lambda array: {name: array[:, i] for i, name in enumerate(ESTIMATORS)}
     filtered = {name: jax.vmap(state_errors)(estimate.mean, drive) for name, estimate in estimates.items()}
     nothing = jnp.full((seeds,), jnp.nan)
@@ -100,9 +102,10 @@ def run_staged(study: Study, seeds: int, key, *, progress: Progress = silent, st
         log_likelihood={**{n: e.log_likelihood for n, e in estimates.items()}, "prior": nothing, "MAP": -fit.cost},
         result={**{n: e.result for n, e in estimates.items()}, "MAP": fit.result, "prior": jnp.zeros_like(fit.result)},
     )
-    loops = {name: {k: v[:, ESTIMATORS.index(name)] for k, v in loops.items()} for name in ("prior", "MAP")}
+    loops = {name: {k: v[:, i] for k, v in loops.items()} for i, name in enumerate(ESTIMATORS)}
     by_angle = {degrees: by_name(errors) for degrees, errors in steps.items()}
-    return Staged(outcome, by_angle, estimates, fit, loops, done["observability"], clock.seconds)
+    first = {name: first[:, i] for i, name in enumerate(("truth", *ESTIMATORS))}
+    return Staged(outcome, by_angle, first, estimates, fit, loops, done["observability"], clock.seconds)
 
 
 def _filter(study: Study, name: str) -> Callable:
@@ -125,34 +128,36 @@ def _fit(study: Study) -> Callable:
 
 
 def _judge(study: Study) -> Callable:
-    """Errors of all estimators' tyres: curves (5, 2), open-loop states' errors (5, 2), those states, step steers."""
+    """Errors of all estimators' tyres: curves (5, 2), open-loop states' errors (5, 2), those states, step steers and the first of
+    these."""
 
     def each(values, drive):
         car = with_tyres(values)
         truth = open_loop(study, car).truth
-        shown = {name: truth[name] for name in ("v_y", "yaw_rate", "sideslip")}
+        shown = {name: truth[name] for name in ("v_y", "yaw_rate", "yaw", "sideslip")}
         return curve_error(car, drive), state_errors(truth.channels, drive), shown
 
     def judge(values, drive):
         curves, states, shown = jax.vmap(each, in_axes=(0, None))(values, drive)
-        return curves, states, shown, _step_steers(study, values)
+        return curves, states, shown, *_step_steers(study, values)
 
     return judge
 
 
-def _step_steers(study: Study, values) -> dict:
-    """What `step_steer_errors` says of each estimator's tyres (5, 8), by angle; one simulation for all of them."""
+def _step_steers(study: Study, values) -> tuple[dict, jax.Array]:
+    """RMSE of `STEP_OUTPUTS` of each estimator's tyres (5, outputs), by angle, and the course of the first step, the truth's in
+    front, (6, outputs, T); one simulation for all of them."""
     truth = jnp.stack(pick(vehicles.passenger_car(), resolve(vehicles.passenger_car(), tyres)))
-    steers = jnp.asarray([math.radians(degrees) for degrees in STEP_STEER], values.dtype)
+    steers = jnp.asarray([math.radians(degrees) for degrees in STEPS], values.dtype)
 
     def go(one, steer):
         manoeuvre = manoeuvres.step_steer(speed=study.speed, steer=steer, ramp=0.2, duration=study.duration)
         found = simulate(with_tyres(one), manoeuvre, None, dt=1 / study.rate, throw=False).truth
-        return jnp.stack([found["yaw"], found["yaw_rate"]])
+        return jnp.stack([found[name] for name in STEP_OUTPUTS])
 
     rows = jax.vmap(lambda one: jax.vmap(lambda steer: go(one, steer))(steers))(jnp.concatenate([truth[None], values]))
     errors = jnp.sqrt(jnp.mean((rows[1:] - rows[:1]) ** 2, axis=-1))
-    return {degrees: errors[:, i] for i, degrees in enumerate(STEP_STEER)}
+    return {degrees: errors[:, i] for i, degrees in enumerate(STEPS)}, rows[:, 0]
 
 
 def _segments(study: Study, drive, guess):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import jax
@@ -120,12 +119,3 @@ def state_errors(found, drive: Recording) -> jax.Array:
     estimate = lambda name: found[name] if isinstance(found, dict) else getattr(found, name)
     rms = lambda name: jnp.sqrt(jnp.mean((estimate(name) - drive[f"true.{name}"]) ** 2))
     return jnp.stack([rms("v_y"), rms("yaw_rate")])
-
-
-def step_steer_errors(parameters, degrees: float, study: Study) -> jax.Array:
-    """(2,) RMSE of yaw (rad) and yaw rate (rad/s) in an open-loop step steer with these parameters, against the truth."""
-    manoeuvre = manoeuvres.step_steer(speed=study.speed, steer=math.radians(degrees), ramp=0.2, duration=study.duration)
-    go = lambda car: simulate(car, manoeuvre, None, dt=1 / study.rate, throw=False).truth
-    truth, found = go(vehicles.passenger_car()), go(with_tyres(parameters))
-    rms = lambda name: jnp.sqrt(jnp.mean((found[name] - truth[name]) ** 2))
-    return jnp.stack([rms("yaw"), rms("yaw_rate")])

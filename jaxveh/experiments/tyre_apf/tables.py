@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from jaxveh.experiments.report import interval, spread
+from jaxveh.experiments.tyre_apf.claims import claims_table
+from jaxveh.experiments.tyre_apf.order import order_table
 from jaxveh.experiments.tyre_apf.printed import Printed, PrintedOutcome
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
 from jaxveh.experiments.tyre_apf.saturated import over_bound
-from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_STEER, TABLE_2, TABLE_3
+from jaxveh.experiments.tyre_apf.settings import LEVELS, STEP_OUTPUTS, STEP_STEER, STEPS, TABLE_2, TABLE_3
 from jaxveh.experiments.tyre_apf.sharpness import Sharpness, likelihood_ratio, pairs
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS
+from jaxveh.experiments.tyre_apf.tracks import tracks_table
+from jaxveh.experiments.tyre_apf.variants import variants_table
 from jaxveh.sweeps import ConfidenceInterval, Swept, Table
 
 
@@ -20,6 +24,10 @@ def tables(result: Reproduction) -> list[Table]:
         _curve_table(result),
         _parameter_table(result),
         _step_table(result),
+        tracks_table(result.tracks, result.study),
+        variants_table(result.variants, result.seeds),
+        order_table(result.order, result.seeds),
+        claims_table(result),
         _saturated_table(result),
         _error_table(result.sharpness),
         _likelihood_table(result.sharpness),
@@ -63,10 +71,12 @@ def _parameter_table(result: Reproduction) -> Table:
 
 def _step_table(result: Reproduction) -> Table:
     rows = []
-    for degrees, printed in STEP_STEER.items():
-        for i, what in enumerate(("yaw, rad", "yaw rate, rad/s")):
+    for degrees in STEPS:
+        printed = dict(zip(("yaw", "yaw_rate"), STEP_STEER.get(degrees, ()), strict=False))
+        for i, (what, unit) in enumerate(STEP_OUTPUTS.items()):
             cells = [spread(np.asarray(result.steps[degrees][n])[:, i]) for n in ESTIMATORS]
-            rows.append((f"{degrees} degrees, {what}", f"{printed[i]:g}", *cells))
+            paper = f"{printed[what]:g}" if what in printed else ""
+            rows.append((f"{degrees} degrees, {what.replace('yaw_rate', 'yaw rate')}, {unit}", paper, *cells))
     return Table(
         "Step steer with the estimated tyres: RMSE, median [quartiles]", ("step steer", "paper", *ESTIMATORS), rows
     )
