@@ -35,6 +35,7 @@ SYSTEMS = (
     ),
     System("accelerometer and two forgetting factors", "introduction [13]", _ways("mass", "forgetting")),
     System("satellites", "introduction", _ways("grade", "satellite")),
+    System("the paper's sentences", "3, 4", ("experiments.mass_grade_aukf.claims",)),
     System("lidar", "introduction", (), "a sensor of the road ahead, which no vehicle model feels"),
     System("mass and grade of a log, without code", "", _ways("mass", "filter")[:1] + _ways("grade", "filter")),
 )
