@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from typing import Any
 
 import equinox as eqx
@@ -64,9 +66,27 @@ def check_whole(name: str, value, least: int = 1, advice: str = "") -> None:
 
 
 def check_one_of(name: str, value, allowed) -> None:
-    """Raise unless `value` is one of `allowed`."""
+    """Raise unless `value` is one of `allowed`; the message proposes the one that looks most like it."""
     if value not in tuple(allowed):
-        raise InputError(f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}.")
+        raise InputError(
+            f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}.{did_you_mean([value], allowed)}"
+        )
+
+
+def near(name: str, names: Iterable[str]) -> list[str]:
+    """The names that look like `name`, nearest first; case does not count."""
+    folded: dict[str, list[str]] = {}
+    for candidate in names:
+        folded.setdefault(candidate.casefold(), []).append(candidate)
+    close = difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.6)
+    return [candidate for match in close for candidate in folded[match]]
+
+
+def did_you_mean(unknown: Iterable[Any], names: Iterable[Any]) -> str:
+    """A question, " Did you mean a, b?", of the names that look most like the unknown ones; nothing where none does."""
+    names = [name for name in names if isinstance(name, str)]
+    found = [close[0] for one in unknown if isinstance(one, str) and (close := near(one, names))]
+    return f" Did you mean {', '.join(dict.fromkeys(found))}?" if found else ""
 
 
 def float_array(value) -> Any:

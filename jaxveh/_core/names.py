@@ -7,7 +7,7 @@ from collections import namedtuple
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, did_you_mean
 
 
 @functools.cache
@@ -66,4 +66,7 @@ def check_names(what: str, names: Iterable[str], allowed: Iterable[str]) -> None
     allowed = tuple(allowed)
     unknown = [name for name in names if name not in allowed]
     if unknown:
-        raise InputError(f"{what}: unknown name(s) {', '.join(unknown)}; there are: {', '.join(allowed) or 'none'}.")
+        there = ", ".join(allowed) or "none"
+        raise InputError(
+            f"{what}: unknown name(s) {', '.join(unknown)}; there are: {there}.{did_you_mean(unknown, allowed)}"
+        )

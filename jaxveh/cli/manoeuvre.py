@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import jax
 
 from jaxveh import InputError, manoeuvres
-from jaxveh._core.errors import check_one_of
+from jaxveh._core.errors import check_one_of, did_you_mean
 from jaxveh.manoeuvres import MANOEUVRES, USUAL, Course, manoeuvre_options, options_of_car
 
 NOT_SET = {"speed": "--speed", "to_speed": "--speed", "steer": "--steer-deg", "duration": "--duration", "key": "--seed"}
@@ -73,7 +73,8 @@ def _settings(name: str, settings: Sequence[str]) -> dict[str, float | int]:
             raise InputError(f"--set {text}: {option} has an option of its own, {NOT_SET[option]}.")
         if option not in known:
             there = ", ".join(option for option in known if option not in NOT_SET)
-            raise InputError(f"--set {text}: {name} has no option {option!r}; there are: {there}.")
+            guess = did_you_mean([option], known)
+            raise InputError(f"--set {text}: {name} has no option {option!r}; there are: {there}.{guess}")
         found[option] = _number(text, value, isinstance(known[option], int))
     return found
 

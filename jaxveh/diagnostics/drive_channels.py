@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, did_you_mean
 from jaxveh._core.recording import TRUTH, Recording
 
 LONGEST_GAP = 0.5
@@ -26,8 +26,9 @@ def channel(recording: Recording, name: str) -> np.ndarray:
     **Raises** `InputError` for a channel that is not there, or that has no finite sample.
     """
     if not has(recording, name):
-        names = ", ".join(dict.fromkeys(one.removeprefix(TRUTH) for one in recording.names))
-        raise InputError(f"recording: no channel {name!r} to look at; there are: {names}.")
+        names = list(dict.fromkeys(one.removeprefix(TRUTH) for one in recording.names))
+        guess = did_you_mean([name], names)
+        raise InputError(f"recording: no channel {name!r} to look at; there are: {', '.join(names)}.{guess}")
     values = _samples(recording, name)
     known = np.isfinite(values)
     if not known.any():

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxveh import numerics
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_one_of
 from jaxveh._core.result import Result, code
 from jaxveh.filters.auxiliary import FirstStage
 from jaxveh.filters.choosing import DRAW_INSTEAD, Scheme, check_ancestors, choose_ancestors, gather, log_chosen, log_of
@@ -147,8 +147,7 @@ class Guided(AbstractParticleFilter):
     def __check_init__(self):
         check_particle_settings(self.particles, self.threshold, self.gradient)
         check_ancestors("Guided", self.resampling, DRAW_INSTEAD)
-        if self.rule not in RULES:
-            raise InputError(f"rule = {self.rule!r}: must be one of {', '.join(RULES)}.")
+        check_one_of("rule", self.rule, RULES)
 
     def check(self, model):
         if model.process_noise is None:

@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, near
 
 _SHOWN = 30
-
-
-def near(name: str, names: Iterable[str]) -> list[str]:
-    """The names that look like `name`, nearest first; case does not count."""
-    folded = {}
-    for candidate in names:
-        folded.setdefault(candidate.casefold(), []).append(candidate)
-    close = difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.6)
-    return [candidate for match in close for candidate in folded[match]]
 
 
 def listing(name: str, names: Iterable[str]) -> str:

@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from jaxveh._core.errors import InputError, check_one_of
+from jaxveh._core.errors import InputError, check_one_of, did_you_mean
 from jaxveh.manoeuvres.braking import braking_in_a_turn, mu_jump_braking
 from jaxveh.manoeuvres.courses import iso_lane_change, iso_obstacle_avoidance, slalom_course, steady_circle
 from jaxveh.manoeuvres.cruise import cruise
@@ -53,4 +53,5 @@ def check_options(name: str, options: Iterable[str]) -> None:
     known = manoeuvre_options(name)
     unknown = [option for option in options if option not in known]
     if unknown:
-        raise InputError(f"{name}: no option(s) {', '.join(unknown)}; there are: {', '.join(known)}.")
+        guess = did_you_mean(unknown, known)
+        raise InputError(f"{name}: no option(s) {', '.join(unknown)}; there are: {', '.join(known)}.{guess}")

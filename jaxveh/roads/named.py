@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import jax
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, did_you_mean
 from jaxveh.io import read_road
 from jaxveh.roads.base import AbstractRoad
 from jaxveh.roads.friction import Level, MuJump, SplitMu
@@ -69,4 +69,5 @@ def named_road(name: str | os.PathLike, key: jax.Array | None = None) -> Abstrac
         return road.make(key) if road.random else road.make()
     if Path(name).suffix.lower() == ".toml":
         return from_specification(read_road(name))
-    raise InputError(f"road = {str(name)!r}: must be one of {', '.join(ROADS)}, or a file that ends in .toml.")
+    guess = did_you_mean([str(name)], ROADS)
+    raise InputError(f"road = {str(name)!r}: must be one of {', '.join(ROADS)}, or a file that ends in .toml.{guess}")

@@ -174,7 +174,8 @@ def start_from(model: StateSpace, **physical) -> StateSpace:
     by_field = {} if model.chosen is None else {p.field: p for p in model.chosen.parameters}
     unknown = [name for name in physical if name not in model.states]
     if unknown:
-        raise InputError(f"start_from: unknown state(s) {', '.join(unknown)}; there are: {', '.join(model.states)}.")
+        there, guess = ", ".join(model.states), did_you_mean(unknown, model.states)
+        raise InputError(f"start_from: unknown state(s) {', '.join(unknown)}; there are: {there}.{guess}")
     new = {}
     for name, value in physical.items():
         like = getattr(model.prior.mean, name)
