@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxveh._core.bijectors import AbstractBijector
-from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.errors import InputError, did_you_mean, is_concrete
 from jaxveh._core.names import record_type
 from jaxveh._core.parameter import Parameter, Where, check_shares, pick, prior_spread, put, resolve, share_of
 from jaxveh._core.parameters import Parameters
