@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 
+import equinox as eqx
 import jax
 import numpy as np
 import pandas as pd
@@ -27,6 +28,7 @@ from jaxveh.cli import all_papers, estimate_report, output
 from jaxveh.cli.drives import Drive
 from jaxveh.estimators import geometry
 from jaxveh.estimators.geometry import learned
+from jaxveh.experiments.sideslip_review import network_training
 from jaxveh.io import files
 
 resource = pytest.importorskip("resource")  # the size of files can be limited
@@ -101,6 +103,9 @@ WRITERS = {
     "write_calibration toml": calibration,
     "write_learned toml": lambda path: geometry.write_learned(
         geometry.Learned({name: learned.Entry(1.0, 0.1, True) for name in geometry.SHOWN}), path, **OVER
+    ),
+    "write_weights npz": lambda path: network_training.write_weights(
+        path, eqx.nn.MLP(25, 2, 32, 2, key=jax.random.key(0)), **OVER
     ),
     "save png": lambda path: plots.save(plots.recording(RECORDING), path),
     "write_numbers json": lambda path: output.write_numbers(path, {"x": [0.5] * 1000}, {}, 0),

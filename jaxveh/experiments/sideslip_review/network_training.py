@@ -24,6 +24,7 @@ from jaxveh.experiments.sideslip_review.chapters import chapter_drives
 from jaxveh.experiments.sideslip_review.chapters.fleet import told_cars
 from jaxveh.experiments.sideslip_review.chapters.racing import LOST, STEP
 from jaxveh.io import kit as io
+from jaxveh.io import replacing_file
 
 TRAINED_ON = ("passenger_car", "suv", "race_car", "ev", "truck")
 """Measured cars of CommonRoad's vehicle models, none of them in the chapters."""
@@ -156,10 +157,11 @@ def crossed_errors(rows: Rows, candidate: Candidate, key) -> tuple[np.ndarray, n
     return np.array(errors), np.array(whitened)
 
 
-def write_weights(path: Path, network) -> None:
-    """Layer by layer, in float32."""
+def write_weights(path: Path, network, *, overwrite: bool = False) -> None:
+    """Layer by layer, in float32. **Raises** `InputError` where there is such a file, unless `overwrite`."""
     arrays = [leaf for layer in network.layers for leaf in (layer.weight, layer.bias)]
-    np.savez_compressed(path, **{f"{i:02d}": np.asarray(array, np.float32) for i, array in enumerate(arrays)})
+    with replacing_file(path, overwrite) as part, part.open("wb") as file:
+        np.savez_compressed(file, **{f"{i:02d}": np.asarray(array, np.float32) for i, array in enumerate(arrays)})
 
 
 def main(arguments: list[str], progress: Progress = silent) -> None:
