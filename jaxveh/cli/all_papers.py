@@ -22,8 +22,8 @@ from jaxveh.cli.family import Family, ends_in_order
 from jaxveh.cli.output import plain
 from jaxveh.io import write_text
 
-SLOWEST = ("tyre-apf", "model-adaptive-pf", "federated-ckf", "mass-grade-aukf", "sideslip-review")
-"""In this order they fill two cores best: the first with the fourth on one, the others on the other."""
+SLOWEST = ("model-adaptive-pf", "sideslip-review", "tyre-apf", "mass-grade-aukf", "federated-ckf")
+"""In this order they fill two cores best: the first with both short ones on one, the others on the other."""
 
 
 class Done(NamedTuple):

@@ -85,7 +85,7 @@ def _model(study: Study, car, order, solver) -> Any:
     return estimators.state_space(car, devices, process_noise=process, solver=solver, **unknown)
 
 
-def order_table(found: sweeps.Swept, seeds: int) -> Table:
+def order_table(found: sweeps.Swept) -> Table:
     """Errors by row, order and solver, and each over Runge-Kutta's."""
     rows = []
     axis = lambda name: found.design.axis(name).labels
@@ -99,7 +99,7 @@ def order_table(found: sweeps.Swept, seeds: int) -> Table:
                  interval(over), spread(100 * at("share"), 2), lost)
             )  # fmt: skip
     return Table(
-        f"What order and integrator do to the particle filter: median [quartiles] over {seeds} seeds, or ratio [95 %]",
+        f"What order and integrator do to the particle filter: median [quartiles] over {found.seeds} seeds, or ratio [95 %]",
         ("case", "integrator", "prior's error, its sd", "parameters' error, prior sd", "v_y, m/s", "yaw rate, rad/s",
          "v_y over Runge-Kutta's", "effective particles, %", "lost"),
         rows,

@@ -196,9 +196,9 @@ def at_variant(found: dict[str, sweeps.Swept], metric: str, variant: str, estima
     return found[model].at(metric, estimator=estimator)[there.index(variant)]
 
 
-def variants_table(found: dict[str, sweeps.Swept], seeds: int) -> Table:
+def variants_table(found: dict[str, sweeps.Swept]) -> Table:
     """What each variant does to each estimator; ratios are to the study's own drive on the same seeds."""
-    rows = []
+    rows, seeds = [], next(iter(found.values())).seeds
     for variant, (_, model, what) in VARIANTS.items():
         for name in found[model].design.axis("estimator").labels:
             at = lambda metric, which=variant, name=name: at_variant(found, metric, which, name)
