@@ -71,6 +71,29 @@ def raced(errors):
     return chapters.ChaptersRaced({}, found, {}, {})
 
 
+def test_a_road_that_rolls_and_pitches_is_felt_and_the_roll_is_that_against_the_horizon():
+    time = jnp.arange(0.0, 10.0, 0.01)
+    none = 0.0 * time
+    bank, grade = 0.05 * jnp.sin(time), 0.04 * jnp.sin(0.7 * time + 1.0)
+    inner = slice(2, -2)
+    roll_rate, pitch_rate = jax.jit(fleet_drives.road_rates)(none, bank, none, time)
+    np.testing.assert_allclose(roll_rate[inner], 0.05 * np.cos(time)[inner], atol=1e-6)
+    np.testing.assert_allclose(pitch_rate[inner], 0.0, atol=1e-4)
+    # Nose up is a negative pitch.
+    roll_rate, pitch_rate = jax.jit(fleet_drives.road_rates)(grade, none, none, time)
+    np.testing.assert_allclose(pitch_rate[inner], -0.028 * np.cos(0.7 * time + 1.0)[inner], atol=1e-6)
+    np.testing.assert_allclose(roll_rate[inner], 0.0, atol=1e-4)
+    # On a slope that does not move a car that turns rolls and pitches by what its heading makes of it.
+    yaw = 0.2 * time
+    slope = 0.06
+    roll_rate, pitch_rate = jax.jit(fleet_drives.road_rates)(
+        jnp.arctan(slope * jnp.cos(yaw)), jnp.arctan(-slope * jnp.sin(yaw)), yaw, time
+    )
+    np.testing.assert_allclose(jnp.stack([roll_rate, pitch_rate])[:, inner], 0.0, atol=1e-3)
+    roll = fleet_drives.roll_of_horizon(0.0, jnp.asarray(0.1), jnp.asarray(0.03), jnp.asarray(0.0))
+    np.testing.assert_allclose(roll, 0.13, rtol=1e-9)
+
+
 def test_a_stiffness_is_the_slope_at_little_slip():
     slip = jnp.linspace(-0.1, 0.1, 2001)
     np.testing.assert_allclose(fleet_drives.slope_at_zero(8e4 * slip, slip), 8e4)

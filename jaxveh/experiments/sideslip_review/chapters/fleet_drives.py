@@ -97,12 +97,54 @@ def drive_once(built: FourteenDOF, scenario: Scenario, key, *, duration: float) 
         car, driver, _devices(built, scenario, offset_key), sensor_key, road=_road(scenario, road_key, duration),
         max_step=0.0025, solver="explicit", start={"v_x": SPEED}, throw=False,
     )  # fmt: skip
-    channels = {name: found[name] for name in found.names}
+    channels = _on_a_road_that_turns({name: found[name] for name in found.names}, jnp.asarray(found.time))
     channels |= _made_of(built, scenario, channels, jnp.asarray(found.time), more_key, duration)
     # Over what the file's tyres have: the road's friction, and the draw of the car's own.
     grip = car.vehicle.front.scaling.LMUY / built.front.scaling.LMUY
     friction = grip * sum(channels[f"true.friction_{at}"] for at in CORNERS) / 4.0
     return channels | {"true.friction": friction} | _own_numbers(car.vehicle, channels)
+
+
+def _on_a_road_that_turns(said: dict[str, Any], time) -> dict[str, Any]:
+    """What simulated roads, which are quasi-static, leave out: gyroscopes feel that the road itself rolls and pitches. And the
+    truth of the roll, which is that against the horizon."""
+    roll_rate, pitch_rate = road_rates(said["true.grade"], said["true.bank"], said["true.yaw"], time)
+    return said | {
+        "roll_rate": said["roll_rate"] + roll_rate,
+        "pitch_rate": said["pitch_rate"] + pitch_rate,
+        "true.roll_rate": said["true.roll_rate"] + roll_rate,
+        "true.roll": roll_of_horizon(said["true.grade"], said["true.bank"], said["true.roll"], said["true.pitch"]),
+    }
+
+
+def road_rates(grade, bank, yaw, time):
+    """How fast the plane of a road of these slopes (rad, (T,)) rolls and pitches under a car of this heading, rad/s: the rate of
+    the axes of the road's plane, of which `vehicles.kit.gravity` says where they lie, in themselves."""
+    along, across = numerics.tan(grade), numerics.tan(bank)
+    one, none = jnp.ones_like(along), jnp.zeros_like(along)
+    unit = lambda *v: jnp.stack(v, -1) / jnp.linalg.norm(jnp.stack(v, -1), axis=-1, keepdims=True)
+    x, z = unit(one, none, along), unit(-along, -across, one)
+    axes = jnp.stack([x, jnp.cross(z, x), z], -1)
+    c, s = numerics.cos(yaw), numerics.sin(yaw)
+    heading = jnp.stack(
+        [jnp.stack([c, -s, none], -1), jnp.stack([s, c, none], -1), jnp.stack([none, none, one], -1)], -2
+    )
+    turned = heading @ axes
+    step = time[1] - time[0]
+    spin = jnp.swapaxes(turned, 1, 2) @ (jnp.gradient(turned, axis=0) / step)
+    return spin[:, 2, 1], spin[:, 0, 2]
+
+
+def roll_of_horizon(grade, bank, roll, pitch):
+    """The roll (rad) against the horizon of a body that stands so on a road of these slopes."""
+    along, across = numerics.tan(grade), numerics.tan(bank)
+    run = numerics.sqrt(1.0 + along * along)
+    rise = numerics.sqrt(run * run + across * across)
+    # The vertical in the road's plane, then as the body pitches and rolls.
+    x, y, z = along / run, across / (run * rise), 1.0 / rise
+    z = numerics.cos(pitch) * z + numerics.sin(pitch) * x
+    c, s = numerics.cos(roll), numerics.sin(roll)
+    return numerics.arctan2(c * y + s * z, c * z - s * y)
 
 
 def _own_numbers(car: FourteenDOF, channels: dict[str, Any]) -> dict[str, Any]:
