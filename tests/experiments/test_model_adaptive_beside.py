@@ -166,7 +166,7 @@ def test_the_figure_of_six_states_has_their_units():
     np.testing.assert_allclose(truth.get_ydata(), np.rad2deg(np.linspace(0.0, 1.0, 11)))
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_what_the_paper_has_beside_runs_on_its_own_drives():
     drives = experiment.drives_of(STUDY, SWERVE, 2, jax.random.key(3))
     turning = drives.true_rims / drives.true_v_x[..., None] - 1.0

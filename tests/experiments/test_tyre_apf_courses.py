@@ -85,7 +85,7 @@ def test_the_speed_of_an_acceleration_begins_at_the_drives():
     np.testing.assert_allclose(found[:, [0, 10]], [[20.0, 20.5]] * 2)
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_every_variant_beats_the_prior_with_the_unscented_filter():
     study = Study(rate=50.0)
     found = variants.run_variants(study, 4, jax.random.key(5), kinds=("UKF",))
@@ -95,7 +95,7 @@ def test_every_variant_beats_the_prior_with_the_unscented_filter():
         assert (variants.at_variant(found, "result", name, "UKF") == 0).all(), name
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_the_particle_filter_runs_with_every_order_and_integrator():
     found = order.run_order(Study(), Printed(particles=50), 3, jax.random.key(6))
     assert found["error"].shape == (len(order.CASES), len(order.SOLVERS), 3)
