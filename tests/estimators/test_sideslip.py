@@ -371,6 +371,8 @@ USED = {
     **dict.fromkeys(("roll_gradient", "roll_frequency", "roll_damping", "pitch_gradient"), "the body does not lean here"),
     **dict.fromkeys(("antenna_position", "satellite_delay", "inertial_delay", "camera_delay"), "of navigation"),
     "brake_torque_per_pressure": "nobody brakes here",
+    "steering": "on one track an inner wheel that turns further changes nothing; steered rear wheels are refused",
+    "rear_steer_speed": "of a ratio that goes with the speed",
     **dict.fromkeys(("front_tyre", "rear_tyre"), "of a wheel: nobody opens them before a car on four wheels is built"),
 }  # fmt: skip
 """What of a car's file moves the estimate, or the score alone; and why the rest does neither."""
@@ -389,8 +391,14 @@ class Found(NamedTuple):
 @pytest.mark.parametrize("entry", dataclasses.fields(io.CarSpecification), ids=lambda entry: entry.name)
 def test_what_a_cars_file_says_is_used_or_named(entry):
     plain = dataclasses.replace(CAR, rear=None, front=None)
+    if entry.name.startswith("rear_steer_ratio"):
+        # Nothing of a car whose front wheels alone turn.
+        with pytest.raises(InputError, match="four-wheel"):
+            dataclasses.replace(plain, **{entry.name: 0.2})
+        return
     other = {
-        "name": "another", "sensor_position": (0.1, 0.1, 0.0), "reference_position": (0.3, 0.0, 0.0), "front_tyre": "a.tir",
+        "name": "another", "steering": "ackermann", "sensor_position": (0.1, 0.1, 0.0), "reference_position": (0.3, 0.0, 0.0),
+        "front_tyre": "a.tir",
         "rear_tyre": "a.tir", "front": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0), "rear": io.AxleTyre(B=9.0, C=1.3, D=9e3, E=0.0),
         "front_drive": 0.7, "front_brake": 0.7, "steer_offset": 0.02, "rolling_resistance": 0.02,
         **dict.fromkeys(("track_front", "track_rear", "wheel_radius", "roll_frequency"), 1.0),

@@ -17,6 +17,7 @@ ALWAYS_THE_SAME = {
     ("tyre_apf", "curves_figure"): "the shade of the prior's draws",
     ("tyre_apf", "main"): "a program that chose what `settings` has, on drives of its own",
     ("sideslip_review", "_run_estimators"): "one real log, judged once",
+    ("sideslip_review", "main"): "programs of their own, which no report calls",
 }
 """Functions that make a key without being asked for a seed, and why."""
 

@@ -41,7 +41,7 @@ def test_a_drive_goes_beyond_the_peak_and_does_not_spin():
 
 @pytest.mark.full
 def test_a_line_of_the_table_compares_all_four():
-    table = hybrid.hybrid_table(("passenger_car",), (1.0,), 1, steps=150)
+    table = hybrid.hybrid_table(("passenger_car",), (1.0,), 1, jax.random.key(0), steps=150)
     (row,) = table.rows
     nothing, physics, networks, law, ratio = row[3:]
     assert law < networks < physics < nothing and ratio == networks / physics

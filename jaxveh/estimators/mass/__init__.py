@@ -28,7 +28,8 @@ METHODS = {
     ),
     "high_pass": MethodOfCar(
         lambda car: high_pass_of(car, NAME),
-        "least squares of what is fast in force and in the speed's rate, where grades are slow",
+        "least squares of what is fast in force and in the speed's rate, where grades are slow; known only where "
+        "pedals have moved much",
         "paper 004 [11]",
     ),
     "forgetting": MethodOfCar(

@@ -100,10 +100,12 @@ def _brushes(model: StateSpace) -> tuple:
     return (*numbers, *noise.law.std)
 
 
-def compare_networks(name: str, minutes: float, seed: int, *, steps: int = 300, progress: Progress = silent) -> tuple:
+def compare_networks(
+    name: str, minutes: float, seed: int, key: jax.Array, *, steps: int = 300, progress: Progress = silent
+) -> tuple:
     """One line of the table."""
     true, told = true_and_told(name)
-    fit_key, judge_key, net_key, walk_key = jax.random.split(jax.random.fold_in(jax.random.key(46), seed), 4)
+    fit_key, judge_key, net_key, walk_key = jax.random.split(jax.random.fold_in(key, seed), 4)
     log = drive(true, 60.0 * minutes, fit_key)
     judged = [drive(true, LENGTH, key) for key in jax.random.split(judge_key, JUDGED)]
     options = dict(prior=PRIOR, learning_rate=0.03, batch=8, key=walk_key)
@@ -126,14 +128,20 @@ def compare_networks(name: str, minutes: float, seed: int, *, steps: int = 300, 
 
 
 def hybrid_table(
-    cars: Sequence[str], minutes: Sequence[float], seeds: int, *, steps: int = 300, progress: Progress = silent
+    cars: Sequence[str],
+    minutes: Sequence[float],
+    seeds: int,
+    key: jax.Array,
+    *,
+    steps: int = 300,
+    progress: Progress = silent,
 ) -> Table:
     """All of them."""
     every = [(name, length, seed) for name in cars for length in minutes for seed in range(seeds)]
     rows = []
     for i, one in enumerate(every):
         told = part(progress, i / len(every), (i + 1) / len(every), f"{one[0]}, {one[1]:g} min, seed {one[2]}")
-        rows.append(compare_networks(*one, steps=steps, progress=told))
+        rows.append(compare_networks(*one, key, steps=steps, progress=told))
     return Table("Sideslip RMSE [deg] on drives that nothing was fitted on, by minutes that were", COLUMNS, rows)
 
 
@@ -148,7 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     jax.config.update("jax_enable_x64", True)
     for name in given.cars:
         for length in given.minutes:
-            for row in hybrid_table((name,), (length,), given.seeds).rows:
+            for row in hybrid_table((name,), (length,), given.seeds, jax.random.key(46)).rows:
                 print(dict(zip(COLUMNS, row, strict=True)), flush=True)
 
 

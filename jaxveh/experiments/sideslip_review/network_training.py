@@ -25,6 +25,7 @@ from jaxveh.experiments.sideslip_review.chapters.fleet import told_cars
 from jaxveh.experiments.sideslip_review.chapters.racing import LOST, STEP
 from jaxveh.io import kit as io
 from jaxveh.io import replacing_file
+from jaxveh.sweeps import IN_MEMORY, Stores
 
 TRAINED_ON = ("passenger_car", "suv", "race_car", "ev", "truck")
 """Measured cars of CommonRoad's vehicle models, none of them in the chapters."""
@@ -57,9 +58,11 @@ class Rows(NamedTuple):
     car: np.ndarray
 
 
-def learned_rows(seeds: int, key, *, duration: float = DURATION, progress: Progress = silent) -> Rows:
+def learned_rows(
+    seeds: int, key, *, duration: float = DURATION, progress: Progress = silent, stores: Stores = IN_MEMORY
+) -> Rows:
     """Simulated drives as features and truths."""
-    drives = chapter_drives(seeds, key, duration=duration, cars=TRAINED_ON, progress=progress)
+    drives = chapter_drives(seeds, key, duration=duration, cars=TRAINED_ON, progress=progress, stores=stores)
     # What the network says is not looked at here.
     blank = eqx.nn.MLP(learned.SideslipNetwork.size, 2, 1, 2, jnp.tanh, key=key)
     networks = [learned.sideslip_network(car, blank) for car in told_cars(TRAINED_ON)]
