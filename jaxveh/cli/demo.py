@@ -148,7 +148,7 @@ def _numbers(found: tyre_apf.Staged) -> dict[str, Any]:
                 "std": fields(outcome.spread[name]),
                 "curve_rmse_share_of_D": pair(("front", "rear"), outcome.curve_error[name]),
                 "state_rmse": pair(("v_y", "yaw_rate"), outcome.states[name]),
-                "step_steer_rmse": {d: pair(("yaw", "yaw_rate"), e[name]) for d, e in found.steps.items()},
+                "step_steer_rmse": {d: pair(tuple(tyre_apf.STEP_OUTPUTS), e[name]) for d, e in found.steps.items()},
                 "log_likelihood": outcome.log_likelihood[name],
                 "result": outcome.result[name],
             }

@@ -6,7 +6,7 @@ from jaxveh.experiments.tyre_apf.criteria import CRITERIA
 from jaxveh.experiments.tyre_apf.printed import Printed, run_printed
 from jaxveh.experiments.tyre_apf.report import as_printed, check, run, settings
 from jaxveh.experiments.tyre_apf.reproduction import Reproduction
-from jaxveh.experiments.tyre_apf.settings import CITATION, Study, tyres
+from jaxveh.experiments.tyre_apf.settings import CITATION, STEP_OUTPUTS, Study, tyres
 from jaxveh.experiments.tyre_apf.staged import Staged, run_staged
 from jaxveh.experiments.tyre_apf.study import ESTIMATORS, FIELDS
 from jaxveh.experiments.tyre_apf.tables import tables
@@ -17,6 +17,7 @@ __all__ = [
     "CRITERIA",
     "ESTIMATORS",
     "FIELDS",
+    "STEP_OUTPUTS",
     "Check",
     "Printed",
     "Reproduction",
