@@ -38,7 +38,7 @@ WRONG = (1.15, 0.87)
 """Of the stiffnesses before the fit, front and rear, over the true ones."""
 
 SHAPE = {"C": 1.6, "E": -1.5}
-"""Of the true Magic Formulas: behind the peak, at 9 degrees, a tenth of the force is lost by 25."""
+"""Of the true Magic Formulas: their peak is at 6 to 7 degrees of slip, and by 25 a quarter of the force is lost."""
 
 SPEED, STEER, STEP, SETTLED = 25.0, 0.05, 0.02, 2.0
 """m/s; rad, standard deviation at the road wheels; s between rows; s of a judged drive that do not count."""
