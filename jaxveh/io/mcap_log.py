@@ -17,6 +17,7 @@ from jaxveh.io.log import numeric
 from jaxveh.io.optional import require
 
 MCAP_SUFFIX = ".mcap"
+"""What an MCAP file's name ends in."""
 LATEST = 2**63 / 1e9
 """s: the largest stamp."""
 

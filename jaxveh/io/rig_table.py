@@ -22,6 +22,7 @@ from jaxveh.io.units import convert, is_unit
 
 INPUTS = ("slip_angle", "slip_ratio", "load", "camber", "speed", "pressure")
 RIG_CHANNELS = ("F_x", "F_y", "M_x", "M_y", "M_z")
+"""Forces (N) and moments (N m) of a rig table."""
 TYDEX_SUFFIXES = (".tdx", ".tyd", ".tydex")
 
 COLUMNS = {

@@ -24,8 +24,9 @@ COLOURS = {
 """Colours by role; what has no role takes `CYCLE` in turn."""
 
 CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Colours of series without a role."""
 SHADE = "#f7f1df"
-"""For series without a role, and the shade of spans of time."""
+"""The shade of spans of time."""
 
 PAGE_WIDTH = 7.2
 """Inches: the width of a page's text."""

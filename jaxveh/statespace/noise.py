@@ -18,6 +18,7 @@ from jaxveh._core.names import as_mapping, record
 from jaxveh._core.parameter import parameter, positive
 
 LOG_2PI = 1.8378770664093453
+"""Logarithm of 2 pi."""
 
 
 class AbstractNoise(eqx.Module):

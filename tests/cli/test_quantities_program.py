@@ -121,7 +121,7 @@ def test_the_catalogue_is_what_the_methods_declare():
     assert CATALOGUE.read_text() == HEAD + estimators.kit.catalogue(QUANTITIES)
 
 
-CATALOGUE = Path(__file__).parents[2] / "notebooks" / "pages" / "estimators.md"
+CATALOGUE = Path(__file__).parents[2] / "notebooks" / "catalogues" / "estimators.md"
 HEAD = """# Quantities and their methods
 
 What `jaxveh estimate --what` and `jaxveh.estimators` know. Channels in brackets may be missing; `*` stands for the four wheels;

@@ -11,7 +11,7 @@ import pytest
 from jaxveh import estimators, experiments
 from jaxveh.experiments.systems import resolve_name, systems_page
 
-PAGE = Path(__file__).parents[2] / "notebooks" / "pages" / "papers.md"
+PAGE = Path(__file__).parents[2] / "notebooks" / "catalogues" / "papers.md"
 HEAD = """# The papers' systems
 
 What each of the five papers has, models, methods, tables, figures and claims, and which names below `jaxveh` have it. Where

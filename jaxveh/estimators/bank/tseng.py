@@ -24,6 +24,7 @@ from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.io import CarSpecification
 
 STEERING = Need("steering_wheel", "rad")
+"""The steering wheel, which the method cannot do without."""
 
 
 class TsengMemory(NamedTuple):

@@ -15,6 +15,7 @@ from jaxveh.simulation import simulate
 
 ESTIMATORS = ("prior", "PF", "APF", "UKF", "MAP")
 FIELDS = tuple(f"{axle}_{name}" for axle in ("front", "rear") for name in "BCDE")
+"""The eight coefficients, as states of a filter."""
 
 
 class Outcome(NamedTuple):

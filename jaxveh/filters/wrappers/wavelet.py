@@ -20,6 +20,7 @@ from jaxveh.statespace import AbstractFilter, AbstractWrapper, CauchyGaussianMix
 
 # The median of the absolute value of a standard normal number.
 NORMAL_MEDIAN = 0.6744897501960817
+"""Median of the absolute value of a standard normal variable."""
 
 
 class Window(NamedTuple):

@@ -1,0 +1,76 @@
+"""Build the site: `python -m notebooks.site`, from the project's root, with `pip install -e ".[docs]"`.
+
+What the pages' code prints and draws is taken from `--executed`; `--execute` runs every page whose output is not there (a minute or
+two each for notebooks; `JAXVEH_SMOKE=1` at a small size). `--builder mkdocs` builds with Material for MkDocs, whose link check is the
+stricter one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from notebooks.site.executed import ROOT, blocks_of, is_run
+from notebooks.site.pages import SOURCES, name_of, put_together, sources
+
+BUILD = ROOT / "build" / "site"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m notebooks.site", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--execute", action="store_true", help="run the code of pages whose output is not there yet")
+    parser.add_argument("--executed", type=Path, default=BUILD / "executed", help="folder of what the code left")
+    parser.add_argument("--builder", choices=("zensical", "mkdocs"), default="zensical")
+    given = parser.parse_args()
+    if given.execute:
+        execute(given.executed)
+    put_together(BUILD / "pages", given.executed)
+    return build(given.builder)
+
+
+def execute(folder: Path) -> None:
+    """Run every page and notebook whose output is not in the folder, each in a process of its own."""
+    for place, page in sources().items():
+        if any(map(is_run, blocks_of(page.read_text()))):
+            left = folder / name_of(place)
+            if not (left / "outputs.json").exists():
+                print(f"running {place}", flush=True)
+                subprocess.run(
+                    [sys.executable, "-m", "notebooks.site.executed", str(page), str(left)], check=True, cwd=ROOT
+                )
+    for page in sorted(SOURCES.glob("*.ipynb")):
+        left = folder / page.stem
+        if not (left / page.name).exists():
+            print(f"running {page.name}", flush=True)
+            run_notebook(page, left)
+
+
+def run_notebook(page: Path, folder: Path) -> None:
+    """Run a notebook, and leave it with its outputs in the folder."""
+    import nbformat
+    from nbclient import NotebookClient
+
+    notebook = nbformat.read(page, as_version=4)
+    NotebookClient(notebook, timeout=1200, resources={"metadata": {"path": str(page.parent)}}).execute()
+    folder.mkdir(parents=True, exist_ok=True)
+    nbformat.write(notebook, folder / page.name)
+
+
+def build(builder: str) -> int:
+    """Build strictly; the exit status."""
+    # Both find the configuration's extensions from the project's root.
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1"}
+    command = {
+        "zensical": [sys.executable, "-m", "zensical", "build", "--clean", "--strict"],
+        "mkdocs": [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", str(BUILD / "mkdocs")],
+    }[builder]
+    return subprocess.run(command, cwd=ROOT, env=environment).returncode
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

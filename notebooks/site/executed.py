@@ -1,0 +1,104 @@
+"""A page's code, run from top to bottom in an empty folder: what it prints, and the figures that it draws.
+
+A block of `python` goes on where the last one ended. A block of `sh` runs in the same folder. A block with a title
+(`toml title="car.toml"`) is written to the file of that name. All others are not run.
+
+`python -m notebooks.site.executed PAGE FOLDER` leaves `outputs.json` and figures in FOLDER.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+FENCE = re.compile(r"^```(?P<language>\w+)(?P<rest>[^\n`]*)\n(?P<code>.*?)^```[ ]*$", re.S | re.M)
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Block(NamedTuple):
+    """A fenced block: its language, its title (or ""), its code and where it ends in the page."""
+
+    language: str
+    title: str
+    code: str
+    end: int
+
+
+def blocks_of(text: str) -> list[Block]:
+    """The fenced blocks of a page."""
+    found = []
+    for match in FENCE.finditer(text):
+        title = re.search(r'title="([^"]+)"', match["rest"])
+        found.append(Block(match["language"], title[1] if title else "", match["code"], match.end()))
+    return found
+
+
+def is_run(block: Block) -> bool:
+    """Whether a block does something: runs, or makes a file."""
+    return bool(block.title) or block.language in ("python", "sh")
+
+
+def run_page(page: Path, folder: Path) -> list[dict]:
+    """Run a page's blocks in a new folder; for each what it printed (`text`) and the name of its figure (`figure`, "" without one).
+
+    Figures are written to `folder`. **Raises** what the page's code raises, or `RuntimeError` for a command that fails.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    namespace: dict = {"__name__": "__main__"}
+    outputs = []
+    with tempfile.TemporaryDirectory() as work, contextlib.chdir(work):
+        for place, block in enumerate(blocks_of(page.read_text())):
+            one = {"text": "", "figure": ""}
+            if block.title:
+                Path(block.title).write_text(block.code)
+            elif block.language == "python":
+                one["text"], figure = _run_python(block.code, namespace, f"{page.name}[{place}]")
+                if figure is not None:
+                    one["figure"] = f"{page.stem}-{place}.png"
+                    figure.savefig(folder / one["figure"], dpi=110, bbox_inches="tight")
+            elif block.language == "sh":
+                one["text"] = _run_shell(block.code, page.name)
+            outputs.append(one)
+    (folder / "outputs.json").write_text(json.dumps(outputs, indent=1))
+    return outputs
+
+
+def _run_python(code: str, namespace: dict, name: str):
+    """What a block prints, and the figure that its last expression is, if it is one."""
+    tree = ast.parse(code)
+    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    printed, value = io.StringIO(), None
+    with contextlib.redirect_stdout(printed):
+        exec(compile(tree, name, "exec"), namespace)
+        if last is not None:
+            value = eval(compile(ast.Expression(last.value), name, "eval"), namespace)
+            if value is not None and not hasattr(value, "savefig"):
+                print(value if isinstance(value, str) else repr(value))
+    return printed.getvalue(), value if hasattr(value, "savefig") else None
+
+
+def _run_shell(code: str, name: str) -> str:
+    """What the commands of a block print; programs are those of this Python."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        ["bash", "-e", "-c", code],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PATH": path, "COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"},
+    )
+    if done.returncode:
+        raise RuntimeError(f"{name}: the commands\n{code}\nended with {done.returncode}:\n{done.stdout}\n{done.stderr}")
+    return done.stdout
+
+
+if __name__ == "__main__":
+    run_page(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
