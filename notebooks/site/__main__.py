@@ -1,8 +1,8 @@
 """Build the site: `python -m notebooks.site`, from the project's root, with `pip install -e ".[docs]"`.
 
-What the pages' code prints and draws is taken from `--executed`; `--execute` runs every page whose output is not there (a minute or
-two each for notebooks; `JAXVEH_SMOKE=1` at a small size). `--builder mkdocs` builds with Material for MkDocs, whose link check is the
-stricter one.
+What the pages' code prints and draws is taken from `--executed`; `--execute` runs every page whose output is not there (a
+minute or two each for notebooks; `JAXVEH_SMOKE=1` at a small size). `--builder mkdocs` builds with Material for MkDocs, whose
+link check is the stricter one.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def execute(folder: Path) -> None:
                 subprocess.run(
                     [sys.executable, "-m", "notebooks.site.executed", str(page), str(left)], check=True, cwd=ROOT
                 )
-    for page in sorted(SOURCES.glob("*.ipynb")):
+    for page in sorted((SOURCES / "tutorials").glob("*.ipynb")):
         left = folder / page.stem
         if not (left / page.name).exists():
             print(f"running {page.name}", flush=True)
@@ -67,7 +67,7 @@ def build(builder: str) -> int:
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1"}
     command = {
         "zensical": [sys.executable, "-m", "zensical", "build", "--clean", "--strict"],
-        "mkdocs": [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", str(BUILD / "mkdocs")],
+        "mkdocs": [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(BUILD / "mkdocs")],
     }[builder]
     return subprocess.run(command, cwd=ROOT, env=environment).returncode
 

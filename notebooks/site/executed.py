@@ -48,7 +48,7 @@ def is_run(block: Block) -> bool:
 
 
 def run_page(page: Path, folder: Path) -> list[dict]:
-    """Run a page's blocks in a new folder; for each what it printed (`text`) and the name of its figure (`figure`, "" without one).
+    """Run a page's blocks in a new folder; for each what it printed (`text`) and its figure's name (`figure`, "" without one).
 
     Figures are written to `folder`. **Raises** what the page's code raises, or `RuntimeError` for a command that fails.
     """

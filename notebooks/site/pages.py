@@ -15,6 +15,8 @@ from notebooks.site.reference import PLACE, write_reference
 SOURCES = Path(__file__).resolve().parents[1]
 CAPTION = re.compile(r"\n+Figure: (.+?)(?=\n\n|\Z)", re.S)
 HIDDEN = "site"
+FOLDED_FROM = 24
+"""Lines."""
 
 
 def sources() -> dict[str, Path]:
@@ -32,7 +34,7 @@ def put_together(folder: Path, executed: Path) -> None:
     for place, text in texts.items():
         if not place.startswith(f"{PLACE}/"):
             _write(folder / place, _with_outputs(place, text, folder, executed))
-    for path in sorted(SOURCES.glob("*.ipynb")):
+    for path in sorted((SOURCES / "tutorials").glob("*.ipynb")):
         run = executed / path.stem / path.name
         _write_notebook(run if run.exists() else path, folder / "tutorials")
     heads = folder / ".heads"
@@ -70,7 +72,7 @@ def _with_outputs(place: str, text: str, folder: Path, executed: Path) -> str:
         parts.append(text[begin : block.end])
         begin = block.end
         if output["text"].strip():
-            parts.append(f"\n\n```text\n{output['text'].rstrip()}\n```")
+            parts.append(_printed(output["text"].rstrip()))
         if output["figure"]:
             figures = folder / "figures"
             figures.mkdir(exist_ok=True, parents=True)
@@ -81,6 +83,14 @@ def _with_outputs(place: str, text: str, folder: Path, executed: Path) -> str:
             up = "../" * place.count("/")
             parts.append(_figure(f"{up}figures/{name_of(place)}-{output['figure']}", words))
     return "".join([*parts, text[begin:]])
+
+
+def _printed(text: str) -> str:
+    """What a block printed; folded where it is long."""
+    fence = f"```text\n{text}\n```"
+    if text.count("\n") < FOLDED_FROM:
+        return f"\n\n{fence}"
+    return '\n\n??? quote "What it prints"\n\n' + "\n".join(f"    {line}" for line in fence.splitlines())
 
 
 def _figure(path: str, caption: str) -> str:

@@ -82,7 +82,7 @@ def public_entries() -> dict[str, list[Entry]]:
 
 def arguments_of(entry: Entry) -> list[Argument]:
     """What a function or class takes, each with its words."""
-    if not callable(entry.value) or not entry.value.__module__.startswith("jaxveh") or _is_enumeration(entry.value):
+    if not callable(entry.value) or not entry.value.__module__.startswith("jaxveh") or _is_made_elsewhere(entry.value):
         return []
     try:
         parameters = inspect.signature(entry.value).parameters.values()
@@ -95,8 +95,10 @@ def arguments_of(entry: Entry) -> list[Argument]:
     ]
 
 
-def _is_enumeration(value: Any) -> bool:
-    return inspect.isclass(value) and issubclass(value, enum.Enum)
+def _is_made_elsewhere(value: Any) -> bool:
+    """Whether a class is made as another library says: an enumeration, a figure."""
+    bases = value.__mro__ if inspect.isclass(value) else ()
+    return any(base is enum.Enum or base.__module__.startswith("matplotlib") for base in bases)
 
 
 def _type(annotation: Any) -> str:
@@ -127,7 +129,7 @@ def _words(entry: Entry, name: str) -> str:
     said = said.removeprefix("-; ")
     unit, _, positive = declared.partition(", ")
     if said == "-":
-        return declared
+        return declared or "no unit"
     if said.startswith(unit):
         return f"{said}, {positive}" if positive else said
     return "; ".join(part for part in (declared, said) if part)

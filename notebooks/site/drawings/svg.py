@@ -34,7 +34,7 @@ def arrow(x1, y1, x2, y2, colour=INK, width=2.0) -> str:
 
 
 def arc(x, y, radius, start, end, colour=INK, width=2.0, head=True) -> str:
-    """A part of a circle about (x, y), from angle to angle in degrees, counter-clockwise from the right; with a head at its end."""
+    """A part of a circle about (x, y), from angle to angle (degrees counter-clockwise from the right), with a head at its end."""
     x1, y1 = x + radius * math.cos(math.radians(start)), y - radius * math.sin(math.radians(start))
     x2, y2 = x + radius * math.cos(math.radians(end)), y - radius * math.sin(math.radians(end))
     large, sweep = int(abs(end - start) > 180), int(end < start)

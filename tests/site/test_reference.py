@@ -1,0 +1,70 @@
+"""The reference has every public name, with words for it and for each of its arguments; every module is in the site's nav."""
+
+import re
+
+import pytest
+import yaml
+
+from notebooks.site import reference
+from notebooks.site.executed import ROOT
+
+ENTRIES = reference.public_entries()
+NAV = (ROOT / "mkdocs.yml").read_text().split("\nnav:\n")[1]
+
+
+@pytest.mark.parametrize("module", ENTRIES)
+def test_every_public_name_has_words_and_each_argument_too(module):
+    silent = []
+    for entry in ENTRIES[module]:
+        text = reference.text_of(entry.value) if callable(entry.value) else reference.text_of_value(entry)
+        if not text.strip():
+            silent.append(entry.path)
+        silent += [f"{entry.path}({a.name})" for a in reference.arguments_of(entry) if not a.words]
+    assert not silent
+
+
+@pytest.mark.parametrize("module", reference.public_modules())
+def test_what_a_module_lists_has_an_entry_somewhere(module):
+    import importlib
+    import inspect
+
+    everywhere = {id(entry.value) for entries in ENTRIES.values() for entry in entries}
+    here = {entry.name for entry in ENTRIES.get(module, [])}
+    listed = importlib.import_module(module)
+    lost = [
+        name for name in listed.__all__
+        if not name.startswith("__") and name not in here
+        and not inspect.ismodule(value := getattr(listed, name)) and id(value) not in everywhere
+    ]  # fmt: skip
+    assert not lost
+
+
+def test_the_nav_has_each_module_and_each_page():
+    from notebooks.site.pages import SOURCES, sources
+
+    named = set(re.findall(r"[\w./-]+\.md", NAV))
+    made = {f"{reference.PLACE}/{reference.page_of(module)}" for module in ENTRIES}
+    made |= {f"tutorials/{path.stem}.md" for path in (SOURCES / "tutorials").glob("*.ipynb")}
+    written = {place for place in sources() if not place.startswith(f"{reference.PLACE}/")}
+    assert named == made | written
+    assert yaml.safe_load("nav:\n" + NAV)
+
+
+def test_a_signature_and_its_arguments():
+    (entry,) = (entry for entry in ENTRIES["jaxveh.filters"] if entry.name == "Unscented")
+    assert reference.signature_of(entry) == "filters.Unscented(alpha=1.0, beta=2.0, kappa=0.0, form=Covariance())"
+    (car,) = (entry for entry in ENTRIES["jaxveh.vehicles"] if entry.name == "SevenDOF")
+    words = {a.name: a.words for a in reference.arguments_of(car)}
+    assert words["wheel_inertia"] == "kg m^2, of one wheel, positive"
+    assert words["steering"] != words["wheel_radius"]
+
+
+def test_an_example_is_the_shortest_statement_that_uses_a_name():
+    pages = {
+        "a.md": "```python\nx = filters.run(filters.Kalman(), model, drive)\nfilters.run\n```\n",
+        "b.md": "```text\nfilters.run\n```\n",
+    }
+    assert reference.usages(pages)["filters.run"] == [
+        ("a.md", "filters.run"),
+        ("a.md", "x = filters.run(filters.Kalman(), model, drive)"),
+    ]
