@@ -73,8 +73,16 @@ def check_one_of(name: str, value, allowed) -> None:
         )
 
 
+WHEELS = {"front_left": "fl", "front_right": "fr", "rear_left": "rl", "rear_right": "rr"}
+"""How wheels are called elsewhere, and here."""
+
+
 def near(name: str, names: Iterable[str]) -> list[str]:
-    """The names that look like `name`, nearest first; case does not count."""
+    """The names that look like `name`, nearest first; case does not count, and wheels may have their whole names."""
+    names = list(names)
+    for whole, short in WHEELS.items():
+        if name.casefold().endswith(whole) and name[: -len(whole)] + short in names:
+            return [name[: -len(whole)] + short]
     folded: dict[str, list[str]] = {}
     for candidate in names:
         folded.setdefault(candidate.casefold(), []).append(candidate)
@@ -87,6 +95,13 @@ def did_you_mean(unknown: Iterable[Any], names: Iterable[Any]) -> str:
     names = [name for name in names if isinstance(name, str)]
     found = [close[0] for one in unknown if isinstance(one, str) and (close := near(one, names))]
     return f" Did you mean {', '.join(dict.fromkeys(found))}?" if found else ""
+
+
+def check_key(who: str, key: Any) -> None:
+    """Raise unless `key` is a key of `jax.random`, of the new kind or the old."""
+    dtype = getattr(key, "dtype", None)
+    if dtype is None or not (jax.dtypes.issubdtype(dtype, jax.dtypes.prng_key) or dtype == np.uint32):
+        raise InputError(f"{who}: key = {key!r}: must be a key of jax.random, e.g. key=jax.random.key(0).")
 
 
 def float_array(value) -> Any:

@@ -13,7 +13,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxveh._core.bijectors import AbstractBijector, Positive, Real
-from jaxveh._core.errors import InputError, check_finite, check_positive, float_array
+from jaxveh._core.errors import InputError, check_finite, check_positive, did_you_mean, float_array
 from jaxveh._core.names import check_names
 
 Where = Callable[..., object]
@@ -97,10 +97,14 @@ def resolve(model, where: Where | None) -> tuple[Parameter, ...]:
         return ()
     paths, treedef = jtu.tree_flatten_with_path(model)
     marks = [_Mark(i) for i in range(len(paths))]
+    if not callable(where):
+        raise InputError(f"where = {where!r}: must be a function, such as lambda car: (car.front.B, car.rear.B).")
     try:
         picked = where(jtu.tree_unflatten(treedef, marks))
     except (AttributeError, LookupError, TypeError) as error:
-        raise InputError(f"where: {error}; it must pick leaves of {type(model).__name__}.") from None
+        there = dir(error.obj) if isinstance(error, AttributeError) else ()
+        hint = did_you_mean([getattr(error, "name", None)], [name for name in there if not name.startswith("_")])
+        raise InputError(f"where: {error}; it must pick leaves of {type(model).__name__}.{hint}") from None
     indices = []
     for leaf in jtu.tree_leaves(picked, is_leaf=lambda x: isinstance(x, _Mark)):
         if not isinstance(leaf, _Mark):

@@ -101,6 +101,8 @@ def state_space(
     )
     if estimate is None:
         return model
+    if not callable(estimate):
+        raise InputError(f"estimate = {estimate!r}: must be a function, such as lambda car: (car.front.B, car.rear.B).")
     return with_parameters(model, lambda model: estimate(model.system.vehicle), prior, walk, domain=domain)
 
 

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.errors import InputError, check_key, check_whole
 from jaxveh._core.parameters import Parameters
 from jaxveh.fitting.problem import AbstractProblem, by_name, in_units
 from jaxveh.fitting.solve import MOST_STEPS, optimum
@@ -47,6 +47,7 @@ def bootstrap(
     **Raises** `InputError` for fewer than two fits, or fewer than five parts.
     """
     check_whole("count", count, 2)
+    check_key("bootstrap", key)
     parts = problem.units()
     group = np.arange(parts) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
     if group.shape != (parts,):

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jaxveh._core.errors import check, check_at_least, check_positive
+from jaxveh._core.errors import check, check_at_least, check_key, check_positive
 from jaxveh._core.parameter import parameter
 from jaxveh.manoeuvres.base import AbstractManoeuvre, PedalInputs, as_time, check_drive
 from jaxveh.manoeuvres.speeds import AbstractSpeed, SteadySpeed, wavering_speed
@@ -61,6 +61,7 @@ def cruise(
     check_positive("speed_time", speed_time, "s")
     check_positive("pedal_time", pedal_time, "s")
     check("count", count, lambda v: v >= 1, "at least 1")
+    check_key("cruise", key)
     wander, foot = jax.random.split(key)
     held = not eqx.is_array(speed_std) and speed_std == 0
     wanted = SteadySpeed(speed) if held else wavering_speed(speed, speed_std, wander, time=speed_time, count=count)

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import DTypeLike
 
+from jaxveh._core.errors import check_key
 from jaxveh.numerics.elementary import arctan, cos, tan
 from jaxveh.numerics.random import uniform
 
@@ -51,6 +52,7 @@ def sum_of_harmonics(x: Array, frequencies: Array, phases: Array) -> Array:
 
 def _shares(key: Array, count: int, dtype: DTypeLike | None) -> tuple[Array, Array]:
     """One random number in each of `count` equal parts of (0, 1), and random phases."""
+    check_key("random harmonics", key)
     places, phases = jax.random.split(key)
     inside = uniform(places, (count,), dtype)
     return (jnp.arange(count, dtype=inside.dtype) + inside) / count, (2.0 * math.pi) * uniform(phases, (count,), dtype)

@@ -248,7 +248,7 @@ def axle_chart(points: AxlePoints) -> Any:
 
 
 def innovation_charts(points: InnovationPoints) -> Any:
-    """Bokeh's layout of a channel's normalised innovations squared over time, meaned, and their correlation from row to row."""
+    """Bokeh's layout of a channel's normalised innovations squared over time, averaged, and their correlation from row to row."""
     require_bokeh()
     from bokeh.layouts import column
     from bokeh.models import BoxAnnotation

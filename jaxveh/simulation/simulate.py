@@ -10,7 +10,7 @@ import diffrax
 import jax
 import numpy as np
 
-from jaxveh._core.errors import FilterError, InputError, JaxvehWarning, check_one_of, is_concrete
+from jaxveh._core.errors import FilterError, InputError, JaxvehWarning, check_key, check_one_of, is_concrete
 from jaxveh._core.names import as_mapping
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import TRUTH, Recording
@@ -23,7 +23,6 @@ from jaxveh.simulation.events import Event
 from jaxveh.simulation.meter import meter_for
 from jaxveh.simulation.solve import Solution, even_grid, grid_through, solve
 from jaxveh.simulation.stiffness import SolverChoice
-from jaxveh.statespace import RK4, RolledRK4
 from jaxveh.vehicles import AbstractVehicle, Travelling
 
 SOLVERS = ("auto", "explicit", "implicit")
@@ -86,6 +85,8 @@ def simulate(
     """
     sensors = _suite_of(sensors)
     _check_event(until)
+    if key is not None:
+        check_key("simulate", key)
     driven = driven_car(car, manoeuvre, sensors if isinstance(sensors, SensorSet) else None, road)
     duration, values = driven.driver.duration, {} if start is None else as_mapping(start, "start")
     rows = None if not isinstance(sensors, Suite) else device_rows(sensors, duration)
@@ -199,13 +200,12 @@ def _run(driven: Driven, values: dict, run, asked: SolverChoice | None, times: n
 
 
 def _warn_of_long_steps(driven: Driven, found: Solution, choice: SolverChoice, times: np.ndarray) -> None:
-    if not isinstance(choice.solver, (RK4, RolledRK4)):
-        return
+    limit, stable = stiffness.limits(choice.solver)
     pole, time = stiffness.worst(driven, times, found.x, found.u)
-    if pole * choice.max_step > stiffness.LIMIT:
+    if pole * choice.max_step > limit:
         warnings.warn(
             f"simulate: steps of {choice.max_step:g} s are too long for a motion of {pole:.0f} 1/s at t = {time:g} s, so what is "
-            f'seen there may be ringing of the solver: take max_step = {stiffness.STABLE / pole:.2g} s, or solver = "auto".',
+            f'seen there may be ringing of the solver: take max_step = {stable / pole:.2g} s, or solver = "auto".',
             JaxvehWarning,
             stacklevel=4,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import diffrax
@@ -40,6 +41,18 @@ SLOW = {
 
 SLOW_POLE = 1000.0
 """1/s: some hundred at walking speed, and room."""
+
+
+def limits(solver: Any) -> tuple[float, float]:
+    """The largest pole times step that equal steps of a solver bear, and what is well inside; infinite of an implicit one.
+
+    Explicit rules of one or two stages bear 2, those with more stages at least what RK4 does (E. Hairer and G. Wanner, Solving
+    Ordinary Differential Equations II, sec. IV.2).
+    """
+    if isinstance(solver, diffrax.AbstractImplicitSolver):
+        return math.inf, math.inf
+    few = isinstance(solver, diffrax.Euler | diffrax.Heun | diffrax.Midpoint | diffrax.Ralston)
+    return (2.0, 1.8) if few else (LIMIT, STABLE)
 
 
 class SolverChoice(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, final
 
 import equinox as eqx
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, check_key
 from jaxveh.numerics import apart
 from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.model import Row, StateSpace
@@ -178,6 +178,20 @@ class AbstractTwoPartWrapper(AbstractTwoPartFilter, AbstractWrapper):
         return self.inner._update(model, ahead, row)
 
 
+def check_told(filter: Any, model: Any) -> None:
+    """Raise unless these are a filter, made, and a model, in this order."""
+    if isinstance(filter, type) and issubclass(filter, AbstractFilter):
+        raise InputError(f"filter = {filter.__name__}: is a class; make one of it: {filter.__name__}(...).")
+    for name, value, kind, example in (
+        ("filter", filter, AbstractFilter, "a filter, such as filters.Unscented()"),
+        ("model", model, StateSpace, "a StateSpace, as estimators.state_space makes it"),
+    ):
+        if not isinstance(value, kind):
+            raise InputError(
+                f"{name} = {type(value).__name__}: must be {example}. The order is filter, model, recording."
+            )
+
+
 def layers(filter: Any) -> tuple[Any, ...]:
     """A filter and all inside it, from the outermost to the innermost."""
     found = [filter]
@@ -201,6 +215,7 @@ def key_for(filter: AbstractFilter, key: Any) -> Any:
     if key is None:
         who = type(innermost(filter)).__name__
         raise InputError(f"{who} draws random numbers: give it a key, e.g. key=jax.random.key(0).")
+    check_key(type(innermost(filter)).__name__, key)
     return key
 
 

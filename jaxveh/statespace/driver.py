@@ -16,10 +16,11 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import FilterError, JaxvehWarning, check_one_of, is_concrete
+from jaxveh._core.fresh_functions import note_function
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
 from jaxveh.statespace.belief import Info
-from jaxveh.statespace.contract import KEPT, AbstractFilter, who_lacks
+from jaxveh.statespace.contract import KEPT, AbstractFilter, check_told, who_lacks
 from jaxveh.statespace.model import Row, StateSpace
 from jaxveh.statespace.parameters import parameters_of
 
@@ -85,7 +86,10 @@ def run(
     reason where the filter failed, and **warns** (`JaxvehWarning`) where it went on but remarks on rows (`info.remark`),
     unless `throw=False`.
     """
+    check_told(filter, model)
     filter.check(model)
+    note_function("run: transition", model.transition_function)
+    note_function("run: observation", model.observation_function)
     estimate = scan(filter, model, model.rows(recording), key, tuple(keep))
     estimate = dataclasses.replace(estimate, time=recording.time)
     if throw:

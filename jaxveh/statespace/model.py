@@ -156,6 +156,11 @@ class StateSpace(eqx.Module):
         Raises `InputError` for a missing channel, NaN in an input (fill it on request first), or infinite values.
         Where float32 rules, times count from the first row, so that steps keep their digits.
         """
+        if not isinstance(recording, Recording):
+            raise InputError(
+                f"recording = {type(recording).__name__}: must be a Recording: jaxveh.Recording(time, {{name: values}}), or what "
+                "io.read_log and simulate return."
+            )
         check_names("recording lacks a channel the model needs", (*self.inputs, *self.channels), recording.names)
         dtype = self.prior.mean[0].dtype
         u = {name: _channel(recording, name, dtype, is_input=True) for name in self.inputs}

@@ -48,6 +48,8 @@ def put_together(folder: Path, executed: Path) -> None:
         (drawings / f"{name}.svg").write_text(draw())
     for path in (*SOURCES.glob("*.png"), *(SOURCES / "site" / "assets").glob("*")):
         shutil.copy(path, folder / path.name)
+    for path in (SOURCES / "tutorials").glob("*.png"):
+        shutil.copy(path, folder / "tutorials" / path.name)
 
 
 def name_of(place: str) -> str:

@@ -111,6 +111,43 @@ def test_words_that_the_glossary_replaces_stand_nowhere(words):
     assert not found, NOT_OURS[words]
 
 
+AMERICAN = (
+    "behavior|cent(er|ers|ered)|color(s|ed)?|optimiz(e|ed|es|ation)|maneuvers?|tires?|analyz(e|ed|es)|normaliz(e|ed|ation)"
+    "|regulariz(e|ed)|lineariz(e|ed|ation)|initializ(e|ed)|minimiz(e|ed|es)|maximiz(e|ed|es)|label(ed|ing)|model(ed|ing)|catalogs?"
+    "|gray|neighbors?|recogniz(e|ed)|summariz(e|ed)|vectoriz(e|ed)|discretiz(e|ed|ation)|travel(ed|ing)|cancel(ed|ing)"
+)
+TITLES = ("entropy-regularized", "optimization barrier", "unified tire model", "modeling using the t", "Optimization")
+"""Titles of papers, and other libraries' words."""
+
+
+def prose_of(path, text):
+    """What is written for people: a page without its code, the docstrings of a module."""
+    if path.suffix == ".ipynb":
+        text = "\n".join(
+            "".join(cell["source"]) for cell in json.loads(path.read_text())["cells"] if cell["cell_type"] == "markdown"
+        )
+    if path.suffix == ".py":
+        tree = trees().get(path) or ast.parse(text)
+        strings = [
+            node.value.value
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        ]
+        text = "\n".join(string for string in strings if isinstance(string, str))
+    return re.sub(r"```.*?```|`[^`]*`", "", text, flags=re.DOTALL)
+
+
+def test_english_is_spelt_as_in_british_journals():
+    found = []
+    for path, text in texts():
+        prose = prose_of(path, text)
+        for title in TITLES:
+            prose = prose.replace(title, "")
+        # Titles of books have capitals.
+        found += [f"{path.relative_to(TOP)}: {word[0]}" for word in re.finditer(rf"\b({AMERICAN})\b", prose)]
+    assert not found
+
+
 def test_the_glossary_has_each_word_once():
     table = (TOP / "CONTRIBUTING.md").read_text().split("| word | what it is |")[1].split("\n\n")[0]
     words = [word.strip() for line in table.splitlines()[2:] for word in line.split("|")[1].split(",")]

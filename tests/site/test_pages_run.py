@@ -61,7 +61,14 @@ def test_readme_is_short_and_names_what_there_is():
     quantities = [vars(estimators)[name] for name in estimators.__all__ if hasattr(vars(estimators)[name], "METHODS")]
     methods = sum(len(quantity.METHODS) for quantity in quantities)
     assert f"[{methods} methods]" in text
-    around = (tyres.FrictionEllipse, tyres.Similarity, tyres.OnRoad, tyres.Mirrored, tyres.Relaxed)
+    around = (
+        tyres.LongitudinalLaw,
+        tyres.FrictionEllipse,
+        tyres.Similarity,
+        tyres.OnRoad,
+        tyres.Mirrored,
+        tyres.Relaxed,
+    )
     laws = [
         law for law in vars(tyres).values()
         if isinstance(law, type) and issubclass(law, tyres.AbstractTyre) and law.__module__.startswith("jaxveh")

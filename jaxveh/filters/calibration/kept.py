@@ -8,6 +8,7 @@ from typing import Any
 
 import equinox as eqx
 
+from jaxveh._core.fresh_functions import note_function
 from jaxveh._core.recording import Recording
 from jaxveh.statespace import AbstractFilter, Estimate, StateSpace, kit
 
@@ -21,7 +22,9 @@ def run_and_keep(
 
     A new lambda compiles anew. **Raises** as `run`.
     """
+    kit.check_told(filter, model)
     filter.check(model)
+    note_function("run_and_keep: keep", keep)
     estimate, kept = _scan_and_keep(filter, model, model.rows(recording), key, keep)
     estimate = dataclasses.replace(estimate, time=recording.time)
     if throw:

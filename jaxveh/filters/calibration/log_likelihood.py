@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_positive, check_whole
+from jaxveh._core.errors import InputError, check_key, check_positive, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.filters.calibration.batches import in_batches
@@ -69,6 +69,7 @@ def log_likelihood_spread(
     **Raises** `InputError` where things do not go together or the filter draws nothing; `FilterError` where runs fail.
     """
     check_whole("runs", runs, 2)
+    check_key("log_likelihood_spread", key)
     filter.check(model)
     rows = model.rows(recording)
     found, results = in_batches(

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jaxveh._core.errors import FilterError, check_whole
+from jaxveh._core.errors import FilterError, check_key, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result
@@ -61,6 +61,7 @@ def monte_carlo(
     """
     truth = model if truth is None else truth
     check_whole("runs", runs)
+    check_key("monte_carlo", key)
     check_truth(model, truth)
     kit.check_covariance("monte_carlo", filter)
     filter.check(model)

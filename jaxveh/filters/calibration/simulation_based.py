@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check, check_whole
+from jaxveh._core.errors import InputError, check, check_key, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh._core.recording import Recording
 from jaxveh.diagnostics import chi_squared_tails
@@ -79,6 +79,7 @@ def simulation_based_calibration(
     """
     truth = model if truth is None else truth
     check_whole("runs", runs)
+    check_key("simulation_based_calibration", key)
     check_whole("draws", draws)
     check_truth(model, truth)
     filter.check(model)

@@ -38,6 +38,7 @@ def smooth(
     **Raises** as `run`, and `InputError` for a method that does not go with filter or model, and for a filter whose class does
     not declare that it can be smoothed (`AbstractFilter.smooths`).
     """
+    kit.check_told(filter, model)
     filter.check(model)
     kind = kit.check_smooths("smooth", filter)
     rows = model.rows(recording)
