@@ -127,7 +127,7 @@ def reference_in_words(calibration: Calibration, uses: tuple[str, ...]) -> str |
 
 def untold_in_words(calibration: Calibration) -> str | None:
     """Of what the logs say little; None where they tell all."""
-    names = sideslip.little_told(calibration)
+    names = [estimators.kit.in_words(name) for name in sideslip.little_told(calibration)]
     if not names:
         return None
     they = "it is" if len(names) == 1 else "they are"

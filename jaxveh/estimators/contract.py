@@ -129,13 +129,19 @@ class Calibration(eqx.Module):
     def summary(self) -> dict[str, dict[str, Any]]:
         """Fitted values by name: `{"value", "std", "unit"}`."""
         fit = self.fit
-        in_words = lambda name: name.replace("process_noise.law.std", "process noise")
         return {
-            in_words(p.name).replace("measurement_noise.std", "measurement noise"): {
+            in_words(p.name): {
                 "value": float(fit.parameters[p.name]), "std": float(fit.parameters_std[p.name]), "unit": p.unit
             }
             for p in fit.chosen
         }  # fmt: skip
+
+
+def in_words(name: str) -> str:
+    """The name of a fitted parameter as tables show it."""
+    for path, words in (("process_noise.law.std", "process noise"), ("measurement_noise.std", "measurement noise")):
+        name = name.replace(path, words)
+    return name
 
 
 def model_of(who: str, source: Any, model: Callable[[Any], StateSpace]) -> StateSpace:

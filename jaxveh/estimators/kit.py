@@ -1,7 +1,7 @@
 """What those who add an estimator build with: see `jaxveh.estimators.contract` for what one is."""
 
 from jaxveh.estimators.catalogue import FULL_CAR, catalogue, keys_asked
-from jaxveh.estimators.contract import Need, check_needs, cut_pieces, model_of, spans_of, start_of
+from jaxveh.estimators.contract import Need, check_needs, cut_pieces, in_words, model_of, spans_of, start_of
 from jaxveh.estimators.live import AbstractCleaning, AsItIs, clean_recording
 from jaxveh.estimators.method import (
     answer,
@@ -22,6 +22,7 @@ __all__ = [
     "cut_pieces",
     "follow",
     "follow_rows",
+    "in_words",
     "keys_asked",
     "method_of",
     "model_of",

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from jaxveh._core.errors import InputError
 from jaxveh.io import kit, replacing_file
 
@@ -121,11 +123,9 @@ def legend(figure: Any, axes: Any) -> Any:
             entries.setdefault(label, handle)
     if not entries:
         return None
-    # As many beside each other as the words leave room for.
-    columns = min(len(entries), 8)
-    while (
-        columns > 1 and len(entries) * (sum(map(len, entries)) / len(entries) + 7) / -(-len(entries) // columns) > WORDS
-    ):
+    # As many beside each other as the words leave room for; each column is as wide as its longest words.
+    columns, letters = min(len(entries), 8), [len(label) for label in entries]
+    while columns > 1 and sum(max(part) + 7 for part in np.array_split(letters, columns)) > WORDS:
         columns -= 1
     return figure.legend(
         entries.values(), entries.keys(), loc="outside upper left", ncols=columns, handlelength=1.6,

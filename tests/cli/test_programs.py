@@ -201,6 +201,8 @@ def kept(tmp_path_factory):
     more = ("--car-file", folder / "fitted.toml", "--json", folder / "fit.json", "--out", folder / "figures")
     result = run("fit", log, "--vehicle", car, "-o", folder / "calibration.toml", *more)
     assert result.exit_code == 0, result.output
+    # The sentence names what the table names.
+    assert "says little of" in result.output and "process_noise" not in result.output
     return folder
 
 

@@ -54,6 +54,15 @@ def test_several_estimates_show_their_wide_bands_alone():
     assert [band.get_label() for band in figure.axes[0].collections] == ["UKF, 95 % band", "APF, 95 % band"]
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6])
+def test_the_legend_of_several_estimates_is_no_wider_than_the_figure(count):
+    names = ("extended", "unscented", "particles", "walking", "one of a longer name", "last")[:count]
+    figure = plots.estimate({name: an_estimate() for name in names}, {"v_y": WAVE}, ["v_y"], seconds=1e3)
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    assert legend.get_window_extent().x1 <= figure.bbox.x1
+
+
 def test_who_claims_no_spread_has_no_band():
     silent = an_estimate(std={"v_y": np.full_like(TIME, np.nan)})
     figure = plots.estimate({"UKF": an_estimate(), "formula": silent}, quantities=["v_y"], seconds=1e3)

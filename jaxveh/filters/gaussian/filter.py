@@ -1,6 +1,7 @@
 """What every Gaussian filter does: predict, update, and both as one step."""
 
 import abc
+import dataclasses
 import warnings
 from typing import Any, ClassVar
 
@@ -97,6 +98,13 @@ class AbstractRuleFilter(AbstractGaussianFilter):
     rows_between: ClassVar[bool] = True
     written_out: ClassVar[bool] = True
     form: eqx.AbstractVar[AbstractForm]
+
+    def __check_init__(self):
+        for entry in dataclasses.fields(self):
+            value = getattr(self, entry.name)
+            if entry.name != "form" and isinstance(value, AbstractForm):
+                kind, form = type(self).__name__, type(value).__name__
+                raise InputError(f"{kind}.{entry.name} = {form}(): is a form; give it by name, {kind}(form={form}()).")
 
     @property
     def gradients(self):
