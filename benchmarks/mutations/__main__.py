@@ -28,7 +28,18 @@ from .mutate import SWAPS, Mutation, mutations
 
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("jaxveh/filters", "jaxveh/vehicles", "jaxveh/tyres", "jaxveh/sensors")
-COPIED = ("jaxveh", "tests", "benchmarks", "notebooks", "pyproject.toml", "README.md", "CHANGELOG.md", "CITATION.cff", "mkdocs.yml", "noxfile.py")
+COPIED = (
+    "jaxveh",
+    "tests",
+    "benchmarks",
+    "notebooks",
+    "pyproject.toml",
+    "README.md",
+    "CHANGELOG.md",
+    "CITATION.cff",
+    "mkdocs.yml",
+    "noxfile.py",
+)
 EXIT_NO_TESTS = 5
 
 SLOWER = 4.0

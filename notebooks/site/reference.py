@@ -249,11 +249,49 @@ def _entry(entry: Entry, uses: dict[str, list[tuple[str, str]]], page: str) -> s
             f"| `{a.name}` | {_cell(a.type)} | {_cell(a.default)} | {a.words.replace('|', '/')} |" for a in arguments
         ]
         parts.append("\n".join(["| argument | type | default | what it is |", "| --- | --- | --- | --- |", *rows]))
+    if links := _related(entry):
+        parts.append(links)
     if used := uses.get(entry.short):
         where, code = used[0]
         link = "" if where == page else f" ([{Path(where).stem.replace('_', ' ')}]({_from_reference(where)}))"
         parts.append(f"Example{link}:\n\n```python\n{code}\n```")
     return "\n\n".join(parts)
+
+
+def _related(entry: Entry) -> str:
+    """Of a class, which functions return it, and which public classes are of its kind."""
+    if not inspect.isclass(entry.value):
+        return ""
+    returned, kinds = [], []
+    for other in _every_entry():
+        if inspect.isclass(other.value):
+            kinds += [other] if entry.value in other.value.__mro__[1:] else []
+        elif callable(other.value) and re.search(rf"\b{entry.name}\b", _returns(other.value)):
+            returned.append(other)
+    links = [("Returned by", returned), ("Kinds of it", kinds)]
+    return "\n\n".join(
+        f"{title}: " + ", ".join(f"[`{one.short}`]({page_of(one.module)}#{one.path})" for one in found) + "."
+        for title, found in links
+        if found
+    )
+
+
+@functools.cache
+def _every_entry() -> list[Entry]:
+    return [entry for entries in public_entries().values() for entry in entries]
+
+
+def _returns(function: Any) -> str:
+    try:
+        annotation = inspect.signature(function).return_annotation
+    except (ValueError, TypeError):
+        return ""
+    return annotation if isinstance(annotation, str) else getattr(annotation, "__name__", "")
+
+
+def has_example(entry: Entry, uses: dict[str, list[tuple[str, str]]]) -> bool:
+    """Whether a page shows how it is used, or says what returns it or is of its kind."""
+    return entry.short in uses or bool(_related(entry)) or not callable(entry.value)
 
 
 def _heading(entry: Entry) -> str:

@@ -22,7 +22,9 @@ def check_imports() -> None:
     import jaxveh
 
     home = pathlib.Path(jaxveh.__file__).resolve()
-    assert pathlib.Path(sysconfig.get_paths()["purelib"]).resolve() in home.parents, f"{home} is not the installed package"
+    assert pathlib.Path(sysconfig.get_paths()["purelib"]).resolve() in home.parents, (
+        f"{home} is not the installed package"
+    )
     assert (home.parent / "py.typed").exists()
     there = [name for name in OPTIONAL if importlib.util.find_spec(name)]
     assert not there, f"this environment has more than the core: {there}"
@@ -75,7 +77,9 @@ if __name__ == "__main__":
     __import__("jax")
     alone = time.perf_counter()
     __import__("jaxveh")
-    print(f"Python {sys.version.split()[0]}: import of jax {alone - begin:.1f} s, of jaxveh {time.perf_counter() - alone:.2f} s more")
+    print(
+        f"Python {sys.version.split()[0]}: import of jax {alone - begin:.1f} s, of jaxveh {time.perf_counter() - alone:.2f} s more"
+    )
     check_imports()
     check_estimates()
     check_extras()
