@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -11,6 +12,7 @@ import typer
 
 from jaxveh import InputError, Recording, io
 from jaxveh._core.errors import check_at_least, check_one_of
+from jaxveh._core.recording import TRUTH as SIMULATED
 from jaxveh.cli import options, quantities, quantity_options, sideslip
 from jaxveh.cli.blanking import LogParts, split
 from jaxveh.cli.console import number, progress, results, spread, table
@@ -53,7 +55,8 @@ CALIBRATION = typer.Option(
 TRUTH = typer.Option(
     "--truth",
     metavar="CHANNEL",
-    help="Score against this channel (v_y or sideslip), which no estimator gets to see (but see --calibrate-on).",
+    help="Score against this channel (v_y or sideslip; true.v_y of a simulation), which no estimator gets to see (but see "
+    "--calibrate-on).",
 )
 REPORT = typer.Option(
     "--report",
@@ -179,6 +182,7 @@ def _estimate(choice: Choice) -> tuple[Any, dict[str, Any]]:
     car = _car(told, found)
     used = (choice.truth, *choice.calibrate_on)
     drives = read_drives(choice.logs, car, choice.channels, choice.fill, choice.span, used, choice.anyway)
+    choice, drives = _with_simulated_truth(choice, drives)
     jobs = [_job(choice, drive, product) for drive, product in zip(drives, products, strict=True)]
     fitted_on = [job.parts.estimate if job.parts.calibration is None else job.parts.calibration for job in jobs]
     reason = "--as-told" if choice.as_told else None
@@ -214,7 +218,7 @@ def _check(choice: Choice) -> list[Path]:
     check_report_page(choice.report, choice.force, sources)
     check_at_least("--particles", choice.particles, 2)
     if choice.truth is not None:
-        check_one_of("--truth", choice.truth, sideslip.SCORED)
+        check_one_of("--truth", choice.truth, (*sideslip.SCORED, *(f"{SIMULATED}{name}" for name in sideslip.SCORED)))
     if choice.as_told and choice.calibrate is not None:
         raise InputError("--as-told fits nothing: leave --calibrate out, or --as-told.")
     if choice.calibration is not None and (choice.as_told or choice.calibrate is not None):
@@ -223,6 +227,19 @@ def _check(choice: Choice) -> list[Path]:
     if choice.calibrate is not None and len(logs) > 1:
         raise InputError("--calibrate is of one log: calibrate with `jaxveh fit`, and give its file as --calibration.")
     return products
+
+
+def _with_simulated_truth(choice: Choice, drives: Sequence[Drive]) -> tuple[Choice, list[Drive]]:
+    """Of a simulated log `true.v_y` is scored as a measured v_y would be, in whose place it stands."""
+    if choice.truth is None or not choice.truth.startswith(SIMULATED):
+        return choice, list(drives)
+    name = choice.truth.removeprefix(SIMULATED)
+    if name in choice.calibrate_on:
+        raise InputError(
+            f"--truth {choice.truth}: calibrated on {name}, too: take --truth {name}, or leave --calibrate-on out."
+        )
+    logs = [drive.recording.replace(**{name: drive.recording[choice.truth]}) for drive in drives]
+    return choice._replace(truth=name), [one._replace(recording=log) for one, log in zip(drives, logs, strict=True)]
 
 
 def _job(choice: Choice, drive: Drive, product: Path) -> Job:

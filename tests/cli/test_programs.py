@@ -101,6 +101,21 @@ def test_estimate_without_calibration(tmp_path, drive):
     assert all((tmp_path / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG") for name in drawn)
 
 
+def test_the_truth_of_a_simulation_is_scored_as_a_measured_one_is(tmp_path, drive):
+    """`true.v_y` as `simulate` writes it."""
+    table, numbers = dict(drive), []
+    table["true.v_y"] = table.pop("v_y")
+    for name, log, truth in (("measured", drive, "v_y"), ("simulated", table, "true.v_y")):
+        (folder := tmp_path / name).mkdir()
+        result, _ = estimate(folder, log, "--as-told", "--truth", truth, "--json", folder / "numbers.json")
+        assert result.exit_code == 0, result.output
+        numbers.append(read_json(folder / "numbers.json"))
+    assert numbers[0]["sideslip_rmse_deg"] == numbers[1]["sideslip_rmse_deg"] > 0
+    both = {**drive, "true.v_y": drive["v_y"]}
+    result, _ = estimate(tmp_path, both, "--calibrate", "0:2", "--calibrate-on", "v_y", "--truth", "true.v_y")
+    assert result.exit_code == 2 and "calibrated on v_y, too" in error_line(result)
+
+
 def test_estimate_never_sees_the_truth(tmp_path, drive):
     files = []
     for name, table in (("with", drive), ("other", {**drive, "v_y": 9 + drive["v_y"]})):
@@ -163,7 +178,7 @@ def test_a_log_calibrates_itself_unless_told_otherwise(tmp_path, drive):
 
 def test_truth_that_says_nothing_of_sideslip(tmp_path, drive):
     result, product = estimate(tmp_path, drive, "--truth", "a_y")
-    assert "--truth = 'a_y': must be one of 'v_y', 'sideslip'." in error_line(result)
+    assert "--truth = 'a_y': must be one of 'v_y', 'sideslip', 'true.v_y', 'true.sideslip'." in error_line(result)
     assert not product.exists()
 
 

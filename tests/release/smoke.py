@@ -1,6 +1,6 @@
-"""What a wheel that was installed alone can do, with the core's dependencies and nothing else: `python smoke.py`, without pytest.
+"""What a wheel that was installed alone can do, with the core's dependencies: `python smoke.py`, without pytest.
 
-Every public module is imported, or says which extra it needs; a drive is simulated, filtered, fitted and differentiated; what needs an
+Every public module is imported, or says which extra it needs; a drive is simulated, filtered and differentiated; what needs an
 extra names it.
 """
 
@@ -18,6 +18,11 @@ os.environ.setdefault("XLA_FLAGS", "--xla_cpu_prefer_vector_width=512")
 OPTIONAL = ("pandas", "matplotlib", "typer", "zarr", "mcap", "bokeh", "asammdf", "optax")
 
 
+def check(holds: bool, words: object) -> None:
+    if not holds:
+        raise AssertionError(words)
+
+
 def check_imports() -> None:
     import jaxveh
 
@@ -33,7 +38,7 @@ def check_imports() -> None:
             try:
                 importlib.import_module(module.name)
             except jaxveh.InputError as error:
-                assert 'pip install "jaxveh[' in str(error), error
+                check('pip install "jaxveh[' in str(error), error)
 
 
 def check_estimates() -> None:
@@ -64,7 +69,7 @@ def check_extras() -> None:
         try:
             act()
         except InputError as error:
-            assert f'pip install "jaxveh[{extra}]"' in str(error), error
+            check(f'pip install "jaxveh[{extra}]"' in str(error), error)
         else:
             raise AssertionError(f"nothing was said of the extra {extra}")
     program = pathlib.Path(sysconfig.get_path("scripts")) / "jaxveh"
@@ -77,9 +82,8 @@ if __name__ == "__main__":
     __import__("jax")
     alone = time.perf_counter()
     __import__("jaxveh")
-    print(
-        f"Python {sys.version.split()[0]}: import of jax {alone - begin:.1f} s, of jaxveh {time.perf_counter() - alone:.2f} s more"
-    )
+    ours = time.perf_counter() - alone
+    print(f"Python {sys.version.split()[0]}: import of jax {alone - begin:.1f} s, of jaxveh {ours:.2f} s more")
     check_imports()
     check_estimates()
     check_extras()

@@ -10,10 +10,10 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
-from notebooks.site.executed import ROOT
 
 import jaxveh
 from jaxveh import io, manoeuvres, sensors, tyres, vehicles
+from notebooks.site.executed import ROOT
 
 README = (ROOT / "README.md").read_text()
 BLOCKS = [block.splitlines() for block in re.findall(r"^```\n(.*?)^```", README, re.S | re.M)]
