@@ -19,13 +19,15 @@ _SOURCE = b"source"
 
 def open_parquet(path: Path, channels: ChannelMap | None) -> TableLog:
     """A Parquet file; a field's metadata `unit` is its unit, the table's `source` its note. Loads only what is used."""
-    arrow = require("pyarrow", "reading Parquet")
+    require("pyarrow", "reading Parquet")
     parquet = require("pyarrow.parquet", "reading Parquet")
     try:
         schema = parquet.read_schema(path)
-    except (arrow.ArrowException, OSError) as error:
+        headings = [name for name in schema.names if not name.startswith("__index_level_")]
+        units = {name: unit for name in headings if (unit := _unit(schema.field(schema.names.index(name))))}
+        note = (schema.metadata or {}).get(_SOURCE, b"").decode()
+    except Exception as error:  # pyarrow raises whatever a damaged block leads to
         raise InputError(f"{path}: is not a readable Parquet file ({error}).") from error
-    headings = [name for name in schema.names if not name.startswith("__index_level_")]
     twice = sorted({name for name in headings if headings.count(name) > 1})
     if twice:
         raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
@@ -34,11 +36,9 @@ def open_parquet(path: Path, channels: ChannelMap | None) -> TableLog:
         try:
             with parquet.ParquetFile(path) as file:
                 return file.read(columns=[heading]).column(heading).to_numpy()
-        except (arrow.ArrowException, OSError) as error:
+        except Exception as error:  # as above
             raise InputError(f"{path}: column {heading!r} cannot be read ({error}).") from error
 
-    units = {name: unit for name in headings if (unit := _unit(schema.field(name)))}
-    note = (schema.metadata or {}).get(_SOURCE, b"").decode()
     return TableLog(path, headings, load, units, note, channels.time if channels else None)
 
 

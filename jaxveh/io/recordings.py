@@ -1,4 +1,4 @@
-"""Recordings in and out: CSV, Parquet, MDF4."""
+"""Recordings in and out: CSV, Parquet, MDF4; in from MATLAB and MCAP."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.csv_log import open_csv, write_csv
 from jaxveh.io.files import check_readable, check_suffix, replacing_file
 from jaxveh.io.log import Column, Log, apply
+from jaxveh.io.mat_log import open_mat
+from jaxveh.io.mcap_reader import open_mcap
 from jaxveh.io.mdf_log import open_mdf, write_mdf
 from jaxveh.io.merge import merge, resample
 from jaxveh.io.parquet_log import open_parquet, write_parquet
@@ -26,10 +28,14 @@ _OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
     ".parquet": open_parquet,
     ".mf4": open_mdf,
     ".mdf": open_mdf,
+    ".mat": open_mat,
+    ".mcap": open_mcap,
 }
 _WRITE = {".csv": write_csv, ".parquet": write_parquet, ".mf4": write_mdf, ".mdf": write_mdf}
-SUFFIXES = tuple(_OPEN)
+SUFFIXES = tuple(_WRITE)
 """File name endings that are read and written."""
+LOG_SUFFIXES = tuple(_OPEN)
+"""File name endings that are read."""
 
 
 def read_recording(
@@ -39,18 +45,19 @@ def read_recording(
     raster: str | None = None,
     method: str = "linear",
 ) -> Recording:
-    """Read a log: `.csv`, `.parquet`, `.mf4` or `.mdf`.
+    """Read a log: `.csv`, `.parquet`, `.mf4` or `.mdf`, MATLAB's `.mat` (structs included), or `.mcap` (topics of JSON messages).
 
     **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.CHANNEL_MAP_SCHEMA`); without it every column
     is a channel of the name it has, and time is the column `time`, `timestamps`, `timestamp` or `t`. `raster`: the name
     of a channel whose samples become the rows, the others filled there by `method` (`linear`, `hold`; `io.resample`).
 
-    **Units**: the channel map's, else the file's own (Parquet: the field's metadata `unit`; MDF4: the channel's unit;
-    CSV and Parquet: `name [unit]` in the first line), else SI is taken for granted. Channels of `io.CANONICAL` come out
-    in SI; other names keep the unit they have.
+    **Units**: the channel map's, else the file's own (Parquet: the field's metadata `unit`; MDF4: the channel's unit; MATLAB:
+    `Units` beside the data; CSV and Parquet: `name [unit]` in the first line), else SI is taken for granted. Channels of
+    `io.CANONICAL` come out in SI; other names keep the unit they have.
 
-    **Time base**: MDF4 groups of different rasters are merged, not resampled: a row for every stamp, NaN where a sensor
-    did not speak. Stamps keep the log's own time, in seconds, on the host in float64; channels have JAX's float type.
+    **Time base**: MDF4 groups, MATLAB structs and MCAP topics of different rasters are merged, not resampled: a row for every
+    stamp, NaN where a sensor did not speak. Stamps keep the log's own time, in seconds, on the host in float64; channels have
+    JAX's float type.
 
     **Raises** `InputError` naming file, column, row, value and what to do: no such file or suffix, a broken file, an
     empty log, an unknown column, a unit of another dimension, a cell that is not a number, time that does not increase.

@@ -1,0 +1,108 @@
+"""Every kind of log that is no text, cut and spoilt at random: a recording, or an `InputError`; never another exception."""
+
+import random
+import warnings
+
+import numpy as np
+import pytest
+
+from jaxveh import InputError, Recording, io
+
+COUNT, MANY = 400, 3000
+"""Spoilt files of each kind: in the default run and in the full one,"""
+
+SLOW = 20
+"""and how many times fewer of MDF4, which takes a tenth of a second each."""
+
+T = np.arange(40) * 0.01
+LOG = Recording(T, {"yaw_rate": np.sin(T), "v_x": 20 + T}, {"yaw_rate": "rad/s", "v_x": "m/s"}, "a drive")
+TREE = {"time": T, "log": {"v_x": {"Time": T, "Data": 20 + T, "Units": "m/s"}, "yaw": np.stack([T, T], 1)}, "car": "sedan",
+        "scope": {"time": T, "signals": [{"values": T, "label": "a"}, {"values": T, "label": "b"}]}}  # fmt: skip
+
+
+def write_mat_old(path):
+    scipy_io = pytest.importorskip("scipy.io")
+    scipy_io.savemat(path, {name: value for name, value in TREE.items() if name != "scope"}, do_compression=False)
+
+
+def write_mat_new(path):
+    pytest.importorskip("h5py")
+    from matlab_files import write_new
+
+    write_new(path, TREE)
+
+
+def write_mcap(path):
+    pytest.importorskip("mcap.writer")
+    io.write_topics({"/log": io.to_frame(LOG)}, path, overwrite=True)
+
+
+def write_as(path):
+    io.write_recording(LOG, path, overwrite=True)
+
+
+KINDS = {
+    "MATLAB 5": ("mat", write_mat_old),
+    "MATLAB 7.3": ("mat", write_mat_new),
+    "MCAP": ("mcap", write_mcap),
+    "Parquet": ("parquet", write_as),
+    "MDF4": ("mf4", write_as),
+}
+
+
+def test_every_log_that_is_no_text_is_here():
+    told = {f".{suffix}" for suffix, _ in KINDS.values()}
+    assert set(io.LOG_SUFFIXES) - told == {
+        ".csv",
+        ".mdf",
+    }  # text, spoilt in test_mutated_files; and MDF4 by its other name
+
+
+def spoil(rng, data):
+    """Bytes cut off, replaced, left out, doubled or turned over, near the front as often as anywhere."""
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        at = rng.randrange(rng.choice((len(data), min(len(data), 600))))
+        size = rng.choice((1, 1, 1, 2, 4, 8, 64))
+        change = rng.randrange(6)
+        if change == 0:
+            data = data[: max(at, 1)]
+        elif change == 1:
+            data = data[:at] + data[at + size :]
+        elif change == 2:
+            data = data[:at] + data[at : at + size] + data[at:]
+        elif change == 3:
+            data = data[:at] + bytes(rng.choice((0, 0xFF, 0x80, 0x7F)) for _ in range(size)) + data[at + size :]
+        else:
+            data = data[:at] + rng.randbytes(size) + data[at + size :]
+    return data or b"\0"
+
+
+def check(kind, count, seed, folder):
+    count = count // SLOW if kind == "MDF4" else count
+    suffix, write = KINDS[kind]
+    path = folder / f"odd.{suffix}"
+    write(path)
+    whole, read = path.read_bytes(), 0
+    assert len(io.read_recording(path)) == len(T)
+    for k in range(count):
+        path.write_bytes(spoil(random.Random(f"{seed}/{k}"), whole))
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found = io.read_recording(path)
+        except InputError:
+            continue
+        read += 1
+        assert (np.diff(np.asarray(found.time)) > 0).all(), k
+    assert read < count
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_recording_or_an_error(kind, tmp_path):
+    check(kind, COUNT, 1, tmp_path)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_recording_or_an_error_many_times(kind, tmp_path):
+    check(kind, MANY, 2, tmp_path)
