@@ -10,7 +10,7 @@ from jaxveh.io.car import AxleTyre, CarSpecification, read_car, write_car
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.commonroad import CommonRoadSpecification, read_commonroad
 from jaxveh.io.files import check_readable, making_folder, replacing_file, write_text
-from jaxveh.io.frames import to_frame, write_frame
+from jaxveh.io.frames import from_frame, to_frame, write_frame
 from jaxveh.io.mcap_log import write_topics
 from jaxveh.io.merge import resample
 from jaxveh.io.property_file import PropertyFile, read_property_file, write_property_file
@@ -36,6 +36,7 @@ __all__ = [
     "TydexFile",
     "canonical_unit",
     "check_readable",
+    "from_frame",
     "kit",
     "making_folder",
     "read_car",

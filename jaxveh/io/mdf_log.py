@@ -93,13 +93,18 @@ def _quiet_finalizers() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
+def _stored(values: np.ndarray) -> np.ndarray:
+    """Samples of a type that the writer has: single precision for half."""
+    return np.asarray(values, np.float32 if values.dtype.itemsize == 2 else None)
+
+
 def write_mdf(
     path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str], note: str
 ) -> None:
     """One channel group of MDF 4.10 over one time base; NaN stays NaN; the note is the header's comment."""
     asammdf = require("asammdf", "writing MDF4")
     signals = [
-        asammdf.Signal(samples=np.asarray(values), timestamps=time, name=name, unit=units.get(name, ""))
+        asammdf.Signal(samples=_stored(values), timestamps=time, name=name, unit=units.get(name, ""))
         for name, values in columns.items()
     ]
     with asammdf.MDF(version="4.10") as mdf:

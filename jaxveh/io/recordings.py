@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
@@ -20,6 +21,7 @@ from jaxveh.io.mat_log import open_mat
 from jaxveh.io.mcap_reader import open_mcap
 from jaxveh.io.mdf_log import open_mdf, write_mdf
 from jaxveh.io.merge import merge, resample
+from jaxveh.io.netcdf import open_netcdf, write_recording_netcdf
 from jaxveh.io.parquet_log import open_parquet, write_parquet
 from jaxveh.io.units import convert, is_unit
 
@@ -30,8 +32,15 @@ _OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
     ".mdf": open_mdf,
     ".mat": open_mat,
     ".mcap": open_mcap,
+    ".nc": open_netcdf,
 }
-_WRITE = {".csv": write_csv, ".parquet": write_parquet, ".mf4": write_mdf, ".mdf": write_mdf}
+_WRITE = {
+    ".csv": write_csv,
+    ".parquet": write_parquet,
+    ".mf4": write_mdf,
+    ".mdf": write_mdf,
+    ".nc": write_recording_netcdf,
+}
 SUFFIXES = tuple(_WRITE)
 """File name endings that are read and written."""
 LOG_SUFFIXES = tuple(_OPEN)
@@ -45,7 +54,8 @@ def read_recording(
     raster: str | None = None,
     method: str = "linear",
 ) -> Recording:
-    """Read a log: `.csv`, `.parquet`, `.mf4` or `.mdf`, MATLAB's `.mat` (structs included), or `.mcap` (topics of JSON messages).
+    """Read a log: `.csv`, `.parquet`, `.mf4` or `.mdf`, MATLAB's `.mat` (structs included), `.mcap` (topics of JSON messages), or
+    NetCDF 4 (`.nc`).
 
     **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.CHANNEL_MAP_SCHEMA`); without it every column
     is a channel of the name it has, and time is the column `time`, `timestamps`, `timestamp` or `t`. `raster`: the name
@@ -62,6 +72,21 @@ def read_recording(
     **Raises** `InputError` naming file, column, row, value and what to do: no such file or suffix, a broken file, an
     empty log, an unknown column, a unit of another dimension, a cell that is not a number, time that does not increase.
     """
+    return _read(path, channels, raster, method, as_saved=False)
+
+
+def load_recording(path: str | os.PathLike) -> Recording:
+    """As `read_recording`; a file that a recording was saved in gives the float types of its channels back, too."""
+    return _read(path, None, None, "linear", as_saved=True)
+
+
+def _read(
+    path: str | os.PathLike,
+    channels: ChannelMap | str | os.PathLike | None,
+    raster: str | None,
+    method: str,
+    as_saved: bool,
+) -> Recording:
     path = Path(path)
     suffix = check_suffix(path, _OPEN, "log")
     check_readable(path)
@@ -72,7 +97,11 @@ def read_recording(
             raise InputError(f"{path}: holds no channel beside time.")
         loaded = {name: _load(log, name, channel) for name, channel in wanted.items()}
         note = log.note or path.name
+        as_saved = as_saved and log.as_saved
     time, values = merge(loaded)
+    if as_saved:
+        # A recording leaves arrays of jax as they are; those of NumPy get the float type of today.
+        values = {name: jnp.asarray(one) for name, one in values.items()}
     units = {name: column.unit for name, column in loaded.items() if column.unit}
     try:
         recording = Recording(time, values, units, note)
@@ -82,10 +111,11 @@ def read_recording(
 
 
 def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-    """Write a recording as `.csv`, `.parquet`, `.mf4` or `.mdf`; `read_recording` gives it back.
+    """Write a recording as `.csv`, `.parquet`, `.mf4`, `.mdf` or `.nc`; `read_recording` gives it back.
 
-    Values and time come back bit for bit from every format; units and source note from Parquet and MDF4. CSV has no
-    place for them: where units are not SI, or for other readers, write `with_units_in_names(recording)`.
+    Values and time come back bit for bit from every format; units and source note from Parquet, MDF4 and NetCDF. CSV has no
+    place for them: where units are not SI, or for other readers, write `with_units_in_names(recording)`. `Recording.load` gives
+    the channels of Parquet and NetCDF the float types back that they had.
 
     The file appears as a whole or not at all. **Raises** `InputError` for another suffix, or where the file exists and
     `overwrite` is False.
