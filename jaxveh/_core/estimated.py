@@ -8,9 +8,10 @@ from typing import Any, ClassVar, Self
 import jax
 import numpy as np
 
-from jaxveh._core.labelled import TIME, Labelled, Packing, Variable, make_again, run_axes, time_again, time_axis, unpack
+from jaxveh._core.labelled import TIME, Labelled, Variable, make_again, run_axes, time_again, time_axis
 from jaxveh._core.names import as_mapping
 from jaxveh._core.overview import Lazy, Overview, counted, is_known, number, span, stretch
+from jaxveh._core.packing import Packing, unpack
 from jaxveh._core.result import Result
 from jaxveh._core.shown import Kept, above
 

@@ -33,7 +33,9 @@ class WithParameters(Shown):
         leaves = self._leaves()
         title = f"{type(self).__name__}: {self.called}, {counted(len(leaves), 'parameter')}"
         row = lambda name: (name, number(leaves[name][1]), leaves[name][0].unit)
-        return Overview(title, ("parameter", "value", "unit"), Lazy(list(leaves), row))
+        # Its own before those of its parts.
+        names = sorted(leaves, key=lambda name: name.count("."))
+        return Overview(title, ("parameter", "value", "unit"), Lazy(names, row))
 
     def _labelled(self) -> Labelled:
         leaves = self._leaves()

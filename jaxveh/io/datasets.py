@@ -88,18 +88,18 @@ def result_of(kind: type, labelled: Labelled, what: str) -> Any:
 
 
 def frame_of(labelled: Labelled) -> Any:
-    """A data frame of what is shown: a row for each place along its dimensions, whose coordinates are the first columns. What has
-    more dimensions than the first of them is taken apart: `name[0]`, or by the coordinate there."""
+    """A data frame of what is shown: a row for each place along the dimensions that all of it has, whose coordinates are the
+    first columns. What has more dimensions is taken apart: `name[0]`, or by the coordinate there."""
     pandas = require("pandas", "making a data frame")
     shown = {name: labelled.both[name] for name in labelled.shown if name in labelled.both}
-    dims = next(iter(shown.values())).dims if shown else ()
+    first = next(iter(shown.values())).dims if shown else ()
+    dims = tuple(d for d in first if all(d in one.dims for one in shown.values()))
     sizes = {d: n for one in shown.values() for d, n in zip(one.dims, np.shape(one.values), strict=True)}
     shape = tuple(sizes[d] for d in dims)
     columns: dict[str, Any] = {}
-    for name, one in labelled.coordinates.items():
-        if one.dims and set(one.dims) <= set(dims):
-            columns[name] = _along(one, dims, shape)
+    of_dims = {name: one for name, one in labelled.coordinates.items() if one.dims and set(one.dims) <= set(dims)}
     for k, d in enumerate(dims):
+        columns |= {name: _along(one, dims, shape) for name, one in of_dims.items() if one.dims[-1] == d}
         if d not in columns and not any(one.dims == (d,) for one in labelled.coordinates.values()):
             columns[d] = np.broadcast_to(
                 np.arange(shape[k]).reshape([-1 if i == k else 1 for i in range(len(dims))]), shape
