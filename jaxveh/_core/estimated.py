@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxveh._core.labelled import TIME, Labelled, Variable, make_again, run_axes, time_again, time_axis
 from jaxveh._core.names import as_mapping
-from jaxveh._core.overview import Lazy, Overview, counted, is_known, number, span, stretch
+from jaxveh._core.overview import Lazy, Overview, count_of, is_known, number, span, stretch
 from jaxveh._core.packing import Packing, unpack
 from jaxveh._core.result import Result
 from jaxveh._core.shown import Kept, above
@@ -34,7 +34,7 @@ class Estimated(Kept):
     records: ClassVar[dict[str, Any]] = {}
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame` with a column `time`, each quantity's mean as `name`, beside it `name_std`, and `name_known` where
+        """A `pandas.DataFrame` with a column `time`, each quantity's mean as `name`, beside it `name_std`, and one more where
         a method says so; units in `frame.attrs["units"]`. A batch has a column `run` as well."""
         return super().to_pandas()
 
@@ -79,7 +79,7 @@ class Estimated(Kept):
         names = self._quantities()
         mean, std, known = ({} if one is None else as_mapping(one) for one in self._said())
         title = (
-            f"{type(self).__name__}: {counted(len(names), 'quantity')}, {stretch(getattr(self, TIME))}{self._ended()}"
+            f"{type(self).__name__}: {count_of(len(names), 'quantity')}, {stretch(getattr(self, TIME))}{self._ended()}"
         )
         heads = ("quantity", "unit", "least", "most", "usual std", *(("known",) if known else ()))
 

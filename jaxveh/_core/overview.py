@@ -181,7 +181,7 @@ def span(values: Any) -> tuple[str, str]:
     return f"{float(finite.min()):.4g}", f"{float(finite.max()):.4g}"
 
 
-def missing(values: Any) -> str:
+def missing_share(values: Any) -> str:
     """The share of an array that is not finite, in per cent."""
     if not is_known(values):
         return "-"
@@ -194,17 +194,17 @@ def missing(values: Any) -> str:
 
 def stretch(time: Any) -> str:
     """Rows, and from when to when, in words."""
-    rows = counted(time.shape[-1], "row")
+    rows = count_of(time.shape[-1], "row")
     if time.ndim > 1:
-        return f"{rows}, {counted(int(np.prod(time.shape[:-1])), 'run')}"
+        return f"{rows}, {count_of(int(np.prod(time.shape[:-1])), 'run')}"
     if not is_known(time):
         return f"{rows}, traced"
     stamps = np.asarray(time)
     rate = f" ({1 / np.median(np.diff(stamps)):.4g} Hz)" if len(stamps) > 1 else ""
-    return f"{rows}, {stamps[0]:.6g} to {stamps[-1]:.6g} s{rate}"
+    return f"{rows}, {stamps[0]:.10g} to {stamps[-1]:.10g} s{rate}"
 
 
-def counted(count: int, word: str) -> str:
+def count_of(count: int, word: str) -> str:
     """`1 row`, `2 rows`."""
     return (
         f"{count} {word}"

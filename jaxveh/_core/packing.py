@@ -45,7 +45,7 @@ class Packing:
         return {"jax" if isinstance(tree, jax.Array) else "scalar" if isinstance(tree, np.generic) else "numpy": taken}
 
     def _parameters(self, tree: Parameters, name: str, lead: tuple[str, ...]) -> Any:
-        stacked = tree.stacked()
+        stacked = tree.stack()
         if stacked is None:
             return {"parameters": {one: self.add(value, f"{name}.{one}", lead) for one, value in tree.items()}}
         taken, values = self._free(name), np.moveaxis(stacked, 0, -1)

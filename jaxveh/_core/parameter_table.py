@@ -8,7 +8,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxveh._core.labelled import PARAMETER, Labelled, Variable
-from jaxveh._core.overview import Lazy, Overview, counted, number
+from jaxveh._core.overview import Lazy, Overview, count_of, number
 from jaxveh._core.parameter import Parameter, every_parameter
 from jaxveh._core.shown import Shown
 
@@ -31,7 +31,7 @@ class WithParameters(Shown):
 
     def _overview(self) -> Overview:
         leaves = self._leaves()
-        title = f"{type(self).__name__}: {self.called}, {counted(len(leaves), 'parameter')}"
+        title = f"{type(self).__name__}: {self.called}, {count_of(len(leaves), 'parameter')}"
         row = lambda name: (name, number(leaves[name][1]), leaves[name][0].unit)
         # Its own before those of its parts.
         names = sorted(leaves, key=lambda name: name.count("."))

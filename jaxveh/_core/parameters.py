@@ -88,14 +88,14 @@ class Parameters(Kept, Mapping):
             raise InputError(f"Parameters.from_pandas: {', '.join(twice)} is there twice: must be a row a parameter.")
         return cls(dict(zip(names, jnp.asarray(frame["value"].to_numpy()), strict=True)))
 
-    def stacked(self) -> np.ndarray | None:
+    def stack(self) -> np.ndarray | None:
         """The values in one array (p, ...) of NumPy; None where they are of several kinds, shapes or types, or there are none."""
         values = list(self._values.values())
         kinds = {(_kind_of(value), np.shape(value), np.result_type(value)) for value in values}
         return np.stack([np.asarray(value) for value in values]) if len(kinds) == 1 else None
 
     def _labelled(self) -> Labelled:
-        stacked, name = self.stacked(), Variable((PARAMETER,), np.array(list(self), object))
+        stacked, name = self.stack(), Variable((PARAMETER,), np.array(list(self), object))
         facts = {"names": list(self), "kinds": [_kind_of(value) for value in self.values()]}
         if stacked is not None:
             dims = tuple(f"value_{k}" for k in range(stacked.ndim - 1))

@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh._core.errors import InputError, check_one_of, is_concrete
 from jaxveh._core.labelled import TIME, Labelled, Variable, make_again, time_again, time_axis
 from jaxveh._core.names import check_names
-from jaxveh._core.overview import Lazy, Overview, counted, is_known, missing, number, span, stretch
+from jaxveh._core.overview import Lazy, Overview, count_of, is_known, missing_share, number, span, stretch
 from jaxveh._core.shown import Kept, above
 
 TRUTH = "true."
@@ -186,12 +186,12 @@ class Recording(Kept, eqx.Module):
 
     def _overview(self) -> Overview:
         names, shape = list(self.channels), self.time.shape
-        title = f"Recording: {counted(len(names), 'channel')}, {stretch(self.time)}"
+        title = f"Recording: {count_of(len(names), 'channel')}, {stretch(self.time)}"
         title += f", {self.source!r}" if self.source else ""
         if not is_known(self.time) or len(shape) > 1:
             rows = [(name, self.unit(name), number(self.channels[name])) for name in names]
             return Overview(title, ("channel", "unit", "values"), rows, 2)
-        rows = Lazy(names, lambda name: (name, self.unit(name), *span(self[name]), missing(self[name])))
+        rows = Lazy(names, lambda name: (name, self.unit(name), *span(self[name]), missing_share(self[name])))
         return Overview(
             title, ("channel", "unit", "least", "most", "missing"), rows, 2, Lazy(names, self.channels.__getitem__)
         )

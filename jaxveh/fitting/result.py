@@ -13,7 +13,7 @@ import numpy as np
 from jaxveh._core import bijectors
 from jaxveh._core.errors import FilterError, InputError, is_concrete
 from jaxveh._core.labelled import PARAMETER, Labelled, Variable, make_again, run_axes
-from jaxveh._core.overview import Lazy, Overview, counted, is_known, number
+from jaxveh._core.overview import Lazy, Overview, count_of, is_known, number
 from jaxveh._core.packing import Packing, unpack
 from jaxveh._core.parameter import Parameter
 from jaxveh._core.parameters import Parameters
@@ -121,7 +121,7 @@ class AbstractFit(Kept, eqx.Module):
         return make_again(cls, {**fields, **cls._of_facts(labelled.facts)})
 
     def _overview(self) -> Overview:
-        title = f"{type(self).__name__}: {counted(len(self.chosen), 'parameter')}{self._ended()}"
+        title = f"{type(self).__name__}: {count_of(len(self.chosen), 'parameter')}{self._ended()}"
         value, std = self.parameters, self.parameters_std
         row = lambda p: (p.name, number(value[p.name]), number(std[p.name]), p.unit)
         return Overview(title, ("parameter", "value", "std", "unit"), Lazy(self.chosen, row))
@@ -132,9 +132,9 @@ class AbstractFit(Kept, eqx.Module):
             return ""
         if np.ndim(self.result):
             well = int(np.sum(np.asarray(self.result) == 0))
-            return f", {counted(np.size(self.result), 'fit')}, of which {well} converged"
+            return f", {count_of(np.size(self.result), 'fit')}, of which {well} converged"
         went = "converged" if int(self.result) == 0 else f"not converged ({self.reason})"
-        return f", {went} after {counted(int(self.steps), 'step')}, cost {number(self.cost)}"
+        return f", {went} after {count_of(int(self.steps), 'step')}, cost {number(self.cost)}"
 
     @property
     def reason(self) -> str:

@@ -16,7 +16,7 @@ TOLD = "jaxveh"
 """The attribute with what makes a result of a dataset again."""
 
 
-def told(labelled: Labelled) -> str:
+def facts_as_text(labelled: Labelled) -> str:
     """Kind, version and facts as JSON, for a file's attribute."""
     return json.dumps(
         {"kind": labelled.kind, "version": VERSION, "shown": labelled.shown, "facts": labelled.facts}, default=_of_numpy
@@ -27,10 +27,10 @@ def _of_numpy(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else list(value)
 
 
-def labelled_again(
+def arrays_of_text(
     text: Any, variables: dict[str, Variable], coordinates: dict[str, Variable], source: str, what: str
 ) -> Labelled:
-    """What `told` was told of, with its arrays. **Raises** `InputError` for a text that is not of ours."""
+    """What `facts_as_text` was told of, with its arrays. **Raises** `InputError` for a text that is not of ours."""
     try:
         content = json.loads(text)
         return Labelled(content["kind"], variables, coordinates, tuple(content["shown"]), source, content["facts"])
@@ -45,7 +45,7 @@ def dataset_of(labelled: Labelled) -> Any:
     return xarray.Dataset(
         {name: array(one) for name, one in labelled.variables.items()},
         {name: array(one) for name, one in labelled.coordinates.items()},
-        {"kind": labelled.kind, "source": labelled.source, TOLD: told(labelled)},
+        {"kind": labelled.kind, "source": labelled.source, TOLD: facts_as_text(labelled)},
     )
 
 
@@ -54,10 +54,10 @@ def of_dataset(kind: type, dataset: Any) -> Any:
     xarray = require("xarray", "reading a dataset")
     if not isinstance(dataset, xarray.Dataset):
         raise InputError(f"{kind.__name__}.from_xarray: {type(dataset).__name__}: must be an xarray.Dataset.")
-    return result_of(kind, labelled_of(dataset, f"{kind.__name__}.from_xarray"), f"{kind.__name__}.from_xarray")
+    return result_of(kind, arrays_of_dataset(dataset, f"{kind.__name__}.from_xarray"), f"{kind.__name__}.from_xarray")
 
 
-def labelled_of(dataset: Any, what: str) -> Labelled:
+def arrays_of_dataset(dataset: Any, what: str) -> Labelled:
     """A dataset's arrays with its facts; one of strangers is of no kind."""
     variable = lambda one: Variable(one.dims, _plain(one.values), str(one.attrs.get("units", "")))
     variables = {str(name): variable(one) for name, one in dataset.data_vars.items()}
@@ -65,7 +65,7 @@ def labelled_of(dataset: Any, what: str) -> Labelled:
     source = str(dataset.attrs.get("source", ""))
     if TOLD not in dataset.attrs:
         return Labelled("", variables, coordinates, (), source)
-    return labelled_again(dataset.attrs[TOLD], variables, coordinates, source, what)
+    return arrays_of_text(dataset.attrs[TOLD], variables, coordinates, source, what)
 
 
 def _plain(values: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from jaxveh.io.canonical import canonical_unit
 from jaxveh.io.log import numeric, split_unit
 from jaxveh.io.optional import require
 from jaxveh.io.recordings import write_columns
+from jaxveh.io.units import convert, is_unit
 
 
 def to_frame(data: Any) -> Any:
@@ -46,8 +47,9 @@ def from_frame(frame: Any) -> Recording:
     """The recording that `to_frame` made a data frame of, or a stranger's frame: a channel a column, of its float type (others
     become floats), in half precision at the least.
 
-    Time is the column `time`, else the index: numbers are seconds, a `TimedeltaIndex` too, a `DatetimeIndex` counts from 1970.
-    Units and note are those of `frame.attrs`; `name [unit]` as a column's name says its unit.
+    Time is the column `time`, else the index: numbers are seconds, a `pandas.TimedeltaIndex` too, a `pandas.DatetimeIndex` counts
+    from 1970. Units and note are those of `frame.attrs`; `name [unit]` as a column's name says its unit, and what `io.CANONICAL`
+    has is converted then.
 
     **Raises** `InputError` for columns that are not numbers, names that are there twice, and time that does not increase.
     """
@@ -65,7 +67,13 @@ def from_frame(frame: Any) -> Recording:
     time = columns.pop("time") if "time" in columns else _index(frame.index)
     told = frame.attrs.get("units", {})
     plain = {name: (name, told.get(name, "")) if name in told else split_unit(name) for name in columns}
-    channels = {plain[name][0]: jnp.asarray(values) for name, values in columns.items()}
+    channels = {}
+    for name, values in columns.items():
+        channel, unit = plain[name]
+        target = None if name in told or not is_unit(unit) else canonical_unit(channel)
+        if target is not None:
+            values, plain[name] = convert(values, unit, target, f"from_frame: {channel}"), (channel, target)
+        channels[channel] = jnp.asarray(values)
     if len(channels) < len(columns):
         raise InputError("from_frame: several columns have the same name without their [unit]; rename them.")
     units = {**{name: unit for name, unit in plain.values() if unit}, **told}
@@ -74,8 +82,10 @@ def from_frame(frame: Any) -> Recording:
 
 def _index(index: Any) -> np.ndarray:
     """Seconds of a frame's index."""
+    if getattr(index, "tz", None) is not None:
+        index = index.tz_convert(None)
     if index.dtype.kind in "mM":
-        return (index - index.dtype.type(0)).to_numpy().astype("timedelta64[ns]").astype(np.int64) / 1e9
+        return index.to_numpy().astype(f"{index.dtype.kind}8[ns]").astype(np.int64) / 1e9
     return numeric(index.to_numpy(), "from_frame: the index, as there is no column `time`")
 
 

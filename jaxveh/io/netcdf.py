@@ -13,9 +13,9 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh._core.labelled import TIME, Labelled, Variable
 from jaxveh.io.channel_map import ChannelMap
-from jaxveh.io.datasets import dataset_of, labelled_of
+from jaxveh.io.datasets import arrays_of_dataset, dataset_of
 from jaxveh.io.log import TIME_NAMES, TableLog
-from jaxveh.io.optional import require
+from jaxveh.io.optional import quiet_finalizers, require
 from jaxveh.io.units import is_unit
 
 NAME, DTYPE, DIMS = "jaxveh_name", "jaxveh_dtype", "jaxveh_dims"
@@ -49,22 +49,27 @@ def write_netcdf(path: Path, labelled: Labelled) -> None:
 
 def read_netcdf(path: Path) -> Labelled:
     """What `write_netcdf` wrote, or a stranger's dataset. **Raises** `InputError` for a damaged file."""
-    xarray = require("xarray", "reading NetCDF")
     require("h5netcdf", "reading NetCDF")
-    try:
-        with xarray.open_dataset(path, engine=ENGINE, decode_times=False, mask_and_scale=False) as opened:
-            dataset = opened.load()
-        old = {name: one.attrs.pop(NAME) for name, one in dataset.variables.items() if NAME in one.attrs}
-        dataset = dataset.rename({**old, **json.loads(dataset.attrs.pop(DIMS, "{}"))})
-        labelled = labelled_of(dataset, str(path))
-        return labelled._replace(
-            variables=_typed(dataset, labelled.variables), coordinates=_typed(dataset, labelled.coordinates)
-        )
-    except InputError:
-        raise
-    except Exception as error:  # HDF5 raises whatever a damaged block leads to
-        reason = str(error) or type(error).__name__
-        raise InputError(f"{path}: is not a readable NetCDF 4 file ({reason}). Is the file damaged?") from error
+    with quiet_finalizers():
+        try:
+            return _read(path)
+        except InputError:
+            raise
+        except Exception as error:  # HDF5 raises whatever a damaged block leads to
+            reason = str(error) or type(error).__name__
+    raise InputError(f"{path}: is not a readable NetCDF 4 file ({reason}). Is the file damaged?")
+
+
+def _read(path: Path) -> Labelled:
+    xarray = require("xarray", "reading NetCDF")
+    with xarray.open_dataset(path, engine=ENGINE, decode_times=False, mask_and_scale=False) as opened:
+        dataset = opened.load()
+    old = {name: one.attrs.pop(NAME) for name, one in dataset.variables.items() if NAME in one.attrs}
+    dataset = dataset.rename({**old, **json.loads(dataset.attrs.pop(DIMS, "{}"))})
+    labelled = arrays_of_dataset(dataset, str(path))
+    return labelled._replace(
+        variables=_typed(dataset, labelled.variables), coordinates=_typed(dataset, labelled.coordinates)
+    )
 
 
 def _typed(dataset: Any, variables: Mapping[str, Variable]) -> dict[str, Variable]:

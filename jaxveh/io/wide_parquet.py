@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.labelled import Labelled, Variable
-from jaxveh.io.datasets import labelled_again, told
+from jaxveh.io.datasets import arrays_of_text, facts_as_text
 from jaxveh.io.optional import require
 
 _TOLD, _PLACES, _SOURCE, _UNIT = b"jaxveh", b"jaxveh_places", b"source", b"unit"
@@ -50,7 +50,7 @@ def write_wide(path: Path, labelled: Labelled) -> None:
     names = [field.name for field in fields]
     if len(set(names)) < len(names):
         raise InputError(f"{path}: two columns would have one name. Write .nc.")
-    metadata = {_TOLD: told(labelled), _PLACES: json.dumps(places), _SOURCE: labelled.source}
+    metadata = {_TOLD: facts_as_text(labelled), _PLACES: json.dumps(places), _SOURCE: labelled.source}
     parquet.write_table(arrow.table(arrays, schema=arrow.schema(fields, metadata=metadata)), path)
 
 
@@ -70,7 +70,7 @@ def read_wide(path: Path) -> Labelled:
         for name, place in json.loads(metadata[_PLACES]).items():
             found = Variable(tuple(place["dims"]), _values(table, place), place["unit"])
             (coordinates if place["coordinate"] else variables)[name] = found
-        return labelled_again(metadata[_TOLD].decode(), variables, coordinates, source, str(path))
+        return arrays_of_text(metadata[_TOLD].decode(), variables, coordinates, source, str(path))
     except InputError:
         raise
     except Exception as error:  # pyarrow raises whatever a damaged block leads to

@@ -15,7 +15,7 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh._core.labelled import Labelled, Variable
 from jaxveh._core.names import check_names
-from jaxveh._core.overview import Lazy, Overview, counted, missing, span
+from jaxveh._core.overview import Lazy, Overview, count_of, missing_share, span
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.shown import Kept, above
 from jaxveh.sweeps.design import Axis, Design
@@ -95,12 +95,12 @@ class Swept(Kept):
 
     def _overview(self) -> Overview:
         axes = [f"{axis.name} ({len(axis.labels)})" for axis in self.design.axes]
-        title = f"Swept: {counted(len(self.values), 'value')} over {' x '.join([*axes, counted(self.seeds, 'seed')])}"
+        title = f"Swept: {count_of(len(self.values), 'value')} over {' x '.join([*axes, count_of(self.seeds, 'seed')])}"
         title += f", {self.note!r}" if self.note else ""
         # A store's values are read when they are asked for, and may be larger than the memory.
         if not isinstance(self.values, dict):
             return Overview(title, ("value", "unit"), [(name, self.unit(name)) for name in self.values], 2)
-        row = lambda name: (name, self.unit(name), *span(self.values[name]), missing(self.values[name]))
+        row = lambda name: (name, self.unit(name), *span(self.values[name]), missing_share(self.values[name]))
         return Overview(title, ("value", "unit", "least", "most", "missing"), Lazy(list(self.values), row), 2)
 
     def __getitem__(self, name: str) -> Any:
@@ -144,7 +144,7 @@ class Swept(Kept):
 
 
 SEED, OWN = "seed", "_of_"
-"""The dimension of runs, and what stands in the names of dimensions of a run's own value: `error_of_0`."""
+"""The dimension of runs, and what stands in the names of dimensions of a run's own value."""
 
 
 def _plain(label: Any) -> Any:

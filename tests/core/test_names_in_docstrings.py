@@ -19,6 +19,7 @@ ELSEWHERE = {
     "SubFigure": "matplotlib's", "Nissan_Patrol": "a car of another library", "disturbance_v_y": "an example of a state's name",
     "finally": "Python's", "PCY1": "a coefficient",
     "Time": "a field of MATLAB's", "Data": "a field of MATLAB's", "Units": "a field of MATLAB's",
+    "TimedeltaIndex": "pandas'", "DatetimeIndex": "pandas'",
 }  # fmt: skip
 FILES = {"init.jaxexport", "step.jaxexport", "names.json"}
 
