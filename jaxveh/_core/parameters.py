@@ -91,7 +91,7 @@ class Parameters(Kept, Mapping):
     def stack(self) -> np.ndarray | None:
         """The values in one array (p, ...) of NumPy; None where they are of several kinds, shapes or types, or there are none."""
         values = list(self._values.values())
-        kinds = {(_kind_of(value), np.shape(value), np.result_type(value)) for value in values}
+        kinds = {(_kind_of(value), np.shape(value), np.asarray(value).dtype) for value in values}
         return np.stack([np.asarray(value) for value in values]) if len(kinds) == 1 else None
 
     def _labelled(self) -> Labelled:

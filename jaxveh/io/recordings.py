@@ -95,9 +95,10 @@ def _read(
         wanted = chosen.channels if chosen else {name: Channel(name) for name in log.names}
         if not wanted:
             raise InputError(f"{path}: holds no channel beside time.")
-        loaded = {name: _load(log, name, channel) for name, channel in wanted.items()}
-        note = log.note or path.name
         as_saved = as_saved and log.as_saved
+        load = (lambda name, channel: log.column(name)) if as_saved else lambda name, channel: _load(log, name, channel)
+        loaded = {name: load(name, channel) for name, channel in wanted.items()}
+        note = log.note if as_saved else log.note or path.name
     time, values = merge(loaded)
     if as_saved:
         # A recording leaves arrays of jax as they are; those of NumPy get the float type of today.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError
+from jaxveh.io import CarSpecification
 from jaxveh.plots.car_outline import BESIDE, OVERHANG, WHEEL
 from jaxveh.plots.style import COLOURS, CYCLE, new_figure, style
 from jaxveh.vehicles import AbstractVehicle
@@ -18,16 +19,16 @@ LEAST_TRACK = 0.3
 """m: wheels that are nearer to each other lie on one track."""
 
 
-def car(vehicle: AbstractVehicle, *, figure: Any = None) -> Any:
+def car(vehicle: AbstractVehicle | CarSpecification, *, figure: Any = None) -> Any:
     """The car from above: where its wheels touch the road, with wheelbase, tracks and the place of the point that its speeds
     belong to (the centre of gravity, unless the vehicle says otherwise), in m. The body around them is ours.
 
     **Returns** the figure; `figure`: where to draw. **Raises** `InputError` for a car without wheels, or a batch of cars.
     """
-    places = [tuple(np.ndim(number) for number in place) for place in vehicle.wheel_positions]
-    if any(any(place) for place in places):
+    places = _places(vehicle)
+    if any(np.ndim(number) for place in places for number in place):
         raise InputError("plots.car: a batch of cars: must be one, such as jax.tree.map(lambda leaf: leaf[0], cars).")
-    wheels = np.array([[float(number) for number in place] for place in vehicle.wheel_positions])
+    wheels = np.array([[float(number) for number in place] for place in places])
     front, rear = wheels[:2, 0].mean(), wheels[2:, 0].mean()
     if front - rear <= 0:
         raise InputError(f"plots.car: {type(vehicle).__name__} has no wheels at places of their own: nothing to draw.")
@@ -61,6 +62,15 @@ def car(vehicle: AbstractVehicle, *, figure: Any = None) -> Any:
         ax.axis("off")
         ax.set(xlim=(tail - 0.1, nose + 0.1), ylim=(-half - 0.85, half + 0.1))
     return figure
+
+
+def _places(vehicle: AbstractVehicle | CarSpecification) -> tuple[tuple[Any, Any], ...]:
+    """Where the wheels stand, as `AbstractVehicle.wheel_positions`; of a file without tracks on one."""
+    if isinstance(vehicle, AbstractVehicle):
+        return vehicle.wheel_positions
+    front, rear = (vehicle.track_front or 0.0) / 2, (vehicle.track_rear or 0.0) / 2
+    to_front, to_rear = vehicle.front_axle_to_cg, -vehicle.rear_axle_to_cg
+    return ((to_front, front), (to_front, -front), (to_rear, rear), (to_rear, -rear))
 
 
 def _measure(ax: Any, start: tuple[float, float], end: tuple[float, float], y: float, words: str) -> None:
