@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io as streams
 import json
 import re
 from collections.abc import Mapping
@@ -44,7 +45,10 @@ def write_netcdf(path: Path, labelled: Labelled) -> None:
     dataset = dataset.rename({**names, **dims})
     # xarray would put NaN in the place of what is missing, and nothing is.
     encoding = {name: {"_FillValue": None} for name in dataset.variables}
-    dataset.to_netcdf(path, engine=ENGINE, encoding=encoding)
+    # Into memory first: HDF5 ends the process where the disk is full.
+    content = streams.BytesIO()
+    dataset.to_netcdf(content, engine=ENGINE, encoding=encoding)
+    path.write_bytes(content.getvalue())
 
 
 def read_netcdf(path: Path) -> Labelled:

@@ -300,6 +300,7 @@ def test_words_are_escaped_and_curves_drawn():
     assert page.words.count(ODD) == 2 and page.tags.count("b") == 1 and page.tags.count("svg") == 3
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", ALL)
 def test_it_looks_well_where_it_is_traced(made, name):
     texts = []
@@ -320,6 +321,7 @@ def test_what_cannot_be_shown_raises_nothing():
     assert repr(broken) == "<Estimate that cannot be shown: InputError>"
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", [name for name in ALL if name not in ("Swept", "Swept, no axis", "CarSpecification")])
 def test_it_is_the_same_tree_as_ever(made, name):
     one = made(name)
@@ -385,6 +387,7 @@ def test_it_comes_back_from_xarray(made, name):
     assert same(type(one).from_xarray(one.to_xarray()), one)
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("suffix", io.kit.RESULT_SUFFIXES)
 @pytest.mark.parametrize("name", THOSE_KEPT)
 def test_it_comes_back_from_a_file(made, name, suffix, tmp_path):
@@ -401,6 +404,7 @@ def test_it_comes_back_from_a_file(made, name, suffix, tmp_path):
     assert same(type(one).load(path), one)
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", THOSE_KEPT)
 def test_what_is_wrong_is_told(made, name, tmp_path):
     one = made(name)
@@ -433,6 +437,7 @@ NOT_DRAWN = {
 }  # fmt: skip
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", [name for name in {**MADE, **CARS, **TYRES} if name not in NOT_DRAWN])
 def test_it_is_a_figure(made, name):
     assert isinstance(made(name).plot(**DRAWN.get(name, {})), figures.Figure)
