@@ -2,8 +2,11 @@
 
 import dataclasses
 import html.parser
-import importlib
 import inspect
+import random
+import subprocess
+import sys
+import textwrap
 from types import ModuleType
 
 import equinox as eqx
@@ -11,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from mutations import spoil
 
 import jaxveh
 from jaxveh import (
@@ -22,7 +26,6 @@ from jaxveh import (
     fitting,
     io,
     kit,
-    manoeuvres,
     statespace,
     sweeps,
     tyres,
@@ -495,9 +498,51 @@ def test_what_was_given_a_file_of_its_own_comes_back(tmp_path):
         calibration().save(tmp_path / "calibration.toml")
 
 
+COUNT = 60
+"""Spoilt files of each kind."""
+
+
+@pytest.mark.parametrize("suffix", io.kit.RESULT_SUFFIXES)
+@pytest.mark.parametrize("name", ["Estimate", "RigFit", "Swept"])
+def test_a_spoilt_file_is_a_result_or_an_error(made, name, suffix, tmp_path):
+    path, kind = tmp_path / f"odd{suffix}", type(made(name))
+    made(name).save(path)
+    whole, refused = path.read_bytes(), 0
+    for k in range(COUNT):
+        path.write_bytes(spoil(random.Random(f"{name}/{k}"), whole))
+        try:
+            found = kind.load(path)
+        except InputError as error:
+            refused += str(path) in str(error)
+            continue
+        assert type(found) is kind and "cannot be shown" not in repr(found)
+    assert refused > COUNT / 4
+
+
+MISSING = {
+    "xarray": lambda one, path: one.to_xarray(),
+    "pandas": lambda one, path: one.to_pandas(),
+    "pyarrow": lambda one, path: one.save(path.with_suffix(".parquet")),
+    "h5netcdf": lambda one, path: one.save(path.with_suffix(".nc")),
+}
+
+
+@pytest.mark.parametrize("library", MISSING)
+def test_a_missing_library_is_named(made, library, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(InputError, match=rf'{library} is not installed, and .* run `pip install "jaxveh\[io\]"`'):
+        MISSING[library](made("Answers"), tmp_path / "kept")
+    assert repr(made("Answers")) and not list(tmp_path.iterdir())
+
+
 def test_nothing_is_imported_before_it_is_asked_for():
-    """Neither an upper room nor an optional library by those that are below."""
-    module = importlib.import_module("jaxveh._core.shown")
-    source = inspect.getsource(module)
-    assert "import_module" in source and "pandas" not in vars(module) and not hasattr(module, "plots")
-    assert manoeuvres.__name__ == "jaxveh.manoeuvres"
+    """Neither an upper room nor an optional library by what is looked at alone."""
+    code = """
+        import sys
+        import jaxveh
+        found = jaxveh.Recording([0.0, 1.0], {"v_x": [1.0, 2.0]})
+        assert repr(found) and found._repr_html_()
+        print(*(name for name in ("jaxveh.plots", "pandas", "xarray", "matplotlib", "h5py", "pyarrow") if name in sys.modules))
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""

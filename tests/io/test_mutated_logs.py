@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from mutations import spoil
 
 from jaxveh import InputError, Recording, io
 
@@ -55,25 +56,6 @@ def test_every_log_that_is_no_text_is_here():
     told = {f".{suffix}" for suffix, _ in KINDS.values()}
     # Text is spoilt in test_mutated_files; and MDF4 by its other name.
     assert set(io.LOG_SUFFIXES) - told == {".csv", ".mdf"}
-
-
-def spoil(rng, data):
-    """Bytes cut off, replaced, left out, doubled or turned over, near the front as often as anywhere."""
-    for _ in range(rng.choice((1, 1, 2, 4))):
-        at = rng.randrange(rng.choice((len(data), min(len(data), 600))))
-        size = rng.choice((1, 1, 1, 2, 4, 8, 64))
-        change = rng.randrange(6)
-        if change == 0:
-            data = data[: max(at, 1)]
-        elif change == 1:
-            data = data[:at] + data[at + size :]
-        elif change == 2:
-            data = data[:at] + data[at : at + size] + data[at:]
-        elif change == 3:
-            data = data[:at] + bytes(rng.choice((0, 0xFF, 0x80, 0x7F)) for _ in range(size)) + data[at + size :]
-        else:
-            data = data[:at] + rng.randbytes(size) + data[at + size :]
-    return data or b"\0"
 
 
 def check(kind, count, seed, folder):
