@@ -11,7 +11,7 @@ import numpy as np
 from jaxveh._core.errors import InputError
 from jaxveh._core.labelled import PARAMETER, ROW, RUN, TIME, Variable, array_again
 from jaxveh._core.names import record_type
-from jaxveh._core.parameters import Parameters
+from jaxveh._core.parameters import Parameters, kind_of, value_again
 
 
 class Packing:
@@ -52,7 +52,7 @@ class Packing:
         more = tuple(f"{taken}_{k}" for k in range(values.ndim - 1 - len(lead)))
         self.variables[taken] = Variable((*(*lead, *more)[: values.ndim - 1], PARAMETER), values)
         self.coordinates[PARAMETER] = Variable((PARAMETER,), np.array(list(tree), object))
-        return {"stacked": taken, "names": list(tree), "jax": isinstance(next(iter(tree.values())), jax.Array)}
+        return {"stacked": taken, "names": list(tree), "kind": kind_of(next(iter(tree.values())))}
 
     def _free(self, name: str) -> str:
         while name in self.variables or name in (RUN, TIME, ROW, PARAMETER):
@@ -73,7 +73,7 @@ def unpack(plan: Any, variables: Mapping[str, Variable], kinds: Mapping[str, Any
     if "stacked" in plan:
         values = np.moveaxis(_find(variables, plan["stacked"]), -1, 0)
         return Parameters(
-            {name: array_again(one, plan["jax"]) for name, one in zip(plan["names"], values, strict=True)}
+            {name: value_again(one, plan["kind"]) for name, one in zip(plan["names"], values, strict=True)}
         )
     if "parameters" in plan:
         return Parameters({name: again(part) for name, part in plan["parameters"].items()})

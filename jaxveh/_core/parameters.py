@@ -91,12 +91,12 @@ class Parameters(Kept, Mapping):
     def stack(self) -> np.ndarray | None:
         """The values in one array (p, ...) of NumPy; None where they are of several kinds, shapes or types, or there are none."""
         values = list(self._values.values())
-        kinds = {(_kind_of(value), np.shape(value), np.asarray(value).dtype) for value in values}
+        kinds = {(kind_of(value), np.shape(value), np.asarray(value).dtype) for value in values}
         return np.stack([np.asarray(value) for value in values]) if len(kinds) == 1 else None
 
     def _labelled(self) -> Labelled:
         stacked, name = self.stack(), Variable((PARAMETER,), np.array(list(self), object))
-        facts = {"names": list(self), "kinds": [_kind_of(value) for value in self.values()]}
+        facts = {"names": list(self), "kinds": [kind_of(value) for value in self.values()]}
         if stacked is not None:
             dims = tuple(f"value_{k}" for k in range(stacked.ndim - 1))
             variables = {"value": Variable((PARAMETER, *dims), stacked)}
@@ -112,7 +112,9 @@ class Parameters(Kept, Mapping):
         # One parameter may be called `value` itself, with another beside it.
         is_stacked = len(variables) == 2 and PARAMETER in variables["value"].dims if "value" in variables else False
         of = lambda k, name: variables["value"].values[k] if is_stacked else variables[name].values
-        return cls({name: _again(of(k, name), kind) for k, (name, kind) in enumerate(zip(names, kinds, strict=True))})
+        return cls(
+            {name: value_again(of(k, name), kind) for k, (name, kind) in enumerate(zip(names, kinds, strict=True))}
+        )
 
     def _overview(self) -> Overview:
         row = lambda name: (name, number(self._values[name]))
@@ -142,7 +144,7 @@ class Parameters(Kept, Mapping):
 PLAIN = {"bool": bool, "int": int, "float": float}
 
 
-def _kind_of(value: Any) -> str:
+def kind_of(value: Any) -> str:
     """What kind of number or array it is."""
     if isinstance(value, jax.Array):
         return "jax"
@@ -155,7 +157,7 @@ def _kind_of(value: Any) -> str:
     )
 
 
-def _again(values: Any, kind: str) -> Any:
+def value_again(values: Any, kind: str) -> Any:
     """A value of this kind."""
     if kind in PLAIN:
         return PLAIN[kind](values)
