@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 import jax
 import numpy as np
 
+from jaxveh._core.errors import InputError
 from jaxveh._core.labelled import TIME, Labelled, Variable, make_again, run_axes, time_again, time_axis
 from jaxveh._core.names import as_mapping
 from jaxveh._core.overview import Lazy, Overview, count_of, is_known, number, span, stretch
@@ -36,7 +37,20 @@ class Estimated(Kept):
     def to_pandas(self) -> Any:
         """A `pandas.DataFrame` with a column `time`, each quantity's mean as `name`, beside it `name_std`, and one more where
         a method says so; units in `frame.attrs["units"]`. A batch has a column `run` as well."""
+        self._need("mean")
         return super().to_pandas()
+
+    def plot(self, *arguments: Any, **options: Any) -> Any:
+        """A panel a quantity with its bands, and a truth where one is given; see `plots.estimate`. **Returns** the figure."""
+        self._need("mean", "std")
+        return super().plot(*arguments, **options)
+
+    def _need(self, *names: str) -> None:
+        lost = [name for name in names if getattr(self, name, None) is None]
+        if lost:
+            raise InputError(
+                f"{type(self).__name__}: {', '.join(lost)} was not kept: run it with keep=('mean', 'std')."
+            )
 
     def _labelled(self) -> Labelled:
         lead = self._lead()

@@ -90,7 +90,7 @@ def _index(index: Any) -> np.ndarray:
 
 
 def write_frame(frame: Any, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-    """Write a data frame with a column `time` as `.csv`, `.parquet`, `.mf4` or `.mdf`, as `write_recording` does.
+    """Write a data frame with a column `time` as `.csv`, `.parquet`, `.nc`, `.mf4` or `.mdf`, as `write_recording` does.
 
     Units and note are those of `frame.attrs`, as `to_frame` sets them. **Raises** `InputError` as `write_recording`,
     and for a frame without `time` or with columns that are not numbers.

@@ -457,6 +457,12 @@ def test_what_cannot_be_drawn_is_told(made):
         jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), vehicles.passenger_car()).plot()
     with pytest.raises(InputError, match="must be 1 to 40, of one number each"):
         made("Fit, a batch").plot()
+    with pytest.raises(InputError, match="Estimate: std was not kept"):
+        made("Estimate, little kept").plot()
+    with pytest.raises(InputError, match="Estimate: mean, std was not kept"):
+        made("Estimate, nothing kept").plot()
+    with pytest.raises(InputError, match="Estimate: mean was not kept"):
+        made("Estimate, nothing kept").to_pandas()
 
 
 def test_a_fit_gets_its_model_back(made, tmp_path):
