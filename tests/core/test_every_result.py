@@ -289,6 +289,7 @@ def test_it_looks_well_in_a_terminal(made, name):
     assert "cannot be shown" not in text
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", ALL)
 def test_it_looks_well_in_a_notebook(made, name):
     page = Page(made(name)._repr_html_())
@@ -347,6 +348,7 @@ def test_it_is_a_data_frame(made, name):
         assert {"value", "unit"} <= set(frame.columns)
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", ALL)
 def test_it_is_a_dataset(made, name):
     data = made(name).to_xarray()
@@ -384,6 +386,7 @@ def same(first, second):
     return True
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", THOSE_KEPT)
 def test_it_comes_back_from_xarray(made, name):
     one = made(name)
@@ -504,7 +507,7 @@ def test_what_was_given_a_file_of_its_own_comes_back(tmp_path):
         calibration().save(tmp_path / "calibration.toml")
 
 
-COUNT = 60
+COUNT = 30
 """Spoilt files of each kind."""
 
 

@@ -9,10 +9,10 @@ from mutations import spoil
 
 from jaxveh import InputError, Recording, io
 
-COUNT, MANY = 400, 3000
+COUNT, MANY = 240, 3000
 """Spoilt files of each kind: in the default run and in the full one,"""
 
-SLOW = {"MDF4": 200, "NetCDF": 4}
+SLOW = {"MDF4": 120, "NetCDF": 4}
 """and how many times fewer of those whose readers are slow: MDF4's collects what it has left, which takes a second at times."""
 
 T = np.arange(40) * 0.01
