@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import importlib
 import os
+from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
 from jaxveh._core.labelled import Labelled
@@ -40,16 +41,19 @@ class Shown:
         raise NotImplementedError
 
     def __repr__(self) -> str:
-        # Whatever is inside (tracers, shapes of a batch, something that a transformation put there): a message that shows an
-        # object must not fail because of it.
-        try:
-            return as_text(self._overview())
-        except Exception as error:
-            return f"<{type(self).__name__} that cannot be shown: {type(error).__name__}>"
+        return self._as(as_text)
 
     def _repr_html_(self) -> str:
         """The overview as HTML, for notebooks: no script, no network."""
-        return as_html(self._overview())
+        return self._as(as_html)
+
+    def _as(self, form: Callable[[Overview], str]) -> str:
+        # Whatever is inside (tracers, shapes of a batch, something that a transformation put there): a message that shows an
+        # object must not fail because of it.
+        try:
+            return form(self._overview())
+        except Exception as error:
+            return form(Overview(f"{type(self).__name__} that cannot be shown: {type(error).__name__}"))
 
     def plot(self, *arguments: Any, **options: Any) -> Any:
         """The figure of `jaxveh.plots` for it, with that function's further arguments. **Returns** the figure."""

@@ -123,6 +123,8 @@ OTHERS = {"save_belief npz", "evaluate_table csv", "all_papers json"}
 def writer(request, tmp_path, monkeypatch):
     """A function that writes a file to a path, and the path's suffix."""
     name, _, suffix = request.param.partition(" ")
+    if suffix == "nc":
+        pytest.importorskip("h5netcdf")
     if name == "save_belief":
         belief = request.getfixturevalue("belief")
         return (lambda path: filters.save_belief(path, belief)), suffix

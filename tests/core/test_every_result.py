@@ -322,7 +322,8 @@ def test_it_looks_well_where_it_is_traced(made, name):
 
 def test_what_cannot_be_shown_raises_nothing():
     broken = eqx.tree_at(lambda e: e.mean, estimate(), 1)
-    assert repr(broken) == "<Estimate that cannot be shown: InputError>"
+    assert repr(broken) == "Estimate that cannot be shown: InputError"
+    assert Page(broken._repr_html_()).words == [repr(broken)]
 
 
 @pytest.mark.product

@@ -150,6 +150,7 @@ def slopes(core):
 
 @pytest.mark.parametrize("suffix", io.kit.RESULT_SUFFIXES)
 def test_a_fit_comes_back_from_a_file(own, suffix, tmp_path):
+    pytest.importorskip({".nc": "h5netcdf", ".parquet": "pyarrow"}[suffix])
     own.save(tmp_path / f"fit{suffix}")
     again = type(own).load(tmp_path / f"fit{suffix}")
     for name in ("parameters", "parameters_std", "unconstrained", "covariance", "cost", "steps", "result"):

@@ -38,6 +38,11 @@ def write_mcap(path):
     io.write_topics({"/log": io.to_frame(LOG)}, path, overwrite=True)
 
 
+def write_netcdf(path):
+    pytest.importorskip("h5netcdf")
+    write_as(path)
+
+
 def write_as(path):
     io.write_recording(LOG, path, overwrite=True)
 
@@ -48,7 +53,7 @@ KINDS = {
     "MCAP": ("mcap", write_mcap),
     "Parquet": ("parquet", write_as),
     "MDF4": ("mf4", write_as),
-    "NetCDF": ("nc", write_as),
+    "NetCDF": ("nc", write_netcdf),
 }
 
 
