@@ -27,6 +27,7 @@ from jaxveh.plots.rear_axles import AxlePoints, rear_axle, rear_axle_points
 from jaxveh.plots.recordings import recording
 from jaxveh.plots.report_page import ReportTable
 from jaxveh.plots.rig_fit import rig_fit
+from jaxveh.plots.rigs import rig
 from jaxveh.plots.step_responses import step_response
 from jaxveh.plots.style import COLOURS, save, style
 from jaxveh.plots.top_views import top_view
@@ -60,6 +61,7 @@ __all__ = [
     "rear_axle",
     "rear_axle_points",
     "recording",
+    "rig",
     "rig_fit",
     "save",
     "sine_with_dwell",

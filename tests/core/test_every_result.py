@@ -59,7 +59,7 @@ OWN_FILES = {
 }
 """What is shown but keeps itself otherwise, or not at all."""
 FAMILIES = {"vehicle": vehicles.AbstractVehicle, "tyre": tyres.AbstractTyre, "fit": fitting.AbstractFit}
-BY_NAME = {"Calibration", "CarSpecification", "Parameters", "Swept"}
+BY_NAME = {"Calibration", "CarSpecification", "Parameters", "RigTable", "Swept"}
 
 
 def classes():
@@ -201,13 +201,19 @@ def car_file():
     return io.CarSpecification(1400.0, 2000.0, 1.0, 1.6, 9e4, 1e5, name=ODD, sensor_position=(0.1, 0.0, 0.3))
 
 
+def rig_table():
+    return io.RigTable(
+        T - 0.3, 0 * T, np.full(8, 4e3), F_y=np.where(T == T[2], np.nan, 5e4 * T), run=np.arange(8.0) // 4, source=ODD
+    )
+
+
 def parameters():
     return Parameters({"front.B": jnp.asarray(8.0), "rear.B": jnp.asarray(9.0), ODD: jnp.asarray(1.0)})
 
 
 MADE = {
     "Recording": recording, "Estimate": estimate, "Answers": answers, "SmoothedEstimate": smoothed, "Fit": fit, "RigFit": rig_fit,
-    "Parameters": parameters, "Swept": swept, "Calibration": calibration, "CarSpecification": car_file,
+    "Parameters": parameters, "Swept": swept, "Calibration": calibration, "CarSpecification": car_file, "RigTable": rig_table,
 }  # fmt: skip
 CARS = {name: (lambda name=name: vehicles.named_car("sedan", name)) for name in vehicles.kit.FIDELITIES}
 CARS["kinematic-trailer"] = lambda: vehicles.KinematicTrailer(3.6, 8.1)
@@ -327,7 +333,9 @@ def test_what_cannot_be_shown_raises_nothing():
 
 
 @pytest.mark.product
-@pytest.mark.parametrize("name", [name for name in ALL if name not in ("Swept", "Swept, no axis", "CarSpecification")])
+@pytest.mark.parametrize(
+    "name", [name for name in ALL if name not in ("Swept", "Swept, no axis", "CarSpecification", "RigTable")]
+)
 def test_it_is_the_same_tree_as_ever(made, name):
     one = made(name)
     leaves, structure = jax.tree.flatten(one)
@@ -367,6 +375,8 @@ def as_kept(one):
         leaves = jax.tree_util.tree_flatten_with_path(one.model)[0]
         numbers = {jax.tree_util.keystr(path): leaf for path, leaf in leaves}
         return one if isinstance(one.model, dict) else dataclasses.replace(one, model=numbers)
+    if isinstance(one, io.RigTable):
+        return dataclasses.asdict(one)
     if isinstance(one, sweeps.Swept):
         plain = lambda axis: axis._replace(values=axis.labels)
         return [{**dataclasses.asdict(one), "design": [plain(axis)._asdict() for axis in one.design.axes]}]
