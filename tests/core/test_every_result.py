@@ -203,7 +203,12 @@ def car_file():
 
 def rig_table():
     return io.RigTable(
-        T - 0.3, 0 * T, np.full(8, 4e3), F_y=np.where(T == T[2], np.nan, 5e4 * T), run=np.arange(8.0) // 4, source=ODD
+        T - 0.3,
+        0 * T,
+        np.full(8, 4e3),
+        F_y=np.where(np.arange(8) == 2, np.nan, 5e4 * T),
+        run=np.arange(8.0) // 4,
+        source=ODD,
     )
 
 

@@ -69,3 +69,16 @@ def test_a_tyre_with_states_is_drawn_as_it_has_settled():
     for one, other in zip(plain.axes[0].lines, relaxed.axes[0].lines, strict=True):
         np.testing.assert_allclose(one.get_ydata(), other.get_ydata(), rtol=1e-6, atol=1e-9)
     assert [line.get_label() for line in plain.axes[0].lines] == ["2 kN", "4 kN", "6 kN"]
+
+
+def test_rig_data_are_the_rows_that_were_measured():
+    force = np.array([1e3, np.nan, 3e3])
+    rig = io.RigTable(np.radians([1.0, 2.0, 4.0]), np.zeros(3), np.array([2e3, 3e3, 4e3]), F_y=force, M_z=-force)
+    figure = plots.rig(rig)
+    dots = [ax.collections[0] for ax in figure.axes[:2]]
+    np.testing.assert_allclose(dots[0].get_offsets(), [[1.0, 1.0], [4.0, 3.0]], rtol=1e-12)
+    np.testing.assert_allclose(dots[1].get_offsets(), [[1.0, -1e3], [4.0, -3e3]], rtol=1e-12)
+    np.testing.assert_array_equal(dots[0].get_array(), [2.0, 4.0])
+    assert len(plots.rig(rig, ["M_z"]).axes) == 2  # and the loads' colours
+    with pytest.raises(InputError, match=r"plots.rig: unknown name\(s\) F_x; there are: F_y, M_z"):
+        plots.rig(rig, ["F_x"])
