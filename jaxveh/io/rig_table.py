@@ -61,7 +61,7 @@ class RigTable(RigShown):
     """
 
     units: ClassVar[dict[str, str]] = {
-        name: {"N*m": "N m", "dimensionless": ""}.get(unit, unit) for name, (_, unit) in COLUMNS.items()
+        name: "N m" if unit == "N*m" else unit.replace("dimensionless", "") for name, (_, unit) in COLUMNS.items()
     }
 
     slip_angle: np.ndarray
