@@ -149,3 +149,22 @@ CHANGES = (
     *(_number, _value, _words_swapped) * 4, *(_dropped, _doubled, _swapped) * 2, _joined, _cut, _indented, _flipped, _flipped,
     _inserted, _removed, _ended, _line_ends, _encoded, _marked,
 )  # fmt: skip
+
+
+def spoil(rng, data):
+    """Bytes cut off, replaced, left out, doubled or turned over, near the front as often as anywhere."""
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        at = rng.randrange(rng.choice((len(data), min(len(data), 600))))
+        size = rng.choice((1, 1, 1, 2, 4, 8, 64))
+        change = rng.randrange(6)
+        if change == 0:
+            data = data[: max(at, 1)]
+        elif change == 1:
+            data = data[:at] + data[at + size :]
+        elif change == 2:
+            data = data[:at] + data[at : at + size] + data[at:]
+        elif change == 3:
+            data = data[:at] + bytes(rng.choice((0, 0xFF, 0x80, 0x7F)) for _ in range(size)) + data[at + size :]
+        else:
+            data = data[:at] + rng.randbytes(size) + data[at + size :]
+    return data or b"\0"

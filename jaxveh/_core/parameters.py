@@ -10,9 +10,14 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxveh._core.errors import InputError
+from jaxveh._core.labelled import PARAMETER, Labelled, Variable, array_again
+from jaxveh._core.overview import Lazy, Overview, number
+from jaxveh._core.shown import Kept
+
 
 @jtu.register_pytree_with_keys_class
-class Parameters(Mapping):
+class Parameters(Kept, Mapping):
     """Values by a parameter's name, in the order of `where`: a mapping, and a pytree with one leaf a parameter.
 
         found["front.B"]        by name
@@ -22,10 +27,14 @@ class Parameters(Mapping):
 
     What the values are is said where they are returned: estimates (T,), fitted numbers, standard deviations, bounds.
 
+    A parameter that is named as one of the methods (`plot`, `save`, ...) is found by `["plot"]` alone.
+
     **Raises** `KeyError` (by name) or `AttributeError` for what is not there, with what is.
     """
 
     __slots__ = ("_values",)
+
+    drawn_by = "fit"
 
     def __init__(self, values: Mapping[str, Any]):
         self._values = dict(values)
@@ -56,8 +65,60 @@ class Parameters(Mapping):
     def __len__(self) -> int:
         return len(self._values)
 
-    def __repr__(self) -> str:
-        return f"Parameters({self._values!r})"
+    def plot(self, truth: Mapping[str, Any], *arguments: Any, **options: Any) -> Any:
+        """How far they are from a `truth` by the same names (`plots.fit`). **Returns** the figure."""
+        return super().plot(truth, *arguments, **options)
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame` with a row a parameter: `parameter` and `value`; arrays have a row an element."""
+        return super().to_pandas()
+
+    @classmethod
+    def from_pandas(cls, frame: Any) -> Parameters:
+        """The parameters of a data frame with the columns `parameter` and `value`, a number each.
+
+        **Raises** `InputError` for a frame without them, or one in which a name is there twice.
+        """
+        lost = [name for name in ("parameter", "value") if name not in getattr(frame, "columns", ())]
+        if lost:
+            raise InputError(f"Parameters.from_pandas: no column {', '.join(map(repr, lost))}.")
+        names = [str(name) for name in frame["parameter"]]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(f"Parameters.from_pandas: {', '.join(twice)} is there twice: must be a row a parameter.")
+        return cls(dict(zip(names, jnp.asarray(frame["value"].to_numpy()), strict=True)))
+
+    def stack(self) -> np.ndarray | None:
+        """The values in one array (p, ...) of NumPy; None where they are of several kinds, shapes or types, or there are none."""
+        values = list(self._values.values())
+        kinds = {(kind_of(value), np.shape(value), np.asarray(value).dtype) for value in values}
+        return np.stack([np.asarray(value) for value in values]) if len(kinds) == 1 else None
+
+    def _labelled(self) -> Labelled:
+        stacked, name = self.stack(), Variable((PARAMETER,), np.array(list(self), object))
+        facts = {"names": list(self), "kinds": [kind_of(value) for value in self.values()]}
+        if stacked is not None:
+            dims = tuple(f"value_{k}" for k in range(stacked.ndim - 1))
+            variables = {"value": Variable((PARAMETER, *dims), stacked)}
+        else:
+            arrays = {name: np.asarray(value) for name, value in self.items()}
+            dims = {name: tuple(f"{name}_{k}" for k in range(array.ndim)) for name, array in arrays.items()}
+            variables = {name: Variable(dims[name], array) for name, array in arrays.items()}
+        return Labelled("Parameters", variables, {PARAMETER: name}, tuple(variables), "", facts)
+
+    @classmethod
+    def _of_labelled(cls, labelled: Labelled) -> Parameters:
+        names, kinds, variables = labelled.facts["names"], labelled.facts["kinds"], labelled.both
+        # One parameter may be called `value` itself, with another beside it.
+        is_stacked = len(variables) == 2 and PARAMETER in variables["value"].dims if "value" in variables else False
+        of = lambda k, name: variables["value"].values[k] if is_stacked else variables[name].values
+        return cls(
+            {name: value_again(of(k, name), kind) for k, (name, kind) in enumerate(zip(names, kinds, strict=True))}
+        )
+
+    def _overview(self) -> Overview:
+        row = lambda name: (name, number(self._values[name]))
+        return Overview(f"Parameters: {len(self)}", ("parameter", "value"), Lazy(list(self), row))
 
     def __reduce__(self):
         return Parameters, (self._values,)
@@ -78,3 +139,26 @@ class Parameters(Mapping):
 
     def _without(self, name: str) -> str:
         return f"no parameter {name!r}; there are: {', '.join(self._values) or 'none'}"
+
+
+PLAIN = {"bool": bool, "int": int, "float": float}
+
+
+def kind_of(value: Any) -> str:
+    """What kind of number or array it is."""
+    if isinstance(value, jax.Array):
+        return "jax"
+    return (
+        type(value).__name__
+        if type(value) in PLAIN.values()
+        else "scalar"
+        if isinstance(value, np.generic)
+        else "numpy"
+    )
+
+
+def value_again(values: Any, kind: str) -> Any:
+    """A value of this kind."""
+    if kind in PLAIN:
+        return PLAIN[kind](values)
+    return np.asarray(values)[()] if kind == "scalar" else array_again(np.asarray(values), kind == "jax")

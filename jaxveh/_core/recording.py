@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -10,12 +11,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of, is_concrete
+from jaxveh._core.labelled import TIME, Labelled, Variable, make_again, time_again, time_axis
 from jaxveh._core.names import check_names
+from jaxveh._core.overview import Lazy, Overview, count_of, is_known, missing_share, number, span, stretch
+from jaxveh._core.shown import Kept, above
 
 TRUTH = "true."
 
 
-class Recording(eqx.Module):
+class Recording(Kept, eqx.Module):
     """Named channels over one time base.
 
     **Fields**: `time` (T,) in seconds, strictly increasing, steps may be irregular. `channels`: a mapping from name to
@@ -27,6 +31,8 @@ class Recording(eqx.Module):
 
     **Raises** `InputError` for an empty log, channels of another length, non-monotonic or non-finite time.
     """
+
+    drawn_by = "recording"
 
     time: jax.Array | np.ndarray
     channels: dict[str, jax.Array]
@@ -58,6 +64,16 @@ class Recording(eqx.Module):
                     "increasing. Two drives in one file? Cut them apart where time steps back; else sort the rows and drop "
                     "repeated stamps."
                 )
+
+    @classmethod
+    def from_pandas(cls, frame: Any) -> Recording:
+        """The recording of a data frame: a channel a column; see `io.from_frame` for time and units. A frame of `to_pandas` gives
+        what it was made of."""
+        return above("io", "from_frame")(frame)
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame` with a column `time` and one a channel; units in `frame.attrs["units"]`. See `io.to_frame`."""
+        return above("io", "to_frame")(self) if self.time.ndim == 1 else Kept.to_pandas(self)
 
     def __getitem__(self, name: str) -> jax.Array:
         check_names("recording", [name], self.channels)
@@ -147,6 +163,53 @@ class Recording(eqx.Module):
             share = (time[missing] - time[before]) / (time[following] - time[before])
             values[missing] = values[before] + share * (values[following] - values[before])
         return self.replace(**{channel: values})
+
+    def _labelled(self) -> Labelled:
+        lead = max((values.ndim for values in self.channels.values()), default=1) - 1
+        dims, time, facts = time_axis(self.time, lead)
+        units = dict(self.units)
+        variables = {name: Variable(dims, values, units.get(name, "")) for name, values in self.channels.items()}
+        if TIME in variables:
+            raise InputError("a channel is named `time`, which is the name of the time column; rename it.")
+        return Labelled("Recording", variables, {TIME: time}, tuple(variables), self.source, {**facts, "units": units})
+
+    @classmethod
+    def _of_labelled(cls, labelled: Labelled) -> Recording:
+        if not labelled.kind:
+            return _of_strangers(labelled)
+        channels = {name: jnp.asarray(one.values) for name, one in labelled.variables.items()}
+        units, source = tuple(sorted(labelled.facts["units"].items())), labelled.source
+        time = time_again(labelled)
+        if time.ndim > 1:
+            return make_again(cls, {"time": time, "channels": channels, "units": units, "source": source})
+        return cls(time, channels, dict(units), source)
+
+    def _overview(self) -> Overview:
+        names, shape = list(self.channels), self.time.shape
+        title = f"Recording: {count_of(len(names), 'channel')}, {stretch(self.time)}"
+        title += f", {self.source!r}" if self.source else ""
+        if not is_known(self.time) or len(shape) > 1:
+            rows = [(name, self.unit(name), number(self.channels[name])) for name in names]
+            return Overview(title, ("channel", "unit", "values"), rows, 2)
+        rows = Lazy(names, lambda name: (name, self.unit(name), *span(self[name]), missing_share(self[name])))
+        return Overview(
+            title, ("channel", "unit", "least", "most", "missing"), rows, 2, Lazy(names, self.channels.__getitem__)
+        )
+
+
+def _of_strangers(labelled: Labelled) -> Recording:
+    """Every variable that is over the dimension `time` alone."""
+    time = labelled.both.get(TIME)
+    if time is None or time.dims != (TIME,):
+        raise InputError(
+            f"no coordinate `time` over a dimension `time`; there are: {', '.join(labelled.both) or 'none'}."
+        )
+    found = {name: one for name, one in labelled.both.items() if one.dims == (TIME,) and name != TIME}
+    channels = {
+        name: jnp.asarray(one.values) for name, one in found.items() if np.asarray(one.values).dtype.kind in "fiub"
+    }
+    units = {name: found[name].unit for name in channels if found[name].unit}
+    return Recording(np.asarray(time.values), channels, units, labelled.source)
 
 
 def _float(values) -> jax.Array:

@@ -37,8 +37,8 @@ PRODUCT = typer.Option(
     "-o",
     metavar="FILE",
     show_default=False,
-    help="Time series with standard deviations: .parquet, .csv, .mf4 or .mdf; or .mcap, with the log's channels and the truth as "
-    "topics of their own, for Foxglove and PlotJuggler. Of several logs a folder, with a .parquet each.",
+    help="Time series with standard deviations: .parquet, .csv, .nc, .mf4 or .mdf; or .mcap, with the log's channels and "
+    "the truth as topics of their own, for Foxglove and PlotJuggler. Of several logs a folder, with a .parquet each.",
 )
 VEHICLE = typer.Option(
     "--vehicle",

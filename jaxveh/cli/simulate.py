@@ -21,7 +21,9 @@ from jaxveh.sensors import DEVICES, named_devices
 
 EVENTS = {"standstill": simulation.standstill, "wheel-lift": simulation.wheel_lift}
 
-PRODUCT = typer.Option("-o", metavar="FILE", help="The recording: .csv, .parquet, .mf4 or .mdf.", show_default=False)
+PRODUCT = typer.Option(
+    "-o", metavar="FILE", help="The recording: .csv, .parquet, .nc, .mf4 or .mdf.", show_default=False
+)
 VEHICLE = typer.Option(
     "--vehicle", metavar="CAR", help=f"A car file (jaxveh schema car), or one of {', '.join(BUILT_IN)}."
 )

@@ -20,6 +20,7 @@ without smoothing.
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -27,7 +28,10 @@ import equinox as eqx
 import numpy as np
 
 from jaxveh._core.errors import InputError, is_concrete
+from jaxveh._core.labelled import Labelled
+from jaxveh._core.overview import Overview
 from jaxveh._core.recording import Recording
+from jaxveh._core.shown import Shown, above
 from jaxveh.fitting import Fit
 from jaxveh.io import CarSpecification
 from jaxveh.io import kit as io
@@ -100,7 +104,7 @@ def start_of(car: Any, options: Mapping[str, Any] | None = None) -> Told | None:
     return Told(car, tuple(options.items())) if plain and isinstance(car, CarSpecification) else None
 
 
-class Calibration(eqx.Module):
+class Calibration(Shown, eqx.Module):
     """What logs told an estimator of a car; a file of it is written and read by `write_calibration` and `read_calibration`.
 
     `estimator`: its name; `fit`: the `fitting.Fit` (its `model` is the fitted StateSpace); `spans`: what was seen, one a log.
@@ -115,6 +119,27 @@ class Calibration(eqx.Module):
     weight: float | None = eqx.field(static=True, default=None)
     validation: tuple[tuple[float | None, float], ...] = eqx.field(static=True, default=())
     told: Told | None = eqx.field(static=True, default=None)
+
+    def plot(self, *arguments: Any, **options: Any) -> Any:
+        """The fitted parameters with their standard errors (`plots.fit`). **Returns** the figure."""
+        return self.fit.plot(*arguments, **options)
+
+    def save(self, path: str | os.PathLike, *, overwrite: bool = False) -> None:
+        """Write it as TOML; see `write_calibration`."""
+        above("estimators", "write_calibration")(self, path, overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> Calibration:
+        """What `save` wrote; see `read_calibration`."""
+        return above("estimators", "read_calibration")(path)
+
+    def _labelled(self) -> Labelled:
+        return self.fit._labelled()
+
+    def _overview(self) -> Overview:
+        spans = ", ".join(f"{span.log} {span.start:g} to {span.end:g} s".strip() for span in self.spans)
+        of_fit = self.fit._overview()
+        return of_fit._replace(title=f"Calibration of {self.estimator} on {spans}; {of_fit.title}")
 
     @property
     def model(self) -> StateSpace:

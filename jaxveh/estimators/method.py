@@ -24,6 +24,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError, check_one_of, is_concrete
+from jaxveh._core.estimated import Estimated
 from jaxveh._core.names import record
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, code
@@ -75,8 +76,10 @@ class MethodOfCar(NamedTuple):
     source: str
 
 
-class Answers(eqx.Module):
+class Answers(Estimated, eqx.Module):
     """What a method said along a log: `time` (T,), and the fields of `Answer` with (T,) in each."""
+
+    by_row = ("mean", "std", "known", "result")
 
     time: Any
     mean: Any

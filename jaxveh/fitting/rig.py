@@ -16,6 +16,7 @@ from jaxveh._core.names import check_names
 from jaxveh._core.parameter import Parameter, Where, pick, prior_spread, resolve
 from jaxveh._core.parameters import Parameters
 from jaxveh._core.progress import Progress, silent
+from jaxveh._core.shown import above
 from jaxveh.fitting.problem import SearchEnd, by_name, on_line, scalar_parameters
 from jaxveh.fitting.result import AbstractFit
 from jaxveh.fitting.rig_data import RigData, Settings, StageReport, fold_of, rms
@@ -43,8 +44,10 @@ class RigFit(AbstractFit):
     channel (`F_x`, ...): `rmse` of residuals, `peak` (the 99.5th percentile of what was measured), `start_rmse` before the
     fit, `noise` (standard deviation), and `cross_validation`, the RMSE at rows that a fold's fit did not see (nan without).
     `residuals` (n,): fitted less measured, nan without a measurement. `stages`: a report each. `problem`: the joint stage's at
-    the fit, for `solve` and `bootstrap`, in which what is held stays.
+    the fit, for `solve` and `bootstrap`, in which what is held stays; None in what a file gives back.
     """
+
+    kept_fields = ("rmse", "start_rmse", "cross_validation", "peak", "noise", "residuals")
 
     parameters: Parameters
     parameters_std: Parameters
@@ -69,6 +72,20 @@ class RigFit(AbstractFit):
     def tyre(self) -> AbstractTyre:
         """The fitted law."""
         return self.model
+
+    def plot(self, rig: RigTable | None = None, *arguments: Any, **options: Any) -> Any:
+        """What the law does to the `rig` data that it was fitted to (`plots.rig_fit`); without them the parameters (`plots.fit`).
+        **Returns** the figure."""
+        if rig is None:
+            return super().plot(*arguments, **options)
+        return above("plots", "rig_fit")(self, rig, *arguments, **options)
+
+    def _facts(self) -> dict[str, Any]:
+        return {"identified": self.identified, "stages": [stage._asdict() for stage in self.stages]}
+
+    @classmethod
+    def _of_facts(cls, facts: dict[str, Any]) -> dict[str, Any]:
+        return {"identified": facts["identified"], "stages": tuple(StageReport(**one) for one in facts["stages"])}
 
 
 def fit_rig(

@@ -1,7 +1,7 @@
-"""Recordings in and out (CSV, Parquet, MDF4; out to MCAP), channel maps, data frames, the files that describe a car and a road,
-tyre property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX, FSAE TTC).
+"""Recordings in and out (CSV, Parquet, MDF4; MCAP; in from MATLAB), channel maps, data frames, the files that describe a car and
+a road, tyre property files, CommonRoad's vehicle files, and tables of tyre test rigs (CSV, TYDEX, FSAE TTC).
 
-pandas, pyarrow, asammdf, pint, pyyaml and scipy are the extra `io`, imported where they are used; mcap is the extra `mcap`.
+pandas, pyarrow, asammdf, pint, pyyaml, scipy and h5py are the extra `io`, imported where they are used; mcap is the extra `mcap`.
 """
 
 from jaxveh.io import kit
@@ -10,11 +10,11 @@ from jaxveh.io.car import AxleTyre, CarSpecification, read_car, write_car
 from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.commonroad import CommonRoadSpecification, read_commonroad
 from jaxveh.io.files import check_readable, making_folder, replacing_file, write_text
-from jaxveh.io.frames import to_frame, write_frame
+from jaxveh.io.frames import from_frame, to_frame, write_frame
 from jaxveh.io.mcap_log import write_topics
 from jaxveh.io.merge import resample
 from jaxveh.io.property_file import PropertyFile, read_property_file, write_property_file
-from jaxveh.io.recordings import SUFFIXES, read_recording, with_units_in_names, write_recording
+from jaxveh.io.recordings import LOG_SUFFIXES, SUFFIXES, read_recording, with_units_in_names, write_recording
 from jaxveh.io.rig_table import RigTable, read_rig_table
 from jaxveh.io.road import RoadSpecification, read_road, write_road
 from jaxveh.io.steering import with_road_steer
@@ -22,6 +22,7 @@ from jaxveh.io.tydex import TydexFile, read_tydex
 
 __all__ = [
     "CANONICAL",
+    "LOG_SUFFIXES",
     "SUFFIXES",
     "AxleTyre",
     "CanonicalChannel",
@@ -35,6 +36,7 @@ __all__ = [
     "TydexFile",
     "canonical_unit",
     "check_readable",
+    "from_frame",
     "kit",
     "making_folder",
     "read_car",

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from jaxveh._core.errors import InputError, check, check_one_of
+from jaxveh.io.car_table import CarTable
 from jaxveh.io.files import write_text
 from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
 
@@ -107,8 +108,8 @@ class AxleTyre:
         _check_numbers(self)
 
 
-@dataclass(frozen=True)
-class CarSpecification:
+@dataclass(frozen=True, repr=False)
+class CarSpecification(CarTable):
     """What a car file says: plain floats in SI units, None where the file is silent. See `car.CAR_SCHEMA`.
 
     Cornering stiffnesses are of the axle, N/rad; one that is left out beside tyre coefficients becomes their B C D.
@@ -178,6 +179,15 @@ class CarSpecification:
                 if tyre is None:
                     raise InputError(f"{key} is missing: give it in N/rad, or tyre coefficients under [{axle}].")
                 object.__setattr__(self, key, tyre.B * tyre.C * tyre.D)
+
+    def save(self, path: str | os.PathLike, *, overwrite: bool = False) -> None:
+        """Write it as a car's file, TOML; see `write_car`."""
+        write_car(self, path, overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> CarSpecification:
+        """A car's file; see `read_car`."""
+        return read_car(path)
 
     @property
     def wheelbase(self) -> float:

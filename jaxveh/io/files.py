@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from jaxveh._core.errors import InputError
+from jaxveh._core.errors import InputError, did_you_mean
 
 
 def check_readable(path: Path) -> None:
@@ -32,7 +32,10 @@ def check_suffix(path: Path, allowed: Iterable[str], kind: str = "file") -> str:
     """The suffix in small letters; raises `InputError` unless it is one of `allowed`."""
     suffix = path.suffix.lower()
     if suffix not in tuple(allowed):
-        raise InputError(f"{path}: suffix {path.suffix!r}; a {kind} must end in one of {', '.join(allowed)}.")
+        allowed = tuple(allowed)
+        raise InputError(
+            f"{path}: suffix {path.suffix!r}; a {kind} must end in one of {', '.join(allowed)}.{did_you_mean([suffix], allowed)}"
+        )
     return suffix
 
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 import os
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.names import as_mapping
 from jaxveh._core.recording import Recording
 from jaxveh.io.canonical import canonical_unit
-from jaxveh.io.log import numeric
+from jaxveh.io.log import numeric, split_unit
 from jaxveh.io.optional import require
 from jaxveh.io.recordings import write_columns
+from jaxveh.io.units import convert, is_unit
 
 
 def to_frame(data: Any) -> Any:
@@ -41,8 +43,54 @@ def to_frame(data: Any) -> Any:
     return frame
 
 
+def from_frame(frame: Any) -> Recording:
+    """The recording that `to_frame` made a data frame of, or a stranger's frame: a channel a column, of its float type (others
+    become floats), in half precision at the least.
+
+    Time is the column `time`, else the index: numbers are seconds, a `pandas.TimedeltaIndex` too, a `pandas.DatetimeIndex` counts
+    from 1970. Units and note are those of `frame.attrs`; `name [unit]` as a column's name says its unit, and what `io.CANONICAL`
+    has is converted then.
+
+    **Raises** `InputError` for columns that are not numbers, names that are there twice, and time that does not increase.
+    """
+    pandas = require("pandas", "reading a data frame")
+    if not isinstance(frame, pandas.DataFrame):
+        raise InputError(f"from_frame: {type(frame).__name__}: must be a pandas.DataFrame.")
+    names = [str(name) for name in frame.columns]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"from_frame: several columns are named {', '.join(map(repr, twice))}; rename them.")
+    columns = {
+        name: numeric(frame[key].to_numpy(), f"from_frame: column {name!r}")
+        for name, key in zip(names, frame, strict=True)
+    }
+    time = columns.pop("time") if "time" in columns else _index(frame.index)
+    told = frame.attrs.get("units", {})
+    plain = {name: (name, told.get(name, "")) if name in told else split_unit(name) for name in columns}
+    channels = {}
+    for name, values in columns.items():
+        channel, unit = plain[name]
+        target = None if name in told or not is_unit(unit) else canonical_unit(channel)
+        if target is not None:
+            values, plain[name] = convert(values, unit, target, f"from_frame: {channel}"), (channel, target)
+        channels[channel] = jnp.asarray(values)
+    if len(channels) < len(columns):
+        raise InputError("from_frame: several columns have the same name without their [unit]; rename them.")
+    units = {**{name: unit for name, unit in plain.values() if unit}, **told}
+    return Recording(np.asarray(time, np.float64), channels, units, str(frame.attrs.get("source", "")))
+
+
+def _index(index: Any) -> np.ndarray:
+    """Seconds of a frame's index."""
+    if getattr(index, "tz", None) is not None:
+        index = index.tz_convert(None)
+    if index.dtype.kind in "mM":
+        return index.to_numpy().astype(f"{index.dtype.kind}8[ns]").astype(np.int64) / 1e9
+    return numeric(index.to_numpy(), "from_frame: the index, as there is no column `time`")
+
+
 def write_frame(frame: Any, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-    """Write a data frame with a column `time` as `.csv`, `.parquet`, `.mf4` or `.mdf`, as `write_recording` does.
+    """Write a data frame with a column `time` as `.csv`, `.parquet`, `.nc`, `.mf4` or `.mdf`, as `write_recording` does.
 
     Units and note are those of `frame.attrs`, as `to_frame` sets them. **Raises** `InputError` as `write_recording`,
     and for a frame without `time` or with columns that are not numbers.

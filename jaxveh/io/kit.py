@@ -2,10 +2,12 @@
 
 from jaxveh.io.car import CAR_SCHEMA, STEERINGS, car_lines, car_of_toml
 from jaxveh.io.channel_map import CHANNEL_MAP_SCHEMA
+from jaxveh.io.datasets import dataset_of, frame_of, of_dataset
 from jaxveh.io.mcap_log import MCAP_SUFFIX
 from jaxveh.io.naming import check_known
 from jaxveh.io.optional import require
 from jaxveh.io.property_file import PROPERTY_UNITS, Entry, parse_property_file
+from jaxveh.io.result_files import RESULT_SUFFIXES, load_result, save_result
 from jaxveh.io.rig_table import RIG_CHANNELS
 from jaxveh.io.steering import check_front_steered
 from jaxveh.io.toml import check_keys, read_toml, toml_number, toml_string, toml_text
@@ -16,6 +18,7 @@ __all__ = [
     "CHANNEL_MAP_SCHEMA",
     "MCAP_SUFFIX",
     "PROPERTY_UNITS",
+    "RESULT_SUFFIXES",
     "RIG_CHANNELS",
     "STEERINGS",
     "Entry",
@@ -24,11 +27,16 @@ __all__ = [
     "check_front_steered",
     "check_keys",
     "check_known",
+    "dataset_of",
+    "frame_of",
     "is_unit",
+    "load_result",
+    "of_dataset",
     "parse_property_file",
     "read_toml",
     "require",
     "same_unit",
+    "save_result",
     "toml_number",
     "toml_string",
     "toml_text",

@@ -38,6 +38,8 @@ class Log(abc.ABC):
     path: Path
     note: str
     names: tuple[str, ...]
+    as_saved: bool = False
+    """Whether the file is a recording's own, whose channels have the float types that they had."""
 
     @abc.abstractmethod
     def column(self, name: str, group: int | None = None) -> Column:
@@ -121,6 +123,8 @@ def apply(channel: Channel, values: np.ndarray) -> np.ndarray:
 def numeric(cells, what: str) -> np.ndarray:
     """Cells as a float array (n,), empty ones as NaN; the error names the first row whose cell is not a number."""
     array = np.asarray(cells)
+    if array.ndim == 1 and array.dtype.name == "bfloat16":
+        return array
     if array.ndim != 1 or array.dtype.kind in "cV":
         raise InputError(f"{what}: holds {array.dtype} of shape {array.shape}, not one number a row. Leave it out.")
     if array.dtype.kind == "f":

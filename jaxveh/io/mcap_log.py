@@ -94,6 +94,8 @@ def _messages(
 
 def _plain(column: np.ndarray) -> list[str | None]:
     """Numbers as JSON writes them, shortest in the column's own precision; None for what is not finite."""
+    # What is not NumPy's own (bfloat16) writes minus zero as a whole number, which has no sign.
+    column = column.astype(np.float32) if column.dtype.kind == "V" else column
     finite = np.isfinite(column)
     return [str(value) if known else None for value, known in zip(column, finite, strict=True)]
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.io.channel_map import ChannelMap
 from jaxveh.io.log import Column, Log, numeric
 from jaxveh.io.naming import check_known
-from jaxveh.io.optional import require
+from jaxveh.io.optional import quiet_finalizers, require
 
 _TIME_SYNC = (0, 1)  # a master without a kind, or one that counts time (others count angle, distance, index)
 
@@ -74,7 +72,7 @@ class MdfLog(Log):
 def open_mdf(path: Path, channels: ChannelMap | None) -> MdfLog:
     """An MDF3 or MDF4 file. Time is each group's own master channel; a time column in the channel map is not used."""
     asammdf = require("asammdf", "reading MDF4")
-    with _quiet_finalizers():
+    with quiet_finalizers():
         try:
             return MdfLog(path, asammdf.MDF(path))
         except Exception as error:  # asammdf raises whatever a damaged block leads to
@@ -83,14 +81,9 @@ def open_mdf(path: Path, channels: ChannelMap | None) -> MdfLog:
     raise InputError(f"{path}: is not a readable MDF file ({reason}).")
 
 
-@contextlib.contextmanager
-def _quiet_finalizers() -> Iterator[None]:
-    """The finalizer of asammdf fails on a file that it could not open, and Python would print that beside our error."""
-    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
-    try:
-        yield
-    finally:
-        sys.unraisablehook = hook
+def _stored(values: np.ndarray) -> np.ndarray:
+    """Samples of a type that the writer has: single precision for half."""
+    return np.asarray(values, np.float32 if values.dtype.itemsize == 2 else None)
 
 
 def write_mdf(
@@ -99,7 +92,7 @@ def write_mdf(
     """One channel group of MDF 4.10 over one time base; NaN stays NaN; the note is the header's comment."""
     asammdf = require("asammdf", "writing MDF4")
     signals = [
-        asammdf.Signal(samples=np.asarray(values), timestamps=time, name=name, unit=units.get(name, ""))
+        asammdf.Signal(samples=_stored(values), timestamps=time, name=name, unit=units.get(name, ""))
         for name, values in columns.items()
     ]
     with asammdf.MDF(version="4.10") as mdf:

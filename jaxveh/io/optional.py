@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import sys
+from collections.abc import Iterator
 from typing import Any
 
 from jaxveh._core.errors import InputError
@@ -19,3 +22,13 @@ def require(module: str, purpose: str, extra: str = "io") -> Any:
         raise InputError(
             f'{library} is not installed, and {purpose} needs it: run `pip install "jaxveh[{extra}]"`.'
         ) from error
+
+
+@contextlib.contextmanager
+def quiet_finalizers() -> Iterator[None]:
+    """Finalizers of asammdf and h5netcdf fail on a file that they could not open; Python would print that beside our error."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import ml_dtypes
 import numpy as np
 
 from jaxveh._core.errors import InputError
@@ -15,17 +16,23 @@ from jaxveh.io.optional import require
 _UNIT = b"unit"
 _UNITS = (_UNIT, b"units", b"Unit", b"Units")
 _SOURCE = b"source"
+_OWN, _DTYPE = b"jaxveh", b"dtype"
+"""Says that the columns' types are those of a recording, and of a column the type that Parquet does not have."""
 
 
 def open_parquet(path: Path, channels: ChannelMap | None) -> TableLog:
     """A Parquet file; a field's metadata `unit` is its unit, the table's `source` its note. Loads only what is used."""
-    arrow = require("pyarrow", "reading Parquet")
+    require("pyarrow", "reading Parquet")
     parquet = require("pyarrow.parquet", "reading Parquet")
     try:
         schema = parquet.read_schema(path)
-    except (arrow.ArrowException, OSError) as error:
+        headings = [name for name in schema.names if not name.startswith("__index_level_")]
+        units = {name: unit for name in headings if (unit := _unit(schema.field(schema.names.index(name))))}
+        note = (schema.metadata or {}).get(_SOURCE, b"").decode()
+        told = {name: (schema.field(schema.names.index(name)).metadata or {}).get(_DTYPE) for name in headings}
+        odd = {name: ml_dtypes.bfloat16 for name, dtype in told.items() if dtype == b"bfloat16"}
+    except Exception as error:  # pyarrow raises whatever a damaged block leads to
         raise InputError(f"{path}: is not a readable Parquet file ({error}).") from error
-    headings = [name for name in schema.names if not name.startswith("__index_level_")]
     twice = sorted({name for name in headings if headings.count(name) > 1})
     if twice:
         raise InputError(f"{path}: several columns are named {', '.join(map(repr, twice))}; rename them.")
@@ -33,13 +40,14 @@ def open_parquet(path: Path, channels: ChannelMap | None) -> TableLog:
     def load(heading: str) -> np.ndarray:
         try:
             with parquet.ParquetFile(path) as file:
-                return file.read(columns=[heading]).column(heading).to_numpy()
-        except (arrow.ArrowException, OSError) as error:
+                values = file.read(columns=[heading]).column(heading).to_numpy()
+            return values if heading not in odd else values.astype(odd[heading])
+        except Exception as error:  # as above
             raise InputError(f"{path}: column {heading!r} cannot be read ({error}).") from error
 
-    units = {name: unit for name in headings if (unit := _unit(schema.field(name)))}
-    note = (schema.metadata or {}).get(_SOURCE, b"").decode()
-    return TableLog(path, headings, load, units, note, channels.time if channels else None)
+    log = TableLog(path, headings, load, units, note, channels.time if channels else None)
+    log.as_saved = _OWN in (schema.metadata or {})
+    return log
 
 
 def write_parquet(
@@ -50,11 +58,15 @@ def write_parquet(
     parquet = require("pyarrow.parquet", "writing Parquet")
     arrays = {"time": time, **columns}
     metadata = {name: {_UNIT: unit} for name, unit in {"time": "s", **units}.items()}
+    for name, values in columns.items():
+        if values.dtype == ml_dtypes.bfloat16:
+            metadata[name] = {**metadata.get(name, {}), _DTYPE: b"bfloat16"}
+            arrays[name] = values.astype(np.float32)
     fields = [
         arrow.field(name, arrow.from_numpy_dtype(values.dtype), metadata=metadata.get(name))
         for name, values in arrays.items()
     ]
-    schema = arrow.schema(fields, metadata={_SOURCE: note} if note else None)
+    schema = arrow.schema(fields, metadata={_OWN: b"Recording", **({_SOURCE: note} if note else {})})
     parquet.write_table(arrow.table([arrow.array(values) for values in arrays.values()], schema=schema), path)
 
 

@@ -1,4 +1,4 @@
-"""Recordings in and out: CSV, Parquet, MDF4."""
+"""Recordings in and out: CSV, Parquet, MDF4; in from MATLAB and MCAP."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
@@ -16,8 +17,11 @@ from jaxveh.io.channel_map import Channel, ChannelMap, read_channel_map
 from jaxveh.io.csv_log import open_csv, write_csv
 from jaxveh.io.files import check_readable, check_suffix, replacing_file
 from jaxveh.io.log import Column, Log, apply
+from jaxveh.io.mat_log import open_mat
+from jaxveh.io.mcap_reader import open_mcap
 from jaxveh.io.mdf_log import open_mdf, write_mdf
 from jaxveh.io.merge import merge, resample
+from jaxveh.io.netcdf import open_netcdf, write_recording_netcdf
 from jaxveh.io.parquet_log import open_parquet, write_parquet
 from jaxveh.io.units import convert, is_unit
 
@@ -26,10 +30,21 @@ _OPEN: dict[str, Callable[[Path, ChannelMap | None], Log]] = {
     ".parquet": open_parquet,
     ".mf4": open_mdf,
     ".mdf": open_mdf,
+    ".mat": open_mat,
+    ".mcap": open_mcap,
+    ".nc": open_netcdf,
 }
-_WRITE = {".csv": write_csv, ".parquet": write_parquet, ".mf4": write_mdf, ".mdf": write_mdf}
-SUFFIXES = tuple(_OPEN)
+_WRITE = {
+    ".csv": write_csv,
+    ".parquet": write_parquet,
+    ".mf4": write_mdf,
+    ".mdf": write_mdf,
+    ".nc": write_recording_netcdf,
+}
+SUFFIXES = tuple(_WRITE)
 """File name endings that are read and written."""
+LOG_SUFFIXES = tuple(_OPEN)
+"""File name endings that are read."""
 
 
 def read_recording(
@@ -39,22 +54,39 @@ def read_recording(
     raster: str | None = None,
     method: str = "linear",
 ) -> Recording:
-    """Read a log: `.csv`, `.parquet`, `.mf4` or `.mdf`.
+    """Read a log: `.csv`, `.parquet`, `.mf4` or `.mdf`, MATLAB's `.mat` (structs included), `.mcap` (topics of JSON messages), or
+    NetCDF 4 (`.nc`).
 
     **Arguments**: `channels`: a channel map or the path of one (see `io.channel_map.CHANNEL_MAP_SCHEMA`); without it every column
     is a channel of the name it has, and time is the column `time`, `timestamps`, `timestamp` or `t`. `raster`: the name
     of a channel whose samples become the rows, the others filled there by `method` (`linear`, `hold`; `io.resample`).
 
-    **Units**: the channel map's, else the file's own (Parquet: the field's metadata `unit`; MDF4: the channel's unit;
-    CSV and Parquet: `name [unit]` in the first line), else SI is taken for granted. Channels of `io.CANONICAL` come out
-    in SI; other names keep the unit they have.
+    **Units**: the channel map's, else the file's own (Parquet: the field's metadata `unit`; MDF4: the channel's unit; MATLAB:
+    `Units` beside the data; CSV and Parquet: `name [unit]` in the first line), else SI is taken for granted. Channels of
+    `io.CANONICAL` come out in SI; other names keep the unit they have.
 
-    **Time base**: MDF4 groups of different rasters are merged, not resampled: a row for every stamp, NaN where a sensor
-    did not speak. Stamps keep the log's own time, in seconds, on the host in float64; channels have JAX's float type.
+    **Time base**: MDF4 groups, MATLAB structs and MCAP topics of different rasters are merged, not resampled: a row for every
+    stamp, NaN where a sensor did not speak. Stamps keep the log's own time, in seconds, on the host in float64; channels have
+    JAX's float type.
 
     **Raises** `InputError` naming file, column, row, value and what to do: no such file or suffix, a broken file, an
     empty log, an unknown column, a unit of another dimension, a cell that is not a number, time that does not increase.
     """
+    return _read(path, channels, raster, method, as_saved=False)
+
+
+def load_recording(path: str | os.PathLike) -> Recording:
+    """As `read_recording`; a file that a recording was saved in gives the float types of its channels back, too."""
+    return _read(path, None, None, "linear", as_saved=True)
+
+
+def _read(
+    path: str | os.PathLike,
+    channels: ChannelMap | str | os.PathLike | None,
+    raster: str | None,
+    method: str,
+    as_saved: bool,
+) -> Recording:
     path = Path(path)
     suffix = check_suffix(path, _OPEN, "log")
     check_readable(path)
@@ -63,9 +95,14 @@ def read_recording(
         wanted = chosen.channels if chosen else {name: Channel(name) for name in log.names}
         if not wanted:
             raise InputError(f"{path}: holds no channel beside time.")
-        loaded = {name: _load(log, name, channel) for name, channel in wanted.items()}
-        note = log.note or path.name
+        as_saved = as_saved and log.as_saved
+        load = (lambda name, channel: log.column(name)) if as_saved else lambda name, channel: _load(log, name, channel)
+        loaded = {name: load(name, channel) for name, channel in wanted.items()}
+        note = log.note if as_saved else log.note or path.name
     time, values = merge(loaded)
+    if as_saved:
+        # A recording leaves arrays of jax as they are; those of NumPy get the float type of today.
+        values = {name: jnp.asarray(one) for name, one in values.items()}
     units = {name: column.unit for name, column in loaded.items() if column.unit}
     try:
         recording = Recording(time, values, units, note)
@@ -75,10 +112,11 @@ def read_recording(
 
 
 def write_recording(recording: Recording, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-    """Write a recording as `.csv`, `.parquet`, `.mf4` or `.mdf`; `read_recording` gives it back.
+    """Write a recording as `.csv`, `.parquet`, `.mf4`, `.mdf` or `.nc`; `read_recording` gives it back.
 
-    Values and time come back bit for bit from every format; units and source note from Parquet and MDF4. CSV has no
-    place for them: where units are not SI, or for other readers, write `with_units_in_names(recording)`.
+    Values and time come back bit for bit from every format; units and source note from Parquet, MDF4 and NetCDF. CSV has no
+    place for them: where units are not SI, or for other readers, write `with_units_in_names(recording)`. `Recording.load` gives
+    the channels of Parquet and NetCDF the float types back that they had.
 
     The file appears as a whole or not at all. **Raises** `InputError` for another suffix, or where the file exists and
     `overwrite` is False.

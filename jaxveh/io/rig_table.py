@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from jaxveh.io.csv_log import read_columns
 from jaxveh.io.files import check_readable, check_suffix
 from jaxveh.io.log import numeric, split_unit
 from jaxveh.io.rig_axes import AXES, to_ours
+from jaxveh.io.rig_shown import RigShown
 from jaxveh.io.ttc import SUFFIXES as TTC_SUFFIXES
 from jaxveh.io.ttc import names_line, read_ttc
 from jaxveh.io.tydex import read_tydex
@@ -47,8 +49,8 @@ LARGEST = {"slip_angle": 1.0, "camber": 1.2}
 RIGHT_ANGLE = np.pi / 2
 
 
-@dataclass(frozen=True, eq=False)
-class RigTable:
+@dataclass(frozen=True, eq=False, repr=False)
+class RigTable(RigShown):
     """Measurements of a tyre; float arrays (n,) in SI units and this package's axes (x forward, y left, z up).
 
     Inputs: `slip_angle` (rad, a positive one gives a positive force), `slip_ratio` (-), `load` (N); `camber` (rad), `speed`
@@ -58,6 +60,10 @@ class RigTable:
     **Raises** `InputError` for arrays of several lengths, an input that is not finite, a load that points down, a negative
     speed, a pressure that is not positive, and a table without a measurement.
     """
+
+    units: ClassVar[dict[str, str]] = {
+        name: "N m" if unit == "N*m" else unit.replace("dimensionless", "") for name, (_, unit) in COLUMNS.items()
+    }
 
     slip_angle: np.ndarray
     slip_ratio: np.ndarray

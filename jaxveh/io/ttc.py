@@ -22,8 +22,8 @@ from jaxveh.io.csv_log import read_below
 from jaxveh.io.decimals import is_number
 from jaxveh.io.files import check_readable
 from jaxveh.io.log import numeric, split_unit
+from jaxveh.io.mat_file import read_mat
 from jaxveh.io.naming import listing
-from jaxveh.io.optional import require
 
 SUFFIXES = (".dat", ".txt", ".mat")
 """Of files that are read as the consortium's; a `.csv` is, where its names are."""
@@ -110,7 +110,7 @@ def names_line(path: Path) -> tuple[int, list[str], str] | None:
 
 
 def read_ttc(path: str | Path) -> TtcTable:
-    """Read a file of the consortium: text, or a MATLAB file up to version 7 (through scipy).
+    """Read a file of the consortium: text, or a MATLAB file.
 
     Units are those that the file names; metric ones, as the consortium has them, where it names none. A slip that is not there is
     zero: `SR` refers to the loaded radius, and its zero is no free rolling.
@@ -196,18 +196,11 @@ def _check_unique(headings: list[str], path: Path) -> None:
 
 
 def _matlab(path: Path) -> _Cells:
-    io = require("scipy.io", "reading MATLAB files")
-    try:
-        found = io.loadmat(path, squeeze_me=True, struct_as_record=False)
-    except NotImplementedError as error:
-        raise InputError(f"{path}: is a MATLAB file of version 7.3; save it as version 7: save(..., '-v7').") from error
-    except Exception as error:  # scipy raises its own, ValueError, TypeError, zlib.error and OSError alike
-        raise InputError(f"{path}: cannot be read as a MATLAB file ({error}).") from error
+    found = read_mat(path)
     channel = found.get("channel")
-    names, units = _strings(getattr(channel, "name", ())), _strings(getattr(channel, "units", ()))
-    vectors = {
-        name: value for name, value in found.items() if isinstance(value, np.ndarray) and not name.startswith("__")
-    }
+    told = channel if isinstance(channel, dict) else {}
+    names, units = _strings(told.get("name", ())), _strings(told.get("units", ()))
+    vectors = {name: value for name, value in found.items() if isinstance(value, np.ndarray)}
     load = {name.upper(): lambda name=name: _vector(vectors[name], name, path) for name in vectors}
     title = found.get("tireid", "")
     return _Cells(load, dict(zip(map(str.upper, names), units, strict=False)), title if isinstance(title, str) else "")
@@ -215,10 +208,12 @@ def _matlab(path: Path) -> _Cells:
 
 def _strings(cells: Any) -> list[str]:
     """The texts of a MATLAB cell array, however deeply they are wrapped."""
-    return [str(np.squeeze(cell)) for cell in np.ravel(np.asarray(cells, dtype=object))]
+    if isinstance(cells, list | tuple):
+        return [text for cell in cells for text in _strings(cell)]
+    return [cells] if isinstance(cells, str) else []
 
 
 def _vector(values: np.ndarray, name: str, path: Path) -> np.ndarray:
-    if values.ndim != 1 or values.dtype.kind not in "fiu":
+    if max(values.shape, default=0) != values.size or values.dtype.kind not in "fiu":
         raise InputError(f"{path}: {name}: must be a vector of numbers, is {values.dtype} of shape {values.shape}.")
-    return values.astype(np.float64)
+    return values.ravel().astype(np.float64)

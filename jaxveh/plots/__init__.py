@@ -1,4 +1,4 @@
-"""Figures of recordings, drives, estimates, innovations, tyre forces, parameters and rig fits, in one restrained style;
+"""Figures of recordings, drives, cars, estimates, innovations, tyre forces, parameters and fits, in one restrained style;
 matplotlib is the extra `plot`. A page to zoom into is `log_report`, with Bokeh, the extra `report`.
 
 Every function returns a matplotlib `Figure` made without pyplot: no window, no global state, shown by notebooks as it
@@ -8,10 +8,12 @@ show a simulation's truth where the recording has it, else what was measured.
 
 from jaxveh.plots import kit
 from jaxveh.plots.braking_drives import braking
+from jaxveh.plots.cars import car
 from jaxveh.plots.closeup import closeup
 from jaxveh.plots.drives import drive
 from jaxveh.plots.dwell import sine_with_dwell
 from jaxveh.plots.estimates import estimate
+from jaxveh.plots.fits import fit
 from jaxveh.plots.force_curves import force_curves
 from jaxveh.plots.frequency_responses import frequency_response
 from jaxveh.plots.friction_ellipse import friction_ellipse
@@ -25,6 +27,7 @@ from jaxveh.plots.rear_axles import AxlePoints, rear_axle, rear_axle_points
 from jaxveh.plots.recordings import recording
 from jaxveh.plots.report_page import ReportTable
 from jaxveh.plots.rig_fit import rig_fit
+from jaxveh.plots.rigs import rig
 from jaxveh.plots.step_responses import step_response
 from jaxveh.plots.style import COLOURS, save, style
 from jaxveh.plots.top_views import top_view
@@ -38,9 +41,11 @@ __all__ = [
     "ReportTable",
     "ReportedLog",
     "braking",
+    "car",
     "closeup",
     "drive",
     "estimate",
+    "fit",
     "force_curves",
     "frequency_response",
     "friction_ellipse",
@@ -56,6 +61,7 @@ __all__ = [
     "rear_axle",
     "rear_axle_points",
     "recording",
+    "rig",
     "rig_fit",
     "save",
     "sine_with_dwell",

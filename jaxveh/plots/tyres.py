@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh.plots.style import CYCLE, legend, new_figure, style
-from jaxveh.tyres import AbstractTyre, Contact
+from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact
 
 POINTS = 181
 SLIP_ANGLE = np.radians(18.0)
@@ -22,23 +22,31 @@ COMBINED = (1.0, 2.0, 4.0, 10.0)
 """Degrees of slip angle whose forces of combined slip are drawn."""
 
 
-def tyre(law: AbstractTyre, loads: Sequence[float], *, figure: Any = None) -> Any:
+LOADS = (2000.0, 4000.0, 6000.0)
+"""N, where nobody says otherwise,"""
+
+SPEED = 16.7
+"""m/s: and the speed, that of most rigs."""
+
+
+def tyre(law: AbstractTyre, loads: Sequence[float] = LOADS, *, speed: float = SPEED, figure: Any = None) -> Any:
     """Lateral force and aligning moment over slip angle, longitudinal force over slip ratio, at `loads` (N); lateral over
-    longitudinal force at several slip angles, at the middle load. **Returns** the figure; `figure`: where to draw."""
+    longitudinal force at several slip angles, at the middle load; all at a forward `speed` (m/s). A tyre with states of its own
+    has settled. **Returns** the figure; `figure`: where to draw."""
     angle, ratio = np.linspace(-SLIP_ANGLE, SLIP_ANGLE, POINTS), np.linspace(-SLIP_RATIO, SLIP_RATIO, POINTS)
     with style():
         figure = new_figure(5.2) if figure is None else figure
         axes = figure.subplots(2, 2)
         for i, load in enumerate(loads):
             settings = {"color": CYCLE[i % len(CYCLE)], "label": f"{load / 1e3:g} kN"}
-            across, along = forces_at(law, load, angle, 0.0), forces_at(law, load, 0.0, ratio)
+            across, along = (forces_at(law, load, *slips, speed) for slips in ((angle, 0.0), (0.0, ratio)))
             axes[0, 0].plot(np.degrees(angle), across.F_y / 1e3, **settings)
             axes[0, 1].plot(100 * ratio, along.F_x / 1e3, **settings)
             axes[1, 0].plot(np.degrees(angle), across.M_z, **settings)
         middle = loads[len(loads) // 2]
         wide = np.linspace(-1.0, 1.0, 4 * POINTS)
         for i, degrees in enumerate(COMBINED):
-            found = forces_at(law, middle, np.radians(degrees), wide)
+            found = forces_at(law, middle, np.radians(degrees), wide, speed)
             shade = str(0.75 - 0.75 * i / len(COMBINED))
             axes[1, 1].plot(found.F_x / 1e3, found.F_y / 1e3, color=shade, label=f"{degrees:g}°")
         axes[1, 1].legend(title="slip angle", loc="lower center", ncols=2, handlelength=1.4)
@@ -54,14 +62,16 @@ def tyre(law: AbstractTyre, loads: Sequence[float], *, figure: Any = None) -> An
     return figure
 
 
-def forces_at(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any) -> Any:
+def forces_at(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any, speed: float | None = None) -> Any:
     """Forces at a load (N) as NumPy arrays of the shape to which slip angles (rad) and slip ratios broadcast."""
     shape = np.broadcast_shapes(np.shape(slip_angle), np.shape(slip_ratio))
     # Lines of different lengths are one program.
     size = (max(ROOM, *shape),) if len(shape) == 1 else shape
     wide = lambda value: jnp.asarray(np.resize(np.broadcast_to(value, shape), size), float)
+    settings = {} if speed is None else {"speed": jnp.asarray(speed, float)}
     found = _evaluate(
-        law, Contact(slip_angle=wide(slip_angle), slip_ratio=wide(slip_ratio), load=jnp.asarray(load, float))
+        law,
+        Contact(slip_angle=wide(slip_angle), slip_ratio=wide(slip_ratio), load=jnp.asarray(load, float), **settings),
     )
     shown = tuple(slice(0, count) for count in shape)
     return jax.tree.map(lambda value: np.broadcast_to(np.asarray(value), size)[shown], found)
@@ -69,4 +79,4 @@ def forces_at(law: AbstractTyre, load: float, slip_angle: Any, slip_ratio: Any) 
 
 @eqx.filter_jit
 def _evaluate(law: AbstractTyre, contact: Contact) -> Any:
-    return law.forces(contact)
+    return law.forces(contact, law.start(contact)) if isinstance(law, AbstractDynamicTyre) else law.forces(contact)

@@ -7,7 +7,7 @@ import enum
 import functools
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -16,6 +16,7 @@ import numpy as np
 
 from jaxveh import numerics
 from jaxveh._core.errors import FilterError, JaxvehWarning, check_one_of, is_concrete
+from jaxveh._core.estimated import Estimated
 from jaxveh._core.fresh_functions import note_function
 from jaxveh._core.recording import Recording
 from jaxveh._core.result import Result, first_failure
@@ -43,7 +44,7 @@ SHOWN = ("mean", "std", "info")
 """What an `Estimate` has row by row, where nobody says otherwise."""
 
 
-class Estimate(eqx.Module):
+class Estimate(Estimated, eqx.Module):
     """What a filter made of a recording.
 
     `time` (T,); `mean`, `std`: NamedTuples of the model's report with (T,) in each field, in physical units;
@@ -51,7 +52,14 @@ class Estimate(eqx.Module):
     code (`jaxveh.Result`) and `failed_at` its row, 0 and -1 where all went well; `belief`: after the last row, ready
     for `filter.step`. `parameters` and `parameters_std`: `Parameters` with (T,) each, as in the car
     (`.front.B`); None without. What was not to be kept is None, too.
+
+    `save`, `load`, `to_xarray` and `from_xarray` keep all but the `belief`, which `filters.save_belief` keeps; NamedTuples come
+    back with the same names and fields.
     """
+
+    by_row = ("mean", "std", "info", "parameters", "parameters_std")
+    by_run = ("log_likelihood", "result", "failed_at")
+    records: ClassVar = {"Info": Info}
 
     time: Any
     mean: Any

@@ -19,6 +19,7 @@ from jaxveh._core.errors import InputError
 from jaxveh.io import kit
 from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.plan import Chunk, Plan
+from jaxveh.sweeps.swept import OWN, SEED
 
 MANIFEST = "jaxveh_sweep"
 """The attribute with the sweep's identity."""
@@ -31,9 +32,6 @@ NOT_DONE, DONE, FAILED = 0, 1, 2
 
 LONGEST_ERROR = 1000
 """Bytes of UTF-8 that are kept of a chunk's error."""
-
-SEED = "seed"
-OWN = "_of_"
 
 
 class Store:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,19 +13,25 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxveh._core.errors import InputError
+from jaxveh._core.labelled import Labelled, Variable
 from jaxveh._core.names import check_names
+from jaxveh._core.overview import Lazy, Overview, count_of, missing_share, span
 from jaxveh._core.parameters import Parameters
-from jaxveh.sweeps.design import Design
+from jaxveh._core.shown import Kept, above
+from jaxveh.sweeps.design import Axis, Design
 from jaxveh.sweeps.paired import Comparison, compare
 
 
-@dataclasses.dataclass(frozen=True)
-class Swept:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Swept(Kept):
     """`values` by name, each with the design's axes, then the `seeds`, then what a run's own value has.
 
     Where runs return trees, such as an estimate's `parameters`, `found["parameters"]` is all of them, `Parameters` again, and
     `found["parameters.front.B"]` one; so it is in `at`, `quantile` and what follows from it. `units` by the
     names of values and axes, and a `note` on what it is, are those that the sweep was given.
+
+    `to_xarray` is as xarray opens a sweep's store: dimensions are the axes and `seed`. What comes back has the labels of choices
+    instead of the objects, as `read_sweep` does; `load` opens stores (`.zarr`), too.
     """
 
     design: Design
@@ -36,6 +43,65 @@ class Swept:
     def unit(self, name: str) -> str:
         """The unit of a value or an axis, `-` where none was given."""
         return self.units.get(name, "-")
+
+    def plot(self, value: str | None = None) -> Any:
+        """The first figure that `studies.figures` has of a value (default: the first error, or value). **Returns** the figure."""
+        return next(above("studies.figures", "figures")(self, () if value is None else (value,)))[1]
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame` with a row a run: a column an axis, `seed`, and a column a value; what a run has more than one of
+        is taken apart (`name[0]`)."""
+        return super().to_pandas()
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> Swept:
+        """What `save` wrote, or a sweep's store (`.zarr`), as `read_sweep`."""
+        if str(path).lower().rstrip("/").endswith(".zarr"):
+            return above("sweeps", "read_sweep")(path)
+        return super().load(path)
+
+    def _labelled(self) -> Labelled:
+        axes, coordinates = self.design.axes, {}
+        for axis in axes:
+            labels = np.array([str(label) for label in axis.labels], object) if axis.choice else np.asarray(axis.labels)
+            coordinates[axis.name] = Variable((axis.name,), labels, self.units.get(axis.name, ""))
+            for name, column in (axis.columns or {}).items():
+                of = f"{axis.name}.{name}"
+                coordinates[of] = Variable((axis.name,), np.asarray(column), self.units.get(of, ""))
+        lead = (*(axis.name for axis in axes), SEED)
+        variables = {}
+        for name, values in self.values.items():
+            array = np.asarray(values)
+            more = tuple(f"{name}{OWN}{i}" for i in range(array.ndim - len(lead)))
+            variables[name] = Variable((*lead, *more), array, self.units.get(name, ""))
+        told = [
+            {"name": axis.name, "labels": [_plain(label) for label in axis.labels], "choice": axis.choice,
+             "columns": list(axis.columns or {})} for axis in axes
+        ]  # fmt: skip
+        facts = {"axes": told, "seeds": self.seeds, "units": dict(self.units)}
+        return Labelled("Swept", variables, coordinates, tuple(variables), self.note, facts)
+
+    @classmethod
+    def _of_labelled(cls, labelled: Labelled) -> Swept:
+        design, facts, both = Design(), labelled.facts, labelled.both
+        column = lambda axis, name: np.asarray(both[f"{axis['name']}.{name}"].values)
+        columns = lambda axis: {name: column(axis, name) for name in axis["columns"]} or None
+        design.axes = tuple(
+            Axis(axis["name"], tuple(axis["labels"]), tuple(axis["labels"]), axis["choice"], columns(axis))
+            for axis in facts["axes"]
+        )
+        values = {name: np.asarray(one.values) for name, one in labelled.variables.items()}
+        return cls(design, facts["seeds"], values, facts["units"], labelled.source)
+
+    def _overview(self) -> Overview:
+        axes = [f"{axis.name} ({len(axis.labels)})" for axis in self.design.axes]
+        title = f"Swept: {count_of(len(self.values), 'value')} over {' x '.join([*axes, count_of(self.seeds, 'seed')])}"
+        title += f", {self.note!r}" if self.note else ""
+        # A store's values are read when they are asked for, and may be larger than the memory.
+        if not isinstance(self.values, dict):
+            return Overview(title, ("value", "unit"), [(name, self.unit(name)) for name in self.values], 2)
+        row = lambda name: (name, self.unit(name), *span(self.values[name]), missing_share(self.values[name]))
+        return Overview(title, ("value", "unit", "least", "most", "missing"), Lazy(list(self.values), row), 2)
 
     def __getitem__(self, name: str) -> Any:
         """All values of this name, (axes..., seeds, ...), or `Parameters` of those that begin with it and a dot."""
@@ -75,6 +141,15 @@ class Swept:
         return compare(
             self.at(name, **{axis: a}), self.at(name, **{axis: b}), axis=len(self.design.axes) - 1, level=level
         )
+
+
+SEED, OWN = "seed", "_of_"
+"""The dimension of runs, and what stands in the names of dimensions of a run's own value."""
+
+
+def _plain(label: Any) -> Any:
+    """A label as JSON has it."""
+    return label if isinstance(label, bool | int | float | str) else str(label)
 
 
 def _quantile(values: np.ndarray, share: float, axis: int) -> np.ndarray:

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh._core.errors import InputError
 from jaxveh._core.parameter import check_parameters
+from jaxveh._core.parameter_table import WithParameters
 
 
 class Contact(NamedTuple):
@@ -64,11 +65,14 @@ class Forces(NamedTuple):
     M_z: Any = 0.0
 
 
-class AbstractTyre(eqx.Module):
+class AbstractTyre(WithParameters, eqx.Module):
     """A tyre (or an axle's tyres together): an elementwise force law, its array leaves are its parameters.
 
     **Raises** `InputError` for parameters outside their domain.
     """
+
+    drawn_by = "tyre"
+    called = "tyre law"
 
     def __check_init__(self):
         check_parameters(self)

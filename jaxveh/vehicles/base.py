@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from jaxveh import numerics
 from jaxveh._core.names import check_names
+from jaxveh._core.parameter_table import WithParameters
 from jaxveh.roads import LEVEL, Ground
 
 GRAVITY = 9.80665
@@ -61,7 +62,7 @@ def with_shared_parameters(kind: type) -> str:
     return "\n\n".join([*paragraphs[:at], *shared, *paragraphs[at:]]) + "\n    "
 
 
-class AbstractVehicle(eqx.Module):
+class AbstractVehicle(WithParameters, eqx.Module):
     """Equations of motion of one vehicle: array leaves are parameters, states and inputs are NamedTuples of scalars.
 
     Written for one instant and elementwise: a batch of vehicles, states or parameters has arrays in the fields. Axes
@@ -71,6 +72,9 @@ class AbstractVehicle(eqx.Module):
     Parameters that several vehicles share are declared by abstract classes, whose docstrings say of what in a paragraph that
     begins with `SHARED`; the docstring of a vehicle gets these paragraphs, so that `help` shows all.
     """
+
+    drawn_by = "car"
+    called = "vehicle"
 
     def __init_subclass__(cls, **options: Any):
         super().__init_subclass__(**options)

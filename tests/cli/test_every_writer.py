@@ -39,6 +39,8 @@ RECORDING = Recording(np.arange(ROWS) * 0.01, {"yaw_rate": np.sin(np.arange(ROWS
 
 
 State, Measured = record_type("State", ("x1", "x2")), record_type("Measured", ("y",))
+WAVES = State(*np.random.default_rng(0).normal(size=(2, ROWS)))
+ANSWERS = estimators.Answers(np.arange(ROWS) * 0.01, WAVES, WAVES, WAVES, WAVES.x1)
 MODEL = statespace.StateSpace(
     transition=lambda system, t0, t1, x, u: x,
     observation=lambda system, t, x, u: Measured(x.x1),
@@ -88,6 +90,9 @@ WRITERS = {
     "write_recording csv": lambda path: io.write_recording(RECORDING, path, **OVER),
     "write_recording parquet": lambda path: io.write_recording(RECORDING, path, **OVER),
     "write_recording mf4": lambda path: io.write_recording(RECORDING, path, **OVER),
+    "write_recording nc": lambda path: io.write_recording(RECORDING, path, **OVER),
+    "save_result nc": lambda path: ANSWERS.save(path, **OVER),
+    "save_result parquet": lambda path: ANSWERS.save(path, **OVER),
     "write_frame csv": lambda path: io.write_frame(io.to_frame(RECORDING), path, **OVER),
     "write_topics mcap": lambda path: io.write_topics({"/log": io.to_frame(RECORDING)}, path, **OVER),
     "write_car toml": lambda path: io.write_car(CAR, path, **OVER),
@@ -118,6 +123,8 @@ OTHERS = {"save_belief npz", "evaluate_table csv", "all_papers json"}
 def writer(request, tmp_path, monkeypatch):
     """A function that writes a file to a path, and the path's suffix."""
     name, _, suffix = request.param.partition(" ")
+    if suffix == "nc":
+        pytest.importorskip("h5netcdf")
     if name == "save_belief":
         belief = request.getfixturevalue("belief")
         return (lambda path: filters.save_belief(path, belief)), suffix
@@ -294,6 +301,7 @@ def test_links_and_modes_stay(tmp_path):
 # What writes to a path: the word that is called, and which of its calls do not make files.
 OPENERS = {
     "open", "write_text", "write_bytes", "savefig", "to_csv", "to_parquet", "to_json", "to_excel", "to_hdf", "to_pickle",
+    "to_netcdf", "to_zarr",
     "write_table", "save", "savez", "savez_compressed", "savetxt", "tofile", "dump", "savemat", "ZipFile", "replace_file",
     "rename", "touch", "symlink_to", "copyfile", "copy2", "move", "mkdir", "makedirs", "mkdtemp", "mkstemp", "NamedTemporaryFile",
 }  # fmt: skip
@@ -301,6 +309,10 @@ HANDED = {
     ("io/csv_log.py", "to_csv"): "write_columns hands it the part",
     ("io/parquet_log.py", "write_table"): "write_columns hands it the part",
     ("io/mdf_log.py", "save"): "write_columns hands it the part",
+    ("io/netcdf.py", "to_netcdf"): "into memory",
+    ("io/netcdf.py", "rename"): "a dataset's variables",
+    ("io/netcdf.py", "write_bytes"): "write_columns and save_result hand it the part",
+    ("io/wide_parquet.py", "write_table"): "save_result hands it the part",
     ("plots/figure.py", "savefig"): "into memory",
     ("plots/style.py", "savefig"): "into memory",
     ("cli/output.py", "mkdir"): "the report's folder, which files are written into",

@@ -18,6 +18,8 @@ ELSEWHERE = {
     "pitch_slope": "a stem of names",
     "SubFigure": "matplotlib's", "Nissan_Patrol": "a car of another library", "disturbance_v_y": "an example of a state's name",
     "finally": "Python's", "PCY1": "a coefficient",
+    "Time": "a field of MATLAB's", "Data": "a field of MATLAB's", "Units": "a field of MATLAB's",
+    "TimedeltaIndex": "pandas'", "DatetimeIndex": "pandas'",
 }  # fmt: skip
 FILES = {"init.jaxexport", "step.jaxexport", "names.json"}
 

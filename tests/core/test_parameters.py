@@ -48,4 +48,13 @@ def test_leaves_have_names_and_keep_their_order():
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
 def test_copies_are_the_same(again):
     assert dict(again(FOUND)) == dict(FOUND)
-    assert "Parameters({'rear.B': 8.0" in repr(again(FOUND))
+    assert repr(again(FOUND)) == repr(FOUND)
+
+
+def test_they_look_like_a_table():
+    lines = repr(FOUND).splitlines()
+    assert (
+        lines[0] == "Parameters: 5"
+        and lines[2].split() == ["rear.B", "8"]
+        and lines[4].split() == ["front.tyre.D", "7000"]
+    )

@@ -20,7 +20,7 @@ from rig_sweeps import brush, measured_of, small_plan, table
 from test_maximum_likelihood import LEVELS
 from test_maximum_likelihood import model as diffuse
 
-from jaxveh import InputError, Parameters, Recording, filters, fitting, tyres
+from jaxveh import InputError, Parameters, Recording, filters, fitting, io, tyres
 from jaxveh.fitting.solve import MOST_STEPS
 
 FILTER = filters.Unscented()
@@ -146,6 +146,24 @@ def slopes(core):
         return jax.vmap(along, out_axes=1)(jnp.eye(3)), jax.vmap(against)(jnp.eye(2))[0]
 
     return jax.jit(both).lower(jnp.zeros(3))
+
+
+@pytest.mark.parametrize("suffix", io.kit.RESULT_SUFFIXES)
+def test_a_fit_comes_back_from_a_file(own, suffix, tmp_path):
+    pytest.importorskip({".nc": "h5netcdf", ".parquet": "pyarrow"}[suffix])
+    own.save(tmp_path / f"fit{suffix}")
+    again = type(own).load(tmp_path / f"fit{suffix}")
+    for name in ("parameters", "parameters_std", "unconstrained", "covariance", "cost", "steps", "result"):
+        first, second = jax.tree.leaves(getattr(own, name)), jax.tree.leaves(getattr(again, name))
+        assert all(
+            type(a) is type(b) and np.array_equal(a, b, equal_nan=True) for a, b in zip(first, second, strict=True)
+        ), name
+    assert again.chosen == own.chosen and repr(again) == repr(own)
+    pytest.importorskip("pandas").testing.assert_frame_equal(again.to_pandas(), own.to_pandas())
+    # Any model of its structure will do: all of its numbers are those of the fit.
+    model = again.with_model(jax.tree.map(jnp.zeros_like, own.model)).model
+    assert jax.tree.structure(model) == jax.tree.structure(own.model)
+    assert all(np.array_equal(a, b) for a, b in zip(jax.tree.leaves(model), jax.tree.leaves(own.model), strict=True))
 
 
 def test_every_fit_and_every_problem_has_a_case():

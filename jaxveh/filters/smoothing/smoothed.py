@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jaxveh._core.estimated import Estimated, with_prefix
+from jaxveh._core.labelled import Labelled
 from jaxveh.statespace import Estimate, StateSpace, parameters_of
 
 
-class SmoothedEstimate(eqx.Module):
+class SmoothedEstimate(Estimated, eqx.Module):
     """Each row's quantities given all rows, or those up to a lag behind it.
 
     `time` (T,); `mean`, `std`: NamedTuples of the model's report with (T,) in each field; `parameters`, `parameters_std` as in
     `Estimate`; `filtered`: the filter's `Estimate`, with log-likelihood, info and result. `trajectories`: draws of whole
     paths, the state's NamedTuple with (T, M) in each field, and their `weights` (M,) (particle smoothers, else None).
     """
+
+    by_row = ("mean", "std", "parameters", "parameters_std", "trajectories")
+    by_run = ("weights",)
 
     time: Any
     mean: Any
@@ -31,6 +37,23 @@ class SmoothedEstimate(eqx.Module):
     def __getitem__(self, name: str):
         """The mean of a reported quantity by name, (T,)."""
         return getattr(self.mean, name)
+
+    def _lead(self) -> int:
+        return self.filtered._lead()
+
+    def _labelled(self) -> Labelled:
+        own, filtered = super()._labelled(), self.filtered._labelled()
+        return own._replace(
+            variables={**own.variables, **with_prefix(filtered, "filtered")},
+            facts={**own.facts, "filtered": filtered.facts},
+        )
+
+    @classmethod
+    def _of_labelled(cls, labelled: Labelled) -> SmoothedEstimate:
+        of_filtered = {n: one for n, one in labelled.variables.items() if n.startswith("filtered.")}
+        plain = {name.removeprefix("filtered."): one for name, one in of_filtered.items()}
+        filtered = Estimate._of_labelled(labelled._replace(variables=plain, facts=labelled.facts["filtered"]))
+        return dataclasses.replace(super()._of_labelled(labelled), filtered=filtered)
 
 
 def smoothed_estimate(

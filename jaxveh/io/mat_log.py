@@ -1,0 +1,152 @@
+"""MATLAB's `.mat` files as logs: vectors beside a time vector, structs with `Time` and `Data`, Simulink's structure with time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxveh._core.errors import InputError
+from jaxveh.io.channel_map import ChannelMap
+from jaxveh.io.log import TIME_NAMES, apply
+from jaxveh.io.mat_elements import Unread
+from jaxveh.io.mat_file import read_mat
+from jaxveh.io.naming import check_known
+from jaxveh.io.nested_log import Leaf, NestedLog, in_words
+from jaxveh.io.units import convert, is_unit
+
+DATA_NAMES = ("data", "values", "value", "signals")
+UNIT_NAMES = ("units", "unit")
+NAME_NAMES = ("label", "name")
+WIDEST = 64
+"""Columns that a matrix may be taken apart into."""
+
+_SECONDS = {"seconds": "s", "milliseconds": "ms", "microseconds": "us", "minutes": "min", "hours": "h"}
+
+
+def open_mat(path: Path, channels: ChannelMap | None) -> NestedLog:
+    """A `.mat` file of version 5 or 7.3. A struct with a time vector (`time`, `Time`, `t`, ...) has the columns beside it, and
+    those of structs below it of as many rows; `Data` or `values` have the name of their struct, a matrix is taken apart as
+    `name[0]`, `name[1]`, .... The channel map's `time` names the vector for all of as many rows.
+
+    **Raises** `InputError` for a file in which no vector goes with a time vector, saying what was found.
+    """
+    content = read_mat(path)
+    found, seen = {}, {}
+    time = None if channels is None or channels.time is None else _named_time(path, content, channels)
+    for leaf in _leaves(content, "", "", time, time is not None, seen):
+        found.setdefault(leaf.path, leaf)
+    leaves = [leaf for leaf in found.values() if leaf.path not in {one for one, what in seen.items() if what == "time"}]
+    objects = {name: what for name, what in seen.items() if what not in ("time", "")}
+    if not leaves:
+        raise InputError(
+            f"{path}: no vector goes with a time vector ({', '.join(TIME_NAMES)}); found: {in_words(objects)}. "
+            'Name the time in a channel map: time = "COLUMN". Objects (timeseries, Dataset, timetable) only MATLAB can read: '
+            "save the fields, as in log.v_x.Time and log.v_x.Data."
+        )
+    return NestedLog(path, leaves, without=f"Not read: {in_words(objects)}." if objects else "")
+
+
+def _leaves(
+    node: Any, path: str, short: str, time: np.ndarray | None, fixed: bool, seen: dict[str, str], unit: str = ""
+) -> Iterator[Leaf]:
+    """The columns in a part of the file, which lies at `path` beneath a time vector; `seen` gets what is no column."""
+    if isinstance(node, Mapping):
+        yield from _of_struct(node, path, short, time, fixed, seen)
+    elif isinstance(node, list) and any(isinstance(one, Mapping) for one in node):
+        for k, one in enumerate(node):
+            name = _text(one, NAME_NAMES) or f"{short}[{k}]" if isinstance(one, Mapping) else f"{short}[{k}]"
+            yield from _leaves(one, f"{path}[{k}]", name, time, fixed, seen)
+    elif isinstance(node, np.ndarray):
+        columns = None if time is None else _columns(node, len(time))
+        if columns is None or time is None:
+            seen[path] = "x".join(map(str, node.shape))
+            return
+        for k, values in enumerate(columns):
+            index = f"[{k}]" if len(columns) > 1 else ""
+            yield Leaf(path + index, short + index, time, values, unit)
+    elif isinstance(node, Unread):
+        seen[path] = node.what
+
+
+def _of_struct(
+    node: Mapping[str, Any], path: str, short: str, time: np.ndarray | None, fixed: bool, seen: dict[str, str]
+) -> Iterator[Leaf]:
+    below = lambda name: f"{path}.{name}" if path else name
+    name = next((one for wanted in TIME_NAMES for one in node if one.casefold() == wanted), None)
+    own = None if fixed or name is None else _vector(node[name])
+    if own is not None and name is not None:
+        time = _in_seconds(own, node)
+        seen[below(name)] = "time"
+    unit = _text(node, UNIT_NAMES) or _text(node.get("DataInfo"), UNIT_NAMES)
+    for key, value in node.items():
+        if key == name and own is not None:
+            continue
+        # `log.vx.Data` is `log.vx`, and `scope.signals` what is in the scope.
+        is_data = bool(path) and key.casefold() in DATA_NAMES and time is not None
+        at, called = (path, short) if is_data else (below(key), key)
+        yield from _leaves(value, at, called, time, fixed, seen, unit if is_data else "")
+
+
+def _named_time(path: Path, content: Mapping[str, Any], channels: ChannelMap) -> np.ndarray:
+    """The vector that the channel map names as time, in seconds."""
+    named = channels.time
+    assert named is not None
+    vectors = dict(_vectors(content, ""))
+    shorts = [one.rpartition(".")[2] for one in vectors]
+    vectors |= {one.rpartition(".")[2]: v for one, v in vectors.items() if shorts.count(one.rpartition(".")[2]) == 1}
+    check_known(str(path), "vector", named.column, vectors, "It is the time of the channel map.")
+    stamps = apply(named, vectors[named.column])
+    return convert(stamps, named.unit, "s", f"{path}: {named.column}") if is_unit(named.unit) else stamps
+
+
+def _vectors(node: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
+    if isinstance(node, Mapping):
+        for key, value in node.items():
+            yield from _vectors(value, f"{path}.{key}" if path else key)
+    elif isinstance(node, np.ndarray) and (vector := _vector(node)) is not None:
+        yield path, vector
+
+
+def _vector(value: Any) -> np.ndarray | None:
+    """An array of numbers with one long side, as (n,); None for anything else."""
+    numbers = isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size > 0
+    if not numbers or max(value.shape) != value.size:
+        return None
+    return np.ascontiguousarray(value.ravel(), np.float64)
+
+
+def _columns(values: np.ndarray, rows: int) -> list[np.ndarray] | None:
+    """The columns (rows,) of an array one of whose sides is time; None where none is, or it holds no numbers."""
+    if values.dtype.kind not in "fiub" or values.size == 0:
+        return None
+    if (vector := values.ravel()).size == rows:
+        return [vector]
+    shape = tuple(side for side in values.shape if side > 1)
+    if rows not in shape or values.size // rows > WIDEST:
+        return None
+    # Simulink has time last where a sample is a matrix, and first where it is a vector.
+    along = 0 if shape[0] == rows else len(shape) - 1
+    if shape[along] != rows:
+        return None
+    table = np.moveaxis(values.reshape(shape), along, 0).reshape(rows, -1)
+    return list(np.ascontiguousarray(table.T))
+
+
+def _in_seconds(time: np.ndarray, node: Mapping[str, Any]) -> np.ndarray:
+    """Time as a timeseries' `TimeInfo` says it, in seconds."""
+    unit = _text(node.get("TimeInfo"), UNIT_NAMES)
+    unit = _SECONDS.get(unit, unit)
+    return convert(time, unit, "s", "TimeInfo") if is_unit(unit) else time
+
+
+def _text(node: Any, names: tuple[str, ...]) -> str:
+    """The text of the first of these fields that has some, "" without."""
+    if not isinstance(node, Mapping):
+        return ""
+    folded = {key.casefold(): value for key, value in node.items()}
+    return next(
+        (folded[name].strip() for name in names if isinstance(folded.get(name), str) and folded[name].strip()), ""
+    )
