@@ -83,7 +83,7 @@ def state_space(
     """
     check_at_least("steps", steps, 1)
     check_at_least("minimum_speed", minimum_speed, 0)
-    _check_kinds(car, sensors)
+    _check_kinds(car, sensors, estimate)
     system = Instrumented(car, _without_noise(sensors))
     states = system.state_type._fields
     transition = Propagate(_derivatives, solver or RK4(), steps)
@@ -101,8 +101,6 @@ def state_space(
     )
     if estimate is None:
         return model
-    if not callable(estimate):
-        raise InputError(f"estimate = {estimate!r}: must be a function, such as lambda car: (car.front.B, car.rear.B).")
     return with_parameters(model, lambda model: estimate(model.system.vehicle), prior, walk, domain=domain)
 
 
@@ -114,7 +112,9 @@ def _observation(system: Instrumented, t, x, u):
     return system.observation(t, x, u)
 
 
-def _check_kinds(car, sensors) -> None:
+def _check_kinds(car, sensors, estimate) -> None:
+    if not (estimate is None or callable(estimate)):
+        raise InputError(f"estimate = {estimate!r}: must be a function, such as lambda car: (car.front.B, car.rear.B).")
     if not isinstance(car, AbstractVehicle):
         raise InputError(f"state_space: car = {type(car).__name__}: must be a vehicle of jaxveh.vehicles.")
     if not isinstance(sensors, SensorSet):

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxveh._core.errors import InputError, check_whole
+from jaxveh._core.errors import InputError, check_key, check_whole
 from jaxveh.sweeps.design import Design
 from jaxveh.sweeps.swept import named_leaves
 
@@ -24,6 +24,8 @@ class Given:
             raise InputError(
                 "sweep: give seeds and a key, from which each run draws, or data, of which each has its part."
             )
+        if key is not None:
+            check_key("sweep", key)
         if seeds is None:
             seeds = next((np.shape(leaf)[len(points)] for leaf in parts.values() if np.ndim(leaf) > len(points)), None)
         check_whole("seeds", seeds)

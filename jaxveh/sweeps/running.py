@@ -12,7 +12,7 @@ import numpy as np
 from jax.sharding import Mesh
 from jax.sharding import PartitionSpec as P
 
-from jaxveh._core.errors import InputError, check_key, check_positive, check_whole
+from jaxveh._core.errors import InputError, check_positive, check_whole
 from jaxveh._core.progress import Progress, silent
 from jaxveh.sweeps.design import Design
 from jaxveh.sweeps.given import Given
@@ -76,8 +76,6 @@ def sweep(
     **Warns** where a program may never end even on one device, and what keeps it from that.
     """
     check_positive("patience", patience, "s")
-    if key is not None:
-        check_key("sweep", key)
     if store is not None or (client, processes, part) != (None, None, None):
         if store is None or (memory, devices) != (None, None):
             raise InputError(

@@ -297,6 +297,7 @@ SHARED = {
     "inertia_spread": "relative, of the first guess",
     "moved": "particles after the step",
     "base_said": "what the inner belief said",
+    "labelled": "numbers with their dimensions, coordinates and units",
     "motion": "yaw rate and lateral acceleration per angle of steer",
 }
 """By the argument's name."""
