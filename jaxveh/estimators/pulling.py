@@ -167,8 +167,9 @@ class Pulling(AbstractMethod):
         v_y = self._rolls_across(x.v_x, heard)
         return self._felt(x, heard) + v_y * heard["yaw_rate"] - GRAVITY * numerics.sin(x.grade)
 
-    def _measured(self, belief: Belief, doubt, heard, values) -> Belief:
+    def _measured(self, belief: Belief, slides, heard, values) -> Belief:
         v_x, dt = State(*belief.mean).v_x, jnp.maximum(heard["dt"], 1e-3)
+        fast = jnp.maximum(jnp.abs(v_x), SLOWEST)
         drive, brake = values["drive_torque"], values["brake_torque"]
         pushed = ~(jnp.isnan(drive) | jnp.isnan(brake))
         drive, brake = jnp.where(pushed, drive, 0.0), jnp.where(pushed, brake, 0.0)
@@ -189,20 +190,22 @@ class Pulling(AbstractMethod):
 
         climbs = ~jnp.isnan(values["climb_rate"])
         # The speed over ground of a car that slides across is more than its v_x.
-        drifts = jnp.square(jnp.square(doubt.across) / (2.0 * jnp.maximum(jnp.abs(v_x), SLOWEST)))
+        drifts = jnp.square(jnp.square(slides.across) / (2.0 * fast))
 
         def climb(x):
-            fast = jnp.where(satellites, said, x.v_x - self.delay * self._speeds_up(x, heard))
-            rises = fast * numerics.sin(x.grade - self.delay * x.grade_rate)
+            passes = jnp.where(satellites, said, x.v_x - self.delay * self._speeds_up(x, heard))
+            rises = passes * numerics.sin(x.grade - self.delay * x.grade_rate)
             return jnp.where(climbs, values["climb_rate"], 0.0) - rises
 
         slowing = brake / (self.wheel_radius * self.mass)
         # All wheels brake; of a car that drives both axles those whose speed counts drive, too.
         pushing = drive * 2.0 * driven_share(self.motion.front_share) / (self.wheel_radius * self.mass)
         slips = jnp.square(self.wheel_noise) + jnp.square(0.002 * v_x * (slowing + pushing))
-        slips = slips + 2.0 * self.sliding.staying / dt * jnp.square(doubt.along)
+        slips = slips + 2.0 * self.sliding.staying / dt * jnp.square(slides.along)
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
-        lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt)
+        # Wheels that spin or lock push less than their torque.
+        lost = (slowing + jnp.abs(drive) / (self.wheel_radius * self.mass)) * slides.along / (slides.along + 0.01 * fast)
+        lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt + jnp.square(lost))
 
         def wheels(x):
             ago = x.v_x - self.wheel_delay * self._speeds_up(x, heard)

@@ -22,7 +22,7 @@ class Doubt(NamedTuple):
 
 class SlidingMemory(NamedTuple):
     """Of the lateral speed what was gathered beyond the tyres' (m/s), and the tyres' own in the last row (m/s); how much faster
-    front wheels usually are, left and right (shares); the doubt of the last row."""
+    each wheel usually is than their mean (4,), a share; the doubt of the last row."""
 
     gathered: Any
     ordinary: Any
@@ -36,9 +36,9 @@ class Sliding(eqx.Module):
     - `across`: what accelerometer and yaw rate say of the lateral speed's rate, `a_y / (1 + g roll_gradient) - v_x r`, less the
     rate of the lateral speed that the tyres' linear range makes, gathered over `gathering` (s). A bank and an offset gather, too:
     up to `usual_across` (m/s) counts for nearly nothing.
-    - `along`: how much faster or slower front wheels are than the rear ones of their side, beside what the bend makes and what
-    they are within `learning` (s) of ordinary driving, less `usual_along` (a share of the speed). Wheels that all slip alike do
-    not show it.
+    - `along`: by how much one wheel is faster or slower than all in the mean, beside what the bend makes (`half_track`, m) and
+    what it is within `learning` (s) of ordinary driving, less `usual_along` (a share of the speed). Wheels that all slip alike
+    do not show it.
 
     Both stay for `staying` (s): wheels that grip again need a moment to be what they say.
     """
@@ -47,13 +47,14 @@ class Sliding(eqx.Module):
     gathering: jax.Array = positive("s", default=1.0)
     usual_across: jax.Array = positive("m/s", default=1.0)
     learning: jax.Array = positive("s", default=10.0)
-    usual_along: jax.Array = positive("-", default=0.02)
+    usual_along: jax.Array = positive("-", default=0.015)
+    half_track: jax.Array = positive("m", default=0.75)
     staying: jax.Array = positive("s", default=0.5)
 
     def start(self, t: Any) -> SlidingMemory:
         """Before the first row: a car that does not slide."""
         zero = jnp.zeros_like(t)
-        return SlidingMemory(zero, zero, jnp.zeros((2,), zero.dtype), Doubt(zero, zero))
+        return SlidingMemory(zero, zero, jnp.zeros((4,), zero.dtype), Doubt(zero, zero))
 
     def next(self, last: SlidingMemory, heard: dict[str, Any], v_x: Any, ordinary: Any, wheelbase: Any) -> SlidingMemory:
         """After a row. `v_x` (m/s) as believed, `ordinary`: the lateral speed (m/s) of tyres that do not slide."""
@@ -68,13 +69,16 @@ class Sliding(eqx.Module):
         return SlidingMemory(gathered, ordinary, usual, doubt)
 
     def _along(self, usual, heard, v_x, wheelbase):
-        speed = dict(zip(AT, (heard[f"wheel_speed_{at}"] for at in AT), strict=True))
-        fast = jnp.abs(away_from_zero(v_x))
-        # A front wheel goes round a wider circle than the rear one.
-        wider = 0.5 * jnp.square(wheelbase * heard["yaw_rate"] / fast)
-        shares = jnp.stack([speed["fl"] - speed["rl"], speed["fr"] - speed["rr"]]) / fast - wider
-        there = ~jnp.isnan(shares)
-        beyond = jnp.where(there, shares, usual) - usual
-        calm = there & (jnp.abs(beyond) < 2.0 * self.usual_along)
+        speeds = jnp.stack([heard[f"wheel_speed_{at}"] for at in AT])
+        there = ~jnp.isnan(speeds)
+        fast, turn = jnp.abs(away_from_zero(v_x)), heard["yaw_rate"]
+        # Outer wheels go round wider circles than inner ones, front wheels than rear ones.
+        wider = 0.5 * jnp.square(wheelbase * turn) / fast
+        beside = self.half_track * turn
+        bend = jnp.stack([wider - beside, wider + beside, -beside, beside])
+        shares = jnp.where(there, speeds - bend, 0.0) / fast
+        mean = jnp.sum(shares) / jnp.maximum(jnp.sum(there), 1)
+        beyond = jnp.where(there, shares - mean - usual, 0.0)
+        calm = jnp.max(jnp.abs(beyond)) < 2.0 * self.usual_along
         usual = usual + jnp.where(calm, heard["dt"] / (self.learning + heard["dt"]), 0.0) * beyond
         return fast * jnp.max(jnp.maximum(jnp.abs(beyond) - self.usual_along, 0.0)), usual
