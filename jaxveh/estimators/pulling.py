@@ -76,7 +76,8 @@ class Pulling(AbstractMethod):
     **Parameters**: of the car `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2), `drag` (N s^2/m^2),
     `rolling_resistance` (-), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`, `pitch_gradient`
     (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`, `rolling_spread`
-    (m/s^2); of the sensors `wheel_noise`, `satellite_noise`, `climb_noise` (m/s), `wheel_delay` and satellites' `delay` (s),
+    (m/s^2); of the sensors `wheel_noise`, `told_noise` (of a channel `v_x`, which another estimator made and whose errors last),
+    `satellite_noise`, `climb_noise` (m/s), `wheel_delay` and satellites' `delay` (s),
     `force_noise` (m/s^2), which lasts `force_time` (s).
     """
 
@@ -98,6 +99,7 @@ class Pulling(AbstractMethod):
     a_x_offset_spread: jax.Array = positive("m/s^2", default=0.06)
     rolling_spread: jax.Array = positive("m/s^2", default=0.025)
     wheel_noise: jax.Array = positive("m/s", default=0.012)
+    told_noise: jax.Array = positive("m/s", default=0.05)
     wheel_delay: jax.Array = parameter("s", scale=0.02, default=0.02)
     satellite_noise: jax.Array = positive("m/s", default=0.06)
     climb_noise: jax.Array = positive("m/s", default=0.12)
@@ -200,7 +202,8 @@ class Pulling(AbstractMethod):
         slowing = brake / (self.wheel_radius * self.mass)
         # All wheels brake; of a car that drives both axles those whose speed counts drive, too.
         pushing = drive * 2.0 * driven_share(self.motion.front_share) / (self.wheel_radius * self.mass)
-        slips = jnp.square(self.wheel_noise) + jnp.square(0.002 * v_x * (slowing + pushing))
+        noise = jnp.where(jnp.isnan(values["v_x"]), self.wheel_noise, self.told_noise)
+        slips = jnp.square(noise) + jnp.square(0.002 * v_x * (slowing + pushing))
         slips = slips + 2.0 * self.sliding.staying / dt * jnp.square(slides.along)
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
         # Wheels that spin or lock push less than their torque.

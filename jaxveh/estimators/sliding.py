@@ -77,7 +77,7 @@ class Sliding(eqx.Module):
         beside = self.half_track * turn
         bend = jnp.stack([wider - beside, wider + beside, -beside, beside])
         shares = jnp.where(there, speeds - bend, 0.0) / fast
-        mean = jnp.sum(shares) / jnp.maximum(jnp.sum(there), 1)
+        mean = jnp.sum(shares) / jnp.maximum(jnp.sum(there.astype(shares.dtype)), 1.0)
         beyond = jnp.where(there, shares - mean - usual, 0.0)
         calm = jnp.max(jnp.abs(beyond)) < 2.0 * self.usual_along
         usual = usual + jnp.where(calm, heard["dt"] / (self.learning + heard["dt"]), 0.0) * beyond
