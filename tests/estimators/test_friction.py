@@ -178,7 +178,7 @@ def test_observers_of_the_wheels_find_the_friction_of_their_own_law():
     known = np.asarray(said.known.friction) & (T > 8.0)
     assert known.mean() > 0.1
     assert abs(np.median(said["friction"][known]) / mu - 1.0) < 0.15
-    law = friction.METHODS["lugre"].make(CAR).law
+    law = friction.METHODS["lugre"].make(CAR).inner.law
     for k, at in enumerate(CORNERS):
         load = float(PLANAR.static_loads()[k // 2]) / 2.0
         contact = Contact(slip_ratio=swings(0.08), load=load, friction=mu, speed=SPEED, slip_speed=SPEED)
