@@ -18,6 +18,7 @@ from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
 from jaxveh.estimators.friction.augmented import augmented_filter
 from jaxveh.estimators.friction.axles import AligningTorque, Axles, HybridObserver, LateralCurve
 from jaxveh.estimators.friction.bank import FrictionBank
+from jaxveh.estimators.friction.curve_follower import CurveFollower
 from jaxveh.estimators.friction.laws import planar_car
 from jaxveh.estimators.friction.scalar import Follower
 from jaxveh.estimators.friction.slipping_wheels import SidesApart, WheelObserver
@@ -58,7 +59,7 @@ def _bank(car: CarSpecification) -> FrictionBank:
 
 
 def _lateral(car: CarSpecification) -> LateralCurve:
-    return LateralCurve(Axles(planar_car(car)), Follower())
+    return LateralCurve(Axles(planar_car(car)), CurveFollower())
 
 
 def _aligning(car: CarSpecification) -> AligningTorque:
@@ -88,7 +89,7 @@ METHODS = {
         "section 3.1.2.1, joint with reference [99]; interacting multiple models (Blom & Bar-Shalom 1988)",
     ),
     "lateral_curve": MethodOfCar(
-        doubting(_lateral),
+        _lateral,
         "the front axle's force beside its slip angle on a brush curve; known only near the limit",
         "section 3.1.2.1, by tyre response",
     ),
@@ -98,7 +99,7 @@ METHODS = {
         "section 3.1.2.1, lateral and self-aligning",
     ),
     "hybrid": MethodOfCar(
-        doubting(lambda car: HybridObserver(_lateral(car))),
+        lambda car: HybridObserver(_lateral(car)),
         "the observer of lateral_curve, and nonlinear least squares over two seconds where they can tell; known only near the "
         "limit",
         "section 3.1.1.1, figure 3, reference [101]",
