@@ -98,13 +98,16 @@ class LateralCurve(AbstractMethod):
     The rear force tells its slip angle (the brush's inverse), steer and yaw rate the front's from it, and the front force what
     friction there is. In the linear range nothing is told: the force grows by `F - alpha dF/dalpha` with ln mu.
 
-    `force_noise` (-): error of the front force as a share of its stiffness's part, `noise` as a share of the static load.
+    Both axles' stiffness is believed to the follower's spread, and learnt.
+
+    `force_noise` (-): error of the front force as a share of itself, `noise` as a share of the static load; rows of which more
+    than `knee` (-) of the linear force is missing tell friction.
     """
 
     axles: Axles
     follower: CurveFollower
-    force_noise: jax.Array = positive("-", default=0.07)
-    noise: jax.Array = positive("-", default=0.02)
+    force_noise: jax.Array = positive("-", default=0.05)
+    noise: jax.Array = positive("-", default=0.015)
     knee: jax.Array = positive("-", default=0.2)
 
     @property
@@ -197,13 +200,14 @@ class HybridObserver(AbstractMethod):
 
     The observer (`lateral`) follows row by row. Its gain fails at large front and small rear slip angles and where nothing is
     excited; over a window of samples `every` (s) a few Gauss-Newton steps on the same residuals find ln mu at once. Where the
-    window's information, `sum (dF / d ln mu)^2 / noise^2`, is above `enough`, the answer is the least squares', and the observer
-    goes on from it.
+    window's information, `sum (dF / d ln mu)^2 / noise^2` of samples of which those within `correlation` (s) say the same, is above
+    `enough` and tells more than the observer knows, the answer is the least squares', and the observer goes on from it.
     """
 
     lateral: LateralCurve
     every: jax.Array = positive("s", default=0.1)
-    enough: jax.Array = positive("-", default=100.0)
+    enough: jax.Array = positive("-", default=30.0)
+    correlation: jax.Array = positive("s", default=2.0)
     samples: int = eqx.field(static=True, default=20)
 
     @property
@@ -229,10 +233,11 @@ class HybridObserver(AbstractMethod):
         front, rear, difference, weight = map(push, window[:4], sample)
         window = Window(front, rear, difference, weight, jnp.where(due, t, window.time))
         mean, information, pull = self._least_squares(window, state)
-        better = due & now.told.moves & (information > self.enough)
+        told = _told_by_window(state.covariance, information, pull)
+        better = due & now.told.moves & (information > self.enough) & (told[0, 0] < state.covariance[0, 0])
         state = state._replace(
             mean=jnp.where(better, state.mean.at[0].set(mean), state.mean),
-            covariance=jnp.where(better, _told_by_window(state.covariance, information, pull), state.covariance),
+            covariance=jnp.where(better, told, state.covariance),
         )
         return ((now, state), window), self.lateral._answer(now, state)
 
@@ -243,8 +248,7 @@ class HybridObserver(AbstractMethod):
         forces = (window.front, window.rear)
         noise = lateral.noise * axles.car.static_loads()[0] + lateral.force_noise * jnp.abs(window.front)
         weighed = lambda x: window.weight * axles.residual(forces, window.difference, x[0], (x[1], x[2])) / noise
-        # Ten samples of a window are about one independent one a `correlation`.
-        share = jnp.minimum(self.every / lateral.follower.correlation, 1.0)
+        share = jnp.minimum(self.every / self.correlation, 1.0)
         information, pull = jnp.zeros_like(x[0]), jnp.zeros_like(x[1:])
         for _ in range(3):
             errors, slopes = weighed(x), jax.jacfwd(weighed)(x)

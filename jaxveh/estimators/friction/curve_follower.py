@@ -46,7 +46,7 @@ class CurveFollower(eqx.Module):
     usual: jax.Array = positive("-", default=0.8)
     spread: jax.Array = positive("-", default=0.6)
     memory: jax.Array = positive("s", default=40.0)
-    stiffness_spread: jax.Array = positive("-", default=0.25)
+    stiffness_spread: jax.Array = positive("-", default=0.35)
     stiffness_memory: jax.Array = positive("s", default=100.0)
     correlation: jax.Array = positive("s", default=0.2)
     known: jax.Array = positive("-", default=0.15)
