@@ -106,8 +106,8 @@ class LateralCurve(AbstractMethod):
 
     axles: Axles
     follower: CurveFollower
-    force_noise: jax.Array = positive("-", default=0.05)
-    noise: jax.Array = positive("-", default=0.015)
+    force_noise: jax.Array = positive("-", default=0.04)
+    noise: jax.Array = positive("-", default=0.0125)
     knee: jax.Array = positive("-", default=0.2)
 
     @property
