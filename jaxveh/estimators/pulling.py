@@ -207,7 +207,9 @@ class Pulling(AbstractMethod):
         slips = slips + 2.0 * self.sliding.staying / dt * jnp.square(slides.along)
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
         # Wheels that spin or lock push less than their torque.
-        lost = (slowing + jnp.abs(drive) / (self.wheel_radius * self.mass)) * slides.along / (slides.along + 0.01 * fast)
+        lost = (
+            (slowing + jnp.abs(drive) / (self.wheel_radius * self.mass)) * slides.along / (slides.along + 0.01 * fast)
+        )
         lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt + jnp.square(lost))
 
         def wheels(x):
@@ -215,7 +217,9 @@ class Pulling(AbstractMethod):
             return heard["v_x"] - ago * (1.0 + x.wheel_scale + x.slip * (pushing - slowing))
 
         belief = correct(belief, wheels, slips, spoke, State, 3.0)
-        belief = correct(belief, satellite, jnp.square(self.satellite_noise) + drifts, satellites & (v_x > 1.0), State, 3.0)
+        belief = correct(
+            belief, satellite, jnp.square(self.satellite_noise) + drifts, satellites & (v_x > 1.0), State, 3.0
+        )
         belief = correct(belief, climb, jnp.square(self.climb_noise), climbs, State, 3.0)
         there = (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
         return correct(belief, balance, lasting, pushed & there, State, 3.0)

@@ -56,7 +56,9 @@ class Sliding(eqx.Module):
         zero = jnp.zeros_like(t)
         return SlidingMemory(zero, zero, jnp.zeros((4,), zero.dtype), Doubt(zero, zero))
 
-    def next(self, last: SlidingMemory, heard: dict[str, Any], v_x: Any, ordinary: Any, wheelbase: Any) -> SlidingMemory:
+    def next(
+        self, last: SlidingMemory, heard: dict[str, Any], v_x: Any, ordinary: Any, wheelbase: Any
+    ) -> SlidingMemory:
         """After a row. `v_x` (m/s) as believed, `ordinary`: the lateral speed (m/s) of tyres that do not slide."""
         dt = heard["dt"]
         rate = heard["a_y"] / (1.0 + GRAVITY * self.roll_gradient) - v_x * heard["yaw_rate"]

@@ -76,7 +76,9 @@ class Axles(eqx.Module):
         """Front force (N) that is measured less the one that the brush makes of the front slip, the rear's being told by its
         force. `stiffer`: logarithms of front and rear stiffness over the file's."""
         mu, car = jnp.exp(log_friction), self.car
-        front, rear = (axle.stiffness * jnp.exp(more) for axle, more in zip((car.front, car.rear), stiffer, strict=True))
+        front, rear = (
+            axle.stiffness * jnp.exp(more) for axle, more in zip((car.front, car.rear), stiffer, strict=True)
+        )
         behind = brush_curve.slip_of(forces[1], rear, mu * car.rear.peak)
         return forces[0] - brush_curve.force(difference + behind, front, mu * car.front.peak)
 

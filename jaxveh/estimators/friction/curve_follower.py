@@ -61,7 +61,9 @@ class CurveFollower(eqx.Module):
     def _nothing(self):
         zero = jnp.zeros_like(self.usual)
         stiff = self.stiffness_spread + zero
-        return jnp.stack([jnp.log(self.usual), zero, zero]), jnp.diag(jnp.square(jnp.stack([self.spread, stiff, stiff])))
+        return jnp.stack([jnp.log(self.usual), zero, zero]), jnp.diag(
+            jnp.square(jnp.stack([self.spread, stiff, stiff]))
+        )
 
     def next(self, last: CurveBelief, dt, residual, noise, here, tells) -> CurveBelief:
         """After `dt` (s) and a residual: a function of the mean (3,), zero at the truth but for `noise` (its standard deviation);

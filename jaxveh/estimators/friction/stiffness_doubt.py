@@ -58,7 +58,9 @@ class StiffnessDoubt(AbstractMethod):
         own = jax.tree.map(lambda std, mu: jnp.mean(jnp.square(std / jnp.maximum(mu, LEAST))), said.std, said.mean)
         wide = jax.tree.map(lambda apart, own: numerics.sqrt(apart + jnp.where(jnp.isnan(own), 0.0, own)), apart, own)
         known = jax.tree.map(lambda known, wide: jnp.all(known) & (wide < self.widest), said.known, wide)
-        claims = jax.tree.map(lambda mu, wide, std: jnp.where(jnp.isnan(std), std, mu * wide), middle.mean, wide, middle.std)
+        claims = jax.tree.map(
+            lambda mu, wide, std: jnp.where(jnp.isnan(std), std, mu * wide), middle.mean, wide, middle.std
+        )
         return memory, middle._replace(std=claims, known=known, result=jnp.max(said.result))
 
 
