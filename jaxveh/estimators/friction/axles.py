@@ -202,8 +202,8 @@ class HybridObserver(AbstractMethod):
 
     The observer (`lateral`) follows row by row. Its gain fails at large front and small rear slip angles and where nothing is
     excited; over a window of samples `every` (s) a few Gauss-Newton steps on the same residuals find ln mu at once. Where the
-    window's information, `sum (dF / d ln mu)^2 / noise^2` of samples of which those within `correlation` (s) say the same, is above
-    `enough` and tells more than the observer knows, the answer is the least squares', and the observer goes on from it.
+    window's information, `sum (dF / d ln mu)^2 / noise^2` of samples of which those within `correlation` (s) say the same, is
+    above `enough` and tells more than the observer knows, the answer is the least squares', and the observer goes on from it.
     """
 
     lateral: LateralCurve
