@@ -234,7 +234,9 @@ def test_a_file_whose_stiffness_is_wrong_by_a_fifth_makes_no_friction_known_that
         drives.append(drive)
         truths.append(mu)
     keys = ("front_cornering_stiffness", "rear_cornering_stiffness")
-    files = {by: dataclasses.replace(CAR, **{key: getattr(CAR, key) * by for key in keys}) for by in (0.8, 1.0, 1.2)}
+    wrong = lambda by: {key: getattr(CAR, key) * factor for key, factor in zip(keys, by, strict=True)}
+    factors = ((0.8, 0.8), (1.0, 1.0), (1.2, 1.2), (1.2, 0.8), (0.8, 1.2))
+    files = {by: dataclasses.replace(CAR, **wrong(by)) for by in factors}
     cases = [(by, drive) for by in files for drive in drives]
     said = follow_all(lambda by: friction.METHODS[name].make(files[by]), cases, T)
     mean, std, known = (part.friction[:, T > 3.0] for part in said[:3])
