@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 
@@ -17,6 +18,7 @@ from jaxveh.estimators.contract import Need
 from jaxveh.estimators.live import AbstractCleaning
 from jaxveh.estimators.method import AbstractMethod, Filtered, answer
 from jaxveh.estimators.sequential import Belief, belief_of, correct, move, spread_of
+from jaxveh.estimators.sliding import Sliding
 from jaxveh.filters import Extended
 from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
@@ -50,9 +52,10 @@ WIDEST_MASS = 0.04
 
 
 class PullingMemory(NamedTuple):
-    """What was heard, and what is believed."""
+    """What was heard, whether the car slides, and what is believed."""
 
     motion: Any
+    slides: Any
     belief: Belief
 
 
@@ -73,7 +76,8 @@ class Pulling(AbstractMethod):
     **Parameters**: of the car `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2), `drag` (N s^2/m^2),
     `rolling_resistance` (-), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`, `pitch_gradient`
     (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`, `rolling_spread`
-    (m/s^2); of the sensors `wheel_noise`, `satellite_noise`, `climb_noise` (m/s), `wheel_delay` and satellites' `delay` (s),
+    (m/s^2); of the sensors `wheel_noise`, `told_noise` (of a channel `v_x`, which another estimator made and whose errors last),
+    `satellite_noise`, `climb_noise` (m/s), `wheel_delay` and satellites' `delay` (s),
     `force_noise` (m/s^2), which lasts `force_time` (s).
     """
 
@@ -95,6 +99,7 @@ class Pulling(AbstractMethod):
     a_x_offset_spread: jax.Array = positive("m/s^2", default=0.06)
     rolling_spread: jax.Array = positive("m/s^2", default=0.025)
     wheel_noise: jax.Array = positive("m/s", default=0.012)
+    told_noise: jax.Array = positive("m/s", default=0.05)
     wheel_delay: jax.Array = parameter("s", scale=0.02, default=0.02)
     satellite_noise: jax.Array = positive("m/s", default=0.06)
     climb_noise: jax.Array = positive("m/s", default=0.12)
@@ -104,6 +109,7 @@ class Pulling(AbstractMethod):
     slip: jax.Array = positive("1/(m/s^2)", default=0.003)
     slip_spread: jax.Array = positive("1/(m/s^2)", default=0.003)
     brake_doubt: jax.Array = positive("-", default=0.1)
+    sliding: Sliding = eqx.field(default_factory=Sliding)
 
     def __check_init__(self):
         check_parameters(self)
@@ -119,20 +125,26 @@ class Pulling(AbstractMethod):
             "log_mass": self.mass_spread, "rolling_bias": self.rolling_spread, "wheel_scale": 0.005, "slip": self.slip_spread,
         }  # fmt: skip
         belief = belief_of(State, {"v_x": heard["v_x"], "a_x_bias": self.a_x_offset, "slip": self.slip}, stds, t)
-        return self._answer(motion, self._measured(belief, heard, values), heard)
+        slides = self.sliding.start(t)
+        return self._answer(motion, slides, self._measured(belief, slides.doubt, heard, values), heard)
 
     def next(self, memory, t, values):
         motion, heard = self.motion.next(memory.motion, t, values)
-        belief = self._ahead(memory.belief, heard)
-        return self._answer(motion, self._measured(belief, heard, values), heard)
+        v_x = State(*memory.belief.mean).v_x
+        slides = self.sliding.next(memory.slides, heard, v_x, self._rolls_across(v_x, heard), self.wheelbase)
+        belief = self._ahead(memory.belief, slides.doubt, heard)
+        return self._answer(motion, slides, self._measured(belief, slides.doubt, heard, values), heard)
 
-    def _ahead(self, belief: Belief, heard) -> Belief:
+    def _ahead(self, belief: Belief, doubt, heard) -> Belief:
         dt = heard["dt"]
-        fast = jnp.maximum(jnp.abs(heard["v_x"]), SLOWEST)
+        fast = jnp.maximum(jnp.abs(State(*belief.mean).v_x), SLOWEST)
         slow, quick = fast / self.grade_length, fast / self.grade_edge
         walk = 2.0 * jnp.square(self.grade_spread) * slow * quick * (slow + quick)
+        # A car that slides speeds up by what nobody knows, for a while.
+        slides = 2.0 * self.sliding.gathering * jnp.square(doubt.across * heard["yaw_rate"])
         per_second = {
-            "v_x": 4e-5, "grade_rate": walk, "a_x_bias": 4e-6, "log_mass": 1e-8, "rolling_bias": 1e-6, "wheel_scale": 1e-9,
+            "v_x": 4e-5 + slides, "grade_rate": walk, "a_x_bias": 4e-6, "log_mass": 1e-8, "rolling_bias": 1e-6,
+            "wheel_scale": 1e-9,
         }  # fmt: skip
 
         def step(x):
@@ -148,14 +160,18 @@ class Pulling(AbstractMethod):
         """Specific force along the road, m/s^2."""
         return (heard["a_x"] - x.a_x_bias) / (1.0 + GRAVITY * self.pitch_gradient)
 
-    def _speeds_up(self, x, heard):
-        turn, v_x = heard["yaw_rate"], heard["v_x"]
+    def _rolls_across(self, v_x, heard):
+        """Lateral speed of a rear axle that does not slide, m/s."""
         slip = self.rear_compliance * heard["a_y"] * (v_x / away_from_zero(v_x))
-        v_y = self.rear_axle_to_cg * turn - v_x * slip
-        return self._felt(x, heard) + v_y * turn - GRAVITY * numerics.sin(x.grade)
+        return self.rear_axle_to_cg * heard["yaw_rate"] - v_x * slip
 
-    def _measured(self, belief: Belief, heard, values) -> Belief:
-        v_x, dt = heard["v_x"], jnp.maximum(heard["dt"], 1e-3)
+    def _speeds_up(self, x, heard):
+        v_y = self._rolls_across(x.v_x, heard)
+        return self._felt(x, heard) + v_y * heard["yaw_rate"] - GRAVITY * numerics.sin(x.grade)
+
+    def _measured(self, belief: Belief, slides, heard, values) -> Belief:
+        v_x, dt = State(*belief.mean).v_x, jnp.maximum(heard["dt"], 1e-3)
+        fast = jnp.maximum(jnp.abs(v_x), SLOWEST)
         drive, brake = values["drive_torque"], values["brake_torque"]
         pushed = ~(jnp.isnan(drive) | jnp.isnan(brake))
         drive, brake = jnp.where(pushed, drive, 0.0), jnp.where(pushed, brake, 0.0)
@@ -175,29 +191,40 @@ class Pulling(AbstractMethod):
             return jnp.where(satellites, said, 0.0) - ago
 
         climbs = ~jnp.isnan(values["climb_rate"])
+        # The speed over ground of a car that slides across is more than its v_x.
+        drifts = jnp.square(jnp.square(slides.across) / (2.0 * fast))
 
         def climb(x):
-            ago = (x.v_x - self.delay * self._speeds_up(x, heard)) * numerics.sin(x.grade - self.delay * x.grade_rate)
-            return jnp.where(climbs, values["climb_rate"], 0.0) - ago
+            passes = jnp.where(satellites, said, x.v_x - self.delay * self._speeds_up(x, heard))
+            rises = passes * numerics.sin(x.grade - self.delay * x.grade_rate)
+            return jnp.where(climbs, values["climb_rate"], 0.0) - rises
 
         slowing = brake / (self.wheel_radius * self.mass)
         # All wheels brake; of a car that drives both axles those whose speed counts drive, too.
         pushing = drive * 2.0 * driven_share(self.motion.front_share) / (self.wheel_radius * self.mass)
-        slips = jnp.square(self.wheel_noise) + jnp.square(0.002 * v_x * (slowing + pushing))
+        noise = jnp.where(jnp.isnan(values["v_x"]), self.wheel_noise, self.told_noise)
+        slips = jnp.square(noise) + jnp.square(0.002 * v_x * (slowing + pushing))
+        slips = slips + 2.0 * self.sliding.staying / dt * jnp.square(slides.along)
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
-        lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt)
+        # Wheels that spin or lock push less than their torque.
+        lost = (
+            (slowing + jnp.abs(drive) / (self.wheel_radius * self.mass)) * slides.along / (slides.along + 0.01 * fast)
+        )
+        lasting = 2.0 * self.force_time / dt * (jnp.square(self.force_noise) + doubt + jnp.square(lost))
 
         def wheels(x):
             ago = x.v_x - self.wheel_delay * self._speeds_up(x, heard)
-            return v_x - ago * (1.0 + x.wheel_scale + x.slip * (pushing - slowing))
+            return heard["v_x"] - ago * (1.0 + x.wheel_scale + x.slip * (pushing - slowing))
 
         belief = correct(belief, wheels, slips, spoke, State, 3.0)
-        belief = correct(belief, satellite, jnp.square(self.satellite_noise), satellites & (v_x > 1.0), State, 3.0)
+        belief = correct(
+            belief, satellite, jnp.square(self.satellite_noise) + drifts, satellites & (v_x > 1.0), State, 3.0
+        )
         belief = correct(belief, climb, jnp.square(self.climb_noise), climbs, State, 3.0)
         there = (heard["pull_silence"] < SILENCE) & (v_x > SLOWEST)
         return correct(belief, balance, lasting, pushed & there, State, 3.0)
 
-    def _answer(self, motion, belief, heard):
+    def _answer(self, motion, slides, belief, heard):
         x = State(*belief.mean)
         wide = {name: spread_of(belief, {name: 1.0}, State) for name in State._fields}
         mass = self.mass * jnp.exp(x.log_mass)
@@ -210,7 +237,7 @@ class Pulling(AbstractMethod):
         }
         there = heard["pull_silence"] < SILENCE
         known = {"grade": there & (wide["grade"] < WIDEST), "mass": wide["log_mass"] < WIDEST_MASS, "v_x": there}
-        return PullingMemory(motion, belief), answer(said, stds, known)
+        return PullingMemory(motion, slides, belief), answer(said, stds, known)
 
 
 def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:

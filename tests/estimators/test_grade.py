@@ -2,15 +2,17 @@
 
 import dataclasses
 
+import jax
 import numpy as np
 import pytest
 from banked_drives import DEGREE, file_of, follow_all
 from method_logs import CAR
-from steady_logs import WHEELS, G, pushed
+from steady_logs import WHEELS, G, log, pushed
 from winding_roads import SCORED, heard_of
 
 from jaxveh import Recording
 from jaxveh.estimators import grade
+from jaxveh.experiments.sideslip_review.chapters import fleet, fleet_drives, scenarios
 
 
 @pytest.mark.parametrize("name", list(grade.METHODS))
@@ -70,6 +72,79 @@ def test_driven_wheels_slip_and_the_grade_does_not_take_it_for_its_own():
     front = grade.METHODS["filter"].make(dataclasses.replace(CAR, front_drive=1.0))
     slipped = np.std(np.asarray(grade.estimate(front, log.replace(**wheels))["grade"])[1500:])
     assert slipped > 1.3 * error(log)
+
+
+def slippery(needs, what, seed=0, rows=5000):
+    """A car on a winding, hilly road that now and then slides across by up to 6 m/s, of which one wheel then spins or locks; and
+    the grade."""
+    rng, time = np.random.default_rng(seed), 0.01 * np.arange(rows)
+    noise = lambda std: std * rng.normal(size=rows)
+    true = 0.015 * np.sin(0.25 * time) + 0.008 * np.sin(0.6 * time + 1.0)
+    now = 4.0 * np.clip(np.sin(time) - 0.5, 0.0, None) ** 2 * (time > 8.0)
+    v_x, turn = 20.0 + 2.0 * np.sin(0.3 * time), 0.1 * np.sin(0.4 * time) + 0.3 * now * (what == "slides")
+    v_y, rate = 6.0 * now * (what == "slides"), np.gradient(v_x, time)
+    force = (CAR.mass + 4.0 * CAR.wheel_inertia / CAR.wheel_radius**2) * rate + CAR.drag * v_x**2
+    force += CAR.mass * G * (CAR.rolling_resistance + np.sin(true))
+    beside = np.array([-0.75, 0.75, -0.75, 0.75])[:, None] * turn
+    slip = {"spins": 12.0, "locks": -15.0}.get(what, 0.0) * now
+    # A wheel that spins or locks has a torque that does not push.
+    torque = force * CAR.wheel_radius + 900.0 * now * np.sign(slip)
+    heard = np.arange(rows) % 20 == 0
+    late = lambda value: np.where(heard, np.interp(time - 0.14, time, value), np.nan)
+    channels = {
+        "a_x": (rate - v_y * turn + G * np.sin(true)) * (1.0 + G * CAR.pitch_gradient) + 0.05 + noise(0.05),
+        "a_y": np.gradient(v_y, time) + v_x * turn + noise(0.05), "yaw_rate": turn + noise(0.002),
+        **{name: v_x + beside[k] + slip * (k == 0) + noise(0.02) for k, name in enumerate(WHEELS)},
+        "speed": late(np.hypot(v_x, v_y)) + noise(0.05), "climb_rate": late(v_x * np.sin(true)) + noise(0.1),
+        "drive_torque": np.maximum(torque, 0.0), "brake_torque": np.maximum(-torque, 0.0),
+    }  # fmt: skip
+    return log(needs, channels, rows), true
+
+
+@pytest.mark.parametrize(("without", "share", "most"), [((), 0.4, 2.0), (("speed", "climb_rate"), 0.9, 3.0)])
+def test_where_the_car_slides_the_grade_is_not_worse_than_a_level_road_and_the_spread_says_how_good(
+    without, share, most
+):
+    """With satellites, and without; slides of two seconds."""
+    method = grade.METHODS[grade.RECOMMENDED].make(CAR)
+    late = slice(500, None)
+    for what in ("slides", "spins", "locks"):
+        drive, true = slippery(method.needs, what)
+        found = grade.estimate(method, drive.without(*without) if without else drive)
+        error, std = (np.asarray(found["grade"]) - true)[late], np.asarray(found.std.grade)[late]
+        known = np.asarray(found.known.grade)[late]
+        assert np.sqrt(np.mean(error**2)) < share * np.sqrt(np.mean(true[late] ** 2)), what
+        assert known.mean() > 0.5 and np.mean((error / std)[known] ** 2) < most, what
+
+
+@pytest.mark.full
+def test_on_slippery_roads_no_unseen_car_is_worse_than_a_level_road():
+    """Cars and seeds with which nothing was chosen; until a car has spun."""
+    names, seeds = ["low mu", "mu jump", "split mu", "ABS", "wheelspin"], (9100, 9101, 9102)
+    places = [list(scenarios.SCENARIOS).index(name) for name in names]
+    cases, truths = [], []
+    for car in ("compact_car", "suv"):
+        built = jax.tree.map(lambda leaf: leaf[0], fleet.built_cars((car,)))
+        run = lambda scenario, seed, built=built: fleet_drives.drive_once(
+            built, scenarios.scenario_at(scenario), jax.random.key(seed), duration=30.0
+        )
+        which = np.array([(place, seed) for place in places for seed in seeds])
+        made = jax.tree.map(np.asarray, jax.jit(jax.vmap(run))(which[:, 0], which[:, 1]))
+        drives = [{name: value[k] for name, value in made.items()} for k in range(len(which))]
+        cases += [(car, drive) for drive in drives]
+        truths += drives
+    rows = len(truths[0]["true.grade"])
+    said = follow_all(
+        lambda car: grade.METHODS["filter"].make(fleet.told_cars((car,))[0]), cases, 0.01 * np.arange(rows)
+    )
+    true = np.stack([truth["true.grade"] for truth in truths])
+    held = np.cumprod(np.abs([truth["true.sideslip"] for truth in truths]) < 20.0 * DEGREE, axis=1).astype(bool)
+    held[:, :500] = False
+    error, std = said.mean.grade - true, said.std.grade
+    for k, name in enumerate(names):
+        chosen = held & (np.arange(len(cases)) // len(seeds) % len(names) == k)[:, None]
+        assert np.sqrt(np.mean(error[chosen] ** 2)) < 0.35 * DEGREE < np.sqrt(np.mean(true[chosen] ** 2)), name
+        assert np.mean((error / std)[chosen] ** 2) < 2.0, name
 
 
 @pytest.mark.full

@@ -18,9 +18,11 @@ from jaxveh.estimators.friction.along import AlongEvidence, WheelForces
 from jaxveh.estimators.friction.augmented import augmented_filter
 from jaxveh.estimators.friction.axles import AligningTorque, Axles, HybridObserver, LateralCurve
 from jaxveh.estimators.friction.bank import FrictionBank
+from jaxveh.estimators.friction.curve_follower import CurveFollower
 from jaxveh.estimators.friction.laws import planar_car
 from jaxveh.estimators.friction.scalar import Follower
 from jaxveh.estimators.friction.slipping_wheels import SidesApart, WheelObserver
+from jaxveh.estimators.friction.stiffness_doubt import doubting
 from jaxveh.estimators.friction.wheels import Reconstruction, SlipSlope, WheelSlips
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.io import CarSpecification
@@ -57,7 +59,7 @@ def _bank(car: CarSpecification) -> FrictionBank:
 
 
 def _lateral(car: CarSpecification) -> LateralCurve:
-    return LateralCurve(Axles(planar_car(car)), Follower())
+    return LateralCurve(Axles(planar_car(car)), CurveFollower())
 
 
 def _aligning(car: CarSpecification) -> AligningTorque:
@@ -103,7 +105,7 @@ METHODS = {
         "section 3.1.1.1, figure 3, reference [101]",
     ),
     "augmented": MethodOfCar(
-        lambda car: augmented_filter(planar_car(car)),
+        doubting(lambda car: augmented_filter(planar_car(car))),
         "friction as a slow state of a nonlinear single track; known only near the limit",
         "section 3.1.2.1.4, mu-dot = 0",
     ),
@@ -114,22 +116,22 @@ METHODS = {
         "section 3.1.2.1, references [112-116]",
     ),
     "reconstruction": MethodOfCar(
-        lambda car: Reconstruction(_slips(car, "reconstruction")),
+        doubting(lambda car: Reconstruction(_slips(car, "reconstruction"))),
         "used friction over slip and its slope, to the peak; known only where the slope falls",
         "section 3.2, equations 18 and 19, figure 6 (d lambda / dt guarded near 0)",
     ),
     "wheel_observer": MethodOfCar(
-        lambda car: WheelObserver(_slips(car, "wheel_observer")),
+        doubting(lambda car: WheelObserver(_slips(car, "wheel_observer"))),
         "an adaptive observer of the wheels, linear in friction; known only while wheels slip",
         "section 3.1.2.1.3, equation 14, reference [118]",
     ),
     "lugre": MethodOfCar(
-        _lugre,
+        doubting(_lugre),
         "an adaptive observer of the wheels on LuGre's bristles; known only while wheels slip",
         "section 3.1.2.1.3, reference [119]",
     ),
     "sides_apart": MethodOfCar(
-        lambda car: SidesApart(_slips(car, "sides_apart"), Follower()),
+        doubting(lambda car: SidesApart(_slips(car, "sides_apart"), Follower())),
         "left and right wheels each for themselves; known only while wheels slip",
         "section 3.2, equation 18 by wheel",
     ),

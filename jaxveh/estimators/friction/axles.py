@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxveh._core.parameter import positive
 from jaxveh.estimators.contract import Need
 from jaxveh.estimators.friction import brush_curve
+from jaxveh.estimators.friction.curve_follower import CurveBelief, CurveFollower
 from jaxveh.estimators.friction.laws import PlanarCar
 from jaxveh.estimators.friction.motion import LATERAL, Told, next_told, start_told
 from jaxveh.estimators.friction.scalar import Follower, LogFriction
@@ -71,20 +72,23 @@ class Axles(eqx.Module):
         """That of front and rear slip angle, rad."""
         return now.steer - self.car.wheelbase * now.yaw_rate / now.told.v_x
 
-    def residual(self, forces, difference, log_friction):
+    def residual(self, forces, difference, log_friction, stiffer):
         """Front force (N) that is measured less the one that the brush makes of the front slip, the rear's being told by its
-        force."""
+        force. `stiffer`: logarithms of front and rear stiffness over the file's."""
         mu, car = jnp.exp(log_friction), self.car
-        rear = brush_curve.slip_of(forces[1], car.rear.stiffness, mu * car.rear.peak)
-        return forces[0] - brush_curve.force(difference + rear, car.front.stiffness, mu * car.front.peak)
+        front, rear = (
+            axle.stiffness * jnp.exp(more) for axle, more in zip((car.front, car.rear), stiffer, strict=True)
+        )
+        behind = brush_curve.slip_of(forces[1], rear, mu * car.rear.peak)
+        return forces[0] - brush_curve.force(difference + behind, front, mu * car.front.peak)
 
-    def bend(self, forces, difference, log_friction):
+    def bend(self, forces, difference, log_friction, stiffer):
         """The share (-) of a linear front force that is missing, in what is measured or in what this friction foretells,
         whichever is more; 0 at little slip, where noise would be all of it."""
         mu, car = jnp.exp(log_friction), self.car
-        rear = brush_curve.slip_of(forces[1], car.rear.stiffness, mu * car.rear.peak)
-        linear = car.front.stiffness * jnp.abs(difference + rear)
-        foretold = forces[0] - self.residual(forces, difference, log_friction)
+        rear = brush_curve.slip_of(forces[1], car.rear.stiffness * jnp.exp(stiffer[1]), mu * car.rear.peak)
+        linear = car.front.stiffness * jnp.exp(stiffer[0]) * jnp.abs(difference + rear)
+        foretold = forces[0] - self.residual(forces, difference, log_friction, stiffer)
         least = jnp.minimum(jnp.abs(forces[0]), jnp.abs(foretold))
         enough = linear > LEAST_FORCE * car.front.peak
         return jnp.where(enough, 1.0 - least / jnp.where(enough, linear, 1.0), 0.0)
@@ -96,13 +100,16 @@ class LateralCurve(AbstractMethod):
     The rear force tells its slip angle (the brush's inverse), steer and yaw rate the front's from it, and the front force what
     friction there is. In the linear range nothing is told: the force grows by `F - alpha dF/dalpha` with ln mu.
 
-    `force_noise` (-): error of the front force as a share of its stiffness's part, `noise` as a share of the static load.
+    Both axles' stiffness is believed to the follower's spread, and learnt.
+
+    `force_noise` (-): error of the front force as a share of itself, `noise` as a share of the static load; rows of which more
+    than `knee` (-) of the linear force is missing tell friction.
     """
 
     axles: Axles
-    follower: Follower
-    force_noise: jax.Array = positive("-", default=0.07)
-    noise: jax.Array = positive("-", default=0.02)
+    follower: CurveFollower
+    force_noise: jax.Array = positive("-", default=0.04)
+    noise: jax.Array = positive("-", default=0.0125)
     knee: jax.Array = positive("-", default=0.2)
 
     @property
@@ -119,13 +126,13 @@ class LateralCurve(AbstractMethod):
         dt = jnp.clip(t - last.told.t, 0.0, 1.0)
         forces, difference = self.axles.forces(now), self.axles.slip_difference(now)
         noise = self.noise * self.axles.car.static_loads()[0] + self.force_noise * jnp.abs(forces[0])
-        residual = lambda x: self.axles.residual(forces, difference, x)
-        tells = self.axles.bend(forces, difference, state.mean) > self.knee
-        here = now.told.moves & ~jnp.isnan(values["a_y"]) & tells
-        state = self.follower.next(state, dt, residual, noise, here)
+        residual = lambda x: self.axles.residual(forces, difference, x[0], (x[1], x[2]))
+        tells = self.axles.bend(forces, difference, state.log_friction, state.stiffer) > self.knee
+        here = now.told.moves & ~jnp.isnan(values["a_y"])
+        state = self.follower.next(state, dt, residual, noise, here, tells)
         return (now, state), self._answer(now, state)
 
-    def _answer(self, now: AxlesTold, state: LogFriction):
+    def _answer(self, now: AxlesTold, state: CurveBelief):
         mean, std, known = self.follower.says(state, now.told.moves)
         return answer({"friction": mean}, {"friction": std}, known)
 
@@ -175,7 +182,9 @@ class AligningTorque(AbstractMethod):
         state = self.follower.next(state, dt, residual, noise, here)
         return (now, torque, state), self._answer(now, state)
 
-    _answer = LateralCurve._answer
+    def _answer(self, now: AxlesTold, state: LogFriction):
+        mean, std, known = self.follower.says(state, now.told.moves)
+        return answer({"friction": mean}, {"friction": std}, known)
 
 
 class Window(NamedTuple):
@@ -193,13 +202,14 @@ class HybridObserver(AbstractMethod):
 
     The observer (`lateral`) follows row by row. Its gain fails at large front and small rear slip angles and where nothing is
     excited; over a window of samples `every` (s) a few Gauss-Newton steps on the same residuals find ln mu at once. Where the
-    window's information, `sum (dF / d ln mu)^2 / noise^2`, is above `enough`, the answer is the least squares', and the observer
-    goes on from it.
+    window's information, `sum (dF / d ln mu)^2 / noise^2` of samples of which those within `correlation` (s) say the same, is
+    above `enough` and tells more than the observer knows, the answer is the least squares', and the observer goes on from it.
     """
 
     lateral: LateralCurve
     every: jax.Array = positive("s", default=0.1)
-    enough: jax.Array = positive("-", default=100.0)
+    enough: jax.Array = positive("-", default=30.0)
+    correlation: jax.Array = positive("s", default=2.0)
     samples: int = eqx.field(static=True, default=20)
 
     @property
@@ -217,33 +227,43 @@ class HybridObserver(AbstractMethod):
         axles = self.lateral.axles
         front, rear = axles.forces(now)
         difference = axles.slip_difference(now)
-        tells = axles.bend((front, rear), difference, state.mean) > self.lateral.knee
+        tells = axles.bend((front, rear), difference, state.log_friction, state.stiffer) > self.lateral.knee
         sample = (front, rear, difference, jnp.where(now.told.moves & tells, 1.0, 0.0))
         # A little earlier, so that rounding does not choose the rows.
         due = t - window.time >= 0.95 * self.every
         push = lambda old, new: jnp.where(due, jnp.concatenate([old[1:], new[None]]), old)
         front, rear, difference, weight = map(push, window[:4], sample)
         window = Window(front, rear, difference, weight, jnp.where(due, t, window.time))
-        mean, information = self._least_squares(window, state.mean)
-        better = due & now.told.moves & (information > self.enough)
-        variance = jnp.where(better, 1.0 / jnp.maximum(information, 1.0), state.variance)
-        state = state._replace(mean=jnp.where(better, mean, state.mean), variance=variance)
+        mean, information, pull = self._least_squares(window, state)
+        told = _told_by_window(state.covariance, information, pull)
+        better = due & now.told.moves & (information > self.enough) & (told[0, 0] < state.covariance[0, 0])
+        state = state._replace(
+            mean=jnp.where(better, state.mean.at[0].set(mean), state.mean),
+            covariance=jnp.where(better, told, state.covariance),
+        )
         return ((now, state), window), self.lateral._answer(now, state)
 
-    def _least_squares(self, window: Window, start):
-        """ln mu and its information: three steps of Gauss and Newton, damped."""
-        axles, lateral = self.lateral.axles, self.lateral
+    def _least_squares(self, window: Window, state: CurveBelief):
+        """ln mu, its information, and by how much it grows with the logarithms of front and rear stiffness (2,): three steps of
+        Gauss and Newton, damped, with the stiffness that the observer believes."""
+        axles, lateral, x = self.lateral.axles, self.lateral, state.mean
+        forces = (window.front, window.rear)
         noise = lateral.noise * axles.car.static_loads()[0] + lateral.force_noise * jnp.abs(window.front)
-
-        def weighed(x):
-            return window.weight * axles.residual((window.front, window.rear), window.difference, x) / noise
-
-        # Ten samples of a window are about one independent one a `correlation`.
-        share = jnp.minimum(self.every / self.lateral.follower.correlation, 1.0)
-        information, x = jnp.zeros_like(start), start
+        weighed = lambda x: window.weight * axles.residual(forces, window.difference, x[0], (x[1], x[2])) / noise
+        share = jnp.minimum(self.every / self.correlation, 1.0)
+        information, pull = jnp.zeros_like(x[0]), jnp.zeros_like(x[1:])
         for _ in range(3):
-            errors, slopes = jax.jvp(weighed, (x,), (jnp.ones_like(x),))
-            information = share * jnp.sum(slopes**2)
-            x = x - jnp.clip(jnp.sum(slopes * errors) / (jnp.sum(slopes**2) + 1.0), -0.3, 0.3)
-            x = jnp.clip(x, jnp.log(0.05), jnp.log(1.5))
-        return x, information
+            errors, slopes = weighed(x), jax.jacfwd(weighed)(x)
+            own = slopes[:, 0]
+            total = jnp.sum(own**2) + 1.0
+            information, pull = share * jnp.sum(own**2), -(own @ slopes[:, 1:]) / total
+            log_friction = x[0] - jnp.clip(jnp.sum(own * errors) / total, -0.3, 0.3)
+            x = x.at[0].set(jnp.clip(log_friction, jnp.log(0.05), jnp.log(1.5)))
+        return x[0], information, pull
+
+
+def _told_by_window(P, information, pull):
+    """The covariance where ln mu is that of a window alone: its noise's, and what the stiffness does to it."""
+    across = P[1:, 1:] @ pull
+    own = 1.0 / jnp.maximum(information, 1.0) + pull @ across
+    return P.at[0, 0].set(own).at[0, 1:].set(across).at[1:, 0].set(across)

@@ -77,7 +77,7 @@ class FrictionBank(AbstractMethod):
     walk: jax.Array = positive("1/sqrt(s)", default=0.03)
     turn_time: jax.Array = positive("s", default=0.011)
     force_time: jax.Array = positive("s", default=0.03)
-    certainty: jax.Array = parameter("-", scale=0.1, default=0.85)
+    certainty: jax.Array = parameter("-", scale=0.1, default=0.94)
     stiffness_spread: jax.Array = positive("-", default=0.15)
     stiffness_time: jax.Array = positive("s", default=3.0)
     steer_noise: jax.Array = positive("rad", default=0.0007)

@@ -1,0 +1,102 @@
+"""The friction's logarithm beside those of both axles' stiffness, followed by what single residuals say."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh import numerics
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.friction.scalar import HIGHEST_FRICTION, LOWEST_FRICTION
+
+
+class CurveBelief(NamedTuple):
+    """Mean (3,) and covariance (3, 3) of ln mu and of the logarithms of front and rear stiffness over the file's; the squared
+    innovations over their variances, averaged."""
+
+    mean: Any
+    covariance: Any
+    surprise: Any
+
+    @property
+    def log_friction(self):
+        """ln mu."""
+        return self.mean[0]
+
+    @property
+    def stiffer(self):
+        """Logarithms of front and rear stiffness over the file's."""
+        return (self.mean[1], self.mean[2])
+
+
+class CurveFollower(eqx.Module):
+    """A Kalman filter of ln mu, as `scalar.Follower`, that does not believe the file's stiffness: a curve that lies lower than
+    the file's is a softer tyre or a slippery road, and only where it bends the two differ.
+
+    Every row tells the stiffness, those where the curve bends the friction, too. Friction returns to `usual` within `memory`
+    (s) where nothing is told, stiffness to the file's within `stiffness_memory` (s), each with its spread (of the logarithm,
+    `spread` and `stiffness_spread`). `correlation` (s): residuals closer than this say the same; `known` (-): up to this spread
+    of ln mu the friction is known; `surprise`: how large averaged squared innovations over their variance may be before friction
+    is forgotten; `attention` (s): over which they are averaged.
+    """
+
+    usual: jax.Array = positive("-", default=0.8)
+    spread: jax.Array = positive("-", default=0.6)
+    memory: jax.Array = positive("s", default=40.0)
+    stiffness_spread: jax.Array = positive("-", default=0.35)
+    stiffness_memory: jax.Array = positive("s", default=100.0)
+    correlation: jax.Array = positive("s", default=0.2)
+    known: jax.Array = positive("-", default=0.15)
+    surprise: jax.Array = positive("-", default=6.0)
+    attention: jax.Array = positive("s", default=0.3)
+
+    def start(self) -> CurveBelief:
+        """Where nothing is told yet."""
+        mean, covariance = self._nothing()
+        return CurveBelief(mean, covariance, jnp.ones_like(self.usual))
+
+    def _nothing(self):
+        zero = jnp.zeros_like(self.usual)
+        stiff = self.stiffness_spread + zero
+        return jnp.stack([jnp.log(self.usual), zero, zero]), jnp.diag(
+            jnp.square(jnp.stack([self.spread, stiff, stiff]))
+        )
+
+    def next(self, last: CurveBelief, dt, residual, noise, here, tells) -> CurveBelief:
+        """After `dt` (s) and a residual: a function of the mean (3,), zero at the truth but for `noise` (its standard deviation);
+        `here`: whether it was measured, `tells`: whether the friction may be told by it."""
+        mean, P = self._ahead(last, dt)
+        error, slope = jax.value_and_grad(residual)(mean)
+        rough = jnp.square(noise) * jnp.maximum(self.correlation / jnp.maximum(dt, 1e-3), 1.0)
+        expected = slope @ P @ slope
+        squared = jnp.square(error) / (expected + jnp.square(noise))
+        share = 1.0 - jnp.exp(-dt / self.attention)
+        average = last.surprise + jnp.where(here & tells, share, 0.0) * (jnp.minimum(squared, 50.0) - last.surprise)
+        jumped = here & tells & (average > self.surprise)
+        P = jnp.where(jumped, self._forgets_friction(P), P)
+        along = P @ slope
+        gain = jnp.where(here, -along / (slope @ along + rough), 0.0)
+        # A row that does not tell the friction leaves it, and what is known of it.
+        gain = jnp.where(jnp.asarray([True, False, False]) & ~tells, 0.0, gain)
+        mean = mean + jnp.clip(gain * jnp.where(here, error, 0.0), -0.5, 0.5)
+        mean = mean.at[0].set(jnp.clip(mean[0], jnp.log(LOWEST_FRICTION), jnp.log(HIGHEST_FRICTION)))
+        left = jnp.eye(3, dtype=P.dtype) + jnp.outer(gain, slope)
+        P = numerics.symmetric(left @ P @ left.T) + rough * jnp.outer(gain, gain)
+        return CurveBelief(mean, P, jnp.where(jumped, 1.0, average))
+
+    def _ahead(self, last: CurveBelief, dt):
+        usual, nothing = self._nothing()
+        stays = jnp.exp(-dt / jnp.stack([self.memory, self.stiffness_memory, self.stiffness_memory]))
+        mean = usual + stays * (last.mean - usual)
+        return mean, stays[:, None] * last.covariance * stays + (1.0 - jnp.diag(stays**2)) * nothing
+
+    def _forgets_friction(self, P):
+        return P.at[0, :].set(0.0).at[:, 0].set(0.0).at[0, 0].set(jnp.square(self.spread))
+
+    def says(self, state: CurveBelief, moves):
+        """Friction, its standard deviation and whether it is known."""
+        mu, variance = jnp.exp(state.mean[0]), state.covariance[0, 0]
+        return mu, mu * numerics.sqrt(jnp.maximum(variance, 0.0)), moves & (variance < jnp.square(self.known))

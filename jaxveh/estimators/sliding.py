@@ -1,0 +1,86 @@
+"""How far a car may slide across, and its wheels along, of what its control unit hears: what kinematics are then worth."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from jaxveh._core.parameter import positive
+from jaxveh.estimators.body_motion import AT, away_from_zero
+from jaxveh.vehicles import GRAVITY
+
+
+class Doubt(NamedTuple):
+    """What may be wrong: the lateral speed `across` and the wheels' speed `along`, both m/s; in ordinary driving zero, nearly."""
+
+    across: Any
+    along: Any
+
+
+class SlidingMemory(NamedTuple):
+    """Of the lateral speed what was gathered beyond the tyres' (m/s), and the tyres' own in the last row (m/s); how much faster
+    each wheel usually is than their mean (4,), a share; the doubt of the last row."""
+
+    gathered: Any
+    ordinary: Any
+    usual: Any
+    doubt: Doubt
+
+
+class Sliding(eqx.Module):
+    """Two signs that a car slides, neither of which needs the road's friction.
+
+    - `across`: what accelerometer and yaw rate say of the lateral speed's rate, `a_y / (1 + g roll_gradient) - v_x r`, less the
+    rate of the lateral speed that the tyres' linear range makes, gathered over `gathering` (s). A bank and an offset gather, too:
+    up to `usual_across` (m/s) counts for nearly nothing.
+    - `along`: by how much one wheel is faster or slower than all in the mean, beside what the bend makes (`half_track`, m) and
+    what it is within `learning` (s) of ordinary driving, less `usual_along` (a share of the speed). Wheels that all slip alike
+    do not show it.
+
+    Both stay for `staying` (s): wheels that grip again need a moment to be what they say.
+    """
+
+    roll_gradient: jax.Array = positive("rad/(m/s^2)", default=0.006)
+    gathering: jax.Array = positive("s", default=1.0)
+    usual_across: jax.Array = positive("m/s", default=1.0)
+    learning: jax.Array = positive("s", default=10.0)
+    usual_along: jax.Array = positive("-", default=0.015)
+    half_track: jax.Array = positive("m", default=0.75)
+    staying: jax.Array = positive("s", default=0.5)
+
+    def start(self, t: Any) -> SlidingMemory:
+        """Before the first row: a car that does not slide."""
+        zero = jnp.zeros_like(t)
+        return SlidingMemory(zero, zero, jnp.zeros((4,), zero.dtype), Doubt(zero, zero))
+
+    def next(
+        self, last: SlidingMemory, heard: dict[str, Any], v_x: Any, ordinary: Any, wheelbase: Any
+    ) -> SlidingMemory:
+        """After a row. `v_x` (m/s) as believed, `ordinary`: the lateral speed (m/s) of tyres that do not slide."""
+        dt = heard["dt"]
+        rate = heard["a_y"] / (1.0 + GRAVITY * self.roll_gradient) - v_x * heard["yaw_rate"]
+        gathered = last.gathered * jnp.exp(-dt / self.gathering) + dt * rate - (ordinary - last.ordinary)
+        square = jnp.square(gathered)
+        across = jnp.abs(gathered) * square / (square + jnp.square(self.usual_across))
+        along, usual = self._along(last.usual, heard, v_x, wheelbase)
+        stays = jnp.exp(-dt / self.staying)
+        doubt = Doubt(jnp.maximum(across, stays * last.doubt.across), jnp.maximum(along, stays * last.doubt.along))
+        return SlidingMemory(gathered, ordinary, usual, doubt)
+
+    def _along(self, usual, heard, v_x, wheelbase):
+        speeds = jnp.stack([heard[f"wheel_speed_{at}"] for at in AT])
+        there = ~jnp.isnan(speeds)
+        fast, turn = jnp.abs(away_from_zero(v_x)), heard["yaw_rate"]
+        # Outer wheels go round wider circles than inner ones, front wheels than rear ones.
+        wider = 0.5 * jnp.square(wheelbase * turn) / fast
+        beside = self.half_track * turn
+        bend = jnp.stack([wider - beside, wider + beside, -beside, beside])
+        shares = jnp.where(there, speeds - bend, 0.0) / fast
+        mean = jnp.sum(shares) / jnp.maximum(jnp.sum(there.astype(shares.dtype)), 1.0)
+        beyond = jnp.where(there, shares - mean - usual, 0.0)
+        calm = jnp.max(jnp.abs(beyond)) < 2.0 * self.usual_along
+        usual = usual + jnp.where(calm, heard["dt"] / (self.learning + heard["dt"]), 0.0) * beyond
+        return fast * jnp.max(jnp.maximum(jnp.abs(beyond) - self.usual_along, 0.0)), usual
