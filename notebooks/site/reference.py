@@ -216,7 +216,7 @@ def write_reference(heads: Path, folder: Path, pages: dict[str, str]) -> None:
         head = heads / name
         opening = head.read_text() if head.exists() else _opening(module)
         body = "\n\n".join(_entry(entry, uses, f"{PLACE}/{name}") for entry in entries)
-        (folder / name).write_text(f"{opening.rstrip()}\n\n{_overview(entries)}\n\n{body}\n")
+        (folder / name).write_text(f"{opening.rstrip()}\n\n{_overview(module, entries)}\n\n{body}\n")
 
 
 def page_of(module: str) -> str:
@@ -228,8 +228,16 @@ def _opening(module: str) -> str:
     return f"# {module}\n\n{inspect.getdoc(importlib.import_module(module))}"
 
 
-def _overview(entries: list[Entry]) -> str:
+def _overview(module: str, entries: list[Entry]) -> str:
+    """A table of what the module lists; what another page has is linked there."""
     rows = [f"| [`{entry.name}`](#{entry.path}) | {_first_sentence(entry)} |" for entry in entries]
+    there = {id(entry.value): entry for entry in _every_entry() if callable(entry.value)}
+    own = {entry.name for entry in entries}
+    for name in importlib.import_module(module).__all__:
+        value = getattr(importlib.import_module(module), name)
+        if name not in own and (entry := there.get(id(value))):
+            anchor = f'<a id="{module}.{name}"></a>'
+            rows.append(f"| {anchor}[`{name}`]({page_of(entry.module)}#{entry.path}) | {_first_sentence(entry)} |")
     return "\n".join(["## What it lists", "", "| name | |", "| --- | --- |", *rows])
 
 
