@@ -10,6 +10,7 @@ import ast
 import dataclasses
 import enum
 import functools
+import html
 import importlib
 import inspect
 import itertools
@@ -165,7 +166,8 @@ def _explained(text: str, name: str) -> str:
 def _sentence(text: str, pattern: str) -> str:
     """The first sentence of a text that has the pattern, without its full stop; where it is long, that it is there."""
     sentences = re.split(r"(?<=[a-z)`\]0-9])[.;](?= [A-Z`*a-z])| - (?=`)", text)
-    found = next((one.strip(" .") for one in sentences if re.search(pattern, one)), "")
+    told = (one.strip(" .") for one in sentences if "**Raises" not in one)
+    found = next((one for one in told if re.search(pattern, one)), "")
     return found if len(found) < 160 else "see the text above"
 
 
@@ -309,7 +311,12 @@ def _heading(entry: Entry) -> str:
         return f"{anchor}\n\n{_shown_value(entry.value)}\n\n{text_of_value(entry)}"
     if not (entry.value.__module__ or "").startswith("jaxveh"):
         return f"{anchor}\n\n`{entry.value.__module__}.{entry.name}`, as it is."
-    return f"::: {entry.path}"
+    home = f"{entry.value.__module__}.{entry.name}"
+    if not entry.value.__module__.endswith(f".{entry.name}") or entry.module == entry.value.__module__:
+        return f"::: {entry.path}"
+    # By its path in the room mkdocstrings finds the module of the same name.
+    options = f'    options:\n      heading: "{entry.path}"\n      toc_label: "{entry.name}"'
+    return f'<a id="{entry.path}"></a>\n\n::: {home}\n{options}'
 
 
 def _shown_value(value: Any) -> str:
@@ -348,7 +355,8 @@ def text_of_value(entry: Entry) -> str:
 
 
 def _cell(text: str) -> str:
-    return f"`{text.replace('|', chr(92) + '|')}`" if text else ""
+    # In a table a bar would begin the next cell, in code too.
+    return f"<code>{html.escape(text).replace('|', '&#124;')}</code>" if text else ""
 
 
 def _from_reference(page: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from programs import CAR, columns, error_line, run, write_car, write_log
 
-from jaxveh import estimators, io
+from jaxveh import __version__, estimators, io
 
 
 def read_json(path):
@@ -425,7 +425,7 @@ def broken(kept, change):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda text: text.replace('version = "0.1.0"', 'version = "7.2.0"'), "of another version than 0.1.0"),
+        (lambda text: re.sub('(?m)^version = ".*"', 'version = "77.2.0"', text), f"of another version than {__version__}"),
         (lambda text: text[: len(text) // 2], "broken.toml"),
         (lambda text: text[: text.index("[covariance]")], "no covariance"),
         (lambda text: text.replace('"sideslip"', '"mass_and_grade"', 1), "broken.toml"),
