@@ -425,7 +425,10 @@ def broken(kept, change):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda text: re.sub('(?m)^version = ".*"', 'version = "77.2.0"', text), f"of another version than {__version__}"),
+        (
+            lambda text: re.sub('(?m)^version = ".*"', 'version = "77.2.0"', text),
+            f"of another version than {__version__}",
+        ),
         (lambda text: text[: len(text) // 2], "broken.toml"),
         (lambda text: text[: text.index("[covariance]")], "no covariance"),
         (lambda text: text.replace('"sideslip"', '"mass_and_grade"', 1), "broken.toml"),

@@ -22,7 +22,7 @@ from jaxveh.estimators.friction.curve_follower import CurveFollower
 from jaxveh.estimators.friction.laws import planar_car
 from jaxveh.estimators.friction.scalar import Follower
 from jaxveh.estimators.friction.slipping_wheels import SidesApart, WheelObserver
-from jaxveh.estimators.friction.stiffness_doubt import doubting
+from jaxveh.estimators.friction.stiffness_doubt import with_doubt
 from jaxveh.estimators.friction.wheels import Reconstruction, SlipSlope, WheelSlips
 from jaxveh.estimators.method import Answers, LiveMethod, MethodOfCar, follow, method_of
 from jaxveh.io import CarSpecification
@@ -105,7 +105,7 @@ METHODS = {
         "section 3.1.1.1, figure 3, reference [101]",
     ),
     "augmented": MethodOfCar(
-        doubting(lambda car: augmented_filter(planar_car(car))),
+        with_doubt(lambda car: augmented_filter(planar_car(car))),
         "friction as a slow state of a nonlinear single track; known only near the limit",
         "section 3.1.2.1.4, mu-dot = 0",
     ),
@@ -116,22 +116,22 @@ METHODS = {
         "section 3.1.2.1, references [112-116]",
     ),
     "reconstruction": MethodOfCar(
-        doubting(lambda car: Reconstruction(_slips(car, "reconstruction"))),
+        with_doubt(lambda car: Reconstruction(_slips(car, "reconstruction"))),
         "used friction over slip and its slope, to the peak; known only where the slope falls",
         "section 3.2, equations 18 and 19, figure 6 (d lambda / dt guarded near 0)",
     ),
     "wheel_observer": MethodOfCar(
-        doubting(lambda car: WheelObserver(_slips(car, "wheel_observer"))),
+        with_doubt(lambda car: WheelObserver(_slips(car, "wheel_observer"))),
         "an adaptive observer of the wheels, linear in friction; known only while wheels slip",
         "section 3.1.2.1.3, equation 14, reference [118]",
     ),
     "lugre": MethodOfCar(
-        doubting(_lugre),
+        with_doubt(_lugre),
         "an adaptive observer of the wheels on LuGre's bristles; known only while wheels slip",
         "section 3.1.2.1.3, reference [119]",
     ),
     "sides_apart": MethodOfCar(
-        doubting(lambda car: SidesApart(_slips(car, "sides_apart"), Follower())),
+        with_doubt(lambda car: SidesApart(_slips(car, "sides_apart"), Follower())),
         "left and right wheels each for themselves; known only while wheels slip",
         "section 3.2, equation 18 by wheel",
     ),

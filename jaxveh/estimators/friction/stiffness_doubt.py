@@ -83,6 +83,6 @@ def _on_tyres(method: AbstractMethod, factors) -> AbstractMethod:
     return jax.tree.map(stiffer, method, is_leaf=lambda node: isinstance(node, PlanarCar | LuGre))
 
 
-def doubting(make: Callable[..., AbstractMethod]) -> Callable[..., StiffnessDoubt]:
+def with_doubt(make: Callable[..., AbstractMethod]) -> Callable[..., StiffnessDoubt]:
     """What makes the method of a car's file, wary of the file's stiffness."""
     return lambda car: StiffnessDoubt(make(car))
