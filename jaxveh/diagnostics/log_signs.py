@@ -9,6 +9,9 @@ from jaxveh.diagnostics.log_findings import GRAVITY, LogFinding, LogView, fit
 AGREE = 0.5
 """Correlation above which two channels are said to tell the same story."""
 
+SCALED = 0.8
+"""Correlation above which a slope other than 1 is put down to a unit: below it a channel may be damaged, or late."""
+
 # What a slope other than 1 means, for a_y over v_x yaw_rate and for a_x over dv_x/dt.
 _LATERAL = {
     1 / 3.6: ("v_x", "km/h"),
@@ -173,6 +176,9 @@ def _slope(name: str, other: str, line: tuple[float, float, float], table: dict,
             return LogFinding("warning", name, f"{story}: a bias of {intercept:.2g} m/s^2, or a banked road.", values)
         return LogFinding("ok", name, f"{story} (correlation {correlation:.2f}).", values)
     factors = {factor: guess for factor, guess in table.items() if abs(np.log(slope / factor)) < np.log(1.25)}
+    if correlation < SCALED:
+        message = f"{story}, which should be 1, and follows it loosely (correlation {correlation:.2f}): a damaged or late channel?"
+        return LogFinding("warning", name, message, values)
     if factors:
         nearest = min(factors, key=lambda factor: abs(np.log(slope / factor)))
         channel, unit = factors[nearest]

@@ -56,7 +56,10 @@ def update(belief: Belief, found: Innovation, trust: Any = 1.0) -> Belief:
     along = belief.covariance @ found.slope
     gain = trust * along / found.variance
     mean = belief.mean + gain * found.residual
-    return Belief(mean, numerics.symmetric(belief.covariance - jnp.outer(gain, along)))
+    # Joseph's form: a sum of two covariances, of which float32 cannot make a negative one.
+    left = jnp.eye(mean.shape[0], dtype=mean.dtype) - jnp.outer(gain, found.slope)
+    noise = (found.variance - trust * (found.slope @ along)) * jnp.outer(gain, along / found.variance)
+    return Belief(mean, numerics.symmetric(left @ belief.covariance @ left.T + noise))
 
 
 def innovations(belief: Belief, expect: Callable[[Any], Any], values: Any, variances: Any) -> Innovation:

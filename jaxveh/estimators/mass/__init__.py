@@ -24,7 +24,9 @@ SHOWN = {"mass": "kg"}
 
 METHODS = {
     "gated": MethodOfCar(
-        lambda car: gated_ratios(car, NAME), "least squares of force over acceleration above 0.6 m/s^2", "paper 004 [8]"
+        lambda car: gated_ratios(car, NAME),
+        "least squares of force over acceleration, known only after some seconds above 0.6 m/s^2",
+        "paper 004 [8]",
     ),
     "high_pass": MethodOfCar(
         lambda car: high_pass_of(car, NAME),
@@ -39,7 +41,7 @@ METHODS = {
     ),
     "kinematic_grade": MethodOfCar(
         lambda car: kinematic_of(car, NAME),
-        "the grade of accelerometer and speed first, then least squares",
+        "the grade of accelerometer and speed first, then least squares; known only after some seconds of acceleration",
         "paper 004 [12]",
     ),
     "joint": MethodOfCar(
