@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from rich.text import Text
 
-from jaxveh import InputError, Recording, diagnostics, io
+from jaxveh import InputError, Recording, diagnostics, estimators, io
 from jaxveh.cli import options
 from jaxveh.cli.blanking import SEEN, fill_gaps
 from jaxveh.cli.console import results
@@ -16,6 +16,9 @@ from jaxveh.io import CarSpecification
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "cyan", "ok": "green"}
 
+
+BRIDGED = 0.1
+"""s."""
 
 UNLIKE, SURE = 1.25, 0.8
 """Steers that are so many times as large against what one car needs, each with this correlation, are not of one car. Quarters of
@@ -46,7 +49,7 @@ def read_drives(
     """
     drives = []
     for log in logs:
-        recording = fill_gaps(_read(log, car, channels, span), fill)
+        recording = fill_gaps(_on_one_clock(log, _read(log, car, channels, span)), fill)
         findings = _look_at(log, recording, car, {*SEEN, "time", *(name for name in used if name)}, anyway)
         drives.append(Drive(log, recording, findings))
     if not anyway:
@@ -77,6 +80,18 @@ def _read(log: Path, car: CarSpecification, channels: Path | None, span: str | N
         results().print(f"{log.name}: {words}", markup=False, soft_wrap=True)
     wanted = options.span_of(span, float(recording.time[0]), float(recording.time[-1]), "--span")
     return recording if wanted is None else recording.between(*wanted)
+
+
+def _on_one_clock(log: Path, recording: Recording) -> Recording:
+    """The log at the rows of its yaw rate, where that and a_y never share one; said, not silent."""
+    if not estimators.sideslip.speak_apart(recording):
+        return recording
+    words = (
+        f"note: {log.name}: a_y and yaw_rate have clocks of their own: all channels are taken at the rows of yaw_rate, along "
+        f"lines over at most {BRIDGED:g} s."
+    )
+    results().print(words, markup=False, soft_wrap=True)
+    return io.resample(recording, "yaw_rate", max_gap=BRIDGED)
 
 
 def _check_one_car(drives: Sequence[Drive]) -> None:

@@ -177,7 +177,7 @@ def _slope(name: str, other: str, line: tuple[float, float, float], table: dict,
         return LogFinding("ok", name, f"{story} (correlation {correlation:.2f}).", values)
     factors = {factor: guess for factor, guess in table.items() if abs(np.log(slope / factor)) < np.log(1.25)}
     if correlation < SCALED:
-        message = f"{story}, which should be 1, and follows it loosely (correlation {correlation:.2f}): a damaged or late channel?"
+        message = f"{story}, not 1, and follows it loosely (correlation {correlation:.2f}): a damaged or late channel?"
         return LogFinding("warning", name, message, values)
     if factors:
         nearest = min(factors, key=lambda factor: abs(np.log(slope / factor)))

@@ -31,7 +31,14 @@ from jaxveh.estimators.rear_axle import RearAxle, rear_axle_model
 from jaxveh.estimators.rear_axle_fit import Reference, fit_rear_axle
 from jaxveh.estimators.rear_axle_prior import SPREADS, car_of, chosen_parameters
 from jaxveh.estimators.sideslip_methods import METHODS
-from jaxveh.estimators.sideslip_score import at_centre, is_measured, least_speed_of, reference_sideslip, score
+from jaxveh.estimators.sideslip_score import (
+    at_centre,
+    is_measured,
+    least_speed_of,
+    reference_sideslip,
+    score,
+    speak_apart,
+)
 from jaxveh.estimators.standing import offsets_at_standstill
 from jaxveh.filters import AbstractFilter, Estimate, Extended, SmoothedEstimate, run, smooth
 from jaxveh.io import AxleTyre, CarSpecification, with_road_steer
@@ -49,7 +56,7 @@ RECOMMENDED = "rear_axle"
 __all__ = [
     "METHODS", "NAME", "RECOMMENDED", "REFERENCES", "SHOWN", "at_centre", "calibrate", "car_of", "chosen_parameters",
     "do_nothing", "estimate", "fitted_car", "least_speed_of", "little_told", "live", "model", "needs", "reference_sideslip",
-    "score",
+    "score", "speak_apart",
 ]  # fmt: skip
 
 needs = BLIND
@@ -153,6 +160,15 @@ def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
         raise InputError(
             "sideslip: a_y (m/s^2) is missing from the log: without an accelerometer no tyre can be calibrated. Estimate "
             "with the car's file at its word, or calibrate on another log of the car."
+        )
+    _check_one_clock(recording)
+
+
+def _check_one_clock(recording: Recording) -> None:
+    if is_concrete(recording) and speak_apart(recording):
+        raise InputError(
+            "sideslip: yaw_rate and a_y are hardly ever measured in the same row: their devices have clocks of their own. Take "
+            'all channels at the rows of one: io.resample(recording, "yaw_rate", max_gap=0.1).'
         )
 
 
@@ -280,6 +296,7 @@ def estimate(
         _check_alone(filter, key)
         return follow(NAME, method_of(NAME, METHODS, source, method or RECOMMENDED), recording)
     check_needs(NAME, needs, recording)
+    _check_one_clock(recording)
     one = model_of(NAME, source, model)
     if smoothed:
         recording = on_time(recording, one.system)

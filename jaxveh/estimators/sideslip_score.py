@@ -15,10 +15,21 @@ from jaxveh.filters import Estimate, SmoothedEstimate
 from jaxveh.io import CarSpecification, with_road_steer
 from jaxveh.vehicles import from_specification
 
+TOGETHER = 0.1
+"""Share of the rarer channel's rows below which two channels do not share a clock."""
+
 
 def is_measured(recording: Recording, name: str) -> bool:
     """Whether the channel is there, and not NaN in every row."""
     return name in recording and bool(np.isfinite(np.asarray(recording[name])).any())
+
+
+def speak_apart(recording: Recording) -> bool:
+    """Whether yaw rate and lateral acceleration are measured, and hardly ever in the same row: two clocks."""
+    if not (is_measured(recording, "yaw_rate") and is_measured(recording, "a_y")):
+        return False
+    there = [np.isfinite(np.asarray(recording[name])) for name in ("yaw_rate", "a_y")]
+    return bool((there[0] & there[1]).sum() < TOGETHER * min(one.sum() for one in there))
 
 
 def at_centre(car: CarSpecification | RearAxle, recording: Recording) -> Recording:

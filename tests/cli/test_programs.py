@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from programs import CAR, columns, error_line, run, write_car, write_log
 
-from jaxveh import __version__, estimators, io
+from jaxveh import InputError, Recording, __version__, estimators, io
 
 
 def read_json(path):
@@ -114,6 +114,32 @@ def test_the_truth_of_a_simulation_is_scored_as_a_measured_one_is(tmp_path, driv
     both = {**drive, "true.v_y": drive["v_y"]}
     result, _ = estimate(tmp_path, both, "--calibrate", "0:2", "--calibrate-on", "v_y", "--truth", "true.v_y")
     assert result.exit_code == 2 and "calibrated on v_y, too" in error_line(result)
+
+
+def test_devices_with_clocks_of_their_own(tmp_path, drive):
+    """a_y 3 ms beside the others, so that no row has both: the library says so, the program takes one clock and says that."""
+    drive = {name: values for name, values in drive.items() if name != "v_y"}
+    count = len(drive["time"])
+    late = {name: np.where(name == "a_y", np.nan, values) for name, values in drive.items() if name != "time"}
+    other = {name: np.full(count, np.nan) for name in late} | {"a_y": drive["a_y"]}
+    order = np.argsort(time := np.append(drive["time"], drive["time"] + 0.003))
+    apart = {"time": time[order]} | {name: np.append(late[name], other[name])[order] for name in late}
+    (log := tmp_path / "apart").mkdir()
+    result, _ = estimate(log, apart, "--as-told", "--fill", "0.05")
+    assert result.exit_code == 0, result.output
+    assert "have clocks of their own: all channels are taken at the rows of yaw_rate" in result.output
+    (together := tmp_path / "together").mkdir()
+    assert estimate(together, drive, "--as-told")[0].exit_code == 0
+    found, there = (io.read_recording(folder / "estimate.csv") for folder in (log, together))
+    spread = lambda one: float(np.median(np.asarray(one["sideslip_std"])))
+    assert spread(found) < 2.0 * spread(there)
+    car = io.read_car(write_car(tmp_path))
+    log = Recording(apart["time"], {name: values for name, values in apart.items() if name != "time"})
+    for name in ("v_x", "a_x", "steer"):
+        log = log.fill(name)
+    for call in (estimators.sideslip.estimate, estimators.sideslip.calibrate):
+        with pytest.raises(InputError, match=r'clocks of their own.*io.resample\(recording, "yaw_rate"'):
+            call(car, log)
 
 
 def test_estimate_never_sees_the_truth(tmp_path, drive):
