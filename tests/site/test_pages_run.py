@@ -53,7 +53,9 @@ def test_a_page_takes_only_what_is_public(place):
                 assert not node.attr.startswith("_") or allowed
 
 
-@pytest.mark.parametrize("place", [place for place in PYTHON if place.startswith(("start", "guides", "explanations"))])
+@pytest.mark.parametrize(
+    "place", [place for place in PYTHON if place.startswith(("start", "guides", "explanations", "reference"))]
+)
 def test_a_page_asserts_something(place):
     assert any(isinstance(node, ast.Assert) for code in python_of(place) for node in ast.walk(ast.parse(code)))
 
