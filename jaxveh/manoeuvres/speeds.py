@@ -86,7 +86,7 @@ class WaveringSpeed(AbstractSpeed):
     phases: jax.Array = parameter("rad", scale=1.0)
 
     def v_x(self, t: Any) -> jax.Array:
-        wanted = self.mean + self.std * sum_of_harmonics(t, self.frequencies, self.phases)
+        wanted = self.mean + self.std * sum_of_harmonics(as_time(t, self.mean), self.frequencies, self.phases)
         return smooth_ramp(wanted, 0.5)
 
 

@@ -6,7 +6,7 @@ from jaxveh.simulation.events import Event, standstill, wheel_lift
 from jaxveh.simulation.fixed_steps import fixed_steps
 from jaxveh.simulation.simulate import driven_car, simulate
 from jaxveh.simulation.solve import Grid, Solution, even_grid, grid_through, solve
-from jaxveh.simulation.stiffness import fastest_pole
+from jaxveh.simulation.stiffness import SolverChoice, fastest_pole
 
 __all__ = [
     "Driven",
@@ -14,6 +14,7 @@ __all__ = [
     "Event",
     "Grid",
     "Solution",
+    "SolverChoice",
     "driven_car",
     "even_grid",
     "fastest_pole",

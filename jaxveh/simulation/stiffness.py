@@ -56,7 +56,8 @@ def limits(solver: Any) -> tuple[float, float]:
 
 
 class SolverChoice(NamedTuple):
-    """A solver with equal steps of at most `max_step` (s), or with a controller that chooses its own."""
+    """How `solve` integrates: the `solver` (one of diffrax) with equal steps of at most `max_step` (s), or with a `controller` of
+    diffrax that chooses its own (None: equal steps)."""
 
     solver: diffrax.AbstractSolver
     controller: diffrax.AbstractStepSizeController | None

@@ -140,11 +140,12 @@ class WheelWeights(AxleWeights, Protocol):
 def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     """Wheel loads, N, of a rigid car whose body neither rolls nor pitches visibly.
 
-    In the road's plane, with a_x, a_y what accelerometers at the centre of gravity say (slopes are in them), h its height
-    and q the front axle's share of the lateral transfer:
+    In the road's plane, with a_x, a_y what accelerometers at the centre of gravity say (slopes are in them), g_z gravity along
+    z (upwards, so -9.81 on a level road), h the height of the centre of gravity and q the front axle's share of the lateral
+    transfer:
 
-        front axle:  m (g_z b - a_x h) / (a + b),   moved to its right wheel:  q m a_y h / track_front
-        rear axle:   m (g_z a + a_x h) / (a + b),   moved to its right wheel:  (1 - q) m a_y h / track_rear
+        front axle:  m (-g_z b - a_x h) / (a + b),  moved to its right wheel:  q m a_y h / track_front
+        rear axle:   m (-g_z a + a_x h) / (a + b),  moved to its right wheel:  (1 - q) m a_y h / track_rear
 
     No wheel is pulled down: one that lifts leaves the axle's load to the other, and an axle that lifts to the other axle. What
     an axle on one wheel cannot take of the moment the other axle takes.
@@ -171,7 +172,7 @@ def limit_transfer(moved: Any, half: Any) -> Any:
 
 
 def axle_loads(car: AxleWeights, a_x: Any, g_z: Any) -> tuple[Any, Any]:
-    """Loads of the front and the rear axle, N: `m (g_z b - a_x h) / (a + b)` and the rest of the weight, none below zero."""
+    """Loads of the front and the rear axle, N: `m (-g_z b - a_x h) / (a + b)` and the rest of the weight, none below zero."""
     a, b = car.front_axle_to_cg, car.rear_axle_to_cg
     weight = -car.mass * g_z
     moved = car.mass * car.cg_height / (a + b) * a_x

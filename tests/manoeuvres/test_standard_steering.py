@@ -157,3 +157,10 @@ def test_every_name_is_what_it_says(name):
     assert isinstance(made, manoeuvres.AbstractManoeuvre) != entry.closed_loop
     if not entry.closed_loop:
         assert hasattr(made.inputs(0.0), "brake_torque") == entry.pedals
+
+
+def test_a_speed_takes_a_plain_number_as_its_time():
+    for speed in (
+        manoeuvres.SteadySpeed(20.0), manoeuvres.ChangingSpeed(15.0, 25.0), manoeuvres.wavering_speed(20.0, 1.0, KEY)
+    ):  # fmt: skip
+        assert speed.v_x(3.0) == speed.at(3.0)[0]

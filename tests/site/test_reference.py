@@ -1,5 +1,6 @@
 """The reference has every public name, with words for it and for each of its arguments; every module is in the site's nav."""
 
+import functools
 import re
 
 import pytest
@@ -7,6 +8,7 @@ import yaml
 
 from notebooks.site import reference
 from notebooks.site.executed import ROOT
+from notebooks.site.pages import sources
 
 ENTRIES = reference.public_entries()
 NAV = (ROOT / "mkdocs.yml").read_text().split("\nnav:\n")[1]
@@ -40,7 +42,7 @@ def test_what_a_module_lists_has_an_entry_somewhere(module):
 
 
 def test_the_nav_has_each_module_and_each_page():
-    from notebooks.site.pages import SOURCES, sources
+    from notebooks.site.pages import SOURCES
 
     named = set(re.findall(r"[\w./-]+\.md", NAV))
     made = {f"{reference.PLACE}/{reference.page_of(module)}" for module in ENTRIES}
@@ -68,3 +70,33 @@ def test_an_example_is_the_shortest_statement_that_uses_a_name():
         ("a.md", "filters.run"),
         ("a.md", "x = filters.run(filters.Kalman(), model, drive)"),
     ]
+
+
+NO_EXAMPLE: dict[str, str] = {}
+"""Names that no page can show, each with the reason."""
+
+
+@functools.cache
+def uses():
+    """What every page's code uses."""
+    return reference.usages({place: path.read_text() for place, path in sources().items()})
+
+
+@pytest.mark.parametrize("module", ENTRIES)
+def test_every_public_name_has_an_example(module):
+    lacking = [entry.short for entry in ENTRIES[module] if not reference.has_example(entry, uses())]
+    assert [name for name in lacking if name not in NO_EXAMPLE] == []
+
+
+def test_what_is_excused_is_public_and_lacks_an_example():
+    everything = [entry for entries in ENTRIES.values() for entry in entries]
+    assert set(NO_EXAMPLE) <= {entry.short for entry in everything if not reference.has_example(entry, uses())}
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "notebooks" / reference.PLACE).glob("*.md")), ids=lambda path: path.stem
+)
+def test_a_head_is_of_a_module_and_begins_with_its_name(path):
+    modules = {reference.page_of(module): module for module in ENTRIES}
+    assert path.name in modules
+    assert path.read_text().startswith(f"# {modules[path.name]}\n")
