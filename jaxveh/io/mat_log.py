@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jaxveh._core.errors import InputError
-from jaxveh.io.channel_map import ChannelMap
+from jaxveh.io.channel_map import Channel, ChannelMap
 from jaxveh.io.log import TIME_NAMES, apply
 from jaxveh.io.mat_elements import Unread
 from jaxveh.io.mat_file import read_mat
@@ -26,17 +26,30 @@ WIDEST = 64
 _SECONDS = {"seconds": "s", "milliseconds": "ms", "microseconds": "us", "minutes": "min", "hours": "h"}
 
 
+class Clocks(NamedTuple):
+    """Where the time is that the channel map names ("" for none), and what makes seconds of a struct's own."""
+
+    named: str
+    in_seconds: Callable[[np.ndarray, Mapping[str, Any]], np.ndarray]
+
+
 def open_mat(path: Path, channels: ChannelMap | None) -> NestedLog:
     """A `.mat` file of version 5 or 7.3. A struct with a time vector (`time`, `Time`, `t`, ...) has the columns beside it, and
     those of structs below it of as many rows; `Data` or `values` have the name of their struct, a matrix is taken apart as
-    `name[0]`, `name[1]`, .... The channel map's `time` names the vector for all of as many rows.
+    `name[0]`, `name[1]`, .... The channel map's `time` names the vector for all of as many rows that have none of their own, and
+    its unit is that of all clocks.
 
     **Raises** `InputError` for a file in which no vector goes with a time vector, saying what was found.
     """
     content = read_mat(path)
     found, seen = {}, {}
-    time = None if channels is None or channels.time is None else _named_time(path, content, channels)
-    for leaf in _leaves(content, "", "", time, time is not None, seen):
+    time, clocks = None, Clocks("", _in_seconds)
+    if channels is not None and (named := channels.time) is not None:
+        time, place = _named_time(path, content, named)
+        clocks = Clocks(
+            place, lambda own, node: _stamps(path, named, own) if is_unit(named.unit) else _in_seconds(own, node)
+        )
+    for leaf in _leaves(content, "", "", time, clocks, seen):
         found.setdefault(leaf.path, leaf)
     leaves = [leaf for leaf in found.values() if leaf.path not in {one for one, what in seen.items() if what == "time"}]
     objects = {name: what for name, what in seen.items() if what not in ("time", "")}
@@ -50,15 +63,15 @@ def open_mat(path: Path, channels: ChannelMap | None) -> NestedLog:
 
 
 def _leaves(
-    node: Any, path: str, short: str, time: np.ndarray | None, fixed: bool, seen: dict[str, str], unit: str = ""
+    node: Any, path: str, short: str, time: np.ndarray | None, clocks: Clocks, seen: dict[str, str], unit: str = ""
 ) -> Iterator[Leaf]:
     """The columns in a part of the file, which lies at `path` beneath a time vector; `seen` gets what is no column."""
     if isinstance(node, Mapping):
-        yield from _of_struct(node, path, short, time, fixed, seen)
+        yield from _of_struct(node, path, short, time, clocks, seen)
     elif isinstance(node, list) and any(isinstance(one, Mapping) for one in node):
         for k, one in enumerate(node):
             name = _text(one, NAME_NAMES) or f"{short}[{k}]" if isinstance(one, Mapping) else f"{short}[{k}]"
-            yield from _leaves(one, f"{path}[{k}]", name, time, fixed, seen)
+            yield from _leaves(one, f"{path}[{k}]", name, time, clocks, seen)
     elif isinstance(node, np.ndarray):
         columns = None if time is None else _columns(node, len(time))
         if columns is None or time is None:
@@ -72,13 +85,13 @@ def _leaves(
 
 
 def _of_struct(
-    node: Mapping[str, Any], path: str, short: str, time: np.ndarray | None, fixed: bool, seen: dict[str, str]
+    node: Mapping[str, Any], path: str, short: str, time: np.ndarray | None, clocks: Clocks, seen: dict[str, str]
 ) -> Iterator[Leaf]:
     below = lambda name: f"{path}.{name}" if path else name
     name = next((one for wanted in TIME_NAMES for one in node if one.casefold() == wanted), None)
-    own = None if fixed or name is None else _vector(node[name])
+    own = None if name is None or (clocks.named and not path) else _vector(node[name])
     if own is not None and name is not None:
-        time = _in_seconds(own, node)
+        time = time if below(name) == clocks.named else clocks.in_seconds(own, node)
         seen[below(name)] = "time"
     unit = _text(node, UNIT_NAMES) or _text(node.get("DataInfo"), UNIT_NAMES)
     for key, value in node.items():
@@ -87,18 +100,23 @@ def _of_struct(
         # `log.vx.Data` is `log.vx`, and `scope.signals` what is in the scope.
         is_data = bool(path) and key.casefold() in DATA_NAMES and time is not None
         at, called = (path, short) if is_data else (below(key), key)
-        yield from _leaves(value, at, called, time, fixed, seen, unit if is_data else "")
+        yield from _leaves(value, at, called, time, clocks, seen, unit if is_data else "")
 
 
-def _named_time(path: Path, content: Mapping[str, Any], channels: ChannelMap) -> np.ndarray:
-    """The vector that the channel map names as time, in seconds."""
-    named = channels.time
-    assert named is not None
+def _named_time(path: Path, content: Mapping[str, Any], named: Channel) -> tuple[np.ndarray, str]:
+    """The vector that the channel map names as time, in seconds, and its path in the file."""
     vectors = dict(_vectors(content, ""))
     shorts = [one.rpartition(".")[2] for one in vectors]
-    vectors |= {one.rpartition(".")[2]: v for one, v in vectors.items() if shorts.count(one.rpartition(".")[2]) == 1}
-    check_known(str(path), "vector", named.column, vectors, "It is the time of the channel map.")
-    stamps = apply(named, vectors[named.column])
+    places = {one.rpartition(".")[2]: one for one in vectors if shorts.count(one.rpartition(".")[2]) == 1}
+    places |= {one: one for one in vectors}
+    check_known(str(path), "vector", named.column, places, "It is the time of the channel map.")
+    place = places[named.column]
+    return _stamps(path, named, vectors[place]), place
+
+
+def _stamps(path: Path, named: Channel, values: np.ndarray) -> np.ndarray:
+    """Times as the channel map says them, in seconds."""
+    stamps = apply(named, values)
     return convert(stamps, named.unit, "s", f"{path}: {named.column}") if is_unit(named.unit) else stamps
 
 

@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from notebooks.site.executed import ROOT, blocks_of, is_run
+from notebooks.site.executed import ROOT, blocks_of, is_run, outputs_of
 from notebooks.site.pages import SOURCES, name_of, put_together, sources
 
 BUILD = ROOT / "build" / "site"
@@ -36,9 +36,10 @@ def main() -> int:
 def execute(folder: Path) -> None:
     """Run every page and notebook whose output is not in the folder, each in a process of its own."""
     for place, page in sources().items():
-        if any(map(is_run, blocks_of(page.read_text()))):
+        text = page.read_text()
+        if any(map(is_run, blocks_of(text))):
             left = folder / name_of(place)
-            if not (left / "outputs.json").exists():
+            if not outputs_of(text, left):
                 print(f"running {place}", flush=True)
                 subprocess.run(
                     [sys.executable, "-m", "notebooks.site.executed", str(page), str(left)], check=True, cwd=ROOT

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import hashlib
 import io
 import json
 import os
@@ -42,6 +43,18 @@ def blocks_of(text: str) -> list[Block]:
     return found
 
 
+def digest(text: str) -> str:
+    """What tells a page from the same page before it was changed."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def outputs_of(page: str, folder: Path) -> list[dict]:
+    """What the blocks of this text left in a folder; nothing where another text, or none, was run."""
+    file = folder / "outputs.json"
+    left = json.loads(file.read_text()) if file.exists() else {}
+    return left["outputs"] if left.get("page") == digest(page) else []
+
+
 def is_run(block: Block) -> bool:
     """Whether a block does something: runs, or makes a file."""
     return bool(block.title) or block.language in ("python", "sh")
@@ -68,7 +81,7 @@ def run_page(page: Path, folder: Path) -> list[dict]:
             elif block.language == "sh":
                 one["text"] = _run_shell(block.code, page.name)
             outputs.append(one)
-    (folder / "outputs.json").write_text(json.dumps(outputs, indent=1))
+    (folder / "outputs.json").write_text(json.dumps({"page": digest(page.read_text()), "outputs": outputs}, indent=1))
     return outputs
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 from pathlib import Path
 
 from notebooks.site.drawings import DRAWINGS
-from notebooks.site.executed import blocks_of
+from notebooks.site.executed import blocks_of, outputs_of
 from notebooks.site.maths import draw_equations
 from notebooks.site.reference import PLACE, write_reference
 
@@ -65,7 +64,7 @@ def _write(path: Path, text: str) -> None:
 def _with_outputs(place: str, text: str, folder: Path, executed: Path) -> str:
     """A page with what each block printed below it, and its figure in place of the line that begins with `Figure:`."""
     left = executed / name_of(place)
-    outputs = json.loads((left / "outputs.json").read_text()) if (left / "outputs.json").exists() else []
+    outputs = outputs_of(text, left)
     blocks = blocks_of(text)
     if len(outputs) != len(blocks):
         return CAPTION.sub("", text)

@@ -185,3 +185,27 @@ def test_what_matlab_wrote_is_what_scipy_reads():
                 np.testing.assert_array_equal(value, reference[name], err_msg=path.name)
                 compared += 1
     assert compared > 15
+
+
+@pytest.mark.parametrize("version", WRITE)
+def test_the_maps_time_is_for_what_has_no_clock_of_its_own(version, tmp_path):
+    """And its unit is that of all clocks."""
+    WRITE[version](
+        tmp_path / "log.mat", {"Zeit": 1000 * T, "vx": T + 20.0, "log": {"ay": {"Time": 1000 * SLOW, "Data": SLOW}}}
+    )
+    (tmp_path / "map.toml").write_text(
+        'time = { column = "Zeit", unit = "ms" }\n[channels]\nv_x = "vx"\na_y = "log.ay"\n'
+    )
+    found = io.read_recording(tmp_path / "log.mat", io.read_channel_map(tmp_path / "map.toml"))
+    np.testing.assert_allclose(found.time, T)
+    np.testing.assert_allclose(found["v_x"], T + 20.0)
+    there = np.isfinite(np.asarray(found["a_y"]))
+    np.testing.assert_allclose(np.asarray(found.time)[there], SLOW)
+
+
+@pytest.mark.parametrize("version", WRITE)
+def test_a_time_within_a_struct_has_the_maps_unit(version, tmp_path):
+    WRITE[version](tmp_path / "log.mat", {"log": {"time": 1000 * T, "vx": T + 20.0}})
+    (tmp_path / "map.toml").write_text('time = { column = "log.time", unit = "ms" }\n[channels]\nv_x = "log.vx"\n')
+    found = io.read_recording(tmp_path / "log.mat", io.read_channel_map(tmp_path / "map.toml"))
+    np.testing.assert_allclose(found.time, T)

@@ -51,6 +51,14 @@ def test_blocks_run_in_one_folder_and_one_namespace(tmp_path):
     assert (tmp_path / "site" / "figures" / f"page-{outputs[3]['figure']}").exists()
 
 
+def test_what_an_older_text_printed_is_not_shown(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("```python\nprint(1)\n```\n")
+    executed.run_page(page, tmp_path / "left" / "page")
+    shown = pages._with_outputs("page.md", "```python\nprint(2)\n```\n", tmp_path, tmp_path / "left")
+    assert "```text" not in shown
+
+
 def test_a_page_that_was_not_run_is_shown_without_outputs(tmp_path):
     assert "Figure:" not in pages._with_outputs("page.md", PAGE, tmp_path, tmp_path / "nothing")
 
