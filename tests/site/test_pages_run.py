@@ -51,7 +51,7 @@ def test_a_page_takes_only_what_is_public(place):
                 listed = importlib.import_module(node.module).__all__
                 assert not [alias.name for alias in node.names if alias.name not in listed]
             if isinstance(node, ast.Attribute):
-                allowed = node.attr.startswith("__") or node.attr in OF_NAMED_TUPLES or "own_" in place
+                allowed = node.attr.startswith("__") or node.attr in (*OF_NAMED_TUPLES, *HOOKS) or "own_" in place
                 assert not node.attr.startswith("_") or allowed
 
 
