@@ -116,9 +116,9 @@ def test_the_truth_of_a_simulation_is_scored_as_a_measured_one_is(tmp_path, driv
     assert result.exit_code == 2 and "calibrated on v_y, too" in error_line(result)
 
 
-def test_devices_with_clocks_of_their_own(tmp_path, drive):
+def test_devices_with_clocks_of_their_own(tmp_path):
     """a_y 3 ms beside the others, so that no row has both: the library says so, the program takes one clock and says that."""
-    drive = {name: values for name, values in drive.items() if name != "v_y"}
+    drive = {name: values for name, values in columns(800).items() if name != "v_y"}
     count = len(drive["time"])
     late = {name: np.where(name == "a_y", np.nan, values) for name, values in drive.items() if name != "time"}
     other = {name: np.full(count, np.nan) for name in late} | {"a_y": drive["a_y"]}
