@@ -188,6 +188,7 @@ def test_a_log_without_a_channel(tmp_path, drive):
         assert "Nothing was calibrated" in result.output
 
 
+@pytest.mark.studies
 def test_a_log_calibrates_itself_unless_told_otherwise(tmp_path, drive):
     result, _ = estimate(tmp_path, drive, "--as-told", "--calibrate", "0:2")
     assert "--as-told fits nothing" in error_line(result)

@@ -49,6 +49,7 @@ def swept(tmp_path_factory):
     return folder, result
 
 
+@pytest.mark.studies
 def test_a_study_is_swept_and_told(swept):
     folder, result = swept
     assert "16 runs: passenger_car as single-track" in result.stdout

@@ -63,6 +63,7 @@ def test_a_tyre_with_states_is_refused():
         learned.with_residual_tyres(relaxed, jax.random.key(0))
 
 
+@pytest.mark.full
 def test_training_finds_what_a_fit_finds_and_tells_how_far_it_is():
     """Two wrong stiffnesses, by the likelihood alone."""
     log, told, ends = drive(on_brushes(), 1, 40), [], []

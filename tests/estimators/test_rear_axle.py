@@ -176,7 +176,7 @@ def test_every_cars_stiffness_is_found_where_its_file_is_wrong(name):
     assert errors(car, log, calibration) < 0.5 * errors(car, log, told)
 
 
-@pytest.mark.parametrize("rate", [10.0, 25.0, 400.0])
+@pytest.mark.parametrize("rate", [10.0, *(pytest.param(rate, marks=pytest.mark.full) for rate in (25.0, 400.0))])
 def test_every_rate_of_a_log_serves(rate):
     told = dataclasses.replace(test_sideslip.CAR, rear_cornering_stiffness=0.7 * 127000.0)
     log = drive_of(test_sideslip.CAR, rate)

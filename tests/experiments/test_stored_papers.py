@@ -191,6 +191,7 @@ def written(monkeypatch):
     return seen
 
 
+@pytest.mark.full
 def test_a_paper_goes_on_and_computes_nothing_twice(tmp_path, monkeypatch, written, unstored):
     monkeypatch.setattr(study_stores, "RUNS", 3)
     stores = Stores(tmp_path / "stores")
