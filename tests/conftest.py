@@ -37,7 +37,7 @@ MOST_MAPPINGS = 45000
 LOOKED_AFTER = 25
 """Programs compiled: a filter's takes up to 500 mappings."""
 
-COLOURS = 3
+COLOURS = 6
 
 # Traces and programs are many objects that live long; looking through them for cycles after every few hundred new ones took 8 %
 # of the tests' time.
@@ -66,8 +66,8 @@ def keep_programs(config):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Of a `product` one case in three stays, the others are left to `-m full`: each value of a parameter meets a third of the
-    others', and each test has a third of the cases, as the fields of one colour on a board of three."""
+    """Of a `product` one case in six stays, the others are left to `-m full`: each value of a parameter meets a sixth of the
+    others', and each test has a sixth of the cases, as the fields of one colour on a board of six."""
     order: dict = {}
     for item in items:
         if item.get_closest_marker("product") and hasattr(item, "callspec"):

@@ -66,7 +66,7 @@ def test_the_estimate_hardly_suffers(name):
     assert error(calibration, FAULTS[name](log)) < 1.2 * error(calibration, log) + 0.1
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_a_calibration_hardly_suffers_from_spikes_and_a_late_accelerometer_is_shifted():
     log, calibration = sound()
     clean = error(calibration, log)

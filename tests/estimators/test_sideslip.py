@@ -307,7 +307,7 @@ def test_what_a_log_hardly_tells_is_named():
     assert "heading_offset" in estimators.sideslip.little_told(with_reference)
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_a_reference_is_used_only_where_it_helps_inside_the_span():
     calibration = estimators.sideslip.calibrate(CAR_TOLD, log(), uses=("v_y",))
     assert [weight for weight, _ in calibration.validation] == [None, 0.05, 0.02]

@@ -28,7 +28,7 @@ def drives():
     return experiment.drives_of(SMALL, PEDALS, 3, jax.random.key(5))
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_the_drive_is_a_gentle_one(drives):
     assert drives.v_x.shape == (2, 3, 601)
     assert 40 / 3.6 < drives.true_v_x.min() < drives.true_v_x.max() < 85 / 3.6

@@ -122,7 +122,7 @@ def test_noise_has_the_levels_that_the_case_says():
     np.testing.assert_allclose(np.median(np.abs(wild)), 0.6745 * study.outlier_size * study.a_y, rtol=0.15)
 
 
-@pytest.mark.studies
+@pytest.mark.full
 def test_what_knows_outliers_beats_what_does_not(drives):
     cases = {"both": NOISY, "quiet": experiment.Case()}
     particles = filters.ParticleFilter(60)

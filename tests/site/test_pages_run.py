@@ -22,8 +22,13 @@ def python_of(place):
     return [block.code for block in blocks_of(PAGES[place].read_text()) if block.language == "python"]
 
 
-@pytest.mark.studies
-@pytest.mark.parametrize("place", RUN)
+def when(k, place):
+    """Starts, and of the other pages one in six, are run for each change; the rest by `-m full`."""
+    marks = pytest.mark.studies if k % 6 == 0 or place.startswith(("README", "index", "start/")) else pytest.mark.full
+    return pytest.param(place, marks=marks)
+
+
+@pytest.mark.parametrize("place", [when(k, place) for k, place in enumerate(RUN)])
 def test_a_page_runs_from_top_to_bottom(place, tmp_path):
     """What it leaves is kept where the site is built of it (`JAXVEH_EXECUTED`)."""
     given = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))}
