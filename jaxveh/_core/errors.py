@@ -100,7 +100,7 @@ def did_you_mean(unknown: Iterable[Any], names: Iterable[Any]) -> str:
 def check_key(who: str, key: Any) -> None:
     """Raise unless `key` is a key of `jax.random`, of the new kind or the old."""
     dtype = getattr(key, "dtype", None)
-    if dtype is None or not (jax.dtypes.issubdtype(dtype, jax.dtypes.prng_key) or dtype == np.uint32):
+    if dtype is None or not (jax.numpy.issubdtype(dtype, jax.dtypes.prng_key) or dtype == np.uint32):
         raise InputError(f"{who}: key = {key!r}: must be a key of jax.random, e.g. key=jax.random.key(0).")
 
 
