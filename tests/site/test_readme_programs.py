@@ -37,10 +37,11 @@ def folder(tmp_path_factory):
         "mass = 1150.0\nyaw_inertia = 1800.0\nfront_axle_to_cg = 1.16\nrear_axle_to_cg = 1.42\n"
         "front_cornering_stiffness = 80000.0\nrear_cornering_stiffness = 90000.0\n"
     )
-    law = tyres.MagicFormula(B=10.0, C=1.3, D=4000.0, E=0.2)
-    slips = np.linspace(-0.2, 0.2, 81)
-    force = law.forces(tyres.Contact(slip_angle=slips, load=4000.0)).F_y
-    rows = [f"{alpha},4000.0,{one}" for alpha, one in zip(slips, np.asarray(force), strict=True)]
+    law = tyres.typical_mf_tyre(4000.0)
+    slips, loads = (grid.ravel() for grid in np.meshgrid(np.linspace(-0.2, 0.2, 41), [2000.0, 4000.0, 6000.0]))
+    force = law.forces(tyres.Contact(slip_angle=slips, load=loads, speed=16.7)).F_y
+    # CSV files are in ISO-W, where a positive slip angle has a negative force.
+    rows = [f"{-alpha},{load},{one}" for alpha, load, one in zip(slips, loads, np.asarray(force), strict=True)]
     (folder / "rig.csv").write_text("\n".join(["alpha,Fz,Fy", *rows]) + "\n")
     return folder
 
@@ -53,13 +54,13 @@ def test_the_commands_are_those_that_are_run():
 @pytest.mark.parametrize("command", [command for command in COMMANDS if command not in ELSEWHERE])
 def test_a_command_of_the_readme_runs(command, folder):
     program = Path(sys.executable).parent / "jaxveh"
-    before = set(folder.iterdir())
     words = shlex.split(command)
-    more = ["--model", "brush"] if words[1:3] == ["tyre", "fit"] else []
+    if "simulate" in words:
+        (folder / "drive.csv").unlink()  # It is the product here, and stays otherwise.
     done = subprocess.run(
-        [str(program), *words[1:], *more], cwd=folder, capture_output=True, text=True,
+        [str(program), *words[1:]], cwd=folder, capture_output=True, text=True,
         env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
     )  # fmt: skip
     assert not done.returncode, done.stdout + done.stderr
-    if "-o" in words and "simulate" not in words:
-        assert (folder / words[words.index("-o") + 1]).exists() and set(folder.iterdir()) - before
+    if "-o" in words:
+        assert (folder / words[words.index("-o") + 1]).exists()
