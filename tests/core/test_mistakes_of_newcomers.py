@@ -156,6 +156,17 @@ def test_a_lambda_in_a_loop(drive):
     assert all("outside of the loop" in one for one in told)
 
 
+def test_functions_that_are_used_again_are_no_loop():
+    """Two of one place in the source, in turns: what they compiled is there."""
+    from jaxveh._core.fresh_functions import note_function
+
+    pair = [lambda x, k=k: x + k for k in range(2)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for turn in range(20):
+            note_function("test", pair[turn % 2])
+
+
 def test_a_where_in_a_loop_compiles_nothing_anew(car, drive):
     """The parameters that it picks count, not the function."""
     scan = jax.jit(lambda model, rows: filters.scan(filters.Extended(), model, rows).log_likelihood)

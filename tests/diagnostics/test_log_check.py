@@ -395,3 +395,17 @@ def test_pedals_and_cars_that_stand_raise_no_alarm(sound):
 def test_time_in_milliseconds_is_an_error(sound):
     time, channels = sound
     assert matching(findings(1e3 * time, channels), "error", "time", "looks like milliseconds")
+
+
+def test_a_slope_that_is_loosely_followed_is_no_unit(sound):
+    """A channel that is zero half of the time has a third of the slope, as km/h would have for m/s."""
+    time, channels = plant(sound)
+    a_y = np.array(channels["a_y"])
+    for begin in range(0, len(a_y), 1200):
+        a_y[begin : begin + 660] = 0.0
+    found = findings(time, {**channels, "a_y": a_y})
+    loose = [one for one in found if one.channel == "a_y" and "follows it loosely" in one.message]
+    assert not [one for one in found if "looks like mph" in one.message or "looks like km/h" in one.message]
+    assert [one.severity for one in loose] == ["warning"]
+    mph = findings(time, {**channels, "v_x": np.asarray(channels["v_x"]) / 0.44704})
+    assert matching(mph, "error", "v_x", "looks like mph")

@@ -1,0 +1,44 @@
+"""The small extended Kalman filter: its update against the information form, trust, and float32."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxveh.estimators import sequential
+
+
+def belief_of(seed, n, dtype=jnp.float64):
+    root = jax.random.normal(jax.random.key(seed), (n, n), jnp.float64)
+    mean = jax.random.normal(jax.random.key(seed + 100), (n,), jnp.float64)
+    return sequential.Belief(mean.astype(dtype), (root @ root.T + 0.1 * jnp.eye(n)).astype(dtype))
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("trust", [1.0, 0.3, 0.0])
+def test_an_update_is_that_of_a_sensor_whose_noise_is_larger_by_the_trust(seed, trust):
+    """inv(P') = inv(P) + h h' / R, of the noise R that the expected variance over the trust leaves."""
+    n, noise = 4, 0.2
+    belief = belief_of(seed, n)
+    h = jax.random.normal(jax.random.key(seed + 200), (n,), jnp.float64)
+    expected = h @ belief.covariance @ h + noise
+    found = sequential.update(belief, sequential.Innovation(jnp.asarray(0.7), expected, h), jnp.asarray(trust))
+    told = 0.0 if trust == 0 else 1.0 / (expected / trust - h @ belief.covariance @ h)
+    covariance = np.linalg.inv(np.linalg.inv(belief.covariance) + told * np.outer(h, h))
+    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.mean, belief.mean + covariance @ h * told * 0.7, rtol=1e-9, atol=1e-12)
+
+
+def test_in_float32_ten_thousand_sharp_measurements_leave_a_covariance():
+    """What is left of a variance is a small difference of large numbers: no eigenvalue becomes negative."""
+    belief = sequential.Belief(jnp.zeros(3, jnp.float32), jnp.diag(jnp.asarray([1e4, 1e2, 1.0], jnp.float32)))
+    slopes = jax.random.normal(jax.random.key(0), (10_000, 3), jnp.float32)
+
+    def step(belief, h):
+        found = sequential.Innovation(jnp.zeros((), jnp.float32), h @ belief.covariance @ h + jnp.float32(1e-6), h)
+        belief = sequential.update(belief, found, jnp.ones((), jnp.float32))
+        return belief, jnp.linalg.eigvalsh(belief.covariance)[0] / jnp.trace(belief.covariance)
+
+    last, least = jax.lax.scan(step, belief, slopes)
+    assert last.covariance.dtype == jnp.float32
+    assert float(least.min()) > -1e-6
