@@ -56,8 +56,8 @@ def update(belief: Belief, found: Innovation, trust: Any = 1.0) -> Belief:
     along = belief.covariance @ found.slope
     gain = trust * along / found.variance
     mean = belief.mean + gain * found.residual
-    # Joseph's form. In float32 neither it nor the difference of two covariances stays positive where a sensor is ten thousand times
-    # sharper than the belief; then this one is off by less (least over largest eigenvalue -3e3 instead of -4e6).
+    # Joseph's form. In float32 neither it nor the difference of two covariances stays positive where a sensor is ten thousand
+    # times sharper than the belief; then this one is off by less (least over largest eigenvalue -3e3 instead of -4e6).
     left = jnp.eye(mean.shape[0], dtype=mean.dtype) - jnp.outer(gain, found.slope)
     noise = (found.variance - trust * (found.slope @ along)) * jnp.outer(gain, along / found.variance)
     return Belief(mean, numerics.symmetric(left @ belief.covariance @ left.T + noise))
