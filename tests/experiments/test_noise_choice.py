@@ -10,7 +10,7 @@ import scipy.stats
 
 from jaxveh import Recording, filters, numerics
 from jaxveh.experiments.tyre_apf import Study, noise, predictive, sharpness
-from jaxveh.experiments.tyre_apf.settings import NoiseLevel
+from jaxveh.experiments.tyre_apf.settings import NoiseLevel, StudyNoise
 
 SMALL = dataclasses.replace(Study(), rate=25.0, particles=40)
 
@@ -144,6 +144,6 @@ def test_the_predictive_look_ahead_is_raced_at_noise_of_its_own_choice():
         study, 2, jax.random.key(0), levels=[NoiseLevel(0.02, 0.4, None)], candidates=CANDIDATES[:2], rounds=[noise.Round(2, 2)],
         particles=40, again=2,
     )  # fmt: skip
-    assert levels[0].noise in [noise.Noise(*candidate) for candidate in CANDIDATES[:2]]
+    assert levels[0].noise in [StudyNoise(*candidate) for candidate in CANDIDATES[:2]]
     assert (raced.found[40]["result"] == 0).all()
     assert raced.found[40].compare("error", "filter", "APF", "PF").wins.shape == (1,)

@@ -297,6 +297,13 @@ def test_init_and_step_are_final(method):
         type("Own", (filters.Kalman,), {method: lambda self, *given: None})
 
 
+@pytest.mark.parametrize("method", ["predict", "update"])
+def test_a_wrapper_does_not_write_a_part_that_nothing_calls(method):
+    written = {method: lambda self, *given: None, "__annotations__": {"inner": filters.kit.AbstractGaussianFilter}}
+    with pytest.raises(TypeError, match=f"Own.{method}: nothing calls it.* Write _{method}"):
+        type(AbstractTwoPartWrapper)("Own", (AbstractTwoPartWrapper,), written)
+
+
 class Wider(AbstractTwoPartWrapper):
     """Of a user: predictions wider by a factor."""
 
