@@ -99,8 +99,8 @@ METHODS = {
     ),
     "hybrid": MethodOfCar(
         lambda car: HybridObserver(_lateral(car)),
-        "the observer of lateral_curve, with nonlinear least squares over two seconds where these are better; known only near the "
-        "limit",
+        "the observer of lateral_curve, with nonlinear least squares over two seconds where these are better; known only near "
+        "the limit",
         "section 3.1.1.1, figure 3, reference [101]",
     ),
     "augmented": MethodOfCar(

@@ -49,7 +49,8 @@ class SimilarCurve(eqx.Module):
         """The derivative of the force (N) by the friction's logarithm: `dF / d ln mu = F - s dF/ds`, for every tyre law that
         friction scales in this way. The linear part of a force contributes nothing to it.
 
-        It bounds the accuracy: a force with a standard deviation of `std` newton gives ln mu no better than `std / |dF / d ln mu|`.
+        It bounds the accuracy: from a force with a standard deviation of `std` (N), that of ln mu is at least
+        `std / |dF / d ln mu|`.
         """
         force, slope = self.with_slope(slip, friction, load, factor)
         return force - slip * slope
