@@ -37,8 +37,8 @@ class AxlesTold(NamedTuple):
 
 class Axles(eqx.Module):
     """Lateral forces of both axles by equation 15, and the difference of their slip angles, which needs no lateral velocity:
-    `alpha_f - alpha_r = delta - l r / v`. All signals have a low-pass filter of `lag` (s); the filter's derivative of the yaw rate
-    is the yaw acceleration.
+    `alpha_f - alpha_r = delta - l r / v`. All signals have a low-pass filter of `lag` (s); its derivative of the yaw rate is the
+    yaw acceleration.
     """
 
     car: PlanarCar
