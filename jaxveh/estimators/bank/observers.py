@@ -19,8 +19,8 @@ SETTLED = 3.0
 
 
 class DisturbanceMemory(NamedTuple):
-    """The motion; the low-passed disturbance, `push` (m/s^2), and lateral velocity (m/s); and the time since the first row, `age`
-    (s)."""
+    """The motion; the low-passed disturbance, `push` (m/s^2), and lateral velocity (m/s); and for how long the signals have been
+    available, `age` (s)."""
 
     motion: Any
     push: Any
@@ -72,7 +72,8 @@ class DisturbanceObserver(AbstractMethod):
 
 
 class IntegralMemory(NamedTuple):
-    """The motion; lateral velocity (m/s); the bank's acceleration, `push` (m/s^2); and the time since the first row, `age` (s)."""
+    """The motion; lateral velocity (m/s); the bank's acceleration, `push` (m/s^2); and for how long the signals have been
+    available, `age` (s)."""
 
     motion: Any
     v_y: Any

@@ -28,8 +28,8 @@ STEERING = Need("steering_wheel", "rad")
 
 
 class TsengMemory(NamedTuple):
-    """The motion; the steering wheel's angle (rad); the low-passed static bank (rad) and trust, `agreement` (-); and the time since
-    the first row, `age` (s)."""
+    """The motion; the steering wheel's angle (rad); the low-passed static bank (rad) and trust, `agreement` (-); and for how long
+    the signals have been available, `age` (s)."""
 
     motion: Any
     wheel: Any
@@ -41,8 +41,8 @@ class TsengMemory(NamedTuple):
 class Tseng(AbstractMethod):
     """The bank of H. E. Tseng (Vehicle System Dynamics 36, 2001): `bank = static max(0, 1 - |DFC| - |d static / dt|)`.
 
-    `static = arcsin((f_y - v_x r) / g)`. The dynamics factor DFC measures how much acceleration, yaw rate and steer disagree with a
-    steady state, in which `l r / v_x = steer - understeer f_y`: it is that residual over `doubt` (rad). The rate is taken over
+    `static = arcsin((f_y - v_x r) / g)`. The dynamics factor DFC is the deviation of acceleration, yaw rate and steer from a
+    steady state, in which `l r / v_x = steer - understeer f_y`: that residual over `doubt` (rad). The rate is divided by
     `doubt_rate` (rad/s). All signals have a low-pass filter of `time` (s). `ratio` (-) is the steering ratio.
     """
 

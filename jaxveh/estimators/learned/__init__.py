@@ -1,4 +1,4 @@
-"""What is learned from drives: a tyre's law inside a filter, trained through the filter's likelihood."""
+"""Tyre laws that are learned from drives inside a filter, by the filter's likelihood."""
 
 from jaxveh.estimators.learned.residual_tyre import ResidualTyre, network_weights, with_residual_tyres
 from jaxveh.estimators.learned.training import Trained, train

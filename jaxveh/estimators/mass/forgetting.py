@@ -61,8 +61,8 @@ class Pulled(AbstractCleaning):
 
 
 def forgetting_factors(car: CarSpecification) -> Filtered:
-    """Makes `F = m (d v_x/dt + g f_r) + m g sin(grade)` from a car's file, with one forgetting factor for the mass and one for the
-    grade (A. Vahidi et al. 2005), and separate variances (`observers.RecursiveLeastSquares`). An observer gives no standard
+    """Makes `F = m (d v_x/dt + g f_r) + m g sin(grade)` from a car's file, with one forgetting factor for the mass and one for
+    the grade (A. Vahidi et al. 2005), and separate variances (`observers.RecursiveLeastSquares`). An observer gives no standard
     deviation: the answer is `known` in rows with excitation by the pedals.
 
     **Raises** `InputError` for a file without `wheel_radius`.

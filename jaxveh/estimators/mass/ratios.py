@@ -36,8 +36,8 @@ class Pull(eqx.Module):
 
 
 class RatioMemory(NamedTuple):
-    """The motion; the last torques (N m); the low-passed `force` (N); slow force (N) and acceleration (m/s^2); the sums of squares,
-    of products and of squared residuals; and the time since the first row, `age` (s)."""
+    """The motion; the last torques (N m); the low-passed `force` (N); slow force (N) and acceleration (m/s^2); the sums of
+    squares, of products and of squared residuals; and the time since the first row, `age` (s)."""
 
     motion: Any
     drive: Any
@@ -52,9 +52,9 @@ class RatioMemory(NamedTuple):
 
 
 class AbstractRatio(AbstractMethod):
-    """`mass = sum(a F) / sum(a^2)`, with sums over time that start from the file's `mass` (kg) with the relative standard deviation
-    `prior_spread` (-), and forget with the time constant `memory` (s). The standard deviation is that of residuals with the
-    correlation time `lasting` (s)."""
+    """`mass = sum(a F) / sum(a^2)`, with sums over time that start from the file's `mass` (kg) with the relative standard
+    deviation `prior_spread` (-), and forget with the time constant `memory` (s). The standard deviation is that of residuals with
+    the correlation time `lasting` (s)."""
 
     motion: eqx.AbstractVar[BodyMotion]
     pull: eqx.AbstractVar[Pull]
@@ -184,8 +184,7 @@ class HighPass(AbstractRatio):
 
 
 def pull_of(car: CarSpecification, who: str) -> Pull:
-    """Makes a `Pull` from a car's file. **Raises** `InputError` for a file without `wheel_radius`, which converts torque to force.
-    """
+    """Makes `Pull` from a car's file. **Raises** `InputError` for a file without `wheel_radius`."""
     told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")}
     known = {name: value for name, value in told.items() if value is not None}
     return Pull(number_of(car, "wheel_radius", who, "m"), **known)

@@ -48,8 +48,7 @@ def navigation_model(system: Navigator) -> StateSpace:
 
 
 class Known(NamedTuple):
-    """The memory of `Navigation`: the filter's belief, the cleaning's memory `felt`, and whether a fix has started it.
-    """
+    """The memory of `Navigation`: the filter's belief, the cleaning's memory `felt`, and whether a fix has started it."""
 
     belief: Any
     felt: Felt

@@ -34,8 +34,8 @@ class Gyro(AbstractMethod):
 
         d roll = roll_rate + r slope - offset + e / time,   d offset = -e / (4 time^2),   e = arcsin((a_y - v_x r) / g) - roll
 
-    Fast roll comes from the gyroscope, slow roll from the accelerometer, whose reference is right except for `d v_y/dt`, which has
-    zero mean. `slope`: the car's pitch, by which the gyroscope measures a part of the yaw rate r. `time` (s): time constant
+    Fast roll comes from the gyroscope, slow roll from the accelerometer, whose reference is right except for `d v_y/dt`, which
+    has zero mean. `slope`: the car's pitch, by which the gyroscope measures a part of the yaw rate r. `time` (s): time constant
     between slow and fast.
     """
 

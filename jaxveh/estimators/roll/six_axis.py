@@ -44,11 +44,11 @@ class SixAxis(AbstractMethod):
         d roll = p + tan(pitch) (q sin(roll) + r cos(roll)),  d pitch = q cos(roll) - r sin(roll)
 
     (ISO 8855: pitch positive nose down). The measurements are v_x of the wheels, and zero lateral velocity with the standard
-    deviation `slip` (m/s) and the correlation time `slip_time` (s). It does not estimate the sensors' offsets, as the review says,
+    deviation `slip` (m/s) and the correlation time `slip_time` (s). The sensors' offsets are not estimated, as the review says,
     so that they appear in `roll`.
 
-    `a_noise` (m/s per root second), `gyro_noise` (rad per root second): noise of the integrated sensors; `v_noise` (m/s): noise of
-    the wheels' speed.
+    `a_noise` (m/s per root second), `gyro_noise` (rad per root second): noise of the integrated sensors; `v_noise` (m/s): noise
+    of the wheels' speed.
     """
 
     motion: BodyMotion

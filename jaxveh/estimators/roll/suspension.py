@@ -28,9 +28,9 @@ class SteadyMemory(NamedTuple):
 
 
 class Steady(AbstractMethod):
-    """`roll = R a_y / (1 + g R)` (A. Hac et al. 2010, of the suspension): R = `roll_gradient` (rad/(m/s^2)) is for the acceleration
-    in the road's plane, of which a sensor on the rolling body measures `1 + g R`. The roll has a low-pass filter of `time` (s),
-    whose derivative is the rate.
+    """`roll = R a_y / (1 + g R)` (A. Hac et al. 2010, of the suspension): R = `roll_gradient` (rad/(m/s^2)) refers to the
+    acceleration in the road's plane; a sensor on the rolling body measures `1 + g R` times this. The roll has a low-pass filter
+    of `time` (s), whose derivative is the rate.
     """
 
     roll_gradient: jax.Array = positive("rad/(m/s^2)")

@@ -26,7 +26,8 @@ class AxleForces(AbstractMethod):
     `delta - l r / v = F_f / C_f - F_r / C_r + offset` holds without the lateral velocity, so that it needs no observer of it (the
     review's general method has one). It is linear in both compliances, an offset, and the delay of the inertial sensors against
     the steer. In slow manoeuvres front and rear forces are nearly proportional, and only the difference of the compliances is
-    observable; yaw accelerations distinguish them. Compliances are relative to the file's, so that the unknowns have similar size.
+    observable; yaw accelerations distinguish them. Compliances are relative to the file's, so that the unknowns are of similar
+    size.
 
     `memory` (s): time constant of the forgetting; `spread` (-): standard deviation of the relative compliances before the drive;
     `angle_noise` (rad): error of the slip angle difference, with the correlation time `correlation` (s); `known_spread` (-): up
@@ -91,8 +92,8 @@ class AxleForces(AbstractMethod):
 
 
 class DerivativesMemory(NamedTuple):
-    """The signals; for front and rear, (2,): accelerations and their filtered values (m/s^2), slip rates and their filtered values
-    (rad/s), and the means over the window of the products and of the squared slip rates."""
+    """The signals; for front and rear, (2,): accelerations and their filtered values (m/s^2), slip rates and their filtered
+    values (rad/s), and the means over the window of the products and of the squared slip rates."""
 
     signals: Signals
     felt: Any
