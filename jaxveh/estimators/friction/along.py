@@ -115,7 +115,7 @@ class AlongMemory(NamedTuple):
 class AlongEvidence(eqx.Module):
     """Log-likelihoods of frictions from the wheels' slips and forces.
 
-    A radius is known to a share of `radius_noise` (-): the slip of a wheel at small force is learnt as an offset and subtracted.
+    A radius is known to a share of `radius_noise` (-): the slip of a wheel at small force is learned as an offset and subtracted.
     A force's error is a share `force_noise` (-) of it and `load_noise` (-) of the load. A slip's error is `slip_noise` (-) and
     the error of the offset; it lasts for `slip_time` (s), so that many rows give hardly more information than one. The curve's
     uncertainty grows with the slip. Slips below `knee` (-) hardly count: they depend on stiffness, not on friction. Rows closer
@@ -144,7 +144,7 @@ class AlongEvidence(eqx.Module):
         return AlongMemory(wheels, jnp.zeros_like(wheels.speed), unknown, jnp.zeros_like(t), jnp.zeros_like(t))
 
     def _learn(self, memory: AlongMemory, seen: Slips, stiffness, dt):
-        """The slips' offsets and variances after a row. They are learnt from wheels whose force is less than a tenth of the
+        """The slips' offsets and variances after a row. They are learned from wheels whose force is less than a tenth of the
         linear force at a slip of 0.05."""
         rolls = seen.there & (jnp.abs(seen.force) < 0.1 * self.stiffness_ratio * stiffness * 0.05)
         shown = jnp.where(rolls, seen.slip - seen.force / (self.stiffness_ratio * stiffness * seen.load), 0.0)

@@ -16,7 +16,7 @@ LEAST_FRICTION = 0.02
 """Lower limit of the friction by which a slip is divided."""
 
 ROLL_GRADIENT = 0.006
-"""rad s^2/m: roll angle of an ordinary body per lateral acceleration, which a car's file does not have."""
+"""rad s^2/m: roll angle of an ordinary body per lateral acceleration, used for every car instead of the file's value."""
 
 
 class SimilarCurve(eqx.Module):

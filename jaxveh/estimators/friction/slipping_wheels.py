@@ -113,7 +113,7 @@ class SidesApart(AbstractWheelMethod):
     for a road that is slippery on one side.
 
     `friction` is the mean of both sides. The force of each wheel is compared with the longitudinal curve of its axle. The slip of
-    a wheel at small force is an error of its radius, which is learnt within `learning` (s) and subtracted. Rows count from
+    a wheel at small force is an error of its radius, which is learned within `learning` (s) and subtracted. Rows count from
     `LEAST_SLIP` on. Slips are known to `slip_noise` (-), forces to `force_noise` (-) of themselves and `load_noise` (-) of the
     load. `rolls` (-): force over load below which a wheel rolls freely.
     """

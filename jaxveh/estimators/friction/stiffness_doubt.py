@@ -25,8 +25,8 @@ class StiffnessDoubt(AbstractMethod):
 
     If the file's tyre is stiffer than the car's, the predicted force is too large, as on a slippery road; if it is softer, it
     hides low friction. The five answers only agree where the curve has bent. The answer is that with the file's stiffnesses. Its
-    variance is the mean square of the five about it, if the method gives a standard deviation. It is `known` where all five
-    are known and their standard deviation, the method's own included, is less than `widest` (-, of the logarithm).
+    variance is the mean square of the five about it plus the mean of their own variances, if the method gives any. It is `known`
+    where all five are known and the standard deviation of the logarithm is less than `widest` (-).
     """
 
     inner: AbstractMethod

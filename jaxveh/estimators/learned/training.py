@@ -129,7 +129,7 @@ def _spread(p: Any, prior: float | Mapping[str, float]) -> float:
 
 
 def _pieces(model: StateSpace, recordings: Recording | Sequence[Recording], piece: float, warm_up: float):
-    """Rows of all pieces, (pieces, T) in each leaf, and the number of warm-up rows of each. Pieces are as long as the shortest."""
+    """Rows of all pieces, (pieces, T) in each leaf, and the number of warm-up rows; pieces are as long as the shortest."""
     logs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not logs:
         raise InputError("train: no recording to learn from.")

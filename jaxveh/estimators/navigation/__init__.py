@@ -1,4 +1,4 @@
-"""Satellite navigation with an inertial unit, and a camera: section 1.3.2 and 1.3.3 of the review (Chen, Gao, Xu 2013)."""
+"""Satellite navigation with an inertial unit and a camera: sections 1.3.2 and 1.3.3 of the review (Chen, Gao, Xu 2013)."""
 
 from __future__ import annotations
 

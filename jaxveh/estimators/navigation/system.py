@@ -19,9 +19,9 @@ SLOWEST = 0.5
 
 
 class Parts(NamedTuple):
-    """The measurements of a navigation in addition to accelerations, yaw rate, speed and course: the inertial unit's other axes
-    (`three_more`), the `heading` from two antennas, the speeds of the rear `wheels`, a `camera` of the lane. `axle` is the tyre
-    law of its rear axle, "none", "linear" or "saturating"; its stiffness is estimated if it `adapts`."""
+    """The parts of a navigation in addition to accelerations, yaw rate, speed and course. `three_more`: the inertial unit's other
+    axes; `heading`: the one from two antennas; `wheels`: the speeds of the rear wheels; `camera`: one that sees the lane; `axle`:
+    the tyre law of the rear axle, "none", "linear" or "saturating"; `adapts`: the stiffness of the rear axle is estimated."""
 
     three_more: bool = False
     heading: bool = False

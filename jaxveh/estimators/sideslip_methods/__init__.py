@@ -70,7 +70,7 @@ METHODS = {
     ),
     "upf": MethodOfCar(
         single_track_filter(filters.Guided(PARTICLES, rule="unscented"), random=True),
-        "the same, particles drawn given the measurement",
+        "the same, with particles drawn given the measurement",
         "section 1.4.6, [76]",
     ),
     "ukf_hsri": _in_tyres("hsri", "eq 4, [2, 25]"),

@@ -52,7 +52,7 @@ from jaxveh.vehicles import (
 )
 
 STIFFEST = 2.0
-"""Load at which a wheel's cornering stiffness is greatest, over its static load: an axle with lateral load transfer is softer."""
+"""Load at which a wheel's cornering stiffness is greatest, over its static load, so that lateral load transfer softens an axle."""
 
 UNSPRUNG = 0.025
 """Unsprung mass at a wheel over the car's mass."""
@@ -72,7 +72,7 @@ LEANING = ("v_y", "yaw_rate", "roll", "roll_rate")
 
 
 def wheel_options(car: CarSpecification) -> dict[str, Any]:
-    """The tyres of a wheel on each axle: half of the axle's Magic Formula, stretched by load (`tyres.Similarity`)."""
+    """The tyres of a wheel on each axle: half of the axle's Magic Formula, scaled by load (`tyres.Similarity`)."""
     found = {}
     for name, axle in zip(("front", "rear"), axles_of(single_track(car)), strict=True):
         tyre, load = axle.tyre, 0.5 * axle.load

@@ -38,7 +38,7 @@ BANKED, BANK_TIME = 0.5, 1.0
 """m/s^2, and s: if a_y - v_x r stays beyond this over this time, it is gravity on a banked road and must not be integrated."""
 
 PSEUDO_TIME = 0.2
-"""s: time constant below which the integral counts, and above which the dynamic estimate counts."""
+"""s: on shorter time scales the integral counts, on longer ones the dynamic estimate."""
 
 
 class FusionMemory(NamedTuple):

@@ -97,7 +97,7 @@ class AbstractIntegration(AbstractMethod):
 
 
 class DirectIntegration(AbstractIntegration):
-    """`v_y = integral of (a_y - v_x r)`, the kinematic method of section 1.1 (its [5]): it needs no car parameters and never
+    """`v_y = integral of (a_y - v_x r)`, the kinematic method of section 1.1 (its [5]): it needs no model of the car and never
     forgets an error."""
 
     @property
@@ -116,7 +116,7 @@ class RollCompensated(AbstractIntegration):
 
     At low frequencies the roll angle is that of a steady turn, at high frequencies it is the integral of the roll rate. It
     contains body roll, bank and the accelerometer's offset, so that v_y does not drift; changes of v_y slower than `time` T (s)
-    are lost. Hac, Nichols & Sygnarowicz also use the suspension's parameters; this method needs no car parameters.
+    are lost. Hac, Nichols & Sygnarowicz also use the suspension's parameters; this method does not.
     """
 
     time: jax.Array = positive("s", default=ROLL_TIME)

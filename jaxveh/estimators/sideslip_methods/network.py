@@ -77,7 +77,7 @@ class SideslipNetwork(AbstractMethod):
         return (V_X, STEER, YAW_RATE, A_Y)
 
     def signals(self, values) -> jax.Array:
-        """(SIGNALS,), of about 1 each in ordinary driving."""
+        """The signals (SIGNALS,), each about 1 in ordinary driving."""
         v_x = jnp.maximum(values["v_x"], self.slowest)
         turn, push = values["yaw_rate"], values["a_y"]
         rolling = (self.front_axle_to_cg + self.rear_axle_to_cg) * turn / v_x
@@ -108,7 +108,7 @@ class SideslipNetwork(AbstractMethod):
 
 
 def layers_of(arrays: list[np.ndarray]) -> eqx.nn.MLP:
-    """The network with these weights and biases in turn."""
+    """The network with these weights and biases, in alternating order."""
     width, depth = arrays[0].shape[0], len(arrays) // 2 - 1
     network = eqx.nn.MLP(SideslipNetwork.size, 2, width, depth, jnp.tanh, key=jax.random.key(0))
     where = lambda one: [leaf for layer in one.layers for leaf in (layer.weight, layer.bias)]
@@ -117,7 +117,7 @@ def layers_of(arrays: list[np.ndarray]) -> eqx.nn.MLP:
 
 @functools.cache
 def trained_arrays() -> tuple[np.ndarray, ...]:
-    """The weights and biases in turn that `sideslip_review.network_training` found."""
+    """The weights and biases of `sideslip_review.network_training`, in alternating order."""
     with importlib.resources.files(__package__).joinpath(FILE).open("rb") as file, np.load(file) as stored:
         return tuple(np.asarray(stored[name], float) for name in sorted(stored.files))
 

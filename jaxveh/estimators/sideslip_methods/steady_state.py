@@ -106,7 +106,7 @@ def numbers(car: CarSpecification) -> dict[str, float]:
     """The linear single track's parameters from a car's file."""
     assert (
         car.front_cornering_stiffness is not None and car.rear_cornering_stiffness is not None
-    )  # the file has filled it
+    )  # given in the file, or from the axle's coefficients
     return dict(
         mass=car.mass,
         front_axle_to_cg=car.front_axle_to_cg,

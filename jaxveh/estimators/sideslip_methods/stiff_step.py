@@ -24,9 +24,9 @@ class StiffStep(eqx.Module):
 
         (I - g h J) k1 = f(x),    (I - g h J) k2 = f(x + h k1) - 2 k1,    x + h (3 k1 + k2) / 2
 
-    The poles of lateral motion are proportional to one over the speed, 80 1/s and more where a car crawls, and logs have steps of
-    0.1 s, and gaps; a step longer than `LONGEST` is cut to it. `derivatives(system, t, x, u)` returns a NamedTuple like x, of
-    scalars, or of arrays for a batch of states.
+    The poles of lateral motion are proportional to one over the speed, 80 1/s and more at a crawl, and logs have steps of 0.1 s,
+    and gaps. A step longer than `LONGEST` is cut to it. `derivatives(system, t, x, u)` returns a NamedTuple like x, of scalars,
+    or of arrays for a batch of states.
     """
 
     derivatives: Callable = eqx.field(static=True)

@@ -64,7 +64,7 @@ class AbstractForces(AbstractWheelMethod):
         return self.wheel_inertia / jnp.square(self.wheel_radius) * 4.0 * wheels.mean_rate
 
     def rolls(self, wheels: Wheels) -> Any:
-        """Rolling resistance of all wheels, N, against the travel; fades out at standstill."""
+        """Rolling resistance of all wheels, N, against the direction of travel; it fades out at standstill."""
         return self.rolling_resistance * self.mass * GRAVITY * jnp.tanh(wheels.mean)
 
     def begin(self, wheels, values):

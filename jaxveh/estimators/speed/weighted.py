@@ -28,10 +28,9 @@ class Weighted(AbstractWheelMethod):
 
         dv_x/dt = a_x - offset - slope,    doffset/dt = noise,    dslope/dt = -slope / slope_time + noise
 
-    The driving state decides how much the wheels count: less, the more the car accelerates and the more they disagree. The
-    variance of their mean is the sum of squares of `wheel` (m/s), `share` (-) of the mean, `by_acceleration` (s) times |a_x|, and
-    `by_spread` (-) times the difference of fastest and slowest. Without an accelerometer measurement the speed is a random walk
-    with `unfelt_walk` (m/s/sqrt(s)).
+    The wheels count less when the car accelerates and when they disagree. The variance of their mean is the sum of squares of
+    `wheel` (m/s), `share` (-) of the mean, `by_acceleration` (s) times |a_x|, and `by_spread` (-) times the difference of fastest
+    and slowest. Without an accelerometer measurement the speed is a random walk with `unfelt_walk` (m/s/sqrt(s)).
 
     The speed is known where its standard deviation is below `agreement` (-) of the speed plus `agreement_speed` (m/s). Slope and
     offset are only distinguished by how fast they change. The reported standard deviation also includes `radius` (-) of the
