@@ -26,7 +26,7 @@ SLOWEST = 0.3
 
 
 LEAST_SLIP = 0.02
-"""Slip below which it may be an error of a wheel's radius or of the speed, and gives no information on the friction limit."""
+"""A smaller slip may be an error of a wheel's radius or of the speed, and gives no information on the friction limit."""
 
 
 class WheelsTold(NamedTuple):

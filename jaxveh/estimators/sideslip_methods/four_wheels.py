@@ -52,7 +52,7 @@ from jaxveh.vehicles import (
 )
 
 STIFFEST = 2.0
-"""Load at which a wheel's cornering stiffness is greatest, over its static load, so that lateral load transfer softens an axle."""
+"""Load at which a wheel's cornering stiffness is greatest, over its static load: lateral load transfer softens an axle."""
 
 UNSPRUNG = 0.025
 """Unsprung mass at a wheel over the car's mass."""

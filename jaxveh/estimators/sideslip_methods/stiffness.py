@@ -68,14 +68,14 @@ def linear_model(car: CarSpecification, **noise: float) -> StateSpace:
 
 
 def adapted_stiffness(car: CarSpecification) -> Guarded:
-    """Makes the unscented filter of the linear single track with both stiffnesses among its states from a car's file: section
+    """Makes the unscented filter of the linear single track, with both stiffnesses among its states, from a car's file: section
     1.2.2, as M. Best, T. Gordon & P. Dixon do (the review's [29]) and A. von Vietinghoff et al. ([7])."""
     model = with_parameters(linear_model(car, force_error=FORCE_ERROR), shares, SPREAD, WALK)
     return in_filter(car, model, filters.Unscented(), claims=True)
 
 
 def adaptive(car: CarSpecification) -> Guarded:
-    """Makes the observer of the linear single track with both stiffnesses adapted by a Lyapunov law from a car's file: section
+    """Makes the observer of the linear single track, with both stiffnesses adapted by a Lyapunov law, from a car's file: section
     1.4.7, after M. Kaminaga & G. Naito (the review's [77]), H. Cherouat et al. and H. Grip et al. ([78, 79]).
 
     Their Lyapunov function is the sum of squares of the errors of yaw rate and sideslip. That of `observers.Adaptive` includes

@@ -18,7 +18,7 @@ SHARE = 0.5
 """Share of the largest possible bound: halfway between the least mean square and the limit that no filter reaches."""
 
 BOUND = 1e4
-"""Bound for errors of v_y in m/s: larger than `SHARE` allows wherever v_y is known to less than 0.01 m/s."""
+"""Bound for errors of v_y in m/s: larger than `SHARE` allows wherever the standard deviation of v_y is above 0.01 m/s."""
 
 
 class HInfinityShare(HInfinity):
