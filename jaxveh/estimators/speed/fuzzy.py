@@ -43,7 +43,7 @@ class Fuzzy(AbstractWheelMethod):
 
     The membership "large" is linear between two bounds each: for the wheels' disagreement over their mean (`spread_low`,
     `spread_high`, -), for the difference of the wheels' mean rate and the acceleration (`rate_low`, `rate_high`, m/s^2), and for
-    the rate of lateral slip `a_y - v_x yaw_rate` (`swerve_low`, `swerve_high`, m/s^2; 0 where the log lacks one of the channels).
+    the rate of lateral slip `a_y - v_x yaw_rate` (`swerve_low`, `swerve_high`, m/s^2; 0 if one of the two channels is missing).
     The rules, with the product as "and":
 
         swerve:  lateral slip large                                              -> integrate
