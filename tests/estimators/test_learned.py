@@ -86,7 +86,7 @@ def test_bad_arguments_are_named():
     )
     with pytest.raises(InputError, match="learning_rate = 0.0"):
         go(learning_rate=0.0)
-    with pytest.raises(InputError, match="prior: no spread for .*friction"):
+    with pytest.raises(InputError, match="prior: no standard deviation for .*friction"):
         go(prior={"cornering_stiffness": 1.0})
     with pytest.raises(InputError, match="no recording to learn from"):
         go(log=[])

@@ -1,8 +1,8 @@
 """The cross slope of the road, positive where the left side is higher: section 3.1.2.3 of the review (Chen, Gao, Xu 2013).
 
-An accelerometer that leans with the body feels `f_y + g roll`, the yaw rate and the sideslip say `f_y - g bank`: their
-difference is bank and roll together, and the suspension tells the roll. What stays is the accelerometer's offset: 0.1 m/s^2 is
-0.58 degrees.
+An accelerometer that leans with the body measures `f_y + g roll`, while yaw rate and sideslip give `f_y - g bank`. Their
+difference contains bank and roll, and the suspension determines the roll. The accelerometer's offset remains: 0.1 m/s^2 is 0.58
+degrees.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SHOWN = {"bank": "rad"}
 METHODS = {
     "disturbance_observer": MethodOfCar(
         lambda car: disturbance_observer(car, NAME),
-        "what pushes the car sideways beside its tyres, low-passed",
+        "the lateral acceleration that the tyres do not explain, low-passed",
         "3.1.2.3 [125]",
     ),
     "unknown_input": MethodOfCar(
@@ -35,12 +35,12 @@ METHODS = {
     ),
     "tseng": MethodOfCar(
         lambda car: tseng_of(car, NAME),
-        "the static bank, as far as steer, yaw rate and acceleration agree on it",
+        "the static bank, weighted by the agreement of steer, yaw rate and acceleration",
         "3.1.2.3 [123]",
     ),
     "filter": MethodOfCar(
         lambda car: leaning_filter(car, NAME),
-        "bank, roll and the sensors' offsets in one Kalman filter; satellites' course and a roll gyroscope where there are any",
+        "one Kalman filter of bank, roll and the sensors' offsets; uses satellite course and roll gyroscope if available",
         "3.1.2.3, 1.3.2 [46]",
     ),
 }
@@ -49,7 +49,7 @@ RECOMMENDED = "filter"
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """A road that does not bank."""
+    """Zero bank in all rows."""
     del car
     return dict.fromkeys(SHOWN, np.zeros(len(recording)))
 
@@ -60,5 +60,5 @@ def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) ->
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same a row at a time."""
+    """The same, one row at a time."""
     return LiveMethod(method_of(NAME, METHODS, source, method))

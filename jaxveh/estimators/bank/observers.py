@@ -1,4 +1,4 @@
-"""Bank as what pushes a car sideways beside its tyres: observers of a disturbance."""
+"""Bank as the lateral acceleration that the tyres do not explain: disturbance observers."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 SETTLED = 3.0
-"""Time constants after which an observer has forgotten where it began."""
+"""Number of time constants after which an observer has forgotten its initial state."""
 
 
 class DisturbanceMemory(NamedTuple):
-    """What was heard, the low-passed disturbance (m/s^2) and lateral speed (m/s), and for how long (s)."""
+    """The motion; the low-passed disturbance, `push` (m/s^2), and lateral velocity (m/s); and for how long the signals have been
+    available, `age` (s)."""
 
     motion: Any
     push: Any
@@ -32,9 +33,9 @@ class DisturbanceObserver(AbstractMethod):
 
         g bank = Q (f_y - v_x r - d v_y/dt),    f_y = a_y / (1 + g roll_gradient)
 
-    Q is a low-pass of `time` (s), through which the derivative needs no difference. Their sideslip is known; here it is that of a
-    rear axle that carries its share. Their projection, which takes out what wrong tyres do, needs all four wheels' forces and
-    is left out. An accelerometer's offset of 0.1 m/s^2 shows as 0.58 degrees.
+    Q is a low-pass filter of `time` (s), which also gives the derivative without a difference quotient. The paper's sideslip is
+    measured; here it is that of a rear axle with its share of the lateral force. The paper's projection, which removes errors of
+    the tyres, needs the forces of all four wheels and is left out. An accelerometer offset of 0.1 m/s^2 appears as 0.58 degrees.
     """
 
     motion: BodyMotion
@@ -71,7 +72,8 @@ class DisturbanceObserver(AbstractMethod):
 
 
 class IntegralMemory(NamedTuple):
-    """What was heard, lateral speed (m/s), the bank's acceleration (m/s^2), and for how long (s)."""
+    """The motion; lateral velocity (m/s); the bank's acceleration, `push` (m/s^2); and for how long the signals have been
+    available, `age` (s)."""
 
     motion: Any
     v_y: Any
@@ -84,8 +86,8 @@ class UnknownInput(AbstractMethod):
 
         d v_y = f_y - v_x r - push + 2 w e,    d push = -w^2 e,    e = v_y,rear - v_y,    bank = arcsin(push / g)
 
-    Both poles lie at `bandwidth` w (1/s). Theirs measures the yaw rate of a car whose tyres are known; here what is followed is
-    the lateral speed of a rear axle that carries its share, which needs no steer.
+    Both poles are at `bandwidth` w (1/s). The paper's observer measures the yaw rate of a car with known tyres; this one follows
+    the lateral velocity of a rear axle with its share of the lateral force, which needs no steer.
     """
 
     motion: BodyMotion
@@ -109,7 +111,7 @@ class UnknownInput(AbstractMethod):
         dt, w, v_x, turn = heard["dt"], self.bandwidth, heard["v_x"], heard["yaw_rate"]
         f_y = self.car.plane_force(heard["a_y"])
         ahead = v_y + dt * (f_y - v_x * turn - push)
-        # Exact poles of a step, so that a long row cannot ring.
+        # Exact poles of a step, so that a long step cannot oscillate.
         fade = jnp.exp(-w * dt)
         error = self.car.rear_speed(v_x, turn, f_y) - ahead
         v_y = ahead + (1.0 - fade * fade) * error
@@ -123,10 +125,10 @@ class UnknownInput(AbstractMethod):
 
 
 def disturbance_observer(car: CarSpecification, who: str) -> DisturbanceObserver:
-    """Of a car's file."""
+    """Makes `DisturbanceObserver` from a car's file."""
     return DisturbanceObserver(motion_of(car), lateral_of(car, who))
 
 
 def unknown_input_observer(car: CarSpecification, who: str) -> UnknownInput:
-    """Of a car's file."""
+    """Makes `UnknownInput` from a car's file."""
     return UnknownInput(motion_of(car), lateral_of(car, who))

@@ -1,4 +1,4 @@
-"""Bank of a car in steady running, faded out where it is not."""
+"""Bank in a steady state, faded out in transients."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.io import CarSpecification
 
 STEERING = Need("steering_wheel", "rad")
-"""The steering wheel, which the method cannot do without."""
+"""The steering wheel angle, which the method requires."""
 
 
 class TsengMemory(NamedTuple):
-    """What was heard, the steering wheel's angle (rad), the low-passed static bank and dynamics factor, and for how long (s)."""
+    """The motion; the steering wheel's angle (rad); the low-passed static bank (rad) and trust, `agreement` (-); and for how long
+    the signals have been available, `age` (s)."""
 
     motion: Any
     wheel: Any
@@ -40,9 +41,9 @@ class TsengMemory(NamedTuple):
 class Tseng(AbstractMethod):
     """The bank of H. E. Tseng (Vehicle System Dynamics 36, 2001): `bank = static max(0, 1 - |DFC| - |d static / dt|)`.
 
-    `static = arcsin((f_y - v_x r) / g)`. The dynamics factor DFC is how far acceleration, yaw rate and steer disagree about a
-    steady state, in which `l r / v_x = steer - understeer f_y`: that residual over `doubt` (rad); the rate is over `doubt_rate`
-    (rad/s). All through a low-pass of `time` (s). `ratio` (-), `offset` (rad at the road wheels): of the steering.
+    `static = arcsin((f_y - v_x r) / g)`. The dynamics factor DFC is the deviation of acceleration, yaw rate and steer from a
+    steady state, in which `l r / v_x = steer - understeer f_y`: that residual over `doubt` (rad). The rate is divided by
+    `doubt_rate` (rad/s). All signals have a low-pass filter of `time` (s). `ratio` (-) is the steering ratio.
     """
 
     motion: BodyMotion
@@ -83,7 +84,7 @@ class Tseng(AbstractMethod):
 
 
 def tseng_of(car: CarSpecification, who: str) -> Tseng:
-    """Of a car's file."""
+    """Makes `Tseng` from a car's file."""
     return Tseng(motion_of(car), lateral_of(car, who), ratio=number_of(car, "steering_ratio", who, "-"))
 
 

@@ -1,8 +1,8 @@
-"""The road's friction from what it does to the tyres: section 3 of the review (Chen, Gao, Xu 2013).
+"""The road's friction from the tyre forces: section 3 of the review (Chen, Gao, Xu 2013).
 
-It is the friction over that on which the numbers of the car's tyres hold; for a file without tyre curves the peak force over the
-load. **Where tyres work in their linear range, nothing tells it**: force grows with ln mu by `F - s dF/ds` alone
-(`laws.SimilarCurve.sensitivity`), so every method says by `known` whether the drive excites it.
+It is the friction over that of the road on which the car's tyre parameters hold; for a file without tyre curves it is the peak
+force over the load. **It is not observable while the tyres work in their linear range**: the force grows with ln mu only by
+`F - s dF/ds` (`laws.SimilarCurve.sensitivity`). Every method therefore reports with `known` whether the drive excites it.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ NAME = "friction"
 SHOWN = {"friction": "-"}
 
 COUNT, LEAST, MOST = 28, 0.1, 1.25
-"""Filters of the recommended method, evenly from the least to the largest friction on a logarithmic scale."""
+"""Number of filters of the recommended method, from the least to the largest friction in equal logarithmic steps."""
 
 
 def _wheels(car: CarSpecification, who: str) -> WheelForces:
     for key, unit in (("wheel_radius", "m"), ("wheel_inertia", "kg m^2")):
         if getattr(car, key) is None:
             raise InputError(
-                f"friction: {who}: the car's file has no {key} ({unit}), by which a torque becomes a force."
+                f"friction: {who}: the car's file has no {key} ({unit}), which converts a torque to a force; give it."
             )
     rolling = 0.01 if car.rolling_resistance is None else car.rolling_resistance
     return WheelForces(car.wheel_radius, car.wheel_inertia, rolling)
@@ -71,7 +71,7 @@ def _aligning(car: CarSpecification) -> AligningTorque:
 def _lugre(car: CarSpecification) -> WheelObserver:
     slips = _slips(car, "lugre")
     front = slips.car.front
-    # The bristles' slip stiffness over load is sigma_0 L / 2.
+    # The slip stiffness of the bristles over load is sigma_0 L / 2.
     per_load = float(front.stiffness / slips.car.static_loads()[0])
     friction = float(front.peak / slips.car.static_loads()[0])
     law = LuGre(
@@ -84,24 +84,23 @@ def _lugre(car: CarSpecification) -> WheelObserver:
 METHODS = {
     "bank": MethodOfCar(
         _bank,
-        "a filter of the lateral motion for each of many frictions, with wheel slips where the log has them; known only near the "
-        "limit",
+        "one filter of the lateral motion per friction, with wheel slips where the log has them; known only near the limit",
         "section 3.1.2.1, joint with reference [99]; interacting multiple models (Blom & Bar-Shalom 1988)",
     ),
     "lateral_curve": MethodOfCar(
         _lateral,
-        "the front axle's force beside its slip angle on a brush curve; known only near the limit",
+        "the front axle's force and slip angle on a brush curve; known only near the limit",
         "section 3.1.2.1, by tyre response",
     ),
     "aligning_torque": MethodOfCar(
         _aligning,
-        "the steering torque's trail, which shrinks before the force saturates; trails are a guess",
+        "the pneumatic trail from the steering torque, which shrinks before the force saturates; the trails are a guess",
         "section 3.1.2.1, lateral and self-aligning",
     ),
     "hybrid": MethodOfCar(
         lambda car: HybridObserver(_lateral(car)),
-        "the observer of lateral_curve, and nonlinear least squares over two seconds where they can tell; known only near the "
-        "limit",
+        "the observer of lateral_curve, with nonlinear least squares over two seconds where these are better; known only near "
+        "the limit",
         "section 3.1.1.1, figure 3, reference [101]",
     ),
     "augmented": MethodOfCar(
@@ -117,7 +116,7 @@ METHODS = {
     ),
     "reconstruction": MethodOfCar(
         with_doubt(lambda car: Reconstruction(_slips(car, "reconstruction"))),
-        "used friction over slip and its slope, to the peak; known only where the slope falls",
+        "used friction over slip and its slope, extrapolated to the peak; known only where the slope falls",
         "section 3.2, equations 18 and 19, figure 6 (d lambda / dt guarded near 0)",
     ),
     "wheel_observer": MethodOfCar(
@@ -132,7 +131,7 @@ METHODS = {
     ),
     "sides_apart": MethodOfCar(
         with_doubt(lambda car: SidesApart(_slips(car, "sides_apart"), Follower())),
-        "left and right wheels each for themselves; known only while wheels slip",
+        "left and right wheels separately; known only while wheels slip",
         "section 3.2, equation 18 by wheel",
     ),
 }
@@ -141,7 +140,7 @@ RECOMMENDED = "bank"
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """The road on which the tyres' numbers hold."""
+    """Friction 1 in all rows: that of the road on which the tyre parameters hold."""
     del car
     return {"friction": np.ones(len(recording))}
 
@@ -152,5 +151,5 @@ def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) ->
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same a row at a time."""
+    """The same, one row at a time."""
     return LiveMethod(method_of(NAME, METHODS, source, method))

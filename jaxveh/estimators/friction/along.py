@@ -1,4 +1,4 @@
-"""What torques and wheel speeds tell of friction: the force of each wheel beside its slip."""
+"""Friction from torques and wheel speeds: the force of each wheel and its slip."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ CORNERS = ("fl", "fr", "rl", "rr")
 WHEELS = tuple(Need(f"wheel_speed_{at}", "m/s", optional=True) for at in CORNERS) + tuple(
     Need(f"torque_{at}", "N m", optional=True) for at in CORNERS
 )
-"""Wheel speeds and the torques on the wheels."""
+"""The wheel speeds, and the torques at the wheels."""
 
 SLOWEST = 0.3
-"""Share of the car's speed: a wheel that turns more slowly is about to lock, and its brake's torque is not what it gives."""
+"""Share of the car's speed: a wheel that turns more slowly is about to lock, and its brake torque is no longer the tyre's."""
 
 
 LEAST_SLIP = 0.02
-"""Of the speed: less slip than this may be an error of a wheel's radius or of the speed, and says nothing of friction's limit."""
+"""A smaller slip may be an error of a wheel's radius or of the speed, and gives no information on the friction limit."""
 
 
 class WheelsTold(NamedTuple):
-    """Of each wheel (4,): filtered `speed` (m/s) and `torque` (N m), what was measured of them last, and their `age` (s); the
-    car's filtered `v_x` (m/s); the time `t` (s)."""
+    """For each wheel (4,): filtered `speed` (m/s) and `torque` (N m), their last measurements, and their `age` (s); the car's
+    filtered `v_x` (m/s); the time `t` (s)."""
 
     t: Any
     v_x: Any
@@ -43,7 +43,8 @@ class WheelsTold(NamedTuple):
 
 
 class Slips(NamedTuple):
-    """Of each wheel (4,): longitudinal `slip` (-), `force` (N), static-load `ratio` of its load, and whether they are `there`."""
+    """For each wheel (4,): longitudinal `slip` (-), `force` (N), `load` over the static load (-), and whether they are available,
+    `there`."""
 
     slip: Any
     force: Any
@@ -52,8 +53,8 @@ class Slips(NamedTuple):
 
 
 class WheelForces(eqx.Module):
-    """Slip and longitudinal force of each wheel from its speed and torque (equation 12 of the review; torques that brake are
-    negative): `F = (T - J domega/dt) / R` less the rolling resistance, all low-pass filtered alike by `lag` (s)."""
+    """Slip and longitudinal force of each wheel from its speed and torque (equation 12 of the review; brake torques are
+    negative): `F = (T - J domega/dt) / R` less the rolling resistance, all with the same low-pass filter of `lag` (s)."""
 
     wheel_radius: jax.Array = positive("m")
     wheel_inertia: jax.Array = positive("kg m^2")
@@ -61,12 +62,12 @@ class WheelForces(eqx.Module):
     lag: jax.Array = positive("s", default=0.08)
 
     def start(self, t) -> WheelsTold:
-        """Before the first row."""
+        """The memory before the first row."""
         zero = jnp.zeros((4,), t.dtype)
         return WheelsTold(t, jnp.zeros_like(t), zero, zero, zero, zero, zero + 1e3)
 
     def next(self, last: WheelsTold, t, values, told) -> WheelsTold:
-        """With the next row; `told` is the motion's `Told` of the same row."""
+        """The memory after the next row; `told` is the motion's `Told` of the same row."""
         dt = jnp.clip(t - last.t, 0.0, 1.0)
         speeds, torques = (jnp.stack([values[f"{kind}_{at}"] for at in CORNERS]) for kind in ("wheel_speed", "torque"))
         here = ~(jnp.isnan(speeds) | jnp.isnan(torques))
@@ -82,12 +83,12 @@ class WheelForces(eqx.Module):
         )
 
     def slips(self, car: PlanarCar, memory: WheelsTold, told, yaw_rate, a_y) -> Slips:
-        """What they are now; `yaw_rate` (rad/s), `a_y` (m/s^2) as held."""
+        """The present slips and forces, from the held `yaw_rate` (rad/s) and `a_y` (m/s^2)."""
         left = jnp.asarray([-1.0, 1.0, -1.0, 1.0], memory.speed.dtype)
         along = jnp.maximum(memory.v_x, LOWEST) + left * car.half_track * yaw_rate
         along = jnp.maximum(along, 0.5 * LOWEST)
         slip = (memory.speed - along) / along
-        # The derivative of what the low-pass says.
+        # The derivative of the low-passed speed.
         faster = (memory.last_speed - memory.speed) / self.lag
         ratios, static = car.load_ratios(told.a_x), car.static_loads()
         moved = car.mass * a_y * car.cg_height / (4.0 * car.half_track)
@@ -101,8 +102,8 @@ class WheelForces(eqx.Module):
 
 
 class AlongMemory(NamedTuple):
-    """The wheels, what a rolling wheel's slip shows of errors of radius and speed (4,) and the variance of that, and what was
-    measured last."""
+    """The wheels; the slip `offset` (4,) by errors of radius and speed, seen while a wheel rolls freely, and its `variance` (4,);
+    the last yaw rate (rad/s) and a_y (m/s^2)."""
 
     wheels: WheelsTold
     offset: Any
@@ -114,11 +115,11 @@ class AlongMemory(NamedTuple):
 class AlongEvidence(eqx.Module):
     """Log-likelihoods of frictions from the wheels' slips and forces.
 
-    A radius is not known to better than `radius_noise`: what slip a wheel shows while it hardly pulls is learnt and taken off.
-    A force's error is a share `force_noise` of it and `load_noise` of the load; a slip's is `slip_noise` and what is not learnt
-    yet, which stays for `slip_time` (s), so that many rows say hardly more than one; a curve is less certain the further the
-    slip is beyond its peak. Slips below `knee` (-) hardly count: they tell stiffness, not friction. Rows closer than
-    `correlation` (s) say the same.
+    A radius is known to a share of `radius_noise` (-): the slip of a wheel at small force is learned as an offset and subtracted.
+    A force's error is a share `force_noise` (-) of it and `load_noise` (-) of the load. A slip's error is `slip_noise` (-) and
+    the error of the offset; it lasts for `slip_time` (s), so that many rows give hardly more information than one. The curve's
+    uncertainty grows with the slip. Slips below `knee` (-) hardly count: they depend on stiffness, not on friction. Rows closer
+    than `correlation` (s) count as one.
     """
 
     car: PlanarCar
@@ -137,25 +138,26 @@ class AlongEvidence(eqx.Module):
         return WHEELS
 
     def start(self, t) -> AlongMemory:
-        """Before the first row."""
+        """The memory before the first row."""
         wheels = self.wheels.start(t)
         unknown = jnp.square(self.radius_noise) + jnp.zeros_like(wheels.speed)
         return AlongMemory(wheels, jnp.zeros_like(wheels.speed), unknown, jnp.zeros_like(t), jnp.zeros_like(t))
 
     def _learn(self, memory: AlongMemory, seen: Slips, stiffness, dt):
-        """The slips' offsets and variances after a row: of wheels that pull less than a tenth of their load."""
+        """The slips' offsets and variances after a row. They are learned from wheels whose force is less than a tenth of the
+        linear force at a slip of 0.05."""
         rolls = seen.there & (jnp.abs(seen.force) < 0.1 * self.stiffness_ratio * stiffness * 0.05)
         shown = jnp.where(rolls, seen.slip - seen.force / (self.stiffness_ratio * stiffness * seen.load), 0.0)
         variance = jnp.minimum(
             memory.variance + dt * jnp.square(self.slip_noise) / 100.0, jnp.square(self.radius_noise)
         )
-        # Errors of a slip are alike for half a second.
+        # Errors of a slip are correlated over half a second.
         rough = jnp.square(0.003 + 0.0 * variance) * 0.5 / jnp.maximum(dt, 1e-3)
         gain = jnp.where(rolls, variance / (variance + rough), 0.0)
         return memory.offset + gain * (shown - memory.offset), (1.0 - gain) * variance
 
     def next(self, memory: AlongMemory, t, values, told, frictions, weights):
-        """The memory, and the log-likelihood of each friction (K,), of probabilities `weights`, for the time since the last
+        """The memory, and the log-likelihood (K,) of `frictions` with probabilities `weights`, for the time since the last
         row."""
         dt = jnp.clip(t - memory.wheels.t, 0.0, 1.0)
         wheels = self.wheels.next(memory.wheels, t, values, told)
@@ -172,12 +174,12 @@ class AlongEvidence(eqx.Module):
         for k in range(4):
             curve, across = (self.car.front, lateral[0]) if k < 2 else (self.car.rear, lateral[1])
             one = jax.tree.map(lambda leaf, k=k: leaf[k], seen)
-            # Two wheels of an axle share most of their errors.
+            # The two wheels of an axle share most of their errors.
             of = lambda mu, c=curve, f=across, s=one, p=variance[k]: self._of_wheel(c, f, s, p, mu)
             error, rough = jax.vmap(of)(frictions)
-            # One variance for all, as for the motion.
+            # One variance for all frictions, as for the motion.
             counts = one.slip**4 / (one.slip**4 + self.knee**4)
-            # A wheel that slides across tells little along.
+            # A wheel that slides laterally gives little longitudinal information.
             limit = jnp.sum(weights * frictions) * curve.peak
             counts = counts * jnp.square(jnp.maximum(1.0 - jnp.square(across / limit), 0.0))
             total = total - 0.25 * counts * jnp.square(error) / jnp.sum(weights * rough)

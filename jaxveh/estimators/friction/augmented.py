@@ -1,4 +1,4 @@
-"""Friction as a slow state of a single track with nonlinear tyres: what `d mu / dt = 0` stands for."""
+"""Friction as a slow state of a single track with nonlinear tyres, from the assumption `d mu / dt = 0`."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ READS = (
     Need("a_y", "m/s^2"),
 )
 KNOWN = 0.12
-"""Spread of ln mu up to which it is known."""
+"""Standard deviation of ln mu up to which the friction is known."""
 
 USUAL, SPREAD = 0.8, 0.6
-"""Friction before anything is told, and the spread of its logarithm."""
+"""Prior friction, and the standard deviation of its logarithm."""
 
 
 class State(NamedTuple):
@@ -37,9 +37,11 @@ class State(NamedTuple):
 
 
 def augmented_filter(car: PlanarCar) -> Filtered:
-    """An unscented filter of [v_y, yaw rate, ln mu]; friction walks by 0.05 of itself in a second. Below `LOWEST` the model runs
-    as at that speed, and nothing is known. It knows no jumps: it follows one as fast as its walk lets it, and its spread, that of
-    white noises, is too small by what its tyre curve lacks."""
+    """An unscented filter of [v_y, yaw rate, ln mu]; friction walks by 0.05 of itself in a second.
+
+    Below `LOWEST` the model runs as at that speed, and nothing is known. The model has no jumps of friction, so that it follows
+    one only as fast as the random walk allows. Its standard deviation assumes white noises, and leaves out errors of the tyre
+    curve."""
     model = StateSpace(
         system=car, transition=_transition, observation=_observation, report=_report,
         process_noise=Continuous(Gaussian({"v_y": 0.2, "yaw_rate": 0.1, "log_friction": 0.05})),
@@ -57,7 +59,7 @@ def _forces(car: PlanarCar, x, u):
 
 
 def _transition(car: PlanarCar, t0, t1, x, u):
-    """Linearly implicit steps on the tyres' damping, stable for rows as sparse as a tenth of a second."""
+    """A step that is linearly implicit in the tyres' damping, stable for steps up to a tenth of a second."""
     v_x = jnp.maximum(u.v_x, LOWEST)
     front, rear = _forces(car, x, u)
     stiff, a, b = car.front.stiffness + car.rear.stiffness, car.front_axle_to_cg, car.rear_axle_to_cg

@@ -1,4 +1,4 @@
-"""Friction from the axles' lateral forces, which inertial sensors tell: by the tyre curve, by the steering torque, over a
+"""Friction from the axles' lateral forces, which follow from inertial sensors: by the tyre curve, by the steering torque, over a
 window."""
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.vehicles import GRAVITY
 
 LEAST_FORCE = 0.15
-"""Of the axle's limit on dry road: a linear force below this does not tell whether the curve bends."""
+"""Share of the axle's limit on dry road: a linear force below this does not show whether the curve bends."""
 
 
 class AxlesTold(NamedTuple):
-    """The motion and, low-pass filtered alike: steer (rad), yaw rate (rad/s), a_y (m/s^2); and what was measured last of yaw
+    """The motion; steer (rad), yaw rate (rad/s) and a_y (m/s^2) with the same low-pass filter; and the last measurements of yaw
     rate and a_y."""
 
     told: Told
@@ -36,24 +36,25 @@ class AxlesTold(NamedTuple):
 
 
 class Axles(eqx.Module):
-    """Lateral forces of both axles by equation 15, and the difference of their slip angles, which needs no lateral speed:
-    `alpha_f - alpha_r = delta - l r / v`. All is low-pass filtered by `lag` (s), whose derivative is the yaw acceleration's.
+    """Lateral forces of both axles by equation 15, and the difference of their slip angles, which needs no lateral velocity:
+    `alpha_f - alpha_r = delta - l r / v`. All signals have a low-pass filter of `lag` (s); its derivative of the yaw rate is the
+    yaw acceleration.
     """
 
     car: PlanarCar
     lag: jax.Array = positive("s", default=0.06)
 
     def start(self, t, values) -> AxlesTold:
-        """After the first row."""
+        """The memory after the first row."""
         told, zero = start_told(t, values), jnp.zeros_like(t)
         known = lambda name: jnp.where(jnp.isnan(values[name]), zero, values[name])
         return AxlesTold(told, told.steer, known("yaw_rate"), known("a_y"), known("yaw_rate"), known("a_y"))
 
     def next(self, last: AxlesTold, t, values) -> AxlesTold:
-        """After the next row."""
+        """The memory after the next row."""
         dt = jnp.clip(t - last.told.t, 0.0, 1.0)
         told = next_told(last.told, t, values)
-        # The bilinear low-pass, of which `(x - slow) / lag` is the derivative exactly.
+        # The bilinear low-pass filter, whose exact derivative is `(x - slow) / lag`.
         share = dt / (2.0 * self.lag + dt)
         held = lambda name, old: jnp.where(jnp.isnan(values[name]), old, values[name])
         yaw_rate, a_y = held("yaw_rate", last.last_yaw_rate), held("a_y", last.last_a_y)
@@ -64,17 +65,17 @@ class Axles(eqx.Module):
         )  # fmt: skip
 
     def forces(self, now: AxlesTold):
-        """Of front and rear, N."""
+        """The lateral forces of front and rear axle, N."""
         turn = (now.last_yaw_rate - now.yaw_rate) / self.lag
         return self.car.axle_forces(now.a_y / (1.0 + GRAVITY * self.car.roll_gradient), turn)
 
     def slip_difference(self, now: AxlesTold):
-        """That of front and rear slip angle, rad."""
+        """The front slip angle less the rear slip angle, rad."""
         return now.steer - self.car.wheelbase * now.yaw_rate / now.told.v_x
 
     def residual(self, forces, difference, log_friction, stiffer):
-        """Front force (N) that is measured less the one that the brush makes of the front slip, the rear's being told by its
-        force. `stiffer`: logarithms of front and rear stiffness over the file's."""
+        """The measured front force (N) less that of the brush curve at the front slip angle; the rear slip angle follows from the
+        rear force. `stiffer`: logarithms of front and rear stiffness over the file's."""
         mu, car = jnp.exp(log_friction), self.car
         front, rear = (
             axle.stiffness * jnp.exp(more) for axle, more in zip((car.front, car.rear), stiffer, strict=True)
@@ -83,8 +84,8 @@ class Axles(eqx.Module):
         return forces[0] - brush_curve.force(difference + behind, front, mu * car.front.peak)
 
     def bend(self, forces, difference, log_friction, stiffer):
-        """The share (-) of a linear front force that is missing, in what is measured or in what this friction foretells,
-        whichever is more; 0 at little slip, where noise would be all of it."""
+        """The missing share (-) of the linear front force, in the measured force or in the one predicted with this friction,
+        whichever is more; 0 at small slip, where it would be noise."""
         mu, car = jnp.exp(log_friction), self.car
         rear = brush_curve.slip_of(forces[1], car.rear.stiffness * jnp.exp(stiffer[1]), mu * car.rear.peak)
         linear = car.front.stiffness * jnp.exp(stiffer[0]) * jnp.abs(difference + rear)
@@ -95,15 +96,16 @@ class Axles(eqx.Module):
 
 
 class LateralCurve(AbstractMethod):
-    """Friction by an axle's brush curve: the front force beside the front slip angle.
+    """Friction from an axle's brush curve: the front force at the front slip angle.
 
-    The rear force tells its slip angle (the brush's inverse), steer and yaw rate the front's from it, and the front force what
-    friction there is. In the linear range nothing is told: the force grows by `F - alpha dF/dalpha` with ln mu.
+    The rear force gives the rear slip angle (the brush's inverse), which with steer and yaw rate gives the front slip angle; the
+    front force at this angle gives the friction. In the linear range friction is not observable, because the force grows with
+    ln mu only by `F - alpha dF/dalpha`.
 
-    Both axles' stiffness is believed to the follower's spread, and learnt.
+    Both axles' stiffnesses are estimated, too, with the follower's standard deviation as prior.
 
-    `force_noise` (-): error of the front force as a share of itself, `noise` as a share of the static load; rows of which more
-    than `knee` (-) of the linear force is missing tell friction.
+    `force_noise` (-): error of the front force as a share of itself; `noise` (-): as a share of the static load. Rows update the
+    friction if more than `knee` (-) of the linear force is missing.
     """
 
     axles: Axles
@@ -138,12 +140,13 @@ class LateralCurve(AbstractMethod):
 
 
 class AligningTorque(AbstractMethod):
-    """Friction by the steering torque: the pneumatic trail shrinks from the smallest slip on, so that it knows sooner than the
-    force (the review names the chain; the trail is the brush's, `t_0 (1 - g)^3 / (1 - g + g^2 / 3)`).
+    """Friction from the steering torque: the pneumatic trail shrinks from the smallest slip on, so that it shows friction sooner
+    than the force (the review names the chain; the trail is the brush's, `t_0 (1 - g)^3 / (1 - g + g^2 / 3)`).
 
-    The torque of the road on both front wheels is the steering wheel's times `steering_ratio` (friction and assistance of the
-    steering are not in it): `M = F_yf (caster_trail + t)`. `caster_trail`, `pneumatic_trail` t_0 (m): no file has them, the
-    defaults are a guess and the answer is as good as they are. `torque_noise` (N m at the steering wheel), `trail_noise` (m).
+    The torque of the road on both front wheels is that at the steering wheel times `steering_ratio` (-), without friction and
+    assistance of the steering: `M = F_yf (caster_trail + t)`. `caster_trail`, `pneumatic_trail` t_0 (m): a car's file has
+    neither; the defaults are a guess, and the answer is only as good as they are. `torque_noise` (N m at the steering wheel),
+    `trail_noise` (m).
     """
 
     axles: Axles
@@ -198,12 +201,13 @@ class Window(NamedTuple):
 
 
 class HybridObserver(AbstractMethod):
-    """An observer and nonlinear least squares over a window, the one that can tell (figure 3 of the review; reference [101]).
+    """An observer, and nonlinear least squares over a window where it is better (figure 3 of the review; reference [101]).
 
-    The observer (`lateral`) follows row by row. Its gain fails at large front and small rear slip angles and where nothing is
-    excited; over a window of samples `every` (s) a few Gauss-Newton steps on the same residuals find ln mu at once. Where the
-    window's information, `sum (dF / d ln mu)^2 / noise^2` of samples of which those within `correlation` (s) say the same, is
-    above `enough` and tells more than the observer knows, the answer is the least squares', and the observer goes on from it.
+    The observer (`lateral`) follows row by row. Its gain fails at large front and small rear slip angles, and without excitation.
+    Over a window of samples every `every` (s), a few Gauss-Newton steps on the same residuals find ln mu at once. The window's
+    information is `sum (dF / d ln mu)^2 / noise^2`, where samples within `correlation` (s) count as one. Where it is above
+    `enough` (-) and its variance of ln mu is below the observer's, the answer is that of least squares, and the observer
+    continues from it.
     """
 
     lateral: LateralCurve
@@ -229,7 +233,7 @@ class HybridObserver(AbstractMethod):
         difference = axles.slip_difference(now)
         tells = axles.bend((front, rear), difference, state.log_friction, state.stiffer) > self.lateral.knee
         sample = (front, rear, difference, jnp.where(now.told.moves & tells, 1.0, 0.0))
-        # A little earlier, so that rounding does not choose the rows.
+        # Slightly earlier, so that the choice of rows does not depend on rounding.
         due = t - window.time >= 0.95 * self.every
         push = lambda old, new: jnp.where(due, jnp.concatenate([old[1:], new[None]]), old)
         front, rear, difference, weight = map(push, window[:4], sample)
@@ -244,8 +248,8 @@ class HybridObserver(AbstractMethod):
         return ((now, state), window), self.lateral._answer(now, state)
 
     def _least_squares(self, window: Window, state: CurveBelief):
-        """ln mu, its information, and by how much it grows with the logarithms of front and rear stiffness (2,): three steps of
-        Gauss and Newton, damped, with the stiffness that the observer believes."""
+        """ln mu, its information, and its derivatives by the logarithms of front and rear stiffness (2,): three damped
+        Gauss-Newton steps with the observer's stiffnesses."""
         axles, lateral, x = self.lateral.axles, self.lateral, state.mean
         forces = (window.front, window.rear)
         noise = lateral.noise * axles.car.static_loads()[0] + lateral.force_noise * jnp.abs(window.front)
@@ -263,7 +267,7 @@ class HybridObserver(AbstractMethod):
 
 
 def _told_by_window(P, information, pull):
-    """The covariance where ln mu is that of a window alone: its noise's, and what the stiffness does to it."""
+    """The covariance where ln mu is that of a window only: that of its noise, and that of the stiffnesses' errors."""
     across = P[1:, 1:] @ pull
     own = 1.0 / jnp.maximum(information, 1.0) + pull @ across
     return P.at[0, 0].set(own).at[0, 1:].set(across).at[1:, 0].set(across)

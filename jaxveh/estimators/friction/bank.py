@@ -1,4 +1,4 @@
-"""The recommended method: a filter of the lateral motion for each of many frictions, weighed by what they foretold."""
+"""The recommended method: one filter of the lateral motion per friction, weighted by their predictions."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from jaxveh.estimators.method import AbstractMethod, answer
 from jaxveh.vehicles import GRAVITY
 
 STATES = 7
-"""v_y (m/s), yaw rate (rad/s), relative stiffness errors in front and at the rear, offsets of a_y (m/s^2) and steer (rad), and by
-which share of itself a_y shows more because the body leans."""
+"""Number of states: v_y (m/s), yaw rate (rad/s), relative stiffness errors in front and at the rear, offsets of a_y (m/s^2) and
+steer (rad), and the relative increase of the measured a_y because the body leans."""
 
 
 STEER_TIME = 3.0
-"""s: how long an error of the measured steer lasts, most of it the play of the steering."""
+"""s: time constant of an error of the measured steer, most of which is the play of the steering."""
 
 
 NEAR = 0.18232
-"""ln 1.2: a friction is known where it is within this of the truth."""
+"""ln 1.2: a friction is known if it is probably within this range around the median."""
 
 
 class Bank(NamedTuple):
-    """Logarithms of the weights (K,), each filter's mean (K, 6) and covariance (K, 6, 6)."""
+    """Logarithms of the weights (K,), each filter's mean (K, 7) and covariance (K, 7, 7)."""
 
     weights: Any
     means: Any
@@ -38,8 +38,8 @@ class Bank(NamedTuple):
 
 
 class BankMemory(NamedTuple):
-    """What the log has told last, the filters, and what the wheels' slips have said (None for a file without the wheels'
-    radius and inertia)."""
+    """The last motion, `told`; the filters, `bank`; and the memory of the wheel slips, `along` (None for a file without the
+    wheels' radius and inertia)."""
 
     told: Told
     bank: Bank
@@ -47,27 +47,30 @@ class BankMemory(NamedTuple):
 
 
 class FrictionBank(AbstractMethod):
-    """Friction by many filters, one a friction, whose weights are the probabilities of the frictions.
+    """Friction by a bank of filters, one per friction, whose weights are the probabilities of the frictions.
 
-    Each filter is an extended Kalman filter of a single track whose axle curves friction stretches (`SimilarCurve`), with what
-    would be taken for friction as states of its own: the axles' stiffness errors, the offsets of accelerometer and steer. In a
-    row they are mixed (interacting multiple models, Blom & Bar-Shalom 1988): friction walks slowly, and jumps now and then to
-    anything. So weights forget, a jump is followed as fast as the forces can tell it, and a spread says what is not known:
-    forces in the linear range say only that there is more friction than they use. Torques and wheel speeds, where the log has
-    them and the car's file a wheel, weigh the frictions by the longitudinal slips (`AlongEvidence`).
+    Each filter is an extended Kalman filter of a single track whose axle curves are scaled by friction (`SimilarCurve`). Errors
+    that could be mistaken for friction are states: the axles' stiffness errors, the offsets of accelerometer and steer. In each
+    row the filters are mixed (interacting multiple models, Blom & Bar-Shalom 1988): friction walks slowly, and sometimes jumps
+    to any value. So old evidence is forgotten, a jump is followed as fast as the forces show it, and the standard deviation
+    reflects missing excitation: forces in the linear range only show that there is more friction than they use. If the log has
+    torques and wheel speeds and the car's file has the wheels' radius and inertia, longitudinal slips also weight the frictions
+    (`AlongEvidence`).
 
-    It says the median and the standard deviation about it. `known`: with `certainty` at least the friction is within 20 % of
-    the median. It answers of the road's friction over that on which the car's tyre numbers hold, one for all wheels.
+    The answer is the median and the standard deviation about it. `known`: the probability that the friction is within 20 % of the
+    median is at least `certainty`. The estimate is the road's friction over that on which the car's tyre parameters hold, one
+    value for all wheels.
 
-    `frictions` (K,) of the filters and `prior` (K,), their probabilities where nothing is told; `jumps` (1/s): how often it
-    changes to anything; `walk` (1/sqrt(s)): how fast ln mu wanders; `turn_time`, `force_time` (s): innovations of yaw rate and of
-    a_y closer than this count as one; `stiffness_spread` (-) of an axle's slope, which changes within `stiffness_time` (s) so
-    that it takes up what the curve lacks; `steer_noise` (rad), play included; `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5):
-    what the model leaves out; `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y; `yaw_rate_noise` (rad/s).
+    `frictions` (K,) of the filters and `prior` (K,), their probabilities without information; `jumps` (1/s): rate of jumps to any
+    friction; `walk` (1/sqrt(s)): random walk of ln mu; `turn_time`, `force_time` (s): innovations of yaw rate and of a_y closer
+    than this count as one; `stiffness_spread` (-) of an axle's slope, which changes within `stiffness_time` (s) and so absorbs
+    errors of the curve; `steer_noise` (rad), play included; `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5): model errors;
+    `a_y_noise` (m/s^2) and `force_noise` (-), a share of the measured a_y; `yaw_rate_noise` (rad/s).
 
-    The weights are no exact likelihoods: one innovation variance serves all frictions, for each its own would prefer little
-    friction wherever noises are overrated. So the spread hangs on noises that were chosen on simulated cars: too wide on some,
-    too small on others. A friction that was known stays so for up to a few seconds after a jump that nothing excites.
+    The weights are no exact likelihoods: all frictions share one innovation variance, because separate ones would favour low
+    friction wherever the noise is overestimated. The standard deviation therefore depends on noises that were chosen on simulated
+    cars; it is too large on some cars and too small on others. A known friction stays known for up to a few seconds after a jump
+    without excitation.
     """
 
     car: PlanarCar
@@ -132,7 +135,8 @@ class FrictionBank(AbstractMethod):
         )
 
     def _mix(self, bank: Bank, dt) -> Bank:
-        """Friction walks and jumps: every filter takes over from those whose friction may have become its own."""
+        """The mixing step, in which friction walks and jumps: each filter starts from those whose friction may have changed to
+        its own."""
         count = len(self.frictions)
         spacing = jnp.log(self.frictions[1:] / self.frictions[:-1])
         there = jnp.minimum(0.5 * jnp.square(self.walk / spacing) * dt, 0.3)
@@ -152,7 +156,7 @@ class FrictionBank(AbstractMethod):
         return Bank(jnp.log(after), means + middle, mixed)
 
     def _forces(self, x, friction, told: Told):
-        """Lateral forces of both axles (N) in the body's axes, the longitudinal ones taken out of the friction."""
+        """Lateral forces of both axles (N) in the body's axes; longitudinal forces reduce the available friction."""
         v_y, yaw_rate, soft_front, soft_rear, _, offset, _ = x
         car = self.car
         slips = car.slip_angles(told.steer - offset, told.v_x, v_y, yaw_rate)
@@ -175,7 +179,7 @@ class FrictionBank(AbstractMethod):
         return jnp.stack([v_y, turn])
 
     def _felt(self, x, friction, told: Told):
-        """The lateral acceleration as the leaning accelerometer shows it."""
+        """The lateral acceleration that the leaning accelerometer measures."""
         front, rear = self._forces(x, friction, told)
         return (front + rear) / self.car.mass * (1.0 + x[6]) + x[4]
 
@@ -224,7 +228,7 @@ class FrictionBank(AbstractMethod):
         means, covariances, said = jax.vmap(one)(bank.means, bank.covariances, self.frictions)
         likelihoods = jnp.zeros_like(self.frictions)
         for (error, variance), time in zip(said, (self.turn_time, self.force_time), strict=True):
-            # One variance for all: what is foretold less sharply is no less likely where noises are a guess.
+            # One variance for all: where noises are a guess, a less certain prediction is not less likely.
             common = jnp.sum(jnp.exp(bank.weights) * variance)
             likelihoods = likelihoods - 0.5 * (1.0 - jnp.exp(-dt / time)) * jnp.square(error) / common
         return Bank(bank.weights, means, covariances), likelihoods
@@ -242,7 +246,7 @@ class FrictionBank(AbstractMethod):
 
 
 def scalar_update(x, P, measured, observation, variance):
-    """Kalman's update by one number, NaN where it is missing; and its innovation (0 there) with its variance."""
+    """The Kalman update by one scalar measurement, NaN if missing; with the innovation (0 if missing) and its variance."""
     here = ~jnp.isnan(measured)
     expected, slope = observation(x), jax.grad(observation)(x)
     error = jnp.where(here, measured, expected) - expected
@@ -254,7 +258,7 @@ def scalar_update(x, P, measured, observation, variance):
 
 
 def _quantile(places, weights, share: float):
-    """Where the weights, each spread evenly between the middles to its neighbours, reach a share."""
+    """The place at which the cumulated weights reach a share. Each weight is spread evenly to the midpoints to its neighbours."""
     middles = 0.5 * (places[1:] + places[:-1])
     edges = jnp.concatenate([2.0 * places[:1] - middles[:1], middles, 2.0 * places[-1:] - middles[-1:]])
     sums = jnp.concatenate([jnp.zeros_like(weights[:1]), jnp.cumsum(weights)])

@@ -1,4 +1,4 @@
-"""The friction's logarithm beside those of both axles' stiffness, followed by what single residuals say."""
+"""The logarithms of friction and of both axles' stiffnesses, followed by a filter of single residuals."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ class CurveBelief(NamedTuple):
 
 
 class CurveFollower(eqx.Module):
-    """A Kalman filter of ln mu, as `scalar.Follower`, that does not believe the file's stiffness: a curve that lies lower than
-    the file's is a softer tyre or a slippery road, and only where it bends the two differ.
+    """A Kalman filter of ln mu, like `scalar.Follower`, that also estimates the stiffnesses: a force below the file's curve means
+    a softer tyre or a slippery road, and the two can only be distinguished where the curve bends.
 
-    Every row tells the stiffness, those where the curve bends the friction, too. Friction returns to `usual` within `memory`
-    (s) where nothing is told, stiffness to the file's within `stiffness_memory` (s), each with its spread (of the logarithm,
-    `spread` and `stiffness_spread`). `correlation` (s): residuals closer than this say the same; `known` (-): up to this spread
-    of ln mu the friction is known; `surprise`: how large averaged squared innovations over their variance may be before friction
-    is forgotten; `attention` (s): over which they are averaged.
+    Every row updates the stiffness; rows where the curve bends also update the friction. Without information friction returns to
+    `usual` (-) within `memory` (s), and stiffness to the file's within `stiffness_memory` (s), with standard deviations of the
+    logarithms of `spread` (-) and `stiffness_spread` (-). `correlation` (s): residuals closer than this are fully correlated;
+    `known` (-): up to this standard deviation of ln mu the friction is known; `surprise` (-): limit of the averaged squared
+    innovations over their variance, above which friction is forgotten; `attention` (s): time constant of this average.
     """
 
     usual: jax.Array = positive("-", default=0.8)
@@ -54,7 +54,7 @@ class CurveFollower(eqx.Module):
     attention: jax.Array = positive("s", default=0.3)
 
     def start(self) -> CurveBelief:
-        """Where nothing is told yet."""
+        """The belief before any information."""
         mean, covariance = self._nothing()
         return CurveBelief(mean, covariance, jnp.ones_like(self.usual))
 
@@ -66,8 +66,8 @@ class CurveFollower(eqx.Module):
         )
 
     def next(self, last: CurveBelief, dt, residual, noise, here, tells) -> CurveBelief:
-        """After `dt` (s) and a residual: a function of the mean (3,), zero at the truth but for `noise` (its standard deviation);
-        `here`: whether it was measured, `tells`: whether the friction may be told by it."""
+        """The belief after `dt` (s) and a residual. `residual` is a function of the mean (3,) that is zero at the truth, except
+        for `noise` (its standard deviation); `here`: whether it was measured; `tells`: whether it may update the friction."""
         mean, P = self._ahead(last, dt)
         error, slope = jax.value_and_grad(residual)(mean)
         rough = jnp.square(noise) * jnp.maximum(self.correlation / jnp.maximum(dt, 1e-3), 1.0)
@@ -79,7 +79,7 @@ class CurveFollower(eqx.Module):
         P = jnp.where(jumped, self._forgets_friction(P), P)
         along = P @ slope
         gain = jnp.where(here, -along / (slope @ along + rough), 0.0)
-        # A row that does not tell the friction leaves it, and what is known of it.
+        # A row that may not update the friction leaves its mean and its variance.
         gain = jnp.where(jnp.asarray([True, False, False]) & ~tells, 0.0, gain)
         mean = mean + jnp.clip(gain * jnp.where(here, error, 0.0), -0.5, 0.5)
         mean = mean.at[0].set(jnp.clip(mean[0], jnp.log(LOWEST_FRICTION), jnp.log(HIGHEST_FRICTION)))

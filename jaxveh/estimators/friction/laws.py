@@ -1,4 +1,4 @@
-"""What a car's file says of its axles' forces on a road of any friction, and what a force can tell of that friction."""
+"""Axle forces of a car's file on a road of any friction, and the sensitivity of a force to that friction."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from jaxveh.tyres import kit as tyres
 from jaxveh.vehicles import GRAVITY
 
 LEAST_FRICTION = 0.02
-"""The least friction by which a slip is divided."""
+"""Lower limit of the friction by which a slip is divided."""
 
 ROLL_GRADIENT = 0.006
-"""rad s^2/m: how far an ordinary body leans for a lateral acceleration. A file does not say it."""
+"""rad s^2/m: roll angle of an ordinary body per lateral acceleration, used for every car instead of the file's value."""
 
 
 class SimilarCurve(eqx.Module):
-    """An axle's force over its slip, stretched by friction as the similarity method has it (Pacejka, 3rd ed., sec. 4.2):
+    """An axle's force over its slip, scaled by friction with the similarity method (Pacejka, 3rd ed., sec. 4.2):
 
         F = mu f D sin(C atan(x - E (x - atan x))),    x = k K s / (C D mu)
 
-    `stiffness` K (N/rad, or N along) at the static load, which friction leaves as it is; `peak` D (N) at the static load on the
-    road on which the file's numbers hold; `shape` C, `bend` E (-). f is load over static load, k a factor on the stiffness.
+    `stiffness` K (N/rad, longitudinally N) at the static load, independent of friction; `peak` D (N) at the static load on the
+    road on which the file's parameters hold; `shape` C, `bend` E (-). f is load over static load, k a factor on the stiffness.
     """
 
     stiffness: jax.Array = positive("N/rad")
@@ -46,17 +46,18 @@ class SimilarCurve(eqx.Module):
         return jax.jvp(lambda s: self.force(s, friction, load, factor), (slip,), (jnp.ones_like(slip),))
 
     def sensitivity(self, slip, friction, load=1.0, factor=1.0):
-        """By how much the force (N) grows with the friction's logarithm: `dF / d ln mu = F - s dF/ds` of every law that friction
-        stretches alike. The linear part of a force says nothing; this is what is left.
+        """The derivative of the force (N) by the friction's logarithm: `dF / d ln mu = F - s dF/ds`, for every tyre law that
+        friction scales in this way. The linear part of a force contributes nothing to it.
 
-        The bound: a force known to `std` newton cannot tell ln mu better than `std / |told|`.
+        It bounds the accuracy: from a force with a standard deviation of `std` (N), that of ln mu is at least
+        `std / |dF / d ln mu|`.
         """
         force, slope = self.with_slope(slip, friction, load, factor)
         return force - slip * slope
 
 
 class PlanarCar(eqx.Module):
-    """What the methods want of a car, each number a leaf; see `planar_car` for those that a file need not have."""
+    """The car's parameters that the methods need, each a leaf; `planar_car` has defaults for those that a file may lack."""
 
     front: SimilarCurve
     rear: SimilarCurve
@@ -87,7 +88,7 @@ class PlanarCar(eqx.Module):
         return least(1.0 - moved / self.rear_axle_to_cg), least(1.0 + moved / self.front_axle_to_cg)
 
     def axle_forces(self, a_y, yaw_acceleration):
-        """Lateral forces of both axles (N) by equation 15 of the review, small steer: what the inertial sensors say of them."""
+        """Lateral forces of both axles (N) from the inertial sensors, by equation 15 of the review for small steer."""
         turn = self.yaw_inertia * yaw_acceleration
         lateral = self.mass * a_y
         front = (turn + self.rear_axle_to_cg * lateral) / self.wheelbase
@@ -100,8 +101,8 @@ class PlanarCar(eqx.Module):
 
 
 def planar_car(car: CarSpecification) -> PlanarCar:
-    """The car of a file. What the file leaves out is ordinary: a centre of gravity 0.55 m high, a track of 1.5 m, half of the
-    drive and 0.65 of the brakes in front; a tyre without a curve has the shape and the friction of `tyres.kit.GENERIC_TYRE`."""
+    """The car of a file. Missing values have defaults: a centre of gravity 0.55 m high, a track of 1.5 m, half of the drive and
+    0.65 of the brakes in front; a tyre without a curve has the shape and the friction of `tyres.kit.GENERIC_TYRE`."""
     told = lambda value, otherwise: otherwise if value is None else value
     tracks = [track for track in (car.track_front, car.track_rear) if track is not None] or [1.5]
     weight = car.mass * GRAVITY / car.wheelbase
@@ -118,7 +119,7 @@ def planar_car(car: CarSpecification) -> PlanarCar:
 
 
 def along_curve(curve: SimilarCurve, ratio: float = 1.2) -> SimilarCurve:
-    """The curve along of an axle whose lateral one is known: as much friction and the same shape, `ratio` times as stiff."""
+    """The longitudinal curve of an axle from its lateral one: equal friction and shape, `ratio` times the stiffness."""
     return SimilarCurve(ratio * curve.stiffness, curve.peak, curve.shape, curve.bend)
 
 

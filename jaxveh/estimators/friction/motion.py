@@ -1,4 +1,4 @@
-"""What a log tells of the car's motion at the front of every lateral method: values held between rows, and their ages."""
+"""The car's motion from a log, the first stage of every lateral method: values held between measurements, and their ages."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ LATERAL = (Need("v_x", "m/s"), Need("steer", "rad"), Need("yaw_rate", "rad/s"), 
 """Speed, steer at the road wheels, yaw rate and lateral acceleration."""
 
 LOWEST = 5.0
-"""m/s: below this speed nothing lateral is told."""
+"""m/s: below this speed no lateral quantity is known."""
 
 LAG = 0.025
-"""s: inertial sensors are later than the steering angle's by about this, their low-pass included."""
+"""s: delay of the inertial sensors against the steering angle sensor, their low-pass filter included."""
 
 LONGEST = 0.3
-"""s: a value that is older than this is not known any more."""
+"""s: a value that is older than this is no longer known."""
 
 
 class Told(NamedTuple):
-    """The last row: its time `t` (s), `v_x` (m/s, never below `LOWEST`), `steer` (rad) as late as the inertial sensors are,
-    `a_x` (m/s^2), their ages (s) as far as they matter, and whether it `moves`: speed, steer and inertial sensors speak. What was
-    measured last is `raw_v_x` and `raw_steer`."""
+    """The last row: its time `t` (s), `v_x` (m/s, never below `LOWEST`), `steer` (rad) with the delay of the inertial sensors,
+    `a_x` (m/s^2), the ages (s) of speed, steer and inertial sensors, and whether the car `moves`: speed, steer and inertial
+    sensors have recent measurements, and the speed is at least `LOWEST`. `raw_v_x` and `raw_steer` are the last measurements."""
 
     t: Any
     v_x: Any
@@ -39,13 +39,13 @@ class Told(NamedTuple):
 
 
 def start_told(t, values) -> Told:
-    """What the first row tells."""
+    """The motion after the first row."""
     zero, old = jnp.zeros_like(t), jnp.full_like(t, 1e3)
     return next_told(Told(t, zero + LOWEST, zero, zero, zero, zero, old, old, old, jnp.asarray(False)), t, values)
 
 
 def next_told(last: Told, t, values) -> Told:
-    """What the next row tells."""
+    """The motion after the next row."""
     dt = jnp.clip(t - last.t, 0.0, 1.0)
     v_x, speed_age = _held(values["v_x"], last.raw_v_x, last.speed_age, dt)
     raw_steer, steer_age = _held(values["steer"], last.raw_steer, last.steer_age, dt)

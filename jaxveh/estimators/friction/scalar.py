@@ -1,4 +1,4 @@
-"""One number that walks: the friction's logarithm, followed by what single residuals say."""
+"""A random walk of the friction's logarithm, followed by a filter of single residuals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxveh._core.parameter import positive
 
 LOWEST_FRICTION, HIGHEST_FRICTION = 0.05, 1.5
-"""What a friction is held between."""
+"""Bounds of a friction."""
 
 
 class LogFriction(NamedTuple):
@@ -23,12 +23,12 @@ class LogFriction(NamedTuple):
 
 
 class Follower(eqx.Module):
-    """A Kalman filter of ln mu, which returns to `usual` friction within `memory` (s) where nothing is told, and is widened anew
-    where innovations are too large for its spread: so a jump is followed.
+    """A Kalman filter of ln mu, which returns to the `usual` friction (-) within `memory` (s) where there is no information. Its
+    variance is reset where innovations are too large for it, so that a jump is followed.
 
-    `spread` (-) of ln mu where nothing is told; `correlation` (s): residuals closer than this say the same; `known` (-): up to
-    this spread of ln mu the friction is known; `surprise`: how large averaged squared innovations over their variance may be;
-    `attention` (s): over which they are averaged.
+    `spread` (-): standard deviation of ln mu without information; `correlation` (s): residuals closer than this are fully
+    correlated; `known` (-): up to this standard deviation of ln mu the friction is known; `surprise` (-): limit of the averaged
+    squared innovations over their variance; `attention` (s): time constant of this average.
     """
 
     usual: jax.Array = positive("-", default=0.8)
@@ -40,12 +40,12 @@ class Follower(eqx.Module):
     attention: jax.Array = positive("s", default=0.3)
 
     def start(self) -> LogFriction:
-        """Where nothing is told yet."""
+        """The belief before any information."""
         return LogFriction(jnp.log(self.usual), jnp.square(self.spread), jnp.ones_like(self.usual))
 
     def next(self, last: LogFriction, dt, residual, noise, here) -> LogFriction:
-        """After `dt` (s) and a residual: a function of ln mu, zero at the truth but for `noise` (its standard deviation); `here`:
-        whether it was measured."""
+        """The belief after `dt` (s) and a residual. `residual` is a function of ln mu that is zero at the truth, except for
+        `noise` (its standard deviation); `here`: whether it was measured."""
         stays = jnp.exp(-dt / self.memory)
         mean = jnp.log(self.usual) + stays * (last.mean - jnp.log(self.usual))
         variance = stays**2 * last.variance + (1.0 - stays**2) * jnp.square(self.spread)

@@ -1,4 +1,4 @@
-"""Friction while wheels slip: adaptive observers of the wheels, and left and right wheels each for themselves."""
+"""Friction while wheels slip: adaptive observers of the wheels, and a method for left and right wheels separately."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jaxveh.tyres import Contact, LuGre
 
 
 class ObserverMemory(NamedTuple):
-    """Speeds of the observed wheels (4,), m/s; friction; its excitation, averaged (-)."""
+    """The observer's wheel speeds (4,), m/s; its friction (-); the averaged excitation of friction (-)."""
 
     wheels: WheelMemory
     speed: Any
@@ -26,16 +26,16 @@ class ObserverMemory(NamedTuple):
 
 
 class WheelObserver(AbstractWheelMethod):
-    """An adaptive observer of the wheels' dynamics (`law` None: references [118]; a `tyres.LuGre`: reference [119]).
+    """An adaptive observer of the wheels' dynamics (`law` None: reference [118]; a `tyres.LuGre`: reference [119]).
 
-    Each wheel: `J domega/dt = T - R F(slip, mu) + gain J (omega - observed)`; friction follows the gradient,
-    `d mu / dt = - rate sum e dF/dmu / F_z - leak (mu - usual)`, normalised, where the leak (sigma-modification) holds it while
-    nothing is excited. Without a law `F = mu F_z phi(slip)`, phi the file's curve over its peak: linear in mu as [118] has it,
-    and wrong where tyres keep their slope on slippery roads. With LuGre the bristles are taken as settled (they settle within
-    milliseconds), and mu is what multiplies their friction.
+    Each wheel obeys `J domega/dt = T - R F(slip, mu) + gain J (omega - observed)`. Friction follows the normalised gradient
+    `d mu / dt = - rate sum e dF/dmu / F_z - leak (mu - usual)`, where the leak (sigma-modification) holds it near `usual` without
+    excitation. Without a law `F = mu F_z phi(slip)`, with phi the file's curve over its peak: this is linear in mu, as in [118],
+    and wrong for tyres that keep their slope on slippery roads. With LuGre the bristles are taken as settled (they settle within
+    milliseconds), and mu multiplies their friction.
 
-    `known`: the averaged `|F - slip dF/dslip| / F_z` of the wheel that has most of it, of those that slip more than
-    `LEAST_SLIP`, is above `enough`. No spread is claimed.
+    `known`: among the wheels that slip more than `LEAST_SLIP`, the largest `|F - slip dF/dslip| / F_z`, averaged over time, is
+    above `enough`. It gives no standard deviation.
     """
 
     slips: WheelSlips
@@ -68,14 +68,14 @@ class WheelObserver(AbstractWheelMethod):
         # Linearly implicit in the gain, so that no step is too long.
         observed = memory.speed + dt * (push + self.gain * error) / (1.0 + dt * self.gain)
         observed = jnp.where(seen.there & memory.wheels.told.moves, observed, speed)
-        # The error that stays is the force's: e = R^2 (F - F_true) / (J gain); per load it teaches friction.
+        # The stationary error is that of the force: e = R^2 (F - F_true) / (J gain); over the load it adapts the friction.
         lacks = jnp.where(seen.there, error * one.wheel_inertia * self.gain / one.wheel_radius**2 / load, 0.0)
         tells = jnp.where(seen.there, slope / load, 0.0)
         squares = jnp.sum(tells**2)
         step = -self.rate * jnp.sum(tells * lacks) / (squares + 0.05) - self.leak * (memory.friction - self.usual)
         friction = jnp.clip(memory.friction + dt * step, 0.05, 1.5)
         share = 1.0 - jnp.exp(-dt / 0.3)
-        # What the slip does not explain in proportion: the part of a force that is no stiffness.
+        # The part of a force that is not proportional to the slip.
         _, stiff = jax.jvp(
             lambda slip: self._forces(seen._replace(slip=slip), wheels, memory.friction), (seen.slip,), (ones,)
         )
@@ -100,7 +100,7 @@ class WheelObserver(AbstractWheelMethod):
 
 
 class SidesMemory(NamedTuple):
-    """What the wheels have told, the slips that they show without force, (4,), and the logarithm of friction on either side."""
+    """The wheels; the slips of the wheels at zero force, `offset` (4,); and the logarithm of friction on either side."""
 
     wheels: WheelMemory
     offset: Any
@@ -109,13 +109,13 @@ class SidesMemory(NamedTuple):
 
 
 class SidesApart(AbstractWheelMethod):
-    """Friction under the left and under the right wheels, each by a filter of ln mu on the forces and slips of its own wheels:
-    what a road that is slippery on one side needs.
+    """Friction under the left and under the right wheels, each by a filter of ln mu on the forces and slips of its own wheels,
+    for a road that is slippery on one side.
 
-    `friction` is the mean of both, weighed by load. The force of each wheel is compared with the curve along of its axle; what
-    slip a wheel shows while it hardly pulls, an error of its radius, is learnt within `learning` (s) and taken off; rows count
-    from `LEAST_SLIP` on. Beside, slips
-    are known to `slip_noise` (-), forces to `force_noise` (-) of themselves and `load_noise` of the load.
+    `friction` is the mean of both sides. The force of each wheel is compared with the longitudinal curve of its axle. The slip of
+    a wheel at small force is an error of its radius, which is learned within `learning` (s) and subtracted. Rows count from
+    `LEAST_SLIP` on. Slips are known to `slip_noise` (-), forces to `force_noise` (-) of themselves and `load_noise` (-) of the
+    load. `rolls` (-): force over load below which a wheel rolls freely.
     """
 
     slips: WheelSlips
@@ -153,7 +153,7 @@ class SidesApart(AbstractWheelMethod):
                 + jnp.square(self.load_noise * load * nominal[k])
             )
             residual = lambda x, c=curve, s=slip, f=force, n=load: f - c.force(s, jnp.exp(x), n)
-            # Time passes twice for a side, once a wheel: what is forgotten is, too.
+            # The filter of a side takes this step twice, once per wheel, so that it also forgets twice.
             tells = seen.there[k] & (jnp.abs(slip) > LEAST_SLIP)
             sides[k % 2] = self.follower.next(state, dt, residual, noise, tells)
         after = SidesMemory(wheels, offset, *sides)

@@ -1,4 +1,4 @@
-"""A method of friction that takes its tyres' stiffness for what a file can know of it."""
+"""A wrapper of friction methods that allows for errors of the file's cornering stiffnesses."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from jaxveh.estimators.method import AbstractMethod, Answer
 from jaxveh.tyres import LuGre
 
 LEAST = 1e-3
-"""The least friction whose logarithm is taken."""
+"""Lower limit of a friction before its logarithm is taken."""
 
 
 class StiffnessDoubt(AbstractMethod):
-    """A method five times side by side: with the file's stiffness, and with that of each axle less or more by the `spread` of its
-    logarithm.
+    """Five copies of a method in parallel: with the file's stiffnesses, and with those of front and rear smaller or larger by the
+    `spread` (-) of their logarithms.
 
-    A tyre that is stiffer in the file than on the car foretells more force than there is, as a slippery road does, and softer
-    ones hide it. Only where the curve has bent do the answers come together. So the answer is that of the file's stiffness; its
-    variance is the mean one of the five about it, where the method claims any; and it is `known` where all five know, and differ
-    by a spread of less than `widest` (of the logarithm, what the method claims itself included).
+    If the file's tyre is stiffer than the car's, the predicted force is too large, as on a slippery road; if it is softer, it
+    hides low friction. The five answers only agree where the curve has bent. The answer is that with the file's stiffnesses. Its
+    variance is the mean square of the five about it plus the mean of their own variances, if the method gives any. It is `known`
+    where all five are known and the standard deviation of the logarithm is less than `widest` (-).
     """
 
     inner: AbstractMethod
@@ -45,12 +45,12 @@ class StiffnessDoubt(AbstractMethod):
         return self._together(jax.vmap(step)(self._factors(), memory))
 
     def _factors(self):
-        """(5, 2): of front and rear stiffness."""
+        """Factors of front and rear stiffness, (5, 2)."""
         signs = ((0.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0))
         return jnp.exp(self.spread * jnp.asarray(signs, self.spread.dtype))
 
     def _with(self, factor) -> AbstractMethod:
-        """The method of tyres that are so many times as stiff."""
+        """The method with tyres whose stiffness is multiplied by `factor`."""
         return _on_tyres(self.inner, factor)
 
     def _together(self, each: tuple[Any, Answer]) -> tuple[Any, Answer]:
@@ -68,14 +68,14 @@ class StiffnessDoubt(AbstractMethod):
 
 
 def _on_tyres(method: AbstractMethod, factors) -> AbstractMethod:
-    """The method of axles that are so many times as stiff, (2,) front and rear."""
+    """The method with axles whose stiffnesses are multiplied by `factors` (2,), front and rear."""
 
     def stiffer(node):
         if isinstance(node, PlanarCar):
             both = (node.front.stiffness * factors[0], node.rear.stiffness * factors[1])
             return eqx.tree_at(lambda car: (car.front.stiffness, car.rear.stiffness), node, both)
         if isinstance(node, LuGre):
-            # Its numbers are those of the front axle.
+            # Its parameters are those of the front axle.
             both = (node.stiffness_x * factors[0], node.stiffness_y * factors[0])
             return eqx.tree_at(lambda law: (law.stiffness_x, law.stiffness_y), node, both)
         return node
@@ -84,5 +84,5 @@ def _on_tyres(method: AbstractMethod, factors) -> AbstractMethod:
 
 
 def with_doubt(make: Callable[..., AbstractMethod]) -> Callable[..., StiffnessDoubt]:
-    """What makes the method of a car's file, wary of the file's stiffness."""
+    """A function that makes the method from a car's file, wrapped in `StiffnessDoubt`."""
     return lambda car: StiffnessDoubt(make(car))

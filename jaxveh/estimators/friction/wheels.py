@@ -1,4 +1,4 @@
-"""Friction from the wheels' longitudinal slips and forces: what reads them, the slip slope, the reconstruction."""
+"""Friction from the wheels' longitudinal slips and forces: the slip slope and the reconstruction."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MORE = (
 
 
 class WheelMemory(NamedTuple):
-    """The motion, the wheels, and what was measured last of yaw rate (rad/s) and a_y (m/s^2)."""
+    """The motion, the wheels, and the last measurements of yaw rate (rad/s) and a_y (m/s^2)."""
 
     told: Told
     wheels: WheelsTold
@@ -37,19 +37,19 @@ class WheelMemory(NamedTuple):
 
 
 class WheelSlips(eqx.Module):
-    """Slips and forces of the wheels as a log tells them, row by row; a steer is not needed."""
+    """Slips and forces of the wheels from a log, row by row; the steer is not needed."""
 
     car: PlanarCar
     wheels: WheelForces
 
     def start(self, t, values) -> WheelMemory:
-        """After the first row."""
+        """The memory after the first row."""
         return WheelMemory(
             start_told(t, self._straight(t, values)), self.wheels.start(t), jnp.zeros_like(t), jnp.zeros_like(t)
         )
 
     def next(self, last: WheelMemory, t, values) -> tuple[WheelMemory, Slips]:
-        """After the next row, and what the wheels do."""
+        """The memory after the next row, and the wheels' slips and forces."""
         told = next_told(last.told, t, self._straight(t, values))
         wheels = self.wheels.next(last.wheels, t, values, told)
         held = lambda name, old: jnp.where(jnp.isnan(values[name]), old, values[name])
@@ -62,18 +62,18 @@ class WheelSlips(eqx.Module):
         return 0.5 * jnp.stack([front, front, rear, rear])
 
     def curves(self, ratio) -> tuple[SimilarCurve, ...]:
-        """The curve along of each wheel: half its axle's, `ratio` times as stiff."""
+        """The longitudinal curve of each wheel: half of its axle's, with `ratio` times the stiffness."""
         axles = (self.car.front, self.car.front, self.car.rear, self.car.rear)
         return tuple(SimilarCurve(0.5 * ratio * c.stiffness, 0.5 * c.peak, c.shape, c.bend) for c in axles)
 
     def _straight(self, t, values):
-        """The lateral sensors count as speaking: nothing here hangs on them."""
+        """The values with zero for the lateral sensors, which count as measured because nothing here depends on them."""
         still = jnp.zeros_like(t)
         return {"v_x": values["v_x"], "a_x": values["a_x"], "steer": still, "yaw_rate": still, "a_y": still}
 
 
 class AbstractWheelMethod(AbstractMethod):
-    """What reads wheels: `slips` is how."""
+    """A method that uses the wheels' slips and forces; `slips` computes them."""
 
     slips: eqx.AbstractVar[WheelSlips]
 
@@ -83,7 +83,7 @@ class AbstractWheelMethod(AbstractMethod):
 
 
 class SlopeMemory(NamedTuple):
-    """Compliance (slip over force over load) and the axles' slip offsets, (3,), and their covariance."""
+    """Mean (3,) and covariance (3, 3) of the compliance (slip over normalised force) and both axles' slip offsets."""
 
     wheels: WheelMemory
     mean: Any
@@ -91,15 +91,17 @@ class SlopeMemory(NamedTuple):
 
 
 class SlipSlope(AbstractWheelMethod):
-    """Friction by the slope of the normalised force over the slip at small slip (references [112-116]).
+    """Friction from the slope of the normalised force over the slip at small slip (references [112-116]).
 
-    Per axle `slip = (F_x / F_z) / K + offset` (F. Gustafsson, Automatica 33, 1997), the compliance 1/K one number and the
-    offsets, errors of radii, one an axle: a Kalman filter with forgetting, of used frictions up to `used` alone.
+    For each axle `slip = (F_x / F_z) / K + offset` (F. Gustafsson, Automatica 33, 1997). A Kalman filter with forgetting
+    estimates the compliance 1/K, common to both axles, and one offset per axle, which is an error of the radii; it uses rows with
+    a used friction up to `used` only.
 
-    **The slope is no friction.** Brush and Magic Formula have the same slope on every road; that measured slopes fall with
-    friction is an observation on real tyres, whose size hangs on tyre, wear, temperature and pressure. `friction =
-    (K / K_0)^exponent`, K_0 the file's, is that calibration: `exponent` and `calibration_spread` (of ln mu) are to be found on
-    the car at hand, and the spread that is claimed holds both. `known` says that the slope is, within a tenth.
+    **The slope is not the friction.** Brush model and Magic Formula have the same slope on every road. That measured slopes fall
+    with friction is an observation on real tyres, and the effect depends on tyre, wear, temperature and pressure. `friction =
+    (K / K_0)^exponent`, with K_0 from the car's file, is the calibration of that effect: identify `exponent` and
+    `calibration_spread` (of ln mu) on the car at hand. The standard deviation includes the slope's and the calibration's. `known`
+    only refers to the slope: it is known within a tenth.
     """
 
     slips: WheelSlips
@@ -120,7 +122,7 @@ class SlipSlope(AbstractWheelMethod):
         dt = jnp.clip(t - memory.wheels.told.t, 0.0, 1.0)
         wheels, seen = self.slips.next(memory.wheels, t, values)
         mean, stays = memory.mean, jnp.exp(-dt / self.memory)
-        # What is forgotten returns to what was known before the drive.
+        # Forgetting leads back to the covariance before the drive.
         P = stays**2 * memory.covariance + (1.0 - stays**2) * self._spread()
         rough = jnp.square(self.slip_noise) * jnp.maximum(0.2 / jnp.maximum(dt, 1e-3), 1.0)
         normal = seen.force / (seen.load * self.slips.nominal())
@@ -153,8 +155,8 @@ class SlipSlope(AbstractWheelMethod):
 
 
 class CurveMemory(NamedTuple):
-    """The filtered slip and used friction of the car's wheels, the curve's slope, and the friction that it points at; how long
-    ago the slope was measured (s)."""
+    """The filtered slip and used friction of the wheel that uses most, the curve's slope, the friction extrapolated from it, and
+    the slope's age (s)."""
 
     wheels: WheelMemory
     slip: Any
@@ -167,15 +169,16 @@ class CurveMemory(NamedTuple):
 class Reconstruction(AbstractWheelMethod):
     """The curve of used friction over slip, reconstructed (equations 18, 19, figure 6 of the review; references [3, 136-138]).
 
-    `mu = F_x / F_z` (18) and its slope `d mu / d lambda = (d mu / dt) / (d lambda / dt)` (19), of the wheel that uses most. Where
-    `|d lambda / dt|` is below `least_rate` (1/s) (19) divides noise by noise: the slope is kept then. Figure 6 reads the peak
-    where the slope is zero; before it, the brush's curve says how far away that is: with the slope's share `k` of the first one,
-    `1 - g = sqrt(k)` and the peak is `mu / (1 - (1 - g)^3)`. Without a `lag` (s) on both, derivatives of noise would rule.
+    `mu = F_x / F_z` (18) and its slope `d mu / d lambda = (d mu / dt) / (d lambda / dt)` (19), for the wheel that uses most.
+    Where `|d lambda / dt|` is below `least_rate` (1/s), (19) divides noise by noise, and the last slope is kept. Figure 6 reads
+    the peak where the slope is zero. Before that, the brush curve extrapolates: with `k` the slope over the initial slope of the
+    car's file, `1 - g = sqrt(k)`, and the peak is `mu / (1 - (1 - g)^3)`. A low-pass filter of `lag` (s) on both limits the noise
+    of the derivatives.
 
-    `known`: the slope is that of now and below `bent` of the first one, at more than `LEAST_SLIP`, so that the curve has left the
-    line. No spread is
-    claimed. **With the wheel speeds of a series car this rule does not hold**: an error of half a per cent of a radius and the
-    sensor's noise bend the curve at slips of a per cent, and what is called known is far too small.
+    `known`: the slope is recent and below `bent` of the initial one, at a slip above `LEAST_SLIP`, so that the curve has left its
+    linear part. It gives no standard deviation. **With the wheel speeds of a series car this rule fails**: an error of half a per
+    cent of a radius and the sensor's noise bend the curve at slips of a per cent, and frictions marked as known are far too
+    small.
     """
 
     slips: WheelSlips

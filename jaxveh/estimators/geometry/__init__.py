@@ -1,8 +1,8 @@
-"""What changes slowly in a car and is learned over drives: steering ratio and offset, centre of gravity, yaw inertia.
+"""Parameters of a car that change slowly and are learned over drives: steering ratio and offset, centre of gravity, yaw inertia.
 
-Section 3.1.2.4 of the review (Chen, Gao, Xu 2013), eq 17 with its erratum (`l r / v - delta`). The learner says nothing new where
-nothing excites it: its values stay, their spreads too, and `known` is a flag of a spread that is small enough. Between drives
-it is a file (`write_learned`, `read_learned`), which the next drive starts from (`start_from`).
+Section 3.1.2.4 of the review (Chen, Gao, Xu 2013), eq 17 with its erratum (`l r / v - delta`). Without excitation the learner's
+values and standard deviations stay; `known` says that a standard deviation is small enough. Between drives the result is stored
+in a file (`write_learned`, `read_learned`), from which the next drive starts (`start_from`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SHOWN = dict(UNITS)
 METHODS = {
     "learner": MethodOfCar(
         lambda car: learner_of(car, NAME),
-        "least squares of steer against yaw rate and of yaw moments, with flags of what a drive has told",
+        "least squares of steer against yaw rate and of yaw moments, with flags for the parameters that a drive determines",
         "3.1.2.4, eq 17 [133]",
     ),
 }
@@ -33,20 +33,20 @@ RECOMMENDED = "learner"
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """What the car's file says; an offset that it leaves out is none, a ratio is NaN."""
+    """The values of the car's file; a missing offset is zero, a missing ratio NaN."""
     told = {name: getattr(car, name) for name in SHOWN}
     told |= {"steer_offset": told["steer_offset"] or 0.0}
     return {name: np.full(len(recording), np.nan if value is None else value) for name, value in told.items()}
 
 
 def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) -> Answers:
-    """The slow numbers along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as
+    """The slow parameters along a log. `source`: a car's file, or a method; `method`: a name of `METHODS`. **Raises** as
     `follow`."""
     return follow(NAME, method_of(NAME, METHODS, source, method), recording)
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same a row at a time."""
+    """The same, one row at a time."""
     return LiveMethod(method_of(NAME, METHODS, source, method))
 
 

@@ -1,4 +1,4 @@
-"""What one drive has learned of a car, as a file that the next one starts from."""
+"""The parameters of a car that one drive has learned, as a file from which the next drive starts."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ SPREADS = {
     "yaw_inertia": "inertia_spread", "front_axle_to_cg": "place_spread", "steer_offset": "offset_spread",
     "steering_ratio": "ratio_spread",
 }  # fmt: skip
-"""The learner's parameter that says how well a number is known before a drive."""
+"""The learner's parameter that has the standard deviation of a number before a drive."""
 
 RELATIVE = ("yaw_inertia", "steering_ratio")
-"""Those whose spread is relative to the number."""
+"""Numbers whose standard deviation is relative in the learner."""
 
 
 class Entry(NamedTuple):
@@ -38,9 +38,9 @@ class Entry(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Learned:
-    """What is known of a car: an `Entry` by name, for each of `UNITS`.
+    """The learned parameters of a car: an `Entry` by name, for each of `UNITS`.
 
-    **Raises** `InputError` for names that are missing or unknown, a spread that is not positive, a value that no car has.
+    **Raises** `InputError` for missing or unknown names, standard deviations that are not positive, and values that no car has.
     """
 
     entries: dict[str, Entry]
@@ -49,7 +49,7 @@ class Learned:
         kit.check_keys("Learned", self.entries, UNITS)
         missing = [name for name in UNITS if name not in self.entries]
         if missing:
-            raise InputError(f"Learned: no {', '.join(missing)}: cut short, or of another version; learn again.")
+            raise InputError(f"Learned: no {', '.join(missing)}: incomplete or from another version; learn again.")
         for name, entry in self.entries.items():
             check_positive(f"{name}: std", entry.std, UNITS[name])
             if name != "steer_offset":
@@ -57,7 +57,7 @@ class Learned:
 
 
 def numbers_learned(said: Any) -> Learned:
-    """The last of what a learner said: of `Answers` along a log, or of a live `Answer`."""
+    """The last values of a learner, from `Answers` along a log or from a live `Answer`."""
     last = lambda part, name: np.asarray(getattr(part, name)).reshape(-1)[-1]
     return Learned(
         {
@@ -68,9 +68,9 @@ def numbers_learned(said: Any) -> Learned:
 
 
 def start_from(method: Learner, learned: Learned) -> Learner:
-    """The learner that starts where another drive ended: values of `valid` entries and their spreads, of the others nothing.
+    """The learner that starts where another drive ended: with the values and standard deviations of the `valid` entries.
 
-    A spread grows by a fifth from drive to drive, so that what changes is learned anew.
+    The standard deviations grow by a fifth from drive to drive, so that changes of the car are learned.
     """
     changes: dict[str, Any] = {}
     for name, entry in learned.entries.items():
@@ -84,12 +84,13 @@ def start_from(method: Learner, learned: Learned) -> Learner:
 
 
 def write_learned(learned: Learned, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-    """Write what was learned as TOML that `read_learned` reads back bit for bit; the file appears as a whole or not at all.
+    """Write the learned parameters as TOML, which `read_learned` reads back exactly. The file is written completely or not at
+    all.
 
     **Raises** `InputError` where the file exists and `overwrite` is False.
     """
     lines = [
-        "# What jaxveh has learned of a car. SI units; valid: the spread is small enough to be used.",
+        "# Parameters of a car that jaxveh has learned. SI units; valid: the standard deviation is small enough to use them.",
         f"version = {kit.toml_string(VERSION)}",
     ]
     for name, entry in learned.entries.items():
@@ -99,7 +100,7 @@ def write_learned(learned: Learned, path: str | os.PathLike, *, overwrite: bool 
 
 
 def read_learned(path: str | os.PathLike) -> Learned:
-    """What `write_learned` wrote. **Raises** `InputError`, naming file and key, for a file that is none, is cut short, or has
+    """Read a file of `write_learned`. **Raises** `InputError` with file and key if it is no such file, is incomplete, or has
     another unit."""
     path = Path(path)
     content = dict(kit.read_toml(path))
@@ -115,7 +116,7 @@ def _entry(name: str, table: Any) -> Entry:
     kit.check_keys(f"[{name}]", table, KEYS)
     missing = [key for key in KEYS if key not in table]
     if missing:
-        raise InputError(f"[{name}]: no {', '.join(missing)}: cut short; learn again.")
+        raise InputError(f"[{name}]: no {', '.join(missing)}: incomplete; learn again.")
     if kit.toml_text(f"[{name}]: unit", table["unit"]) != UNITS[name]:
         raise InputError(f"[{name}]: unit = {table['unit']!r}: must be {UNITS[name]!r}.")
     if not isinstance(table["valid"], bool):

@@ -1,4 +1,4 @@
-"""The learner of what changes slowly: two least-squares fits that only lively rows move."""
+"""The learner of slowly changing parameters: two least-squares fits, which only rows with excitation change."""
 
 from __future__ import annotations
 
@@ -19,27 +19,28 @@ from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 UNITS = {"yaw_inertia": "kg m^2", "front_axle_to_cg": "m", "steer_offset": "rad", "steering_ratio": "-"}
-"""What is learned, and its unit."""
+"""The learned parameters and their units."""
 
 RATES = {"yaw_inertia": 10.0, "front_axle_to_cg": 0.005, "steer_offset": 2e-4, "steering_ratio": 0.05}
-"""Units per second: no faster does what is reported move."""
+"""Largest rates of the reported values, in units per second."""
 
 NARROW = {"yaw_inertia": 0.1, "front_axle_to_cg": 0.05, "steer_offset": 6e-4, "steering_ratio": 0.025}
-"""A spread below which a number is known: of inertia and ratio relative to the start, of the others in their units."""
+"""Standard deviations below which a number is known: relative to the start for inertia and ratio, otherwise in its unit."""
 
 STEERING = Need("steering_wheel", "rad")
 
 Steering = record_type("SteeringFit", ("ratio", "offset", "understeer"))
-"""Relative error of the ratio, offset at the road wheels (rad), understeer gradient beside the start's (rad/(m/s^2))."""
+"""Relative error of the ratio, offset at the road wheels (rad), understeer gradient less that of the start (rad/(m/s^2))."""
 
 Turning = record_type("TurningFit", ("stiffness", "inertia"))
 """Relative errors of the front axle's cornering stiffness and of the yaw inertia."""
 
 
 class LearnerMemory(NamedTuple):
-    """The memory of the filter of roll and bank, the steering wheel (rad), the steer as late as
-    the yaw rate, the mean of its square, low-passed steer (rad), yaw rate (rad/s), lateral
-    force (m/s^2) and lateral speed (m/s), the two fits, and what is reported."""
+    """The memory of the filter of roll and bank, `leaning`; the steering `wheel` angle (rad); the steer with the delay of the yaw
+    rate, `late` (rad); the mean `square` of the steer without slip (rad^2); low-passed steer (rad), yaw rate (rad/s), lateral
+    force over mass (m/s^2) and lateral velocity (m/s); the two fits; the reported values, `shown`; the time since the first row,
+    `age` (s)."""
 
     leaning: Any
     wheel: Any
@@ -58,24 +59,25 @@ class LearnerMemory(NamedTuple):
 class Learner(AbstractMethod):
     """Steering ratio and offset, the centre of gravity and the yaw inertia, learned while a car drives.
 
-    In turns of little lateral acceleration, with the yaw rate and the roll that the filter of `leaning` has corrected,
+    In turns of little lateral acceleration, with yaw rate and roll corrected by the filter `leaning`,
 
         steering_wheel / ratio = offset + l r / v_x + understeer f_y + J_z (1 / C_f + 1 / C_r) / l dr/dt
 
-    tells ratio, offset and understeer; the last is a place of the centre of gravity where both cornering stiffnesses are known
+    gives ratio, offset and understeer. With known cornering stiffnesses understeer gives the position of the centre of gravity
     (eq 17 of the review, corrected: `l r / v - delta`): `l_f = l (m / C_f - understeer) / (m (1 / C_f + 1 / C_r))`.
 
         m l_r f_y = C_f l alpha_f - J_z dr/dt,    alpha_f = steer - (v_y + l_f r) / v_x
 
-    tells yaw inertia and front stiffness. What the stiffnesses of the file are wrong by (`stiffness_spread`) is in the spread of
-    l_f. What is reported moves no faster than `RATES`, and is known where its spread is within `NARROW`.
+    gives yaw inertia and front stiffness. The standard deviation of l_f includes the errors of the file's stiffnesses
+    (`stiffness_spread`). The reported values change no faster than `RATES`, and are known where their standard deviations are
+    within `NARROW`.
 
     **Parameters**: the car's `mass` (kg), `yaw_inertia` (kg m^2), `front_axle_to_cg`, `wheelbase` (m), `front_stiffness`,
-    `rear_stiffness` (N/rad), `steering_ratio` (-), `steer_offset` (rad, at the road wheels); how well they are known before:
+    `rear_stiffness` (N/rad), `steering_ratio` (-), `steer_offset` (rad, at the road wheels); prior standard deviations:
     `ratio_spread`, `stiffness_spread`, `inertia_spread` (-), `offset_spread` (rad), `place_spread` (m); `steer_error` (rad at the
-    road wheels) and `moment_error` (of m g l), which last `lasting` (s); `play` (rad at the road wheels): half the sensor's play,
-    of which half stays in the offset, and in the ratio its share of the steer, however long one drives; `time` (s) of the
-    low-pass of both sides; `late` (s): by how much the inertial unit is later than the steering sensor.
+    road wheels) and `moment_error` (of m g l), with the correlation time `lasting` (s); `play` (rad at the road wheels): half the
+    sensor's play, of which half always remains in the offset's standard deviation, and its share of the steer in the ratio's;
+    `time` (s): low-pass filter of both sides; `late` (s): delay of the inertial unit against the steering sensor.
     """
 
     leaning: Leaning
@@ -135,7 +137,7 @@ class Learner(AbstractMethod):
         silent = jnp.maximum(motion.silence, motion.speed_silence) > 0.5 * SILENCE
         there = ~silent & ~jnp.isnan(values["steering_wheel"]) & (memory.age > START) & (motion.v_x > SLOWEST)
         fast = away_from_zero(motion.v_x)
-        # Rows count less in hard turns and at a crawl, smoothly.
+        # Rows count gradually less in hard turns and at low speed.
         doubt = 1.0 + jnp.square(jnp.square(force / LINEAR)) + jnp.square(jnp.square(QUICK / fast))
         lasting = doubt * 2.0 * self.lasting / jnp.maximum(dt, 1e-3)
         curve = self.wheelbase * turn / fast
@@ -153,14 +155,14 @@ class Learner(AbstractMethod):
             tyres = self.front_stiffness * (1.0 + x.stiffness) * self.wheelbase * front
             return (self.mass * rear * force - tyres + self.yaw_inertia * (1.0 + x.inertia) * rate) / scale
 
-        # What ratio and place are wrong by stays: no number of rows averages it.
+        # Errors of ratio and position are constant: no number of rows averages them out.
         wrong = numerics.hypot(
             steer * numerics.sqrt(steering.covariance[0, 0]), numerics.hypot(self.place_spread * turn / fast, 1e-4)
         )
         stays = jnp.square(self.front_stiffness * self.wheelbase / scale * wrong) * (STAYS / self.lasting)
         turning = correct(memory.turning, moment, (jnp.square(self.moment_error) + stays) * lasting, there, Turning)
         heading = said.std.yaw_rate_bias / jnp.maximum(fast, QUICK)
-        # A play takes so much of every swing.
+        # Share of the steering amplitude that is lost in the play.
         swing = self.play / numerics.sqrt(square + jnp.square(0.1 * self.play))
         means, stds = self._numbers(steering, turning, heading, jnp.minimum(swing, self.ratio_spread))
         most = {name: RATES[name] * jnp.where(there, dt, 0.0) for name in UNITS}
@@ -183,7 +185,7 @@ class Learner(AbstractMethod):
         return self.mass * (rear / self.front_stiffness - self.front_axle_to_cg / self.rear_stiffness) / self.wheelbase
 
     def _place_slope(self):
-        """How the understeer gradient changes with the place of the centre of gravity, rad/(m/s^2) per m."""
+        """The derivative of the understeer gradient by `front_axle_to_cg`, rad/(m/s^2) per m."""
         return -self.mass * (1.0 / self.front_stiffness + 1.0 / self.rear_stiffness) / self.wheelbase
 
     def _understeer_spread(self):
@@ -193,11 +195,11 @@ class Learner(AbstractMethod):
         return numerics.hypot(of_tyres, self._place_slope() * self.place_spread)
 
     def _numbers(self, steering: Belief, turning: Belief, heading: Any, swing: Any) -> tuple[dict, dict]:
-        """What the fits say of each number, and spreads: with that of the yaw rate's offset over the speed, `heading`, and the
-        share of the steer that is play, `swing`."""
+        """The numbers from the fits and their standard deviations. `heading`: standard deviation of the yaw rate's offset over
+        the speed; `swing`: share of the steer that is play."""
         fit, turn = Steering(*steering.mean), Turning(*turning.mean)
         std = Steering(*numerics.sqrt(jnp.diagonal(steering.covariance)))
-        # Of the understeer's spread the tyres have a part, which no drive takes away from the place.
+        # The tyres' part of the understeer's standard deviation always remains in that of the position.
         prior = self._understeer_spread()
         gain = self._place_slope() * jnp.square(self.place_spread / prior)
         place = self.front_axle_to_cg + gain * fit.understeer
@@ -220,35 +222,36 @@ class Learner(AbstractMethod):
 
 
 def _within(change: Any, most: Any) -> Any:
-    """A change that does not exceed the most, smoothly; small ones are themselves."""
+    """A change, smoothly limited to `most`; small changes are hardly affected."""
     bound = jnp.where(most > 0, most, 1.0)
     return jnp.where(most > 0, bound * jnp.tanh(change / bound), 0.0)
 
 
 LONG = 60.0
-"""s: over which the size of the steer is averaged."""
+"""s: time constant of the averaged square of the steer."""
 
 START = 2.0
-"""s: until the low-passes have forgotten where they began."""
+"""s: time until the low-pass filters have forgotten their initial values."""
 
 SLOWEST = 3.0
-"""m/s: slower is not learned from,"""
+"""m/s: nothing is learned below this speed."""
 
 QUICK = 5.0
-"""and below this little."""
+"""m/s: little is learned below this speed."""
 
 LINEAR = 2.0
-"""m/s^2: above this tyres are not linear, and little is learned."""
+"""m/s^2: above this acceleration the tyres are not linear, and little is learned."""
 
 CALM = 0.15
-"""rad/s^2: above this yaw acceleration little is learned of the steering."""
+"""rad/s^2: above this yaw acceleration little is learned about the steering."""
 
 STAYS = 10.0
-"""s: so long an error counts as one that stays."""
+"""s: correlation time that is assumed for a constant error."""
 
 
 def learner_of(car: CarSpecification, who: str) -> Learner:
-    """Of a car's file. **Raises** `InputError` for one without stiffnesses, `steering_ratio` or `roll_gradient`."""
+    """Makes `Learner` from a car's file. **Raises** `InputError` for a file without stiffnesses, `steering_ratio` or
+    `roll_gradient`."""
     return Learner(
         leaning_filter(car, who),
         car.mass,

@@ -1,7 +1,8 @@
 """The slope of the road along the car, positive uphill: section 3.1.2.3 of the review (Chen, Gao, Xu 2013), and paper 004's.
 
-An accelerometer feels `d v_x/dt - v_y r + g sin(grade)`. What it feels beside the speed's rate is the grade and its own offset:
-0.1 m/s^2 is 0.58 degrees. What the torques at the wheels push tells the two apart, and satellites that say how fast a car climbs.
+An accelerometer measures `d v_x/dt - v_y r + g sin(grade)`. The part that the speed's rate does not explain is the grade and the
+accelerometer's offset: 0.1 m/s^2 is 0.58 degrees. Torques at the wheels distinguish the two, and so does a vertical speed from
+satellites.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ SHOWN = {"grade": "rad"}
 
 METHODS = {
     "kinematic": MethodOfCar(
-        kinematic_of, "what the accelerometer feels beside the rate of the wheels' speed", "paper 004 [12]"
+        kinematic_of, "the measured acceleration less the rate of the wheels' speed", "paper 004 [12]"
     ),
     "satellite": MethodOfCar(
-        satellite_of, "what the accelerometer feels beside the rate of the satellites' speed", "3.1.2.3 [128]"
+        satellite_of, "the measured acceleration less the rate of the satellites' speed", "3.1.2.3 [128]"
     ),
     "climb": MethodOfCar(
         lambda car: Climb(),
@@ -39,7 +40,7 @@ METHODS = {
     ),
     "filter": MethodOfCar(
         lambda car: pulling_filter(car, NAME),
-        "kinematics with the accelerometer's offset as a state, which torques at the wheels tell where there are any",
+        "kinematics with the accelerometer's offset as a state, which is observable if wheel torques are available",
         "3.1.2.3 [124, 127]",
     ),
 }
@@ -48,7 +49,7 @@ RECOMMENDED = "filter"
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """A level road."""
+    """Zero grade in all rows."""
     del car
     return dict.fromkeys(SHOWN, np.zeros(len(recording)))
 
@@ -59,5 +60,5 @@ def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) ->
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same a row at a time."""
+    """The same, one row at a time."""
     return LiveMethod(method_of(NAME, METHODS, source, method))

@@ -1,4 +1,4 @@
-"""Grade of what an accelerometer feels beside the rate of a speed."""
+"""Grade from a measured acceleration less the rate of a speed."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 LONG_AGO = 1e3
-"""s: since satellites that have not spoken yet."""
+"""s: the time since the last fix, before the first one."""
 
 
 class KinematicMemory(NamedTuple):
-    """What was heard, and for how long (s)."""
+    """The motion, and for how long its signals have been available, `age` (s)."""
 
     motion: Any
     age: Any
 
 
 class Kinematic(AbstractMethod):
-    """`grade = arcsin((a_x / (1 + g P) - d v_x/dt + v_y r) / g)`, P = `pitch_gradient` (rad/(m/s^2)), through the low-pass of the
-    motion (`slope_time`); of `v_y` what the rear axle's place alone makes, `rear_axle_to_cg r`."""
+    """`grade = arcsin((a_x / (1 + g P) - d v_x/dt + v_y r) / g)`, P = `pitch_gradient` (rad/(m/s^2)), with the low-pass filter of
+    the motion (`slope_time`). For `v_y` only the kinematic part `rear_axle_to_cg r` is used, without slip of the rear axle."""
 
     motion: BodyMotion
     rear_axle_to_cg: jax.Array = positive("m")
@@ -59,8 +59,9 @@ class Kinematic(AbstractMethod):
 
 
 class SatelliteMemory(NamedTuple):
-    """What was heard; of satellites the last speed, its low-passed value (m/s), the time since it (s) and whether there was any;
-    the accelerometer as late (m/s^2), its integral since then (m/s), and as low-passed."""
+    """The motion; the satellites' last speed, its low-passed value (m/s), the time `since` it (s), and whether there was any; the
+    measured acceleration with the satellites' delay, `late` (m/s^2), its integral since the last fix (m/s), and its low-passed
+    value, `felt` (m/s^2); and for how long all have been available, `age` (s)."""
 
     motion: Any
     speed: Any
@@ -74,9 +75,9 @@ class SatelliteMemory(NamedTuple):
 
 
 class Satellite(AbstractMethod):
-    """`grade = arcsin((a_x / (1 + g P) - d speed/dt) / g)`, the speed of satellites, which slips with no wheel (P. Sahlholm, K.
-    Johansson 2008). Both through a low-pass of `time` (s), the accelerometer through
-    another of the satellites' `delay` (s). In bends the speed over ground is not v_x, by little."""
+    """`grade = arcsin((a_x / (1 + g P) - d speed/dt) / g)` with the satellites' speed, which contains no wheel slip (P. Sahlholm,
+    K. Johansson 2008). Both have a low-pass filter of `time` (s), the acceleration also one of the satellites' `delay` (s). In
+    bends the speed over ground differs slightly from v_x."""
 
     motion: BodyMotion
     pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005)
@@ -106,7 +107,7 @@ class Satellite(AbstractMethod):
         slow = jnp.where(begins, speed, moved)
         started = jnp.where(spoke, 1.0, memory.started)
         late = memory.late + dt / (self.delay + dt) * (heard["a_x"] - memory.late)
-        # Both go through one filter, at the satellites' pace: of what was felt between two speeds, the mean.
+        # Both have the same filter at the satellites' rate, with the mean acceleration between two fixes.
         gathered = memory.gathered + dt * late
         mean = gathered / jnp.where(since > 0, since, 1.0)
         felt = jnp.where(spoke, memory.felt + share * (mean - memory.felt), memory.felt)
@@ -121,8 +122,8 @@ class Satellite(AbstractMethod):
 
 
 class ClimbMemory(NamedTuple):
-    """The time of the last row (s), for how long satellites have been silent (s), and vertical and horizontal speed, low-passed
-    (m/s)."""
+    """The time of the last row (s), the time since the satellites' last measurement, `silent` (s), and low-passed vertical and
+    horizontal speed (m/s)."""
 
     t: Any
     silent: Any
@@ -131,8 +132,8 @@ class ClimbMemory(NamedTuple):
 
 
 class Climb(AbstractMethod):
-    """`grade = arctan(climb_rate / speed)` of satellites' vertical and horizontal speed (H. Bae, J. Ryu, J. Gerdes 2001), both
-    through a low-pass of `time` (s). No offset is in it, and it is late. Known above `slowest` (m/s)."""
+    """`grade = arctan(climb_rate / speed)` from the satellites' vertical and horizontal speed (H. Bae, J. Ryu, J. Gerdes 2001),
+    both with a low-pass filter of `time` (s). It has no offset, but a delay. The answer is known above `slowest` (m/s)."""
 
     time: jax.Array = positive("s", default=0.5)
     slowest: jax.Array = positive("m/s", default=SLOWEST)
@@ -158,10 +159,10 @@ class Climb(AbstractMethod):
 
 
 def kinematic_of(car: CarSpecification) -> Kinematic:
-    """Of a car's file; a body that does not pitch where it says nothing of that."""
+    """Makes `Kinematic` from a car's file; without a `pitch_gradient` the body does not pitch."""
     return Kinematic(motion_of(car), car.rear_axle_to_cg, car.pitch_gradient or 0.0)
 
 
 def satellite_of(car: CarSpecification) -> Satellite:
-    """Of a car's file; a body that does not pitch where it says nothing of that."""
+    """Makes `Satellite` from a car's file; without a `pitch_gradient` the body does not pitch."""
     return Satellite(motion_of(car), car.pitch_gradient or 0.0)

@@ -1,4 +1,4 @@
-"""What is learned from drives: a tyre's law inside a filter, trained through the filter's likelihood."""
+"""Models that are learned from drives: a tyre law inside a filter, trained by the filter's likelihood; a sideslip network."""
 
 from jaxveh.estimators.learned.residual_tyre import ResidualTyre, network_weights, with_residual_tyres
 from jaxveh.estimators.learned.training import Trained, train

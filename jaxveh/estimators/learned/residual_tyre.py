@@ -1,4 +1,4 @@
-"""A tyre law of physics, and beside it a small network for what its formula cannot form."""
+"""A physical tyre law with a small network that corrects its errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jaxveh.tyres import AbstractDynamicTyre, AbstractTyre, Contact, Forces, cor
 from jaxveh.tyres import kit as tyres
 
 REACH = 3.0
-"""The network's inputs are scaled slip angles from about minus to plus this: the tyre slides beyond."""
+"""Range of the network's inputs, which are scaled slip angles: beyond it the tyre slides."""
 
 
 class ResidualTyre(AbstractTyre):
@@ -21,11 +21,11 @@ class ResidualTyre(AbstractTyre):
 
         F_y = F_y of tyre + F_z sum over j of v_j (1 + c_j (F_z / load - 1)) (tanh(a_j s + b_j) + tanh(a_j s - b_j)) / 2
 
-    with the slip angle scaled by the one at which a linear tyre of `stiffness` (N/rad) would reach the load,
-    `s = stiffness alpha / F_z`: the correction is odd in the slip angle, as the force is. With `outer` v = 0 nothing is
-    corrected. It knows the slip angle and the load alone; the physics keeps friction, combined slip and aligning moments.
+    with the slip angle relative to that at which the force of a linear tyre of `stiffness` (N/rad) equals the load,
+    `s = stiffness alpha / F_z`. The correction is odd in the slip angle, as the force is. With `outer` v = 0 there is no
+    correction. It depends on slip angle and load only; friction, combined slip and aligning moment are those of the physical law.
 
-    `inner` a, `bias` b, `outer` v, `load_share` c: (H,) each. `load` (N): at which it was scaled.
+    `inner` a, `bias` b, `outer` v, `load_share` c: (H,) each. `load` (N): reference load of the correction.
 
     **Raises** `InputError` for a tyre with states of its own.
     """
@@ -44,7 +44,7 @@ class ResidualTyre(AbstractTyre):
     def forces(self, contact: Contact, state: Any = None) -> Forces:
         found = self.tyre.forces(contact, state)
         load = tyres.need_load(contact, "ResidualTyre")
-        # Written out: a contact may be a batch of any shape, beside which the hidden units need no axis.
+        # A loop over the hidden units: a contact may be a batch of any shape, which then needs no further axis.
         scaled = self.stiffness * contact.slip_angle / jnp.maximum(load, 1e-3 * self.load)
         ratio = load / self.load - 1.0
         correction = jnp.zeros_like(scaled)
@@ -56,7 +56,7 @@ class ResidualTyre(AbstractTyre):
 
 
 def with_residual_tyres(car: Any, key: jax.Array, *, units: int = 6) -> Any:
-    """The car with a `ResidualTyre` of `units` hidden units around its `front` and its `rear` tyre, which corrects nothing yet.
+    """The car with a `ResidualTyre` of `units` hidden units around its `front` and its `rear` tyre, with zero correction.
 
     **Raises** `InputError` for tyres with states of their own.
     """
@@ -70,7 +70,7 @@ def with_residual_tyres(car: Any, key: jax.Array, *, units: int = 6) -> Any:
 
 
 def network_weights(model: Any) -> tuple[jax.Array, ...]:
-    """The weights of both tyres' networks, of a model whose vehicle has such tyres: what `train` shall choose."""
+    """The weights of both tyres' networks, for a model whose vehicle has such tyres: a `where` for `train`."""
     car = model.system.vehicle
     return tuple(w for tyre in (car.front, car.rear) for w in (tyre.inner, tyre.bias, tyre.outer, tyre.load_share))
 
@@ -81,7 +81,7 @@ def _around(tyre: AbstractTyre, load: Any, key: jax.Array, units: int) -> Residu
     if isinstance(tyre, AbstractDynamicTyre):
         tyres.need_static("with_residual_tyres", tyre)
     stiffness = cornering_stiffness(tyre, Contact(0.0 * one, load=load, speed=20.0 * one))
-    # Bends that are spread over the range of slips.
+    # The bends of the hidden units are spread over the range of slips.
     bias = jnp.linspace(0.0, REACH, units, dtype=load.dtype)
     inner = 1.0 + 0.3 * jax.random.normal(key, (units,), load.dtype)
     none = jnp.zeros(units, load.dtype)

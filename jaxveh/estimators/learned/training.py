@@ -1,4 +1,4 @@
-"""Choose many numbers of a state space, the weights of a network among them, by the likelihood of a filter."""
+"""Training of many parameters of a state space, such as the weights of a network, by the likelihood of a filter."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from jaxveh.io import kit as io
 from jaxveh.statespace import StateSpace
 
 TOLD = 25
-"""Steps from one word to the listener to the next."""
+"""Number of steps between two calls of `progress`."""
 
 
 class Trained(NamedTuple):
-    """`model`: the state space with the numbers that were found. `history`: of each step the mean over its pieces of what a row
-    costs (negative log-likelihood, and the prior's share), (steps,)."""
+    """`model`: the state space with the trained parameters. `history`: the cost per row of each step (negative log-likelihood and
+    the prior's share), the mean over its pieces, (steps,)."""
 
     model: StateSpace
     history: jax.Array
@@ -46,14 +46,14 @@ def train(
     warm_up: float = WARM_UP,
     progress: Progress = silent,
 ) -> Trained:
-    """Maximise the filter's posterior over the leaves that `where` picks, arrays of weights among them, by Adam (optax) on
-    pieces.
+    """Maximise the filter's posterior over the leaves that `where` picks, such as arrays of weights, by Adam (optax) on pieces of
+    the recordings.
 
-    `fitting.prediction_error` is the better choice for a dozen numbers; here there may be hundreds, and hours of data, of which a
-    step sees `batch` pieces, drawn by `key`. Logs are cut into pieces of about `piece` s that overlap by `warm_up` s, in which
-    the filter finds its state and which do not count. Each number walks on its unconstrained line (a stiffness on its
-    logarithm); `prior`: the standard deviation there, in units of the number's scale, about where it started, one for all or by
-    the last part of a name: what little data tells no better stays what it was.
+    `fitting.prediction_error` is the better choice for a dozen parameters; here there may be hundreds, and hours of data. Each
+    step uses `batch` pieces, drawn by `key`. Logs are cut into pieces of about `piece` seconds that overlap by `warm_up` seconds,
+    in which the filter finds its state and which do not count. Parameters are optimised on their unconstrained scale (a stiffness
+    as its logarithm). `prior`: standard deviation on that scale about the start, in units of the parameter's scale, one for all
+    or by the last part of a name. It keeps parameters near their start where the data have little information.
 
     Needs the extra `learn`. **Raises** `InputError` for recordings too short for a piece and arguments out of range.
     """
@@ -94,7 +94,7 @@ def train(
 
 
 def _change(search: Any, slope: Any, memory: Any) -> tuple[Any, Any]:
-    """Optax counts in integers, which the user's strict promotion would refuse."""
+    """The optimiser's update. Optax counts in integers, which strict dtype promotion would refuse."""
     with jax.numpy_dtype_promotion("standard"):
         return search.update(slope, memory)
 
@@ -105,30 +105,31 @@ def _check(**values: float) -> None:
 
 
 def _walk(go_on, state, model, chosen, steps: int, key, progress: Progress) -> Trained:
-    """Step by step, telling now and then."""
+    """All steps, with calls of `progress`."""
     history = []
     progress(0, steps, "train (compiling first)")
     for k in range(-(-steps // TOLD)):
         state, values = go_on(state, jax.random.fold_in(key, k))
         history.append(values)
         done = min((k + 1) * TOLD, steps)
-        progress(done, steps, f"train: step {done}, {float(values[-1]):.4g} a row")
+        progress(done, steps, f"train: step {done}, cost {float(values[-1]):.4g} per row")
     numbers = [p.domain.forward(z) for p, z in zip(chosen, state[0], strict=True)]
     return Trained(put(model, chosen, numbers), jnp.concatenate(history)[:steps])
 
 
 def _spread(p: Any, prior: float | Mapping[str, float]) -> float:
-    """Of a number on its unconstrained line: a share of its scale where that line is its own, else of its logarithm."""
+    """The prior standard deviation of a parameter on its unconstrained scale: a share of its scale if the parameter itself is
+    unconstrained, otherwise that of its logarithm."""
     last = p.name.split(".")[-1]
     share = prior.get(last) if isinstance(prior, Mapping) else prior
     if share is None:
-        raise InputError(f"train: prior: no spread for {p.name}; name it by {last}.")
+        raise InputError(f"train: prior: no standard deviation for {p.name}; add the key {last}.")
     check_positive(f"train: prior of {last}", share)
     return share * (abs(p.scale) if p.scale is not None and type(p.domain).__name__ == "Real" else 1.0)
 
 
 def _pieces(model: StateSpace, recordings: Recording | Sequence[Recording], piece: float, warm_up: float):
-    """Rows of all pieces, (pieces, T) in each leaf, and how many of each are warm-up. Pieces are as long as the shortest."""
+    """Rows of all pieces, (pieces, T) in each leaf, and the number of warm-up rows; pieces are as long as the shortest."""
     logs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not logs:
         raise InputError("train: no recording to learn from.")

@@ -1,8 +1,8 @@
 """The mass of a car: refs [8], [11], [12], [13] of paper 004, and section 3.1.2.4 of the review (Chen, Gao, Xu 2013).
 
-A force over a mass is an acceleration: what is known of the mass is what is known of the torque at the wheels and of the wheels'
-radius, and it is known only where pedals move. `known` says whether the spread is within 4 per cent; the mean stays where a
-drive tells nothing more.
+The mass follows from force over acceleration. Its accuracy is that of the torque at the wheels and of the wheels' radius, and it
+is only observable where pedals move. `known` says whether the standard deviation is within 4 per cent; without new information
+the mean stays.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ METHODS = {
     ),
     "high_pass": MethodOfCar(
         lambda car: high_pass_of(car, NAME),
-        "least squares of what is fast in force and in the speed's rate, where grades are slow; known only where "
+        "least squares of the fast parts of force and of the speed's rate, because grades are slow; known only where "
         "pedals have moved much",
         "paper 004 [11]",
     ),
     "forgetting": MethodOfCar(
         forgetting_factors,
-        "recursive least squares of mass and grade, which forgets the grade faster",
+        "recursive least squares of mass and grade, with faster forgetting of the grade",
         "paper 004 [13], 3.1.2.3 [127]",
     ),
     "kinematic_grade": MethodOfCar(
         lambda car: kinematic_of(car, NAME),
-        "the grade of accelerometer and speed first, then least squares; known only after some seconds of acceleration",
+        "the grade from accelerometer and speed, then least squares; known only after some seconds of acceleration",
         "paper 004 [12]",
     ),
     "joint": MethodOfCar(
@@ -51,7 +51,7 @@ METHODS = {
     ),
     "filter": MethodOfCar(
         lambda car: pulling_filter(car, NAME),
-        "grade, mass and the accelerometer's offset in one filter, with bends, slip and a road that changes by the metre",
+        "one filter of grade, mass and the accelerometer's offset, with bends, slip and a grade that changes with distance",
         "paper 004 [9, 10]",
     ),
 }
@@ -60,7 +60,7 @@ RECOMMENDED = "filter"
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """What the car's file says."""
+    """The mass of the car's file."""
     return dict.fromkeys(SHOWN, np.full(len(recording), car.mass))
 
 
@@ -70,5 +70,5 @@ def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) ->
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same a row at a time."""
+    """The same, one row at a time."""
     return LiveMethod(method_of(NAME, METHODS, source, method))

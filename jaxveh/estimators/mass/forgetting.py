@@ -1,4 +1,4 @@
-"""Mass and grade by recursive least squares with a forgetting factor each."""
+"""Mass and grade by recursive least squares with one forgetting factor each."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from jaxveh.vehicles import GRAVITY
 State = record_type("ForgettingState", ("mass", "sine"))
 
 EXCITED = 0.4
-"""m/s^2: with less the force tells the mass nothing that the grade does not, and the row counts for nothing."""
+"""m/s^2: with a smaller acceleration mass and grade cannot be distinguished, and the row does not count."""
 
 
 class Pulled(AbstractCleaning):
-    """Force (N) and the speed's rate (m/s^2) through one low-pass, the force none in rows that tell nothing."""
+    """Force over the file's mass and the speed's rate (m/s^2) through the same low-pass filter; the force is NaN in rows without
+    torques, and 0 without excitation."""
 
     motion: BodyMotion
     pull: Pull
@@ -60,8 +61,9 @@ class Pulled(AbstractCleaning):
 
 
 def forgetting_factors(car: CarSpecification) -> Filtered:
-    """`F = m (d v_x/dt + g f_r) + m g sin(grade)` with a factor for the mass and one for the grade (A. Vahidi et al. 2005), their
-    variances apart (`observers.RecursiveLeastSquares`). An observer claims no spread: `known` in rows that pedals excite.
+    """Makes `F = m (d v_x/dt + g f_r) + m g sin(grade)` from a car's file, with one forgetting factor for the mass and one for
+    the grade (A. Vahidi et al. 2005), and separate variances (`observers.RecursiveLeastSquares`). An observer gives no standard
+    deviation: the answer is `known` in rows with excitation by the pedals.
 
     **Raises** `InputError` for a file without `wheel_radius`.
     """

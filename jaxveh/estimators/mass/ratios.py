@@ -20,8 +20,8 @@ from jaxveh.vehicles import GRAVITY
 
 
 class Pull(eqx.Module):
-    """What pulls a car: torques over `wheel_radius` (m), air (`drag`, N s^2/m^2), wheels that spin up (`wheel_inertia`, kg m^2),
-    `rolling_resistance` (-), `pitch_gradient` (rad/(m/s^2))."""
+    """The longitudinal force on a car: torques over `wheel_radius` (m), air (`drag`, N s^2/m^2), rotation of the wheels
+    (`wheel_inertia`, kg m^2), `rolling_resistance` (-), `pitch_gradient` (rad/(m/s^2))."""
 
     wheel_radius: jax.Array = positive("m")
     wheel_inertia: jax.Array = positive("kg m^2", default=1.2)
@@ -30,14 +30,14 @@ class Pull(eqx.Module):
     pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005, default=0.0)
 
     def force(self, drive: Any, brake: Any, heard: Any) -> Any:
-        """Force along the road, N, without rolling resistance, which goes with the mass."""
+        """Force along the road, N, without rolling resistance, which is proportional to the mass."""
         spins = 4.0 * self.wheel_inertia / jnp.square(self.wheel_radius) * heard["v_x_rate"]
         return (drive - brake) / self.wheel_radius - self.drag * heard["v_x"] * jnp.abs(heard["v_x"]) - spins
 
 
 class RatioMemory(NamedTuple):
-    """What was heard, torques (N m), low-passed force (N), slow force and acceleration, the sums of squares and products and of
-    squared residuals, and the time (s) that they are of."""
+    """The motion; the last torques (N m); the low-passed `force` (N); slow force (N) and acceleration (m/s^2); the sums of
+    squares, of products and of squared residuals; and the time since the first row, `age` (s)."""
 
     motion: Any
     drive: Any
@@ -52,8 +52,9 @@ class RatioMemory(NamedTuple):
 
 
 class AbstractRatio(AbstractMethod):
-    """`mass = sum(a F) / sum(a^2)`, sums over time that start with a car of the file's `mass` (kg), as far as `prior_spread` (-)
-    says, and forget with the time constant `memory` (s). The spread is that of residuals that last `lasting` (s)."""
+    """`mass = sum(a F) / sum(a^2)`, with sums over time that start from the file's `mass` (kg) with the relative standard
+    deviation `prior_spread` (-), and forget with the time constant `memory` (s). The standard deviation is that of residuals with
+    the correlation time `lasting` (s)."""
 
     motion: eqx.AbstractVar[BodyMotion]
     pull: eqx.AbstractVar[Pull]
@@ -64,8 +65,7 @@ class AbstractRatio(AbstractMethod):
 
     @abc.abstractmethod
     def pair(self, heard: Any, force: Any, memory: RatioMemory) -> tuple[Any, Any, Any]:
-        """Acceleration (m/s^2), force (N), and how much they count (0 to 1); slow parts in the memory are those of before this
-        row."""
+        """Acceleration (m/s^2), force (N), and their weight (0 to 1); the slow parts in the memory are those before this row."""
 
     @property
     def needs(self):
@@ -74,7 +74,7 @@ class AbstractRatio(AbstractMethod):
     def first(self, t, values):
         motion, heard = self.motion.first(t, values)
         zero = jnp.zeros_like(t)
-        # As if a second of a m/s^2, with a residual of its own, had been seen before.
+        # The prior is equivalent to an earlier measurement with this sum of squares.
         start = jnp.square(RESIDUAL / self.prior_spread) * 2.0 * self.lasting + zero
         memory = RatioMemory(motion, zero, zero, zero, zero, zero, start, start * self.mass, zero, zero)
         return self._next(motion, heard, memory, values)
@@ -87,7 +87,7 @@ class AbstractRatio(AbstractMethod):
         dt = heard["dt"]
         drive, brake = hold(values["drive_torque"], memory.drive), hold(values["brake_torque"], memory.brake)
         raw = self.pull.force(drive, brake, heard)
-        # The speed's rate has been through this low-pass, too.
+        # The speed's rate has the same low-pass filter.
         force = memory.force + dt / (self.motion.slope_time + dt) * (raw - memory.force)
         rate, push, counts = self.pair(heard, force, memory)
         spoke = ~(jnp.isnan(values["drive_torque"]) | jnp.isnan(values["brake_torque"]))
@@ -104,7 +104,7 @@ class AbstractRatio(AbstractMethod):
             motion, drive, brake, force, memory.slow_force + share * (force - memory.slow_force),
             memory.slow_rate + share * (heard["v_x_rate"] - memory.slow_rate), square, product, residual, memory.age + dt,
         )  # fmt: skip
-        # Squared residuals: at first those that the start assumes.
+        # The mean square of residuals starts at the assumed one.
         start = jnp.square(RESIDUAL / self.prior_spread) * 2.0 * self.lasting
         gathered = jnp.maximum(square - start, 0.0)
         mean_square = (residual + jnp.square(RESIDUAL)) / (memory.age + 1.0)
@@ -115,27 +115,27 @@ class AbstractRatio(AbstractMethod):
 
 
 RESIDUAL = 0.05
-"""m/s^2: by so much force over mass and acceleration differ at least, for a while."""
+"""m/s^2: least standard deviation of the residual, force over mass less acceleration."""
 
 
 OF_THE_CAR = 0.025
-"""By this share of itself a mass is wrong whose file is wrong by so much in the wheel's radius, or in the torques."""
+"""Relative standard deviation of the mass by errors of the wheel radius in the car's file, or of the torques."""
 
 
 def beyond(rate: Any, gate: Any) -> Any:
-    """1 of an acceleration larger than the gate, 0 of a smaller one, and smoothly between within a tenth of it (m/s^2)."""
+    """1 for an acceleration above the gate (m/s^2), 0 below, with a smooth transition within a tenth of it."""
     return numerics.smooth_step(0.5 + 5.0 * (jnp.abs(rate) / gate - 1.0))
 
 
 START = 2.5
-"""s: until the low-passes have forgotten where they began."""
+"""s: time until the low-pass filters have forgotten their initial values."""
 
 SLOW = 4.0
-"""s: what is slower than this is the grade's."""
+"""s: slower changes are attributed to the grade."""
 
 
 class Gated(AbstractRatio):
-    """The accelerometer against the force, where it shows more than `gate` m/s^2 (P. Karoshi et al. 2018, ref. [8] of paper
+    """The force against the accelerometer where it measures more than `gate` (m/s^2) (P. Karoshi et al. 2018, ref. [8] of paper
     004)."""
 
     motion: BodyMotion
@@ -152,7 +152,7 @@ class Gated(AbstractRatio):
 
 
 class KinematicGrade(AbstractRatio):
-    """The grade of accelerometer and speed first, then `F = m (d v_x/dt + g sin(grade) + g f_r)` (ref. [12] of paper 004)."""
+    """The grade from accelerometer and speed, then `F = m (d v_x/dt + g sin(grade) + g f_r)` (ref. [12] of paper 004)."""
 
     motion: BodyMotion
     pull: Pull
@@ -169,7 +169,7 @@ class KinematicGrade(AbstractRatio):
 
 
 class HighPass(AbstractRatio):
-    """What is faster than `SLOW` in the force against what is in the speed's rate (ref. [11] of paper 004): grades are slower."""
+    """Changes of the force faster than `SLOW` against those of the speed's rate (ref. [11] of paper 004): grades are slower."""
 
     motion: BodyMotion
     pull: Pull
@@ -184,22 +184,22 @@ class HighPass(AbstractRatio):
 
 
 def pull_of(car: CarSpecification, who: str) -> Pull:
-    """Of a car's file. **Raises** `InputError` for one without `wheel_radius`, by which a torque becomes a force."""
+    """Makes `Pull` from a car's file. **Raises** `InputError` for a file without `wheel_radius`."""
     told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")}
     known = {name: value for name, value in told.items() if value is not None}
     return Pull(number_of(car, "wheel_radius", who, "m"), **known)
 
 
 def gated_ratios(car: CarSpecification, who: str) -> Gated:
-    """Of a car's file."""
+    """Makes `Gated` from a car's file."""
     return Gated(motion_of(car), pull_of(car, who), car.mass)
 
 
 def kinematic_of(car: CarSpecification, who: str) -> KinematicGrade:
-    """Of a car's file."""
+    """Makes `KinematicGrade` from a car's file."""
     return KinematicGrade(motion_of(car), pull_of(car, who), car.mass)
 
 
 def high_pass_of(car: CarSpecification, who: str) -> HighPass:
-    """Of a car's file."""
+    """Makes `HighPass` from a car's file."""
     return HighPass(motion_of(car), pull_of(car, who), car.mass)

@@ -1,4 +1,4 @@
-"""Satellite navigation with an inertial unit, and a camera: section 1.3.2 and 1.3.3 of the review (Chen, Gao, Xu 2013)."""
+"""Satellite navigation with an inertial unit and a camera: sections 1.3.2 and 1.3.3 of the review (Chen, Gao, Xu 2013)."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ SHOWN = {"v_x": "m/s", "v_y": "m/s", "yaw": "rad", "sideslip": "rad"}
 
 METHODS = {
     "kinematic": MethodOfCar(
-        navigation(Parts()), "inertial unit of three axes and satellites, no vehicle", "section 1.3.2 [44, 45]"
+        navigation(Parts()), "inertial unit of three axes and satellites, no vehicle model", "section 1.3.2 [44, 45]"
     ),
     "six_axes": MethodOfCar(
-        navigation(Parts(three_more=True)), "with roll and pitch of six axes", "sections 1.1.2, 1.3.2 [48-50]"
+        navigation(Parts(three_more=True)), "with roll and pitch from six axes", "sections 1.1.2, 1.3.2 [48-50]"
     ),
     "two_antennas": MethodOfCar(
-        navigation(Parts(heading=True)), "with the heading of two antennas", "section 1.3.2 [52, 53]"
+        navigation(Parts(heading=True)), "with the heading from two antennas", "section 1.3.2 [52, 53]"
     ),
     "adapted_stiffness": MethodOfCar(
         navigation(Parts(wheels=True, axle="linear", adapts=True)),
-        "with a rear axle whose stiffness satellites tell",
+        "with a linear rear axle whose stiffness is estimated from the satellites",
         "section 1.3.2 [46, 47]",
     ),
     "rear_axle": MethodOfCar(
         navigation(Parts(wheels=True, axle="saturating", adapts=True)),
-        "with a rear axle that saturates, and adapts",
+        "with a saturating rear axle whose stiffness is estimated",
         "section 1.3.2 [46, 47], with another tyre law",
     ),
     "multi_rate": MethodOfCar(
@@ -43,7 +43,7 @@ METHODS = {
     ),
     "camera": MethodOfCar(
         navigation(Parts(wheels=True, camera=True, axle="saturating", adapts=True)),
-        "with a rear axle and a camera that sees the lane, slow and late",
+        "with a rear axle and a slow, delayed camera of the lane",
         "section 1.3.3 [54, 55]",
     ),
 }
@@ -67,7 +67,7 @@ __all__ = [
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """The satellites' last speed and course, as if the car did not slip; NaN before the first."""
+    """The satellites' last speed and course, as if the car had no sideslip; NaN before the first fix."""
     del car
     said = {"v_x": _held(recording, "speed"), "yaw": _held(recording, "course")}
     return said | dict.fromkeys(("v_y", "sideslip"), np.zeros(len(recording)))
@@ -92,5 +92,5 @@ def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) ->
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same a row at a time."""
+    """The same, one row at a time."""
     return LiveMethod(method_of(NAME, METHODS, source, method))

@@ -1,4 +1,4 @@
-"""What is made of a log's row before the filter sees it: looking back only."""
+"""The cleaning of a log's row before the filter, which only looks back."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ FELT = ("a_x", "a_y", "yaw_rate")
 MORE = ("a_z", "roll_rate", "pitch_rate")
 
 SMOOTH = 0.03
-"""s: the yaw acceleration is the yaw rate's slope behind a low-pass of this time."""
+"""s: time constant of the low-pass filter that differentiates the yaw rate to the yaw acceleration."""
 
 LONGEST_SILENCE = 0.25
-"""s: an inertial unit that has been silent for longer is no witness: all must begin anew."""
+"""s: after a longer gap of the inertial unit the navigation must restart."""
 
 
 ROUGH_TIME = 2.0
-"""s: memory of how rough the lateral acceleration is."""
+"""s: time constant of the average roughness of the lateral acceleration."""
 
 
 class Felt(NamedTuple):
-    """The last row: its time (s), what the unit said last by channel, when (s), the yaw rate behind a low-pass (rad/s), the
-    lateral acceleration of the two rows before (m/s^2) and the square of its roughness, and the last moments."""
+    """The last row: its time `t` (s); the unit's last measurements by channel, `held`, and their time, `spoke` (s); the
+    low-passed yaw rate, `smooth` (rad/s); the last two lateral accelerations, `lately` (m/s^2), and their squared roughness,
+    `rough`; the `window` of the past."""
 
     t: Any
     held: dict[str, Any]
@@ -42,14 +43,14 @@ class Felt(NamedTuple):
 
 
 class Cleaning(AbstractCleaning):
-    """Holds what the inertial unit said last, moves it from the unit's place to the centre of gravity, and looks back by the lags
-    of the `system`."""
+    """Holds the inertial unit's last measurements, converts them from the unit's position to the centre of gravity, and
+    integrates them over the lags of the `system`."""
 
     system: Navigator
 
     @property
     def parts(self) -> Parts:
-        """What is read."""
+        """The measurements that the navigation uses."""
         return self.system.parts
 
     @property
@@ -101,7 +102,7 @@ class Cleaning(AbstractCleaning):
         return Felt(t, held, spoke, smooth, lately, rough, window), cleaned
 
     def _roughness(self, memory: Felt, a_y, said, step):
-        """The last two lateral accelerations, and the variance of what is white in them, by second differences."""
+        """The last two lateral accelerations, and the variance of their white noise, from second differences."""
         bend = a_y - 2.0 * memory.lately[0] + memory.lately[1]
         share = 1.0 - jnp.exp(-step / ROUGH_TIME)
         rough = memory.rough + share * (jnp.square(bend) / 6.0 - memory.rough)
@@ -109,7 +110,7 @@ class Cleaning(AbstractCleaning):
         return (kept(a_y, memory.lately[0]), kept(memory.lately[0], memory.lately[1])), kept(rough, memory.rough)
 
     def _at_centre(self, held, yaw_acceleration) -> dict[str, Any]:
-        """Accelerations of the centre of gravity in a plane motion; the other channels as they are."""
+        """Accelerations of the centre of gravity in a plane motion; other channels unchanged."""
         turns = jnp.square(held["yaw_rate"])
         moved = {
             "a_x": held["a_x"] + yaw_acceleration * self.system.unit_y + turns * self.system.unit_x,
@@ -127,9 +128,10 @@ class Cleaning(AbstractCleaning):
         return jax.tree.map(lambda new, none: jnp.where(lost, none, new), after, empty_window(dt))
 
     def _measured(self, values, pasts: dict[str, Past], said) -> dict[str, Any]:
-        """What satellites, wheels and camera said, where the past that it is of is known; and what is measured to be nothing."""
+        """The measurements of satellites, wheels and camera where the window covers their lag, and the pseudo-measurements of
+        zero."""
         known = lambda name, value: jnp.where(pasts[name].covered, value, jnp.nan)
-        # An unit that is silent says nothing of the axle either.
+        # Without a measurement of the inertial unit there is no information on the axle, either.
         nothing = jnp.where(said, jnp.zeros_like(values["a_y"]), jnp.nan)
         seen = {name: known("sky", values[name]) for name in ("speed", "course")}
         seen |= {ROLLS: nothing, f"{STANDS}_roll": nothing, f"{STANDS}_pitch": nothing}

@@ -1,4 +1,5 @@
-"""Navigation as a method: it begins with the first fix, coasts without, and begins anew after the inertial unit was silent."""
+"""Navigation as a method: it starts with the first fix, integrates without fixes, and restarts after a gap of the inertial
+unit."""
 
 from __future__ import annotations
 
@@ -18,17 +19,18 @@ from jaxveh.filters import Extended, kit
 from jaxveh.statespace import Continuous, Gaussian, Prior, Row, StateDependent, StateSpace
 
 LEAST_SPEED = 2.0
-"""m/s: a fix of less does not begin a navigation, and sideslip is not told at less."""
+"""m/s: a fix at a lower speed does not start a navigation, and sideslip is not known at a lower speed."""
 
 ENOUGH = {"v_x": 1.0, "v_y": 0.5, "yaw": 0.05, "sideslip": 0.02}
-"""m/s, rad: what is less certain than this is not known; of what is not here the answer is a memory as good as its spread."""
+"""m/s, rad: with a larger standard deviation a quantity is not known. Quantities that are not listed are known from the first
+fix on."""
 
 FORGOTTEN = ("v_x", "v_y", "yaw", "lane_offset", "lane_heading")
-"""What is not known any more where the inertial unit was silent; its biases, the axle's stiffness and the like are kept."""
+"""States that are lost in a gap of the inertial unit; others, such as biases and the axle's stiffness, are kept."""
 
 
 def navigation_model(system: Navigator) -> StateSpace:
-    """The state space, for any Gaussian filter whose rows `Cleaning` has made."""
+    """The state space for any Gaussian filter, with rows from `Cleaning`."""
     states = states_of(system.parts)
     kind = state_type(system.parts)
     return StateSpace(
@@ -46,7 +48,7 @@ def navigation_model(system: Navigator) -> StateSpace:
 
 
 class Known(NamedTuple):
-    """What is remembered: the filter's belief, the cleaning's memory, and whether a fix has begun it."""
+    """The memory of `Navigation`: the filter's belief, the cleaning's memory `felt`, and whether a fix has started it."""
 
     belief: Any
     felt: Felt
@@ -54,11 +56,13 @@ class Known(NamedTuple):
 
 
 class Navigation(AbstractMethod):
-    """A Gaussian `filter` on `navigation_model`, begun by the first fix whose speed is more than `LEAST_SPEED`: its course is the
-    yaw to within the spread of the sideslip, its speed the car's. The car is taken to go forwards then.
+    """A Gaussian `filter` on `navigation_model`, which starts with the first fix whose speed is more than `LEAST_SPEED`. The yaw
+    starts at the course, with the standard deviation of the sideslip, and the speed at that of the fix. The car is then taken to
+    go forwards.
 
-    An outage of the satellites is coasted through; what is `known` follows from the spread (`ENOUGH`). Where the inertial unit is
-    silent for longer than `cleaning.LONGEST_SILENCE` velocity and yaw are lost, and the next fix begins them anew.
+    During an outage of the satellites the filter integrates the inertial unit; what is `known` follows from the standard
+    deviations (`ENOUGH`). If the inertial unit has no measurement for longer than `cleaning.LONGEST_SILENCE`, velocity and yaw
+    are lost, and the next fix restarts them.
     """
 
     model: StateSpace
@@ -66,7 +70,7 @@ class Navigation(AbstractMethod):
 
     @property
     def _cleaning(self) -> Cleaning:
-        """What is made of a row before the filter sees it."""
+        """The cleaning of each row before the filter."""
         return Cleaning(self.model.system)
 
     @property
@@ -102,7 +106,7 @@ class Navigation(AbstractMethod):
         return self._said(belief, felt, goes_on, row, cleaned, jnp.where(goes_on, info.result, 0))
 
     def _said(self, belief, felt, begun, row, cleaned, result):
-        """The memory and the answer; a fix begins what has not begun."""
+        """The memory and the answer; a fix starts a navigation that has not started."""
         fix = jnp.isfinite(row.y.speed) & jnp.isfinite(row.y.course) & (row.y.speed > LEAST_SPEED)
         begins = ~begun & fix & cleaned["felt"]
         belief = _choose(begins, self._begun(belief, row), belief)
@@ -119,7 +123,7 @@ class Navigation(AbstractMethod):
         return Known(belief, felt, begun), said
 
     def _begun(self, belief, row: Row):
-        """The belief with what a fix says of velocity and yaw, and the prior's spread of them."""
+        """The belief with velocity and yaw from a fix, and with their prior standard deviations."""
         prior, system = self.model.prior, self.model.system
         speed = jnp.where(row.y.speed > LEAST_SPEED, row.y.speed, LEAST_SPEED)
         yaw = jnp.where(jnp.isfinite(row.y.course), row.y.course, 0.0) + row.u.sky_turned
@@ -129,7 +133,7 @@ class Navigation(AbstractMethod):
         mean = jnp.where(anew, jnp.stack([started[name] for name in self.model.states]), belief.vector)
         kept = ~anew[:, None] & ~anew[None, :]
         covariance = jnp.where(kept, belief.covariance, 0.0) + jnp.where(anew, 1.0, 0.0) * prior.covariance()
-        # Yaw and lateral velocity are wrong together: their sum is the course.
+        # The errors of yaw and lateral velocity are correlated: yaw plus sideslip is the course.
         both = covariance[slip, slip]
         place = self.model.states.index("yaw")
         fixed = jnp.square(system.across / speed)

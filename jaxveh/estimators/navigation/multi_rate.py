@@ -1,4 +1,4 @@
-"""A single track that is corrected by the yaw rate in every row, and by the course whenever satellites speak (Nguyen, Wang, Oh,
+"""A single track that is corrected by the yaw rate in every row, and by the course at each satellite fix (Nguyen, Wang, Oh,
 Fujimoto, Hori 2012, [51] of the review's section 1.3.2)."""
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from jaxveh.io import CarSpecification
 from jaxveh.statespace import Continuous, Gaussian, Prior, StateSpace
 
 SLOWEST = 3.0
-"""m/s: at less the single track is taken to go at this speed, where its steer no longer says much; sideslip is not known."""
+"""m/s: a slower single track is computed at this speed, where the steer has little influence; sideslip is then not known."""
 
 DEPTH = 24
-"""How many rows are kept for a fix that is late."""
+"""Number of rows that are kept for a delayed fix."""
 
 
 SLIP_ERROR, SLIP_TIME = 0.004, 2.0
-"""rad and s: size and memory of what a linear single track does not know of sideslip."""
+"""rad and s: standard deviation and time constant of a linear single track's sideslip error."""
 
 
 class Track(NamedTuple):
-    """`sideslip` (rad), `yaw_rate` (rad/s) and `yaw` (rad) of the centre of gravity as the single track has them;
-    `bias_yaw_rate` (rad/s) of the gyroscope, `steer_offset` (rad) of the road wheels, and `slip_error` (rad): by how much the
-    true sideslip is more, first-order Gauss-Markov."""
+    """`sideslip` (rad), `yaw_rate` (rad/s) and `yaw` (rad) of the single track; `bias_yaw_rate` (rad/s) of the gyroscope,
+    `steer_offset` (rad) of the road wheels, and `slip_error` (rad): true sideslip less that of the single track, first-order
+    Gauss-Markov."""
 
     sideslip: Any
     yaw_rate: Any
@@ -43,7 +43,7 @@ class Track(NamedTuple):
 
 
 class TrackReport(NamedTuple):
-    """What is shown: speeds (m/s), yaw and sideslip (rad), yaw rate and its bias (rad/s), `steer_offset` (rad)."""
+    """The outputs of the filter: velocity (m/s), yaw and sideslip (rad), yaw rate and its bias (rad/s), `steer_offset` (rad)."""
 
     v_x: Any
     v_y: Any
@@ -69,7 +69,7 @@ class LinearTrack(eqx.Module):
         check_parameters(self)
 
     def matrices(self, v) -> tuple[Any, ...]:
-        """a_11, a_12, a_21, a_22, b_1, b_2 of sideslip and yaw rate at a speed (m/s)."""
+        """The coefficients a_11, a_12, a_21, a_22, b_1, b_2 of sideslip and yaw rate at a speed `v` (m/s)."""
         m, J, a, b = self.mass, self.yaw_inertia, self.front_axle_to_cg, self.rear_axle_to_cg
         C_f, C_r = self.front_stiffness, self.rear_stiffness
         lever = b * C_r - a * C_f
@@ -84,7 +84,7 @@ class LinearTrack(eqx.Module):
 
 
 def transition(system: LinearTrack, t0, t1, x: Track, u) -> Track:
-    """The trapezoidal rule: stable however slow the car or long the step."""
+    """The state after a step by the trapezoidal rule, which is stable at any speed and for any step."""
     half = 0.5 * (t1 - t0)
     v = jnp.maximum(jnp.abs(u.v_x), SLOWEST)
     a_11, a_12, a_21, a_22, b_1, b_2 = system.matrices(v)
@@ -104,27 +104,27 @@ def transition(system: LinearTrack, t0, t1, x: Track, u) -> Track:
 
 
 class Seen(NamedTuple):
-    """What is measured: `yaw_rate` (rad/s) and `course` (rad)."""
+    """The measurements: `yaw_rate` (rad/s) and `course` (rad)."""
 
     yaw_rate: Any
     course: Any
 
 
 def observation(system: LinearTrack, t, x: Track, u) -> Seen:
-    """Yaw rate with its bias, and the course, yaw and sideslip together."""
+    """The yaw rate plus its bias, and the course, which is yaw plus sideslip."""
     del system, t, u
     return Seen(x.yaw_rate + x.bias_yaw_rate, x.yaw + x.sideslip + x.slip_error)
 
 
 def report(system: LinearTrack, t, x: Track, u) -> TrackReport:
-    """What is shown."""
+    """The outputs of the filter."""
     del system, t
     v_x, sideslip = u.v_x + 0.0 * x.sideslip, x.sideslip + x.slip_error
     return TrackReport(v_x, v_x * sideslip, x.yaw, sideslip, x.yaw_rate, x.bias_yaw_rate, x.steer_offset)
 
 
 class Held(AbstractCleaning):
-    """Steer and speed as they were said last: the speed of the rear wheels, or of the satellites where these are silent."""
+    """The last measured steer and speed. The speed is that of the rear wheels, or that of the satellites in rows without it."""
 
     @property
     def channels(self):
@@ -146,7 +146,7 @@ class Held(AbstractCleaning):
 
 
 class MultiRate(AbstractMethod):
-    """The filter `tracked`, whose speed is told: of that it claims no spread."""
+    """The filter `tracked` with the measured speed as an input; it gives no standard deviation for the speed."""
 
     tracked: Filtered
 
@@ -175,7 +175,7 @@ PROCESS_NOISE = {
     "steer_offset": 1e-4,
     "slip_error": SLIP_ERROR * (2.0 / SLIP_TIME) ** 0.5,
 }
-"""rad and rad/s, per root second."""
+"""Standard deviations of the process noise, rad and rad/s per root second."""
 
 SPREAD = {
     "sideslip": 0.05,
@@ -185,14 +185,15 @@ SPREAD = {
     "steer_offset": 0.01,
     "slip_error": SLIP_ERROR,
 }
-"""rad, rad/s: at the start, the yaw as good as unknown."""
+"""Standard deviations at the start, rad and rad/s; the yaw is practically unknown."""
 
 
 def multi_rate_of(car: CarSpecification) -> MultiRate:
-    """The filter of a car's file. The fix is put among the rows at its own time, and these are filtered anew (`Delayed`).
+    """Makes the filter from a car's file. A fix is inserted among the rows at its own time, and the later rows are filtered again
+    (`Delayed`).
 
-    Between two fixes the paper predicts the residual of the course, and corrects by it; a filter needs none there, since its
-    belief already is what all measurements so far say.
+    Between two fixes the paper predicts the residual of the course, and corrects by it. A filter does not need this, since its
+    belief already contains all measurements so far.
     """
     numbers = ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg")
     stiffness = {f"{axle}_stiffness": getattr(car, f"{axle}_cornering_stiffness") for axle in ("front", "rear")}
@@ -221,7 +222,8 @@ def multi_rate_of(car: CarSpecification) -> MultiRate:
 
 
 def what_is_told(model: StateSpace, belief: Any, row: Any) -> dict[str, Any]:
-    """What is known: all but the yaw while the car is not slow and sideslip is certain enough; the yaw after a fix."""
+    """Which outputs are known: speed and yaw rate above `SLOWEST`; lateral velocity and sideslip there if the standard deviation
+    of sideslip is below 0.02 rad; the yaw if its standard deviation is below 0.05 rad, which needs a fix."""
     std = belief.moments(model)[1]
     moving = row.u.v_x > SLOWEST
     sure = moving & (std.sideslip < 0.02)

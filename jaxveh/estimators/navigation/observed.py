@@ -1,4 +1,4 @@
-"""What satellites, wheels, the rear axle and a camera would say of a state."""
+"""Predicted measurements of satellites, wheels, the rear axle and a camera, and their noise."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from jaxveh.estimators.navigation.window import rotate
 from jaxveh.vehicles import GRAVITY
 
 ROLLS, BALANCE = "rolls", "slip_balance"
-"""m/s: how much faster to the left the rear axle goes than where it points, which is little as long as nothing pushes the car
-aside; and than its force asks for. Both are measured to be nothing."""
+"""m/s: pseudo-measurements of zero: the lateral velocity of the rear axle, which is small without lateral forces; and its
+lateral velocity beyond the one that its force implies."""
 
 STANDS = "stands"
-"""rad: how much more the body rolls and dips than its springs ask for, measured to be nothing as well."""
+"""rad: pseudo-measurements of zero: roll and pitch of the body beyond its equilibrium on the springs."""
 
 WHEELS_APART = 5.0
-"""How much of the difference of two wheels is taken for an error of their mean, which lasts: for many rows it is one error."""
+"""Factor from the difference of two wheels to the error of their mean. It is large because the error lasts over many rows."""
 
 SATURATED = 0.93
-"""The share of the grip beyond which the force no longer tells the slip angle."""
+"""Share of the grip beyond which the force no longer determines the slip angle."""
 
 BEND = 0.05
-"""The share of the grip over which that sets in."""
+"""Width of the smooth transition to `SATURATED`, as a share of the grip."""
 
 STEEPEST = 0.6
-"""rad: no axle's slip angle is taken to be more, where the tangent would run away."""
+"""rad: limit of an axle's slip angle, beyond which the tangent becomes too large."""
 
 
 def channels_of(parts: Parts) -> tuple[str, ...]:
-    """What is measured, and what is measured to be nothing."""
+    """The channels of measurements and of pseudo-measurements of zero."""
     named = {
         "heading": parts.heading,
         "wheel_speed": parts.wheels,
@@ -49,11 +49,11 @@ def channels_of(parts: Parts) -> tuple[str, ...]:
 
 
 ANGLES = ("course", "heading", "lane_heading")
-"""Channels that are told to a whole turn."""
+"""Channels that are angles, known up to whole turns."""
 
 
 def observation(system: Navigator, t, x, u) -> Any:
-    """All of it by channel."""
+    """The predicted measurements by channel."""
     del t
     parts = system.parts
     ahead, aside = antenna_velocity(system, x, u)
@@ -63,7 +63,7 @@ def observation(system: Navigator, t, x, u) -> Any:
         "heading": x.yaw - turned_since(system, x, u, "sky"),
     }
     if parts.wheels:
-        # Wheels do not know the direction in which they turn; pushing forward they turn faster.
+        # Wheel speeds have no sign; driven wheels turn faster.
         slips = x.wheel_scale + x.wheel_slip * u.a_x
         seen["wheel_speed"] = (1.0 + slips) * numerics.sqrt(jnp.square(x.v_x) + 1e-4)
     if parts.axle == "none":
@@ -83,14 +83,14 @@ def observation(system: Navigator, t, x, u) -> Any:
 
 
 def velocity_then(system: Navigator, x, u, past: str) -> tuple[Any, Any]:
-    """The velocity of the centre of gravity (m/s) when `past` began, in the axes in which the car stands now.
+    """The velocity of the centre of gravity (m/s) at the beginning of `past`, in the car's present axes.
 
-    It is that of now less what was felt since, and what was felt is `gained` less what of it biases and slopes have made.
+    It is the present velocity less its change since, which is `gained` corrected for biases and slopes.
     """
     lag, gains = system.lags[past], (1.0, 1.0) if system.parts.three_more else system.gains(x)
     leant = (0.0, 0.0)
     if system.parts.three_more:
-        # On the average of these moments.
+        # The mean attitude over this time.
         half = 0.5 * lag
         dip = x.dip - half * (u.pitch_rate - x.bias_pitch_rate)
         leant = -dip, x.lean - half * (u.roll_rate - x.bias_roll_rate)
@@ -105,15 +105,15 @@ def velocity_then(system: Navigator, x, u, past: str) -> tuple[Any, Any]:
 
 
 def turned_since(system: Navigator, x, u, past: str) -> Any:
-    """By what angle (rad) the car has turned since."""
+    """The angle (rad) by which the car has turned since the beginning of `past`."""
     return getattr(u, f"{past}_turned") - system.lags[past] * x.bias_yaw_rate
 
 
 def antenna_velocity(system: Navigator, x, u) -> tuple[Any, Any]:
-    """The antenna's velocity (m/s) when the satellites saw it, in the axes in which the car stands now.
+    """The antenna's velocity (m/s) at the time of the satellites' measurement, in the car's present axes.
 
-    To that of the centre of gravity comes `omega x r` of the lever arm, whose place was turned back by the angle of these
-    moments, and of the antenna's height where the unit says how the body rolls.
+    It is the velocity of the centre of gravity plus `omega x r` of the lever arm in its past direction; the antenna's height
+    counts if the unit measures the roll rate.
     """
     ahead, aside = velocity_then(system, x, u, "sky")
     spun, turned = u.sky_spun - x.bias_yaw_rate, turned_since(system, x, u, "sky")
@@ -123,10 +123,10 @@ def antenna_velocity(system: Navigator, x, u) -> tuple[Any, Any]:
 
 
 def balance(system: Navigator, x, u) -> Any:
-    """How much faster to the left the rear axle goes than its force asks for, m/s.
+    """The rear axle's lateral velocity (to the left) beyond the one that its force implies, m/s.
 
-    Force and motion are averages over `axle_time`, the motion's by Simpson's rule: a single acceleration is rough, and a law
-    that adapts would take its noise for slip that needs no force.
+    Force and motion are averages over `axle_time`, that of the motion by Simpson's rule: a single acceleration is noisy, and an
+    adapted law would mistake its noise for slip without force.
     """
     moves = [(x.v_x, x.v_y, u.yaw_rate)]
     for past in ("half", "whole"):
@@ -139,12 +139,12 @@ def balance(system: Navigator, x, u) -> Any:
 
 
 def error_growth(system: Navigator, share) -> Any:
-    """How much larger the law's error is under a force of this share of load than without one."""
+    """The law's error at a force of this share of the load, over that without a force."""
     return 1.0 + system.slip_growth * numerics.hypot(share, 0.01)
 
 
 def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
-    """The slip angle (rad) that the rear axle's force asks for, how much it grows with the force over load, and that.
+    """The slip angle (rad) that the rear axle's force implies, its derivative by the force over load, and the force over load.
 
     Linear: force over load = stiffness angle. Saturating: `F = c a / (1 + |c a / grip|^shape)^(1 / shape)`, whose inverse has a
     closed form.
@@ -153,12 +153,12 @@ def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
     a_x, a_y = rotate(u.whole_gained_x / time, u.whole_gained_y / time, -0.5 * u.whole_turned)
     felt = u._replace(a_y=a_y)
     if system.parts.three_more:
-        # The body as it stood in the middle of this time.
+        # With the body's attitude in the middle of this time.
         felt = felt._replace(a_y=a_y + GRAVITY * 0.5 * time * (u.roll_rate - x.bias_roll_rate))
     f_y = system.forces(x, felt)[1]
     swing = (u.yaw_rate - u.whole_spun) / time
     force = (a * system.mass * f_y - system.yaw_inertia * swing) / length
-    # The accelerometer as it speaks: no error of the law should be taken for an error of it.
+    # The measured acceleration without bias states, so that errors of the law are not attributed to them.
     load = system.mass * (GRAVITY * a + system.cg_height * a_x) / length
     share = force / jnp.maximum(load, 0.2 * GRAVITY * system.mass * a / length)
     stiffness = system.stiffness * (jnp.exp(x.stiffening) if system.parts.adapts else 1.0)
@@ -166,7 +166,7 @@ def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
         angle, slope = share / stiffness, 1.0 / stiffness + 0.0 * share
     else:
         used = numerics.smooth_clip(share / system.grip, -SATURATED, SATURATED, BEND)
-        # A little more than zero: a power of zero has no slope.
+        # Slightly above zero, because a power of zero has no derivative.
         rest = 1.0 - numerics.sqrt(jnp.square(used) + 1e-12) ** system.shape
         angle = used * system.grip / stiffness * rest ** (-1.0 / system.shape)
         slope = rest ** (-1.0 - 1.0 / system.shape) / stiffness
@@ -174,13 +174,13 @@ def axle_slip(system: Navigator, x, u) -> tuple[Any, Any, Any]:
 
 
 def lane(system: Navigator, x, u) -> dict[str, Any]:
-    """Offset from the lane's middle (m, to the left) and heading against it (rad) when the camera saw them."""
+    """Offset from the lane's middle (m, to the left) and heading against it (rad) at the time of the camera's measurement."""
     lag, turned = system.camera_lag, turned_since(system, x, u, "camera")
     along = lag * x.v_x * x.bend
     middle = x.lane_heading - 0.5 * (turned - along)
     then = x.lane_heading - (turned - along)
     before = velocity_then(system, x, u, "camera")
-    # The mean velocity, in the axes of the middle of the lag.
+    # The mean velocity, in the axes at the middle of the lag.
     ahead, aside = rotate(0.5 * (x.v_x + before[0]), 0.5 * (x.v_y + before[1]), -0.5 * turned)
     gone = lag * (ahead * numerics.sin(middle) + aside * numerics.cos(middle))
     return {
@@ -190,10 +190,10 @@ def lane(system: Navigator, x, u) -> dict[str, Any]:
 
 
 def noise(system: Navigator, t, x, u) -> dict[str, Any]:
-    """Standard deviations by channel. The course's is the velocity's error across, over speed."""
+    """Standard deviations by channel. That of the course is the lateral error of the velocity over the speed."""
     del t
     parts, moving = system.parts, numerics.sqrt(jnp.square(x.v_x) + jnp.square(x.v_y) + SLOWEST**2)
-    # An error that lasts is told once in its time, not in every row.
+    # A lasting error counts once per `slip_time`, not in every row.
     lasting = numerics.sqrt(system.slip_time / u.step)
     std = {
         "speed": system.along,
@@ -206,7 +206,7 @@ def noise(system: Navigator, t, x, u) -> dict[str, Any]:
         f"{STANDS}_pitch": system.lean_error * lasting,
     }
     if parts.wheels:
-        # One that is in the air, or locked, is told by the other.
+        # A wheel that is in the air or locked is detected by the other one.
         std["wheel_speed"] = (
             system.wheel_error
             + system.wheel_slip_error * jnp.abs(u.a_x) * moving
@@ -217,17 +217,17 @@ def noise(system: Navigator, t, x, u) -> dict[str, Any]:
         std[ROLLS] = (0.02 + moving * slip) * lasting
     else:
         angle, slope, _ = axle_slip(system, x, u)
-        # Rows share most of the time over which they are averages.
+        # Averages of successive rows overlap.
         shared = numerics.sqrt(system.axle_time / u.step)
         force = numerics.hypot(system.force_noise * shared, u.rough / GRAVITY)
-        # Of a force of which little is left to grow the law says less and less.
+        # Near saturation the law gives less and less information on the slip angle.
         uncertain = numerics.hypot(system.slip_noise / numerics.sqrt(u.step), force * slope)
         std[BALANCE] = 0.02 * shared + jnp.abs(x.v_x) * (1.0 + jnp.square(numerics.tan(angle))) * uncertain
     return {name: std[name] + 0.0 * x.v_x for name in channels_of(parts)}
 
 
 def report(system: Navigator, t, x, u) -> Any:
-    """What is shown: of the time at which the inertial unit speaks, its own lag made up by what it feels."""
+    """The outputs at the present time: the inertial unit's own lag is compensated with its accelerations."""
     del t
     a_x, a_y = system.accelerations(x, u)
     roll, pitch = system.tilts(x, u)

@@ -1,4 +1,4 @@
-"""A navigation of a car's file."""
+"""Navigation methods from a car's file."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from jaxveh.io import AxleTyre, CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 SATELLITE_DELAY, CAMERA_DELAY, UNIT_DELAY = 0.15, 0.08, 0.01
-"""s: what is usual of a series car where its file does not say."""
+"""s: usual delays of a series car, for a file without them."""
 
 USUAL_LOW_PASS = 15.0
-"""Hz: so is the low-pass in its inertial unit."""
+"""Hz: usual corner frequency of the low-pass filter in its inertial unit."""
 
 USUAL_TRACK = 1.5
-"""m: of the rear wheels, where a file does not say it."""
+"""m: track of the rear wheels, for a file without it."""
 
 USUAL_HEIGHT = 0.55
-"""m: of a centre of gravity whose height a file does not say; it shifts load by acceleration, a correction."""
+"""m: height of the centre of gravity, for a file without it; it only corrects the axle load for acceleration."""
 
 
 def navigation(parts: Parts) -> Callable[[CarSpecification], Navigation]:
-    """What makes a navigation with these `parts` of a car's file."""
+    """A function that makes a navigation with these `parts` from a car's file."""
     return lambda car: navigation_of(car, parts)
 
 
 def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -> Navigation:
-    """The navigation of a car, with these `parts`; `numbers` of `Navigator` that are not in the file, by name.
+    """The navigation of a car, with these `parts`; `numbers`: parameters of `Navigator` that are not in the file, by name.
 
-    A file that says no `antenna_position` has its antenna at the centre of gravity; without delays they are those of a usual
-    series car, `SATELLITE_DELAY` and so on. `sensor_position` is the inertial unit's.
+    For a file without `antenna_position` the antenna is at the centre of gravity; missing delays are those of a usual series car,
+    `SATELLITE_DELAY` and so on. `sensor_position` is that of the inertial unit.
     """
     sensor_lag = unit_lag(car)
     antenna = car.antenna_position or (0.0, 0.0, 0.0)
@@ -57,20 +57,20 @@ def navigation_of(car: CarSpecification, parts: Parts = PLAIN, **numbers: Any) -
 
 
 def unit_lag(car: CarSpecification) -> float:
-    """How late the inertial unit is, s: its delay, and that of a Butterworth low-pass of second order for slow signals."""
+    """The delay of the inertial unit, s: its own, and that of a second-order Butterworth low-pass filter for slow signals."""
     low_pass = USUAL_LOW_PASS if car.low_pass is None else car.low_pass
     return _or(car.inertial_delay, UNIT_DELAY) + math.sqrt(2.0) / (2.0 * math.pi * low_pass)
 
 
 def satellite_lag(car: CarSpecification) -> float:
-    """How much later satellites speak than the inertial unit, s."""
+    """The delay of the satellites beyond that of the inertial unit, s."""
     return max(_or(car.satellite_delay, SATELLITE_DELAY) - unit_lag(car), 0.0)
 
 
 def _axle(car: CarSpecification) -> dict[str, float]:
-    """Stiffness and grip of the rear axle, over its load at rest."""
+    """Stiffness and grip of the rear axle, over its static load."""
     weight = car.mass * GRAVITY * car.front_axle_to_cg / car.wheelbase
-    # A file's axle always has one: its own, or that of its coefficients.
+    # A file's axle always has a stiffness: its own, or that of its coefficients.
     stiffness = car.rear_cornering_stiffness or 0.0
     told = {"stiffness": stiffness / weight}
     if car.rear is not None:
@@ -80,27 +80,27 @@ def _axle(car: CarSpecification) -> dict[str, float]:
 
 
 BEND = 0.8
-"""The share of its peak at which a file's Magic Formula and the curve here are alike."""
+"""Share of the peak at which the file's Magic Formula and the curve used here coincide."""
 
 
 def _shape(tyre: AxleTyre) -> float:
-    """How sharply the curve has to bend to be like a Magic Formula of these coefficients.
+    """The curve's shape parameter (-) that approximates a Magic Formula of these coefficients.
 
     The formula's slip angle at `BEND` of its peak, times the stiffness, over that force is `(1 - BEND^shape)^(-1 / shape)`.
     """
     formula = lambda x: math.sin(tyre.C * math.atan(x - tyre.E * (x - math.atan(x))))
-    # The argument B a at which it has risen so far; formulas that never do have one far out.
+    # The argument B a at which the formula reaches `BEND`; for formulas that never do, the upper end.
     x = _crossing(lambda x: formula(x) - BEND, 0.0, 50.0)
     stretch = max(tyre.C * x / BEND, 1.0 + 1e-3)
     return _crossing(lambda shape: stretch - (1.0 - BEND**shape) ** (-1.0 / shape), *SHAPES)
 
 
 SHAPES = 1.0, 8.0
-"""No curve bends less sharply, or more."""
+"""Bounds of the curve's shape parameter."""
 
 
 def _crossing(rising: Callable[[float], float], low: float, high: float) -> float:
-    """Where a rising function is zero, by halving; an end where it is not between them."""
+    """The zero of a rising function by bisection; an end of the interval if there is none inside."""
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if rising(middle) > 0 else (middle, high)

@@ -1,4 +1,4 @@
-"""The numbers of a car that finds its way by an inertial unit and satellites, and how its velocity moves between two fixes."""
+"""Parameters, states and transition of a car with an inertial unit and satellite navigation."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from jaxveh.estimators.navigation.window import rotate
 from jaxveh.vehicles import GRAVITY
 
 SLOWEST = 0.5
-"""m/s: slower, the direction of the velocity is not looked at."""
+"""m/s: below this speed the direction of the velocity is not used."""
 
 
 class Parts(NamedTuple):
-    """What a navigation reads beside accelerations, yaw rate, speed and course: the inertial unit's other `three_more` axes, the
-    `heading` of two antennas, the rear `wheels`, a `camera` that sees the lane; and which law its rear axle has: `axle` is
-    "none", "linear" or "saturating", whose stiffness is found on the way where it `adapts`."""
+    """The parts of a navigation in addition to accelerations, yaw rate, speed and course. `three_more`: the inertial unit's other
+    axes; `heading`: the one from two antennas; `wheels`: the speeds of the rear wheels; `camera`: one that sees the lane; `axle`:
+    the tyre law of the rear axle, "none", "linear" or "saturating"; `adapts`: the stiffness of the rear axle is estimated."""
 
     three_more: bool = False
     heading: bool = False
@@ -32,30 +32,30 @@ class Parts(NamedTuple):
 
 
 PLAIN = Parts()
-"""Three axes and satellites, nothing else."""
+"""Three axes and satellites only."""
 
 
 class Navigator(eqx.Module):
-    """An inertial unit on a car with satellites.
+    """An inertial unit on a car with satellite navigation.
 
-    - `lag` (s): by how much satellites speak later than the inertial unit of what was true at one time; `sensor_lag`: by how
-      much the latter is late itself, its low-pass included; `camera_lag` (s): as `lag`, of the camera.
-    - `unit_x`, `unit_y`, `antenna_x`, `antenna_y`, `antenna_z` (m): places of the inertial unit and of the antenna (of two the
-      one whose velocity is told) from the centre of gravity.
-    - `along`, `across` (m/s): standard deviations of the satellites' velocity; `heading_error` (rad) of two antennas.
-    - `bank_time`, `grade_time` (s): memories of the slow tilts, first-order Gauss-Markov.
-    - `dip_gradient` (rad s^2/m): by how much the nose dips for each m/s^2 of braking.
-    - `wheel_error` (m/s), `wheel_slip_error` (s^2/m): standard deviation of the rear wheels' speed, and what of it comes with
-      acceleration, as a share of speed; `track` (m), by which the two are known to agree; `lean_error` (rad): of a body's roll by
-      its springs.
+    - `lag` (s): delay of the satellites beyond that of the inertial unit; `sensor_lag` (s): delay of the inertial unit, its
+      low-pass filter included; `camera_lag` (s): delay of the camera beyond that of the inertial unit.
+    - `unit_x`, `unit_y`, `antenna_x`, `antenna_y`, `antenna_z` (m): positions of the inertial unit and of the antenna (of two,
+      the one whose velocity is measured) from the centre of gravity.
+    - `along`, `across` (m/s): standard deviations of the satellites' velocity; `heading_error` (rad): that of two antennas.
+    - `bank_time`, `grade_time` (s): time constants of bank and grade, first-order Gauss-Markov processes.
+    - `dip_gradient` (rad s^2/m): pitch angle per m/s^2 of braking.
+    - `wheel_error` (m/s), `wheel_slip_error` (s^2/m): standard deviation of the rear wheels' speed, and its increase with
+      acceleration, as a share of speed; `track` (m): rear track, for the difference of both wheels' speeds; `lean_error` (rad):
+      standard deviation of the body's roll and pitch on its springs.
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m); `stiffness` (1/rad) and `grip`
-      (-): cornering stiffness and largest lateral force of the rear axle over its load, `shape` (-): how sharply the curve
-      between bends; `axle_time` (s): over which force and slip are averaged; `slip_growth` (-): by how much the slip angle's
-      error grows with force over load; `slip_noise` (rad sqrt s): its white part, `force_noise` (-): of the averaged force over
-      load. Where no law is taken, the slip angle is within `rolling_slip` (rad) and `slip_gradient` (rad s^2/m) times the force
-      over mass. `slip_time` (s): memory of errors that last, these, that of `slip_error`, and of how the body stands.
-    - `lane_error` (m), `lane_angle_error` (rad), `bend_time` (s): of the camera, and the memory of the lane's curvature;
-      `camera_x` (m): where it says how far the lane's middle is away, ahead of the centre of gravity.
+      (-): cornering stiffness and largest lateral force of the rear axle over its load; `shape` (-): sharpness of the curve's
+      bend; `axle_time` (s): time over which force and slip are averaged; `slip_growth` (-): growth of the slip angle's error
+      with force over load; `slip_noise` (rad sqrt s): its white part; `force_noise` (-): error of the averaged force over load.
+      Without a tyre law the slip angle is within `rolling_slip` (rad) plus `slip_gradient` (rad s^2/m) times force over mass.
+      `slip_time` (s): time constant of lasting errors: these, `slip_error`, and those of the body's attitude.
+    - `lane_error` (m), `lane_angle_error` (rad): standard deviations of the camera; `bend_time` (s): time constant of the lane's
+      curvature; `camera_x` (m): distance ahead of the centre of gravity at which the camera measures the lane offset.
     """
 
     lag: jax.Array = parameter("s", scale=0.1, default=0.125)
@@ -85,7 +85,7 @@ class Navigator(eqx.Module):
     grip: jax.Array = positive("-", default=1.0)
     shape: jax.Array = positive("-", default=2.5)
     slip_growth: jax.Array = positive("-", default=3.0)
-    # No multiple of a usual step: whether the rows reach back so far should not hang on rounding.
+    # No multiple of a usual step, so that the rows that it covers do not depend on rounding.
     axle_time: jax.Array = positive("s", default=0.19)
     rolling_slip: jax.Array = positive("rad", default=0.002)
     slip_gradient: jax.Array = positive("rad s^2/m", default=0.006)
@@ -108,7 +108,7 @@ class Navigator(eqx.Module):
 
     @property
     def lags(self) -> dict[str, Any]:
-        """By how much is looked back (s): to what satellites saw (`sky`), a `camera`, and to middle and begin of the time over
+        """The lags (s) by name: of the satellites (`sky`), of the `camera`, and to the middle and the beginning of the time over
         which the axle's force is averaged (`half`, `whole`)."""
         lags = {"sky": self.lag}
         if self.parts.camera:
@@ -119,24 +119,25 @@ class Navigator(eqx.Module):
 
     @property
     def longest_lag(self) -> Any:
-        """The longest of them, s."""
+        """The longest lag, s."""
         return jnp.max(jnp.stack(list(self.lags.values())))
 
     def forces(self, x, u) -> tuple[Any, Any]:
-        """Forces on the car over its mass (m/s^2), forward and to the left: what accelerometers feel less their biases, and less
-        gravity in a body that leans and dips on its springs."""
+        """Forces on the car over its mass (m/s^2), forward and to the left: the measured accelerations less their biases, and
+        less gravity in a body that rolls and pitches on its springs."""
         dipped = -GRAVITY * x.dip if self.parts.three_more else 0.0
         leant = GRAVITY * x.lean if self.parts.three_more else 0.0
-        # Without gyroscopes about these axes the body is taken to stand where its springs hold it.
+        # Without gyroscopes about these axes the body is taken to be in equilibrium on its springs.
         stands = (1.0, 1.0) if self.parts.three_more else self.gains(x)
         return (u.a_x - x.bias_a_x - dipped) / stands[0], (u.a_y - x.bias_a_y - leant) / stands[1]
 
     def gains(self, x) -> tuple[Any, Any]:
-        """What accelerometers of a body on its springs feel, over what they would feel in one that stays upright."""
+        """The measured accelerations of a body on its springs over those of an upright body."""
         return 1.0 + GRAVITY * self.dip_gradient, 1.0 + GRAVITY * x.lean_gradient
 
     def accelerations(self, x, u) -> tuple[Any, Any]:
-        """Of the centre of gravity over ground (m/s^2), in the car's axes: the forces less gravity along a sloping road."""
+        """Accelerations of the centre of gravity over ground (m/s^2), in the car's axes: the forces over mass less gravity along
+        a sloping road."""
         f_x, f_y = self.forces(x, u)
         return f_x - GRAVITY * x.grade, f_y - GRAVITY * x.bank
 
@@ -151,11 +152,11 @@ class Navigator(eqx.Module):
 def states_of(parts: Parts) -> dict[str, tuple[float, float, float]]:
     """The states: mean and standard deviation of the prior, and the standard deviation of the noise (per root second).
 
-    Speeds (m/s) and yaw (rad) at the centre of gravity; `bias_` of each axis (m/s^2, rad/s); `bank`, `grade` (rad) that the car
-    stands on; `lean_gradient` (rad s^2/m): roll on its springs for each m/s^2; `lean`, `dip` (rad): roll and pitch on its
-    springs; `wheel_scale` (-) of the rear wheels' speed, and their `wheel_slip` (s^2/m) for each m/s^2 of push; `slip_error`
-    (rad) of the axle's law without a force, `stiffening`: the logarithm of its stiffness over the file's; `lane_offset` (m),
-    `lane_heading` (rad) against the lane, to the left, and its `bend` (1/m).
+    Velocity (m/s) and yaw (rad) at the centre of gravity; `bias_` of each axis (m/s^2, rad/s); `bank`, `grade` (rad) of the road;
+    `lean_gradient` (rad s^2/m): roll on the springs per m/s^2; `lean`, `dip` (rad): roll and pitch on the springs; `wheel_scale`
+    (-): relative error of the rear wheels' speed; `wheel_slip` (s^2/m): their slip per m/s^2 of acceleration; `slip_error` (rad):
+    error of the axle's tyre law without a force; `stiffening` (-): logarithm of its stiffness over the file's; `lane_offset` (m)
+    and `lane_heading` (rad) against the lane, to the left; the lane's `bend` (1/m).
     """
     degree = jnp.pi / 180
     walk = lambda std, time: std * (2.0 / time) ** 0.5
@@ -199,11 +200,11 @@ def state_type(parts: Parts) -> Any:
 
 
 def inputs_of(parts: Parts) -> tuple[str, ...]:
-    """What `cleaning` makes of a log for the model.
+    """The model's inputs, which `cleaning` makes from a log.
 
-    Accelerations at the centre of gravity (m/s^2) and rates (rad/s), held where the unit is silent; the `step` (s) that the row
-    stands for; how `rough` the lateral acceleration is (m/s^2); how far the rear wheels' speeds are `wheels_apart` beyond what
-    turning makes of them (m/s); and of each of `Navigator.lags` what `window.Past` says, as
+    Accelerations at the centre of gravity (m/s^2) and rates (rad/s), held where the unit has no measurement; the `step` (s) since
+    the unit's last measurement; the roughness of the lateral acceleration, `rough` (m/s^2); the difference of the rear wheels'
+    speeds beyond that of turning, `wheels_apart` (m/s); and for each of `Navigator.lags` the fields of `window.Past`, as
     `sky_turned` and so on.
     """
     names = ("sky", *(("camera",) if parts.camera else ()), *(("half", "whole") if parts.axle != "none" else ()))
@@ -214,7 +215,8 @@ def inputs_of(parts: Parts) -> tuple[str, ...]:
 
 
 def transition(system: Navigator, t0, t1, x, u):
-    """Velocity by what was felt: turned by the gyroscope, its middle value between two rows. What is slow fades to nothing."""
+    """The state after a step: the velocity is integrated from accelerations and yaw rate at the middle of the step; slow states
+    decay to zero."""
     dt, parts = t1 - t0, system.parts
     now = u.at(0.5 * (t0 + t1))
     a_x, a_y = system.accelerations(x, now)

@@ -1,8 +1,7 @@
-"""What an inertial unit has felt in the last moments: by how much the car has turned and its velocity changed since a late
-measurement was true.
+"""A window of the inertial unit's measurements: turn and velocity change of the car since the time of a delayed measurement.
 
-Satellites, cameras and their networks are late by tenths of a second. What they say is of the state of then, which is the state
-of now less what was felt since. That is known without a vehicle: it needs no state that is delayed, and no filter that goes back.
+Satellites, cameras and their networks are delayed by tenths of a second. Their measurements belong to a past state, which is the
+present state less the inertial measurements since. This needs no vehicle model, no delayed states, and no filter that goes back.
 """
 
 from __future__ import annotations
@@ -14,13 +13,13 @@ import jax.numpy as jnp
 from jaxveh import numerics
 
 SLOTS = 32
-"""How many pieces of the past are kept; rows that come closer than a share of the lag go into one."""
+"""Number of pieces of the past; rows that are closer than a share of the lag are joined to one piece."""
 
 
 class Window(NamedTuple):
-    """Pieces of the past, the newest last, (`SLOTS`,) each: how long each is (`span`, s; 0 of one that is not used yet), by how
-    much the car turned in it (rad) and its velocity changed (m/s, in the axes at the piece's end), and the rates of yaw and roll
-    at its end (rad/s)."""
+    """Pieces of the past, the newest last, (`SLOTS`,) each: the duration `span` (s; 0 for an unused piece), the angle `turned`
+    (rad), the velocity changes `gained_x` and `gained_y` (m/s, in the axes at the piece's end), and the yaw and roll rates at its
+    end (rad/s)."""
 
     span: Any
     turned: Any
@@ -31,8 +30,9 @@ class Window(NamedTuple):
 
 
 class Past(NamedTuple):
-    """What happened in the last moments: how far the car `turned` (rad), `gained_x`, `gained_y`: what was felt in sum (m/s, in
-    the axes of now), the rates of yaw and roll then (`spun`, `rolled`, rad/s), and whether that is known (`covered`)."""
+    """The motion over a lag: the angle `turned` (rad); the integrals of the measured accelerations, `gained_x` and `gained_y`
+    (m/s, in the present axes); the yaw and roll rates at its beginning, `spun` and `rolled` (rad/s); and whether the window
+    reaches back so far, `covered`."""
 
     turned: Any
     gained_x: Any
@@ -43,13 +43,13 @@ class Past(NamedTuple):
 
 
 def empty_window(like: Any) -> Window:
-    """Nothing is known of the past."""
+    """A window without a past."""
     nothing = jnp.zeros(SLOTS, jnp.result_type(like))
     return Window(nothing, nothing, nothing, nothing, nothing, nothing)
 
 
 def window_after(window: Window, piece: Window, lag: Any) -> Window:
-    """The window with one more `piece` (of scalars). It joins the newest one as long as that is short against the `lag` (s)."""
+    """The window with one more `piece` (of scalars), which is joined to the newest one while that is short against `lag` (s)."""
     newest = Window(*[leaf[-1] for leaf in window])
     joined = _joined(newest, piece)
     joins = joined.span <= 1.2 * lag / (SLOTS - 4)
@@ -62,7 +62,7 @@ def window_after(window: Window, piece: Window, lag: Any) -> Window:
 
 
 def look_back(window: Window, lag: Any) -> Past:
-    """The sum of the last `lag` seconds, the piece in which they begin counted by its share."""
+    """The motion over the last `lag` (s); the piece in which it begins counts in part."""
     began = jnp.cumsum(window.span[::-1])[::-1]
     ended = began - window.span
     used = window.span > 0
@@ -70,9 +70,9 @@ def look_back(window: Window, lag: Any) -> Past:
     share = jnp.where(used, jnp.clip((lag - ended) / length, 0.0, 1.0), 0.0)
     turned = share * window.turned
     later = jnp.cumsum(turned[::-1])[::-1] - turned
-    # Of a piece that counts in part it is the later part, less turned against the end than all of it on the average.
+    # A piece that counts in part counts with its later part, which on average is turned less against the end than the whole.
     x, y = rotate(window.gained_x, window.gained_y, later - 0.5 * (1.0 - share) * window.turned)
-    # Rates run linearly within a piece; before the first they are its own.
+    # Rates are linear within a piece, and constant within the first.
     before = lambda leaf: jnp.where(jnp.roll(used, 1).at[0].set(False), jnp.roll(leaf, 1), leaf)
     within = used & (lag >= ended) & (lag < began)
     then = lambda leaf: jnp.sum(jnp.where(within, leaf + share * (before(leaf) - leaf), 0.0))
@@ -83,13 +83,13 @@ def look_back(window: Window, lag: Any) -> Past:
 
 
 def rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
-    """A vector in axes that are turned by `angle` (rad, to the left) against those in which it is given."""
+    """The components of a vector in axes that are turned by `angle` (rad, to the left) against the given ones."""
     c, s = numerics.cos(angle), numerics.sin(angle)
     return c * x + s * y, c * y - s * x
 
 
 def _joined(one: Window, other: Window) -> Window:
-    """Two pieces as one, in the axes at the end of the second."""
+    """Two pieces joined to one, in the axes at the end of the second."""
     x, y = rotate(one.gained_x, one.gained_y, other.turned)
     return Window(
         one.span + other.span, one.turned + other.turned, x + other.gained_x, y + other.gained_y, other.yaw_rate,

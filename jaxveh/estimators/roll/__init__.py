@@ -1,9 +1,9 @@
 """The body's roll, positive with the left side up: sections 1.1.1 and 1.1.2 of the review (Chen, Gao, Xu 2013).
 
-`roll` is the body's against the **horizon**, what tilts gravity in an accelerometer; `body_roll` the body's on its springs
-against the road. Roll is the bank and the body's roll together. The two methods `steady` and `springs` know the suspension
-alone: what they call roll is the body's, right against the horizon where the road is level. `roll_rate` is the angle's rate; a
-gyroscope says it less what the yaw rate does in a car that points up or down.
+`roll` is the body's roll against the **horizon**, which tilts gravity in an accelerometer; `body_roll` is the roll on its springs
+against the road. `roll` is the sum of bank and `body_roll`. The two methods `steady` and `springs` only use the suspension: their
+`roll` is the body's roll, which is that against the horizon on a level road. `roll_rate` is the rate of the angle; a gyroscope
+measures it less a share of the yaw rate if the car points up or down.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SHOWN = {"roll": "rad", "roll_rate": "rad/s"}
 
 METHODS = {
     "gyro": MethodOfCar(
-        gyro_of, "the gyroscope integrated, slowly drawn to what the accelerometer says of gravity", "1.1.1 [10]"
+        gyro_of, "the integrated gyroscope, slowly drawn to the accelerometer's direction of gravity", "1.1.1 [10]"
     ),
     "steady": MethodOfCar(
         lambda car: steady_of(car, NAME),
@@ -41,7 +41,7 @@ METHODS = {
     ),
     "filter": MethodOfCar(
         lambda car: leaning_filter(car, NAME),
-        "bank, roll and the sensors' offsets in one Kalman filter; satellites' course and a roll gyroscope where there are any",
+        "one Kalman filter of bank, roll and the sensors' offsets; uses satellite course and roll gyroscope if available",
         "1.1.1, 1.1.2, 1.3.2 [46]",
     ),
 }
@@ -50,7 +50,7 @@ RECOMMENDED = "filter"
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """A body that does not roll."""
+    """Zero roll and roll rate in all rows."""
     del car
     return dict.fromkeys(SHOWN, np.zeros(len(recording)))
 
@@ -62,5 +62,5 @@ def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) ->
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same a row at a time."""
+    """The same, one row at a time."""
     return LiveMethod(method_of(NAME, METHODS, source, method))

@@ -1,4 +1,4 @@
-"""Roll of a gyroscope about the car's x axis."""
+"""Roll from a gyroscope about the car's x axis."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ ROLL_RATE = Need("roll_rate", "rad/s")
 
 
 class GyroMemory(NamedTuple):
-    """What was heard, the gyroscope (rad/s) and for how long it is silent (s), roll (rad), its offset (rad/s), the time (s)."""
+    """The motion; the last roll rate (rad/s) and the time since it was measured (s); roll (rad); the gyroscope's offset (rad/s);
+    for how long all signals have been available, `age` (s)."""
 
     motion: Any
     rate: Any
@@ -33,8 +34,9 @@ class Gyro(AbstractMethod):
 
         d roll = roll_rate + r slope - offset + e / time,   d offset = -e / (4 time^2),   e = arcsin((a_y - v_x r) / g) - roll
 
-    Fast roll is the gyroscope's, slow roll the accelerometer's, whose reference is right but for `d v_y/dt`, which has no mean.
-    `slope`: the car's pitch, through which the gyroscope sees a part of the yaw rate r. `time` (s): between slow and fast.
+    Fast roll comes from the gyroscope, slow roll from the accelerometer, whose reference is right except for `d v_y/dt`, which
+    has zero mean. `slope`: the car's pitch, by which the gyroscope measures a part of the yaw rate r. `time` (s): time constant
+    between slow and fast.
     """
 
     motion: BodyMotion
@@ -62,7 +64,7 @@ class Gyro(AbstractMethod):
         ahead = memory.roll + dt * (turning - memory.offset)
         error = arcsin_of(heard["a_y"] - heard["v_x"] * heard["yaw_rate"]) - ahead
         gain = dt / (self.time + dt)
-        # At first the accelerometer alone: nothing is known of the angle.
+        # At first only the accelerometer counts, because the angle is unknown.
         gain = jnp.maximum(gain, dt / (memory.age + dt + 1e-6))
         error = jnp.where(there, error, 0.0)
         roll = ahead + gain * error
@@ -75,5 +77,5 @@ class Gyro(AbstractMethod):
 
 
 def gyro_of(car: CarSpecification) -> Gyro:
-    """Of a car's file."""
+    """Makes `Gyro` from a car's file."""
     return Gyro(motion_of(car))

@@ -1,4 +1,4 @@
-"""Attitude and velocity of a unit of six axes, corrected by the wheels' speed."""
+"""Attitude and velocity from a six-axis inertial unit, corrected by the wheels' speed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ State = record_type("SixAxisState", ("v_x", "v_y", "roll", "pitch"))
 
 
 class SixAxisMemory(NamedTuple):
-    """What was heard, the two further gyroscopes (rad/s), for how long one is silent (s), the belief."""
+    """The motion; the last roll and pitch rates (rad/s); the time since both were measured, `silence` (s); the belief."""
 
     motion: Any
     roll_rate: Any
@@ -38,15 +38,17 @@ class SixAxisMemory(NamedTuple):
 
 
 class SixAxis(AbstractMethod):
-    """The kinematic Kalman filter of W. Klier, A. Reim, D. Stapel (SAE 2008-01-0582), of a car that stays on the road (v_z = 0):
+    """The kinematic Kalman filter of W. Klier, A. Reim, D. Stapel (SAE 2008-01-0582), for a car that stays on the road (v_z = 0):
 
         d v_x = a_x + v_y r + g sin(pitch),                   d v_y = a_y - v_x r - g sin(roll) cos(pitch)
         d roll = p + tan(pitch) (q sin(roll) + r cos(roll)),  d pitch = q cos(roll) - r sin(roll)
 
-    (ISO 8855: pitch positive nose down), measured: v_x of the wheels, and a lateral speed that stays small (`slip` m/s, which
-    lasts `slip_time` s). It knows nothing of the sensors' offsets, as the review says: `roll` is off by theirs.
+    (ISO 8855: pitch positive nose down). The measurements are v_x of the wheels, and zero lateral velocity with the standard
+    deviation `slip` (m/s) and the correlation time `slip_time` (s). The sensors' offsets are not estimated, as the review says,
+    so that they appear in `roll`.
 
-    `a_noise` (m/s per root second), `gyro_noise` (rad per root second): of what is integrated; `v_noise` (m/s): of the wheels.
+    `a_noise` (m/s per root second), `gyro_noise` (rad per root second): noise of the integrated sensors; `v_noise` (m/s): noise
+    of the wheels' speed.
     """
 
     motion: BodyMotion
@@ -106,5 +108,5 @@ class SixAxis(AbstractMethod):
 
 
 def six_axis_of(car: CarSpecification) -> SixAxis:
-    """Of a car's file."""
+    """Makes `SixAxis` from a car's file."""
     return SixAxis(motion_of(car))

@@ -1,4 +1,4 @@
-"""Roll of a body on its springs, driven by the lateral acceleration."""
+"""Roll of a body on its springs from the lateral acceleration."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ACCELERATION = Need("a_y", "m/s^2")
 
 
 class SteadyMemory(NamedTuple):
-    """The time (s), the acceleration (m/s^2), for how long it is silent (s), the low-passed roll (rad)."""
+    """The time (s), the last acceleration (m/s^2), the time since it was measured (s), and the low-passed roll (rad)."""
 
     t: Any
     a_y: Any
@@ -28,9 +28,9 @@ class SteadyMemory(NamedTuple):
 
 
 class Steady(AbstractMethod):
-    """`roll = R a_y / (1 + g R)` (A. Hac et al. 2010, of the suspension): R = `roll_gradient` for the acceleration in the
-    road's plane, of which a sensor on the rolling body shows `1 + g R`. Through a low-pass of `time` (s), whose
-    derivative is the rate.
+    """`roll = R a_y / (1 + g R)` (A. Hac et al. 2010, of the suspension): R = `roll_gradient` (rad/(m/s^2)) refers to the
+    acceleration in the road's plane; a sensor on the rolling body measures `1 + g R` times this. The roll has a low-pass filter
+    of `time` (s), whose derivative is the rate.
     """
 
     roll_gradient: jax.Array = positive("rad/(m/s^2)")
@@ -56,7 +56,7 @@ class Steady(AbstractMethod):
 
 
 class SpringsMemory(NamedTuple):
-    """The time (s), the acceleration (m/s^2), for how long it is silent (s), roll (rad) and its rate (rad/s)."""
+    """The time (s), the last acceleration (m/s^2), the time since it was measured (s), roll (rad) and its rate (rad/s)."""
 
     t: Any
     a_y: Any
@@ -66,7 +66,7 @@ class SpringsMemory(NamedTuple):
 
 
 class Springs(AbstractMethod):
-    """A body on springs and dampers: `roll'' = w^2 (R (a_y - g roll) - roll) - 2 D w roll'`, stable for rows of any length.
+    """A body on springs and dampers: `roll'' = w^2 (R (a_y - g roll) - roll) - 2 D w roll'`, stable for steps of any length.
 
     `roll_gradient` R (rad/(m/s^2)), `roll_frequency` w / 2 pi (Hz), `roll_damping` D (-).
     """
@@ -99,11 +99,12 @@ class Springs(AbstractMethod):
 
 
 def steady_of(car: CarSpecification, who: str) -> Steady:
-    """Of a car's file. **Raises** `InputError` for one without `roll_gradient`."""
+    """Makes `Steady` from a car's file. **Raises** `InputError` for a file without `roll_gradient`."""
     return Steady(number_of(car, "roll_gradient", who, "rad/(m/s^2)"))
 
 
 def springs_of(car: CarSpecification, who: str) -> Springs:
-    """Of a car's file. **Raises** `InputError` for one without `roll_gradient`, `roll_frequency` or `roll_damping`."""
+    """Makes `Springs` from a car's file. **Raises** `InputError` for a file without `roll_gradient`, `roll_frequency` or
+    `roll_damping`."""
     keys = (("roll_gradient", "rad/(m/s^2)"), ("roll_frequency", "Hz"), ("roll_damping", "-"))
     return Springs(*[number_of(car, key, who, unit) for key, unit in keys])

@@ -1,4 +1,4 @@
-"""The ways to sideslip of the review (Chen, Gao & Xu 2013), each an `AbstractMethod` that is made of a car's file."""
+"""The sideslip methods of the review (Chen, Gao & Xu 2013), each an `AbstractMethod` that is made from a car's file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from jaxveh.estimators.sideslip_methods.stiffness import adapted_stiffness, adap
 from jaxveh.estimators.sideslip_methods.worst_case import h_infinity
 
 PARTICLES = 100
-"""Of the particle filters: two states need no more."""
+"""Number of particles of the particle filters: two states need no more."""
 
 
 def _in_tyres(tyre: str, equation: str) -> MethodOfCar:
@@ -36,19 +36,23 @@ def _in_tyres(tyre: str, equation: str) -> MethodOfCar:
 
 METHODS = {
     "rear_axle": MethodOfCar(
-        rear_axle, "integration held by the rear axle's force, what `live` says", "sections 1.1, 1.2 and 1.3.1; ours"
+        rear_axle, "integration corrected by the rear axle's force, as in `live`", "sections 1.1, 1.2 and 1.3.1; ours"
     ),
-    "open_loop": MethodOfCar(open_loop, "linear single track, steered, listens to no sensor", "section 1.2.2, [14]"),
+    "open_loop": MethodOfCar(
+        open_loop, "linear single track driven by the steer, without correction", "section 1.2.2, [14]"
+    ),
     "integration": MethodOfCar(direct_integration, "a_y - v_x r, integrated", "section 1.1, [5]"),
     "kinematic_kalman": MethodOfCar(
-        kinematic_kalman, "v_x and v_y driven by accelerometers and gyroscope", "section 1.1, [8]"
+        kinematic_kalman, "Kalman filter of v_x and v_y, driven by accelerometers and gyroscope", "section 1.1, [8]"
     ),
     "roll_compensated": MethodOfCar(
-        roll_compensated, "integration with the roll angle estimated and taken out", "section 1.1.1, [10]"
+        roll_compensated, "integration with the estimated roll angle taken out", "section 1.1.1, [10]"
     ),
-    "six_axis": MethodOfCar(six_axis, "inertial unit of six axes, updated by the wheels' speed", "section 1.1.2, [9]"),
-    "steady_steer": MethodOfCar(steady_steer, "steady turn of the linear single track, from steer", "eq 1, [20]"),
-    "steady_turn": MethodOfCar(steady_turn, "steady turn, from yaw rate and a_y", "eq 2, [28]"),
+    "six_axis": MethodOfCar(
+        six_axis, "inertial unit of six axes, corrected by the wheels' speed", "section 1.1.2, [9]"
+    ),
+    "steady_steer": MethodOfCar(steady_steer, "steady turn of the linear single track, from the steer", "eq 1, [20]"),
+    "steady_turn": MethodOfCar(steady_turn, "steady turn, from the yaw rate and a_y", "eq 2, [28]"),
     "linear_kalman": MethodOfCar(linear_kalman, "linear single track, Kalman filter", "section 1.2.2, [17]"),
     "adapted_stiffness": MethodOfCar(
         adapted_stiffness, "linear tyres, both stiffnesses among the filter's states", "section 1.2.2, [7, 29]"
@@ -61,12 +65,12 @@ METHODS = {
     ),
     "pf": MethodOfCar(
         single_track_filter(filters.ParticleFilter(PARTICLES), random=True),
-        "the same, particles",
+        "the same, particle filter",
         "section 1.4.6, [72-75]",
     ),
     "upf": MethodOfCar(
         single_track_filter(filters.Guided(PARTICLES, rule="unscented"), random=True),
-        "the same, particles drawn given the measurement",
+        "the same, with particles drawn given the measurement",
         "section 1.4.6, [76]",
     ),
     "ukf_hsri": _in_tyres("hsri", "eq 4, [2, 25]"),
@@ -74,45 +78,59 @@ METHODS = {
     "ukf_exponential": _in_tyres("exponential", "eq 6, [32]"),
     "ukf_arctangent": _in_tyres("arctangent", "eq 7, [33, 34]"),
     "ukf_unitire": _in_tyres("unitire", "section 1.2.2, [26]"),
-    "two_track": MethodOfCar(two_track, "four wheels, load moves across, unscented filter", "section 1.2.1, [19]"),
-    "roll_3dof": MethodOfCar(roll_3dof, "four wheels and a leaning body, unscented filter", "section 1.2.1, [22]"),
-    "roll_4dof": MethodOfCar(roll_4dof, "the same, driven by torques, its speed a state", "section 1.2.1, [23]"),
+    "two_track": MethodOfCar(
+        two_track, "four wheels with lateral load transfer, unscented filter", "section 1.2.1, [19]"
+    ),
+    "roll_3dof": MethodOfCar(roll_3dof, "four wheels and a rolling body, unscented filter", "section 1.2.1, [22]"),
+    "roll_4dof": MethodOfCar(
+        roll_4dof, "the same, driven by torques, with the speed as a state", "section 1.2.1, [23]"
+    ),
     "motor_moment": MethodOfCar(
         motor_moment, "single track with the yaw moment of motors, unscented filter", "eq 10 with its erratum, [34, 83]"
     ),
     "steering_torque": MethodOfCar(
-        steering_torque, "steering torque to aligning moment, front force, slip angle", "section 1.2.3, [37, 38]"
+        steering_torque,
+        "from the steering torque to aligning moment, front force and slip angle",
+        "section 1.2.3, [37, 38]",
     ),
     "switched": MethodOfCar(
-        by_switch, "integration where tyres are not to be trusted, extended filter else", "section 1.3.1, [40]"
+        by_switch,
+        "integration where the tyre model is not trusted, otherwise the extended filter",
+        "section 1.3.1, [40]",
     ),
     "weighted": MethodOfCar(
-        weighted_mean, "kinematic and extended filter, weighed by their variances", "section 1.3.1, [41]"
+        weighted_mean,
+        "mean of the kinematic and the extended filter, weighted by their variances",
+        "section 1.3.1, [41]",
     ),
     "pseudo_integration": MethodOfCar(
-        pseudo_integration, "slow part of the extended filter, fast part of the integral", "section 1.3.1, [40, 42, 43]"
+        pseudo_integration,
+        "slow part of the extended filter's estimate, fast part of the integral",
+        "section 1.3.1, [40, 42, 43]",
     ),
     "luenberger": MethodOfCar(luenberger, "observer with the gain of straight running", "section 1.4.2"),
     "state_dependent_gain": MethodOfCar(
-        state_dependent, "yaw rate alone, poles placed at the estimate", "section 1.4.2, [58]"
+        state_dependent, "observer of the yaw rate alone, poles placed at the estimate", "section 1.4.2, [58]"
     ),
     "error_linearising": MethodOfCar(
-        error_linearising, "gains at the estimate that make the error linear", "section 1.4.2, [59]"
+        error_linearising, "observer whose gains at the estimate make the error linear", "section 1.4.2, [59]"
     ),
     "sliding_mode": MethodOfCar(
-        sliding_mode, "most of the gain through a smooth switch", "section 1.4.3, eq 9, [60-62]"
+        sliding_mode, "observer with most of its gain in a smooth switch", "section 1.4.3, eq 9, [60-62]"
     ),
-    "decoupled": MethodOfCar(blind_to_front, "blind to whatever disturbs the front axle", "section 1.4.4, [21, 65]"),
-    "h_infinity": MethodOfCar(h_infinity, "single track, worst case bounded", "section 1.4.4, [66, 67]"),
+    "decoupled": MethodOfCar(
+        blind_to_front, "observer that no disturbance of the front axle affects", "section 1.4.4, [21, 65]"
+    ),
+    "h_infinity": MethodOfCar(h_infinity, "single track, filter that bounds the worst case", "section 1.4.4, [66, 67]"),
     "adaptive": MethodOfCar(
-        adaptive, "linear tyres, both stiffnesses adapted by a law of Lyapunov's", "section 1.4.7, [77-79]"
+        adaptive, "linear tyres, both stiffnesses adapted by a Lyapunov law", "section 1.4.7, [77-79]"
     ),
     "fuzzy": MethodOfCar(
-        by_fuzzy_rules, "integration, pulled to the extended filter by fuzzy rules", "section 1.4.7, [80]"
+        by_fuzzy_rules, "integration, drawn to the extended filter by fuzzy rules", "section 1.4.7, [80]"
     ),
     "neural_network": MethodOfCar(
         neural_network,
-        "a network of what was measured and what was before, trained on simulated drives of five other cars",
+        "a network of present and past measurements, trained on simulated drives of five other cars",
         "section 1.4.7, [56, 81]",
     ),
 }

@@ -1,5 +1,5 @@
-"""What the methods of sideslip share: the channels, when an answer counts as known, and the sheet of the car that they ask
-for."""
+"""Shared parts of the sideslip methods: the channels, when an answer counts as known, and the values of the car's file that they
+need."""
 
 from __future__ import annotations
 
@@ -25,24 +25,25 @@ A_X, A_Y, A_Z = (Need(f"a_{axis}", "m/s^2") for axis in "xyz")
 ROLL_RATE, PITCH_RATE = Need("roll_rate", "rad/s"), Need("pitch_rate", "rad/s")
 
 SLOWEST = 3.0
-"""m/s, of a car of the usual wheelbase: slower, or backwards, sideslip is not told. It is the quotient of two small numbers."""
+"""m/s, for a car of the usual wheelbase: sideslip is not known when the car goes slower than this, or backwards, for it is then
+the quotient of two small numbers."""
 
 LONGEST_SILENCE = 0.3
-"""s: a channel that a method listens to and that has been silent for longer leaves its answer a guess."""
+"""s: if a channel that a method needs has had no measurement for longer than this, the answer is only a guess."""
 
 WIDEST = 0.05
-"""rad: an answer whose own standard deviation of sideslip is larger is not known. A stability control acts on some 0.05."""
+"""rad: an answer whose own standard deviation of sideslip is larger is not known. A stability control acts at about 0.05 rad."""
 
 FARTHEST = 2.0
-"""Lateral over longitudinal speed, 63 degrees of sideslip: an answer beyond is that of a car which has spun, or of a method that
-has."""
+"""Largest ratio of lateral to longitudinal speed, 63 degrees of sideslip. Beyond it the car has spun, or the method has
+diverged."""
 
 LONG_AGO = 1e3
-"""s: the age of what was never measured."""
+"""s: the age of a channel that was never measured."""
 
 
 class Watched(NamedTuple):
-    """What `Guarded` remembers: `inner`, the method's memory; time `t` (s); last values by name, `held`, and their `ages` (s)."""
+    """The memory of `Guarded`: the method's memory, `inner`; time `t` (s); last values by name, `held`, and their `ages` (s)."""
 
     inner: Any
     t: Any
@@ -51,13 +52,13 @@ class Watched(NamedTuple):
 
 
 class Guarded(AbstractMethod):
-    """A method of sideslip whose answers say when they are known.
+    """A sideslip method that marks when its answers are known.
 
-    That is where the car goes forward faster than `slowest` (m/s), each of the channels in `hears` was measured in the last
-    `LONGEST_SILENCE`, sideslip is none of a car that has spun (`FARTHEST`), and its standard deviation, where `inner` claims one,
-    is at most `WIDEST`. `holds`: channels
-    of which `inner` gets the last value where none was measured (0 before the first). `anew`: `inner` begins anew with the first
-    row after such a silence, for an integral of what was not measured is worth nothing. `claims` False: no spread is passed on.
+    An answer is known where the car goes forward faster than `slowest` (m/s), each channel in `hears` was measured within the
+    last `LONGEST_SILENCE`, the car has not spun (`FARTHEST`), and the standard deviation of sideslip, where `inner` gives one, is
+    at most `WIDEST`. `holds`: channels whose last value is passed to `inner` in rows without a measurement (0 before the first).
+    `anew`: `inner` starts again at the first row after a gap longer than `LONGEST_SILENCE`, since an integral over the gap is
+    worthless. `claims` False: no standard deviation is passed on.
     """
 
     inner: AbstractMethod
@@ -103,7 +104,7 @@ class Guarded(AbstractMethod):
         for age in ages:
             told &= age <= LONGEST_SILENCE
         told &= jnp.abs(said.mean.v_y) <= FARTHEST * jnp.abs(v_x)
-        # A spread that is not claimed is NaN, and no spread is too wide then.
+        # A standard deviation that is not given is NaN, and NaN is never too wide.
         told &= ~(said.std.sideslip > WIDEST)
         known = jax.tree.map(lambda one: one & told, said.known)
         std = said.std if self.claims else jax.tree.map(lambda one: jnp.full_like(one, jnp.nan), said.std)
@@ -114,23 +115,24 @@ def guard(
     car: CarSpecification, inner: AbstractMethod, hears: tuple[Need, ...] = (), holds: tuple[Need, ...] = (), *,
     anew: bool = False, claims: bool = True,
 ) -> Guarded:  # fmt: skip
-    """The method, `Guarded` as a car of this size asks for."""
+    """The method as a `Guarded` one, with limits for a car of this size."""
     names = lambda needs: tuple(need.channel for need in needs)
     return Guarded(inner, slowest_of(car), names(hears), names(holds), anew, claims)
 
 
 def size_of(car: CarSpecification) -> float:
-    """The car's wheelbase over the usual one: times and speeds of cars that differ in size alone go with its root (Froude)."""
+    """The car's wheelbase over the usual one. Times and speeds of cars that differ only in size scale with its root (Froude)."""
     return car.wheelbase / USUAL_WHEELBASE
 
 
 def slowest_of(car: CarSpecification) -> float:
-    """`SLOWEST` of a car of this size, m/s."""
+    """`SLOWEST` for a car of this size, m/s."""
     return SLOWEST * size_of(car) ** 0.5
 
 
 def sideslip_answer(v_y: Any, v_x: Any, known: Any = True, std: Any = None) -> Answer:
-    """The answer of a lateral velocity (m/s) of standard deviation `std` (m/s; None: it claims none) at a speed (m/s)."""
+    """The answer for a lateral velocity `v_y` (m/s) at a speed `v_x` (m/s); `std` (m/s) is its standard deviation, None if the
+    method gives none."""
     speed = jnp.square(v_x) + jnp.square(v_y)
     # d atan2(v_y, v_x) = v_x / (v_x^2 + v_y^2) d v_y, finite at standstill.
     stds = None if std is None else {"v_y": std, "sideslip": std * jnp.abs(v_x) / jnp.maximum(speed, 1e-6)}
@@ -138,7 +140,7 @@ def sideslip_answer(v_y: Any, v_x: Any, known: Any = True, std: Any = None) -> A
 
 
 def joined_needs(*methods: AbstractMethod) -> tuple[Need, ...]:
-    """What several methods read together."""
+    """The channels that several methods read together."""
     found: dict[str, Need] = {}
     for need in (need for method in methods for need in method.needs):
         other = found.get(need.channel, need)
@@ -148,7 +150,7 @@ def joined_needs(*methods: AbstractMethod) -> tuple[Need, ...]:
 
 
 def keys_of(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
-    """The values of these keys of a car's file; `keys` has their units. **Raises** `InputError` for those that it lacks."""
+    """The values of these keys of a car's file; `keys` maps them to units. **Raises** `InputError` for keys that are missing."""
     missing = [f"{key} ({unit})" for key, unit in keys.items() if getattr(car, key) is None]
     if missing:
         raise InputError(f"sideslip: {who} needs {', '.join(missing)} of the car's file; give it.")

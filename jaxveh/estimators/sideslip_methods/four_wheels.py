@@ -1,4 +1,4 @@
-"""Cars on four wheels, upright and leaning, as what a filter sees (section 1.2.1)."""
+"""Models of cars on four wheels for filters, with and without body roll (section 1.2.1)."""
 
 from __future__ import annotations
 
@@ -52,20 +52,19 @@ from jaxveh.vehicles import (
 )
 
 STIFFEST = 2.0
-"""Of a wheel's load at rest: where its cornering stiffness is greatest, so that an axle whose load moves to one side is
-softer."""
+"""Load at which a wheel's cornering stiffness is greatest, over its static load: lateral load transfer softens an axle."""
 
 UNSPRUNG = 0.025
-"""Of the car's mass: that of a wheel with what does not ride on its spring."""
+"""Unsprung mass at a wheel over the car's mass."""
 
 RADIUS_SHARE = 0.12
-"""Of the wheelbase: a wheel's radius, where a car's file is silent."""
+"""A wheel's radius over the wheelbase, where the car's file has no radius."""
 
 ROLL_RATE_NOISE, ROLL_ERROR = 0.01, 0.05
-"""rad/s, of the gyroscope; rad/s per root second, what uneven roads do to the body's roll rate."""
+"""rad/s: noise of the gyroscope; rad/s per root second: disturbance of the body's roll rate by uneven roads."""
 
 SPEED_NOISE, SPEED_ERROR = 0.05, 0.3
-"""m/s, of the measured speed; m/s per root second, what the torques leave out."""
+"""m/s: noise of the measured speed; m/s per root second: forces that are not in the torques."""
 
 PEDALS = tuple(Need(f"{name}_torque", "N m", throughout=True) for name in ("drive", "brake"))
 
@@ -73,7 +72,7 @@ LEANING = ("v_y", "yaw_rate", "roll", "roll_rate")
 
 
 def wheel_options(car: CarSpecification) -> dict[str, Any]:
-    """The tyres of a wheel on each axle: half of the axle's Magic Formula, stretched by load (`tyres.Similarity`)."""
+    """The tyres of a wheel on each axle: half of the axle's Magic Formula, scaled by load (`tyres.Similarity`)."""
     found = {}
     for name, axle in zip(("front", "rear"), axles_of(single_track(car)), strict=True):
         tyre, load = axle.tyre, 0.5 * axle.load
@@ -84,7 +83,7 @@ def wheel_options(car: CarSpecification) -> dict[str, Any]:
 
 
 def car_numbers(car: CarSpecification, who: str, *, leaning: bool) -> CarNumbers:
-    """The numbers of a car on four wheels, with an ordinary suspension under one that leans.
+    """The parameters of a car on four wheels; `leaning`: with an ordinary suspension.
 
     **Raises** `InputError` for a file without a height of the centre of gravity, or tracks.
     """
@@ -100,15 +99,15 @@ def car_numbers(car: CarSpecification, who: str, *, leaning: bool) -> CarNumbers
 
 
 def two_track(car: CarSpecification) -> Guarded:
-    """The unscented filter of the car on four wheels that stays upright, at a given speed: two degrees of freedom (the review's
-    [19]), with load that moves across."""
+    """Makes the unscented filter of the car on four wheels without body roll, at a given speed: two degrees of freedom (the
+    review's [19]), with lateral load transfer."""
     numbers = car_numbers(car, "the two-track car", leaning=False)
     vehicle = build(numbers, TwoTrack2DOF, load_transfer=QuasiStatic(), **wheel_options(car))
     return in_filter(car, lateral_model(vehicle, slowest_of(car)), filters.Unscented())
 
 
 def leaning_observation(system: Lateral, t, x, u):
-    """What sensors on the leaning body say, whose accelerometer feels gravity, too; and the speed."""
+    """The measurements of sensors on the rolling body, whose accelerometer also measures gravity; and the speed."""
     outputs = system.car.outputs(t, full_state(system.car, x), u)
     felt = outputs.a_y * numerics.cos(x.roll) + GRAVITY * numerics.sin(x.roll)
     seen = {"yaw_rate": x.yaw_rate, "a_y": felt, "roll_rate": x.roll_rate, "v_x": outputs.v_x}
@@ -116,7 +115,7 @@ def leaning_observation(system: Lateral, t, x, u):
 
 
 def _leaning_model(vehicle: Any, car: CarSpecification, *, driven: bool = False) -> StateSpace:
-    """A state space with v_y, yaw rate and roll as states, and the speed of one that is `driven`."""
+    """A state space with v_y, yaw rate, roll and roll rate as states; `driven`: with the speed, too."""
     noise = process_noise(vehicle) | {"roll_rate": ROLL_ERROR}
     seen = {"yaw_rate": YAW_RATE_NOISE, "a_y": A_Y_NOISE, "roll_rate": ROLL_RATE_NOISE}
     spread, states, start = {"v_y": 0.5, "yaw_rate": 0.1, "roll": 0.05, "roll_rate": 0.1}, LEANING, [0.0] * 4
@@ -138,15 +137,15 @@ def _leaning_model(vehicle: Any, car: CarSpecification, *, driven: bool = False)
 
 
 def roll_3dof(car: CarSpecification) -> Guarded:
-    """The unscented filter of the car that leans, at a given speed: three degrees of freedom (the review's [22]). The roll rate
-    is measured where there is one."""
+    """Makes the unscented filter of the car with body roll, at a given speed: three degrees of freedom (the review's [22]). A
+    measured roll rate is used if available."""
     numbers = car_numbers(car, "the leaning car", leaning=True)
     vehicle = build(numbers, Roll3DOF, load_transfer=QuasiStatic(), **wheel_options(car))
     return in_filter(car, _leaning_model(vehicle, car), filters.Unscented(), more=(ROLL_RATE._replace(optional=True),))
 
 
 def driven_transition(system: Lateral, t0, t1, x, u):
-    """The state moved; slower than `slowest` the car rolls where its wheels point."""
+    """The state after a step; below `slowest` the wheels roll without slip."""
     moved = STEP(system, t0, t1, x, u)
     car: Any = system.car
     yaw_rate = moved.v_x * u.steer / car.wheelbase
@@ -155,8 +154,8 @@ def driven_transition(system: Lateral, t0, t1, x, u):
 
 
 def roll_4dof(car: CarSpecification) -> Guarded:
-    """The unscented filter of the car that leans and is driven by torques: four degrees of freedom (the review's [23]). The speed
-    is a state, and measured."""
+    """Makes the unscented filter of the car with body roll that is driven by torques: four degrees of freedom (the review's
+    [23]). The speed is a state, and is measured."""
     numbers = car_numbers(car, "the leaning car", leaning=True)
     vehicle = build(numbers, Roll4DOF, load_transfer=QuasiStatic(), **wheel_options(car))
     model = _leaning_model(vehicle, car, driven=True)

@@ -1,4 +1,4 @@
-"""Kinematic and dynamic estimates joined: by a switch, by their covariances, by frequency (section 1.3.1), by rules."""
+"""Fusion of kinematic and dynamic estimates: by a switch, by their covariances, by frequency (section 1.3.1), by rules."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ from jaxveh.estimators.sideslip_methods.steady_state import SteadySteer, numbers
 from jaxveh.io import CarSpecification
 
 HARD = 4.0
-"""m/s^2: of lateral acceleration, the end of a tyre's linear range on dry road."""
+"""m/s^2: lateral acceleration at which a tyre's linear range ends on dry road."""
 
 SLIPPERY = 2.0
-"""m/s^2: a linear single track in a steady turn of this steer would be pushed aside by so much more than the car is: the road is
-slippery, or the tyres slide."""
+"""m/s^2: if a linear single track in a steady turn with this steer had so much more lateral acceleration than the car has, the
+road is slippery or the tyres slide."""
 
 BANKED, BANK_TIME = 0.5, 1.0
-"""m/s^2, and s: a_y - v_x r that stays beyond this over this time is gravity on a banked road, and would be integrated."""
+"""m/s^2, and s: if a_y - v_x r stays beyond this over this time, it is gravity on a banked road and must not be integrated."""
 
 PSEUDO_TIME = 0.2
-"""s: faster than this the integral counts, slower the dynamic estimate."""
+"""s: on shorter time scales the integral counts, on longer ones the dynamic estimate."""
 
 
 class FusionMemory(NamedTuple):
-    """`inner`, the dynamic method's memory; `v_y` (m/s); what it was integrated from (m/s^2), `rate`, and its slow part, `slow`;
-    the dynamic estimate of the row before, `model` (m/s); time `t` (s)."""
+    """The dynamic method's memory, `inner`; `v_y` (m/s); its `rate` (m/s^2), which is integrated, and the rate's `slow` part; the
+    dynamic estimate of the previous row, `model` (m/s); time `t` (s)."""
 
     inner: Any
     v_y: Any
@@ -68,10 +68,10 @@ class AbstractFusion(AbstractMethod):
         return FusionMemory(inner, v_y, rate, rate, v_y, t), sideslip_answer(v_y, values["v_x"], said.known.v_y)
 
     def _rate(self, values, before):
-        """What v_y is integrated from, m/s^2; that of the row `before` where a sensor was silent."""
+        """The rate of v_y, m/s^2; that of the previous row, `before`, where a measurement is missing."""
         a_y, yaw_rate = values["a_y"], values["yaw_rate"]
         there = ~(jnp.isnan(a_y) | jnp.isnan(yaw_rate))
-        # Nothing is computed of what is missing, whose slopes would not be numbers either.
+        # Missing values are replaced before the computation, because their derivatives would be NaN, too.
         a_y, yaw_rate = (jnp.where(there, value, 0.0) for value in (a_y, yaw_rate))
         return jnp.where(there, a_y - values["v_x"] * yaw_rate, before)
 
@@ -81,7 +81,8 @@ class PseudoIntegration(AbstractFusion):
 
         dv/dt = a_y - v_x r + (v_dynamic - v) / T
 
-    Exact in each step for what runs evenly through it. An offset o of the accelerometer leaves `o T`. `time` T (s).
+    The solution is exact for inputs that are constant over a step. An offset o of the accelerometer leaves an error of `o T`.
+    `time` T (s).
     """
 
     time: jax.Array = positive("s", default=PSEUDO_TIME)
@@ -98,12 +99,12 @@ class PseudoIntegration(AbstractFusion):
 
 
 class Switched(AbstractFusion):
-    """A. Nishio et al. (the review's [40]): the dynamic estimate, and where its tyres are not to be trusted the integral from
-    there.
+    """A. Nishio et al. (the review's [40]): the dynamic estimate while its tyre model is trusted, and from there on the integral.
 
-    They are not where |a_y| is more than `hard`, or where the steer asks a linear car (`steady`) for `slippery` more than is felt
-    (m/s^2: little friction). On a road that looks banked, `a_y - v_x r` having been more than `banked` (m/s^2) over `bank_time`
-    (s), nothing is integrated. The review names friction and bank as the conditions; the signs and their sizes are ours.
+    The tyre model is not trusted where |a_y| is more than `hard` (m/s^2), or where the acceleration of a linear car (`steady`)
+    for this steer exceeds the measured one by `slippery` (m/s^2; low friction). On a road that seems banked, where `a_y - v_x r`
+    was more than `banked` (m/s^2) over `bank_time` (s), nothing is integrated. The review names friction and bank as the
+    conditions; how they are detected, and the limits, are ours.
     """
 
     steady: SteadySteer
@@ -133,14 +134,14 @@ class Switched(AbstractFusion):
 
 
 class Fuzzy(AbstractFusion):
-    """S. Shi, H. Lupker et al. (the review's [80]): the integral is pulled to the dynamic estimate by fuzzy rules.
+    """S. Shi, H. Lupker et al. (the review's [80]): fuzzy rules draw the integral to the dynamic estimate.
 
-        tyres are worked hard, or sideslip changes quickly, and the road does not look banked  -> integrate
-        else                                                                                    -> the dynamic estimate
+        tyre forces are large, or sideslip changes quickly, and the road does not seem banked  -> integrate
+        otherwise                                                                               -> the dynamic estimate
 
-    Of |a_y| and of |a_y - v_x r|, now and over `bank_time` (s), large is linear between two bounds each (`hard`, `quick`,
-    `banked`, m/s^2); "and" is the product. With w the truth of the first rule, v_y is pulled with the time constant
-    `time / (1 - w)` (s). The review names the method alone; rules and bounds are ours.
+    The membership "large" is linear between two bounds: `hard` for |a_y|, `quick` for the present |a_y - v_x r|, and `banked` for
+    its mean over `bank_time` (s), all in m/s^2; "and" is the product. With w the truth of the first rule, v_y is drawn to the
+    dynamic estimate with the time constant `time / (1 - w)` (s). The review only names the method; rules and bounds are ours.
     """
 
     time: jax.Array = positive("s", default=PSEUDO_TIME)
@@ -165,8 +166,8 @@ class Fuzzy(AbstractFusion):
 
 
 class Weighted(AbstractMethod):
-    """H. Lee (the review's [41]): the kinematic and the dynamic estimate, weighed by the inverses of the variances that their
-    filters state, as if their errors were independent (both read the same sensors)."""
+    """H. Lee (the review's [41]): the mean of the kinematic and the dynamic estimate, weighted by the inverse variances of their
+    filters, as if their errors were independent (although both use the same sensors)."""
 
     kinematic: AbstractMethod
     dynamic: AbstractMethod
@@ -197,24 +198,24 @@ EXTENDED = single_track_filter(filters.Extended(), claims=True)
 
 
 def pseudo_integration(car: CarSpecification) -> Guarded:
-    """Pseudo-integration with the extended filter of the single track, for a car's file."""
+    """Makes pseudo-integration with the extended filter of the single track from a car's file."""
     inner = PseudoIntegration(EXTENDED(car), PSEUDO_TIME * size_of(car) ** 0.5)
     return guard(car, inner, SENSORS)
 
 
 def by_switch(car: CarSpecification) -> Guarded:
-    """The switch with the extended filter of the single track, for a car's file."""
+    """Makes the switch with the extended filter of the single track from a car's file."""
     steady = SteadySteer(**numbers(car), steer_offset=-(car.steer_offset or 0.0))
     inner = Switched(EXTENDED(car), steady, bank_time=BANK_TIME * size_of(car) ** 0.5)
     return guard(car, inner, SENSORS)
 
 
 def by_fuzzy_rules(car: CarSpecification) -> Guarded:
-    """Fuzzy rules with the extended filter of the single track, for a car's file."""
+    """Makes the fuzzy rules with the extended filter of the single track from a car's file."""
     scale = size_of(car) ** 0.5
     return guard(car, Fuzzy(EXTENDED(car), PSEUDO_TIME * scale, BANK_TIME * scale), SENSORS)
 
 
 def weighted_mean(car: CarSpecification) -> Guarded:
-    """The weighted mean of the kinematic and the single track's extended filter, for a car's file."""
+    """Makes the weighted mean of the kinematic filter and the single track's extended filter from a car's file."""
     return guard(car, Weighted(kinematic_kalman(car, claims=True), EXTENDED(car)), (*SENSORS, A_X), claims=False)

@@ -1,4 +1,4 @@
-"""Lateral velocity by integration of what the body feels, as it is and with the roll taken out."""
+"""Lateral velocity by integration of the measured lateral acceleration, with and without compensation of the roll angle."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 OFFSET = 0.1
-"""m/s^2: what an accelerometer says too much, by its own offset and by gravity through a body that leans by some 0.01 rad. That
-of a series car's inertial unit (`sensors.production_car`). Lateral velocity drifts by so much a second."""
+"""m/s^2: error of an accelerometer by its own offset and by gravity in a body that leans by some 0.01 rad, for the inertial unit
+of a series car (`sensors.production_car`). Lateral velocity drifts by this amount per second."""
 
 START = 0.5
-"""m/s: lateral velocity at the first row, which is taken to be none, is not known better."""
+"""m/s: uncertainty of the lateral velocity at the first row, where it is taken to be zero."""
 
 ROLL_TIME = 1.0
-"""s: over which the roll angle that the gyroscope's integral gives is drawn to the one that accelerations ask for."""
+"""s: time constant with which the integral of the roll rate is drawn to the roll angle that the accelerations imply."""
 
 LEFT = 0.3
-"""Of the drift: what is left of it once the roll angle is taken out."""
+"""Share of the drift that is left once the roll angle is taken out."""
 
 
 class Integral(NamedTuple):
-    """The row before: `v_y` (m/s), the `rate` that it is integrated from (m/s^2), `roll` (rad) and what it is drawn from, `asked`
-    (rad) and `roll_rate` (rad/s); time `t`, and how far v_y may have drifted (m/s)."""
+    """The previous row: `v_y` (m/s), its `rate` (m/s^2), which is integrated, `roll` (rad) and its sources, `asked` (rad) and
+    `roll_rate` (rad/s); the time `t` (s), and the possible `drift` of v_y (m/s)."""
 
     v_y: Any
     rate: Any
@@ -54,9 +54,10 @@ class Integral(NamedTuple):
 
 
 class AbstractIntegration(AbstractMethod):
-    """By trapezia from no lateral velocity at the first row, and anew where the car is slower than `slowest` (m/s), where it
-    rolls as its rear axle points (`rear_axle_to_cg`, m). Known as long as `drift` (m/s^2) has not made sideslip uncertain by
-    `WIDEST`.
+    """Trapezoidal integration that starts from zero lateral velocity at the first row.
+
+    It is reset while the car is slower than `slowest` (m/s), where the rear axle, `rear_axle_to_cg` (m) behind the centre of
+    gravity, rolls without slip. The answer is known until `drift` (m/s^2) has made sideslip uncertain by `WIDEST`.
     """
 
     rear_axle_to_cg: jax.Array = positive("m")
@@ -68,8 +69,8 @@ class AbstractIntegration(AbstractMethod):
 
     @abc.abstractmethod
     def roll_of(self, memory: Integral | None, t: Any, values: dict[str, Any]) -> tuple[Any, Any, Any]:
-        """The roll angle (rad) now, the one that accelerations ask for (rad), and the roll rate (rad/s); `memory` of the row
-        before, None at the first."""
+        """The present roll angle (rad), the one that the accelerations imply (rad), and the roll rate (rad/s). `memory` is that
+        of the previous row, None at the first row."""
 
     def first(self, t, values):
         roll, asked, roll_rate = self.roll_of(None, t, values)
@@ -96,8 +97,8 @@ class AbstractIntegration(AbstractMethod):
 
 
 class DirectIntegration(AbstractIntegration):
-    """`v_y = integral of (a_y - v_x r)`, the kinematic method of section 1.1 (its [5]): nothing of the car, and nothing that
-    forgets."""
+    """`v_y = integral of (a_y - v_x r)`, the kinematic method of section 1.1 (its [5]): it needs no model of the car and never
+    forgets an error."""
 
     @property
     def needs(self):
@@ -109,13 +110,13 @@ class DirectIntegration(AbstractIntegration):
 
 
 class RollCompensated(AbstractIntegration):
-    """Integration after the roll angle has been estimated and its gravity taken out of a_y: section 1.1.1, of its [10].
+    """Integration of a_y after the gravity component of the estimated roll angle is taken out: section 1.1.1, of its [10].
 
         dphi/dt = p + (phi_a - phi) / T,    sin(phi_a) = (a_y - v_x r) / g,    dv_y/dt = a_y - g sin(phi) - v_x r
 
-    Slowly the roll angle is the one with which the car would turn steadily, quickly it is the integral of the gyroscope: body
-    roll, bank and the accelerometer's offset are all in it, so that v_y does not drift; what v_y does in more than `time` T (s)
-    is lost. Hac, Nichols & Sygnarowicz also know the suspension; here nothing of the car is asked for.
+    At low frequencies the roll angle is that of a steady turn, at high frequencies it is the integral of the roll rate. It
+    contains body roll, bank and the accelerometer's offset, so that v_y does not drift; changes of v_y slower than `time` T (s)
+    are lost. Hac, Nichols & Sygnarowicz also use the suspension's parameters; this method does not.
     """
 
     time: jax.Array = positive("s", default=ROLL_TIME)
@@ -130,20 +131,20 @@ class RollCompensated(AbstractIntegration):
         asked, roll_rate = numerics.arctan2(sine, numerics.sqrt(1.0 - sine**2)), values["roll_rate"]
         if memory is None:
             return asked, asked, roll_rate
-        # Exact for what runs evenly: the filter's steady state is the mean of both rows' wishes.
+        # Exact for constant inputs: the filter's steady state is the mean of both rows' targets.
         kept = jnp.exp(-(t - memory.t) / self.time)
         wished = 0.5 * (memory.asked + asked) + self.time * 0.5 * (memory.roll_rate + roll_rate)
         return kept * memory.roll + (1.0 - kept) * wished, asked, roll_rate
 
 
 def direct_integration(car: CarSpecification) -> Guarded:
-    """Direct integration for a car's file."""
+    """Makes direct integration from a car's file."""
     channels = (YAW_RATE, A_Y)
     return guard(car, DirectIntegration(car.rear_axle_to_cg, slowest_of(car)), channels, channels, anew=True)
 
 
 def roll_compensated(car: CarSpecification) -> Guarded:
-    """Integration with the roll taken out for a car's file."""
+    """Makes integration with roll compensation from a car's file."""
     channels = (YAW_RATE, A_Y, ROLL_RATE)
     time = ROLL_TIME * size_of(car) ** 0.5
     inner = RollCompensated(car.rear_axle_to_cg, slowest_of(car), LEFT * OFFSET, time)

@@ -1,4 +1,4 @@
-"""Kalman filters of a rigid body's kinematics: no tyre, and of the car nothing but its size."""
+"""Kalman filters of a rigid body's kinematics: without tyres, and with the size as the only parameter of the car."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from jaxveh.statespace import Continuous, Gaussian, Heun, Prior, Propagate, Stat
 from jaxveh.vehicles import GRAVITY
 
 STRAIGHT_RATE, STRAIGHT_A_Y = 0.01, 0.3
-"""rad/s, m/s^2: a car that neither yaws nor is pushed aside by more goes straight, and has no lateral velocity."""
+"""rad/s, m/s^2: a car with a smaller yaw rate and lateral acceleration goes straight, and has no lateral velocity."""
 
 UNLEVELLED, ACCELEROMETER, GYROSCOPE = 0.2, 0.05, 0.005
-"""m/s per root second, rad per root second: what errors of inertial sensors add, as white noise; the first is an
-accelerometer's in a body that leans, whose gravity nobody takes out."""
+"""m/s per root second, m/s per root second, rad per root second: errors of inertial sensors, as white noise. The first is that of
+an accelerometer in a body that leans, whose gravity component is not taken out."""
 
 SPEED, ASIDE, UPWARD = 0.05, 0.1, 0.05
 """m/s: standard deviations of the measured speed, of the lateral velocity of a car that goes straight, and of the vertical
-one."""
+velocity."""
 
 LEAN = 0.05
-"""rad: that of roll and pitch at the start."""
+"""rad: standard deviation of roll and pitch at the start."""
 
 
 class PlaneState(NamedTuple):
@@ -67,7 +67,7 @@ class VelocityReport(NamedTuple):
 
 
 class GoingStraight(AbstractCleaning):
-    """What is known without a sensor becomes a measurement: no vertical velocity on any road, no lateral one of a car that goes
+    """Adds measurements that need no sensor: zero vertical velocity on any road, and zero lateral velocity of a car that goes
     straight, by `STRAIGHT_RATE` and `STRAIGHT_A_Y`."""
 
     @property
@@ -84,7 +84,7 @@ class GoingStraight(AbstractCleaning):
 
 
 class AtSpeed(Filtered):
-    """A filter whose model has the speed among its states, and which starts at the speed of the first row."""
+    """A filter whose model has the speed among its states; it starts at the speed of the first row."""
 
     def first(self, t, values):
         start = lambda method: method.model.prior.mean.v_x
@@ -114,7 +114,7 @@ def body_drift(system, t, x: BodyState, u) -> BodyState:
 
 
 class Seen(eqx.Module):
-    """States as they are."""
+    """An observation that returns the states in `names` unchanged."""
 
     names: tuple[str, ...] = eqx.field(static=True)
 
@@ -130,10 +130,10 @@ def report(system, t, x, u) -> VelocityReport:
 def kinematic_model(
     *, accelerometer: float = UNLEVELLED, speed: float = SPEED, aside: float = ASIDE, start: float = 20.0
 ) -> StateSpace:
-    """v_x and v_y driven by accelerometers and gyroscope, both measured, v_y where the car goes straight: the model of the
-    review's [8] (section 1.1), in which the yaw rate is taken as known.
+    """The model of the review's [8] (section 1.1): v_x and v_y, driven by accelerometers and gyroscope, with the yaw rate taken
+    as known. v_x is measured, and so is v_y where the car goes straight.
 
-    Only while the car yaws does the speed tell the lateral velocity: `d(dv_x/dt) / dv_y = r`. Standard deviations:
+    The speed makes the lateral velocity observable only while the car yaws: `d(dv_x/dt) / dv_y = r`. Standard deviations:
     `accelerometer` (m/s per root second), `speed`, `aside` (m/s); `start`: the speed at first (m/s)."""
     return StateSpace(
         transition=Propagate(plane_drift, Heun()),
@@ -151,12 +151,12 @@ def six_axis_model(
     *, accelerometer: float = ACCELEROMETER, gyroscope: float = GYROSCOPE, speed: float = SPEED, aside: float = ASIDE,
     start: float = 20.0,
 ) -> StateSpace:  # fmt: skip
-    """Velocity, roll and pitch driven by an inertial unit of six axes, updated by the speed that the wheels say: the model of the
-    review's [9] (section 1.1.2).
+    """The model of the review's [9] (section 1.1.2): velocity, roll and pitch, driven by an inertial unit of six axes and
+    corrected by the wheels' speed.
 
-    Gravity through body roll, pitch, bank and grade is taken out. That the car does not leave the road and, where it goes
-    straight, not its own direction, are measurements too; without them nothing tells roll from lateral velocity there. The
-    gyroscopes' own turning with the earth is left out.
+    Gravity through body roll, pitch, bank and grade is taken out. Zero vertical velocity, and zero lateral velocity where the car
+    goes straight, are measurements, too; without them roll and lateral velocity could not be distinguished there. The rotation
+    of the earth is left out.
     """
     noise = dict.fromkeys(("v_x", "v_y", "v_z"), accelerometer) | dict.fromkeys(("roll", "pitch"), gyroscope)
     return StateSpace(
@@ -175,12 +175,13 @@ def six_axis_model(
 
 
 def kinematic_kalman(car: CarSpecification, *, claims: bool = False) -> Guarded:
-    """The kinematic filter for a car's file. Its spread knows of no bank and of no offset: it is not claimed unless asked for."""
+    """Makes the kinematic filter from a car's file. Its standard deviation ignores bank and sensor offsets, and is therefore
+    given only if `claims` is True."""
     return _filtered(car, kinematic_model(), (A_X, A_Y, YAW_RATE), claims=claims)
 
 
 def six_axis(car: CarSpecification) -> Guarded:
-    """The filter of the six axes for a car's file."""
+    """Makes the six-axis filter from a car's file."""
     return _filtered(car, six_axis_model(), (A_X, A_Y, A_Z, ROLL_RATE, PITCH_RATE, YAW_RATE))
 
 

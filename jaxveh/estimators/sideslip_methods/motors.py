@@ -32,7 +32,7 @@ TORQUES = tuple(Need(f"torque_{at}", "N m", throughout=True) for at in CORNERS)
 
 
 class MotorTrack(eqx.Module):
-    """A single track on wheels that torques turn: `track_front`, `track_rear`, `wheel_radius` (m); `slowest` as in `Lateral`.
+    """A single track with torques at its wheels: `track_front`, `track_rear`, `wheel_radius` (m); `slowest` as in `Lateral`.
 
     Eq 10, of the review's [34, 83]:
 
@@ -40,7 +40,7 @@ class MotorTrack(eqx.Module):
         I_z dr/dt = (F_xf sin(delta) + F_yf cos(delta)) l_f - F_yr l_r + T
 
     Erratum: the printed first term of both lines has F_yf in the place of F_xf. T is the yaw moment of the longitudinal forces,
-    which are torque over radius (eq 12 without the wheels' own inertia).
+    which are torque over radius (eq 12 without the wheels' inertia).
     """
 
     car: SingleTrack = eqx.field(metadata=UNNAMED)
@@ -74,7 +74,7 @@ STEP = StiffStep(derivatives)
 
 
 def transition(system: MotorTrack, t0, t1, x, u):
-    """The state moved, as in `single_track.transition`."""
+    """The state after a step, as in `single_track.transition`."""
     return rolling_below(system, STEP(system, t0, t1, x, u), u)
 
 
@@ -101,5 +101,5 @@ def motor_model(car: CarSpecification) -> StateSpace:
 
 
 def motor_moment(car: CarSpecification) -> Guarded:
-    """The unscented filter of eq 10 for a car's file."""
+    """Makes the unscented filter of eq 10 from a car's file."""
     return in_filter(car, motor_model(car), filters.Unscented(), more=TORQUES)

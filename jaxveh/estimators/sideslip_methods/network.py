@@ -1,4 +1,4 @@
-"""Sideslip by a neural network that knows no tyre: section 1.4.7 of the review (its [56, 81])."""
+"""Sideslip by a neural network without a tyre model: section 1.4.7 of the review (its [56, 81])."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 TIMES = (0.1, 0.4, 1.5)
-"""s: the time constants of the low-passes through which the network remembers."""
+"""s: time constants of the low-pass filters that are the network's memory."""
 
 SIGNALS = 6
-"""What is low-passed: see `SideslipNetwork.signals`."""
+"""Number of low-passed signals: see `SideslipNetwork.signals`."""
 
 FILE = "network.npz"
-"""Weights and biases, layer by layer, beside this module."""
+"""File of weights and biases, layer by layer, in this module's folder."""
 
 
 class NetworkMemory(NamedTuple):
@@ -45,23 +45,22 @@ class NetworkMemory(NamedTuple):
 
 
 class SideslipNetwork(AbstractMethod):
-    """The slip angle of the rear axle by a network with two hidden layers, of what was measured and what was measured before.
+    """The slip angle of the rear axle by a network with two hidden layers, from present and past measurements.
 
-        beta = l_r r / v_x - slip,    slip and the logarithm of its spread = network(signals, low-passed signals, speed)
+        beta = l_r r / v_x - slip,    slip and log standard deviation of slip = network(signals, low-passed signals, speed)
 
-    Signals have no size of a car in them, so that one network serves all: they are steer, the steer of a turn without slip, both
-    accelerations that a turn has, and what the linear axles of the car's file would have for slip. So the network learned on
-    some cars may be right on others, as far as these are like them (see `sideslip_review.network_training`, which says what it
-    was trained on).
+    The signals do not depend on the size of a car, so that one network serves all cars: the steer, the steer of a turn without
+    slip, the measured lateral acceleration and that of the yaw rate, and the slip angles of the linear axles of the car's file.
+    So the network may be right on cars that resemble those of its training (see `sideslip_review.network_training` for these).
 
     **Parameters**: of the car `front_axle_to_cg`, `rear_axle_to_cg` (m), `front_compliance`, `rear_compliance`, slip angle per
     lateral acceleration (rad/(m/s^2)), `steer_offset` (rad), `slowest` (m/s); `layers`: the network.
     """
 
     unit: ClassVar[float] = 0.05
-    """rad: of the slip that the network says."""
+    """rad: unit of the network's slip."""
     size: ClassVar[int] = SIGNALS * (1 + len(TIMES)) + 1
-    """How many numbers the network reads."""
+    """Number of the network's inputs."""
     layers: eqx.nn.MLP
     front_axle_to_cg: jax.Array = positive("m")
     rear_axle_to_cg: jax.Array = positive("m")
@@ -78,7 +77,7 @@ class SideslipNetwork(AbstractMethod):
         return (V_X, STEER, YAW_RATE, A_Y)
 
     def signals(self, values) -> jax.Array:
-        """(SIGNALS,), of about 1 each in ordinary driving."""
+        """The signals (SIGNALS,), each about 1 in ordinary driving."""
         v_x = jnp.maximum(values["v_x"], self.slowest)
         turn, push = values["yaw_rate"], values["a_y"]
         rolling = (self.front_axle_to_cg + self.rear_axle_to_cg) * turn / v_x
@@ -97,7 +96,7 @@ class SideslipNetwork(AbstractMethod):
         return self._answer(t, now, memory.slow + share[:, None] * (now - memory.slow), values)
 
     def features(self, now, slow, v_x) -> jax.Array:
-        """(size,): the signals, by how much they are other than before, and the speed."""
+        """(size,): the signals, their differences from the low-passed signals, and the speed."""
         return jnp.concatenate([now, (now - slow).reshape(-1), jnp.atleast_1d(v_x / 30.0)])
 
     def _answer(self, t, now, slow, values):
@@ -109,7 +108,7 @@ class SideslipNetwork(AbstractMethod):
 
 
 def layers_of(arrays: list[np.ndarray]) -> eqx.nn.MLP:
-    """The network of weights and biases in turn."""
+    """The network with these weights and biases, in alternating order."""
     width, depth = arrays[0].shape[0], len(arrays) // 2 - 1
     network = eqx.nn.MLP(SideslipNetwork.size, 2, width, depth, jnp.tanh, key=jax.random.key(0))
     where = lambda one: [leaf for layer in one.layers for leaf in (layer.weight, layer.bias)]
@@ -118,13 +117,13 @@ def layers_of(arrays: list[np.ndarray]) -> eqx.nn.MLP:
 
 @functools.cache
 def trained_arrays() -> tuple[np.ndarray, ...]:
-    """Weights and biases in turn, as `sideslip_review.network_training` left them."""
+    """The weights and biases of `sideslip_review.network_training`, in alternating order."""
     with importlib.resources.files(__package__).joinpath(FILE).open("rb") as file, np.load(file) as stored:
         return tuple(np.asarray(stored[name], float) for name in sorted(stored.files))
 
 
 def sideslip_network(car: CarSpecification, layers: eqx.nn.MLP) -> SideslipNetwork:
-    """A network for a car's file."""
+    """The method with these `layers` for a car's file."""
     told = numbers(car)
     wheelbase = told["front_axle_to_cg"] + told["rear_axle_to_cg"]
     compliance = lambda other, stiffness: told["mass"] * told[other] / (wheelbase * told[stiffness])
@@ -135,6 +134,6 @@ def sideslip_network(car: CarSpecification, layers: eqx.nn.MLP) -> SideslipNetwo
 
 
 def neural_network(car: CarSpecification) -> Guarded:
-    """The trained network for a car's file."""
+    """Makes the trained network from a car's file."""
     layers = layers_of(list(trained_arrays()))
     return guard(car, sideslip_network(car, layers), (YAW_RATE, A_Y), (YAW_RATE, A_Y))

@@ -1,6 +1,6 @@
-"""Observers of v_y and yaw rate whose gains are made anew in each row: constant poles at any speed, on any slope of the tyres."""
+"""Observers of v_y and yaw rate that recompute their gains in each row, for constant poles at any speed and tyre slope."""
 
-# No postponed annotations in this file: they would make fields of class variables.
+# No postponed annotations in this file: they would turn class variables into fields.
 
 import abc
 from typing import Any, NamedTuple
@@ -41,29 +41,29 @@ from jaxveh.statespace import Gaussian, Prior, StateSpace
 from jaxveh.vehicles import SingleTrack, linear
 
 POLES = (-10.0, -12.0)
-"""1/s, of a car of the usual wheelbase: about those of a car at 15 m/s, so that the error dies out within 0.3 s where the car's
-own poles are slower, and noise is not made larger."""
+"""1/s, for a car of the usual wheelbase: about the poles of a car at 15 m/s, so that the error decays within 0.3 s where the
+car's own poles are slower, and noise is not amplified."""
 
 LEAST_SLOPE = 0.2
-"""Of its value on straight running: `d a_y / d v_y`, by which a gain is divided, is taken to be at least so steep. A tyre that
-slides tells nothing."""
+"""Lower limit of `d a_y / d v_y`, by which a gain is divided, over its value at straight running. The force of a sliding tyre
+does not depend on v_y."""
 
 LEAST_LEVER = 0.1
-"""Of the axles' moments together, `(a C_f + b C_r) / J`: as much must the yaw acceleration change with sideslip, or the yaw rate
-alone tells nothing of v_y; the gain fades out there."""
+"""Smallest change of the yaw acceleration with sideslip, over the sum of the axles' moments `(a C_f + b C_r) / J`. Below it the
+yaw rate alone does not determine v_y, and the gain fades out."""
 
 LINEAR_SHARE, BOUNDARY = 0.3, (0.02, 1.0)
-"""Of the sliding observer's gain that is linear; and where its switch bends, rad/s and m/s^2: some ten of the sensors' noises."""
+"""Linear share of the sliding observer's gain; width of its switch, rad/s and m/s^2: about ten times the sensors' noise."""
 
 LOST = 0.3
-"""rad/s, of a car of the usual wheelbase: an observer whose yaw rate is further from the measured one has spun, and no slope
-there leads back. It begins anew, with that yaw rate and no lateral velocity."""
+"""rad/s, for a car of the usual wheelbase: an observer whose yaw rate is further from the measured one has spun, and its gain
+does not bring it back. It is reset to the measured yaw rate and zero lateral velocity."""
 
 TINY = 1e-12
 
 
 class StepMemory(NamedTuple):
-    """Slopes of the last step, (2, 2), and whether the car was fast enough to have any."""
+    """Slopes of the last step, (2, 2), and whether the car was fast enough for them to be valid."""
 
     slopes: Any
     moves: Any
@@ -72,8 +72,8 @@ class StepMemory(NamedTuple):
 class AbstractPlaced(AbstractObserver):
     """An observer whose error, after each correction, obeys `(I - K H) F` with the poles `exp(poles dt)`; `poles` (2,), 1/s.
 
-    F are the slopes of the step, H those of the observation, taken anew in each row. Where a channel is missing, nothing is
-    corrected. Yaw rate is the first channel; one that is off by `LOST` or more begins anew.
+    F are the slopes of the step and H those of the observation, recomputed in each row. Where a measurement is missing, there is
+    no correction. Yaw rate is the first channel; if its error exceeds `LOST`, the observer is reset.
     """
 
     poles: jax.Array = table("1/s")
@@ -84,7 +84,7 @@ class AbstractPlaced(AbstractObserver):
 
     @abc.abstractmethod
     def gain(self, model: StateSpace, F: Any, H: Any, z: Any, row: Any) -> Any:
-        """The gain (2, m) of slopes F (2, 2) and H (m, 2) and the poles z (2,) of this step."""
+        """The gain (2, m) for slopes F (2, 2) and H (m, 2) and the poles z (2,) of this step."""
 
     def at(self, model: StateSpace, vector: Any) -> Any:
         """The state (2,) at which slopes are taken."""
@@ -118,30 +118,30 @@ class AbstractPlaced(AbstractObserver):
         return jnp.where(lost, jnp.stack([-belief.vector[0], error[0]]), change), belief.memory
 
     def change(self, K: Any, error: Any) -> Any:
-        """The correction (2,) of a gain and the channels' errors."""
+        """The correction (2,) from a gain and the channels' errors."""
         return K @ error
 
 
 def channels_of(model: StateSpace, row, vector):
-    """What the sensors would say of a state (2,)."""
+    """The predicted measurements for a state (2,)."""
     return model.observation(row.t, type(model.prior.mean)(*vector), row.u)
 
 
 class ErrorLinearising(AbstractPlaced):
-    """The nonlinear observer of U. Kiencke & A. Daiss (the review's [59], section 1.4.2): gains at the estimate with which the
-    error obeys one linear equation, wherever it is.
+    """The nonlinear observer of U. Kiencke & A. Daiss (the review's [59], section 1.4.2): with gains computed at the estimate the
+    error obeys one linear equation everywhere.
 
         L(x, u):  df/dx - L dh/dx = diag(poles)    in a step:  K = (I - diag(z) F^-1) H^-1
 
-    Yaw rate and a_y are measured, so that H is square; its slope `d a_y / d v_y` is held at `LEAST_SLOPE` of that on straight
-    running, where the axles slide.
+    Yaw rate and a_y are measured, so that H is square. Where the axles slide, its slope `d a_y / d v_y` is limited to
+    `LEAST_SLOPE` of that at straight running.
     """
 
     def gain(self, model, F, H, z, row):
         car: Any = model.system.car
         plain = stiffnesses(car)
         least = LEAST_SLOPE * (plain[0] + plain[1]) / car.mass / jnp.maximum(row.u.v_x, model.system.slowest)
-        # Channels are yaw rate, which is the second state, and a_y.
+        # The channels are yaw rate, which is the second state, and a_y.
         slope, turning = -jnp.maximum(-H[1, 0], least), H[1, 1]
         inverse = jnp.stack([jnp.stack([-turning / slope, 1.0 / slope]), jnp.stack([1.0 + 0.0 * slope, 0.0 * slope])])
         determinant = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
@@ -162,8 +162,9 @@ class ArctangentSliding(ConstantPoles):
 
         x = x- + share K e + M (2 / pi) arctan(lambda e),    M = (pi / 2) (1 - share) K / lambda
 
-    K places the poles; near no error the observer is linear with K, and far from it a row corrects no more than M. `share` (-),
-    and `boundary` = 1 / lambda (rad/s, m/s^2) of each channel.
+    K places the poles. For small errors the observer is linear with gain K; for large ones the switching term corrects at most M
+    per row. `share` (-) is the linear part of the gain, `boundary` = 1 / lambda (rad/s, m/s^2) the width of each channel's
+    switch.
     """
 
     share: jax.Array = positive("-", default=LINEAR_SHARE)
@@ -184,19 +185,19 @@ class StateDependentGain(AbstractPlaced):
     """M. Zeitz's extended Luenberger observer (the review's [58], section 1.4.2): Ackermann's formula at the estimate, with the
     yaw rate alone.
 
-    Of the slopes f of a step, whose determinant is D, and the poles z:
+    With the slopes f of a step, their determinant D, and the poles z:
 
         k_r = 1 - z1 z2 / D,    k_v = (f_11 + f_22 z1 z2 / D - z1 - z2) / f_21
 
-    f_21 goes with `(b C_r - a C_f) / (J v)`: a neutral car's yaw rate does not tell v_y. Where it is less than `least` (1/s^2)
-    over the speed the correction of v_y fades out, and the yaw rate has its own pole.
+    f_21 is proportional to `(b C_r - a C_f) / (J v)`: the yaw rate of a neutral car does not determine v_y. Where f_21 is less
+    than `least` (1/s^2) over the speed, times the step, the correction of v_y fades out, and the yaw rate has its own pole.
     """
 
     least: jax.Array = positive("1/s^2", default=1.0)
 
     def gain(self, model, F, H, z, row):
         del H
-        # The step's length out of its poles: a row that takes no time corrects nothing.
+        # The step's length from its poles: a step of zero length corrects nothing.
         step = jnp.log(z[0]) / self.poles[0].astype(z.dtype)
         edge = self.least.astype(z.dtype) * step / jnp.maximum(row.u.v_x, model.system.slowest)
         lever = F[1, 0]
@@ -208,7 +209,7 @@ class StateDependentGain(AbstractPlaced):
 
 
 class RearForce(eqx.Module):
-    """What an observer knows that is blind to the front axle: the `car`, of which the rear axle counts; `slowest` as in
+    """The system of an observer that does not use the front axle: the `car`, of which only the rear axle counts; `slowest` as in
     `Lateral`."""
 
     car: SingleTrack = eqx.field(metadata=UNNAMED)
@@ -216,7 +217,7 @@ class RearForce(eqx.Module):
 
 
 def rear_derivatives(system: RearForce, t, x: LateralState, u) -> LateralState:
-    """`dv_y/dt = a_y - v_x r`, `J dr/dt = a m a_y - (a + b) F_r`: the front axle's force is what a_y leaves of the rear's."""
+    """`dv_y/dt = a_y - v_x r`, `J dr/dt = a m a_y - (a + b) F_r`: the front axle's force is `m a_y - F_r`."""
     car: Any = system.car
     straight = record_type("Inputs", ("steer", "v_x"))(0.0 * u.v_x, u.v_x)
     F_r = car.outputs(t, full_state(car, x), straight).F_yr
@@ -228,25 +229,25 @@ REAR_STEP = StiffStep(rear_derivatives)
 
 
 def rear_transition(system: RearForce, t0, t1, x: LateralState, u) -> LateralState:
-    """The state moved; slower than `slowest` the rear wheels roll where they point."""
+    """The state after a step; below `slowest` the rear wheels roll without slip."""
     moved = REAR_STEP(system, t0, t1, x, u)
     rolling = LateralState(system.car.rear_axle_to_cg * x.yaw_rate, x.yaw_rate)
     return jax.tree.map(lambda a, b: jnp.where(u.v_x >= system.slowest, a, b), moved, rolling)
 
 
 def yaw_rate_alone(system, t, x, u):
-    """The gyroscope."""
+    """The yaw rate of the gyroscope."""
     return record_type("Measurements", ("yaw_rate",))(x.yaw_rate)
 
 
 def rear_force_model(car: SingleTrack, slowest: float) -> StateSpace:
-    """The observer of lateral velocity that no disturbance of the front axle's force reaches (the review's [21, 65], section
-    1.4.4).
+    """The model of an observer of lateral velocity that no disturbance of the front axle's force affects (the review's [21, 65],
+    section 1.4.4).
 
     A force d at the front adds d / m to dv_y/dt and to the measured a_y, and a d / J to dr/dt. A gain `(1, m a / J)` from a_y
-    therefore takes it out of the error's equation, whatever it is: a wrong stiffness in front, a wrong steer, a slippery road
-    under the front wheels. With it the model's front force is gone too, a_y is an input, and the yaw rate is left to place poles.
-    The rear axle's stiffness still counts.
+    therefore removes any d from the error equation: a wrong front stiffness, a wrong steer, a slippery road under the front
+    wheels. This gain also removes the model's front force, so that a_y is an input, and the yaw rate is left to place the poles.
+    The rear axle's stiffness still matters.
     """
     return StateSpace(
         system=RearForce(car, slowest),
@@ -261,7 +262,7 @@ def rear_force_model(car: SingleTrack, slowest: float) -> StateSpace:
 
 
 def blind_to_front(car: CarSpecification) -> Guarded:
-    """The observer that is blind to the front axle, for a car's file."""
+    """Makes the observer that does not use the front axle from a car's file."""
     model = rear_force_model(single_track(car), slowest_of(car))
     filter = StateDependentGain(_poles(car), _least(model.system.car))
     inner = Filtered(model, filter, (V_X, YAW_RATE, A_Y), shown=LateralReport._fields)
@@ -269,22 +270,22 @@ def blind_to_front(car: CarSpecification) -> Guarded:
 
 
 def luenberger(car: CarSpecification) -> Guarded:
-    """The observer with the gain of straight running, for a car's file."""
+    """Makes the observer with the gain of straight running from a car's file."""
     return _observer(car, ConstantPoles(_poles(car)))
 
 
 def error_linearising(car: CarSpecification) -> Guarded:
-    """The error-linearising observer for a car's file."""
+    """Makes the error-linearising observer from a car's file."""
     return _observer(car, ErrorLinearising(_poles(car)))
 
 
 def sliding_mode(car: CarSpecification) -> Guarded:
-    """The sliding-mode observer for a car's file."""
+    """Makes the sliding-mode observer from a car's file."""
     return _observer(car, ArctangentSliding(_poles(car)))
 
 
 def state_dependent(car: CarSpecification) -> Guarded:
-    """The extended Luenberger observer for a car's file."""
+    """Makes the extended Luenberger observer from a car's file."""
     plain = lateral_model(single_track(car), slowest_of(car))
     model = eqx.tree_at(lambda m: m.measurement_noise, plain, Gaussian({"yaw_rate": YAW_RATE_NOISE}))
     filter = StateDependentGain(_poles(car), _least(model.system.car))

@@ -1,5 +1,5 @@
-"""What `sideslip.live` says, as a method: integration held by the rear axle's force, with bands that know how little a file
-knows."""
+"""`sideslip.live` as a method: integration corrected by the rear axle's force, with standard deviations that include the
+uncertainty of the car's file."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from jaxveh.io import CarSpecification
 
 
 class AsLive(AbstractMethod):
-    """A live estimator as a method: its row is a time and the channels that its cleaning reads. Spreads are those of its
-    bands."""
+    """A live estimator as a method: its row is a time and the channels that its cleaning reads. The standard deviations are those
+    of its bands."""
 
     live: Live
 
@@ -40,7 +40,7 @@ class AsLive(AbstractMethod):
 
 
 def rear_axle(car: CarSpecification) -> Guarded:
-    """`rear_axle.RearAxle` of a car's file at its word, as `sideslip.live` has it without a calibration."""
+    """Makes `rear_axle.RearAxle` from a car's file, as `sideslip.live` uses it without a calibration."""
     system = car_of(car)
     model = rear_axle_model(system)
     cleaning = RearAxleCleaning(car.wheelbase)

@@ -1,4 +1,5 @@
-"""Single tracks as what a filter or an observer sees: lateral velocity and yaw rate, steered, with any tyre law of the review."""
+"""Single-track models for filters and observers: lateral velocity and yaw rate, driven by the steer, with any tyre law of the
+review."""
 
 from __future__ import annotations
 
@@ -34,14 +35,14 @@ from jaxveh.tyres import AbstractTyre, Contact, MagicFormula
 from jaxveh.vehicles import GRAVITY, AbstractVehicle, LinearSingleTrack, SingleTrack, from_specification, linear
 
 FORCE_ERROR = 0.02
-"""s^0.5: what an axle's tyre law leaves out, over its load, as white noise: force errors of 3 % of the load that last 0.4 s."""
+"""s^0.5: error of an axle's tyre law over the axle load, as white noise: force errors of 3 % of the load that last 0.4 s."""
 
 YAW_RATE_NOISE, A_Y_NOISE = 0.003, 0.3
-"""rad/s, m/s^2: of the gyroscope, its offset included; of the accelerometer, which also feels gravity through roll and bank,
-and the errors of both axles' forces."""
+"""rad/s, m/s^2: noise of the gyroscope, its offset included; noise of the accelerometer, with gravity through roll and bank, and
+with the errors of both axles' forces."""
 
 USUAL_SPEED = 20.0
-"""m/s, of a car of the usual wheelbase: at which a spread of v_y is made one of sideslip."""
+"""m/s, for a car of the usual wheelbase: speed at which a standard deviation of v_y is converted to one of sideslip."""
 
 CHANNELS = ("yaw_rate", "a_y")
 SENSORS = (YAW_RATE, A_Y)
@@ -69,14 +70,14 @@ class LateralReport(NamedTuple):
 
 
 class Lateral(eqx.Module):
-    """A `car` at a given speed, and the speed `slowest` (m/s) below which it rolls where its wheels point."""
+    """A `car` at a given speed, and the speed `slowest` (m/s) below which its wheels roll without slip."""
 
     car: AbstractVehicle = eqx.field(metadata=UNNAMED)
     slowest: jax.Array = positive("m/s")
 
 
 class OpenLoopMemory(NamedTuple):
-    """The state, the inputs and the time (s) of the row before."""
+    """The state, the inputs and the time (s) of the previous row."""
 
     state: LateralState
     u: Any
@@ -84,7 +85,7 @@ class OpenLoopMemory(NamedTuple):
 
 
 def full_state(car: AbstractVehicle, x: Any) -> Any:
-    """The car's own state of one that has neither place nor heading."""
+    """The car's full state, with zero for the components that `x` lacks (position, heading)."""
     none = jnp.zeros_like(x.yaw_rate)
     known = x._asdict()
     return car.state_type(*[known.get(name, none) for name in car.state_type._fields])
@@ -100,15 +101,15 @@ STEP = StiffStep(derivatives)
 
 
 def transition(system: Lateral, t0, t1, x, u):
-    """The state moved with the inputs of the step's first row; slower than `slowest`, and backwards, the kinematic single track
-    of the steer: `r = v_x delta / l`, `v_y = l_r r`."""
+    """The state after a step with the inputs of its first row. Below `slowest`, and backwards, it is that of the kinematic single
+    track: `r = v_x delta / l`, `v_y = l_r r`."""
     return rolling_below(system, STEP(system, t0, t1, x, u), u)
 
 
 def rolling_below(system: Lateral, moved, u):
-    """The state, or that of a car which rolls where its wheels point."""
+    """The state `moved`, or below `slowest` that of a car whose wheels roll without slip."""
     car: Any = system.car
-    # The step ends where the wheels point; other states (roll) are left as they are.
+    # Only lateral velocity and yaw rate are replaced; other states (roll) are left as they are.
     none = 0.0 * moved.yaw_rate
     sideslip = car.rear_axle_to_cg / car.wheelbase * u.steer + none
     aside = {"sideslip": sideslip} if "sideslip" in moved._fields else {"v_y": u.v_x * sideslip}
@@ -129,8 +130,8 @@ def report(system: Lateral, t, x, u) -> LateralReport:
 
 
 def process_noise(car: Any, force_error: float = FORCE_ERROR) -> dict[str, float]:
-    """What white errors of the axles' forces, of `force_error` (s^0.5) times their loads, add to v_y (m/s per root second) and
-    the yaw rate (rad/s per root second) of this car."""
+    """The process noise of v_y (m/s per root second) and of the yaw rate (rad/s per root second) of this car, from white errors
+    of the axles' forces of `force_error` (s^0.5) times their loads."""
     a, b = float(car.front_axle_to_cg), float(car.rear_axle_to_cg)
     push = GRAVITY * force_error / (a + b)
     return {
@@ -143,8 +144,8 @@ def lateral_model(
     car: AbstractVehicle, slowest: float, *, force_error: float = FORCE_ERROR, yaw_rate: float = YAW_RATE_NOISE,
     a_y: float = A_Y_NOISE, inputs: tuple[str, ...] = ("steer", "v_x"),
 ) -> StateSpace:  # fmt: skip
-    """The state space of a car at a given speed with v_y (of a `LinearSingleTrack` sideslip) and yaw rate as states, which a
-    gyroscope and an accelerometer see.
+    """The state space of a car at a given speed. The states are v_y (for a `LinearSingleTrack` sideslip) and yaw rate, the
+    measurements those of a gyroscope and an accelerometer.
 
     Standard deviations: `force_error` (`process_noise`), `yaw_rate` (rad/s), `a_y` (m/s^2).
     """
@@ -165,7 +166,7 @@ def lateral_model(
 
 
 class Axle(NamedTuple):
-    """An axle at rest: its tyre as the file has it, `stiffness` (N/rad), `grip` (N) and `load` (N)."""
+    """An axle at rest: its `tyre` from the car's file, `stiffness` (N/rad), `grip` (N) and `load` (N)."""
 
     tyre: MagicFormula
     stiffness: Any
@@ -174,7 +175,8 @@ class Axle(NamedTuple):
 
 
 def _arctangent(axle: Axle) -> AbstractTyre:
-    # At four times the static load the law's force is gone; at it, three quarters are left, and pi / 2 of that is the grip.
+    # The law's force is zero at four times the static load, and three quarters are left at the static load; pi / 2 of that is
+    # the grip.
     reduction = axle.grip / axle.load * 8.0 / (3.0 * jnp.pi)
     return tyres.Arctangent(4.0 * axle.load, axle.stiffness / (0.75 * reduction * axle.load), reduction)
 
@@ -189,12 +191,12 @@ TYRES: dict[str, Callable[[Axle], AbstractTyre]] = {
     "unitire": lambda axle: tyres.UniTire(axle.stiffness, axle.stiffness, axle.grip / axle.load),
 }
 """Tyre laws of section 1.2.2 by name, each with the cornering stiffness and the grip of the file's axle at its static load: eqs
-3 to 7 with their errata, which stand in the laws' own docstrings. Laws with a longitudinal part are as stiff along as
-across."""
+3 to 7 with their errata, which are in the docstrings of the laws. Laws with a longitudinal part have the same stiffness in both
+directions."""
 
 
 def single_track(car: CarSpecification, tyre: str = "magic_formula") -> SingleTrack:
-    """The single track of a car's file on a tyre law of `TYRES`, with axle loads as at rest (section 1.2.1)."""
+    """The single track of a car's file on a tyre law of `TYRES`, with static axle loads (section 1.2.1)."""
     check_one_of("sideslip: tyre", tyre, TYRES)
     found = from_specification(dataclasses.replace(car, cg_height=None))
     return eqx.tree_at(lambda c: (c.front, c.rear), found, tuple(TYRES[tyre](axle) for axle in axles_of(found)))
@@ -214,7 +216,7 @@ def in_filter(
     car: CarSpecification, model: StateSpace, filter: AbstractFilter, *, more: tuple[Need, ...] = (), key: Any = None,
     claims: bool = False,
 ) -> Guarded:  # fmt: skip
-    """A filter or an observer on a model of steer, speed and the channels in `more`, as a method."""
+    """A filter or an observer as a method, on a model whose inputs are steer, speed and the channels in `more`."""
     inner = Filtered(model, filter, (V_X, STEER, *SENSORS, *more), shown=LateralReport._fields, key=key)
     return guard(car, inner, SENSORS, claims=claims)
 
@@ -222,10 +224,11 @@ def in_filter(
 def single_track_filter(
     filter: AbstractFilter, tyre: str = "magic_formula", *, random: bool = False, claims: bool = False
 ) -> Callable[[CarSpecification], Guarded]:
-    """A maker of the single track on a tyre law of `TYRES` in a filter; `random`: it draws, with one fixed key.
+    """A function that makes a filter on the single track with a tyre law of `TYRES` from a car's file. `random`: the filter draws
+    samples, with one fixed key.
 
-    The filter's spread is that of white errors about the file's curves. It is too small wherever the curve is another, by road or
-    by car, for seconds, and so it is not claimed unless asked for.
+    The filter's standard deviation assumes white errors about the file's curves. It is too small wherever the road or the car
+    changes the curve for seconds; the method therefore gives it only if `claims` is True.
     """
 
     def make(car: CarSpecification) -> Guarded:
@@ -236,7 +239,7 @@ def single_track_filter(
 
 
 def linear_kalman(car: CarSpecification) -> Guarded:
-    """The Kalman filter on the linear single track of a car's file: section 1.2.2, its [17]."""
+    """Makes the Kalman filter on the linear single track from a car's file: section 1.2.2, its [17]."""
     plain = linear(single_track(car))
     known = {name: getattr(plain, name) for name in ("mass", "yaw_inertia", "front_axle_to_cg", "rear_axle_to_cg")}
     stiffness = dict(front_stiffness=plain.front.cornering_stiffness, rear_stiffness=plain.rear.cornering_stiffness)
@@ -245,8 +248,8 @@ def linear_kalman(car: CarSpecification) -> Guarded:
 
 
 class OpenLoop(AbstractMethod):
-    """The linear single track, steered from straight running, that listens to no sensor: what all others are compared with
-    (section 1.2.2: its accuracy is that of the model and of its parameters)."""
+    """The linear single track, driven by the steer from straight running, without correction by a sensor. It is the baseline of
+    the other methods (section 1.2.2: its accuracy is that of the model and of its parameters)."""
 
     system: Lateral
 
@@ -267,5 +270,5 @@ class OpenLoop(AbstractMethod):
 
 
 def open_loop(car: CarSpecification) -> Guarded:
-    """The linear single track of a car's file, in open loop."""
+    """Makes the open-loop linear single track from a car's file."""
     return guard(car, OpenLoop(Lateral(linear(single_track(car)), slowest_of(car))))

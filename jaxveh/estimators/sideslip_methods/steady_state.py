@@ -13,16 +13,16 @@ from jaxveh.io import CarSpecification
 from jaxveh.vehicles import GRAVITY
 
 LINEAR = 0.4
-"""Of gravity: the lateral acceleration up to which a linear single track is good enough on dry road, as section 1.2.1 of the
-review says after its [15]. The formulas' answers are known no further."""
+"""Lateral acceleration over gravity up to which a linear single track is good enough on dry road, as section 1.2.1 of the review
+says after its [15]. Beyond it the formulas' answers are not known."""
 
 LEAST_STEADINESS = 0.2
-"""The least of `1 + K v^2 / l`, of which eq 1's denominator is made, that is trusted: an oversteering car near its critical speed
-has no steady turn."""
+"""Smallest trusted value of `1 + K v^2 / l`, the denominator of eq 1: an oversteering car near its critical speed has no steady
+turn."""
 
 
 class AbstractSteadyState(AbstractMethod):
-    """The linear single track's numbers: `mass` (kg), distances of the axles (m), their cornering stiffnesses (N/rad)."""
+    """The linear single track's parameters: `mass` (kg), distances of the axles (m), their cornering stiffnesses (N/rad)."""
 
     mass: jax.Array = positive("kg")
     front_axle_to_cg: jax.Array = positive("m")
@@ -43,12 +43,12 @@ class AbstractSteadyState(AbstractMethod):
 
 
 class SteadySteer(AbstractSteadyState):
-    """Eq 1 of the review, of its [20]: sideslip of the steer and the speed, in a steady turn of the linear single track.
+    """Eq 1 of the review, of its [20]: sideslip from the steer and the speed, in a steady turn of the linear single track.
 
         beta = (1 - m l_f v^2 / (2 l_r k_r l)) / (1 - m (l_f k_f - l_r k_r) v^2 / (2 l^2 k_f k_r)) (l_r / l) delta
 
-    Erratum: the printed k is of one tyre, so that an axle has C = 2 k. Known where the lateral acceleration of that turn is at
-    most `LINEAR` g. `steer_offset` (rad): what is added to the channel.
+    Erratum: the printed k is that of one tyre, so that an axle has C = 2 k. The answer is known where the lateral acceleration of
+    that turn is at most `LINEAR` g. `steer_offset` (rad) is added to the channel.
     """
 
     steer_offset: jax.Array = parameter("rad", scale=0.02, default=0.0)
@@ -58,7 +58,7 @@ class SteadySteer(AbstractSteadyState):
         return (STEER, V_X)
 
     def turn_of_steer(self, v_x, steer):
-        """The steer over what it would have to be without understeer (rad), and whether there is a steady turn at all."""
+        """The steer of a neutral car in the same turn (rad), and whether there is a steady turn at all."""
         leverage = self.front_axle_to_cg * self.front_stiffness - self.rear_axle_to_cg * self.rear_stiffness
         stiff = self.wheelbase**2 * self.front_stiffness * self.rear_stiffness
         steadiness = 1.0 - self.mass * jnp.square(v_x) * leverage / stiff
@@ -82,12 +82,12 @@ class SteadySteer(AbstractSteadyState):
 
 
 class SteadyTurn(AbstractSteadyState):
-    """Eq 2 of the review, of its [28]: sideslip of the yaw rate and the lateral acceleration, in a steady turn.
+    """Eq 2 of the review, of its [28]: sideslip from the yaw rate and the lateral acceleration, in a steady turn.
 
         beta = l_r r / v_x - m l_f a_y / (2 l k_r)
 
-    Erratum: the printed k_r is of one tyre. It needs no steer, and holds where v_y does not change; the axle's force is taken to
-    be linear, so that it is known up to `LINEAR` g.
+    Erratum: the printed k_r is that of one tyre. The formula needs no steer, and holds where v_y does not change. It takes the
+    axle's force to be linear, so that the answer is known up to `LINEAR` g.
     """
 
     @property
@@ -103,10 +103,10 @@ class SteadyTurn(AbstractSteadyState):
 
 
 def numbers(car: CarSpecification) -> dict[str, float]:
-    """The linear single track of a car's file."""
+    """The linear single track's parameters from a car's file."""
     assert (
         car.front_cornering_stiffness is not None and car.rear_cornering_stiffness is not None
-    )  # the file has filled it
+    )  # given in the file, or from the axle's coefficients
     return dict(
         mass=car.mass,
         front_axle_to_cg=car.front_axle_to_cg,
@@ -117,10 +117,10 @@ def numbers(car: CarSpecification) -> dict[str, float]:
 
 
 def steady_steer(car: CarSpecification) -> Guarded:
-    """Eq 1 for a car's file."""
+    """Makes eq 1 from a car's file."""
     return guard(car, SteadySteer(**numbers(car), steer_offset=-(car.steer_offset or 0.0)))
 
 
 def steady_turn(car: CarSpecification) -> Guarded:
-    """Eq 2 for a car's file."""
+    """Makes eq 2 from a car's file."""
     return guard(car, SteadyTurn(**numbers(car)), (YAW_RATE, A_Y), (YAW_RATE, A_Y))

@@ -1,4 +1,4 @@
-"""From the torque at the steering wheel to sideslip, through aligning moment, front force and front slip angle."""
+"""Sideslip from the torque at the steering wheel, through aligning moment, front force and front slip angle."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from jaxveh.io import CarSpecification
 STEERING_TORQUE = Need("steering_torque", "N m")
 
 TRAIL = 0.05
-"""m, of a car of the usual size: how far the side force acts behind the steering axis, some 0.02 m of caster and 0.03 m of the
-tyre's own trail."""
+"""m, for a car of the usual size: distance of the lateral force behind the steering axis, about 0.02 m of caster trail and 0.03 m
+of pneumatic trail."""
 
 USED = 0.4
-"""Of the front axle's grip: beyond it the tyre's own trail shrinks, and the moment no longer tells the force."""
+"""Share of the front axle's grip beyond which the pneumatic trail shrinks, and the moment no longer determines the force."""
 
 
 class SteeringTorque(AbstractMethod):
@@ -37,9 +37,9 @@ class SteeringTorque(AbstractMethod):
 
         F_f = i (1 + assist) M / trail,    alpha_f = F_f / C_f,    beta = delta - alpha_f - l_f r / v_x
 
-    M (N m) is the driver's torque, `ratio` i and `assist` (-) the steering's, `trail` (m) what the force's moment about the
-    steering axis has as its arm. Friction and inertia of the steering are left out. Known up to `USED` of the front axle's
-    `grip` (N).
+    M (N m) is the driver's torque, `ratio` i (-) the steering ratio, `assist` (-) the steering assistance, and `trail` (m) the
+    lever arm of the force about the steering axis. Friction and inertia of the steering are left out. The answer is known up to
+    `USED` of the front axle's `grip` (N).
     """
 
     front_axle_to_cg: jax.Array = positive("m")
@@ -71,7 +71,7 @@ class SteeringTorque(AbstractMethod):
 
 
 def steering_torque(car: CarSpecification) -> Guarded:
-    """The chain for a car's file. **Raises** `InputError` for one without a steering ratio."""
+    """Makes the method from a car's file. **Raises** `InputError` for a file without a steering ratio."""
     keys = keys_of(car, "the steering torque", {"steering_ratio": "-"})
     front, _ = axles_of(single_track(car))
     method = SteeringTorque(

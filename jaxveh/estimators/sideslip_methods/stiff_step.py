@@ -1,4 +1,4 @@
-"""A step of stiff equations of a few states that stays stable."""
+"""A stable integration step for stiff equations with a few states."""
 
 from __future__ import annotations
 
@@ -10,22 +10,23 @@ import jax
 import jax.numpy as jnp
 
 GAMMA = 1.0 - 0.5**0.5
-"""Of the method: with it what dies out in the equations dies out in one long step, too."""
+"""Coefficient of the method that makes it L-stable: a fast mode decays within one long step, as it does in the equations."""
 
 
 LONGEST = 0.2
-"""s: of a step. What was before is forgotten by then; over more a slope at its start says nothing of a tyre's curve."""
+"""s: longest step. By then the past is forgotten, and over a longer step the slope at its start does not represent a tyre's
+curve."""
 
 
 class StiffStep(eqx.Module):
-    """A transition by one step of ROS2, a linearly implicit method of second order that is L-stable (J. Verwer, E. Spee,
-    J. Blom & W. Hundsdorfer, SIAM J. Sci. Comput. 20, 1999), inputs held.
+    """A transition by one step of ROS2, a linearly implicit L-stable method of second order (J. Verwer, E. Spee, J. Blom &
+    W. Hundsdorfer, SIAM J. Sci. Comput. 20, 1999), with inputs held.
 
         (I - g h J) k1 = f(x),    (I - g h J) k2 = f(x + h k1) - 2 k1,    x + h (3 k1 + k2) / 2
 
-    The poles of lateral motion go with one over the speed, 80 1/s and more where a car crawls, and logs have rows of 0.1 s and
-    gaps; longer ones than `LONGEST` are cut to it. `derivatives(system, t, x, u)`: a NamedTuple of scalars as x, or of arrays
-    for a batch of states.
+    The poles of lateral motion are proportional to one over the speed, 80 1/s and more at a crawl, and logs have steps of 0.1 s,
+    and gaps. A step longer than `LONGEST` is cut to it. `derivatives(system, t, x, u)` returns a NamedTuple like x, of scalars,
+    or of arrays for a batch of states.
     """
 
     derivatives: Callable = eqx.field(static=True)
@@ -34,7 +35,7 @@ class StiffStep(eqx.Module):
         h, kind, values = jnp.minimum(t1 - t0, LONGEST), type(x), tuple(x)
         n, f = len(values), lambda *at: tuple(self.derivatives(system, t0, kind(*at), u))
         rates, push = jax.linearize(f, *values)
-        # All columns of J at once: a program a column would take as many times as long to compile.
+        # All columns of J at once: one program per column would multiply the compile time.
         along = [jnp.stack([jnp.full_like(v, float(k == i)) for i in range(n)]) for k, v in enumerate(values)]
         slopes = jax.vmap(push)(*along)
         matrix = [[float(i == j) - GAMMA * h * slopes[i][j] for j in range(n)] for i in range(n)]
@@ -45,7 +46,7 @@ class StiffStep(eqx.Module):
 
 
 def solve(matrix: list[list[Any]], right: list[Any]) -> list[Any]:
-    """x of A x = b with entries that are scalars or arrays of a batch, by elimination without pivots."""
+    """The solution x of A x = b by elimination without pivoting; entries are scalars, or arrays of a batch."""
     rows, n = [[*row, b] for row, b in zip(matrix, right, strict=True)], len(right)
     for i in range(n):
         for k in range(i + 1, n):

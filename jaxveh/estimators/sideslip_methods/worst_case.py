@@ -1,4 +1,4 @@
-"""The single track in a filter that looks at the worst case (section 1.4.4)."""
+"""The single track in a filter that bounds the worst case (section 1.4.4)."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from jaxveh.filters import HInfinity
 from jaxveh.io import CarSpecification
 
 SHARE = 0.5
-"""Of the largest bound that there is: halfway between the mean square and what no filter reaches."""
+"""Share of the largest possible bound: halfway between the least mean square and the limit that no filter reaches."""
 
 BOUND = 1e4
-"""Of errors of v_y in m/s: more than `SHARE` allows wherever v_y is less well known than to 0.01 m/s."""
+"""Bound for errors of v_y in m/s: larger than `SHARE` allows wherever the standard deviation of v_y is above 0.01 m/s."""
 
 
 class HInfinityShare(HInfinity):
-    """`filters.HInfinity` whose bound is, in each row, no more than `share` of what is possible there.
+    """`filters.HInfinity` whose bound is, in each row, at most `share` of the largest possible one.
 
-    `P^-1 - bound S` stays positive definite as long as the bound is less than one over the trace of P S, so that a start that is
-    not well known, or a tyre that slides, does not end the filter.
+    `P^-1 - bound S` stays positive definite as long as the bound is less than one over the trace of P S. So the filter does not
+    fail at an uncertain start or with a sliding tyre.
     """
 
     share: jax.Array = eqx.field(
@@ -44,7 +44,8 @@ class HInfinityShare(HInfinity):
 
 
 def h_infinity(car: CarSpecification) -> Guarded:
-    """The worst-case filter for a car's file: the review's [66], and [67] on nonlinear tyres. What it states is no spread."""
+    """Makes the worst-case filter from a car's file: the review's [66], and [67] on nonlinear tyres. Its matrix P is no
+    covariance, so that it gives no standard deviation."""
     model = lateral_model(single_track(car), slowest_of(car))
     filter = HInfinityShare(filters.Extended(), BOUND, {"v_y": 1.0})
     return in_filter(car, model, filter)

@@ -30,7 +30,8 @@ def _brake_forces(car: CarSpecification) -> BrakeForces:
 
 
 def _slip_aware(car: CarSpecification) -> SlipAware:
-    """With the accelerometer's gain of the file's pitch gradient, known to 0.3 % of what is felt, or that of usual cars."""
+    """Makes the filter with the accelerometer's gain from the file's pitch gradient, which is known to 0.3 % of the measured
+    acceleration, or else with the gain of usual cars."""
     if car.pitch_gradient is None:
         return SlipAware(speed_car(car))
     return SlipAware(speed_car(car), Spreads(gain=0.003), GRAVITY * car.pitch_gradient)
@@ -44,42 +45,42 @@ METHODS = {
         lambda car: SlowestWheel(), "the slowest wheel: right unless all of them are driven", "section 2.1, ref 86"
     ),
     "slope_limited": MethodOfCar(
-        lambda car: SlopeLimited(), "the fastest wheel, within the slopes that a car can have", "section 2.1, ref 86"
+        lambda car: SlopeLimited(), "the fastest wheel, limited to the rates that a car can have", "section 2.1, ref 86"
     ),
     "combined": MethodOfCar(
         lambda car: Combined(),
-        "the fastest wheel in braking, the slowest in driving, within slopes",
+        "the fastest wheel in braking, the slowest in driving, with limited rates",
         "section 2.1, ref 86",
     ),
     "adaptive_nonlinear": MethodOfCar(
         lambda car: AdaptiveNonlinear(),
-        "the wheels' peaks under ABS, and the slope between them",
+        "the wheels' peaks under ABS, and the deceleration between them",
         "section 2.1, refs 19, 87",
     ),
     "accelerometer": MethodOfCar(
         lambda car: AccelerometerIntegral(),
-        "integral of a_x, its offset from wheels that roll",
+        "integral of a_x, with its offset from freely rolling wheels",
         "section 2.1, refs 88, 89",
     ),
     "weighted": MethodOfCar(
-        lambda car: Weighted(), "Kalman filter of wheels and a_x with offset and slope", "section 2.1, refs 90 to 92"
+        lambda car: Weighted(), "Kalman filter of wheels and a_x, with offset and slope", "section 2.1, refs 90 to 92"
     ),
     "fuzzy": MethodOfCar(
         lambda car: Fuzzy(), "fuzzy rules between the wheels and the integral of a_x", "section 2.1, ref 93"
     ),
     "brake_force": MethodOfCar(
         _brake_forces,
-        "integral of the forces that brake pressure and half shafts make",
+        "integral of the forces from brake pressure and half-shaft torques",
         "section 2.2, eq 11, refs 2, 94, 95",
     ),
     "motor_force": MethodOfCar(
         lambda car: MotorForces(**keys_of(car, "motor_force", FORCE_KEYS)),
-        "integral of the forces that the wheels' motors make",
+        "integral of the forces from the wheel motors' torques",
         "section 2.3, eq 12, refs 34, 83, 96",
     ),
     "slip_aware": MethodOfCar(
         _slip_aware,
-        "error-state filter that knows slip, radii and slopes, and distrusts wheels one by one",
+        "error-state filter with slip, radii and slopes, which trusts or rejects each wheel separately",
         "sections 2.1 to 2.3; the trust is ours",
     ),
 }
@@ -88,7 +89,7 @@ RECOMMENDED = "slip_aware"
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """The mean of the wheels' speeds (m/s), held where none speaks."""
+    """The mean of the wheels' speeds (m/s), held where no wheel has a measurement."""
     del car
     wheels = [np.asarray(recording[need.channel], float) for need in WHEEL_SPEEDS if need.channel in recording]
     if not wheels:
@@ -105,5 +106,5 @@ def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) ->
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same a row at a time."""
+    """The same, one row at a time."""
     return LiveMethod(method_of(NAME, METHODS, source, method))

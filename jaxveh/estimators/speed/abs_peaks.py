@@ -1,4 +1,4 @@
-"""Speed of a car under its anti-lock system, from the wheels' peaks."""
+"""Speed of a car with active anti-lock system, from the peaks of the wheels' speeds."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from jaxveh.estimators.speed.wheels import AbstractWheelMethod
 
 
 class Peaks(NamedTuple):
-    """Speed (m/s) and slope (m/s^2, positive in braking); whether the wheels come `up`, their `highest` speed since (m/s);
-    the last peak and when it was (s); for how long a wheel has been followed without a break, and for how long not (s)."""
+    """Speed `v_x` (m/s) and `slope` (m/s^2, positive in braking); whether the wheels' speeds rise, `up`, and their `highest`
+    speed since (m/s); the last `peak` (m/s) and its time `peak_at` (s); for how long a wheel has been `followed` without
+    interruption, and for how long not, `alone` (s)."""
 
     v_x: Any
     slope: Any
@@ -26,16 +27,16 @@ class Peaks(NamedTuple):
 
 
 class AdaptiveNonlinear(AbstractWheelMethod):
-    """A filter that follows the fastest wheel up, and falls with a slope of its own where all wheels fall faster.
+    """A filter that follows the fastest wheel, and falls with a slope of its own where all wheels fall faster.
 
     While a wheel has been followed for `slope_time` (s), the slope is that of the wheels: at the start of braking it is the
-    car's. Then it is that from each local peak of the fastest wheel to the next, mixed in by `renewal` (-), by which part the
-    speed, too, goes to the peak: there a wheel rolls best. A peak is where the mean rate, after `turn` (m/s^2) upwards, is `turn`
-    downwards. The slope stays between `least_slope` and `greatest_slope` (m/s^2). Without model and accelerometer; an anti-lock
-    system whose wheels come up seldom, or not wholly, leaves it to its slope, which is what the review says against it: the
-    start counts for much.
+    car's. Later it is that from each local peak of the fastest wheel to the next, mixed in by `renewal` (-). The speed is also
+    drawn to the peak by this share, because a wheel slips least there. A peak is where the mean rate falls below `-turn` after it
+    was above `turn` (m/s^2). The slope is limited to `least_slope` and `greatest_slope` (m/s^2). The filter needs no model and no
+    accelerometer. If the wheels recover seldom or not fully, it depends on its slope only, as the review criticises: the initial
+    slope matters much.
 
-    Known where a wheel was followed within `patience` (s).
+    The speed is known where a wheel was followed within the last `patience` (s).
 
     Chen, Gao, Xu 2013, section 2.1, refs 19 and 87 (whose filters are not printed there; this is our form of it).
     """
@@ -57,12 +58,12 @@ class AdaptiveNonlinear(AbstractWheelMethod):
         del values
         fastest, rate = wheels.fastest, wheels.mean_rate
         fallen = own.v_x - own.slope * step
-        # A wheel that has been followed is believed as long as it falls no faster than a car.
+        # A wheel that has been followed is trusted as long as it decelerates no faster than a car can.
         steepest = jnp.where(own.followed > self.slope_time, self.greatest_slope, own.slope)
         follows = wheels.spoke & (fastest >= own.v_x - steepest * step - self.slack)
         v_x = jnp.where(follows, fastest, jnp.maximum(fallen, 0.0))
         followed = jnp.where(follows, own.followed + step, 0.0)
-        # Wheels that fall faster than any car slip: of the car they say nothing.
+        # Wheels that decelerate faster than any car slip, and give no information on the car.
         learns = (followed > self.slope_time) & (-rate < self.greatest_slope)
         mixed = 1.0 - jnp.exp(-step / self.slope_time)
         slope = jnp.where(learns, own.slope + mixed * (-rate - own.slope), own.slope)

@@ -1,4 +1,4 @@
-"""Speed from the accelerometer, with its offset from the wheels."""
+"""Speed from the accelerometer, whose offset is learned from the wheels."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ A_X = Need("a_x", "m/s^2")
 
 
 class Felt(NamedTuple):
-    """What a channel said last, and when (s)."""
+    """The last measurement of a channel, `value`, and its time `at` (s)."""
 
     value: Any
     at: Any
 
     def hear(self, t: Any, value: Any) -> Felt:
-        """With a row's value, NaN for none."""
+        """The same, updated with a row's value, NaN if there is none."""
         there = ~jnp.isnan(value)
         return Felt(jnp.where(there, value, self.value), jnp.where(there, t, self.at))
 
     def speaks(self, t: Any) -> Any:
-        """Whether it has spoken lately."""
+        """Whether the channel has a recent measurement."""
         return t - self.at <= PATIENCE
 
 
 def never_felt(t: Any) -> Felt:
-    """Before the first row."""
+    """A channel before its first measurement."""
     return Felt(jnp.zeros_like(t), jnp.full_like(t, -jnp.inf))
 
 
 class Integrated(NamedTuple):
-    """Speed (m/s), offset (m/s^2), what is felt, and for how long no wheel has corrected it (s)."""
+    """Speed `v_x` (m/s), `offset` (m/s^2), the last measured acceleration `felt`, and the time since wheels last corrected the
+    speed, `alone` (s)."""
 
     v_x: Any
     offset: Any
@@ -47,13 +48,12 @@ class Integrated(NamedTuple):
 class AccelerometerIntegral(AbstractWheelMethod):
     """The integral of the accelerometer less its offset, from the speed at which the wheels last rolled freely.
 
-    Wheels roll freely where they agree and their mean rate, less what is felt, is below `free_rate` (m/s^2), at an acceleration
-    below `free_acceleration` (m/s^2). Then the speed is their mean's, taken over with the time constant `wheel_time` (s), and
-    the offset learns the difference of what is felt and the wheels' rate with `offset_time` (s): the offset, and the slope of the
-    road with it.
+    Wheels roll freely where they agree, their mean rate is within `free_rate` (m/s^2) of the measured acceleration, and this is
+    below `free_acceleration` (m/s^2). Then the speed follows their mean with the time constant `wheel_time` (s), and the offset,
+    which includes the slope of the road, is learned with `offset_time` (s) from the measured acceleration less the wheels' rate.
 
-    Known for as long as an offset that is wrong by `offset_error` (m/s^2) has made less than `agreement` of the speed and
-    `agreement_speed` together.
+    The speed is known as long as the integral of an offset error of `offset_error` (m/s^2) is below `agreement` (-) of the speed
+    plus `agreement_speed` (m/s).
 
     Chen, Gao, Xu 2013, section 2.1, refs 88 (wheels' acceleration corrects the offset; wheels must roll purely) and 89 (mean
     rates over a time).

@@ -1,4 +1,4 @@
-"""What methods of speed know of a car: numbers of its file, and a typical car's where the file is silent."""
+"""Car parameters of the speed methods: those of the car's file, and typical ones for values that the file lacks."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ TYPICAL = {
     "cg_height": 0.2, "track_front": 0.56, "track_rear": 0.56, "wheel_radius": 0.12, "drag": 3e-4, "rolling_resistance": 0.012,
     "front_drive": 0.5, "front_brake": 0.65,
 }  # fmt: skip
-"""Of a car whose file does not say: heights, tracks and radii over the wheelbase, the drag over the mass (1/m)."""
+"""Defaults for values that a car's file lacks: height, tracks and radius over the wheelbase, the drag over the mass (1/m)."""
 
 
 class SpeedCar(eqx.Module):
-    """Masses (kg), lengths (m), stiffnesses (N/rad, of axles) and shares (-) of a car, as its file has them."""
+    """Mass (kg), lengths (m), cornering stiffnesses of the axles (N/rad) and shares (-) from a car's file."""
 
     mass: jax.Array = positive("kg")
     front_axle_to_cg: jax.Array = positive("m")
@@ -46,7 +46,7 @@ class SpeedCar(eqx.Module):
 
     @property
     def cornering_stiffnesses(self) -> tuple[Any, Any]:
-        """Of the front and the rear axle, N/rad."""
+        """Cornering stiffnesses of the front and the rear axle, N/rad."""
         return self.front_cornering_stiffness, self.rear_cornering_stiffness
 
     @property
@@ -57,7 +57,7 @@ class SpeedCar(eqx.Module):
 
 
 def speed_car(car: CarSpecification) -> SpeedCar:
-    """The numbers of a file; what it leaves out is a typical car's (`TYPICAL`), the steering's ratio 16."""
+    """The parameters of a car's file; missing ones are those of a typical car (`TYPICAL`), with a steering ratio of 16."""
     scale = dict.fromkeys(("cg_height", "track_front", "track_rear", "wheel_radius"), car.wheelbase) | {
         "drag": car.mass
     }
@@ -82,11 +82,11 @@ FORCE_KEYS = {
     "drag": "N s^2/m^2",
     "rolling_resistance": "-",
 }
-"""What turns torques at the wheels into a rate of the speed."""
+"""Keys of the values that convert torques at the wheels to a rate of the speed, and their units."""
 
 
 def keys_of(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, float]:
-    """Numbers of the file by key. **Raises** `InputError` for one that it lacks, naming the key and its unit."""
+    """Values of the car's file by key. **Raises** `InputError` for a missing one, with its key and unit."""
     for name, unit in keys.items():
         if getattr(car, name) is None:
             raise InputError(f"speed, {who}: the car's file has no {name} ({unit}); give it.")
@@ -94,9 +94,10 @@ def keys_of(car: CarSpecification, who: str, keys: dict[str, str]) -> dict[str, 
 
 
 def forces_of_axles(car: SpeedCar, push: Any) -> tuple[Any, Any]:
-    """Longitudinal force of a front and of a rear wheel (N) when all of them push with `push` (N), negative in braking.
+    """Longitudinal force of a front and of a rear wheel (N) for a total force `push` (N), negative in braking.
 
-    Driving is shared out as the drive does, braking as the brakes do; over a hundredth of the car's weight one becomes the other.
+    A driving force is distributed like the drive, a braking force like the brakes; the transition is as wide as a hundredth of
+    the car's weight.
     """
     edge = 0.01 * car.mass * GRAVITY
     drives = jax.nn.sigmoid(4.0 * push / edge)
@@ -107,7 +108,8 @@ def forces_of_axles(car: SpeedCar, push: Any) -> tuple[Any, Any]:
 def slip_stiffness(cornering: Any, load: Any) -> Any:
     """Slip stiffness of a tyre over its load (-) from the cornering stiffness of its axle (N/rad) and its load (N).
 
-    Along its plane a tyre is about as stiff as across, and not as soft as an axle whose steering yields: at least 12, at
-    most 25 loads, where most car tyres lie (H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., sec. 4.3.1 and appendix 3).
+    A tyre's longitudinal stiffness is about its lateral one, and larger than that of an axle with a compliant steering. It is
+    limited to 12 to 25 loads, where most car tyres lie (H. B. Pacejka, Tire and Vehicle Dynamics, 3rd ed., sec. 4.3.1 and
+    appendix 3).
     """
     return jnp.clip(0.5 * cornering / load, 12.0, 25.0)

@@ -1,4 +1,4 @@
-"""Speed from what brakes and motors do to the wheels: their dynamics give the tyres' forces, these the speed's rate."""
+"""Speed from brake and motor torques: the wheels' dynamics give the tyre forces, and these the rate of the speed."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from jaxveh.vehicles import GRAVITY
 
 
 class Pushed(NamedTuple):
-    """Speed (m/s), what is not in the wheels' dynamics, as a rate (m/s^2): the road's slope above all; the torques as they were
-    said last, and for how long no wheel has corrected (s)."""
+    """Speed `v_x` (m/s); the acceleration that is not in the wheels' dynamics, mainly the road's slope, `rest` (m/s^2); the last
+    measured torques, `heard`; and the time since wheels last corrected the speed, `alone` (s)."""
 
     v_x: Any
     rest: Any
@@ -28,10 +28,11 @@ class Pushed(NamedTuple):
 class AbstractForces(AbstractWheelMethod):
     """`mass dv_x/dt = sum of the wheels' F_x - drag v_x |v_x|`, corrected by wheels that roll freely.
 
-    Where they agree and their mean rate is within `free_rate` (m/s^2) of that of the forces, at a rate below `free_acceleration`
-    (m/s^2), the speed takes over their mean with `wheel_time` (s), and what no torque explains (grade, rolling
-    resistance of the road, a wrong mass) is learned with `rest_time` (s). Known for as long as a rate that is wrong by
-    `rate_error` (m/s^2) has made less than `agreement` of the speed and `agreement_speed` together.
+    Wheels roll freely where they agree and their mean rate is within `free_rate` (m/s^2) of that of the forces and below
+    `free_acceleration` (m/s^2). Then the speed follows their mean with the time constant `wheel_time` (s), and the acceleration
+    that no torque explains (grade, rolling resistance of the road, a wrong mass) is learned with `rest_time` (s). The speed is
+    known as long as the integral of an error of `rate_error` (m/s^2) is below `agreement` (-) of the speed plus
+    `agreement_speed` (m/s).
     """
 
     mass: jax.Array = positive("kg", default=1500.0)
@@ -52,18 +53,18 @@ class AbstractForces(AbstractWheelMethod):
 
     @abc.abstractmethod
     def force(self, wheels: Wheels, heard: dict[str, Any]) -> Any:
-        """Sum of the tyres' longitudinal forces, N, positive forwards, of what was heard last (0 where nothing was)."""
+        """Sum of the tyres' longitudinal forces, N, positive forwards, from the last measurements (0 if there is none)."""
 
     @property
     def needs(self):
         return (*WHEEL_SPEEDS, *self.torques)
 
     def spin_up(self, wheels: Wheels) -> Any:
-        """The force that goes into the wheels' rotation, N."""
+        """The force that accelerates the wheels' rotation, N."""
         return self.wheel_inertia / jnp.square(self.wheel_radius) * 4.0 * wheels.mean_rate
 
     def rolls(self, wheels: Wheels) -> Any:
-        """Rolling resistance of all wheels, N, against the travel; fades out at standstill."""
+        """Rolling resistance of all wheels, N, against the direction of travel; it fades out at standstill."""
         return self.rolling_resistance * self.mass * GRAVITY * jnp.tanh(wheels.mean)
 
     def begin(self, wheels, values):
@@ -97,8 +98,8 @@ class BrakeForces(AbstractForces):
         F_x = c_p p / R - M / R + J / R^2 dv_wheel/dt
 
     which as printed is positive in **braking** (an erratum of the review's list: its text calls F_x the force of drive and
-    brake). `brake_torque_per_pressure` is c_p of all brakes together, N m/Pa; M the channel
-    `drive_torque`, 0 where there is none.
+    brake). `brake_torque_per_pressure` (N m/Pa) is c_p of all brakes together; M is the channel `drive_torque`, 0 where it is not
+    available.
 
     Chen, Gao, Xu 2013, section 2.2, refs 2, 94, 95.
     """

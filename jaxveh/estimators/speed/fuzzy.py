@@ -1,4 +1,4 @@
-"""Speed by fuzzy rules: when to believe the wheels' mean, the fastest, the slowest, or the accelerometer alone."""
+"""Speed by fuzzy rules, which choose between the wheels' mean, the fastest, the slowest, and the accelerometer alone."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ LATERAL = (Need("a_y", "m/s^2", optional=True), Need("yaw_rate", "rad/s", option
 
 
 class Situations(NamedTuple):
-    """How true each is (-), between 0 and 1: wheels roll `stable`; all `brake` or all `drive` with slip; the car swerves,
-    `swerve`."""
+    """The truth of each situation (-), between 0 and 1: the wheels roll without slip, `stable`; they slip in braking, `brake`, or
+    in driving, `drive`; the car slips sideways, `swerve`."""
 
     stable: Any
     brake: Any
@@ -27,7 +27,8 @@ class Situations(NamedTuple):
 
 
 class FuzzyMemory(NamedTuple):
-    """Speed (m/s), offset (m/s^2), what is felt along and across (m/s^2) and turned (rad/s); for how long unstable (s)."""
+    """Speed `v_x` (m/s), `offset` of the accelerometer (m/s^2), last longitudinal and lateral acceleration, `along` and `across`
+    (m/s^2), last yaw rate, `turns` (rad/s), and the time since the car was last stable, `alone` (s)."""
 
     v_x: Any
     offset: Any
@@ -40,22 +41,22 @@ class FuzzyMemory(NamedTuple):
 class Fuzzy(AbstractWheelMethod):
     """Rules on four situations decide between the integral of the accelerometer and the wheels.
 
-    The memberships of large are linear between two bounds each: of the wheels' disagreement over their mean (`spread_low`,
-    `spread_high`), of the difference of the wheels' mean rate and the acceleration (`rate_low`, `rate_high`, m/s^2), and of the
-    lateral slip's rate `a_y - v_x yaw_rate` (`swerve_low`, `swerve_high`, m/s^2; small where the log has neither). Rules, with
-    the product as their "and":
+    The membership "large" is linear between two bounds each: for the wheels' disagreement over their mean (`spread_low`,
+    `spread_high`, -), for the difference of the wheels' mean rate and the acceleration (`rate_low`, `rate_high`, m/s^2), and for
+    the rate of lateral slip `a_y - v_x yaw_rate` (`swerve_low`, `swerve_high`, m/s^2; 0 if one of the two channels is missing).
+    The rules, with the product as "and":
 
         swerve:  lateral slip large                                              -> integrate
-        brake:   not so, wheels' spread or rate difference large, a_x < 0        -> integrate, no slower than the fastest wheel
-        drive:   not so, wheels' spread or rate difference large, a_x > 0        -> integrate, no faster than the slowest wheel
-        stable:  none of these                                                  -> the wheels' mean
+        brake:   not swerve, disagreement or rate difference large, a_x < 0      -> integrate, no slower than the fastest wheel
+        drive:   not swerve, disagreement or rate difference large, a_x > 0      -> integrate, no faster than the slowest wheel
+        stable:  none of these                                                   -> the wheels' mean
 
-    The consequents are weighed by how true they are (Sugeno's form). The wheels' mean comes in with `wheel_time` (s); the offset
-    of the accelerometer learns with `offset_time` (s), as far as stable is true. Known where stable has been half true within
-    `patience` (s).
+    The consequents are weighted by the truth of their rules (Sugeno's form). The speed follows the wheels' mean with `wheel_time`
+    (s). The offset of the accelerometer is learned with `offset_time` (s), in proportion to the truth of stable. The speed is
+    known if that truth was above one half within the last `patience` (s).
 
-    Chen, Gao, Xu 2013, section 2.1, ref 93, which names the signals and four situations; bounds and rules are ours, to be fitted
-    to a car's drives as the review says they have to be.
+    Chen, Gao, Xu 2013, section 2.1, ref 93, which names the signals and four situations; bounds and rules are ours, and have to
+    be fitted to a car's drives, as the review says.
     """
 
     spread_low: jax.Array = positive("-", default=0.01)
@@ -78,7 +79,7 @@ class Fuzzy(AbstractWheelMethod):
         return FuzzyMemory(wheels.mean, zero, none, none, none, jnp.where(wheels.spoke, 0.0, jnp.inf))
 
     def situations(self, own: FuzzyMemory, wheels: Wheels, rate: Any) -> Situations:
-        """How true each situation is; `rate`: the acceleration that is felt, less its offset (m/s^2)."""
+        """The truth of each situation; `rate`: the measured acceleration less its offset (m/s^2)."""
         t = wheels.t
         both = own.across.speaks(t) & own.turns.speaks(t)
         aside = jnp.where(both, own.across.value - own.v_x * own.turns.value, 0.0)

@@ -1,4 +1,4 @@
-"""The recommended speed: an error-state filter that knows slip, radii and slopes, and distrusts wheels one by one."""
+"""The recommended speed method: an error-state filter with slip, radii and slopes, which trusts each wheel separately."""
 
 from __future__ import annotations
 
@@ -40,30 +40,31 @@ from jaxveh.vehicles import GRAVITY
 
 
 class SlipAware(AbstractMethod):
-    """An error-state filter of what wheels say, force, slope, the accelerometer's offset and gain, radii and slip softness.
+    """An error-state filter of rolling speed, force, slope, the accelerometer's offset and gain, radii and slip softness.
 
         dv_x/dt = force + v_y yaw_rate - slope,        a_x = (1 + gain) force + offset
-        wheel   = (1 + radius) (1 + sink) (1 + slip) (the speed of the wheel's own place along its plane)
-        slip    = exp(softness) F / (K F_z) - f_r / K,      F from the torques where the log has them, else from `force`
+        wheel   = (1 + radius) (1 + sink) (1 + slip) (speed at the wheel's position, along the wheel's plane)
+        slip    = exp(softness) F / (K F_z) - f_r / K,      F from the torques if the log has them, else from `force`
 
-    `gain` is there because an accelerometer on the body pitches with it: g times the file's `pitch_gradient`, or that of usual
-    cars. Loads move with the forces, and with them the radius on which a tyre rolls (a third of its `compression`, over the
-    radius). Lateral speeds are those of a steady turn on the file's cornering stiffnesses.
+    `gain` models that an accelerometer on the body pitches with it: g times the file's `pitch_gradient`, or that of usual cars.
+    Load transfer also changes the rolling radius (a third of the tyre's `compression`, over the radius). Lateral velocities are
+    those of a steady turn with the file's cornering stiffnesses.
 
-    **Trust**: a wheel counts by `(gate / |e|)^8` where its normalised innovation e is beyond `gate`, and likewise where its own
-    acceleration is further than `rate_gate` (m/s^2) from the car's (four times that without an accelerometer); trust is lost
-    at once and comes back within `memory` (s). Where wheels agree and have little force (`calm`, over load), the belief is
-    wrong rather than they: the gate is five times as wide. A wheel that slips is left out, all four if need be: then the
-    accelerometer carries on, with an offset, gain and slope that the drive before has told. While most wheels are at their limit
-    and the force is beyond `bound_force` (m/s^2), two wheels that are faster than a braking car, or slower than a driven
-    one, bound its speed. Wheels that agree with the accelerometer's rate for `patience` (s) and are still not trusted widen the
-    belief until they are.
+    **Trust**: a wheel is weighted by `(gate / |e|)^8` where its normalised innovation e is beyond `gate`, and likewise where its
+    acceleration differs from the car's by more than `rate_gate` (m/s^2; four times that without an accelerometer). Trust is lost
+    at once and returns within `memory` (s). Where wheels agree and have small forces (`calm`, -, over load), the belief is more
+    likely wrong than the wheels, and the gate is five times as wide. A slipping wheel is left out, all four if necessary: then
+    the filter integrates the accelerometer with the offset, gain and slope estimated before. While most wheels are at their limit
+    and the force is beyond `bound_force` (m/s^2), two wheels that are faster than a braking car, or slower than a driven one,
+    bound its speed. If wheels agree with the accelerometer's rate for `patience` (s) and are still not trusted, the speed's
+    process noise is increased until they are.
 
-    **Delays** (s, of the production car): `a_x_delay` of accelerometer and its low-pass, `wheel_delay` of wheel speeds, half a
-    period included, `satellite_delay`. What is said is of now: the belief, moved on by its acceleration.
+    **Delays** (s, of the production car): `a_x_delay` of the accelerometer and its low-pass filter, `wheel_delay` of wheel
+    speeds, half a period included, `satellite_delay`. The answer is for the present time: the belief, extrapolated by its
+    acceleration.
 
-    `speed` is known where its standard deviation is below `known_share` of itself and `known_speed` (m/s) together.
-    Reported: `v_x`; `grade` (rad), positive uphill, and `a_x_offset` (m/s^2), which are told apart by how fast they change only.
+    `v_x` is known where its standard deviation is below `known_share` (-) of it plus `known_speed` (m/s). Reported: `v_x` (m/s);
+    `grade` (rad), positive uphill, and `a_x_offset` (m/s^2), which are only distinguished by how fast they change.
 
     Chen, Gao, Xu 2013, section 2.1, refs 88 to 92, and sections 2.2, 2.3 for the forces; the trust is our choice.
     """
@@ -126,12 +127,12 @@ class SlipAware(AbstractMethod):
         memory = memory._replace(belief=belief, t=t)
         return memory, self._answer(memory)
 
-    # What was heard last.
+    # The last measurements.
 
     def _hear(self, memory: Memory, t, values):
         steer = values["steer"] - self.car.steer_offset
         wheel = values["steering_wheel"]
-        # A NaN that is divided has a slope that is one, where it is not used, too.
+        # Without this replacement the derivative of the division would be NaN even where its result is not used.
         turned = jnp.where(jnp.isnan(wheel), 0.0, wheel) / self.car.steering_ratio
         turned = jnp.where(jnp.isnan(wheel), jnp.nan, turned)
         now = dict(values) | {"steer": jnp.where(jnp.isnan(steer), turned, steer)}
@@ -161,13 +162,13 @@ class SlipAware(AbstractMethod):
 
     def _move(self, memory: Memory, step) -> Belief:
         s = self.spreads
-        # Without an accelerometer no slope can be told from a force.
+        # Without an accelerometer slope and force cannot be distinguished.
         felt = self._speaks(memory, "a_x")
         falls, back = jnp.where(felt, jnp.exp(-step / s.slope_time), 0.0), jnp.exp(-step / s.softness_time)
 
         def move(mean):
             x = SpeedState(*mean)
-            # Of wheels with a radius that is not the stored one the rate is a little larger; the accelerometer's gain has that.
+            # With a wrong radius the wheels' rate is slightly different, too; the accelerometer's gain contains that.
             rolled = x.rolled + step * self._acceleration(memory, x)
             soft = [back * x.softness_front, back * x.softness_rear]
             return jnp.stack([rolled, x.force, falls * x.slope, *x[3:10], *soft])
@@ -177,7 +178,7 @@ class SlipAware(AbstractMethod):
         soft = s.softness * numerics.sqrt(2.0 / s.softness_time)
         none = 0.0 * s.gain
         slope_walk = jnp.where(felt, s.slope_walk, 0.0)
-        # Of a wheel's own radius: below.
+        # The walk of each wheel's own radius is added below.
         walks = [wander, s.force_walk, slope_walk, s.offset_walk, none, 0.5 * s.radius_walk, *[none] * 4, soft, soft]
         noise = jnp.diag(jnp.square(jnp.stack(walks))) + own_radii(s.radius_walk)
         return predict(memory.belief, move, step * noise)
@@ -186,7 +187,7 @@ class SlipAware(AbstractMethod):
         now = self._acceleration(memory, SpeedState(*belief.mean))
         return memory.rate + (1.0 - jnp.exp(-step / self.smoothing)) * (now - memory.rate)
 
-    # What is measured.
+    # The measurements.
 
     def _felt(self, mean):
         x = SpeedState(*mean)
@@ -205,12 +206,12 @@ class SlipAware(AbstractMethod):
         return update(belief, found, self._gate(found, self.gate))
 
     def _gate(self, found, most):
-        """1 within `most` standard deviations, and less with the eighth power of how far beyond."""
+        """The weight of an innovation: 1 within `most` standard deviations, beyond them falling with the eighth power."""
         far = numerics.sqrt(jnp.square(found.residual) / found.variance)
         return beyond(far / most)
 
     def _wheels(self, memory: Memory, mean) -> Said:
-        """What the wheels would say of a mean (n,)."""
+        """The predicted wheels for a mean (n,)."""
         x, car = SpeedState(*mean), self.car
         v_x = x.rolled - (self.wheel_delay - self.a_x_delay) * self._acceleration(memory, x)
         yaw_rate, a_y, _ = self._lateral(memory, x)
@@ -261,7 +262,7 @@ class SlipAware(AbstractMethod):
         suspicion = memory.suspicion * jnp.exp(-step / self.spreads.suspicion_time)
         most = jnp.sort(suspicion)[1]
         limit = jnp.maximum(suspicion, most)
-        # A wheel at its limit slips the way its force goes.
+        # A wheel at its limit slips in the direction of its force.
         at_limit = self.spreads.limit_slip * limit * belief.mean[0]
         at_limit = at_limit * said.share / (jnp.abs(said.share) + 0.02)
 
@@ -271,14 +272,14 @@ class SlipAware(AbstractMethod):
 
         white, slow = self._wheel_variances(memory, belief, said)
         slow = slow + jnp.square(at_limit)
-        # Where one wheel drags or spins, others have a force that nobody knows.
+        # Where one wheel locks or spins, the forces of the others are unknown.
         slow = slow + jnp.square(self.spreads.other_slip * jnp.max(suspicion) * belief.mean[0])
         both = innovations(belief, expect, jnp.tile(wheels, 2), jnp.concatenate([white + slow, white + 0.0 * slow]))
         found, rolling = (Innovation(*[part[rows] for part in both]) for rows in (slice(0, 4), slice(4, 8)))
         now = self._gates(found, said, white + slow, there) * steady
         trusted = jnp.minimum(memory.trust + step / self.memory * (1.0 - memory.trust), 1.0)
         trust = jnp.where(there, jnp.minimum(now, trusted), trusted)
-        # What stays for a while is not made smaller by being said often.
+        # Errors that last for a while are not reduced by repeated measurements.
         lasts = found.variance / (found.variance + self.spreads.repeats * slow)
         before = belief.mean
         belief = update_by_each(belief, found, jnp.where(there, trust * lasts, 0.0))
@@ -295,9 +296,9 @@ class SlipAware(AbstractMethod):
         )
 
     def _gates(self, found, said: Said, variance, there):
-        """How far each wheel's innovation lets it be trusted, (4,).
+        """The trust of each wheel by its innovation, (4,).
 
-        Where forces are small and the wheels agree, the belief is wrong rather than all the wheels: the gate is wide then.
+        Where forces are small and the wheels agree, the belief is more likely wrong than all wheels, and the gate is wide.
         """
         apart = found.residual[:, None] - found.residual[None, :]
         alike = jnp.exp(-jnp.square(apart) / (9.0 * (variance[:, None] + variance[None, :])))
@@ -316,10 +317,10 @@ class SlipAware(AbstractMethod):
         return white, sum(jnp.square(one) for one in parts)
 
     def _bound(self, belief: Belief, rolling: Innovation, there, white, most) -> Belief:
-        """A braked wheel is not faster than the car, a driven one not slower: two wheels that are say where the speed ends.
+        """The update by two wheels that bound the speed: no braked wheel is faster than the car, no driven one slower.
 
-        Only where most wheels are at their limit (`most`), as noise would move the speed by what one side is believed. One
-        wheel alone may be driven in a car that brakes, by the engine or a lifted wheel's differential.
+        Used only where most wheels are at their limit (`most`), because a one-sided bound turns noise into a bias. A single
+        wheel may be driven in a car that brakes, by the engine or a lifted wheel's differential.
         """
         force = belief.mean[1]
         over = jnp.where(there, jnp.where(force < 0.0, 1.0, -1.0) * rolling.residual, -jnp.inf)

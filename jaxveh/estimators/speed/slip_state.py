@@ -1,4 +1,4 @@
-"""What the recommended filter of speed remembers, and how sure it is of what."""
+"""The state of the recommended speed filter, its memory and its standard deviations."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from jaxveh.estimators.sequential import Belief
 from jaxveh.estimators.speed.wheels import AT
 
 LEFT = np.array([1, -1, 1, -1])
-"""1 of wheels on the left, -1 of those on the right; front left first."""
+"""1 for wheels on the left, -1 for those on the right; front left first."""
 
 FRONT = np.array([True, True, False, False])
-"""Which of them are in front."""
+"""Which wheels are in front."""
 
 RADII = slice(6, 10)
-"""Where the radii are in the state."""
+"""Indices of the wheels' own radii in the state."""
 
 HELD = ("a_x", "a_y", "yaw_rate", "steer", "drive_torque", *(f"brake_torque_{at}" for at in AT))
-"""What is held between two of its samples."""
+"""Channels that are held between two samples."""
 
 MAY_HELP = tuple(
     Need(name, unit, optional=True)
@@ -33,20 +33,20 @@ MAY_HELP = tuple(
         ("drive_torque", "N m"), *[(f"brake_torque_{at}", "N m") for at in AT], *[(f"torque_{at}", "N m") for at in AT],
     )
 )  # fmt: skip
-"""Channels that are read where a log has them."""
+"""Channels that are used if a log has them."""
 
 PATIENCE = 0.3
-"""s: for so long a sample is held, then the channel is silent."""
+"""s: time for which a sample is held; then the channel counts as missing."""
 
 
 class SpeedState(NamedTuple):
-    """`rolled`: what wheels without slip say on the mean, `(1 + radius) v_x` (m/s); `force`: what tyres and air push, over the
-    mass (m/s^2); `slope`: gravity along the road (m/s^2, uphill positive); `offset` (m/s^2) and `gain` (-) of the accelerometer;
-    `radius`: by how much the radii make all wheels' speeds too large (-), and each wheel's beyond that; how much softer than the
-    file says the tyres of an axle slip (-, on the logarithm).
+    """`rolled`: mean speed of wheels without slip, `(1 + radius) v_x` (m/s); `force`: force of tyres and air over the mass
+    (m/s^2); `slope`: gravity along the road (m/s^2, uphill positive); `offset` (m/s^2) and `gain` (-) of the accelerometer;
+    `radius` (-): common relative error of all wheels' speeds by their radii, `radius_fl` to `radius_rr` (-): that of each wheel
+    beyond it; `softness_front`, `softness_rear` (-): logarithm of the slip of an axle's tyres over that of the file.
 
-    With the wheels' speed as a state, not the car's, no wheel can tell what the wheels have in common. (A filter of v_x, linear
-    about a speed that moves, would soon think that it knows.)"""
+    The wheels' speed is a state instead of the car's, so that no wheel makes the common radius error observable. (A filter of
+    v_x, linearised about a changing speed, would soon consider it known.)"""
 
     rolled: Any
     force: Any
@@ -68,17 +68,18 @@ class SpeedState(NamedTuple):
 
 
 class Spreads(eqx.Module):
-    """Standard deviations that the filter begins with, of its random walks, and of what is measured.
+    """Standard deviations of the prior, of the random walks, and of the measurements.
 
-    `slope_walk` and so on are per root second; a slope falls back to level with `slope_time` (s), a softness to the file's with
-    `softness_time` (s), in which it forgets as much as it spreads. `radius` is of each wheel's own, and of what all have in
-    common half of it. `wheel` (m/s) is what edges of teeth leave, `wheel_share` (-) goes with the speed.
+    `slope_walk` and the other walks are per root second. The slope decays to zero with `slope_time` (s), a softness to the file's
+    with `softness_time` (s), with a random walk that keeps its standard deviation. `radius` (-) is that of each wheel's own
+    radius error; the common one has half of it. `wheel` (m/s) is the quantisation of the sensor's teeth, `wheel_share` (-) is
+    proportional to the speed.
 
-    What follows lasts, so that `repeats` samples of it count as one: `slip_share` (-) of the slip that is expected; `peak_slip`
-    (-), the slip that nobody knows at a force of the whole load, less with its fourth power; `limit_slip` (-) of a wheel that has
-    been at its limit lately (it forgets with `suspicion_time`, s), which is expected to slip by as much more; `other_slip` (-)
-    of all wheels where one is at its limit, and the others' forces are not those of the shares; `turn` (m/s per rad/s) of
-    the wheels' places.
+    The following errors are correlated in time, so that `repeats` (-) samples count as one: `slip_share` (-), a share of the
+    expected slip; `peak_slip` (-), unknown slip at a force equal to the load, which falls with the fourth power of the force;
+    `limit_slip` (-), additional slip, expected and uncertain, of a wheel that was recently at its limit (it decays with
+    `suspicion_time`, s); `other_slip` (-), slip of all wheels while one is at its limit, because the forces are then distributed
+    otherwise; `turn` (m/s per rad/s), error of the wheels' positions.
     """
 
     slope: jax.Array = positive("m/s^2", default=0.3)
@@ -107,8 +108,9 @@ class Spreads(eqx.Module):
 
 
 class Memory(NamedTuple):
-    """The belief and its time; what was heard last and when, by channel; each wheel's low-passed speed, when that was heard, its
-    trust, and the suspicion that it is at its limit; the car's low-passed acceleration; since when no wheel was trusted."""
+    """The belief and its time `t` (s); the last measurements by channel, `heard`, and their times `at` (s); for each wheel the
+    low-passed speed `smooth` (m/s), its time `smooth_at` (s), its `trust` (-), and the `suspicion` (-) that it is at its limit;
+    the car's low-passed acceleration `rate` (m/s^2); the time `lost` (s) since which no wheel was trusted."""
 
     belief: Belief
     t: Any
@@ -123,8 +125,8 @@ class Memory(NamedTuple):
 
 
 class Said(NamedTuple):
-    """What the wheels are expected to say, `speed`, and without slip, `rolling` (m/s); the `slip` in it and the force over load,
-    `share` (-), (4,) each."""
+    """The wheels' predicted `speed` (m/s), and that without slip, `rolling` (m/s); their `slip` (-) and force over load, `share`
+    (-), (4,) each."""
 
     speed: Any
     rolling: Any
@@ -133,17 +135,18 @@ class Said(NamedTuple):
 
 
 def front_rear(front: Any, rear: Any) -> Any:
-    """What the wheels of an axle have in common, (4,)."""
+    """The front value for the front wheels and the rear value for the rear wheels, (4,)."""
     return jnp.where(FRONT, front, rear)
 
 
 def beyond(far: Any) -> Any:
-    """1 where |far| <= 1, else its inverse to the eighth power; safe for what is huge."""
+    """1 where |far| <= 1, otherwise |far| to the power of -8; safe for very large values."""
     size = jnp.clip(jnp.abs(far), 1.0, 1e3)
     return 1.0 / jnp.square(jnp.square(jnp.square(size)))
 
 
 def own_radii(std: Any) -> Any:
-    """The covariance of a state whose four radii have equal spreads `std`, less their mean, and nothing else one."""
+    """The covariance (12, 12) of a state in which only the four wheels' own radii are uncertain, with equal standard deviations
+    `std` less that of their mean."""
     free = jnp.eye(4, dtype=std.dtype) - 0.25
     return jnp.zeros((12, 12), std.dtype).at[RADII, RADII].set(free * jnp.square(std))

@@ -1,4 +1,4 @@
-"""Wheels and accelerometer weighed by a Kalman filter, with the accelerometer's offset and the road's slope as states."""
+"""A Kalman filter of wheels and accelerometer, with the accelerometer's offset and the road's slope as states."""
 
 from __future__ import annotations
 
@@ -17,25 +17,24 @@ from jaxveh.vehicles import GRAVITY
 
 
 class Weighed(NamedTuple):
-    """The belief of [v_x (m/s), offset, slope (m/s^2)], and what is felt."""
+    """The belief of [v_x (m/s), offset, slope (m/s^2)], and the last measured acceleration, `felt`."""
 
     belief: Belief
     felt: Felt
 
 
 class Weighted(AbstractWheelMethod):
-    """A Kalman filter of [v_x, offset, slope], driven by the accelerometer, measuring the wheels' mean.
+    """A Kalman filter of [v_x, offset, slope], driven by the accelerometer, with the wheels' mean as measurement.
 
         dv_x/dt = a_x - offset - slope,    doffset/dt = noise,    dslope/dt = -slope / slope_time + noise
 
-    The wheels count the less, the more the car accelerates and the further they are apart, as the driving state says which
-    signal to believe: the standard deviation of their mean is `wheel` (m/s), `share` (-) of it, `by_acceleration` (s) times
-    |a_x| and `by_spread` (-) times the difference of fastest and slowest, together. Where no accelerometer speaks, the speed
-    wanders with `unfelt_walk`.
+    The wheels count less when the car accelerates and when they disagree. The variance of their mean is the sum of squares of
+    `wheel` (m/s), `share` (-) of the mean, `by_acceleration` (s) times |a_x|, and `by_spread` (-) times the difference of fastest
+    and slowest. Without an accelerometer measurement the speed is a random walk with `unfelt_walk` (m/s/sqrt(s)).
 
-    Known where its standard deviation is below `agreement` of the speed and `agreement_speed` together. The slope and the offset
-    are told apart by how fast they change only. The band holds `radius` (-) of the speed beside, what the radii of all wheels
-    together are wrong; it knows nothing of wheels that slip alike, and is too narrow then.
+    The speed is known where its standard deviation is below `agreement` (-) of the speed plus `agreement_speed` (m/s). Slope and
+    offset are only distinguished by how fast they change. The reported standard deviation also includes `radius` (-) of the
+    speed, the common error of all wheels' radii. It does not include slip that all wheels share, and is too small then.
 
     Chen, Gao, Xu 2013, section 2.1, refs 90 to 92.
     """

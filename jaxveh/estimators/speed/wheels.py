@@ -1,4 +1,4 @@
-"""Speed from the wheels alone: the fastest, the slowest, and either within the slopes that a car can have."""
+"""Speed from the wheels alone: the fastest, the slowest, and either one limited to the rates that a car can have."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ AT = ("fl", "fr", "rl", "rr")
 WHEEL_SPEEDS = tuple(Need(f"wheel_speed_{at}", "m/s") for at in AT)
 
 PATIENCE = 0.1
-"""s: for so long a sample stands for the samples that follow it."""
+"""s: time for which a sample is held."""
 
 
 class Wheels(NamedTuple):
-    """What the wheels said last: `speed` (m/s) and when, `at` (s), (4,) each; their low-passed speeds `smooth` and the rates of
-    those (m/s^2); `t`: of the row; `new`: whether any wheel has spoken in it."""
+    """The last measurements of the wheels: `speed` (m/s) and their times `at` (s), (4,) each; the low-passed speeds `smooth`
+    (m/s) and their `rate` (m/s^2); the row's time `t` (s); `new`: whether the row has a measurement of any wheel."""
 
     speed: Any
     at: Any
@@ -34,36 +34,36 @@ class Wheels(NamedTuple):
 
     @property
     def fresh(self) -> jax.Array:
-        """Which wheels have spoken lately, (4,) booleans."""
+        """Which wheels have a recent measurement, (4,) booleans."""
         return self.t - self.at <= PATIENCE
 
     @property
     def spoke(self) -> jax.Array:
-        """Whether one has."""
+        """Whether any wheel has a recent measurement."""
         return jnp.any(self.fresh)
 
     @property
     def fastest(self) -> jax.Array:
-        """Speed of the fastest wheel, m/s; 0 where none has spoken."""
+        """Speed of the fastest wheel, m/s; 0 where no wheel has a recent measurement."""
         return jnp.where(self.spoke, jnp.max(jnp.where(self.fresh, self.speed, -jnp.inf)), 0.0)
 
     @property
     def slowest(self) -> jax.Array:
-        """Speed of the slowest, m/s; 0 where none has spoken."""
+        """Speed of the slowest wheel, m/s; 0 where no wheel has a recent measurement."""
         return jnp.where(self.spoke, jnp.min(jnp.where(self.fresh, self.speed, jnp.inf)), 0.0)
 
     @property
     def mean(self) -> jax.Array:
-        """Their mean speed, m/s."""
+        """Mean speed of the wheels, m/s."""
         return self._mean(self.speed)
 
     @property
     def mean_rate(self) -> jax.Array:
-        """The mean of their rates, m/s^2."""
+        """Mean rate of the wheels' speeds, m/s^2."""
         return self._mean(self.rate)
 
     def agree(self, share: Any, speed: Any) -> jax.Array:
-        """Whether the fastest and the slowest differ by less than a `share` of their mean and a `speed` (m/s) together."""
+        """Whether the fastest and the slowest differ by less than `share` (-) of their mean plus `speed` (m/s)."""
         return self.spoke & (self.fastest - self.slowest < share * jnp.abs(self.mean) + speed)
 
     def _mean(self, values):
@@ -72,12 +72,12 @@ class Wheels(NamedTuple):
 
 
 def wheel_values(values: dict[str, Any]) -> jax.Array:
-    """The wheels' speeds in a row, (4,), NaN where one does not speak."""
+    """The wheels' speeds in a row, (4,), NaN where one is not measured."""
     return jnp.stack([values[need.channel] for need in WHEEL_SPEEDS])
 
 
 def first_wheels(t: Any, values: dict[str, Any]) -> Wheels:
-    """After the first row."""
+    """The wheels after the first row."""
     speeds = wheel_values(values)
     there = ~jnp.isnan(speeds)
     said = jnp.where(there, speeds, 0.0)
@@ -85,8 +85,8 @@ def first_wheels(t: Any, values: dict[str, Any]) -> Wheels:
 
 
 def next_wheels(before: Wheels, t: Any, values: dict[str, Any], smoothing: Any) -> Wheels:
-    """After the next row; rates are those of a first-order low-pass of time constant `smoothing` (s), which begins anew at a
-    wheel that was silent."""
+    """The wheels after the next row; rates are those of a first-order low-pass filter with the time constant `smoothing` (s),
+    which is reset for a wheel after a gap."""
     speeds = wheel_values(values)
     there, late = ~jnp.isnan(speeds), t - before.at > PATIENCE
     said = jnp.where(there, speeds, before.speed)
@@ -99,10 +99,10 @@ def next_wheels(before: Wheels, t: Any, values: dict[str, Any], smoothing: Any) 
 
 
 class AbstractWheelMethod(AbstractMethod):
-    """A method that first of all hears the wheels. Its memory is theirs and its own, its answer is made of both.
+    """A method that first processes the wheels' speeds. Its memory is that of the wheels and its own.
 
-    `smoothing` (s): of the wheels' rates. Wheels agree where the fastest and the slowest differ by less than `agreement` (-) of
-    their mean and `agreement_speed` (m/s) together.
+    `smoothing` (s): time constant of the wheels' rates. Wheels agree where the fastest and the slowest differ by less than
+    `agreement` (-) of their mean plus `agreement_speed` (m/s).
     """
 
     smoothing: jax.Array = positive("s", default=0.1)
@@ -118,11 +118,11 @@ class AbstractWheelMethod(AbstractMethod):
 
     @abc.abstractmethod
     def begin(self, wheels: Wheels, values: dict[str, Any]) -> Any:
-        """Its own memory before the first answer."""
+        """The method's own memory before the first answer."""
 
     @abc.abstractmethod
     def follow(self, own: Any, wheels: Wheels, step: Any, values: dict[str, Any]) -> tuple[Any, Any, Any]:
-        """Its own memory after a row that came `step` s after the last, the speed (m/s), and whether that is known."""
+        """The method's own memory after a row, `step` (s) after the last one, the speed (m/s), and whether it is known."""
 
     def agree(self, wheels: Wheels) -> jax.Array:
         """Whether the wheels agree."""
@@ -143,10 +143,10 @@ class AbstractWheelMethod(AbstractMethod):
 
 
 class AbstractOneWheel(AbstractWheelMethod):
-    """One of the four wheels, chosen row by row; what the last rows said is held where no wheel speaks.
+    """The speed of one of the four wheels, chosen in each row; the last speed is held where no wheel has a measurement.
 
-    Known where the wheels agree and their speed changes no faster than a road lets a car, between `-most_deceleration` and
-    `most_acceleration` (m/s^2): wheels that slip alike do not look different.
+    It is known where the wheels agree and their rate is possible for a car, between `-most_deceleration` and `most_acceleration`
+    (m/s^2): if all wheels slip alike, they also agree.
     """
 
     most_deceleration: jax.Array = positive("m/s^2", default=10.0)
@@ -169,24 +169,24 @@ class AbstractOneWheel(AbstractWheelMethod):
 
 
 class FastestWheel(AbstractOneWheel):
-    """The review's maximum: of a braking car the wheel that slips least (Chen, Gao, Xu 2013, section 2.1, ref 86)."""
+    """The review's maximum: the wheel that slips least on a braking car (Chen, Gao, Xu 2013, section 2.1, ref 86)."""
 
     def choose(self, wheels):
         return wheels.fastest
 
 
 class SlowestWheel(AbstractOneWheel):
-    """The review's minimum: of a driven car the wheel that slips least (Chen, Gao, Xu 2013, section 2.1, ref 86)."""
+    """The review's minimum: the wheel that slips least on a driven car (Chen, Gao, Xu 2013, section 2.1, ref 86)."""
 
     def choose(self, wheels):
         return wheels.slowest
 
 
 class AbstractSlopeLimited(AbstractWheelMethod):
-    """A wheel's speed, followed no faster than a car can slow down (`most_deceleration`, m/s^2) or gain speed
+    """A wheel's speed, with its rate limited to what a car can reach in braking (`most_deceleration`, m/s^2) and in driving
     (`most_acceleration`, m/s^2).
 
-    Known where the wheels agree and neither limit has held it for the last `patience` (s).
+    It is known where the wheels agree and neither limit was active in the last `patience` (s).
     """
 
     most_deceleration: jax.Array = positive("m/s^2", default=10.0)
@@ -195,7 +195,7 @@ class AbstractSlopeLimited(AbstractWheelMethod):
 
     @abc.abstractmethod
     def choose(self, wheels: Wheels) -> Any:
-        """The speed that is to be followed, m/s."""
+        """The wheel speed to follow, m/s."""
 
     def begin(self, wheels, values):
         del values
@@ -205,30 +205,30 @@ class AbstractSlopeLimited(AbstractWheelMethod):
         del values
         wish = jnp.where(wheels.spoke, self.choose(wheels), own.v_x)
         v_x = jnp.clip(wish, own.v_x - self.most_deceleration * step, own.v_x + self.most_acceleration * step)
-        # Edges of teeth make steps that are none of the car's.
+        # The quantisation of the sensor's teeth also makes steps, smaller than this.
         held = jnp.abs(wish - v_x) > 0.5 * self.agreement_speed
         free = jnp.where(held, 0.0, own.free + step)
         return Slope(v_x, free), v_x, self.agree(wheels) & (free >= self.patience)
 
 
 class Slope(NamedTuple):
-    """The speed (m/s), and for how long no limit has held it (s)."""
+    """The speed `v_x` (m/s), and the time since a limit was last active, `free` (s)."""
 
     v_x: Any
     free: Any
 
 
 class SlopeLimited(AbstractSlopeLimited):
-    """The fastest wheel within the slopes (Chen, Gao, Xu 2013, section 2.1, ref 86: the slope method)."""
+    """The fastest wheel with limited rates (Chen, Gao, Xu 2013, section 2.1, ref 86: the slope method)."""
 
     def choose(self, wheels):
         return wheels.fastest
 
 
 class Combined(AbstractSlopeLimited):
-    """The fastest wheel where the car brakes, the slowest where it is driven, their mean between, within the slopes.
+    """The fastest wheel where the car brakes, the slowest where it is driven, a mean in between, with limited rates.
 
-    What the car does say the wheels: braking and driving are told by their mean rate, whole at `edge` (m/s^2).
+    Braking and driving are distinguished by the wheels' mean rate; the transition ends at `edge` (m/s^2) on either side.
     (Chen, Gao, Xu 2013, section 2.1, ref 86: the combined method.)
     """
 

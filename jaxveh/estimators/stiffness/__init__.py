@@ -1,7 +1,7 @@
 """Cornering stiffness of both axles, as the linear single track has it: section 3.1.2.2 of the review (Chen, Gao, Xu 2013).
 
-It is the slope of an axle's lateral force over its slip angle at zero slip, with whatever else of the car goes with the force:
-camber thrust, compliance, roll steer. The car's file is where methods start from.
+It is the slope of an axle's lateral force over its slip angle at zero slip, including effects that are proportional to the force:
+camber thrust, compliance, roll steer. The methods start from the values of the car's file.
 """
 
 from __future__ import annotations
@@ -24,20 +24,19 @@ SHOWN = {"front_cornering_stiffness": "N/rad", "rear_cornering_stiffness": "N/ra
 METHODS = {
     "walking": MethodOfCar(
         lambda car: WalkingStiffness(linear_car(car), Followed()),
-        "walking states of a linear single track in a Kalman filter, with offsets, lean and satellite course; known only after "
-        "half a minute of steering",
+        "Kalman filter of a linear single track with stiffnesses as slow states, offsets, lean and satellite course; known only "
+        "after half a minute of steering",
         "section 3.1.2.2, references [46, 47]",
     ),
     "axle_forces": MethodOfCar(
         lambda car: AxleForces(linear_car(car), Followed()),
-        "recursive least squares on axle forces and the difference of slip angles; known only where yaw accelerates",
+        "recursive least squares on axle forces and the difference of slip angles; known only where the yaw rate changes",
         "section 3.1.2.2, equation 15 (F_yr without cosine) and reference [120]",
     ),
     "derivatives": MethodOfCar(
         lambda car: Derivatives(linear_car(car), Followed(lag=0.3)),
-        "the derivative of a force over that of its slip angle at constant speed, too small by what noise there is; known only "
-        "where "
-        "steer and yaw move fast",
+        "the derivative of a force over that of its slip angle at constant speed, biased low by noise; known only where "
+        "steer and yaw rate change fast",
         "section 3.1.2.2, equation 16 as corrected, reference [122]",
     ),
 }
@@ -46,7 +45,7 @@ RECOMMENDED = "walking"
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """What the car's file says."""
+    """The stiffnesses of the car's file."""
     return {name: np.full(len(recording), getattr(car, name)) for name in SHOWN}
 
 
@@ -56,5 +55,5 @@ def estimate(source: Any, recording: Recording, *, method: str = RECOMMENDED) ->
 
 
 def live(source: Any, *, method: str = RECOMMENDED) -> LiveMethod:
-    """The same a row at a time."""
+    """The same, one row at a time."""
     return LiveMethod(method_of(NAME, METHODS, source, method))

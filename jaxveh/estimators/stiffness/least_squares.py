@@ -1,4 +1,4 @@
-"""Stiffness by recursive least squares: from axle forces (equation 15), and from derivatives alone (equation 16)."""
+"""Stiffness by recursive least squares: from axle forces (equation 15), and from derivatives only (equation 16)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jaxveh.estimators.stiffness.single_track import LATERAL, LEAN, Followed, Li
 
 
 class ForcesMemory(NamedTuple):
-    """The signals; the means (4,) and covariance of the least squares."""
+    """The signals; mean (4,) and covariance (4, 4) of the least squares."""
 
     signals: Signals
     mean: Any
@@ -23,15 +23,15 @@ class ForcesMemory(NamedTuple):
 class AxleForces(AbstractMethod):
     """Least squares on the axles' forces by equation 15 and the difference of their slip angles, with forgetting.
 
-    `delta - l r / v = F_f / C_f - F_r / C_r + offset` holds without the lateral speed, so that no observer of it is needed (the
-    review's general way has one): linear in both compliances, an offset, and how much later the
-    inertial sensors are than the steer. Front and rear forces are nearly proportional in
-    slow driving, and then only the difference of the compliances is told; yaw accelerations tell them apart. Compliances are in
-    units of the file's, so that the numbers are of one size.
+    `delta - l r / v = F_f / C_f - F_r / C_r + offset` holds without the lateral velocity, so that it needs no observer of it (the
+    review's general method has one). It is linear in both compliances, an offset, and the delay of the inertial sensors against
+    the steer. In slow manoeuvres front and rear forces are nearly proportional, and only the difference of the compliances is
+    observable; yaw accelerations distinguish them. Compliances are relative to the file's, so that the unknowns are of similar
+    size.
 
-    `memory` (s) of the forgetting; `angle_noise` (rad) of the slip difference, alike for `correlation` (s); `known_spread`
-    (-): up
-    to this relative spread a stiffness is known.
+    `memory` (s): time constant of the forgetting; `spread` (-): standard deviation of the relative compliances before the drive;
+    `angle_noise` (rad): error of the slip angle difference, with the correlation time `correlation` (s); `known_spread` (-): up
+    to this relative standard deviation a stiffness is known.
     """
 
     car: LinearCar
@@ -65,7 +65,7 @@ class AxleForces(AbstractMethod):
         )
         stays = jnp.exp(-dt / self.memory)
         mean = memory.mean
-        # What is forgotten goes back to what was known before the drive, so that nothing winds up.
+        # Forgetting leads back to the covariance before the drive, so that it does not wind up.
         P = jnp.where(now.moves, stays * memory.covariance + (1.0 - stays) * self._start(), memory.covariance)
         rough = jnp.square(self.angle_noise) * jnp.maximum(self.correlation / jnp.maximum(dt, 1e-3), 1.0)
         across = P @ phi
@@ -92,8 +92,8 @@ class AxleForces(AbstractMethod):
 
 
 class DerivativesMemory(NamedTuple):
-    """The signals; of front and rear, (2,): accelerations (m/s^2), filtered, slip rates (rad/s), filtered, and the mean over the
-    window of their products and of the slip rates' squares."""
+    """The signals; for front and rear, (2,): accelerations and their filtered values (m/s^2), slip rates and their filtered
+    values (rad/s), and the means over the window of the products and of the squared slip rates."""
 
     signals: Signals
     felt: Any
@@ -109,14 +109,14 @@ class Derivatives(AbstractMethod):
 
         C_f = m l_r / l  (d a_f / dt) / (d delta / dt - a_f / v + r),    a_f = a_y + l_f dr/dt
 
-    a_f is the front axle's acceleration (erratum: the print has slip angles there); exact for `J_z = m l_f l_r` at a constant
-    speed. The rear's is the same without steer: `C_r = m l_f / l (d a_r / dt) / (r - a_r / v)`, a_r = a_y - l_r dr/dt. Single
-    quotients are useless where the denominator is near zero, so the paper holds the last value within epsilon; here the quotient
-    is the least squares' over `memory` (s), numerator times denominator over denominator squared, and what is below `epsilon`
-    (rad/s) hardly counts.
+    a_f is the front axle's acceleration (erratum: the print has slip angles there). The formula is exact for `J_z = m l_f l_r` at
+    constant speed. The rear stiffness follows in the same way without steer: `C_r = m l_f / l (d a_r / dt) / (r - a_r / v)`,
+    a_r = a_y - l_r dr/dt. Single quotients are useless where the denominator is near zero, so that the paper holds the last value
+    within epsilon. Here the quotient is that of least squares over `memory` (s), numerator times denominator over denominator
+    squared, and denominators below `epsilon` (rad/s) hardly count.
 
-    No spread is claimed: noise in the denominator makes it too small by a bias that grows with the noise. `known`: the mean
-    square of the denominators in the window is above `enough` times epsilon's.
+    It gives no standard deviation, because noise in the denominator biases the stiffness low. `known`: the mean square of the
+    denominators in the window is above `enough` (-) times the square of epsilon.
     """
 
     car: LinearCar
@@ -143,7 +143,7 @@ class Derivatives(AbstractMethod):
         a_y = now.slow_a_y / (1.0 + LEAN)
         felt = jnp.stack([a_y + self.car.front_axle_to_cg * turn, a_y - self.car.rear_axle_to_cg * turn])
         share = dt / (2.0 * lag + dt)
-        # All once more through the same low-pass, so that derivative and value are of one age.
+        # The same low-pass filter once more, so that derivative and value have the same delay.
         slow = memory.slow + share * (felt + memory.felt - 2.0 * memory.slow)
         rate = (felt - slow) / lag
         steer_rate = (now.steer - now.slow_steer) / lag

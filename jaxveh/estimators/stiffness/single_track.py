@@ -1,4 +1,4 @@
-"""What all methods of cornering stiffness share: the single track's numbers, and signals low-pass filtered alike."""
+"""Shared parts of the cornering stiffness methods: the single track's parameters, and signals with the same low-pass filter."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ LATERAL = (Need("v_x", "m/s"), Need("steer", "rad"), Need("yaw_rate", "rad/s"), 
 """Speed, steer at the road wheels, yaw rate and lateral acceleration."""
 
 LOWEST = 5.0
-"""m/s: below this speed nothing is told."""
+"""m/s: below this speed nothing is known."""
 
 LONGEST = 0.3
-"""s: a value that is older than this is not known any more."""
+"""s: a value that is older than this is no longer known."""
 
 LEAN = 0.059
-"""By which share of itself an ordinary car's accelerometer shows more of a lateral acceleration, because the body leans."""
+"""Relative increase of the measured lateral acceleration because the body leans, for an ordinary car."""
 
 
 class LinearCar(eqx.Module):
-    """The numbers of a linear single track; the stiffnesses (N/rad, of the axles) are where methods start from."""
+    """The parameters of a linear single track; the methods start from its stiffnesses (N/rad, of the axles)."""
 
     mass: jax.Array = positive("kg")
     yaw_inertia: jax.Array = positive("kg m^2")
@@ -51,14 +51,15 @@ class LinearCar(eqx.Module):
 
 
 def linear_car(car: CarSpecification) -> LinearCar:
-    """The car of a file."""
+    """The linear single track of a car's file."""
     names = [field.name for field in dataclasses.fields(LinearCar) if field.name != "steer_offset"]
     return LinearCar(**{name: getattr(car, name) for name in names}, steer_offset=car.steer_offset or 0.0)
 
 
 class Signals(NamedTuple):
-    """Time (s); what was measured last of speed (m/s), steer (rad), yaw rate (rad/s), a_y (m/s^2), the steer as late as these,
-    too; the low-pass filtered ones; the oldest's age (s) and whether the car `moves` and all of them speak."""
+    """Time (s); the last measured speed (m/s), steer (rad), yaw rate (rad/s) and a_y (m/s^2), and the steer with the delay of the
+    inertial sensors; the low-passed signals; the `ages` (s) of the channels, and whether the car `moves` and all of them are
+    available."""
 
     t: Any
     v_x: Any
@@ -74,14 +75,14 @@ class Signals(NamedTuple):
 
 
 class Followed(eqx.Module):
-    """Signals held between rows and low-pass filtered by `lag` (s), by which their derivatives are told: `(x - slow) / lag`.
-    The steer is delayed by `late` (s), by which inertial sensors are behind it."""
+    """Signals held between measurements, with a low-pass filter of `lag` (s), which also gives their derivatives:
+    `(x - slow) / lag`. The steer is delayed by `late` (s), the delay of the inertial sensors against it."""
 
     lag: jax.Array = positive("s", default=0.15)
     late: jax.Array = positive("s", default=0.025)
 
     def start(self, t, values) -> Signals:
-        """After the first row."""
+        """The signals after the first row."""
         known = lambda name: jnp.where(jnp.isnan(values[name]), 0.0, values[name])
         steer, yaw_rate, a_y = known("steer"), known("yaw_rate"), known("a_y")
         old = jnp.where(jnp.stack([jnp.isnan(values[need.channel]) for need in LATERAL]), 1e3, 0.0).astype(t.dtype)
@@ -90,7 +91,7 @@ class Followed(eqx.Module):
         return Signals(t, v_x, steer, steer, yaw_rate, a_y, steer, yaw_rate, a_y, old, moves)
 
     def next(self, last: Signals, t, values) -> Signals:
-        """After the next row."""
+        """The signals after the next row."""
         dt = jnp.clip(t - last.t, 0.0, 1.0)
         missing = jnp.stack([jnp.isnan(values[need.channel]) for need in LATERAL])
         held = lambda name, old: jnp.where(jnp.isnan(values[name]), old, values[name])
@@ -98,11 +99,11 @@ class Followed(eqx.Module):
         anew = jnp.max(last.ages) > LONGEST
         v_x, yaw_rate, a_y = held("v_x", last.v_x), held("yaw_rate", last.yaw_rate), held("a_y", last.a_y)
         raw = held("steer", last.raw_steer)
-        # Pade's delay, an all-pass: `2 / (1 + s late / 2) - 1`, its low-pass bilinear.
+        # A Pade delay, the all-pass `2 / (1 + s late / 2) - 1`, with a bilinear low-pass filter.
         mid = 0.5 * (last.steer + last.raw_steer)
         mid = mid + dt / (self.late + dt) * (raw + last.raw_steer - 2.0 * mid)
         steer = jnp.where(anew, raw, 2.0 * mid - raw)
-        # The bilinear low-pass, of which `(x - slow) / lag` is the derivative exactly.
+        # The bilinear low-pass filter, whose exact derivative is `(x - slow) / lag`.
         share = dt / (2.0 * self.lag + dt)
         follow = lambda slow, old, new: jnp.where(anew, new, slow + share * (new + old - 2.0 * slow))
         moves = (jnp.max(ages) <= LONGEST) & (v_x >= LOWEST)

@@ -1,4 +1,4 @@
-"""The recommended method: stiffnesses as walking states of a linear single track, with offsets and satellite course."""
+"""The recommended method: stiffnesses as random-walk states of a linear single track, with offsets and satellite course."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from jaxveh.estimators.sequential import Belief, innovation, update
 from jaxveh.estimators.stiffness.single_track import LATERAL, LEAN, LOWEST, Followed, LinearCar, Signals
 
 STATES = 10
-"""v_y (m/s), yaw rate (rad/s), ln of both stiffnesses over the file's, offsets of steer (rad), a_y (m/s^2) and yaw rate
-(rad/s), by which share of itself a_y shows more because the body leans, the yaw (rad), and how much later inertial sensors are
-than the steer (s)."""
+"""Number of states: v_y (m/s), yaw rate (rad/s), ln of both stiffnesses over the file's, offsets of steer (rad), a_y (m/s^2) and
+yaw rate (rad/s), relative increase of the measured a_y because the body leans, yaw (rad), and error of the delay between inertial
+sensors and steer (s)."""
 
 SATELLITE = (Need("course", "rad", optional=True),)
 
 
 class WalkMemory(NamedTuple):
-    """The signals; the belief about the states; how fast the course turned of late, a_y / v (rad/s), low-pass filtered."""
+    """The signals; the belief of the states; the low-passed rate of the course, a_y / v (rad/s)."""
 
     signals: Signals
     belief: Belief
@@ -31,19 +31,20 @@ class WalkMemory(NamedTuple):
 
 
 class WalkingStiffness(AbstractMethod):
-    """An extended Kalman filter of [v_y, yaw rate, ln C_f, ln C_r, offsets of steer, a_y and yaw rate, lean, yaw, lateness].
+    """An extended Kalman filter of [v_y, yaw rate, ln C_f, ln C_r, offsets of steer, a_y and yaw rate, lean, yaw, delay].
 
-    The linear single track of the file's mass, inertia and lengths; measured are yaw rate and lateral acceleration and, where the
-    log has it, the satellite's `course = yaw + v_y / v` (references [46, 47]), which alone sees the sideslip. It comes
-    `course_delay` (s) later than the inertial sensors; what it has turned since is the integral of a_y / v. What would be taken
-    for stiffness is a state of its own: offsets,
-    and the lean of the body, by which an accelerometer shows more. Where tyres leave their linear range (`linear` m/s^2 of
-    lateral acceleration), measurements count less and less. On a slippery road it is the slope at zero slip still that is told,
-    as long as there is little lateral acceleration.
+    The model is the linear single track with the file's mass, inertia and lengths. The measurements are yaw rate, lateral
+    acceleration and, if the log has it, the satellites' `course = yaw + v_y / v` (references [46, 47]), the only one that depends
+    directly on the sideslip. It is delayed by `course_delay` (s) against the inertial sensors; the filter adds its change since,
+    the integral of a_y / v. Errors that could be mistaken for stiffness are states of their own: offsets, and the body's lean,
+    which increases the measured acceleration. Where tyres leave their linear range (`linear`, m/s^2 of lateral acceleration),
+    measurements count less and less. Also on a slippery road the estimate is the slope at zero slip, as long as the lateral
+    acceleration is small.
 
-    `spread` (-) of ln C before the drive, `walk` (1/sqrt(s)); `v_y_noise` (m/s^1.5), `yaw_noise` (rad/s^1.5); `a_y_noise`
-    (m/s^2), `yaw_rate_noise` (rad/s), `course_noise` (m/s across); `steer_noise` (rad/sqrt(s)): how the steer's offset walks,
-    play included; `known_spread` (-).
+    `spread` (-): standard deviation of ln C before the drive, `walk` (1/sqrt(s)): its random walk; `v_y_noise` (m/s^1.5),
+    `yaw_noise` (rad/s^1.5); `a_y_noise` (m/s^2), `yaw_rate_noise` (rad/s), `course_noise` (m/s, lateral); `steer_noise`
+    (rad/sqrt(s)): random walk of the steer's offset, play included; `known_spread` (-): up to this standard deviation of ln C a
+    stiffness is known.
     """
 
     car: LinearCar
@@ -99,13 +100,13 @@ class WalkingStiffness(AbstractMethod):
         return jnp.diag(jnp.square(jnp.stack([soft if s is None else s + 0.0 * soft for s in spreads])))
 
     def _standing(self, P):
-        """What is left of a covariance at standstill: that of the constants."""
+        """The covariance at standstill, where only that of the constants is kept."""
         start = self._start()
         keep = (jnp.arange(STATES) >= 2) & (jnp.arange(STATES) != 8)
         return jnp.where(keep[:, None] & keep[None, :], P, start)
 
     def _forces(self, x, now: Signals):
-        """Of front and rear, N, and their acceleration, m/s^2."""
+        """The lateral forces of front and rear axle, N, and their acceleration, m/s^2."""
         car = self.car
         v_x = jnp.maximum(now.v_x, LOWEST)
         front = car.front_cornering_stiffness * jnp.exp(jnp.clip(x[2], -1.6, 1.6))
