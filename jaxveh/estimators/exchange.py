@@ -104,7 +104,7 @@ class Exchange(AbstractMethod):
 
 def _value_of(answer: Answer, giver: str, name: str, like: Any) -> Any:
     if name not in answer.mean._fields:
-        raise InputError(f"Exchange: {giver}.{name}: {giver} reports {', '.join(answer.mean._fields)}.")
+        raise InputError(f"Exchange: {giver}.{name}: the method reports {', '.join(answer.mean._fields)}.")
     value = getattr(answer.mean, name).astype(like.dtype)
     return jnp.where(jnp.isfinite(value), value, jnp.nan)
 

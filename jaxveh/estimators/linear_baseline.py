@@ -32,8 +32,8 @@ def open_loop(car: SingleTrack, recording: Recording) -> dict[str, np.ndarray]:
     """
     if car.steering.inputs != ("steer",):
         raise InputError(
-            f"open_loop: car.steering = {type(car.steering).__name__}: needs {', '.join(car.steering.inputs)}; must be a steering "
-            "with `steer` as its only input."
+            f"open_loop: car.steering = {type(car.steering).__name__}: needs {', '.join(car.steering.inputs)}; must be a "
+            "steering whose only input is steer."
         )
     found = open_loop_of(car, recording.time, recording["steer"], recording["v_x"])
     return {name: np.asarray(values) for name, values in found.items()}
