@@ -41,7 +41,7 @@ LEAST_GRIP = 0.05
 
 
 LONGEST_STEP, LOST = 1.0, 3.0
-"""s and m/s: a longer step is a gap between two drives, after which the standard deviation of lateral velocity is `LOST`."""
+"""s and m/s: a longer step is a gap between two drives, after which lateral velocity has about this standard deviation."""
 
 
 class RearAxleState(NamedTuple):

@@ -34,15 +34,14 @@ roads are banked by about 0.015 rad, which an accelerometer cannot distinguish f
 def chosen_parameters(model: Any):
     """The parameters and noise levels that a calibration fits.
 
-    The ellipse, shares and drag are not among them, and there is no asymmetry: when fitted, they absorbed features of one
-    span only. On real logs, the estimates for the rest of the log then had errors of 0.33 and 0.37 degrees (Ferrari, first 30
-    and 60 s), against 0.25 and 0.31 without them; 5.9 and 3.7 (F1TENTH, 60 s), against 3.4 and 4.2 (30 s); for 31 simulated
-    drives and the Genesis it made no difference; 12 s pieces of the Ferrari were better with them (0.20, 0.24).
+    The ellipse, shares and drag are not among them, and there is no asymmetry: when fitted, they absorbed features of one span
+    only. The errors on the rest of real logs then were 0.33 and 0.37 degrees (Ferrari, first 30 and 60 s), and 0.25 and 0.31
+    without them; 5.9 with and 3.7 without them (F1TENTH, 60 s), but 3.4 with and 4.2 without them (30 s); 31 simulated drives
+    and the Genesis showed no difference; 12 s pieces of the Ferrari were better with them (0.20) than without (0.24).
 
-    Nor can a log choose how many to fit: with the likelihood of the half that a fit did not use as the criterion, for 15
-    settings of those logs (noises alone, sensors, stiffness, all of these), the F1TENTH's first 30 s would keep the file's
-    tyres (17.7 instead of 4.2 degrees), the reversed Genesis the noises alone (0.62, 0.63), and the other logs all
-    parameters.
+    Nor can a log choose how many to fit. With the likelihood of the half that a fit did not use as the criterion, for 15 settings
+    of those logs (noises alone, sensors, stiffness, all of these), the F1TENTH's first 30 s would keep the file's tyres (17.7
+    instead of 4.2 degrees), the reversed Genesis would fit the noises alone (0.62, 0.63), and the other logs all parameters.
     """
     s, noise = model.system, model.process_noise.law.std
     axle = [s.stiffness, s.grip, s.shape]
