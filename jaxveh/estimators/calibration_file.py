@@ -113,7 +113,7 @@ def read_calibration(path: str | os.PathLike) -> Calibration:
 
 def _check_version(version: str) -> None:
     if version.split(".")[:2] != VERSION.split(".")[:2]:
-        raise InputError(f"version = {version!r}: the calibration was written by another version than {VERSION}; fit again.")
+        raise InputError(f"version = {version!r}: the calibration was not written by version {VERSION}; fit again.")
 
 
 def _calibration(content: dict[str, Any], folder: Path) -> Calibration:

@@ -217,7 +217,7 @@ def little_told(source: Calibration) -> tuple[str, ...]:
     chosen = source.fit.chosen
     prior = np.stack([np.asarray(one) for one in prior_spread(chosen, pick(source.model, chosen), SPREADS)])
     left = np.sqrt(np.diag(np.asarray(source.fit.covariance)))
-        # A blind fit has no information on how the reference is turned; so this parameter is not listed.
+    # A blind fit has no information on how the reference is turned; so this parameter is not listed.
     asked = lambda name: name != "heading_offset" or source.weight is not None
     return tuple(
         p.name for p, one, old in zip(chosen, left, prior, strict=True) if one > LITTLE * old and asked(p.name)

@@ -68,10 +68,8 @@ def state_space(
       car has), or a `Continuous` or `Discrete` law. `start`, `start_spread`: mean and standard deviation of the start state.
     - A car whose speed is a state (`SevenDOF`, `TwoTrack3DOF`, ... under torques) needs `start={"v_x": ...}` (m/s), the speed
       in the first row, and starts straight ahead with rolling wheels. Its wheel spins are stiff: with rows 0.01 s apart, one
-      step suffices at 20 m/s; lower speeds or longer intervals need more `steps` (the spins' poles are in the car's
-      docstring).
-    - `measurement_noise`: another noise law than the sensors' own, for their channels (say, a `StateDependent` law that grows
-      with slip).
+      step suffices at 20 m/s; lower speeds or longer intervals need more `steps` (see the poles in the car's docstring).
+    - `measurement_noise`: another noise law than the sensors' own (say, a `StateDependent` one that grows with slip).
     - `minimum_speed` (m/s): below it all states of a car whose speed is the input `v_x` are held (`held_rows` returns where): a
       single track has no steady slip angle at standstill. The states of a car whose speed is a state are never held.
     - `report`: outputs of the car to show in addition to its states, such as `sideslip`, `F_yf`, `slip_angle_front`; by default
@@ -186,7 +184,7 @@ def _start(system: Instrumented, mean: Mapping, spread: Mapping) -> Prior:
     if TOLD_SPEED not in system.inputs and TOLD_SPEED in states:
         usual = _rolling(system, mean)._asdict()
     means = [mean.get(name, usual[name]) for name in states]
-        # All other states are filter states of a sensor: a standard deviation of one is wide, and forgotten at once.
+    # All other states are filter states of a sensor: a standard deviation of one is wide, and forgotten at once.
     spreads = {name: spread.get(name, START_SPREAD.get(name, 1.0)) for name in states}
     return Prior(system.state_type(*means), Gaussian(spreads))
 
