@@ -79,8 +79,7 @@ def model(
     The car's mass is the first guess. From speed and torque alone, mass and grade can be distinguished only by how the speed
     responds to moving pedals: the torque's part of the acceleration goes with 1 / mass, the grade's does not. If the grade is a
     random walk, its changes absorb what the mass should explain; if its **rate** walks, the grade is smooth over seconds and
-    leaves the fast responses to the mass. An accelerometer measures force over mass without the grade, which separates the two
-    at once.
+    leaves the fast responses to the mass. An accelerometer measures force over mass without the grade, and separates the two.
 
     **Arguments** (standard deviations): `v_x` (m/s) of the measured speed; `a_x` (m/s^2) of the accelerometer, None if there is
     none; `a_x_bias` (m/s^2): the prior's spread of its constant offset, a further state, None for no such state; `start_speed`
