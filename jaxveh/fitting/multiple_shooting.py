@@ -138,8 +138,8 @@ def _check_inside(chosen: tuple[Parameter, ...]) -> None:
     for p in chosen:
         if p.path.partition(".")[0] != "system":
             raise InputError(
-                f"multiple_shooting: where picked {p.name}; it fits parameters of the system (`m.system...`): fit noise levels with "
-                "maximum_likelihood; first states are always found."
+                f"multiple_shooting: where picked {p.name}; it fits parameters of the system (`m.system...`): fit noise levels "
+                "with maximum_likelihood; first states are always found."
             )
 
 
