@@ -77,7 +77,7 @@ def canonical(tyre: MFTyre, fixed: Collection[str] = ()) -> MFTyre:
     `fixed`: names of coefficients that must not change, such as those that a user holds or bounds; a twin that would change the
     sign of one of them, unless it is zero, is skipped. A leading coefficient of zero stays.
     """
-    # A later twin may change the lead of an earlier one only if it is no lead: no lead is in another twin's `others`.
+    # No twin changes the lead of another one: no lead is in another twin's `others`.
     for twin in TWINS:
         if float(leaf_of(tyre, twin.lead)) >= 0:
             continue

@@ -184,7 +184,7 @@ class RigData:
         """Run one stage: from the law, then from its other starts; the best end is returned."""
         before = self.share(law, stage)
         law, steps, converged = self.descend(law, stage)
-        # The others start from this end: all else is near the data, so they do not run back to it.
+        # The other starts change this end in a few coefficients: near the data in all others, they do not run back to it.
         ends = [self.descend(one, stage, ROUND)[0] for one in starts_of(law, stage, self.chosen.bounds)]
         noise = self.noise(law)
         best = min([law, *ends], key=lambda end: self.loss(end, stage, noise))
