@@ -37,7 +37,7 @@ def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: 
     if length < 2:
         raise InputError(f"window = {window} s: must span at least two steps of the recording.")
     parts = [cut_rows(model.rows(recording), length) for recording in recordings]
-    # The number of segments per recording is known before anything is traced.
+    # Which recording a segment belongs to is known before anything is traced.
     join = lambda *leaves: (np if isinstance(leaves[0], np.ndarray) else jnp).concatenate(leaves, axis=-1)
     return jax.tree.map(join, *parts)
 
