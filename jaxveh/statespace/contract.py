@@ -184,8 +184,8 @@ def check_told(filter: Any, model: Any) -> None:
         raise InputError(f"filter = {filter.__name__}: is a class; make one of it: {filter.__name__}(...).")
     for name, value, kind, example in (
         ("filter", filter, AbstractFilter, "a filter, such as filters.Unscented()"),
-        ("model", model, StateSpace, "a StateSpace, as estimators.state_space makes it"),
         ("model", model, StateSpace, "a StateSpace, as returned by estimators.state_space"),
+    ):
         if not isinstance(value, kind):
             raise InputError(
                 f"{name} = {type(value).__name__}: must be {example}. The order is filter, model, recording."

@@ -132,7 +132,7 @@ def scan_and_keep(
         check_one_of("keep", name, (*SHOWN, *(f"info.{field}" for field in Info._fields)))
     form = functools.partial(scan_in_form, of_belief=of_belief, keep=keep)
     # A long run of which no row is shown need not equal a live loop to the last bit; written out, a run of three states takes
-    # 180 instead of 203 ns per row (unscented, float64, jax 0.12; compiling takes twice as long).
+    # 180 instead of 203 ns per row (unscented, float64, jax 0.12; with older jax, twice as long as on whole arrays).
     shows_nothing = not keep and of_belief is _nothing and len(rows.t) >= WORTH
     alone = Steps.written_out if shows_nothing and numerics.pays_alone() else Steps.whole
     return in_form_for_batches(form, filter, model, rows, key, alone=alone)
