@@ -77,7 +77,7 @@ class AbstractFilter(eqx.Module):
         super().__init_subclass__(**given)
         for name in ("init", "step"):
             if name in vars(cls):
-                raise TypeError(f"{cls.__name__}.{name}: is final. Implement _{name}, which it runs.")
+                raise TypeError(f"{cls.__name__}.{name}: is final. Write _{name}, which it runs.")
 
     @property
     def gradients(self) -> Gradient:

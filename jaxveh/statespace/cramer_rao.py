@@ -146,7 +146,7 @@ def _with_recursion(model: StateSpace, noisy: tuple[str, ...], terms: _Terms) ->
         name = model.states[i]
         if kept.size == 0 or terms.largest[:, kept, i].any() or terms.seen[:, i, i].any():
             raise InputError(
-                f"posterior_cramer_rao: {name} has no process noise and its transition is not linear, for which there is no "
+                f"posterior_cramer_rao: {name} carries no process noise and its transition is not linear, for which there is no "
                 "recursion, and the other states or the measurements depend on it. Give it a little noise."
             )
     return kept
