@@ -26,6 +26,6 @@ def location_covariance(law: AbstractNoise) -> jax.Array:
     if isinstance(law, StudentT):
         return jnp.diag(jnp.stack([scale**2 for scale in law.scale]) * (law.dof + 3) / (law.dof + 1))
     raise InputError(
-        f"{type(law).__name__}: its Fisher information is unknown; must be Gaussian, MultivariateGaussian, StudentT or "
+        f"{type(law).__name__}: its Fisher information is not known here; must be Gaussian, MultivariateGaussian, StudentT or "
         "several of these."
     )

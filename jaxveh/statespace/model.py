@@ -235,8 +235,8 @@ def _check_stamp(t, dtype) -> None:
     """Raise `InputError` for a time so large that no digits are left for a step."""
     if is_concrete(t) and np.isfinite(t) and np.spacing(np.abs(np.asarray(t, dtype))) > COARSEST:
         raise InputError(
-            f"row: t = {float(t)} s is resolved only to {float(np.spacing(np.asarray(t, dtype))):.3g} s in {np.dtype(dtype).name}: "
-            "count time from the first row, or use float64."
+            f"row: t = {float(t)} s has a resolution of {float(np.spacing(np.asarray(t, dtype))):.3g} s in "
+            f"{np.dtype(dtype).name}: count time from the first row, or use float64."
         )
 
 
