@@ -61,7 +61,7 @@ class Leaning(AbstractMethod):
 
     `f_y` is the lateral acceleration in the road's plane. The measurements are: the rear axle's slip angle, compared with
     that of its force, with a correlated error; `course` of satellites, which is the heading plus the sideslip angle `delay`
-    ago and does not depend on tyres; `roll_rate`, the rate of roll and bank less a part of the yaw rate when the car points
+    ago and does not depend on tyres; `roll_rate`, the rate of roll and bank plus a part of the yaw rate when the car points
     uphill. None of them can distinguish a constant bank from the accelerometer's offset. The two are separated only because
     roads bank to either side about level, while the offset stays. So the standard deviation of the bank falls slowly, and an
     offset from earlier drives helps (`a_y_offset`).

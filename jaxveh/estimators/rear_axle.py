@@ -87,6 +87,7 @@ class RearAxle(eqx.Module):
     - `bank` (rad), `slip_error` (rad): standard deviations of the states of these names, first-order Gauss-Markov with
       correlation times `bank_time` and `slip_time` (s).
     - `force_noise` (sqrt s), `slip_noise` (rad sqrt s): densities of white noise, of the force over load and of the slip angle.
+
     Inputs: see `INPUTS`. Axes of ISO 8855; a positive slip angle gives a positive lateral force.
     """
 

@@ -263,7 +263,7 @@ def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None)
         if not plan:
             raise InputError(
                 "neither slip angle nor slip ratio varies enough to show a coefficient of MF-Tyre: "
-                "neither slip angle nor slip ratio varies enough to show a coefficient of MF-Tyre: "
+                "fit sweeps of slip, or pick coefficients with `where`."
             )
         return tuple(dict.fromkeys(name for stage in plan for name in stage.coefficients))
     every = resolve(law, lambda law: jax.tree.leaves(law))
