@@ -157,7 +157,7 @@ class Filtered(AbstractMethod):
 
 
 TURNING = ("steer", "steering_wheel", "steering_torque", "yaw_rate", "a_y")
-"""Channels that depend on how a car turns."""
+"""Channels that describe how a car turns."""
 
 
 def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: str) -> AbstractMethod:

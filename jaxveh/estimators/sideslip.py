@@ -169,8 +169,8 @@ def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
 def _check_one_clock(recording: Recording) -> None:
     if is_concrete(recording) and speak_apart(recording):
         raise InputError(
-            "sideslip: yaw_rate and a_y are hardly ever measured in the same row: their devices have separate clocks. Resample "
-            'all channels to the rows of one: io.resample(recording, "yaw_rate", max_gap=0.1).'
+            "sideslip: yaw_rate and a_y are hardly ever measured in the same row: their devices have clocks of their own. "
+            'Resample all channels to the rows of one: io.resample(recording, "yaw_rate", max_gap=0.1).'
         )
 
 

@@ -14,7 +14,7 @@ from jax import lax
 FIRST, LESS, MORE = 1.0, 0.1, 4.0
 """Damping at the start, and its factors after a step that went as predicted and after one that did not.
 
-With a first damping of 0.001, a fit from a near start takes two steps less; but from starts that were off by up to a half,
+With a first damping of 0.001, a fit from a near start takes two steps fewer; but from starts that were off by up to a half,
 eight of 28 fits ended in a worse minimum, and with the present value one of 28.
 """
 

@@ -148,5 +148,5 @@ def starting_tyre(model: str, rig: RigTable) -> AbstractTyre:
     """
     check_one_of("model", model, tuple(RIG_STARTS))
     for wrong in wrong_signs(rig):
-        raise InputError(f"{wrong.words} If they are, start from a tyre of your own (--start).")
+        raise InputError(f"{wrong.words} If they do, start from a tyre of your own (--start).")
     return RIG_STARTS[model](rig_facts(rig))

@@ -48,10 +48,10 @@ class Luenberger(AbstractMemoryless):
 class SlidingMode(AbstractMemoryless):
     """`x = x- + gain e + switching s(e / boundary)`, with s(z) = z / (1 + |z|) instead of the sign, to avoid its chatter.
 
-    (J.-J. Slotine, J. Hedrick & E. Misawa 1987.) The switching gain (n, m) limits the error per step of a wrong model that
-    the observer rejects. Within the `boundary` (m,), in each channel's unit, the observer is close to linear with `gain +
-    switching / boundary`; so the boundary must be at least H switching, otherwise the steps chatter. With one channel that
-    measures the state and without `gain`, a disturbance of d per step is rejected for |d| < switching: the error is within
+    (J.-J. Slotine, J. Hedrick & E. Misawa 1987.) The switching gain (n, m) limits the error per step of a wrong model that the
+    observer rejects. Within the `boundary` (m,), in each channel's unit, the observer is close to linear with the gain
+    `gain + switching / boundary`; so the boundary must be at least H switching, otherwise the steps chatter. With one channel
+    that measures the state and without `gain`, a disturbance of d per step is rejected for |d| < switching: the error is within
     the boundary in finite time and ends at `boundary q / (1 - q)`, q = |d| / switching.
     """
 

@@ -37,7 +37,7 @@ class Info(NamedTuple):
 
 
 class AbstractBelief(eqx.Module):
-    """The state of a filter after a row: all that the next step needs, including its `t`, `u` and the `count` of rows."""
+    """A filter's belief after a row: all that the next step needs, including its `t`, `u` and the `count` of rows."""
 
     @abc.abstractmethod
     def moments(self, model: StateSpace) -> tuple[Any, Any]:
