@@ -60,7 +60,7 @@ class AsItIs(AbstractCleaning):
 
 
 def clean_recording(cleaning: AbstractCleaning, recording: Recording) -> Recording:
-    """The cleaned recording, with the same rows."""
+    """The recording after the `cleaning`, with the same rows."""
     values = {name: recording[name] for name in cleaning.channels}
     if not values:
         return recording
@@ -110,7 +110,7 @@ class Live(eqx.Module):
         belief, answer = live.step(belief, t, {...})
         answer.mean.sideslip, answer.std.sideslip
 
-    Its bands include the parameters' uncertainty if it has `members` (`parameter_bands`).
+    Its bands include the parameters' uncertainty if `members` are given (`parameter_bands`).
 
     `init` and `step` are compiled once each. Inputs must be given; a measurement that is not given, or NaN, counts as missing.
     Channels that the model does not read are ignored. In float32, count time from the first row.

@@ -284,8 +284,8 @@ def estimate(
     """Sideslip of the car along a log from v_x, a_x, a_y and yaw_rate: see `rear_axle.RearAxleReport` for the names.
 
     `source`: a `Calibration`, a model, or a car's file without calibration. Every row is estimated from all rows (a
-    smoother), or, with `smoothed=False` and for filters without a Gaussian smoother, from the rows up to it, as `live` does.
-    The bands of Gaussian filters include the uncertainty of the parameters of a calibration or a car's file
+    smoother). With `smoothed=False`, and for filters without a Gaussian smoother, it is estimated from the rows up to it, as
+    `live` does. The bands of Gaussian filters include the uncertainty of the parameters of a calibration or a car's file
     (`parameter_bands`); the parameters of a model count as known. **Raises** as `run` and `clean` do.
 
     Where every row is estimated from all rows, an accelerometer that the calibration found to be late is shifted, and so are

@@ -39,7 +39,7 @@ class Sliding(eqx.Module):
     of the tyres' linear range, accumulated over `gathering` (s). A bank and an offset accumulate, too: up to `usual_across`
     (m/s) the result counts for nearly nothing.
     - `along`: how much one wheel is faster or slower than the mean of all, beyond the effect of the bend (`half_track`, m)
-    and its usual excess (learned over `learning` seconds of ordinary driving), less `usual_along` (a share of the speed).
+    and its usual excess (learned in ordinary driving over `learning` (s)), less `usual_along` (a share of the speed).
     Wheels that all slip alike are not detected.
 
     Both persist for `staying` (s): wheels that grip again need a moment until their speeds are right.

@@ -68,7 +68,7 @@ def state_space(
       car has), or a `Continuous` or `Discrete` law. `start`, `start_spread`: mean and standard deviation of the start state.
     - A car whose speed is a state (`SevenDOF`, `TwoTrack3DOF`, ... under torques) needs `start={"v_x": ...}` (m/s), the speed
       in the first row, and starts straight ahead with rolling wheels. Its wheel spins are stiff: with rows 0.01 s apart, one
-      step suffices at 20 m/s; lower speeds or longer intervals need more `steps` (see the poles in the car's docstring).
+      step suffices at 20 m/s; lower speeds or longer intervals need more `steps`, see the poles in the car's docstring.
     - `measurement_noise`: another noise law than the sensors' own (say, a `StateDependent` one that grows with slip).
     - `minimum_speed` (m/s): below it all states of a car whose speed is the input `v_x` are held (`held_rows` returns where): a
       single track has no steady slip angle at standstill. The states of a car whose speed is a state are never held.

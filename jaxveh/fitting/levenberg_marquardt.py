@@ -42,10 +42,11 @@ class LevenbergMarquardt(optx.AbstractMinimiser):
     """Least squares in the form of J. J. Moré, The Levenberg-Marquardt algorithm: implementation and theory, Numerical Analysis,
     Lecture Notes in Mathematics 630 (1978): each coordinate is damped by its largest curvature so far.
 
-    `quadratic(y, args)`: the `Quadratic` of the cost at y (n,), with the Gauss-Newton matrix, which may be formed without the
-    Jacobian where the structure of the residuals allows. The search ends when a step lowered the cost, and was predicted to
-    lower it, by no more than a share `rtol`, or when no coordinate moves by more than `atol`. A refused step counts as a step.
-    `options` of `optimistix.minimise`: `limit`, the most steps as an array, in addition to `max_steps`, which is compiled in.
+    `quadratic(y, args)`: the `Quadratic` of the cost at y (n,), with the Gauss-Newton matrix. The matrix may be formed
+    without the Jacobian where the structure of the residuals allows. The search ends when a step lowered the cost, and was
+    predicted to lower it, by no more than a share `rtol`, or when no coordinate moves by more than `atol`. A refused step
+    counts as a step. `options` of `optimistix.minimise`: `limit`, the most steps as an array, in addition to `max_steps`,
+    which is compiled in.
     """
 
     rtol: float

@@ -163,10 +163,10 @@ def multiple_shooting(
     name; it replaces the model's own prior. Without any prior: least squares.
 
     The recordings are cut into segments of `window` seconds (Bock 1981); unknown are the parameters and the state at the
-    start of each segment. Residuals: measurements over their noise's standard deviation; the mismatch of each end with the
-    next start, over the process noise accumulated in a window, or over `tie` times the prior's standard deviation for states
-    without process noise; the first states and the parameters against the prior. Works under `jit`, `vmap` and `grad` if the
-    first recording's time is concrete; see `solve`.
+    start of each segment. Residuals: measurements over their noise's standard deviation; the gap between each end and the
+    next start, over the window's process noise, or `tie` times the prior's standard deviation for states without any; the
+    first states and the parameters against the prior. Works under `jit`, `vmap` and `grad` if the first recording's time is
+    concrete; see `solve`.
 
     **Returns** a `Fit`; standard errors from the Jacobian at the optimum, with the starts marginalised. **Raises** `InputError`
     for a model without parameters, or logs too short; `FilterError` if the solver does not converge (`throw`).

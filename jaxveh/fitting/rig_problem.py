@@ -36,12 +36,12 @@ BLOCK = 2000
 class RigProblem(AbstractProblem):
     """Rig data, a law and its coefficients to fit.
 
-    `contact`: arrays (n,); `measured` (m, n): the forces and moments `channels`, zero where there is no measurement; `weight`
-    (m, n): one over the standard deviation, zero where a row does not count; `emphasis` (m,): factors on the channels'
-    weights from the noise. Coordinates z (p,) are steps: `scale` (p,) is the length of one step of each coefficient on its
-    bijector's real line, from `origin` (p,); zero where it is held. `centre`, `spread` (p,): mean and standard deviation of
-    the prior on that line; infinite for no prior. `pull`: how strongly coefficients are pulled to the origin, in standard
-    deviations per step, one for all or each (p,).
+    `contact`: of each row, arrays (n,); `measured` (m, n): the forces and moments `channels`, zero where there is no
+    measurement; `weight` (m, n): one over the standard deviation, zero where a row does not count; `emphasis` (m,): factors
+    on the channels' weights from the noise. Coordinates z (p,) are steps: `scale` (p,) is the length of one step of each
+    coefficient on its bijector's real line, from `origin` (p,); zero where it is held. `centre`, `spread` (p,): mean and
+    standard deviation of the prior on that line; infinite for no prior. `pull`: how strongly coefficients are pulled to the
+    origin, in standard deviations per step, one for all or each (p,).
     """
 
     law: AbstractTyre

@@ -24,10 +24,10 @@ def solve(
 ) -> Fit:
     """Fit a problem: arrays in, arrays out, under `jit`, `vmap` and `grad`.
 
-    The fit has a derivative with respect to every array of the `problem`: with F the cost, an optimum z moves by
-    -(d2F/dz2)^-1 d2F/dz d(data), so no derivative goes through the search. It is valid where the search has converged. `start`:
-    coordinates (n,), by default the problem's own; the optimum does not depend on it, and has no derivative with respect to it.
-    `tolerance`: of the problem's solver. Without `standard_errors` they are NaN.
+    The fit has a derivative with respect to every array of the `problem`. With F the cost, an optimum z moves by
+    -(d2F/dz2)^-1 d2F/dz d(data), so no derivative goes through the search. It is valid where the search has converged.
+    `start`: coordinates (n,), by default the problem's own; the optimum does not depend on it, and has no derivative with
+    respect to it. `tolerance`: of the problem's solver. Without `standard_errors` they are NaN.
 
     **Returns** a `Fit`; its `result` states how it ended.
     """

@@ -21,7 +21,7 @@ def place_poles(
 ) -> np.ndarray:
     """The gain (n, m) of a `Luenberger` observer whose error decays with these `poles`, 1/s, on the linearised model.
 
-    **Arguments**: `poles`, continuous, one per state without those in `leave`: real negative numbers or conjugate pairs. None
+    **Arguments**: `poles`, continuous, one per state that is not left out, real negative numbers or conjugate pairs. None
     may be repeated more often than there are channels, unless all are equal or there is one channel; `dt` (s), the step; `x`,
     the state about which the model is linearised (default: the prior's mean), a NamedTuple; `u`, its inputs by name (default:
     zeros); `leave`, states that nothing else depends on, such as a car's yaw: they get no correction. The poles of a step are

@@ -24,7 +24,7 @@ def uncertain_inputs(
     """The model with inputs that have an error, the same in transition and observation: u + e.
 
     `std`: the error's standard deviation by input, in its unit. It is white from row to row, unless `correlation` gives its
-    time constant (s): then `e` is a Gauss-Markov process with this standard deviation, as for a sensor whose offset wanders.
+    time constant (s). Then `e` is a Gauss-Markov process with this standard deviation, as for a sensor whose offset wanders.
     Each error is a state `<input>_error`, reported with the other states if the model has no report of its own. For inputs
     that are linear over a step, the error at the step's first row is held over the step.
 
