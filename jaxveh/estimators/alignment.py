@@ -1,4 +1,4 @@
-"""Sensors that speak late, and are put right: an accelerometer, found against the yaw rate, and all behind a low-pass."""
+"""Corrects late sensors: an accelerometer, timed against the yaw rate, and all channels behind a low-pass."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ from jaxveh.estimators.rear_axle import RearAxle
 from jaxveh.io import CarSpecification
 
 USUAL, SOFTER = 0.12, 0.7
-"""A delay of up to `USUAL` s is left as it is: in a fleet of cars without any, whose rear axles were fitted, up to 0.09 s were
-found (tyres near their limit). Of a car that was not fitted so is this share of its own lag: a softer one looks alike."""
+"""A delay of up to `USUAL` s is left uncorrected: in a fleet of cars without any delay, whose rear axles were fitted, up to
+0.09 s were found (tyres near their limit). For a car that was not fitted, `SOFTER` times its own lag is added: a softer axle
+looks alike."""
 
 ALIKE = 0.85
-"""Correlation below which nothing is timed."""
+"""Correlation below which no delay is estimated."""
 
 
 def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequence[Recording]) -> float:
-    """By how many seconds a_y comes late in the logs of a car, all taken together; 0 where it is as usual.
+    """The delay of a_y (s) in the logs of a car, all taken together; 0 where it is within the usual range.
 
-    It is told by the `fitted` car, and else, since a fit may take a delay for a soft axle, by the car as it was `told`, if it is
-    more than that could be wrong. A `JaxvehWarning` says so where there is one.
+    The `fitted` car is tried first. A fit may mistake a delay for a soft axle, so the car as `told` (as given) is tried next;
+    its delay counts only if it exceeds the error that a wrong stiffness could cause. A `JaxvehWarning` reports a delay that was
+    found.
     """
     recordings = [without_wild_values(one, told.wheelbase) for one in recordings]
     for car, softer in ((fitted, 0.0), (told, SOFTER)):
@@ -39,7 +41,7 @@ def a_y_delay(fitted: CarSpecification, told: CarSpecification, recordings: Sequ
 
 
 def _found(car: CarSpecification, recordings: Sequence[Recording]) -> tuple[float, float]:
-    """The delay by what a car makes of the yaw rate, and its standard error, s; nothing where it cannot be timed."""
+    """The delay of a_y against the yaw rate by the car's model, and its standard error (s); (0, 0) where it cannot be timed."""
     found = [diagnostics.a_y_delay(one, car) for one in recordings]
     sure = [one for one in found if one is not None and one.correlation > ALIKE and np.isfinite(one.error)]
     if not sure:
@@ -49,7 +51,7 @@ def _found(car: CarSpecification, recordings: Sequence[Recording]) -> tuple[floa
 
 
 def _lag(car: CarSpecification, recording: Recording) -> float:
-    """By how much a linear car's a_y comes after v_x yaw_rate, s: `v_x a m / (L C_r)` at its usual speed."""
+    """The lag of a linear car's a_y behind v_x yaw_rate (s): `v_x a m / (L C_r)` at its usual speed."""
     speed = max(float(np.nanquantile(np.asarray(recording["v_x"]), 0.75)), 0.0)
     return speed * car.front_axle_to_cg * car.mass / (car.wheelbase * float(car.rear_cornering_stiffness or np.inf))
 
@@ -57,27 +59,27 @@ def _lag(car: CarSpecification, recording: Recording) -> float:
 def _warn(seconds: float, error: float) -> None:
     words = f"{abs(seconds) * 1e3:.0f} ms (+-{2e3 * error:.0f}) too {'late' if seconds > 0 else 'early'}"
     warnings.warn(
-        f"sideslip: a_y comes {words} by what the car makes of yaw_rate; it is shifted by as much, and the car fitted again. "
-        "What is left of it, up to 0.05 s, makes the estimate worse: put the channel right where it is made.",
+        f"sideslip: a_y comes {words}, judged by the car's model and yaw_rate; it is shifted by as much, and the car fitted "
+        "again. A remaining delay, up to 0.05 s, makes the estimate worse: correct the channel at its source.",
         JaxvehWarning,
         stacklevel=4,
     )
 
 
 FELT = ("a_x", "a_y", "yaw_rate")
-"""Channels behind the low-pass that a car's file may have (`low_pass`)."""
+"""Channels that may be behind the low-pass of a car's file (`low_pass`)."""
 
 
 def on_time(recording: Recording, system: RearAxle) -> Recording:
-    """The recording with what the sensors said late where it belongs: all of `FELT` by the delay of their low-pass, a_y by its
-    own beside."""
+    """The recording with delayed channels moved to the right time: all of `FELT` by the delay of their low-pass, a_y by its own
+    delay as well."""
     low_pass, a_y = float(system.sensor_delay), float(system.a_y_delay)
     late = {name: low_pass + (a_y if name == "a_y" else 0.0) for name in FELT if name in recording}
     return recording.replace(**{name: _earlier(recording, name, by) for name, by in late.items() if by})
 
 
 def _earlier(recording: Recording, name: str, seconds: float) -> np.ndarray:
-    """A channel as it was said `seconds` later, sample by sample, so that what is stuck or missing stays so."""
+    """A channel moved earlier by `seconds`, sample by sample, so that stuck or missing samples stay so."""
     time, values = np.asarray(recording.time, float), np.asarray(recording[name])
     wanted = time + seconds
     after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)

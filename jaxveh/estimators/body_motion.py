@@ -1,5 +1,5 @@
-"""How a car moves, of what its control unit hears: held from row to row, with the angles and rates that attitude, grade and mass
-are made of."""
+"""The motion of a car from its control unit's channels, held from row to row, with the angles and rates from which attitude,
+grade and mass are estimated."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from jaxveh.vehicles import GRAVITY, regularised_speed
 
 AT = ("fl", "fr", "rl", "rr")
 SPEEDS = (Need("v_x", "m/s", optional=True), *(Need(f"wheel_speed_{at}", "m/s", optional=True) for at in AT))
-"""Where the speed is from: the channel `v_x`, which another estimator may have made, else the wheels."""
+"""The sources of the speed: the channel `v_x`, which another estimator may provide, otherwise the wheel speeds."""
 
 LATERAL = (Need("a_y", "m/s^2"), Need("yaw_rate", "rad/s"), Need("a_x", "m/s^2", optional=True), *SPEEDS)
-"""What a stability control knows of how the car turns and leans."""
+"""Channels of a stability control that describe how the car turns and leans."""
 
 SILENCE = 0.5
-"""s: a quantity is not known after its sensors have said nothing for so long."""
+"""s: a quantity counts as unknown after its channels have had no measurement for so long."""
 
 CRAWL = 2.0
-"""m/s: below this speed angles that are divided by it are regularised."""
+"""m/s: below this speed, angles that are divided by it are regularised."""
 
 
 def number_of(car: CarSpecification, key: str, who: str, unit: str) -> float:
-    """A number of a car's file. **Raises** `InputError` naming key and unit where the file is silent."""
+    """A number of a car's file. **Raises** `InputError` naming key and unit where the file does not have it."""
     value = getattr(car, key)
     if value is None:
         raise InputError(f"{who}: the car's file has no {key} ({unit}); give it.")
@@ -39,14 +39,14 @@ def number_of(car: CarSpecification, key: str, who: str, unit: str) -> float:
 
 
 def hold(value: Any, last: Any) -> Any:
-    """A measurement, or where there is none what was last said."""
+    """The measurement, or the last one where it is missing."""
     return jnp.where(jnp.isnan(value), last, value)
 
 
 def speed_heard(values: dict[str, Any], front_share: Any) -> tuple[Any, Any]:
-    """Speed in this row (m/s) and whether any was heard: the channel `v_x`, else the wheels that are there.
+    """Speed in this row (m/s) and whether it was measured: the channel `v_x`, otherwise the wheel speeds that are available.
 
-    Wheels of the axle that drives slip under power: each axle counts with the other one's share of the driving torque.
+    The wheels of a driven axle slip under power: each axle is weighted by the other axle's share of the driving torque.
     """
     speeds = jnp.stack([values[need.channel] for need in SPEEDS[1:]])
     there = ~jnp.isnan(speeds)
@@ -59,19 +59,19 @@ def speed_heard(values: dict[str, Any], front_share: Any) -> tuple[Any, Any]:
 
 
 def driven_share(front_share: Any) -> Any:
-    """How much of the driving torque acts on an axle, in the mean over the axles as they count for the speed: nearly none where
-    one axle drives, a half where both do alike."""
+    """The share of the driving torque that acts on an axle, averaged over the axles with the weights of the speed: nearly none
+    where one axle drives, a half where both drive alike."""
     front, rear = _axle_weights(front_share)
     return (front * front_share + rear * (1.0 - front_share)) / (front + rear)
 
 
 def _axle_weights(front_share: Any) -> tuple[Any, Any]:
-    """A little of each, so that one axle alone is a speed, too."""
+    """Weights of the front and rear axle, never zero, so that the speed of one axle alone can be used."""
     return 1.02 - front_share, 0.02 + front_share
 
 
 class MotionMemory(NamedTuple):
-    """The time (s), what was last heard (SI units), low-passed values, and for how long the sensors have been silent (s)."""
+    """The time (s), the last measured values (SI units), low-passed values, and how long channels have had no measurement (s)."""
 
     t: Any
     a_x: Any
@@ -88,16 +88,16 @@ class MotionMemory(NamedTuple):
 
 
 class BodyMotion(AbstractCleaning):
-    """Every row complete: `a_x`, `a_y`, `yaw_rate`, `v_x` as last heard (`speed_spoke`: whether a speed is new), and what
-    follows of them.
+    """Completes every row: the last measured `a_x`, `a_y`, `yaw_rate`, `v_x` (`speed_spoke`: whether the speed is new), and
+    quantities derived from them.
 
-    - `v_x_rate`, `slow_a_x` (m/s^2) and `slope` (rad): rate of the speed and `a_x` through a low-pass of `slope_time` (s), and
-    the body's pitch against the horizon, nose up, `(a_x - v_x_rate) / g` through the same.
-    - `late_yaw_rate` (rad/s): lower-passed by half the satellites' `delay` (s), the mean over that delay.
-    - `dt` (s): since the last row; `silence`, `pull_silence` (s): since `a_y` and `yaw_rate`, or `a_x`, or the speed, were last
-      heard.
+    - `v_x_rate`, `slow_a_x` (m/s^2) and `slope` (rad): the rate of the speed and `a_x`, both through a low-pass of `slope_time`
+    (s), and the body's pitch against the horizon, nose up, `(a_x - v_x_rate) / g` through the same low-pass.
+    - `late_yaw_rate` (rad/s): low-passed with half the satellites' `delay` (s) as time constant, for the mean over that delay.
+    - `dt` (s): the time since the last row; `silence`, `pull_silence` (s): the time since the last measurement of `a_y` and
+      `yaw_rate`, or of `a_x`; or of the speed, if that is longer.
 
-    `front_share`: the front axle's share of the driving torque. Other channels are handed on.
+    `front_share`: the front axle's share of the driving torque. Other channels are passed on.
     """
 
     front_share: jax.Array = parameter("-", default=0.5)
@@ -121,7 +121,7 @@ class BodyMotion(AbstractCleaning):
         a_x, a_y, yaw_rate = (hold(values[name], getattr(memory, name)) for name in ("a_x", "a_y", "yaw_rate"))
         pulled = ~jnp.isnan(values["a_x"])
         turned = ~(jnp.isnan(values["a_y"]) | jnp.isnan(values["yaw_rate"]))
-        # The first speed is where the low-passes begin: no speed was lost before.
+        # The low-passes begin at the first measured speed: no speed was lost before it.
         begins = spoke & (memory.started == 0)
         share = dt / (self.slope_time + dt)
         slow_speed = jnp.where(begins, v_x, memory.slow_speed + share * (v_x - memory.slow_speed))
@@ -153,11 +153,11 @@ class BodyMotion(AbstractCleaning):
 
 
 def away_from_zero(v_x: Any) -> Any:
-    """A speed to divide by, m/s, never near zero."""
+    """The speed as a divisor (m/s), never near zero."""
     return regularised_speed(v_x, CRAWL)
 
 
 def arcsin_of(a: Any) -> Any:
-    """The angle whose gravity an acceleration `a` (m/s^2) is, rad; beyond 0.9 g that of 0.9 g."""
+    """The angle at which gravity's component equals an acceleration `a` (m/s^2), rad; limited to the angle of 0.9 g."""
     s = jnp.clip(a / GRAVITY, -0.9, 0.9)
     return numerics.arctan2(s, jnp.sqrt(1.0 - s * s))

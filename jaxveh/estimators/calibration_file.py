@@ -1,4 +1,4 @@
-"""A calibration as a file: TOML that one can read, and that gives the process that made it back to the last digit."""
+"""A calibration as a file: readable TOML that restores the process that wrote it to the last digit."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ KEYS = (
 )
 
 NONE = "none"
-"""An option that is None."""
+"""The text that stands for an option that is None."""
 
 REFERENCE = ("weight", "validation")
 LOG = ("name", "start", "end")
@@ -47,19 +47,19 @@ PARAMETER = ("value", "std", "unit", "line")
 def write_calibration(calibration: Calibration, path: str | os.PathLike, *, overwrite: bool = False) -> None:
     """Write a calibration as TOML that `read_calibration` reads back to the last digit.
 
-    It holds the car's file as it was told, the logs' names and spans, the fitted parameters with their standard errors, and
-    their covariance on the lines of their bijectors, which an estimate's bands need.
+    The file holds the car's file as given, the logs' names and spans, the fitted parameters with their standard errors, and
+    their covariance on the real line of their bijectors, which the bands of an estimate need.
 
     **Raises** `InputError` where the file exists and `overwrite` is False, or the calibration did not start from a car's file.
     """
     told, fit = calibration.told, calibration.fit
     if told is None:
         raise InputError(
-            f"{path}: this calibration did not start from a car's file (io.CarSpecification) and plain options; only such a one "
-            "can be written."
+            f"{path}: this calibration did not start from a car's file (io.CarSpecification) and plain options; only such a "
+            "calibration can be written."
         )
     lines = [
-        "# A calibration by jaxveh. SI units; [parameters] are what was fitted, [car] is the car as it was told.",
+        "# A calibration by jaxveh. SI units; [parameters] are the fitted values, [car] is the car as it was given.",
         f"estimator = {kit.toml_string(calibration.estimator)}",
         f"version = {kit.toml_string(VERSION)}",
         f"result = {kit.toml_string(Result(int(fit.result)).name)}",
@@ -84,7 +84,7 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike, *, over
         ]
         lines += [f"std = {_number(fit.parameters_std[p.name])}", f"line = {_number(line)}"]
     rows = np.asarray(fit.covariance)
-    lines += ["", "[covariance]  # of the lines, the rows' halves up to the diagonal"]
+    lines += ["", "[covariance]  # of the lines, each row up to the diagonal"]
     lines += [
         f"{kit.toml_string(p.name)} = [{', '.join(_number(value) for value in rows[i, : i + 1])}]"
         for i, p in enumerate(fit.chosen)
@@ -93,17 +93,17 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike, *, over
 
 
 def read_calibration(path: str | os.PathLike) -> Calibration:
-    """The calibration that `write_calibration` wrote.
+    """Read the calibration that `write_calibration` wrote.
 
-    **Raises** `InputError` for a file that is none, is cut short, was made by another version, or holds other parameters than the
-    estimator fits.
+    **Raises** `InputError` for a file that is no calibration, is cut short, was written by another version, or holds other
+    parameters than the estimator fits.
     """
     path = Path(path)
     content = kit.read_toml(path)
     kit.check_keys(str(path), content, KEYS)
     missing = [key for key in KEYS if key not in content and key not in ("reference", "options")]
     if missing:
-        raise InputError(f"{path}: no {', '.join(missing)}: this is no calibration, or it is cut short; fit again.")
+        raise InputError(f"{path}: no {', '.join(missing)}: this is not a calibration, or it is cut short; fit again.")
     try:
         _check_version(kit.toml_text("version", content["version"]))
         return _calibration(content, path.parent)
@@ -113,7 +113,7 @@ def read_calibration(path: str | os.PathLike) -> Calibration:
 
 def _check_version(version: str) -> None:
     if version.split(".")[:2] != VERSION.split(".")[:2]:
-        raise InputError(f"version = {version!r}: the calibration is of another version than {VERSION}; fit again.")
+        raise InputError(f"version = {version!r}: the calibration was not written by version {VERSION}; fit again.")
 
 
 def _calibration(content: dict[str, Any], folder: Path) -> Calibration:
@@ -167,7 +167,7 @@ def _fit(content: dict[str, Any], start: Any, chosen: tuple[Parameter, ...]) -> 
 
 def _spans(logs: Any) -> tuple[Span, ...]:
     if not isinstance(logs, list) or not logs:
-        raise InputError("[[logs]]: must be a list of tables, one a log.")
+        raise InputError("[[logs]]: must be a list of tables, one per log.")
     spans = []
     for log in logs:
         kit.check_keys("[[logs]]", log, LOG)
@@ -189,14 +189,14 @@ def _pairs(values: Any) -> list[list[Any]]:
 
 
 def _told_number(where: str, value: Any) -> float:
-    """A number that is there; infinite ones are what a fit may have said."""
+    """A number of the file; infinite values are allowed, since a fit may return them."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"{where} = {value!r}: must be a number; the file may be cut short.")
     return float(value)
 
 
 def _number(value: Any) -> str:
-    """A number as TOML has it, which Python reads back bit for bit."""
+    """A number in TOML, which Python reads back bit for bit."""
     return repr(float(value))
 
 
@@ -205,7 +205,7 @@ def _weight(weight: float | None) -> str:
 
 
 def _plain(value: Any) -> str:
-    """An option as TOML has it, which knows no None."""
+    """An option in TOML, which has no None."""
     if value is None:
         value = NONE
     if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""All methods of all quantities as text: what each is, where it is from, what it reads, and what it asks of the car's file."""
+"""All methods of all quantities as text: description, source, channels, and the keys of the car's file that each method needs."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ FULL_CAR = CarSpecification(
     roll_gradient=0.006, roll_frequency=1.6, roll_damping=0.3, pitch_gradient=0.004,
     front=AxleTyre(B=8.0, C=1.3, D=9000.0, E=-0.5), rear=AxleTyre(B=12.0, C=1.3, D=8300.0, E=-0.5),
 )  # fmt: skip
-"""A file with every key, of which one after the other is left out to see who asks for it."""
+"""A car's file with every key, of which one at a time is left out to find the methods that need it."""
 
 
 def catalogue(quantities: Mapping[str, ModuleType]) -> str:
-    """A Markdown table a quantity: of each method its name (the recommended one in bold), what it is, its source, the channels
-    that it reads (in brackets what it can do without), and the optional keys of the car's file that it asks for."""
+    """A Markdown table per quantity. For each method: its name (the recommended one in bold), description, source, the channels
+    that it reads (optional ones in brackets), and the optional keys of the car's file that it needs."""
     parts = []
     for name, module in quantities.items():
         shown = ", ".join(f"`{field}` ({unit})" for field, unit in module.SHOWN.items())
@@ -59,7 +59,7 @@ def _row(name: str, method: MethodOfCar, module: ModuleType) -> str:
 
 
 def _short(channels: list[str]) -> list[str]:
-    """The four wheels of a channel as one."""
+    """The channels with those of the four wheels combined into one."""
     found: list[str] = []
     for channel in channels:
         plain = channel.strip("[]")

@@ -1,4 +1,4 @@
-"""What a real log needs before a filter of sideslip may read it, looking back only, so that a live loop can do the same."""
+"""Prepares a real log for a filter of sideslip, looking back only, so that a live loop can do the same."""
 
 from __future__ import annotations
 
@@ -21,30 +21,30 @@ A_X_CUTOFF = 1.6
 """Hz: the axle loads follow the longitudinal acceleration, not its vibration."""
 
 FORCE_CUTOFF = 1.0
-"""Hz, of a car of the usual wheelbase: the axle's force, whose curve is not straight, is seen without the body's vibration."""
+"""Hz, for a car of the usual wheelbase: removes the body's vibration from the axle's force, whose curve is not straight."""
 
 A_Y_STEP, A_Y_RANGE = 8.0, 40.0
-"""m/s^2: a sample further than the first from the last good one is a spike, and so is one larger than the second."""
+"""m/s^2: a sample that differs from the last good one by more than `A_Y_STEP`, or exceeds `A_Y_RANGE`, is a spike."""
 
 YAW_RATE_STEP, YAW_ACCELERATION = 0.15, 25.0
-"""rad/s, and rad/s^2, of a car of the usual wheelbase: a sample further from the last good one than noise and the quickest car
-can be is a spike."""
+"""rad/s and rad/s^2, for a car of the usual wheelbase: a sample is a spike if it differs from the last good one by more than
+noise and the quickest car allow."""
 
 OUTLYING = 20.0
-"""A spike is also further away than this many times the mean change from row to row: some channels are nothing but noise."""
+"""A spike also differs by more than this many times the mean change from row to row: some channels are nothing but noise."""
 
 MEMORY = 1.0
-"""s: over which that mean is taken."""
+"""s: the time over which that mean is taken."""
 
 LONGEST_SPIKE = 0.1
-"""s: what lasts longer is no spike."""
+"""s: a deviation that lasts longer is not a spike."""
 
 LONGEST_STILL = 0.5
-"""s: a channel of a moving car that stays the same to the last digit for longer is stuck."""
+"""s: a channel of a moving car that stays the same to the last digit for longer counts as stuck."""
 
 LONGEST_HOLD = 0.3
-"""s: for so long the last good acceleration and yaw rate stand for missing ones; later the car is taken to turn steadily,
-and, where the yaw rate is missing, lateral velocity to stay."""
+"""s: the last good acceleration and yaw rate replace missing ones for so long; after that the car is assumed to turn steadily,
+and, where the yaw rate is missing, its lateral velocity is assumed constant."""
 
 BLIND = (
     Need("v_x", "m/s", throughout=True),
@@ -52,13 +52,13 @@ BLIND = (
     Need("a_y", "m/s^2", optional=True),
     Need("a_x", "m/s^2", optional=True),
 )
-"""What sideslip is estimated from, blind. Without a_x the speed's changes take its place; without a_y every turn is taken to be
-a steady one, and then no tyre can be calibrated."""
+"""The channels from which sideslip is estimated, blind. Without a_x, the changes of the speed replace it; without a_y, every turn
+is assumed steady, and then no tyre can be calibrated."""
 
 
 class Watched(NamedTuple):
-    """Of a channel: the last good value and its time (s), the value of the row before as it came, since when (s) it has been the
-    same, and the mean size of its changes from row to row, over about `MEMORY`."""
+    """The record of one channel: the last good value and its time (s), the raw value of the row before, the time (s) since which
+    it has been the same, and the mean size of its changes from row to row, over about `MEMORY`."""
 
     value: Any
     time: Any
@@ -68,8 +68,8 @@ class Watched(NamedTuple):
 
 
 class RearAxleMemory(NamedTuple):
-    """The row before: time (s), speed, a_x; the low-passes' states; what is known of the measured channels; and the low-passes
-    of the integrals of a_y and v_x yaw_rate, less the integrals (m/s)."""
+    """The row before: time (s), speed, a_x; the states of the low-passes; the records of the measured channels; and the
+    low-passes of the integrals of a_y and v_x yaw_rate, less the integrals (m/s)."""
 
     t: Any
     v_x: Any
@@ -85,11 +85,11 @@ class RearAxleMemory(NamedTuple):
 
 
 class RearAxleCleaning(AbstractCleaning):
-    """From the log's channels to the inputs of `rear_axle_model`, and its balance: nothing, missing where the force is not known.
+    """Turns a log's channels into the inputs of `rear_axle_model` and its balance: 0, or NaN where the force is unknown.
 
-    Spikes and stuck channels are missing, and what is missing in both is held for a while. a_x is low-passed (first order); a_y
-    and yaw_rate are there as they came, for the integral, and low-passed (second order), for the force. What the integral
-    gained since the low-passed rows is added to the balance, so that the low-pass costs no delay. `wheelbase` (m).
+    Spikes and stuck samples count as missing, and missing a_y and yaw_rate are held for a while. a_x is low-passed (first order);
+    a_y and yaw_rate are used raw for the integral and low-passed (second order) for the force. The growth of the integral since
+    the low-passed rows is added to the balance, so that the low-pass causes no delay. `wheelbase` (m).
     """
 
     wheelbase: jax.Array = positive("m", default=USUAL_WHEELBASE)
@@ -114,7 +114,7 @@ class RearAxleCleaning(AbstractCleaning):
         slow = self._a_x_low_pass(v_x).start(a_x)
         smooth = [self._low_pass(v_x).start(value) for value in (a_y, yaw_rate)]
         watched = [Watched(value, t, values[name], t, none) for name, value in (("a_y", a_y), ("yaw_rate", yaw_rate))]
-        # As after a long time at this acceleration: the low-pass runs behind by its delay.
+        # As after a long time at this acceleration: the low-pass lags by its delay.
         behind = lambda rate: (-rate * self._low_pass(v_x).delay, rate)
         felt = (a_y, v_x * yaw_rate)
         a_y_behind, turning_behind = (behind(rate) for rate in felt)
@@ -126,14 +126,14 @@ class RearAxleCleaning(AbstractCleaning):
     def next(self, memory, t, values):
         dt, v_x = t - memory.t, values["v_x"]
         quick, moves = (USUAL_WHEELBASE / self.wheelbase).astype(v_x.dtype), v_x > 1.0
-        # No accelerometer at all, or none so far.
+        # No accelerometer at all, or no measurement of it yet.
         none = jnp.isnan(values["a_y"]) & jnp.isnan(memory.a_y.raw)
         turned, yaw_rate = _watch_yaw_rate(memory.yaw_rate, t, values["yaw_rate"], moves, quick)
         pushed, a_y = _watch_a_y(memory.a_y, t, values["a_y"], moves)
         # Loggers repeat the last row where a sensor is slower than the log.
         repeated = (values["yaw_rate"] == memory.yaw_rate.raw) & (values["a_y"] == memory.a_y.raw)
         old = lambda one: t - one.time > LONGEST_HOLD
-        # Where nothing at all is known, lateral velocity is taken to stay.
+        # Where the yaw rate is unknown, lateral velocity is assumed constant.
         felt = old(yaw_rate) | ~(none | old(a_y))
         rate = yaw_rate.value
         push = jnp.where(none | old(a_y) | old(yaw_rate), v_x * rate, a_y.value)
@@ -156,7 +156,7 @@ class RearAxleCleaning(AbstractCleaning):
         slow = (v_x < rolling_below(self.wheelbase)) | (dt <= 0)
         (smooth_a_y, _), (smooth, change) = memory.smooth_a_y, memory.smooth_yaw_rate
         none = jnp.zeros_like(v_x)
-        # Where no acceleration is felt, nothing makes up for the low-pass' delay: the yaw rate is taken as it comes.
+        # Where the acceleration is unknown, nothing compensates the low-pass' delay: the raw yaw rate is used.
         told = lambda usual, steady: jnp.where(felt, usual, steady)
         return {
             "v_x": v_x, "a_x": memory.slow_a_x[0], "yaw_rate": yaw_rate, "turning": v_x * yaw_rate, "a_y": a_y,
@@ -174,7 +174,7 @@ class RearAxleCleaning(AbstractCleaning):
 
 
 def without_wild_values(recording: Recording, wheelbase: float) -> Recording:
-    """The recording with yaw rate and a_y missing where they are spikes, or stuck."""
+    """The recording with yaw rate and a_y missing where they are spikes or stuck."""
     time, v_x = (np.asarray(values, float) for values in (recording.time, recording["v_x"]))
     channels = [np.asarray(recording[name], float) for name in ("yaw_rate", "a_y")]
     rows = jax.tree.map(jnp.asarray, (time - time[0], v_x, *channels))
@@ -184,12 +184,12 @@ def without_wild_values(recording: Recording, wheelbase: float) -> Recording:
 
 @eqx.filter_jit
 def _good(rows: tuple, quick) -> tuple[Any, Any]:
-    """The yaw rate and a_y of all rows, NaN where no good."""
+    """The yaw rate and a_y of all rows, NaN where they are not good."""
 
     def start(value):
         there = jnp.isfinite(value)
         first = value[jnp.argmax(there)]
-        # Its usual change is known beforehand here.
+        # Here the channel's usual change is known beforehand.
         usual = jnp.nan_to_num(jnp.nanmedian(jnp.abs(jnp.diff(value))))
         return Watched(first, rows[0][jnp.argmax(there)], first, rows[0][0], usual)
 
@@ -217,7 +217,7 @@ def _behind(low_pass: LowPass, state, rate, dt):
 
 
 def _watch(before: Watched, t, value, moves, step: float, rate: float, most: float) -> tuple[Any, Watched]:
-    """A channel's value, NaN where it is a spike or has stood still for too long, and what is known of it after the row."""
+    """A channel's value, NaN where it is a spike or has not changed for too long, and its record after the row."""
     missing = jnp.isnan(value)
     size = jnp.abs(value - before.value)
     jump = (size > step + rate * (t - before.time)) & (size > OUTLYING * before.change)
@@ -227,7 +227,7 @@ def _watch(before: Watched, t, value, moves, step: float, rate: float, most: flo
     good = ~(missing | spike | stuck)
     kept = lambda new, old: jnp.where(good, new, old)
     share = (t - before.time) / MEMORY
-    # An outlier counts for no more than the limit, so that a channel that becomes noisy is believed again.
+    # An outlier counts for no more than the limit, so that a channel that becomes noisy is accepted again.
     change = jnp.where(
         missing, before.change, before.change + jnp.minimum(share, 1.0) * (jnp.minimum(size, step) - before.change)
     )
@@ -238,9 +238,9 @@ def _watch(before: Watched, t, value, moves, step: float, rate: float, most: flo
 
 
 def clean(recording: Recording, cleaning: RearAxleCleaning | None = None) -> Recording:
-    """The log as the filter of sideslip reads it: see `RearAxleCleaning`.
+    """Clean a log as the filter of sideslip reads it: see `RearAxleCleaning`.
 
-    **Raises** `InputError` where a channel is missing, or a speed is NaN (fill it on request first).
+    **Raises** `InputError` where a channel is missing, or a speed is NaN (fill it first with `recording.fill`).
     """
     check_needs("sideslip", BLIND, recording)
     absent = {need.channel: jnp.full(len(recording), jnp.nan) for need in BLIND if need.channel not in recording}

@@ -1,7 +1,7 @@
-"""A log as a calibration reads it: smooth, a few rows a second, looking both ways.
+"""Prepares a log for a calibration: smoothed in both directions, a few rows per second.
 
-What tells of a tyre on a real log is slow: below about one swing a second the accelerometer, the yaw rate and the motion agree on
-every car, above they do not (compliance, vibration, delays of channels). So a calibration looks at no more.
+The information about a tyre in a real log is slow: below about 1 Hz the accelerometer, the yaw rate and the motion agree on
+every car; above it they do not (compliance, vibration, delays of channels). So a calibration uses only the slow part.
 """
 
 from __future__ import annotations
@@ -15,30 +15,31 @@ from jaxveh.estimators.cleaning import without_wild_values
 from jaxveh.estimators.rear_axle import CHANNEL, INPUTS, USUAL_WHEELBASE, rolling_below
 
 CUTOFF = 0.7
-"""Hz, of a car of the usual wheelbase: -3 dB of the smoothing."""
+"""Hz, for a car of the usual wheelbase: the -3 dB frequency of the smoothing."""
 
 RATE = 3.0
-"""Rows a second, of a car of the usual wheelbase: more of them would repeat what a smooth signal has said."""
+"""Rows per second, for a car of the usual wheelbase: a smooth signal holds no more information."""
 
 LONGEST_GAP = 0.3
-"""s: what lies further from a measurement counts for nothing."""
+"""s: rows further from a measurement are not counted."""
 
 ROWS = 128
-"""Logs are filled up with empty rows to a multiple of this, so that calibrations of many lengths are one program."""
+"""Logs are filled up with empty rows to a multiple of this, so that one compiled program serves calibrations of many
+lengths."""
 
 
 def coarse_logs(recordings: Sequence[Recording], wheelbase: float) -> list[Recording]:
-    """Several logs as `coarse` has each, all with as many rows as the longest."""
+    """Several logs prepared by `coarse`, all with as many rows as the longest."""
     logs = [coarse(one, wheelbase) for one in recordings]
     longest = max(len(log) for log in logs)
     return [_filled_up(log, longest) for log in logs]
 
 
 def coarse(recording: Recording, wheelbase: float) -> Recording:
-    """The inputs and the balance of `rear_axle_model`, a few rows a second, of a log with v_x, yaw_rate and a_y.
+    """The inputs and the balance of `rear_axle_model` from a log with v_x, yaw_rate and a_y, at a few rows per second.
 
-    Integrals over a step are exact: `turning` and `a_y` are means until the next row. `recording` must be one that is known in
-    every row but for gaps (NaN), which are bridged and not counted.
+    Integrals over a step are exact: `turning` and `a_y` are means until the next row. The channels of `recording` must be known
+    in every row except for gaps (NaN), which are bridged and not counted.
     """
     quick = (USUAL_WHEELBASE / wheelbase) ** 0.5
     recording = without_wild_values(recording, wheelbase)
@@ -83,7 +84,7 @@ def _bridged(recording: Recording, name: str, time: np.ndarray) -> np.ndarray:
 
 
 def _smoothed(values: np.ndarray, step: float, cutoff: float) -> np.ndarray:
-    """Weighted means with a bell of -3 dB at `cutoff` (Hz), of both sides; at the ends of what there is."""
+    """Weighted means over both sides with a bell of -3 dB at `cutoff` (Hz); at the ends, over the values that exist."""
     sigma = np.sqrt(np.log(2) / 2) / (2 * np.pi * cutoff) / step
     reach = int(4 * sigma) + 1
     bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
@@ -112,7 +113,7 @@ def _reference(recording: Recording, time: np.ndarray, step: float, quick: float
 
 
 def _filled_up(recording: Recording, count: int) -> Recording:
-    """The recording with empty rows at its end, `count` in all."""
+    """The recording filled up with empty rows at its end to `count` rows."""
     extra = count - len(recording)
     time, step = np.asarray(recording.time), float(recording.time[1] - recording.time[0])
     last = {name: np.asarray(recording[name]) for name in recording.names}

@@ -1,4 +1,4 @@
-"""Methods of one quantity side by side on one log, and what each is worth where there is a truth."""
+"""Compares the methods of one quantity on one log, and scores them where there is a truth."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from jaxveh.io import CarSpecification
 
 
 class Compared(NamedTuple):
-    """`answers` by method; `refused`: why a method could not be taken, by its name; `microseconds` a step by method, compiled
-    already, in one scan over the log."""
+    """`answers` by method; `refused`: the reason by method, for those that could not run; `microseconds` per step by method,
+    already compiled, in one scan over the log."""
 
     answers: dict[str, Answers]
     refused: dict[str, str]
@@ -27,8 +27,9 @@ class Compared(NamedTuple):
 
 
 class MethodScore(NamedTuple):
-    """Of one method and one of the names that it shows: a `diagnostics.Score` over all rows of the truth, `known`: the share of
-    those rows in which it says that it knows, `rmse_known` over them (NaN without one), `delay` (s)."""
+    """The score of one method for one of its outputs: `score`, a `diagnostics.Score` over all rows of the truth; `known`: the
+    share of those rows that the method marks as known; `rmse_known`: the RMSE over them (NaN if there are none); `delay`
+    (s)."""
 
     score: Score
     known: float
@@ -39,10 +40,10 @@ class MethodScore(NamedTuple):
 def compare(
     car: CarSpecification, recording: Recording, quantity: ModuleType, methods: Iterable[str] | None = None
 ) -> Compared:
-    """Run methods of a quantity, all of them unless `methods` names some, along a log.
+    """Run the methods of a quantity along a log: all of them, or those named in `methods`.
 
-    One that lacks a key of the car's file or a channel of the log is `refused` with the reason, unless it was named: then it
-    **raises** `InputError`, as does a name that is not there.
+    A method that needs a key missing from the car's file or a channel missing from the log is `refused` with the reason. If
+    it was named in `methods`, it **raises** `InputError` instead, as does an unknown name.
     """
     names = list(quantity.METHODS) if methods is None else list(methods)
     compared = Compared({}, {}, {})
@@ -62,8 +63,8 @@ def compare(
 
 
 def score_answers(found: Answers, name: str, truth: np.ndarray, which: np.ndarray | None = None) -> MethodScore:
-    """What the answers are worth against a `truth` (T,) of the shown `name`, in the rows where it is finite, of those `which`
-    (T,) says. **Raises** `InputError` where no row is left."""
+    """Score the answers against a `truth` (T,) of the output `name`, in the rows where it is finite and `which` (T,) is True.
+    **Raises** `InputError` where no row is left."""
     mean, std, known = (np.asarray(getattr(part, name)) for part in (found.mean, found.std, found.known))
     truth = np.asarray(truth, float)
     rows = np.isfinite(truth) & np.isfinite(mean) & (True if which is None else which)

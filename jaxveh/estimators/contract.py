@@ -1,19 +1,20 @@
-"""What an estimator of a quantity is, and what all of them share.
+"""The definition of an estimator of a quantity, and what all estimators share.
 
-An estimator is a module of `jaxveh.estimators`, named after what it estimates, with seven names and these arguments first:
+An estimator is a module of `jaxveh.estimators`, named after the quantity, with seven names, whose first arguments are:
 
 - `needs`: a tuple of `Need`, the channels that it reads and their units.
-- `car_of(car)`: the vehicle that the estimator is about, of a car's file taken at its word.
-- `model(car, ...) -> StateSpace`: the state space that a filter sees. `car`: an `io.CarSpecification`, or the vehicle that the
-  estimator is about. All other arguments have defaults and are given by name.
+- `car_of(car)`: the vehicle model of the estimator, built from a car's file without calibration.
+- `model(car, ...) -> StateSpace`: the state space that a filter uses. `car`: an `io.CarSpecification`, or the vehicle model of
+  the estimator. All other arguments have defaults and are given by name.
 - `chosen_parameters(model)`: the parameters and noise levels that a calibration fits.
-- `calibrate(car, recording, *, filter=None, progress=silent, ...) -> Calibration`: what of the car and of the noises a span of a
-  log tells, or several logs of one car together.
+- `calibrate(car, recording, *, filter=None, progress=silent, ...) -> Calibration`: parameters of the car and of the noises,
+  fitted to a span of a log, or to several logs of one car together.
 - `estimate(source, recording, *, filter=None, key=None, ...) -> Estimate`: means and standard deviations of the quantity along a
-  log; `source` is a `Calibration`, a model, or a car taken at its word. One that smooths has `smoothed=`, which turns it off.
-- `live(source, *, filter=None, key=None) -> Live`: the same a row at a time.
+  log; `source` is a `Calibration`, a model, or a car's file without calibration. An estimator that smooths has `smoothed=`,
+  which turns it off.
+- `live(source, *, filter=None, key=None) -> Live`: the same, one row at a time.
 
-`AbstractCleaning` is what stands between the log and the filter. It looks back only, so that `live` says what `estimate` says
+`AbstractCleaning` prepares the log for the filter. It looks back only, so that `live` gives the same results as `estimate`
 without smoothing.
 """
 
@@ -39,8 +40,8 @@ from jaxveh.statespace import StateSpace
 
 
 class Need(NamedTuple):
-    """A channel that an estimator reads, in its `unit`. `optional`: only where the model measures it; `throughout`: known in
-    every row, as inputs must be, while measurements may be missing (NaN)."""
+    """A channel that an estimator reads, in its `unit`. `optional`: needed only where the model measures it; `throughout`:
+    needed in every row, as inputs are, while measurements may be missing (NaN)."""
 
     channel: str
     unit: str
@@ -49,9 +50,10 @@ class Need(NamedTuple):
 
 
 def check_needs(who: str, needs: tuple[Need, ...], recording: Recording, model: StateSpace | None = None) -> None:
-    """Raise `InputError` for a channel that the recording lacks, or has in another unit, or with gaps where there may be none.
+    """Raise `InputError` for a channel that is missing from the recording, is in another unit, or has gaps where none are
+    allowed.
 
-    An optional one is needed where the `model` reads it.
+    An optional channel is needed where the `model` reads it.
     """
     read = () if model is None else (*model.inputs, *model.channels)
     wanted = [need for need in needs if not need.optional or need.channel in read]
@@ -77,13 +79,14 @@ def _check_known(who: str, name: str, recording: Recording) -> None:
     if gaps.any():
         raise InputError(
             f"{who}: input channel {name} is NaN in {int(gaps.sum())} rows, first at t = "
-            f"{np.asarray(recording.time)[np.argmax(gaps)]:g} s: an input must be known. "
-            f'Fill it on request: recording.fill("{name}", "linear", max_gap=0.1).'
+            f"{np.asarray(recording.time)[np.argmax(gaps)]:g} s: an input must be known in every row. "
+            f'Fill it with: recording.fill("{name}", "linear", max_gap=0.1).'
         )
 
 
 class Span(NamedTuple):
-    """What a calibration saw of a log: from `start` to `end` (s, in the log's own time); `log`: its file's name, "" for none."""
+    """The span of a log used by a calibration: from `start` to `end` (s, in the log's own time); `log`: its file's name, or
+    ""."""
 
     start: float
     end: float
@@ -91,26 +94,27 @@ class Span(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What a calibration started from: a car's file, and the options of its `model` by name, plain values."""
+    """The start of a calibration: a car's file, and the options of its `model` by name, as plain values."""
 
     car: CarSpecification
     options: tuple[tuple[str, Any], ...] = ()
 
 
 def start_of(car: Any, options: Mapping[str, Any] | None = None) -> Told | None:
-    """What a calibration started from; None where that was no file, or an option is no plain value: it cannot be written then."""
+    """The start of a calibration; None if it was not a car's file or an option is not a plain value, which cannot be
+    written."""
     options = options or {}
     plain = all(value is None or isinstance(value, str | float | int) for value in options.values())
     return Told(car, tuple(options.items())) if plain and isinstance(car, CarSpecification) else None
 
 
 class Calibration(Shown, eqx.Module):
-    """What logs told an estimator of a car; a file of it is written and read by `write_calibration` and `read_calibration`.
+    """An estimator's parameters fitted to logs; `write_calibration` and `read_calibration` write and read it as a file.
 
-    `estimator`: its name; `fit`: the `fitting.Fit` (its `model` is the fitted StateSpace); `spans`: what was seen, one a log.
-    Where a reference was offered, `weight` is the one that it got in the fit, in the reference's unit, None for none, by
-    choice or because validation inside the span said so; `validation`: the error that each weight tried left there. `told`: what
-    the fit started from, None where that was no car's file.
+    `estimator`: its name; `fit`: the `fitting.Fit` (its `model` is the fitted StateSpace); `spans`: the spans used, one per
+    log. If a reference was given, `weight` is its weight in the fit, in the reference's unit, or None if validation inside
+    the span chose not to use it; `validation`: the validation error of each weight that was tried. `told`: the start of the
+    fit, None if it was not a car's file.
     """
 
     estimator: str = eqx.field(static=True)
@@ -121,16 +125,16 @@ class Calibration(Shown, eqx.Module):
     told: Told | None = eqx.field(static=True, default=None)
 
     def plot(self, *arguments: Any, **options: Any) -> Any:
-        """The fitted parameters with their standard errors (`plots.fit`). **Returns** the figure."""
+        """Plot the fitted parameters with their standard errors (`plots.fit`). **Returns** the figure."""
         return self.fit.plot(*arguments, **options)
 
     def save(self, path: str | os.PathLike, *, overwrite: bool = False) -> None:
-        """Write it as TOML; see `write_calibration`."""
+        """Write the calibration as TOML; see `write_calibration`."""
         above("estimators", "write_calibration")(self, path, overwrite=overwrite)
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Calibration:
-        """What `save` wrote; see `read_calibration`."""
+        """Read the calibration that `save` wrote; see `read_calibration`."""
         return above("estimators", "read_calibration")(path)
 
     def _labelled(self) -> Labelled:
@@ -147,7 +151,7 @@ class Calibration(Shown, eqx.Module):
         return self.fit.model
 
     def with_log_names(self, *logs: str) -> Calibration:
-        """The same with the names of the logs' files."""
+        """The same calibration with the names of the logs' files."""
         spans = tuple(span._replace(log=log) for span, log in zip(self.spans, logs, strict=True))
         return dataclasses.replace(self, spans=spans)
 
@@ -163,14 +167,14 @@ class Calibration(Shown, eqx.Module):
 
 
 def in_words(name: str) -> str:
-    """The name of a fitted parameter as tables show it."""
+    """The name of a fitted parameter as shown in tables."""
     for path, words in (("process_noise.law.std", "process noise"), ("measurement_noise.std", "measurement noise")):
         name = name.replace(path, words)
     return name
 
 
 def model_of(who: str, source: Any, model: Callable[[Any], StateSpace]) -> StateSpace:
-    """The state space of a `source`: that of a calibration or a model as it is, else `model(car)`.
+    """The state space of a `source`: that of a calibration, a model itself, or otherwise `model(car)`.
 
     **Raises** `InputError` for a calibration of another estimator.
     """
@@ -179,7 +183,7 @@ def model_of(who: str, source: Any, model: Callable[[Any], StateSpace]) -> State
     if not isinstance(source, Calibration):
         return model(source)
     if source.estimator != who:
-        raise InputError(f"{who}: the calibration is one of {source.estimator}: must be made by {who}.calibrate.")
+        raise InputError(f"{who}: the calibration was made by {source.estimator}: must be made by {who}.calibrate.")
     return source.model
 
 
@@ -188,7 +192,7 @@ def spans_of(
 ) -> tuple[list[Recording], tuple[Span, ...]]:
     """The recordings to calibrate on, as a list, and their spans.
 
-    **Raises** `InputError` for one that is shorter than `shortest` (s), and cannot hold `what` is needed, or for none at all.
+    **Raises** `InputError` if there is no recording, or one is shorter than `shortest` (s), too short to contain `what`.
     """
     recordings = [recording] if isinstance(recording, Recording) else list(recording)
     if not recordings:
@@ -205,14 +209,15 @@ def spans_of(
 
 
 PIECE_LENGTH = 8.0
-"""s: calibration runs the filter on pieces of about this length side by side,"""
+"""s: a calibration runs the filter in parallel on pieces of about this length."""
 
 WARM_UP = 2.0
-"""s: which overlap by this, in which each filter finds its state."""
+"""s: the pieces overlap by this; in the overlap each filter finds its state."""
 
 
 def cut_pieces(log: Recording, length: float = PIECE_LENGTH, overlap: float = WARM_UP) -> tuple[list[Recording], int]:
-    """The log in pieces of one number of rows, about `length` seconds beside an `overlap` (s), and the overlap's rows."""
+    """Cut the log into pieces of equal numbers of rows, about `length` seconds plus an `overlap` (s); also the overlap's
+    rows."""
     time = np.asarray(log.time)
     step = float(np.median(np.diff(time)))
     warm_up = round(overlap / step)

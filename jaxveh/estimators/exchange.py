@@ -1,4 +1,4 @@
-"""Methods that work side by side, each reading what others say as if it were a channel of the log."""
+"""Runs methods side by side, each reading the outputs of the others like channels of the log."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jaxveh.estimators.method import AbstractMethod, Answer
 
 
 class Exchange(AbstractMethod):
-    """Methods by name, each of which may read what another says.
+    """Methods by name, each of which may read an output of another.
 
         whole = Exchange(
             {"speed": speed.METHODS["slip_aware"].make(car), "sideslip": sideslip.METHODS["adapted_stiffness"].make(car)},
@@ -24,18 +24,18 @@ class Exchange(AbstractMethod):
         found = kit.follow("whole", whole, log)             # the log needs no v_x
         found["sideslip_sideslip"], found.std.speed_v_x
 
-    So the review would divide the task (Chen, Gao, Xu 2013, conclusion 2), and paper 002 does. `gives`: of a channel, who says it
-    and under which name. A method reads what was said of this row where who says it stands before it, and of the row before where
-    it stands behind; two may read each other. Nothing has been said before the first row, and of what is not finite: then the
-    channel was not measured (NaN). Spreads are not handed on: what is read counts as a measurement with the noise that the reader
-    expects.
+    The review proposes to divide the task in this way (Chen, Gao, Xu 2013, conclusion 2), and paper 002 does so. `gives`: the
+    source of each such channel, as method and output name. A method reads the output of this row if its source comes earlier in
+    `methods`, and that of the row before if it comes later; two methods may read each other. The channel counts as not measured
+    (NaN) in the first row, where there is no earlier output, and wherever the output is not finite. Standard deviations are not
+    passed on: the channel counts as a measurement with the noise that the reading method expects.
 
-    An answer has the names of all, `<method>_<name>`; its result is the first code that is not 0.
+    An answer contains all outputs, named `<method>_<name>`; its result is the first code that is not 0.
 
-    **Raises** `InputError` for a giver or a name that is not there.
+    **Raises** `InputError` for an unknown source or an unknown output.
     """
 
-    # Not a mapping, whose order is lost on the way into a compiled function.
+    # Not a mapping: its order would be lost when it is passed to a compiled function.
     names: tuple[str, ...] = eqx.field(static=True)
     methods: tuple[AbstractMethod, ...]
     gives: tuple[tuple[str, str, str], ...] = eqx.field(static=True)
@@ -104,7 +104,7 @@ class Exchange(AbstractMethod):
 
 def _value_of(answer: Answer, giver: str, name: str, like: Any) -> Any:
     if name not in answer.mean._fields:
-        raise InputError(f"Exchange: {giver}.{name}: it says {', '.join(answer.mean._fields)}.")
+        raise InputError(f"Exchange: {giver}.{name}: the method reports {', '.join(answer.mean._fields)}.")
     value = getattr(answer.mean, name).astype(like.dtype)
     return jnp.where(jnp.isfinite(value), value, jnp.nan)
 

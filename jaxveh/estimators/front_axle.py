@@ -1,4 +1,4 @@
-"""The front axle's stiffness and the steer's offset, once sideslip is known."""
+"""Fits the front axle's stiffness and the steer offset, once sideslip is known."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from jaxveh.filters import Extended, smooth
 from jaxveh.statespace import StateSpace
 
 LARGEST_SHARE = 0.6
-"""Of the rear axle's grip: forces up to this are told from a straight line."""
+"""Share of the rear axle's grip: the straight line is fitted to forces up to this."""
 
 
 FEWEST = 20
-"""Rows that a straight line is told from."""
+"""The least number of rows for the fit."""
 
 
 class FrontAxle(NamedTuple):
-    """What a car's file says of it: N/rad; rad, what the steer channel shows when the car runs straight."""
+    """The front axle's values for a car's file: the stiffness in N/rad, and the reading of the steer channel in rad when the
+    car runs straight."""
 
     front_cornering_stiffness: float
     steer_offset: float
@@ -30,9 +31,9 @@ class FrontAxle(NamedTuple):
 def front_axle(model: StateSpace, recordings: Sequence[Recording]) -> FrontAxle | None:
     """Least squares of slip angles on forces: `steer - v_y / v_x - a yaw_rate / v_x = F / stiffness + offset`.
 
-    Forces and v_y are those that a calibrated `rear_axle_model` sees in the logs; rows beyond `LARGEST_SHARE` do not count, nor
-    those that are slow. None where too few are left, or where the slip angle does not grow with the force: a steer that is no
-    steer.
+    Forces and v_y are those of a calibrated `rear_axle_model` on the logs; rows beyond `LARGEST_SHARE` or too slow are not
+    counted. None if too few rows are left, or if the slip angle does not grow with the force: then the channel is not a
+    steering angle.
     """
     seen = [_seen(model, one) for one in recordings]
     slip, force = (np.concatenate(values) for values in zip(*seen, strict=True))

@@ -1,4 +1,4 @@
-"""What those who add an estimator build with: see `jaxveh.estimators.contract` for what one is."""
+"""The parts for adding an estimator: see `jaxveh.estimators.contract` for its definition."""
 
 from jaxveh.estimators.catalogue import FULL_CAR, catalogue, keys_asked
 from jaxveh.estimators.contract import Need, check_needs, cut_pieces, in_words, model_of, spans_of, start_of

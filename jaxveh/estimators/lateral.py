@@ -1,4 +1,4 @@
-"""The lateral motion of a car with little slip, of its file's numbers: what simple methods of bank, roll and geometry share."""
+"""Lateral motion of a car at small slip, from the numbers of its file: shared by simple methods of bank, roll and geometry."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from jaxveh.vehicles import GRAVITY
 
 
 class Lateral(eqx.Module):
-    """`wheelbase`, `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle for a lateral acceleration,
-    `m l_f / (l C_r)`; `understeer` (rad/(m/s^2)): the front axle's less the rear axle's; `roll_gradient` (rad/(m/s^2))."""
+    """`wheelbase`, `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle per lateral acceleration,
+    `m l_f / (l C_r)`; `understeer` (rad/(m/s^2)): the front axle's compliance less the rear axle's; `roll_gradient`
+    (rad/(m/s^2))."""
 
     wheelbase: jax.Array = positive("m")
     rear_axle_to_cg: jax.Array = positive("m")
@@ -27,16 +28,16 @@ class Lateral(eqx.Module):
         check_parameters(self)
 
     def plane_force(self, a_y: Any) -> Any:
-        """Lateral specific force in the road's plane (m/s^2) of what a sensor on the rolling body shows: `a_y / (1 + g R)`."""
+        """Lateral specific force in the road's plane (m/s^2) from a sensor on the rolling body: `a_y / (1 + g R)`."""
         return a_y / (1.0 + GRAVITY * self.roll_gradient)
 
     def rear_speed(self, v_x: Any, yaw_rate: Any, f_y: Any) -> Any:
-        """Lateral speed (m/s) at the centre of gravity of a rear axle that carries its share of `f_y`."""
+        """Lateral speed (m/s) at the centre of gravity when the rear axle carries its share of `f_y`."""
         return self.rear_axle_to_cg * yaw_rate - v_x * self.rear_compliance * f_y * (v_x / away_from_zero(v_x))
 
 
 def lateral_of(car: CarSpecification, who: str) -> Lateral:
-    """Of a car's file. **Raises** `InputError` for one without `roll_gradient` or stiffnesses."""
+    """The model of a car's file. **Raises** `InputError` for a file without `roll_gradient` or stiffnesses."""
     front = number_of(car, "front_cornering_stiffness", who, "N/rad")
     rear = number_of(car, "rear_cornering_stiffness", who, "N/rad")
     rear_compliance = car.mass * car.front_axle_to_cg / (car.wheelbase * rear)
@@ -50,5 +51,5 @@ def lateral_of(car: CarSpecification, who: str) -> Lateral:
 
 
 def motion_of(car: CarSpecification) -> BodyMotion:
-    """What makes rows complete, with the car's share of driving torque."""
+    """The cleaning that completes rows, with the car's share of driving torque."""
     return BodyMotion(front_share=0.5 if car.front_drive is None else car.front_drive)

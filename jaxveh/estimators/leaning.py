@@ -1,4 +1,4 @@
-"""Bank and roll in one filter: the lateral kinematics, a body on its springs, a road that tilts slowly."""
+"""Bank and roll in one filter: lateral kinematics, a body on its springs, and a road whose bank changes slowly."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from jaxveh.vehicles import GRAVITY
 DEGREE = math.pi / 180.0
 
 NEEDS = (*LATERAL, Need("roll_rate", "rad/s", optional=True), Need("course", "rad", optional=True))
-"""Those of a stability control; a gyroscope about the x axis and satellite navigation where there are any."""
+"""The channels of a stability control; a gyroscope about the x axis and satellite navigation where available."""
 
 STATES = (
     "v_y", "yaw", "bank", "bank_rate", "body_roll", "body_roll_rate", "a_y_bias", "yaw_rate_bias", "roll_rate_bias",
@@ -31,47 +31,49 @@ STATES = (
 State = record_type("LeaningState", STATES)
 
 WIDEST = 1.0 * DEGREE
-"""rad: with a wider spread bank and roll count as not known."""
+"""rad: with a larger standard deviation, bank and roll count as unknown."""
 
 
 LINEAR = 4.0
-"""m/s^2: about here a tyre's slip angle begins to grow faster than its force."""
+"""m/s^2: from about here a tyre's slip angle grows faster than its force."""
 
 SLOWEST = 3.0
-"""m/s: a road passes at least so fast, so that the law of its bank has a spread at standstill."""
+"""m/s: the speed at which the road passes is at least this, so that the law of its bank has a spread at standstill."""
 
 
 MORE = ("v_y", "rear_scale", "roll_scale", "a_y_bias", "yaw_rate_bias", "roll_rate_bias")
-"""States that are reported beside bank and roll."""
+"""States that are reported in addition to bank and roll."""
 
 
 class Memory(NamedTuple):
-    """What was heard, and what is believed."""
+    """The last measurements, and the belief."""
 
     motion: Any
     belief: Belief
 
 
 class Leaning(AbstractMethod):
-    """Bank, roll and the offsets of the sensors that tell them, by an extended Kalman filter (small angles):
+    """Bank, roll and the offsets of the sensors that measure them, by an extended Kalman filter (small angles):
 
         d v_y = f_y - g bank - v_x r,    f_y = a_y - a_y_bias - g body_roll,    r = yaw_rate - yaw_rate_bias
         body_roll'' = w^2 (gradient f_y - body_roll) - 2 D w body_roll'
         bank' = bank_rate - v_x / bank_length bank,    bank_rate' = -v_x / bank_edge bank_rate + noise
 
-    `f_y` is the lateral acceleration in the road's plane. What is measured: the rear axle's slip angle against that of its
-    force, wrong by an error that lasts; `course` of satellites, the heading and the sideslip angle `delay` ago, which knows
-    nothing of tyres; `roll_rate`: roll and bank that change, less the yaw rate's part in a car that points uphill. A constant
-    bank and the accelerometer's offset are the same to all of them: what separates them is that roads tilt to either side about
-    level, and the offset stays. So the spread of a bank falls slowly, and an offset of earlier drives helps (`a_y_offset`).
+    `f_y` is the lateral acceleration in the road's plane. The measurements are: the rear axle's slip angle, compared with
+    that of its force, with a correlated error; `course` of satellites, which is the heading plus the sideslip angle `delay`
+    ago and does not depend on tyres; `roll_rate`, the rate of roll and bank plus a part of the yaw rate when the car points
+    uphill. None of them can distinguish a constant bank from the accelerometer's offset. The two are separated only because
+    roads bank to either side about level, while the offset stays. So the standard deviation of the bank falls slowly, and an
+    offset from earlier drives helps (`a_y_offset`).
 
-    **Parameters**: `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle for a lateral acceleration,
-    `m l_f / (l C_r)`; `roll_gradient` (rad/(m/s^2)), `roll_frequency` (Hz), `roll_damping` (-) of the body over the road;
-    `bank_spread` (rad), `bank_length`, `bank_edge` (m): standard deviation of banks, over which they are forgotten, and over
-    which they begin to change; `slip_error` (rad), which lasts `slip_error_time` (s); `roll_rate_noise` (rad/s), `across` (m/s):
-    of the gyroscope about x, of the satellites' velocity across; `delay` (s) of these; `a_y_offset` (m/s^2): what is known of the
-    accelerometer's, `a_y_offset_spread`, `gyro_offset_spread` (rad/s): how well at the start; `scale_spread` (-): of compliance
-    and roll gradient about the car's file.
+    **Parameters**: `rear_axle_to_cg` (m); `rear_compliance` (rad/(m/s^2)): the rear axle's slip angle per lateral
+    acceleration, `m l_f / (l C_r)`; `roll_gradient` (rad/(m/s^2)), `roll_frequency` (Hz), `roll_damping` (-) of the body over
+    the road; `bank_spread` (rad): the standard deviation of banks; `bank_length`, `bank_edge` (m): the distances over which a
+    bank is forgotten and over which it begins to change; `slip_error` (rad), whose correlation time is `slip_error_time` (s);
+    `roll_rate_noise` (rad/s): the noise of the gyroscope about x; `across` (m/s): the noise of the satellites' lateral
+    velocity; `delay` (s) of the satellites; `a_y_offset` (m/s^2): the accelerometer's offset as known beforehand;
+    `a_y_offset_spread` (m/s^2), `gyro_offset_spread` (rad/s): standard deviations of the offsets at the start; `scale_spread`
+    (-): the standard deviation of compliance and roll gradient about the car's file.
     """
 
     motion: BodyMotion
@@ -119,7 +121,7 @@ class Leaning(AbstractMethod):
     def _ahead(self, belief: Belief, heard) -> Belief:
         dt = heard["dt"]
         fast = self._passing(heard["v_x"])
-        # The bank's law by the metre: a chain of two first-order lags, with this variance.
+        # The law of the bank by distance: a chain of two first-order lags, with this variance.
         slow, quick = fast / self.bank_length, fast / self.bank_edge
         bank_walk = 2.0 * jnp.square(self.bank_spread) * slow * quick * (slow + quick)
         per_second = {
@@ -139,7 +141,7 @@ class Leaning(AbstractMethod):
         dt = heard["dt"]
         f_y, turn = self._plane_force(x, heard), heard["yaw_rate"] - x.yaw_rate_bias
         v_y = x.v_y + dt * (f_y - GRAVITY * x.bank - heard["v_x"] * turn)
-        # Trapezoidal: a body on its springs stays stable however long a row is.
+        # Trapezoidal: the body on its springs stays stable however long a step is.
         w, half = 2.0 * math.pi * self.roll_frequency, 0.5 * dt
         damping = 2.0 * self.roll_damping * w
         gradient = self.roll_gradient * (1.0 + x.roll_scale)
@@ -185,7 +187,7 @@ class Leaning(AbstractMethod):
 
         forgets = self._passing(v_x) / self.bank_length
         satellites, gyroscope = ~jnp.isnan(heard["course"]), ~jnp.isnan(heard["roll_rate"])
-        # An error that lasts counts once in its time, however many rows there are; in hard turns tyres are not linear.
+        # A correlated error counts once per correlation time, however many rows there are; in hard turns tyres are not linear.
         lasting = jnp.square(self.slip_error) * 2.0 * self.slip_error_time / jnp.maximum(dt, 1e-3)
         slip = lasting * (1.0 + jnp.square(jnp.square(heard["a_y"] / LINEAR)))
         there = heard["silence"] < SILENCE
@@ -213,7 +215,8 @@ class Leaning(AbstractMethod):
 
 
 def leaning_filter(car: CarSpecification, who: str, **options: Any) -> Leaning:
-    """The filter of a car's file. **Raises** `InputError` for one without `roll_gradient`, which tells roll from bank."""
+    """The filter for a car's file. **Raises** `InputError` for a file without `roll_gradient`, which separates roll from
+    bank."""
     stiffness = number_of(car, "rear_cornering_stiffness", who, "N/rad")
     told = {name: getattr(car, name) for name in ("roll_frequency", "roll_damping")}
     return Leaning(

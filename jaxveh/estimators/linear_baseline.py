@@ -1,4 +1,4 @@
-"""The do-nothing baseline: a linear single track that listens to steer and speed and to no sensor."""
+"""The do-nothing baseline: a linear single track that reads steer and speed only, and no other sensor."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ PROPAGATE = Propagate(_derivatives)
 
 
 def open_loop(car: SingleTrack, recording: Recording) -> dict[str, np.ndarray]:
-    """What a linear single track makes of `steer` (rad) and `v_x` (m/s) alone, from straight running at the first row.
+    """Simulate a linear single track from `steer` (rad) and `v_x` (m/s) alone, from straight running at the first row.
 
-    The car's own cornering stiffnesses at its static loads, without load transfer. **Returns** by name, (T,) each: `v_y`
-    (m/s), `yaw_rate` (rad/s), `sideslip` (rad). **Raises** `InputError` for missing channels, or a car that needs more than
-    `steer`.
+    Uses the car's own cornering stiffnesses at its static loads, without load transfer. **Returns** by name, (T,) each: `v_y`
+    (m/s), `yaw_rate` (rad/s), `sideslip` (rad). **Raises** `InputError` for missing channels, or a car that needs more inputs
+    than `steer`.
     """
     if car.steering.inputs != ("steer",):
         raise InputError(
-            f"open_loop: car.steering = {type(car.steering).__name__}: needs {', '.join(car.steering.inputs)}; must be one by "
-            "steer alone."
+            f"open_loop: car.steering = {type(car.steering).__name__}: needs {', '.join(car.steering.inputs)}; must be a "
+            "steering whose only input is steer."
         )
     found = open_loop_of(car, recording.time, recording["steer"], recording["v_x"])
     return {name: np.asarray(values) for name, values in found.items()}
 
 
 def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndarray]:
-    """`v_y` and `sideslip` of the car's file by `open_loop`; without `steer` or `v_x` those of a car that does not slip."""
+    """`v_y` and `sideslip` of the car's file by `open_loop`; zeros where `steer` or `v_x` is missing."""
     recording = with_road_steer(car, recording)
     steered = all(name in recording and np.isfinite(np.asarray(recording[name])).any() for name in ("steer", "v_x"))
     if not steered:
@@ -51,7 +51,7 @@ def do_nothing(car: CarSpecification, recording: Recording) -> dict[str, np.ndar
 
 @eqx.filter_jit
 def open_loop_of(car: SingleTrack, time, steer, v_x) -> dict[str, jax.Array]:
-    """The same of (T,) arrays alone, which may be traced."""
+    """The same as `open_loop` for (T,) arrays, which may be traced."""
     plain = linear(eqx.tree_at(lambda c: c.cg_height, car, None, is_leaf=lambda leaf: leaf is None))
     inputs = {"steer": jnp.asarray(steer), "v_x": jnp.asarray(v_x)}
     states = _drive(plain, Row(jnp.asarray(time), record("Inputs", inputs), ()))

@@ -1,4 +1,4 @@
-"""Estimates a row at a time, and the cleaning that both a log and a live loop go through."""
+"""Estimates one row at a time, with the same cleaning for logs and live loops."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ from jaxveh.statespace import AbstractFilter, Info, Row, StateSpace, kit
 
 
 class AbstractCleaning(eqx.Module):
-    """What a log goes through before a filter reads it, row by row, looking back only.
+    """Prepares the rows of a log for a filter, row by row, looking back only.
 
-    A row is a time (s) and a mapping of `channels` to scalars, NaN where missing. What is returned is the memory for the next
-    row, and the channels as the filter gets them.
+    A row is a time (s) and a mapping of `channels` to scalars, NaN where missing. The methods return the memory for the next
+    row, and the channels for the filter.
     """
 
     @property
     @abc.abstractmethod
     def channels(self) -> tuple[str, ...]:
-        """The channels that it reads; none where it hands on those of the model."""
+        """The channels that it reads; empty if it passes on those of the model."""
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Those of them that every row must have; by default the model's inputs."""
+        """The channels that every row must have; by default the model's inputs."""
         return ()
 
     @abc.abstractmethod
     def first(self, t: Any, values: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-        """The memory after the first row, and what the filter gets of it."""
+        """The memory after the first row, and the channels for the filter."""
 
     @abc.abstractmethod
     def next(self, memory: Any, t: Any, values: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-        """The same of the next row."""
+        """The same for the next row."""
 
 
 class AsItIs(AbstractCleaning):
-    """Nothing is changed."""
+    """Passes all channels on unchanged."""
 
     @property
     def channels(self):
@@ -60,7 +60,7 @@ class AsItIs(AbstractCleaning):
 
 
 def clean_recording(cleaning: AbstractCleaning, recording: Recording) -> Recording:
-    """The recording after its cleaning, with the same rows."""
+    """The recording after the `cleaning`, with the same rows."""
     values = {name: recording[name] for name in cleaning.channels}
     if not values:
         return recording
@@ -84,8 +84,8 @@ def _clean_rows(cleaning: AbstractCleaning, time: Any, values: dict[str, Any]) -
 
 
 class LiveBelief(NamedTuple):
-    """What a live estimator carries from row to row: the filter's belief, the cleaning's memory, and the beliefs of the members
-    that the bands know of, if any."""
+    """The state of a live estimator between rows: the filter's belief, the cleaning's memory, and the beliefs of the members
+    for the bands, if any."""
 
     belief: Any
     memory: Any
@@ -93,8 +93,8 @@ class LiveBelief(NamedTuple):
 
 
 class LiveAnswer(NamedTuple):
-    """What an estimator says of a row: `mean` and standard deviation `std` by name, as fields of the same NamedTuple that an
-    Estimate has, and the filter's `info`."""
+    """The estimate of one row: `mean` and standard deviation `std` by name, as fields of the same NamedTuple as in an Estimate,
+    and the filter's `info`."""
 
     mean: Any
     std: Any
@@ -102,18 +102,18 @@ class LiveAnswer(NamedTuple):
 
 
 class Live(eqx.Module):
-    """An estimator that is given one row at a time, cleaning included, and says what `estimate` says of the same rows
-    without smoothing.
+    """An estimator for one row at a time, cleaning included. It gives the same results as `estimate` on the same rows without
+    smoothing.
 
         live = estimators.sideslip.live(calibration)
         belief, answer = live.init(t, {"v_x": ..., "a_x": ..., "a_y": ..., "yaw_rate": ...})
         belief, answer = live.step(belief, t, {...})
         answer.mean.sideslip, answer.std.sideslip
 
-    Its bands know of the parameters' uncertainty where `members` stand for it (`parameter_bands`).
+    Its bands include the parameters' uncertainty if `members` are given (`parameter_bands`).
 
-    Compiled once each. Inputs must be given; of measurements those that are not given, or NaN, are missing. Channels that the
-    model does not read are not looked at. Where float32 rules, count time from the first row.
+    `init` and `step` are compiled once each. Inputs must be given; a measurement that is not given, or NaN, counts as missing.
+    Channels that the model does not read are ignored. In float32, count time from the first row.
     """
 
     filter: AbstractFilter
@@ -123,7 +123,7 @@ class Live(eqx.Module):
     members: Members | None = None
 
     def init(self, t, channels: Mapping[str, Any]) -> tuple[LiveBelief, LiveAnswer]:
-        """The belief after the first row, and what it says.
+        """The belief after the first row, and its answer.
 
         **Raises** `InputError` for an input that is not given, and as the filter does.
         """
@@ -131,11 +131,11 @@ class Live(eqx.Module):
         return live_init(self, self._row(t, channels))
 
     def step(self, belief: LiveBelief, t, channels: Mapping[str, Any]) -> tuple[LiveBelief, LiveAnswer]:
-        """The belief after the next row, and what it says. **Raises** `InputError` for an input that is not given."""
+        """The belief after the next row, and its answer. **Raises** `InputError` for an input that is not given."""
         return live_step(self, belief, self._row(t, channels))
 
     def _row(self, t, channels: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
-        """Time and channels as scalars: those that the cleaning reads, else those of the model; NaN for what is not given."""
+        """Time and channels as scalars: the channels of the cleaning, otherwise of the model; NaN where not given."""
         needed = self.cleaning.inputs or self.model.inputs
         missing = [name for name in needed if name not in channels]
         if missing:
@@ -148,7 +148,7 @@ class Live(eqx.Module):
 
 @eqx.filter_jit
 def live_init(live: Live, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
-    """What `Live.init` does, of a row's time and channels as scalars."""
+    """The compiled part of `Live.init`, for a row's time and channels as scalars."""
     memory, values = apart(live.cleaning.first, row[0], *row)
     cleaned = _cleaned(live.model, row[0], values)
     belief, info = live.filter.init(live.model, cleaned, live.key)
@@ -159,7 +159,7 @@ def live_init(live: Live, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
 
 @eqx.filter_jit
 def live_step(live: Live, before: LiveBelief, row: tuple) -> tuple[LiveBelief, LiveAnswer]:
-    """What `Live.step` does, of a row's time and channels as scalars."""
+    """The compiled part of `Live.step`, for a row's time and channels as scalars."""
     memory, values = apart(live.cleaning.next, row[0], before.memory, *row)
     cleaned = _cleaned(live.model, row[0], values)
     belief, info = live.filter.step(live.model, before.belief, cleaned)

@@ -34,22 +34,23 @@ needs = (
 """Torques at the wheels, summed, in every row; speed where it was measured; an accelerometer where the model has one."""
 
 DRAG_SPREAD, NOISE_SPREAD = 0.5, 0.7
-"""Prior spreads of what a calibration fits: of the drag in units of its scale, of each noise level on its logarithm."""
+"""Prior standard deviations of the fitted parameters: of the drag in units of its scale, of each noise level on its
+logarithm."""
 
 SHORTEST = 30.0
-"""s: in less the pedals have moved too seldom to tell the noises from the grade."""
+"""s: in a shorter span the pedals move too seldom to distinguish the noises from the grade."""
 
 
 def car_of(car: CarSpecification | Longitudinal) -> Longitudinal:
-    """The car that goes straight of a car's file; what the file leaves out is the vehicle's default.
+    """The car in straight motion from a car's file; for values missing from the file, the vehicle's defaults.
 
-    **Raises** `InputError` for a file without `wheel_radius`, by which a torque becomes a force.
+    **Raises** `InputError` for a file without `wheel_radius`, which converts a torque into a force.
     """
     if isinstance(car, Longitudinal):
         return car
     if car.wheel_radius is None:
         raise InputError(
-            "mass_and_grade: the car's file has no wheel_radius (m), by which a torque becomes a force; give it."
+            "mass_and_grade: the car's file has no wheel_radius (m), which converts a torque into a force; give it."
         )
     told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance")}
     known = {name: value for name, value in told.items() if value is not None}
@@ -73,25 +74,25 @@ def model(
     input_path: str = "linear",
     more_inputs: tuple[str, ...] = (),
 ) -> StateSpace:
-    """The state space [v_x, grade, (grade_rate), (bias), mass] of a car that goes straight, for any filter.
+    """The state space [v_x, grade, (grade_rate), (bias), mass] of a car in straight motion, for any filter.
 
-    The car's mass is the first guess. From speed and torque alone mass and grade can be told apart only by how the speed
-    answers pedals that move: the torque's part of the acceleration goes with 1 / mass, the grade's does not. With a grade that
-    is a random walk its changes take up what the mass should explain; a grade whose **rate** walks is smooth over seconds, and
-    leaves the fast answers to the mass. An accelerometer feels force over mass without the grade, and tells both at once.
+    The car's mass is the first guess. From speed and torque alone, mass and grade can be distinguished only by how the speed
+    responds to moving pedals: the torque's part of the acceleration goes with 1 / mass, the grade's does not. If the grade is a
+    random walk, its changes absorb what the mass should explain; if its **rate** walks, the grade is smooth over seconds and
+    leaves the fast responses to the mass. An accelerometer measures force over mass without the grade, and separates the two.
 
-    **Arguments** (standard deviations): `v_x` (m/s) of the measured speed; `a_x` (m/s^2) of the accelerometer, None without
-    one; `a_x_bias` (m/s^2): the prior's spread of its constant offset, a further state, None for none; `start_speed` (m/s): the
-    prior's mean, known to 20 m/s; `mass_spread` (-) on the mass's logarithm, and its `mass_walk` (1/sqrt(s)); `mass_domain`:
-    `Real()` for a mass that may become negative, as papers have it, its spreads relative still; `grade_spread` (rad);
-    `grade_walk` (rad/sqrt(s)); `grade_rate_walk` (rad/s per sqrt(s)), None leaves the rate out; `speed_noise` (m/s per
-    sqrt(s)): what the model leaves out. `input_path`: torques run `linear` between rows or are `held`; held ones are late by
-    half a step, which a lively pedal turns into a wrong mass. `more_inputs`: names of channels that a filter's wrapper reads
-    (`Paused`, `VaryingNoise`).
+    **Arguments** (standard deviations): `v_x` (m/s) of the measured speed; `a_x` (m/s^2) of the accelerometer, None if there is
+    none; `a_x_bias` (m/s^2): the prior's spread of its constant offset, a further state, None for no such state; `start_speed`
+    (m/s): the prior's mean, with a standard deviation of 20 m/s; `mass_spread` (-) of the mass's logarithm, and its `mass_walk`
+    (1/sqrt(s)); `mass_domain`: `Real()` for a mass that may become negative, as in papers, with spreads still relative;
+    `grade_spread` (rad); `grade_walk` (rad/sqrt(s)); `grade_rate_walk` (rad/s per sqrt(s)), None for no rate among the states;
+    `speed_noise` (m/s per sqrt(s)): for effects missing from the model. `input_path`: torques are `linear` between rows or
+    `held`; held torques are late by half a step, which gives a wrong mass when the pedals move quickly. `more_inputs`: names of
+    channels that a filter's wrapper reads (`Paused`, `VaryingNoise`).
 
-    **Inputs** and **channels**: `needs`. **Reported**: `v_x`, `grade` (rad), `mass` (kg) and what else is a state.
+    **Inputs** and **channels**: `needs`. **Reported**: `v_x`, `grade` (rad), `mass` (kg) and the other states.
 
-    **Raises** `InputError` for spreads out of range, and as `car_of`.
+    **Raises** `InputError` for spreads out of range, and as `car_of` does.
     """
     car = car_of(car)
     for name, value in (("v_x", v_x), ("a_x", a_x), ("a_x_bias", a_x_bias), ("grade_spread", grade_spread)):
@@ -105,7 +106,7 @@ def model(
         noise["grade"] = grade_walk
     if grade_rate_walk is not None:
         check_positive("mass_and_grade: grade_rate_walk", grade_rate_walk, "rad/s per root second")
-        # What the walk makes of the rate in half a minute.
+        # The standard deviation of the rate after half a minute of the walk.
         states["grade_rate"], noise["grade_rate"] = (0.0, grade_rate_walk * 30.0**0.5), grade_rate_walk
     states |= {} if a_x_bias is None else {"bias": (0.0, a_x_bias)}
     kind = record_type("MassAndGradeState", states)
@@ -119,7 +120,7 @@ def model(
 
 
 def chosen_parameters(model: Any):
-    """The parameters and noise levels that a calibration fits: the air's drag, and how much of everything is noise."""
+    """The parameters and noise levels that a calibration fits: the air's drag, and all noise levels."""
     return (model.system.drag, *model.process_noise.law.std, *model.measurement_noise.std)
 
 
@@ -131,10 +132,10 @@ def calibrate(
     progress: Progress = silent,
     **options: Any,
 ) -> Calibration:
-    """Fit drag and noise levels to a span of a log, by maximum posterior of a filter whose mass and grade stay states.
+    """Fit drag and noise levels to a span of a log, by maximum posterior of a filter in which mass and grade remain states.
 
-    Several logs must have the same number of rows. `options`: those of `model`, the start values among them. Rolling resistance
-    is not fitted: a constant grade says the same.
+    Several logs must have the same number of rows. `options`: those of `model`, including the start values. Rolling resistance
+    is not fitted: it cannot be distinguished from a constant grade.
 
     **Raises** `InputError` for missing channels, or a span shorter than `SHORTEST`; `FilterError` where the fit fails.
     """
@@ -142,7 +143,7 @@ def calibrate(
     recordings, spans = spans_of(NAME, recording, SHORTEST, "pedals that move")
     for one in recordings:
         check_needs(NAME, needs, one, start)
-    assert start.process_noise is not None  # `model` has given it
+    assert start.process_noise is not None  # `model` always sets it
     prior = {"drag": DRAG_SPREAD} | dict.fromkeys((*start.process_noise.law.names, *start.channels), NOISE_SPREAD)
     fit = prediction_error(filter or Unscented(), start, recordings, chosen_parameters, prior=prior, progress=progress)
     return Calibration(NAME, fit, spans, told=start_of(car, options))
@@ -155,9 +156,9 @@ def estimate(
     filter: AbstractFilter | None = None,
     key=None,
 ) -> Estimate:
-    """Speed, grade (rad), mass (kg) and what else is a state of the model, along a log of speed and torques.
+    """Speed, grade (rad), mass (kg) and the other states of the model, along a log of speed and torques.
 
-    `source`: a `Calibration`, a model (`model(car, a_x=0.05)`, where there is an accelerometer), or a car taken at its word.
+    `source`: a `Calibration`, a model (`model(car, a_x=0.05)` with an accelerometer), or a car's file without calibration.
 
     **Raises** `InputError` for missing channels, and as `run` does.
     """
@@ -172,7 +173,7 @@ def live(
     filter: AbstractFilter | None = None,
     key=None,
 ) -> Live:
-    """The same a row at a time."""
+    """The same as `estimate`, one row at a time."""
     return Live(filter or Unscented(), model_of(NAME, source, model), AsItIs(), key)
 
 

@@ -1,13 +1,13 @@
-"""A way to a quantity: what it reads, what it remembers from row to row, and what it says of each, looking back only.
+"""A method for a quantity: what it reads, its memory from row to row, and its answer to each row, looking back only.
 
-A quantity has many methods: a formula of what is measured now, an observer with a memory, a filter on a model. All of them are an
-`AbstractMethod`, so that one driver follows a log, one answers live, and both say the same.
+A quantity has many methods: a formula of the present measurements, an observer with a memory, a filter on a model. All of them
+are an `AbstractMethod`, so that one driver follows a log, another answers live, and both give the same results.
 
-A quantity is a module of `jaxveh.estimators` that has, beside what its calibration needs if it has one:
+A quantity is a module of `jaxveh.estimators`. It has, in addition to what its calibration needs (if it has one):
 
 - `SHOWN`: the names that all its methods report, and their units.
-- `METHODS`: `MethodOfCar` by name. `RECOMMENDED`: the name of the one that we would take.
-- `do_nothing(car, recording)`: what one would say without any of them, (T,) by the names of `SHOWN`.
+- `METHODS`: `MethodOfCar` by name. `RECOMMENDED`: the name of the recommended one.
+- `do_nothing(car, recording)`: the answer without any method, (T,) by the names of `SHOWN`.
 - `estimate(source, recording, *, method=...)` and `live(source, *, method=...)`; `source` is a car's file, or a method with
   numbers of one's own.
 """
@@ -37,9 +37,9 @@ from jaxveh.statespace import AbstractFilter, Row, StateSpace, kit
 
 
 class Answer(NamedTuple):
-    """What a method says of a row: `mean` and standard deviation `std` by name, NamedTuples with the same fields; a spread is NaN
-    where the method claims none. `known`: the same fields, False where the drive does not tell the quantity now, so that the mean
-    is a memory or a guess. `result`: a code of `jaxveh.Result`, 0 where all went well."""
+    """A method's answer to a row: `mean` and standard deviation `std` by name, NamedTuples with the same fields; `std` is NaN
+    where the method gives none. `known`: the same fields, False where the drive does not determine the quantity now, so that
+    the mean is a memory or a guess. `result`: a code of `jaxveh.Result`, 0 for success."""
 
     mean: Any
     std: Any
@@ -48,15 +48,15 @@ class Answer(NamedTuple):
 
 
 class AbstractMethod(eqx.Module):
-    """A row is a time (s) and a mapping of the `needs`' channels to scalars, NaN where nothing was measured.
+    """A method. A row is a time (s) and a mapping of the channels of `needs` to scalars, NaN where not measured.
 
-    Numbers that one may want to fit are array leaves. Everything is a pure function of scalars: a batch is `jax.vmap`.
+    Numbers that may be fitted are array leaves. Everything is a pure function of scalars: a batch is `jax.vmap`.
     """
 
     @property
     @abc.abstractmethod
     def needs(self) -> tuple[Need, ...]:
-        """The channels that it reads. An `optional` one is NaN in every row of a log without it."""
+        """The channels that it reads. An `optional` channel that is missing from the log is NaN in every row."""
 
     @abc.abstractmethod
     def first(self, t: Any, values: dict[str, Any]) -> tuple[Any, Answer]:
@@ -64,12 +64,12 @@ class AbstractMethod(eqx.Module):
 
     @abc.abstractmethod
     def next(self, memory: Any, t: Any, values: dict[str, Any]) -> tuple[Any, Answer]:
-        """The same of the next row."""
+        """The same for the next row."""
 
 
 class MethodOfCar(NamedTuple):
-    """How to make a method from a car's file (**raises** `InputError` for a key that the file lacks), what it is in a line, and
-    where it is from."""
+    """How to make a method from a car's file (**raises** `InputError` for a key missing from the file), its description in one
+    line, and its source."""
 
     make: Callable[[CarSpecification], AbstractMethod]
     help: str
@@ -77,7 +77,7 @@ class MethodOfCar(NamedTuple):
 
 
 class Answers(Estimated, eqx.Module):
-    """What a method said along a log: `time` (T,), and the fields of `Answer` with (T,) in each."""
+    """A method's answers along a log: `time` (T,), and the fields of `Answer`, each (T,)."""
 
     by_row = ("mean", "std", "known", "result")
 
@@ -93,8 +93,8 @@ class Answers(Estimated, eqx.Module):
 
 
 def answer(mean: Mapping[str, Any], std: Mapping[str, Any] | None = None, known: Any = True) -> Answer:
-    """An `Answer` of scalars by name. `std`: those that are claimed, the others are NaN; `known`: one boolean, or some by name,
-    of which those that are not named are known. A mean that is not finite is not known, and has the code of a state that is not.
+    """An `Answer` of scalars by name. `std`: standard deviations by name, NaN where not given; `known`: one boolean, or
+    booleans by name, True where not given. A mean that is not finite is unknown, and gives the code of a non-finite state.
     """
     some = jnp.asarray(next(iter(mean.values())))
     of = lambda values, default: {name: values.get(name, default) for name in mean}
@@ -109,10 +109,10 @@ def answer(mean: Mapping[str, Any], std: Mapping[str, Any] | None = None, known:
 
 
 class Filtered(AbstractMethod):
-    """A filter on a state space as a method. `cleaning` stands between the log and the filter.
+    """A filter on a state space as a method. `cleaning` prepares the log for the filter.
 
-    `told_by(model, belief, row)`: booleans by name where something that is reported is not always known; by default all is,
-    unless the filter failed. `shown`: the names of the report to show, all by default.
+    `told_by(model, belief, row)`: booleans by name for outputs that are not always known; by default all are known unless the
+    filter failed. `shown`: the names of the outputs to show, by default all.
     """
 
     model: StateSpace
@@ -157,12 +157,12 @@ class Filtered(AbstractMethod):
 
 
 TURNING = ("steer", "steering_wheel", "steering_torque", "yaw_rate", "a_y")
-"""Channels that say how a car turns."""
+"""Channels that describe how a car turns."""
 
 
 def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: str) -> AbstractMethod:
-    """A method as it is, or the one of a name for a car's file. **Raises** `InputError` for a name that is not there, and for a
-    car whose rear wheels are steered unless the method reads nothing of how the car turns."""
+    """The method of a name for a car's file, or the source itself if it is a method. **Raises** `InputError` for an unknown
+    name, and for a car with steered rear wheels unless the method reads no channel of `TURNING`."""
     if isinstance(source, AbstractMethod):
         return source
     check_one_of(f"{who}: method", name, methods)
@@ -177,9 +177,10 @@ def method_of(who: str, methods: Mapping[str, MethodOfCar], source: Any, name: s
 
 
 def follow(who: str, method: AbstractMethod, recording: Recording) -> Answers:
-    """What the method says of each row of a log, in one scan; compiled once for each kind of method and length.
+    """A method's answers to all rows of a log, in one scan; compiled once for each kind of method and length.
 
-    **Raises** `InputError` for channels that are missing, in other units, infinite, or not known throughout where they must be.
+    **Raises** `InputError` for channels that are missing, in other units, infinite, or not known in every row where they must
+    be.
     """
     there = [need for need in method.needs if not need.optional or need.channel in recording]
     check_needs(who, tuple(need._replace(optional=False) for need in there), recording)
@@ -196,7 +197,7 @@ def follow(who: str, method: AbstractMethod, recording: Recording) -> Answers:
 
 
 def _dtype(method: AbstractMethod) -> Any:
-    """That of the method's numbers; without any, that of numbers in general."""
+    """The dtype of the method's numbers; if it has none, the default dtype."""
     leaves = jax.tree.leaves(eqx.filter(method, eqx.is_inexact_array))
     return jnp.result_type(*leaves) if leaves else jax.dtypes.canonicalize_dtype(float)
 
@@ -214,26 +215,26 @@ def _check_finite(who: str, name: str, recording: Recording) -> None:
 
 @eqx.filter_jit
 def follow_rows(method: AbstractMethod, time: Any, values: dict[str, Any]) -> Answer:
-    """The compiled part of `follow`, of (T,) arrays; steps are checkpointed, so that long logs can be differentiated."""
+    """The compiled part of `follow`, for (T,) arrays; steps are checkpointed, so that long logs can be differentiated."""
     take = lambda rows: jax.tree.map(lambda leaf: leaf[rows], (time, values))
     start, rest = take(0), take(slice(1, None))
     memory, said = apart(method.first, start[0], *start)
-    # What is remembered has the same types after each row as after the first.
+    # The memory has the same types after each row as after the first.
     body = jax.checkpoint(lambda memory, row: apart(method.next, row[0], memory, *row))
     _, later = jax.lax.scan(body, memory, rest)
     return jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), said, later)
 
 
 class LiveMethod(eqx.Module):
-    """A method that is given one row at a time, and says what `follow` says of the same rows.
+    """A method for one row at a time. It gives the same answers as `follow` on the same rows.
 
         live = estimators.speed.live(car)
         memory, answer = live.init(t, {"a_x": ..., "wheel_speed_fl": ..., ...})
         memory, answer = live.step(memory, t, {...})
         answer.mean.v_x, answer.std.v_x, answer.known.v_x
 
-    Compiled once each. Channels that are not given, or NaN, were not measured. Where float32 rules, count time from the first
-    row.
+    `init` and `step` are compiled once each. A channel that is not given, or NaN, counts as not measured. In float32, count
+    time from the first row.
     """
 
     method: AbstractMethod

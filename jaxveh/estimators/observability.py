@@ -12,9 +12,9 @@ from jaxveh.statespace import Row, StateSpace, kit
 
 
 def predict_measurements(model: StateSpace, rows: Row, start) -> tuple[dict, dict]:
-    """The noise-free measurements along rows from a start state (parameters on the real line included).
+    """The noise-free measurements along rows from a start state (parameters included, on the real line).
 
-    Returns two mappings by channel of (T,) arrays: the predictions, and whether the channel was measured.
+    **Returns** two mappings by channel of (T,) arrays: the predictions, and whether the channel was measured.
     """
 
     def body(state, pair):
@@ -32,9 +32,9 @@ def predict_measurements(model: StateSpace, rows: Row, start) -> tuple[dict, dic
 
 
 def observe(model: StateSpace, recording: Recording, known_start: bool = True) -> Observability:
-    """What a recording of these inputs can tell about the model's parameters, at the prior's mean, without process noise.
+    """How well a recording with these inputs determines the model's parameters, at the prior's mean, without process noise.
 
-    The measurements' values are not used, only when they are there. `known_start=False` adds the start states as unknowns
+    Of the measurements only their presence is used, not their values. `known_start=False` adds the start states as unknowns
     with the prior's spread. **Raises** `InputError` for a model without parameters.
     """
     if model.chosen is None:

@@ -1,4 +1,4 @@
-"""Grade and mass in one filter: speed, accelerometer and torques of a car that goes straight or round a bend."""
+"""Grade and mass in one filter, from speed, accelerometer and torques of a car on a straight road or in a bend."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ALONG = (
     Need("a_y", "m/s^2", optional=True),
     Need("yaw_rate", "rad/s", optional=True),
 )
-"""What tells how a car speeds up; in bends, how it turns."""
+"""Channels for the longitudinal motion and, in bends, for the lateral motion."""
 
 TORQUES = (Need("drive_torque", "N m", optional=True), Need("brake_torque", "N m", optional=True))
 
@@ -42,17 +42,17 @@ State = record_type(
 )
 
 SLOWEST = 3.0
-"""m/s: a road passes at least so fast, so that the law of its grade has a spread at standstill."""
+"""m/s: the speed at which the road passes is at least this, so that the law of its grade has a spread at standstill."""
 
 WIDEST = 0.8 * DEGREE
-"""rad: with a wider spread the grade counts as not known,"""
+"""rad: with a larger standard deviation, the grade counts as unknown."""
 
 WIDEST_MASS = 0.04
-"""and with a wider spread of its logarithm the mass."""
+"""With a larger standard deviation of its logarithm, the mass counts as unknown."""
 
 
 class PullingMemory(NamedTuple):
-    """What was heard, whether the car slides, and what is believed."""
+    """The last measurements, whether the car slides, and the belief."""
 
     motion: Any
     slides: Any
@@ -65,20 +65,21 @@ class Pulling(AbstractMethod):
         d v_x = f_x + v_y r - g sin(grade),    f_x = (a_x - a_x_bias) / (1 + g pitch_gradient)
         f_x = (T / radius - drag v^2 - 4 J_w / radius^2 dv_x/dt) / mass - g rolling - f_y (l_r / l) steer
 
-    The first is kinematics and knows no mass: a constant grade and the offset are one to it. The second, where there are torques,
-    is what the car pushes: the offset is what the accelerometer says beside it, the mass how much it says for a torque. What
-    rolling resistance and air are not as in the car's file is a further state, with a spread (`rolling_spread`), which is what
-    the offset can be known to; wheels that brake or drive slip (`slip` of the speed per m/s^2, a state, too). Grades change by
-    the metre (`grade_length`, `grade_edge`). Satellites that say how fast a car climbs say the grade itself, `v_x sin(grade)`,
-    late (H. Bae, J. Ryu, J. Gerdes 2001). Brakes are trusted to `brake_doubt` of their torque. (A. Vahidi et al. 2005 and P.
-    Lingman, B. Schmidtbauer 2003, with an accelerometer and its offset.)
+    The first equation is kinematics and does not contain the mass; it cannot distinguish a constant grade from the offset.
+    The second, used where torques are measured, is the balance of forces: the offset is the accelerometer's excess over it,
+    the mass follows from the acceleration per torque. The difference of rolling resistance and air drag from the car's file
+    is a further state, with a standard deviation (`rolling_spread`) that limits how well the offset can be known. Wheels that
+    brake or drive slip (`slip` of the speed per m/s^2, also a state). Grades change with distance (`grade_length`,
+    `grade_edge`). A climb rate from satellites measures the grade directly, `v_x sin(grade)`, with a delay (H. Bae, J. Ryu,
+    J. Gerdes 2001). Brake torques are assumed correct within a share `brake_doubt`. (A. Vahidi et al. 2005 and P. Lingman, B.
+    Schmidtbauer 2003, with an accelerometer and its offset.)
 
     **Parameters**: of the car `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2), `drag` (N s^2/m^2),
     `rolling_resistance` (-), `rear_axle_to_cg`, `wheelbase` (m), `rear_compliance`, `pitch_gradient`
     (rad/(m/s^2)); of the belief `mass_spread` (-), `grade_spread` (rad), `a_x_offset`, `a_x_offset_spread`, `rolling_spread`
-    (m/s^2); of the sensors `wheel_noise`, `told_noise` (of a channel `v_x`, which another estimator made and whose errors last),
-    `satellite_noise`, `climb_noise` (m/s), `wheel_delay` and satellites' `delay` (s),
-    `force_noise` (m/s^2), which lasts `force_time` (s).
+    (m/s^2); of the sensors `wheel_noise`, `told_noise` (of a channel `v_x` from another estimator, with correlated errors),
+    `satellite_noise`, `climb_noise` (m/s), `wheel_delay` and the satellites' `delay` (s),
+    `force_noise` (m/s^2), whose correlation time is `force_time` (s).
     """
 
     motion: BodyMotion
@@ -140,7 +141,7 @@ class Pulling(AbstractMethod):
         fast = jnp.maximum(jnp.abs(State(*belief.mean).v_x), SLOWEST)
         slow, quick = fast / self.grade_length, fast / self.grade_edge
         walk = 2.0 * jnp.square(self.grade_spread) * slow * quick * (slow + quick)
-        # A car that slides speeds up by what nobody knows, for a while.
+        # While a car slides, its rate of speed has an unknown part.
         slides = 2.0 * self.sliding.gathering * jnp.square(doubt.across * heard["yaw_rate"])
         per_second = {
             "v_x": 4e-5 + slides, "grade_rate": walk, "a_x_bias": 4e-6, "log_mass": 1e-8, "rolling_bias": 1e-6,
@@ -191,7 +192,7 @@ class Pulling(AbstractMethod):
             return jnp.where(satellites, said, 0.0) - ago
 
         climbs = ~jnp.isnan(values["climb_rate"])
-        # The speed over ground of a car that slides across is more than its v_x.
+        # The speed over ground of a car that slides laterally exceeds its v_x.
         drifts = jnp.square(jnp.square(slides.across) / (2.0 * fast))
 
         def climb(x):
@@ -200,13 +201,13 @@ class Pulling(AbstractMethod):
             return jnp.where(climbs, values["climb_rate"], 0.0) - rises
 
         slowing = brake / (self.wheel_radius * self.mass)
-        # All wheels brake; of a car that drives both axles those whose speed counts drive, too.
+        # All wheels brake; in a car that drives both axles, the wheels that give the speed are driven, too.
         pushing = drive * 2.0 * driven_share(self.motion.front_share) / (self.wheel_radius * self.mass)
         noise = jnp.where(jnp.isnan(values["v_x"]), self.wheel_noise, self.told_noise)
         slips = jnp.square(noise) + jnp.square(0.002 * v_x * (slowing + pushing))
         slips = slips + 2.0 * self.sliding.staying / dt * jnp.square(slides.along)
         doubt = jnp.square(self.brake_doubt * slowing) + jnp.square(0.3 * turning)
-        # Wheels that spin or lock push less than their torque.
+        # Wheels that spin or lock transmit less than their torque.
         lost = (
             (slowing + jnp.abs(drive) / (self.wheel_radius * self.mass)) * slides.along / (slides.along + 0.01 * fast)
         )
@@ -241,7 +242,8 @@ class Pulling(AbstractMethod):
 
 
 def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
-    """Of a car's file. **Raises** `InputError` for one without `wheel_radius`, by which a torque becomes a force."""
+    """The filter for a car's file. **Raises** `InputError` for a file without `wheel_radius`, which converts a torque into a
+    force."""
     told = {name: getattr(car, name) for name in ("wheel_inertia", "drag", "rolling_resistance", "pitch_gradient")}
     stiffness = car.rear_cornering_stiffness
     compliance = 0.0 if stiffness is None else car.mass * car.front_axle_to_cg / (car.wheelbase * stiffness)
@@ -258,8 +260,8 @@ def pulling_filter(car: CarSpecification, who: str, **options: Any) -> Pulling:
 
 
 class Held(AbstractCleaning):
-    """What the filter of `mass_and_grade` reads of a row: torques and speed as last heard, the accelerometer without the body's
-    pitch, and none of either where nothing was heard."""
+    """Prepares a row for the filter of `mass_and_grade`: the last measured torques; the speed and the accelerometer without the
+    body's pitch, both NaN where not measured."""
 
     motion: BodyMotion
     pitch_gradient: jax.Array = parameter("rad/(m/s^2)", scale=0.005)
@@ -290,15 +292,15 @@ class Held(AbstractCleaning):
 
 
 JOINT = (*ALONG, *[need._replace(optional=False) for need in TORQUES])
-"""What the filter of `mass_and_grade` reads."""
+"""The channels of the filter of `mass_and_grade`."""
 
 
 def joint_filter(car: CarSpecification, shown: tuple[str, ...]) -> Filtered:
-    """The filter of `mass_and_grade` with accelerometer and offset, as a method. **Raises** as `mass_and_grade.model`.
+    """The filter of `mass_and_grade` with accelerometer and offset, as a method. **Raises** as `mass_and_grade.model` does.
 
-    It starts where a car may, at 20 m/s give or take 20. Bends, slip and the road's metres are not in its model. `known` where
-    the spread of the mass is below `WIDEST_MASS` of it, of the grade below `WIDEST`; where the mass' logarithm is held by too few
-    pedals, as the model's own documentation says, both are wide.
+    The prior speed is 20 m/s with a standard deviation of 20. Bends, slip, and grades that change with distance are not in its
+    model. `known` where the standard deviation of the mass is below `WIDEST_MASS` of it, and that of the grade below `WIDEST`;
+    where the pedals move too seldom to determine the mass, as the model's docstring explains, both are large.
     """
     model = mass_and_grade.model(car, v_x=0.1, a_x=0.5, a_x_bias=0.06, mass_spread=0.15, grade_rate_walk=0.02)
     cleaning = Held(

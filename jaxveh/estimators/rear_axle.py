@@ -1,5 +1,5 @@
-"""Sideslip from what the body feels: lateral velocity by integrated acceleration, held by the slip angle that the rear axle's
-force asks for."""
+"""Sideslip from inertial sensors: lateral velocity is integrated from acceleration and corrected by the slip angle at which the
+rear axle has its force."""
 
 from __future__ import annotations
 
@@ -17,37 +17,36 @@ from jaxveh.statespace import Continuous, Gaussian, Prior, StateDependent, State
 from jaxveh.vehicles import GRAVITY
 
 USUAL_WHEELBASE = 2.6
-"""m: of the car that times and speeds are said for. Cars that differ in size alone do the same in times and at speeds that go
-with the square root of it, at the same accelerations (Froude's law)."""
+"""m: the wheelbase for which times and speeds are stated. Cars that differ only in size show the same accelerations at times
+and speeds that scale with its square root (Froude's law)."""
 
 SLOWEST = 1.4
-"""m/s, of a car of `USUAL_WHEELBASE`: slower, a slip angle is the quotient of two small numbers."""
+"""m/s, for a car of `USUAL_WHEELBASE`: below it, a slip angle is the quotient of two small numbers."""
 
 STEEPEST = 0.04
-"""rad: roads' bank has at most this standard deviation, so that a car that slides is not taken for one on a banked road."""
+"""rad: upper limit for the standard deviation of roads' bank, so that a sliding car is not explained by a banked road."""
 
 SATURATED = 0.95
-"""The share of the grip beyond which the curve's slip angle no longer grows: a force so large says that the axle slides, not how
-much."""
+"""Share of the grip above which the curve's slip angle no longer grows: so large a force shows that the axle slides, but not
+how much."""
 
 BEND = 0.05
-"""The share of the grip over which that sets in."""
+"""Share of the grip over which this limit sets in."""
 
 LARGEST_SLIP = 1.2
-"""rad: no axle is taken to slide at more, where the tangent would run away."""
+"""rad: upper limit of the axle's slip angle, beyond which the tangent would grow without bound."""
 
 LEAST_GRIP = 0.05
-"""The square of the share of lateral grip that is left however large the longitudinal force."""
+"""Lower limit of the squared share of lateral grip, however large the longitudinal force."""
 
 
 LONGEST_STEP, LOST = 1.0, 3.0
-"""s, and m/s: a longer step is a gap between two drives, after which lateral velocity is uncertain by so much."""
+"""s and m/s: a longer step is a gap between two drives, after which lateral velocity has about this standard deviation."""
 
 
 class RearAxleState(NamedTuple):
-    """Lateral velocity `v_y` (m/s) where the accelerometer sits; `bank` of the road and `slip_error` of the curve, in units of
-    the standard deviations that `RearAxle` has for them; `stiffening`, the logarithm of the axle's stiffness over the
-    calibrated one."""
+    """Lateral velocity `v_y` (m/s) at the accelerometer; `bank` of the road and `slip_error` of the curve, in units of their
+    standard deviations in `RearAxle`; `stiffening`, the logarithm of the axle's stiffness over the calibrated stiffness."""
 
     v_y: Any
     bank: Any
@@ -56,9 +55,9 @@ class RearAxleState(NamedTuple):
 
 
 class RearAxleReport(NamedTuple):
-    """What an Estimate shows: `v_y` (m/s) and `sideslip` (rad) of the centre of gravity, `slip_angle_rear` (rad), lateral
+    """The outputs of an Estimate: `v_y` (m/s) and `sideslip` (rad) of the centre of gravity, `slip_angle_rear` (rad), lateral
     forces of the axles (N), `bank` of the road (rad, positive where the left side is higher), `slip_error` (rad) of the curve,
-    `stiffness_rear` (N/rad); `reference_sideslip` (rad): what a reference turned by `heading_offset` would say."""
+    `stiffness_rear` (N/rad); `reference_sideslip` (rad): the reading of a reference turned by `heading_offset`."""
 
     v_y: Any
     sideslip: Any
@@ -72,22 +71,22 @@ class RearAxleReport(NamedTuple):
 
 
 class RearAxle(eqx.Module):
-    """A car as far as its rear axle tells of sideslip; it needs no steer, and nothing of the front axle.
+    """A car reduced to the rear axle, for estimating sideslip; it needs neither steer nor any front axle parameter.
 
     - `mass`, `yaw_inertia`, `front_axle_to_cg`, `rear_axle_to_cg`, `cg_height` (kg, kg m^2, m).
     - `stiffness` (1/rad): cornering stiffness over load; `grip` (-): largest lateral force over load; `shape` (-): how sharply
       the curve bends, `F / load = stiffness a / (1 + |stiffness a / grip|^shape)^(1 / shape)`, whose inverse has a closed form.
     - `yaw_rate_offset` (rad/s), `a_y_gain` (-; roll makes it larger than one), `a_y_offset` (m/s^2): of the sensors.
-    - `sensor_x`, `sensor_y` (m): where the accelerometer sits, forward and left of the centre of gravity. Its height is not
-      looked at: what a body that rolls adds is part of `a_y_gain`.
-    - `a_y_delay` (s): by which a log's accelerometer is late, and `sensor_delay`: by which it, a_x and the yaw rate are behind a
-      low-pass; they move no state, and are taken out before.
-    - `drag` (N/(m/s)^2), `front_drive`, `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`, driving and braking
-      by the front axle's shares, `ellipse` (-): how much of it counts, `sqrt(1 - (ellipse F_x / (grip load))^2)`.
-    - `heading_offset` (rad): by which a reference for sideslip (an INS) is turned against the car; moves no state.
-    - `bank` (rad), `slip_error` (rad): standard deviations of the states of these names, first-order Gauss-Markov with memories
-      `bank_time` and `slip_time` (s).
-    - `force_noise` (sqrt s), `slip_noise` (rad sqrt s): of the force over load and of the slip angle, white, as densities.
+    - `sensor_x`, `sensor_y` (m): position of the accelerometer, forward and left of the centre of gravity. Its height is not
+      used: the effect of a rolling body is part of `a_y_gain`.
+    - `a_y_delay` (s): the delay of a log's accelerometer, and `sensor_delay` (s): the delay of the low-pass of a_x, a_y and
+      the yaw rate; they do not affect the states, and are corrected beforehand.
+    - `drag` (N/(m/s)^2), `front_drive`, `brake_share` (-): longitudinal force `F_x = m a_x + drag v_x^2`, divided by the front
+      axle's shares of driving and braking; `ellipse` (-): how much of it counts, `sqrt(1 - (ellipse F_x / (grip load))^2)`.
+    - `heading_offset` (rad): the angle of a sideslip reference (an INS) against the car; does not affect the states.
+    - `bank` (rad), `slip_error` (rad): standard deviations of the states of these names, first-order Gauss-Markov with
+      correlation times `bank_time` and `slip_time` (s).
+    - `force_noise` (sqrt s), `slip_noise` (rad sqrt s): densities of white noise, of the force over load and of the slip angle.
 
     Inputs: see `INPUTS`. Axes of ISO 8855; a positive slip angle gives a positive lateral force.
     """
@@ -125,7 +124,7 @@ class RearAxle(eqx.Module):
         return self.front_axle_to_cg + self.rear_axle_to_cg
 
     def shares(self, u) -> tuple[Any, Any]:
-        """Lateral force over load of the front axle and of the rear, as the sensors tell: ISO 8855 signs."""
+        """Lateral force over load of the front axle and of the rear axle, from the sensors: ISO 8855 signs."""
         a, b = self.front_axle_to_cg, self.rear_axle_to_cg
         moment = self.yaw_inertia * u.yaw_acceleration
         a_y = self.specific_force(u.a_y_smooth, u.yaw_rate_smooth) - self.sensor_x * u.yaw_acceleration
@@ -143,11 +142,11 @@ class RearAxle(eqx.Module):
         )
 
     def specific_force(self, a_y, yaw_rate) -> Any:
-        """Lateral acceleration less gravity's share, m/s^2, on the car's centre line abreast of the accelerometer."""
+        """Lateral acceleration less gravity's share, m/s^2, on the car's centre line level with the accelerometer."""
         return (a_y - self.a_y_offset) / self.a_y_gain + self.sensor_y * yaw_rate**2
 
     def rolls(self, yaw_rate) -> Any:
-        """v_y of the accelerometer where the rear axle rolls where it points, m/s."""
+        """v_y of the accelerometer if the rear axle rolls without slip, m/s."""
         return (self.rear_axle_to_cg + self.sensor_x) * (yaw_rate - self.yaw_rate_offset)
 
     def left_for_turning(self, u) -> Any:
@@ -161,7 +160,7 @@ class RearAxle(eqx.Module):
         """The slip angle (rad) at which the curve has the axle's force, and its slope over the force's share of load."""
         left = self.left_for_turning(u)
         share = self.shares(u)[1] / left
-        # A little more than zero: a power of zero has no slope.
+        # A little more than zero: the slope of a power is not defined at zero.
         asked = numerics.sqrt(jnp.square(share) + 1e-16) / self.grip
         knee = SATURATED - BEND
         used = jnp.where(asked < knee, asked, knee + BEND * jnp.tanh(jnp.maximum(asked - knee, 0.0) / BEND))
@@ -173,13 +172,13 @@ class RearAxle(eqx.Module):
 
 
 def rolling_below(wheelbase) -> Any:
-    """m/s: below it a car of this wheelbase (m) is taken to roll where its rear axle goes."""
+    """m/s: below this speed a car of this wheelbase (m) is assumed to roll without slip at its rear axle."""
     return SLOWEST * (wheelbase / USUAL_WHEELBASE) ** 0.5
 
 
 def transition(system: RearAxle, t0, t1, x: RearAxleState, u) -> RearAxleState:
-    """Acceleration is integrated. Where it is not known, the car goes as a steady turn's force wants it, and below the speed of
-    `rolling_below` it rolls where its rear axle goes."""
+    """Integrate the acceleration. Where it is unknown, v_y is that of a steady turn's force, and below the speed of
+    `rolling_below` the rear axle rolls without slip."""
     dt = t1 - t0
     felt = system.specific_force(u.a_y, u.yaw_rate) - (u.turning - u.v_x * system.yaw_rate_offset)
     moving = x.v_y + dt * (felt - GRAVITY * system.bank * x.bank)
@@ -197,7 +196,7 @@ def transition(system: RearAxle, t0, t1, x: RearAxleState, u) -> RearAxleState:
 
 
 class BegunAnew(Continuous):
-    """White noise in continuous time, and nothing known of v_y after a step that is too long to integrate over."""
+    """White noise in continuous time; after a step too long to integrate over, v_y is unknown."""
 
     def over(self, dt):
         law = super().over(dt)
@@ -206,12 +205,12 @@ class BegunAnew(Continuous):
 
 
 CHANNEL = "slip_balance"
-"""m/s: what the curve's slip angle says of v_y less what the state says. It is measured to be nothing, in every row whose force
-is known."""
+"""m/s: v_y by the curve's slip angle less v_y by the state. It is measured as 0 in every row in which the force is known."""
 
 
 def observation(system: RearAxle, t, x: RearAxleState, u):
-    """The balance of slip angles; behind the low-pass it is that of `u.lag` seconds ago, and what v_y did since is added."""
+    """The balance of slip angles; the low-passed balance is that of `u.lag` seconds ago, and the change of v_y since is
+    added."""
     del t
     angle, _ = system.slip_angle(x, u)
     then = system.rolls(u.yaw_rate_smooth) - u.v_x * numerics.tan(angle)
@@ -221,7 +220,7 @@ def observation(system: RearAxle, t, x: RearAxleState, u):
 
 
 def balance_noise(system: RearAxle, t, x: RearAxleState, u) -> dict[str, Any]:
-    """The balance's standard deviation, m/s: the axle's force is uncertain, and more so its slip angle where the curve is
+    """The balance's standard deviation, m/s: the axle's force is uncertain, and its slip angle even more so where the curve is
     flat."""
     del t
     angle, slope = system.slip_angle(x, u)
@@ -230,7 +229,7 @@ def balance_noise(system: RearAxle, t, x: RearAxleState, u) -> dict[str, Any]:
 
 
 def report(system: RearAxle, t, x: RearAxleState, u) -> RearAxleReport:
-    """The quantities that an Estimate shows."""
+    """The outputs of an Estimate."""
     del t
     like = jnp.zeros_like(x.v_y)
     yaw_rate = u.yaw_rate - system.yaw_rate_offset
@@ -256,20 +255,20 @@ INPUTS = (
     "v_x", "a_x", "yaw_rate", "turning", "a_y", "yaw_rate_smooth", "yaw_acceleration", "a_y_smooth", "a_y_lead",
     "turning_lead", "lag", "step", "felt",
 )  # fmt: skip
-"""What `cleaning` and `coarse_log` make of a log.
+"""The inputs that `cleaning` and `coarse_log` derive from a log.
 
 - `v_x` (m/s), `a_x` (m/s^2, low-passed), `yaw_rate` (rad/s).
-- What v_y is integrated from until the next row: `a_y` (m/s^2) and `turning`, v_x yaw_rate (m/s^2).
-- What the axle's force is told from, low-passed: `yaw_rate_smooth` (rad/s), `yaw_acceleration` (rad/s^2), `a_y_smooth` (m/s^2).
-- How far the integrals of a_y and of v_x yaw_rate are ahead of their own low-pass, `a_y_lead` and `turning_lead` (m/s), and its
+- For integrating v_y until the next row: `a_y` (m/s^2) and `turning`, v_x yaw_rate (m/s^2).
+- For the axle's force, low-passed: `yaw_rate_smooth` (rad/s), `yaw_acceleration` (rad/s^2), `a_y_smooth` (m/s^2).
+- The lead of the integrals of a_y and of v_x yaw_rate over their own low-pass, `a_y_lead` and `turning_lead` (m/s), and its
   delay, `lag` (s).
-- The time that a row stands for, `step` (s), and whether the acceleration of that time is known, `felt` (1 or 0); where it is
-  not, the others are those of a steady turn, a_y = v_x yaw_rate.
+- The time that a row covers, `step` (s), and whether the acceleration of that time is known, `felt` (1 or 0); where it is
+  unknown, the other inputs are those of a steady turn, a_y = v_x yaw_rate.
 """
 
 
 def rear_axle_model(system: RearAxle) -> StateSpace:
-    """The state space of a real log, with levels of noise that a fit starts from (stated in the code, unit by unit)."""
+    """The state space for a real log, with initial noise levels for a fit (stated in the code, unit by unit)."""
     quick = (system.wheelbase / USUAL_WHEELBASE) ** -0.5
     unit = lambda time: (2.0 / time) ** 0.5
     noise = {

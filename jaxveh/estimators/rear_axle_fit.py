@@ -22,22 +22,22 @@ from jaxveh.fitting import Fit, Target, pose_prediction_error, solve
 from jaxveh.statespace import StateSpace
 
 STEPS, TOLERANCE = 60, 0.02
-"""Of the search: how many at most, and the least gain of log-posterior in two steps."""
+"""Limits of the search: the largest number of steps, and the least gain of log-posterior in two steps."""
 
 SLIDING = ({"grip": 1.02, "slip_error": 3.0, "stiffening": 10.0}, {"grip": 0.77, "slip_error": 5.0, "stiffening": 30.0})
-"""Where further searches start: the grip over the largest force in use, and slow errors over their usual ones."""
+"""Starts of further searches: the grip over the largest force in use, and slow errors over their usual values."""
 
 OVERCONFIDENCE = 8.0
-"""By this the likelihood's information is divided: balances of neighbouring rows are alike, and count as if each were news.
-Chosen with `parameter_bands.WIDER`, see there."""
+"""The likelihood's information is divided by this: balances of neighbouring rows are correlated but count as independent.
+Chosen together with `parameter_bands.WIDER`, see there."""
 
 TARGET_BEND = 0.0035
-"""rad: errors beyond it count less than by their square (INS alignment, tyres that warm up)."""
+"""rad: larger errors count less than their square (INS alignment, tyres that warm up)."""
 
 
 class Reference(NamedTuple):
-    """A reference for sideslip: `values` in rad, (T,) for each log, NaN for none, and how closely it is to be followed, `weight`
-    (rad)."""
+    """A reference for sideslip: `values` in rad, (T,) for each log, NaN where there is none, and `weight` (rad): the standard
+    deviation with which the fit follows it."""
 
     values: Sequence[jax.Array]
     weight: float
@@ -53,12 +53,12 @@ def fit_rear_axle(
 ) -> Fit:
     """Maximise the posterior of the parameters that `chosen_parameters` picks, given `coarse_logs` of one car.
 
-    A log of a car that slides has two explanations: tyres that end at its largest forces, or a road that leans with it. The
-    search begins at both, and the better end is taken. `offsets` of the sensors, told by a car that stood, take the place of
-    the prior's nothing.
+    A log of a car that slides has two explanations: tyres that saturate at its largest forces, or a road that banks with them.
+    The search starts at both, and the better result is returned. The sensors' `offsets`, measured while the car stood, replace
+    the prior's zeros.
 
-    Where the search runs out of steps a `JaxvehWarning` says so. **Raises** `InputError` for a log of which nothing is measured
-    at speed, `FilterError` where the likelihood cannot be had.
+    If the search runs out of steps, a `JaxvehWarning` is given. **Raises** `InputError` for a log without any measured row at
+    speed, `FilterError` if the likelihood is not finite.
     """
     forces = np.concatenate([_forces(model, log) for log in logs])
     if not len(forces):
@@ -67,7 +67,7 @@ def fit_rear_axle(
             f"sideslip: no row of the {length:.3g} s is fast enough and measured: there is nothing to calibrate on. Take a span "
             "in which the car drives."
         )
-    # A blind fit has a reference without values: one compiled function serves all fits.
+    # A blind fit has a reference without values: so one compiled function serves all fits.
     nothing = [jnp.full(len(log), jnp.nan) for log in logs]
     values, weight = (nothing, 1.0) if reference is None else reference
     target = Target("reference_sideslip", values, weight, TARGET_BEND)
@@ -77,7 +77,7 @@ def fit_rear_axle(
     problem = pose_prediction_error(
         filter, model, logs, chosen_parameters, prior=SPREADS if offsets is None else SPREADS | STOOD, target=target
     )
-    # The largest of them that is no single peak.
+    # The largest force, without single peaks.
     starts = _starts(problem, model, max(float(np.quantile(forces, 0.99)), 1e-3))
     found = []
     for i, start in enumerate(starts):
@@ -93,7 +93,7 @@ def fit_rear_axle(
         )
     if int(best.result) != 0:
         warnings.warn(
-            f"sideslip: the fit ended after {int(best.steps)} steps ({best.reason}); what it found is used as it is.",
+            f"sideslip: the fit ended after {int(best.steps)} steps ({best.reason}); its last values are used.",
             JaxvehWarning,
             stacklevel=3,
         )
@@ -101,7 +101,7 @@ def fit_rear_axle(
 
 
 def _widened(fit: Fit, spread: np.ndarray) -> Fit:
-    """The fit with the likelihood's information divided by `OVERCONFIDENCE`, the prior's as it is."""
+    """The fit with the likelihood's information divided by `OVERCONFIDENCE`, and the prior's unchanged."""
     prior = np.diag(1 / spread**2)
     information = np.linalg.inv(np.asarray(fit.covariance)) - prior
     covariance = np.linalg.inv(information / OVERCONFIDENCE + prior)
@@ -112,8 +112,8 @@ def _widened(fit: Fit, spread: np.ndarray) -> Fit:
 
 
 def _starts(problem, model: StateSpace, in_use: float) -> list:
-    """Coordinates to search from: the prior's, and, where the force `in_use` is below the grip that is told, those of cars that
-    slide with it."""
+    """Coordinates at which to start the search: the prior's, and, where the force `in_use` is below the grip of the car's file,
+    those of cars that slide at this force."""
     told = problem.start()
     names = [p.name.split(".")[-1] for p in problem.chosen]
     starts = [told]

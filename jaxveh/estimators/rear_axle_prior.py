@@ -1,4 +1,4 @@
-"""What is known of any car before its log is read: where a fit of `RearAxle` starts, and how sure that is."""
+"""Prior knowledge of any car before its log is read: the start of a fit of `RearAxle`, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from jaxveh.sensors import LowPass
 from jaxveh.vehicles import GRAVITY
 
 CG_HEIGHT_SHARE = 0.19
-"""Of the wheelbase: the centre of gravity's height above ground, where a car's file is silent."""
+"""Share of the wheelbase: the height of the centre of gravity above ground, if the car's file does not give it."""
 
 GRIP = 1.0
-"""The largest lateral force of an axle over its load, where a car's file is silent."""
+"""The largest lateral force of an axle over its load, if the car's file does not give it."""
 
 SPREADS = {
     "stiffness": 0.3, "grip": 0.3, "shape": 0.25, "yaw_inertia": 0.15, "cg_height": 0.25,
@@ -23,25 +23,25 @@ SPREADS = {
     "bank": 0.7, "slip_error": 0.7, "force_noise": 0.7, "slip_noise": 0.7,
     "process_noise.law.std.v_y": 0.3, "process_noise.law.std.stiffening": 0.5,
 }  # fmt: skip
-"""Relative standard deviations by name, on each parameter's own line (unbounded ones in units of their declared scale). Those of
-stiffness and inertia are what car files are worth; those of the noises say little."""
+"""Relative standard deviations by name, on each parameter's real line (unbounded ones in units of their declared scale).
+Those of stiffness and inertia are the usual errors of car files; those of the noises are wide."""
 
 STOOD = {"yaw_rate_offset": 0.1, "a_y_offset": 0.7}
-"""The same of a car that stood (in units of the offsets' scales): gyroscopes hardly drift within a log; roads are banked
-where cars stand, by some 0.015 rad, which an accelerometer cannot tell from its offset."""
+"""The same for a car that stood (in units of the offsets' scales): gyroscopes hardly drift within a log; where cars stand,
+roads are banked by about 0.015 rad, which an accelerometer cannot distinguish from its offset."""
 
 
 def chosen_parameters(model: Any):
     """The parameters and noise levels that a calibration fits.
 
-    The ellipse, shares and drag are not among them, and there is no asymmetry: fitted, they took what only one span had. On real
-    logs the rest then erred 0.33 and 0.37 degrees (Ferrari, first 30 and 60 s), 0.25 and 0.31 without them; 5.9 and 3.7 (F1TENTH,
-    60 s), but 3.4 and 4.2 (30 s); 31 simulated drives, and the Genesis, are indifferent; pieces of 12 s of the Ferrari preferred
-    them (0.20, 0.24).
+    The ellipse, shares and drag are not among them, and there is no asymmetry: when fitted, they absorbed features of one span
+    only. The errors on the rest of real logs then were 0.33 and 0.37 degrees (Ferrari, first 30 and 60 s), and 0.25 and 0.31
+    without them; 5.9 with and 3.7 without them (F1TENTH, 60 s), but 3.4 with and 4.2 without them (30 s); 31 simulated drives
+    and the Genesis showed no difference; 12 s pieces of the Ferrari were better with them (0.20) than without (0.24).
 
-    Nor does a log choose how many: by the likelihood of the half that a fit did not see, in 15 settings of those logs (noises
-    alone, sensors, stiffness, all of these), the F1TENTH's first 30 s would keep the file's tyres (17.7 instead of 4.2 degrees),
-    the Genesis reversed the noises alone (0.62, 0.63), and the others all.
+    Nor can a log choose how many to fit. With the likelihood of the half that a fit did not use as the criterion, for 15 settings
+    of those logs (noises alone, sensors, stiffness, all of these), the F1TENTH's first 30 s would keep the file's tyres (17.7
+    instead of 4.2 degrees), the reversed Genesis would fit the noises alone (0.62, 0.63), and the other logs all parameters.
     """
     s, noise = model.system, model.process_noise.law.std
     axle = [s.stiffness, s.grip, s.shape]
@@ -52,7 +52,7 @@ def chosen_parameters(model: Any):
 
 
 def car_of(car: CarSpecification | RearAxle) -> RearAxle:
-    """The rear axle of a car's file taken at its word; what it leaves out goes with the car's size."""
+    """The rear axle of a car's file without calibration; missing values are scaled with the car's size."""
     if isinstance(car, RearAxle):
         return car
     io.check_front_steered(car, "sideslip")

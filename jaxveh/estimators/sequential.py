@@ -1,9 +1,10 @@
-"""A small extended Kalman filter whose measurements come one by one, each when it comes, with noises that follow the row.
+"""A small extended Kalman filter that takes measurements one by one as they arrive, with noises that vary from row to row.
 
-The Gaussian filters of `jaxveh.filters` see a `StateSpace`, whose process noise is one law for all rows. A road changes by the
-metre and not by the second, so that here the noise is told with every step. A step is a few products of small matrices.
+The Gaussian filters of `jaxveh.filters` use a `StateSpace`, whose process noise has one law for all rows. A road changes with
+distance and not with time, so here the noise is given with every step. A step is a few products of small matrices.
 
-`predict`, `innovation` and `update` are of vectors; `belief_of`, `move`, `correct` and `spread_of` the same of states with names.
+`predict`, `innovation` and `update` work on vectors; `belief_of`, `move`, `correct` and `spread_of` on states with named
+fields.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class Belief(NamedTuple):
 
 
 class Innovation(NamedTuple):
-    """What a number says beyond the belief: `residual`, its expected `variance`, and the slope (n,) of what was expected."""
+    """The innovation of one measurement: `residual`, its expected `variance`, and the slope (n,) of the expected value."""
 
     residual: Any
     variance: Any
@@ -40,7 +41,7 @@ def predict(belief: Belief, transition: Callable[[Any], Any], noise: Any) -> Bel
 
 
 def innovation(belief: Belief, expect: Callable[[Any], Any], value: Any, variance: Any) -> Innovation:
-    """What `value`, measured with noise of `variance`, says beyond `expect(mean)`; nothing at all where it is NaN."""
+    """The innovation of `value`, measured with noise of `variance`, about `expect(mean)`; without effect where it is NaN."""
     expected, slope = jax.value_and_grad(expect)(belief.mean)
     there = ~jnp.isnan(value)
     residual = jnp.where(there, value, expected) - expected
@@ -49,22 +50,22 @@ def innovation(belief: Belief, expect: Callable[[Any], Any], value: Any, varianc
 
 
 def update(belief: Belief, found: Innovation, trust: Any = 1.0) -> Belief:
-    """The belief after an innovation whose expected variance is by `1 / trust` larger than told; 0 leaves it as it is.
+    """The belief after an innovation whose expected variance is multiplied by `1 / trust`; a trust of 0 leaves it unchanged.
 
-    What is added to the variance is noise, so that the gain is the Kalman gain times `trust`.
+    The added variance is noise, so the gain is the Kalman gain times `trust`.
     """
     along = belief.covariance @ found.slope
     gain = trust * along / found.variance
     mean = belief.mean + gain * found.residual
     # Joseph's form. In float32 neither it nor the difference of two covariances stays positive where a sensor is ten thousand
-    # times sharper than the belief; then this one is off by less (least over largest eigenvalue -3e3 instead of -4e6).
+    # times sharper than the belief; then this form is less wrong (least over largest eigenvalue -3e3 instead of -4e6).
     left = jnp.eye(mean.shape[0], dtype=mean.dtype) - jnp.outer(gain, found.slope)
     noise = (found.variance - trust * (found.slope @ along)) * jnp.outer(gain, along / found.variance)
     return Belief(mean, numerics.symmetric(left @ belief.covariance @ left.T + noise))
 
 
 def innovations(belief: Belief, expect: Callable[[Any], Any], values: Any, variances: Any) -> Innovation:
-    """The same of several numbers (m,) at once, whose noises are independent: fields (m,), slopes (m, n)."""
+    """The innovations of several measurements (m,) at once, whose noises are independent: fields (m,), slopes (m, n)."""
     expected, slopes = expect(belief.mean), jax.jacfwd(expect)(belief.mean)
     there = ~jnp.isnan(values)
     residuals = jnp.where(there, values, expected) - expected
@@ -73,7 +74,8 @@ def innovations(belief: Belief, expect: Callable[[Any], Any], values: Any, varia
 
 
 def update_by_each(belief: Belief, found: Innovation, trusts: Any) -> Belief:
-    """The belief after `innovations`, one after the other, each of its trust; about one point, so that their order is nothing."""
+    """The belief after `innovations`, applied one by one, each with its trust; about one point, so their order does not
+    matter."""
     start, noise = belief, found.variance - jnp.sum(found.slope @ belief.covariance * found.slope, axis=1)
     for residual, own, slope, trust in zip(found.residual, noise, found.slope, trusts, strict=True):
         left = residual - slope @ (belief.mean - start.mean)
@@ -82,7 +84,7 @@ def update_by_each(belief: Belief, found: Innovation, trusts: Any) -> Belief:
 
 
 def belief_of(state_type: Any, means: Mapping[str, Any], stds: Mapping[str, Any], like: Any) -> Belief:
-    """Independent states with these means (0 where not named) and standard deviations, of the dtype of `like`."""
+    """Independent states with these means (0 where not given) and standard deviations, in the dtype of `like`."""
     dtype = jnp.result_type(like)
     mean = _vector(means, state_type, dtype)
     return Belief(mean, jnp.diag(jnp.square(_vector(stds, state_type, dtype))))
@@ -99,8 +101,8 @@ def correct(
 ) -> Belief:
     """The belief after one measurement with this noise variance, where it is `here`.
 
-    `error_of(state)`: what was measured less what would be said; finite wherever the belief is. `gate`: an error of more than
-    this many of its predicted spreads counts with so much less weight (Huber), None: all count alike.
+    `error_of(state)`: the measurement less its prediction; finite wherever the belief is. `gate`: an error of more than this
+    many of its predicted standard deviations has a weight reduced in proportion (Huber), None: all have the same weight.
     """
     error, slope = jax.value_and_grad(lambda vector: error_of(state_type(*vector)))(belief.mean)
     found = Innovation(error, slope @ belief.covariance @ slope + variance, -slope)
@@ -117,5 +119,5 @@ def spread_of(belief: Belief, weights: Mapping[str, Any], state_type: Any) -> An
 
 
 def _vector(values: Mapping[str, Any], state_type: Any, dtype: Any) -> Any:
-    """(n,) of what is named, 0 of what is not."""
+    """The vector (n,) of the values by name, 0 where not given."""
     return jnp.stack([jnp.asarray(values.get(name, 0.0), dtype) for name in state_type._fields])

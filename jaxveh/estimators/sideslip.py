@@ -1,8 +1,8 @@
-"""Sideslip of a real car: calibrated on a span of a log, then estimated on another, blind of any reference.
+"""Sideslip of a real car: calibrated on a span of a log, then estimated on another span without any reference (blind).
 
-What is measured is what every production car has: speed, yaw rate and accelerations. Lateral velocity is integrated from them,
-and held by the slip angle that the rear axle's force asks for: see `rear_axle`. All other ways to sideslip of the review (Chen,
-Gao & Xu 2013) are `METHODS` beside it, by name.
+The measurements are those of every production car: speed, yaw rate and accelerations. Lateral velocity is integrated from them
+and corrected by the slip angle at which the rear axle has its force: see `rear_axle`. All other methods for sideslip of the
+review (Chen, Gao & Xu 2013) are in `METHODS` by name.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ from jaxveh.vehicles import GRAVITY
 NAME = "sideslip"
 
 SHOWN = {"v_y": "m/s", "sideslip": "rad"}
-"""What all methods report."""
+"""The outputs of all methods, and their units."""
 
 RECOMMENDED = "rear_axle"
-"""Of `METHODS`: what `live` says without one."""
+"""The method of `METHODS` that `live` uses by default."""
 
 __all__ = [
     "METHODS", "NAME", "RECOMMENDED", "REFERENCES", "SHOWN", "at_centre", "calibrate", "car_of", "chosen_parameters",
@@ -63,27 +63,28 @@ needs = BLIND
 """Speed in every row; yaw rate and accelerations where they were measured."""
 
 REFERENCES = {"v_y": "m/s", "sideslip": "rad"}
-"""Channels that may supervise a calibration, and their units."""
+"""Channels that may serve as the reference of a calibration, and their units."""
 
 SHORTEST = 5.0
-"""s: a span shorter than this holds too little. What it does not tell is left to the prior: pieces of 12 s that calibrated
-themselves erred 0.3 (31 simulated drives), 0.5 (9 of the Ferrari), 0.75 (9 of the Genesis) and 0.5 (4 of the F1TENTH) times as
-much as by their car's file at its word, in medians; two of the 53 erred more, by up to 1.23. Of 6 s, with five more parameters,
-7 of each car erred 0.7 (Ferrari) and 0.76 (Genesis) times as much, none more."""
+"""s: a shorter span contains too little information. Parameters that it does not determine stay at the prior. Pieces of 12 s,
+each calibrated and scored on itself, had 0.3 (31 simulated drives), 0.5 (9 of the Ferrari), 0.75 (9 of the Genesis) and 0.5
+(4 of the F1TENTH) times the error of the car's file without calibration, in medians; two of the 53 had a larger error, by a
+factor of up to 1.23. Pieces of 6 s, with five more parameters, 7 of each car, had 0.7 (Ferrari) and 0.76 (Genesis) times the
+error, none a larger one."""
 
 TARGET_WEIGHTS = (0.05, 0.02)
-"""rad: how closely the estimate is asked to follow a sideslip reference; the choice is made inside the span."""
+"""rad: candidates for how closely the estimate follows a sideslip reference; the choice is made inside the span."""
 
 LITTLE = 0.8
-"""Of its prior standard deviation: a parameter that still has so much is one that was not told."""
+"""A parameter counts as little determined if its standard deviation is still this share of the prior's, or more."""
 
 CURVE = 1.35
 """The Magic Formula's C in a fitted car's file."""
 
 
 def model(car: CarSpecification | RearAxle, *, a_y_delay: float | None = None) -> StateSpace:
-    """The state space of a car's file taken at its word, or of a `RearAxle`: see `rear_axle_model`. `a_y_delay` (s): by which its
-    logs' accelerometer is late, in place of the `RearAxle`'s."""
+    """The state space of a car's file without calibration, or of a `RearAxle`: see `rear_axle_model`. `a_y_delay` (s): the
+    delay of the accelerometer in its logs, in place of the `RearAxle`'s."""
     system = car_of(car)
     if a_y_delay is not None:
         system = dataclasses.replace(system, a_y_delay=a_y_delay)
@@ -98,24 +99,25 @@ def calibrate(
     progress: Progress = silent,
     uses: tuple[str, ...] = (),
 ) -> Calibration:
-    """Fit the rear axle, noise levels and sensor offsets of a car to a span of a log, or to several together, by maximum
+    """Fit the rear axle, noise levels and sensor offsets of a car to one span of a log or to several together, by maximum
     posterior of a filter.
 
-    Blind (`uses=()`) it reads v_x, a_x, a_y and yaw_rate alone. With `uses=("v_y",)`, or `("sideslip",)`, that channel
-    supervises the fit as a reference; how strongly is chosen by fitting on the first half of each span and looking at the
-    second, where "not at all" is among the choices: a reference with slow errors of its own makes a car worse. Start values and
-    priors come from the car's file and `rear_axle_prior.SPREADS`, and nothing outside the recordings is looked at. `validation`
-    of what is returned is the sideslip RMSE in degrees on the second halves by the reference's weight (rad), fitted on the first.
+    A blind calibration (`uses=()`) reads only v_x, a_x, a_y and yaw_rate. With `uses=("v_y",)`, or `("sideslip",)`, that
+    channel is a reference for the fit. Its weight is chosen by fitting on the first half of each span and validating on the
+    second; no weight at all is among the choices, since a reference with slow errors of its own makes a car worse. Start
+    values and priors come from the car's file and `rear_axle_prior.SPREADS`; nothing outside the recordings is used.
+    `validation` of the result is the sideslip RMSE in degrees on the second halves by the reference's weight (rad), for fits
+    on the first halves.
 
-    An a_y that comes late by what the fitted car makes of the yaw rate is shifted, and the car fitted again (`alignment`).
+    An a_y that is late, judged by the fitted car and the yaw rate, is shifted, and the car fitted again (`alignment`).
 
-    **Raises** `InputError` for missing channels, a_y among them, or a span shorter than `SHORTEST`; `FilterError` where the fit
+    **Raises** `InputError` for missing channels (including a_y), or a span shorter than `SHORTEST`; `FilterError` if the fit
     fails.
     """
     for name in uses:
         check_one_of("uses", name, tuple(REFERENCES))
     if len(uses) > 1:
-        raise InputError(f"sideslip: uses = {uses}: must be one reference; they say the same.")
+        raise InputError(f"sideslip: uses = {uses}: must be one reference; v_y and sideslip hold the same information.")
     recordings, spans = spans_of(NAME, recording, SHORTEST, "corners")
     for one in recordings:
         _check_measured(one, uses)
@@ -129,7 +131,7 @@ def _fit(
     car: CarSpecification | RearAxle, recordings: Sequence[Recording], spans: tuple[Span, ...], filter: AbstractFilter,
     uses: tuple[str, ...], progress: Progress, options: dict[str, float],
 ) -> Calibration:  # fmt: skip
-    """What `calibrate` returns, with options of `model`."""
+    """The calibration that `calibrate` returns, with options of `model`."""
     start = model(car, **options)
     seen = [on_time(_seen(one, uses), start.system) for one in recordings]
     seen = [at_centre(car, one) for one in seen] if uses else seen
@@ -159,7 +161,7 @@ def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
     if not is_measured(recording, "a_y"):
         raise InputError(
             "sideslip: a_y (m/s^2) is missing from the log: without an accelerometer no tyre can be calibrated. Estimate "
-            "with the car's file at its word, or calibrate on another log of the car."
+            "with the car's file without calibration, or calibrate on another log of the car."
         )
     _check_one_clock(recording)
 
@@ -167,8 +169,8 @@ def _check_measured(recording: Recording, uses: tuple[str, ...]) -> None:
 def _check_one_clock(recording: Recording) -> None:
     if is_concrete(recording) and speak_apart(recording):
         raise InputError(
-            "sideslip: yaw_rate and a_y are hardly ever measured in the same row: their devices have clocks of their own. Take "
-            'all channels at the rows of one: io.resample(recording, "yaw_rate", max_gap=0.1).'
+            "sideslip: yaw_rate and a_y are hardly ever measured in the same row: their devices have clocks of their own. "
+            'Resample all channels to the rows of one: io.resample(recording, "yaw_rate", max_gap=0.1).'
         )
 
 
@@ -180,7 +182,7 @@ def _seen(recording: Recording, uses: tuple[str, ...]) -> Recording:
 
 
 def _wheelbase(model: StateSpace) -> Any:
-    """m; a number, unless it is traced."""
+    """The wheelbase in m; a float, unless it is traced."""
     wheelbase = model.system.wheelbase
     return float(wheelbase) if is_concrete(wheelbase) else wheelbase
 
@@ -190,7 +192,7 @@ def _part(progress: Progress, index: int, count: int) -> Progress:
 
 
 def _blank(log: Recording, hidden: np.ndarray, channels: tuple[str, ...]) -> Recording:
-    """The log with nothing measured in some rows: the fit of a part is compiled once with that of the whole."""
+    """The log without measurements in some rows: it is as long as the whole log, so that both fits share a compiled program."""
     return log.replace(**{n: np.where(hidden, np.nan, np.asarray(log[n])) for n in (*channels, "v_y") if n in log})
 
 
@@ -199,7 +201,7 @@ def _reference(logs: Sequence[Recording], weight: float | None) -> Reference | N
 
 
 def _validate(filter, model, logs: Sequence[Recording], counted: Sequence[np.ndarray]) -> float:
-    """Sideslip RMSE in degrees over the rows that are counted, the filter having run from the first of each log."""
+    """Sideslip RMSE in degrees over the counted rows, with the filter run from the first row of each log."""
     errors = []
     for log, rows in zip(logs, counted, strict=True):
         found = run(filter, model, log.without("v_y"), throw=False)
@@ -210,12 +212,12 @@ def _validate(filter, model, logs: Sequence[Recording], counted: Sequence[np.nda
 
 
 def little_told(source: Calibration) -> tuple[str, ...]:
-    """Names of the parameters of which the calibration's logs say little: their standard deviation is still `LITTLE` of what it
-    was beforehand, or more. They are near what the car's file says, or what is usual, and the bands allow for it."""
+    """Names of the parameters that the calibration's logs hardly determine: their standard deviation is still `LITTLE` of the
+    prior's, or more. They are near the values of the car's file or the usual ones, and the bands allow for it."""
     chosen = source.fit.chosen
     prior = np.stack([np.asarray(one) for one in prior_spread(chosen, pick(source.model, chosen), SPREADS)])
     left = np.sqrt(np.diag(np.asarray(source.fit.covariance)))
-    # A blind fit can know nothing of how the reference is turned, and is not asked.
+    # A blind fit has no information on how the reference is turned; so this parameter is not listed.
     asked = lambda name: name != "heading_offset" or source.weight is not None
     return tuple(
         p.name for p, one, old in zip(chosen, left, prior, strict=True) if one > LITTLE * old and asked(p.name)
@@ -225,10 +227,10 @@ def little_told(source: Calibration) -> tuple[str, ...]:
 def fitted_car(
     source: Calibration, car: CarSpecification, *, recording: Recording | Sequence[Recording] = ()
 ) -> CarSpecification:
-    """The car's file with the fitted values in place, as far as a car file can say them.
+    """The car's file with the fitted values in place, as far as a car file can hold them.
 
-    With the `recording` (or several) that it was calibrated on, and where one has `steer`, the front axle's stiffness and the
-    steer's offset are fitted to it: see `front_axle`; else they are the file's.
+    If the `recording` (or several) of the calibration is given and has `steer`, the front axle's stiffness and the steer offset
+    are fitted to it: see `front_axle`; otherwise they are the file's.
     """
     fitted = source.model.system
     load = float(fitted.mass) * GRAVITY * float(fitted.front_axle_to_cg) / _wheelbase(source.model)
@@ -249,7 +251,7 @@ def fitted_car(
     told, new = car.front, front_axle(source.model, steered)
     if new is None:
         warnings.warn(
-            "fitted_car: steer says nothing of the front axle; the file's is kept.", JaxvehWarning, stacklevel=2
+            "fitted_car: the front axle cannot be fitted to steer; the file's is kept.", JaxvehWarning, stacklevel=2
         )
         return found
     if told is not None:
@@ -258,7 +260,7 @@ def fitted_car(
 
 
 Known = Calibration | StateSpace | CarSpecification | RearAxle
-"""What `estimate` and `live` take without a `method`."""
+"""Sources that `estimate` and `live` accept without a `method`."""
 
 
 @overload
@@ -281,16 +283,16 @@ def estimate(
 ) -> Estimate | SmoothedEstimate | Answers:
     """Sideslip of the car along a log from v_x, a_x, a_y and yaw_rate: see `rear_axle.RearAxleReport` for the names.
 
-    `source`: a `Calibration`, a model, or a car taken at its word. Every row is estimated from all rows (a smoother), or, with
-    `smoothed=False` and for filters without a Gaussian smoother, from those up to it, as `live` does. The bands of Gaussian
-    filters allow for what a calibration does not know of the parameters, or a car's file (`parameter_bands`); a model is taken
-    to be known. **Raises** as `run` and `clean` do.
+    `source`: a `Calibration`, a model, or a car's file without calibration. Every row is estimated from all rows (a
+    smoother). With `smoothed=False`, and for filters without a Gaussian smoother, it is estimated from the rows up to it, as
+    `live` does. The bands of Gaussian filters include the uncertainty of the parameters of a calibration or a car's file
+    (`parameter_bands`); the parameters of a model count as known. **Raises** as `run` and `clean` do.
 
-    An accelerometer that a calibration found to be late is shifted, and so is all that the car's file has a `low_pass` in, where
-    every row is estimated from all; what is said live must do with it.
+    Where every row is estimated from all rows, an accelerometer that the calibration found to be late is shifted, and so are
+    all channels behind the `low_pass` of the car's file; a live estimate cannot do this.
 
-    `method`: a name of `METHODS`, then `source` is a car's file, or a method with numbers of one's own, and the `Answers` are
-    what that method says, looking back only; the filter is the method's own, and nothing is smoothed. **Raises** as `follow`.
+    `method`: a name of `METHODS`. Then `source` is a car's file, or a method with numbers of one's own, and the result is the
+    `Answers` of that method, looking back only; it uses its own filter, and nothing is smoothed. **Raises** as `follow` does.
     """
     if method is not None or isinstance(source, AbstractMethod):
         _check_alone(filter, key)
@@ -314,7 +316,7 @@ def _check_alone(filter: AbstractFilter | None, key: Any) -> None:
 
 
 def _members(source: Calibration | StateSpace | CarSpecification | RearAxle, model: StateSpace) -> Members | None:
-    """Models that stand for what is not known of the parameters; none where a model is taken to be known."""
+    """Models that represent the uncertainty of the parameters; None where the parameters count as known."""
     if isinstance(source, Calibration):
         return members_of_fit(source.fit)
     return None if isinstance(source, StateSpace) else members_of_prior(model, chosen_parameters, SPREADS)
@@ -329,8 +331,8 @@ def live(source: CarSpecification | AbstractMethod, *, method: str) -> LiveMetho
 def live(
     source: Any, *, filter: AbstractFilter | None = None, key: Any = None, method: str | None = None
 ) -> Live | LiveMethod:
-    """The same a row at a time, cleaning and bands included; a late accelerometer stays late, for what comes cannot be
-    shifted. `method` as in `estimate`, with the `LiveMethod` that says the same."""
+    """The same as `estimate`, one row at a time, cleaning and bands included. A late accelerometer is not corrected, since
+    future rows are not available. `method` as in `estimate`, with a `LiveMethod` that gives the same answers."""
     if method is not None or isinstance(source, AbstractMethod):
         _check_alone(filter, key)
         return LiveMethod(method_of(NAME, METHODS, source, method or RECOMMENDED))

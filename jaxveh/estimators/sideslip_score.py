@@ -1,4 +1,4 @@
-"""How far an estimate of sideslip is from a reference, and where that is measured."""
+"""The error of a sideslip estimate against a reference, and the position at which it is measured."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from jaxveh.io import CarSpecification, with_road_steer
 from jaxveh.vehicles import from_specification
 
 TOGETHER = 0.1
-"""Share of the rarer channel's rows below which two channels do not share a clock."""
+"""Share of the rarer channel's rows; below it, two channels do not share a clock."""
 
 
 def is_measured(recording: Recording, name: str) -> bool:
-    """Whether the channel is there, and not NaN in every row."""
+    """Whether the channel exists and is not NaN in every row."""
     return name in recording and bool(np.isfinite(np.asarray(recording[name])).any())
 
 
 def speak_apart(recording: Recording) -> bool:
-    """Whether yaw rate and lateral acceleration are measured, and hardly ever in the same row: two clocks."""
+    """Whether yaw rate and lateral acceleration are measured, but hardly ever in the same row: two clocks."""
     if not (is_measured(recording, "yaw_rate") and is_measured(recording, "a_y")):
         return False
     there = [np.isfinite(np.asarray(recording[name])) for name in ("yaw_rate", "a_y")]
@@ -33,8 +33,8 @@ def speak_apart(recording: Recording) -> bool:
 
 
 def at_centre(car: CarSpecification | RearAxle, recording: Recording) -> Recording:
-    """The recording with the `v_y` of a reference, m/s, moved to the centre of gravity from where the car's file says that it is
-    measured (`reference_position`): less that place's distance ahead times the yaw rate."""
+    """The recording with the `v_y` of a reference, m/s, moved to the centre of gravity from the position where the car's file
+    says that it is measured (`reference_position`): less the distance of that position ahead times the yaw rate."""
     ahead = _reference_ahead(car)
     if not ahead:
         return recording
@@ -52,25 +52,25 @@ def reference_sideslip(recording: Recording) -> jax.Array:
 
 
 def least_speed_of(car: CarSpecification) -> float:
-    """Speed (m/s) below which sideslip is not scored unless one says otherwise: 3, and 0.5 for cars of less than a metre between
-    their axles. Slower, it is the quotient of two small numbers."""
+    """Speed (m/s) below which sideslip is not scored by default: 3, and 0.5 for cars with a wheelbase of less than a metre.
+    At lower speeds sideslip is the quotient of two small numbers."""
     return 3.0 if car.wheelbase >= 1.0 else 0.5
 
 
 def score(
     car: CarSpecification, found: Estimate | SmoothedEstimate, recording: Recording, *, least_speed: float | None = None
 ) -> dict[str, float]:
-    """Errors of an estimate against a reference recording with `v_y`, next to the open-loop linear model's: the car's file with
-    linear tyres, steered from rest, which is the do-nothing baseline. Both are compared where the file says that the reference is
-    measured (`reference_position`).
+    """Errors of an estimate against a reference recording with `v_y`, next to those of the open-loop linear model: the car's
+    file with linear tyres, steered from rest, which is the do-nothing baseline. Both are compared at the position where the
+    file says that the reference is measured (`reference_position`).
 
-    Over the rows where the reference is finite and `v_x` at least `least_speed` (m/s, default `least_speed_of`). **Returns** by
-    name, for sideslip in degrees (`sideslip_rmse_deg`) and for v_y in m/s, what `diagnostics.Score` has: the
-    error as measured, its constant part and the rest (an INS that is turned against the car by half a degree says so in every
-    row), the largest, coverage of the bands, CRPS; the errors of the baseline as `open_loop_sideslip_...`, where there is a
-    `steer`; `rows` and `least_speed`.
+    Uses the rows in which the reference is finite and `v_x` at least `least_speed` (m/s, default `least_speed_of`).
+    **Returns** by name the numbers of `diagnostics.Score`, for sideslip in degrees (`sideslip_rmse_deg`) and for v_y in m/s:
+    the error as measured, its constant part and the rest (an INS that is turned by half a degree against the car shows this
+    angle in every row), the largest error, coverage of the bands, CRPS; the errors of the baseline as
+    `open_loop_sideslip_...`, if there is a `steer`; `rows` and `least_speed`.
 
-    **Raises** `InputError` where no row is left.
+    **Raises** `InputError` if no row is left.
     """
     recording = with_road_steer(car, recording)
     v_y, v_x = np.asarray(recording["v_y"]), np.asarray(recording["v_x"])
@@ -96,7 +96,7 @@ def score(
 
 
 def _named(quantity: str, unit: str, found: Score) -> dict[str, float]:
-    """A score's numbers by the names of the JSON file; shares have no unit."""
+    """A score's numbers by their names in the JSON file; shares have no unit."""
     numbers = found._asdict()
     del numbers["rows"]
     return {f"{quantity}_{name}{'' if name.startswith('coverage') else unit}": value for name, value in numbers.items()}

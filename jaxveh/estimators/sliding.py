@@ -1,4 +1,5 @@
-"""How far a car may slide across, and its wheels along, of what its control unit hears: what kinematics are then worth."""
+"""How far a car may slide laterally and its wheels longitudinally, from the control unit's channels: when kinematics are
+reliable."""
 
 from __future__ import annotations
 
@@ -14,15 +15,16 @@ from jaxveh.vehicles import GRAVITY
 
 
 class Doubt(NamedTuple):
-    """What may be wrong: the lateral speed `across` and the wheels' speed `along`, both m/s; in ordinary driving zero, nearly."""
+    """Possible errors: of the lateral speed, `across`, and of the wheels' speed, `along`, both in m/s; nearly zero in ordinary
+    driving."""
 
     across: Any
     along: Any
 
 
 class SlidingMemory(NamedTuple):
-    """Of the lateral speed what was gathered beyond the tyres' (m/s), and the tyres' own in the last row (m/s); how much faster
-    each wheel usually is than their mean (4,), a share; the doubt of the last row."""
+    """The lateral speed accumulated beyond that of the tyres (m/s), and the tyres' own in the last row (m/s); the usual
+    excess of each wheel over the mean of all (4,), as a share; the doubt of the last row."""
 
     gathered: Any
     ordinary: Any
@@ -31,16 +33,16 @@ class SlidingMemory(NamedTuple):
 
 
 class Sliding(eqx.Module):
-    """Two signs that a car slides, neither of which needs the road's friction.
+    """Two indications that a car slides, neither of which needs the road's friction.
 
-    - `across`: what accelerometer and yaw rate say of the lateral speed's rate, `a_y / (1 + g roll_gradient) - v_x r`, less the
-    rate of the lateral speed that the tyres' linear range makes, gathered over `gathering` (s). A bank and an offset gather, too:
-    up to `usual_across` (m/s) counts for nearly nothing.
-    - `along`: by how much one wheel is faster or slower than all in the mean, beside what the bend makes (`half_track`, m) and
-    what it is within `learning` (s) of ordinary driving, less `usual_along` (a share of the speed). Wheels that all slip alike
-    do not show it.
+    - `across`: the rate of the lateral speed from accelerometer and yaw rate, `a_y / (1 + g roll_gradient) - v_x r`, less that
+    of the tyres' linear range, accumulated over `gathering` (s). A bank and an offset accumulate, too: up to `usual_across`
+    (m/s) the result counts for nearly nothing.
+    - `along`: how much one wheel is faster or slower than the mean of all, beyond the effect of the bend (`half_track`, m)
+    and its usual excess (learned in ordinary driving over `learning` (s)), less `usual_along` (a share of the speed).
+    Wheels that all slip alike are not detected.
 
-    Both stay for `staying` (s): wheels that grip again need a moment to be what they say.
+    Both persist for `staying` (s): wheels that grip again need a moment until their speeds are right.
     """
 
     roll_gradient: jax.Array = positive("rad/(m/s^2)", default=0.006)
@@ -52,14 +54,15 @@ class Sliding(eqx.Module):
     staying: jax.Array = positive("s", default=0.5)
 
     def start(self, t: Any) -> SlidingMemory:
-        """Before the first row: a car that does not slide."""
+        """The memory before the first row: a car that does not slide."""
         zero = jnp.zeros_like(t)
         return SlidingMemory(zero, zero, jnp.zeros((4,), zero.dtype), Doubt(zero, zero))
 
     def next(
         self, last: SlidingMemory, heard: dict[str, Any], v_x: Any, ordinary: Any, wheelbase: Any
     ) -> SlidingMemory:
-        """After a row. `v_x` (m/s) as believed, `ordinary`: the lateral speed (m/s) of tyres that do not slide."""
+        """The memory after a row. `v_x` (m/s): the estimated speed; `ordinary`: the lateral speed (m/s) if the tyres do not
+        slide."""
         dt = heard["dt"]
         rate = heard["a_y"] / (1.0 + GRAVITY * self.roll_gradient) - v_x * heard["yaw_rate"]
         gathered = last.gathered * jnp.exp(-dt / self.gathering) + dt * rate - (ordinary - last.ordinary)
@@ -74,7 +77,7 @@ class Sliding(eqx.Module):
         speeds = jnp.stack([heard[f"wheel_speed_{at}"] for at in AT])
         there = ~jnp.isnan(speeds)
         fast, turn = jnp.abs(away_from_zero(v_x)), heard["yaw_rate"]
-        # Outer wheels go round wider circles than inner ones, front wheels than rear ones.
+        # Outer wheels run on wider circles than inner ones, front wheels on wider circles than rear ones.
         wider = 0.5 * jnp.square(wheelbase * turn) / fast
         beside = self.half_track * turn
         bend = jnp.stack([wider - beside, wider + beside, -beside, beside])

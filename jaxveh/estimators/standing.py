@@ -1,4 +1,4 @@
-"""What a car that stands tells of its sensors: they should say nothing, and do not."""
+"""Sensor offsets from the rows in which a car stands, where the sensors should read zero."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from jaxveh._core.recording import Recording
 from jaxveh.estimators.rear_axle import USUAL_WHEELBASE
 
 STANDING = 0.1
-"""m/s, of a car of the usual wheelbase: slower, it stands."""
+"""m/s, for a car of the usual wheelbase: below this speed it counts as standing."""
 
 LEAST = 0.5
-"""s: of standing, without which nothing is told."""
+"""s: the least time at standstill for an estimate of the offsets."""
 
 QUIET = 0.02
-"""rad/s: a yaw rate that scatters by more is that of a car that is carried, or turned by hand."""
+"""rad/s: if the yaw rate scatters by more, the car is being carried, or turned by hand."""
 
 
 class Offsets(NamedTuple):
-    """What the yaw rate (rad/s) and a_y (m/s^2) say at standstill."""
+    """The readings of yaw rate (rad/s) and a_y (m/s^2) at standstill."""
 
     yaw_rate: float
     a_y: float
 
 
 def offsets_at_standstill(recordings: Sequence[Recording], wheelbase: float) -> Offsets | None:
-    """Medians over the rows at which the car stands, None where it hardly does. `wheelbase` in m."""
+    """Medians over the rows in which the car stands, None if there are too few. `wheelbase` in m."""
     floor = STANDING * (wheelbase / USUAL_WHEELBASE) ** 0.5
     rows, seconds = [], 0.0
     for one in recordings:

@@ -1,4 +1,4 @@
-"""A vehicle and its sensors as the state space that a filter sees."""
+"""A vehicle and its sensors as the state space that a filter uses."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from jaxveh.statespace import (
 from jaxveh.vehicles import AbstractVehicle
 
 TOLD_SPEED = "v_x"
-"""The input of a car that is told its speed, and the state of one that is not."""
+"""The speed: an input of some cars, and a state of others."""
 
 PROCESS_NOISE = {"v_x": 0.1, "v_y": 0.1, "yaw_rate": 0.05}
-"""Default spreads of what a car's equations leave out: m/s and rad/s, per root second."""
+"""Default standard deviations of effects missing from a car's equations: m/s and rad/s, per root second."""
 
 DIRECTIONS = ("yaw", "course")
-"""Outputs that are directions in the world: sensors say them to a whole turn, so that their innovations wrap."""
+"""Outputs that are directions in the world: sensors give them modulo a whole turn, so their innovations wrap."""
 
 START_SPREAD = {"v_x": 0.5, "v_y": 0.2, "yaw": 0.02, "yaw_rate": 0.02}
-"""Default spreads of the start state: m/s, rad, rad/s."""
+"""Default standard deviations of the start state: m/s, rad, rad/s."""
 
 
 def state_space(
@@ -60,26 +60,26 @@ def state_space(
     steps: int = 1,
     input_path: str = "held",
 ) -> StateSpace:
-    """The state space of a car with sensors, its `estimate`d parameters among the states.
+    """The state space of a car with sensors, with the parameters chosen by `estimate` among the states.
 
-    - `estimate(car)`: the parameters to estimate (`lambda car: (car.front.B, car.front.D)`), `prior` their relative
-      spread and `walk` their random walk's, one number or by name; see `statespace.with_parameters`.
+    - `estimate(car)`: the parameters to estimate (`lambda car: (car.front.B, car.front.D)`), `prior` their relative standard
+      deviation and `walk` that of their random walk, one number or by name; see `statespace.with_parameters`.
     - `process_noise`: standard deviations by state in unit per root second (default `PROCESS_NOISE`, for the states the
-      car has), or a `Continuous` or `Discrete` law. `start`, `start_spread`: mean and spread of the start state.
+      car has), or a `Continuous` or `Discrete` law. `start`, `start_spread`: mean and standard deviation of the start state.
     - A car whose speed is a state (`SevenDOF`, `TwoTrack3DOF`, ... under torques) needs `start={"v_x": ...}` (m/s), the speed
-      in the first row, and starts straight on with wheels that roll. Its wheels' spins are stiff: rows of 0.01 s take one step at
-      20 m/s, slower ones or longer rows more `steps` (the spins' poles are in the car's docstring).
-    - `measurement_noise`: another law than the sensors' own (`StateDependent`: worse in large slip, say), of their channels.
-    - `minimum_speed` (m/s): below it all states are held (`held_rows` says where) of a car whose speed is the input `v_x`: a
-      single track has no steady slip angle at standstill. One whose speed is a state is held nowhere.
-    - `report`: outputs of the car to show beside its states, such as `sideslip`, `F_yf`, `slip_angle_front`; by default the
-      sideslip of a car that has one.
+      in the first row, and starts straight ahead with rolling wheels. Its wheel spins are stiff: with rows 0.01 s apart, one
+      step suffices at 20 m/s; lower speeds or longer intervals need more `steps`, see the poles in the car's docstring.
+    - `measurement_noise`: another noise law than the sensors' own (say, a `StateDependent` one that grows with slip).
+    - `minimum_speed` (m/s): below it all states of a car whose speed is the input `v_x` are held (`held_rows` returns where): a
+      single track has no steady slip angle at standstill. The states of a car whose speed is a state are never held.
+    - `report`: outputs of the car to show in addition to its states, such as `sideslip`, `F_yf`, `slip_angle_front`; by default
+      the sideslip of a car that has one.
     - `solver`, `steps`: fixed steps between two rows; `input_path`: inputs `held` over a step or `linear`.
-    - A measured `yaw` or `course` may be told to a whole turn (within -pi to pi): their innovations wrap.
+    - A measured `yaw` or `course` may be given modulo a whole turn (within -pi to pi): their innovations wrap.
 
     The estimate's fields are the states, then `report`, then the parameters (`front_B`), in physical units.
-    **Raises** `InputError` for unknown names, spreads that are not positive, sensors that are no `SensorSet` or measure what the
-    car does not have.
+    **Raises** `InputError` for unknown names, standard deviations that are not positive, sensors that are no `SensorSet` or
+    measure quantities that the car does not have.
     """
     check_at_least("steps", steps, 1)
     check_at_least("minimum_speed", minimum_speed, 0)
@@ -119,8 +119,8 @@ def _check_kinds(car, sensors, estimate) -> None:
         raise InputError(f"state_space: car = {type(car).__name__}: must be a vehicle of jaxveh.vehicles.")
     if not isinstance(sensors, SensorSet):
         raise InputError(
-            f"state_space: sensors = {type(sensors).__name__}: must be a SensorSet, which says the noise of each channel as a "
-            "filter takes it: sensors.esc(yaw_rate=0.005, a_y=0.1), or SensorSet(Gaussian({...})) with the devices' channels."
+            f"state_space: sensors = {type(sensors).__name__}: must be a SensorSet, which states the noise of each channel for a "
+            "filter: sensors.esc(yaw_rate=0.005, a_y=0.1), or SensorSet(Gaussian({...})) with the devices' channels."
         )
 
 
@@ -158,7 +158,7 @@ class ReportOutputs(eqx.Module):
     def __call__(self, system: Instrumented, t, x, u):
         shown = x._asdict()
         if self.names == ("sideslip",):
-            # By far the most common report needs no tyre force.
+            # By far the most common report; it needs no tyre force.
             moves = system.vehicle.motion(system.split(x)[0], u)
             shown["sideslip"] = numerics.arctan2(moves.v_y, jnp.broadcast_to(moves.v_x, jnp.shape(moves.v_y)))
         elif self.names:
@@ -184,13 +184,13 @@ def _start(system: Instrumented, mean: Mapping, spread: Mapping) -> Prior:
     if TOLD_SPEED not in system.inputs and TOLD_SPEED in states:
         usual = _rolling(system, mean)._asdict()
     means = [mean.get(name, usual[name]) for name in states]
-    # What is neither told nor known by name is a sensor's filter state: one unit is wide, and forgotten at once.
+    # All other states are filter states of a sensor: a standard deviation of one is wide, and forgotten at once.
     spreads = {name: spread.get(name, START_SPREAD.get(name, 1.0)) for name in states}
     return Prior(system.state_type(*means), Gaussian(spreads))
 
 
 def _rolling(system: Instrumented, mean: Mapping):
-    """The state of straight running at the speed given, nothing driving or braking."""
+    """The state of straight running at the given speed, without driving or braking."""
     if TOLD_SPEED not in mean:
         raise InputError(
             f"start: the speed of {type(system.vehicle).__name__} is a state, v_x, which needs a mean: give the speed in the "
@@ -202,7 +202,7 @@ def _rolling(system: Instrumented, mean: Mapping):
 
 
 def _without_noise(sensors: SensorSet) -> SensorSet:
-    """The sensors with the noise's levels taken out: the state space holds them, and each parameter stands once."""
+    """The sensors without the noise levels: the state space holds them, so that each parameter exists only once."""
     levels = sensors.noise.std
     return eqx.tree_at(lambda s: s.noise.std, sensors, type(levels)(*[None] * len(levels)))
 
@@ -223,7 +223,7 @@ def _report_names(system: Instrumented, report: tuple[str, ...] | None) -> tuple
 
 
 def held_rows(model: StateSpace, recording) -> jax.Array:
-    """(T,) booleans: where the lateral states were held because the car was slower than the model's minimum speed."""
+    """(T,) booleans: where the states were held because the car was slower than the model's minimum speed."""
     function = model.transition_function
     while not isinstance(function, HeldBelow):
         function = getattr(function, "function", None)

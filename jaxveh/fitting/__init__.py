@@ -1,11 +1,11 @@
-"""Fits on optimistix: rig data of tyres, residuals of recordings by multiple shooting, likelihoods of filters.
+"""Fits with optimistix: rig data of tyres, residuals of recordings by multiple shooting, likelihoods of filters.
 
-A fit is a problem (`pose_rig`, `pose_shooting`, `pose_likelihood`, `pose_prediction_error`) and its solution by `solve`, a pure
-function under `jit`, `vmap` and `grad`: a solver of optimistix finds the optimum (its Levenberg-Marquardt and its BFGS; of our
-own in its form `LevenbergMarquardt` on normal equations, and `FisherScoring`), the implicit function theorem gives its
-derivatives with respect to data, noise levels and priors. `fit_rig`, `multiple_shooting`, `maximum_likelihood` and
-`prediction_error` are the programs on top, which check, tell how far they are, and raise. All return one shape of result,
-`AbstractFit`.
+A fit is a problem (`pose_rig`, `pose_shooting`, `pose_likelihood`, `pose_prediction_error`) and its solution by `solve`, a
+pure function under `jit`, `vmap` and `grad`. A solver of optimistix finds the optimum: its Levenberg-Marquardt or BFGS, or
+one of this package in the same form (`LevenbergMarquardt` on normal equations, `FisherScoring`). The implicit function
+theorem gives the derivatives with respect to data, noise levels and priors. `fit_rig`, `multiple_shooting`,
+`maximum_likelihood` and `prediction_error` are programs built on these; they check their input, report progress, and raise.
+All return one kind of result, `AbstractFit`.
 """
 
 from jaxveh.fitting import kit

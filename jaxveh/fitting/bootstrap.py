@@ -1,4 +1,4 @@
-"""The bootstrap: fits to data drawn anew from the data, all in one program."""
+"""The bootstrap: fits to data sets resampled from the data, all in one program."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from jaxveh.fitting.problem import AbstractProblem, by_name, in_units
 from jaxveh.fitting.solve import MOST_STEPS, optimum
 
 LEAST_UNITS = 5
-"""Fewer parts than this give hardly any new data when they are drawn anew."""
+"""With fewer parts than this, resampling gives hardly any new data sets."""
 
 
 class Bootstrap(NamedTuple):
-    """Fits to `count` data sets drawn anew: `parameters` as those of the fit, (count,) each; `parameters_std`, their
-    spread, which is their standard error; `converged` (count,): those that did not are left out of it."""
+    """Fits to `count` resampled data sets: `parameters` with the names of the fit's, (count,) each; `parameters_std`, their
+    standard deviation, which is the standard error; `converged` (count,): fits that did not converge are left out of it."""
 
     parameters: Parameters
     parameters_std: Parameters
@@ -37,12 +37,12 @@ def bootstrap(
     max_steps: int = MOST_STEPS,
     tolerance: float = 1e-8,
 ) -> Bootstrap:
-    """Standard errors by fitting `count` times to parts of the data drawn with replacement (B. Efron and R. J. Tibshirani, An
-    Introduction to the Bootstrap, 1993, sec. 9.5: pairs): under `jit`, every fit in one program.
+    """Standard errors from `count` fits to parts of the data drawn with replacement (B. Efron and R. J. Tibshirani, An
+    Introduction to the Bootstrap, 1993, sec. 9.5: pairs): under `jit`, all fits in one program.
 
-    Parts are rows of rig data, or whole recordings. They say nothing of the noise's law, but take the parts for independent.
-    `groups` (rows,): numbers of what is drawn as one, such as the run of each row. Each fit starts where that to all the data
-    ends. `max_steps`, `tolerance` as in `solve`.
+    Parts are rows of rig data, or whole recordings. No law of the noise is assumed, but the parts are assumed independent.
+    `groups` (rows,): numbers of the groups that are drawn as a whole, such as the run of each row. Each fit starts at the
+    optimum for all the data. `max_steps`, `tolerance` as in `solve`.
 
     **Raises** `InputError` for fewer than two fits, or fewer than five parts.
     """
@@ -51,10 +51,10 @@ def bootstrap(
     parts = problem.units()
     group = np.arange(parts) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
     if group.shape != (parts,):
-        raise InputError(f"groups has shape {group.shape}: must be ({parts},), one number a part of the data.")
+        raise InputError(f"groups has shape {group.shape}: must be ({parts},), one number per part of the data.")
     if group.max() + 1 < LEAST_UNITS:
         raise InputError(
-            f"bootstrap: the data have {group.max() + 1} parts to be drawn anew (rows, runs or recordings): must be at least "
+            f"bootstrap: the data have {group.max() + 1} parts to resample (rows, runs or recordings): must be at least "
             f"{LEAST_UNITS}."
         )
     return _bootstrap(problem, key, jnp.asarray(group), int(group.max()) + 1, count, max_steps, tolerance)

@@ -1,4 +1,4 @@
-"""What fits by a filter's likelihood have in common."""
+"""The common part of fits by a filter's likelihood."""
 
 # No postponed annotations here: equinox does not see an AbstractVar in a string.
 
@@ -15,10 +15,10 @@ from jaxveh.statespace import StateSpace
 
 
 class AbstractFilterProblem(AbstractProblem):
-    """A cost of leaves of a filter's model, whose coordinates are the parameters (p,) on their bijectors' line.
+    """A cost of leaves of a filter's model; its coordinates are the parameters (p,) on the real line of their bijectors.
 
-    `counts` (recordings,): how many times each recording counts. `centre`, `spread` (p,): the prior on that line, a spread of
-    infinity for none.
+    `counts` (recordings,): how many times each recording counts. `centre`, `spread` (p,): mean and standard deviation of the
+    prior on that line; infinite for no prior.
     """
 
     filter: eqx.AbstractVar[AbstractFilter]

@@ -1,4 +1,4 @@
-"""What programs over the fits ask for."""
+"""Names for programs built on the fits."""
 
 from jaxveh.fitting.problem import in_units, on_line, scalar_parameters
 from jaxveh.fitting.rig_data import LEAST_NOISE

@@ -12,10 +12,10 @@ import optimistix as optx
 from jax import lax
 
 FIRST, LESS, MORE = 1.0, 0.1, 4.0
-"""Damping at the start, and its factors after a step that went as foretold and after one that did not.
+"""Damping at the start, and its factors after a step that went as predicted and after one that did not.
 
-A first damping of 0.001 saves two steps from a near start, but from starts up to a half off it ended in a worse minimum in
-eight of 28 fits, this one in one.
+With a first damping of 0.001, a fit from a near start takes two steps fewer; but from starts that were off by up to a half,
+eight of 28 fits ended in a worse minimum, and with the present value one of 28.
 """
 
 
@@ -28,7 +28,7 @@ class Quadratic(NamedTuple):
 
 
 class _Search(NamedTuple):
-    """`at` is the point's, but where the point is new (`fresh`): then only its cost."""
+    """The state of a search. `at` belongs to the present point; where the point is new (`fresh`), only its cost does."""
 
     at: Quadratic
     fresh: Any
@@ -40,12 +40,13 @@ class _Search(NamedTuple):
 
 class LevenbergMarquardt(optx.AbstractMinimiser):
     """Least squares in the form of J. J. Moré, The Levenberg-Marquardt algorithm: implementation and theory, Numerical Analysis,
-    Lecture Notes in Mathematics 630 (1978): each coordinate is damped by the largest curvature that it has shown.
+    Lecture Notes in Mathematics 630 (1978): each coordinate is damped by its largest curvature so far.
 
-    `quadratic(y, args)`: the `Quadratic` of the cost at y (n,), its matrix that of Gauss and Newton; who knows the structure of
-    the residuals forms it without their Jacobian. It ends where a step lowered the cost, and was to lower it, by no more than
-    `rtol` of itself, or where no coordinate moves by more than `atol`. A step counts even if it is refused. `options` of
-    `optimistix.minimise`: `limit`, the most steps as an array, beside `max_steps`, which is compiled in.
+    `quadratic(y, args)`: the `Quadratic` of the cost at y (n,), with the Gauss-Newton matrix. The matrix may be formed
+    without the Jacobian where the structure of the residuals allows. The search ends when a step lowered the cost, and was
+    predicted to lower it, by no more than a share `rtol`, or when no coordinate moves by more than `atol`. A refused step
+    counts as a step. `options` of `optimistix.minimise`: `limit`, the most steps as an array, in addition to `max_steps`,
+    which is compiled in.
     """
 
     rtol: float
@@ -54,7 +55,7 @@ class LevenbergMarquardt(optx.AbstractMinimiser):
     norm: Callable = eqx.field(static=True, default=optx.max_norm)
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):
-        """Nothing is computed before the first step."""
+        """The first state; nothing is computed before the first step."""
         zeros = jnp.zeros_like(y)
         infinite = jnp.full((), jnp.inf, y.dtype)
         at = Quadratic(infinite, zeros, jnp.zeros((y.size, y.size), y.dtype))
@@ -63,16 +64,16 @@ class LevenbergMarquardt(optx.AbstractMinimiser):
         )
 
     def step(self, fn, y, args, options, state, tags):
-        """One damped step, taken or refused."""
+        """One damped step, accepted or refused."""
         at = lax.cond(state.fresh, lambda: self.quadratic(y, args), lambda: state.at)
         diagonal = jnp.maximum(state.diagonal, jnp.diagonal(at.matrix))
         factor = jnp.linalg.cholesky(at.matrix + jnp.diag(state.damping * diagonal))
         move = -jax.scipy.linalg.cho_solve((factor, True), at.gradient)
-        # What the step is to lower the cost by, by the linear model: -g m - m H m / 2, with (H + damping D) m = -g.
+        # The decrease that the linear model predicts: -g m - m H m / 2, with (H + damping D) m = -g.
         foretold = 0.5 * (state.damping * jnp.sum(diagonal * move**2) - at.gradient @ move)
         cost, aux = fn(y + move, args)
         lowered = at.cost - cost
-        # NaN where the step left the law's domain; then it is refused.
+        # NaN where the step left the law's domain; then the step is refused.
         better = lowered > 0
         share = jnp.where(jnp.isfinite(lowered), lowered, -1.0) / jnp.where(foretold > 0, foretold, 1.0)
         little = (foretold <= self.rtol * at.cost) & (jnp.abs(lowered) <= self.rtol * at.cost)
@@ -82,16 +83,16 @@ class LevenbergMarquardt(optx.AbstractMinimiser):
         return jnp.where(better, y + move, y), _Search(at, better, diagonal, damping, state.steps + 1, done), aux
 
     def terminate(self, fn, y, args, options, state, tags):
-        """Where it is done, or has taken as many steps as `limit` says."""
+        """Whether the search has ended, or has taken `limit` steps."""
         return termination(state, options)
 
     def postprocess(self, fn, y, aux, args, options, state, tags, result):
-        """The last point is the best."""
+        """The last point, which is the best."""
         return y, aux, {}
 
 
 def termination(state, options):
-    """Whether a search is over, and with which result of optimistix."""
+    """Whether a search is over, and its result code of optimistix."""
     spent = state.steps >= options["limit"] if "limit" in options else jnp.asarray(False)
     reached = optx.RESULTS.nonlinear_max_steps_reached
     result = optx.RESULTS.where(spent & ~state.done, reached, optx.RESULTS.successful)

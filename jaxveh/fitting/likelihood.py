@@ -26,10 +26,11 @@ REJECTED = 1e8
 
 
 class LikelihoodProblem(AbstractFilterProblem):
-    """A filter's negative log-likelihood of recordings, and what of the model is to be fitted.
+    """A filter's negative log-likelihood of recordings, as a function of the chosen parameters of its model.
 
-    `rows`: a tuple, one a recording; `counts` (recordings,): how many times each counts. `centre`, `spread` (p,): the prior on
-    the line of the parameters' bijectors, a spread of infinity for none. `key`: of filters that draw particles.
+    `rows`: a tuple, one entry per recording; `counts` (recordings,): how many times each counts. `centre`, `spread` (p,):
+    mean and standard deviation of the prior on the real line of the bijectors; infinite for no prior. `key`: for filters that
+    draw particles.
     """
 
     filter: AbstractFilter
@@ -65,10 +66,10 @@ class LikelihoodProblem(AbstractFilterProblem):
 
 
 def hessian(cost, z):
-    """Second derivatives (n, n) of a cost that goes through a long scan: passes forward over passes forward.
+    """Second derivatives (n, n) of a cost with a long scan, by forward mode over forward mode.
 
-    They keep nothing of the way, where a pass backward stores it all: three coordinates over a filter of 300 rows take a sixth
-    of the time, and two thirds of the time to compile.
+    Forward mode stores no intermediate values, where reverse mode stores all of them: for three coordinates and a filter over
+    300 rows it takes a sixth of the time to run, and two thirds of the time to compile.
     """
     each = jnp.eye(z.size, dtype=z.dtype)
 
@@ -91,7 +92,7 @@ def pose_likelihood(
     prior: float | Mapping[str, float] | None = None,
     key=None,
 ) -> LikelihoodProblem:
-    """What `maximum_likelihood` solves, for `solve`; arguments and errors as there."""
+    """The problem of `maximum_likelihood`, for `solve`; arguments and errors as there."""
     kit.check_gradients("maximum_likelihood", filter, Gradient.on_average)
     filter.check(model)
     rows = tuple(model.rows(recording) for recording in as_list(recordings))
@@ -118,15 +119,16 @@ def maximum_likelihood(
     standard_errors: bool = True,
     throw: bool = True,
 ) -> Fit:
-    """Choose the leaves of `model` that `where` picks so that the filter's likelihood of the recordings is largest.
+    """Fit the leaves of `model` that `where` picks by maximising the filter's likelihood of the recordings.
 
-    `where` sees the StateSpace: `lambda m: (m.system.vehicle.front.B, m.measurement_noise.std.a_y)`. With `prior` (relative
-    spreads, one number or by name) around the present values, the fit is a MAP fit. BFGS on the real line of each
-    leaf's bijector. With a particle filter give a `key`, the same for every evaluation: its gradient is right on average, and its
-    value jumps where other particles are chosen. Under `jit`, `vmap` and `grad` as it is; see `solve`.
+    `where` is called with the StateSpace: `lambda m: (m.system.vehicle.front.B, m.measurement_noise.std.a_y)`. With `prior`
+    (relative standard deviations, one number or by name) around the present values, the fit is a MAP fit. The solver is BFGS
+    on the real line of each leaf's bijector. A particle filter needs a `key`, the same for every evaluation: its gradient is
+    correct on average, and its value jumps where other particles are chosen. Works under `jit`, `vmap` and `grad`; see
+    `solve`.
 
-    **Returns** a `Fit` whose `model` carries the new values; standard errors from the Hessian at the optimum.
-    **Raises** `InputError` as `run` does; `FilterError` where the solver does not converge, unless `throw=False`.
+    **Returns** a `Fit` whose `model` has the new values; standard errors from the Hessian at the optimum.
+    **Raises** `InputError` as `run` does; `FilterError` if the solver does not converge, unless `throw=False`.
     """
     problem = pose_likelihood(filter, model, recordings, where, prior=prior, key=key)
     fit = solve(problem, max_steps=max_steps, tolerance=tolerance, standard_errors=standard_errors)

@@ -1,4 +1,4 @@
-"""MAP and least-squares fits by multiple shooting: short simulations tied together, so that a spin-out cannot explode."""
+"""MAP and least-squares fits by multiple shooting: short simulations tied together, so that a spin-out cannot diverge."""
 
 from __future__ import annotations
 
@@ -23,18 +23,20 @@ from jaxveh.fitting.solve import solve
 from jaxveh.statespace import StateSpace, kit, start_from
 
 LARGEST_RESIDUAL = 1e6
-"""What a residual of a diverged segment is taken as: finite, so that the solver can step back."""
+"""The limit of a residual of a diverged segment: finite, so that the solver can step back."""
 
 HAIR = 1e-6
-"""What holds a parameter without a prior, in deviations a unit of its line: it keeps the solver's matrix regular."""
+"""Weight that holds a parameter without a prior, in standard deviations per unit of its real line: keeps the solver's matrix
+regular."""
 
 
 class ShootingProblem(AbstractProblem):
-    """Residuals of simulations from the start of each of K segments, and what of the model is to be fitted.
+    """Residuals of simulations from the start of each of K segments, as a function of the chosen parameters of the model.
 
-    Coordinates: the parameters (p,) on their bijectors' line, then each state at the K starts. `tie`: what a state without
-    process noise may jump between segments, over its prior's spread. `counts` (recordings,): how many times each counts.
-    `centre` (p,) and `prior` (p, p): mean and covariance of the parameters on their line; None where nothing was known of them.
+    Coordinates: the parameters (p,) on the real line of their bijectors, then each state at the K starts. `tie`: the standard
+    deviation of a jump between segments for a state without process noise, as a share of its prior's. `counts` (recordings,):
+    how many times each counts. `centre` (p,) and `prior` (p, p): mean and covariance of the parameters on their line; `prior`
+    is None if there is none.
     """
 
     model: StateSpace
@@ -47,7 +49,7 @@ class ShootingProblem(AbstractProblem):
 
     @property
     def states(self) -> tuple[str, ...]:
-        """The model's own states: those that are no parameters."""
+        """The model's own states, without the parameters."""
         return self.model.states if self.model.chosen is None else self.model.chosen.states
 
     def start(self):
@@ -59,7 +61,7 @@ class ShootingProblem(AbstractProblem):
         return z[: len(self.chosen)]
 
     def starts(self, z):
-        """The states at the start of each segment: an array (K,) each."""
+        """The states at the start of each segment: a list of arrays (K,)."""
         return list(z[len(self.chosen) :].reshape(len(self.states), -1))
 
     def model_at(self, z):
@@ -85,7 +87,7 @@ class ShootingProblem(AbstractProblem):
         return inverse @ inverse.T, jnp.ones((p,), bool)
 
     def is_failure(self, cost):
-        # Residuals at their limit do not move with the unknowns: the solver takes a diverged start for an optimum.
+        # Residuals at their limit do not change with the unknowns: the solver takes a diverged start for an optimum.
         return cost >= 0.5 * LARGEST_RESIDUAL**2
 
     def units(self):
@@ -103,7 +105,7 @@ def pose_shooting(
     prior: float | Mapping[str, float] | None = None,
     tie=0.01,
 ) -> ShootingProblem:
-    """What `multiple_shooting` solves over segments (see `cut`, `cut_rows`), for `solve`; arguments and errors as there."""
+    """The problem of `multiple_shooting` over segments (see `cut`, `cut_rows`), for `solve`; arguments and errors as there."""
     check_positive("tie", tie)
     if model.chosen is None and where is None:
         raise InputError("multiple_shooting: the model estimates no parameter; give `where=`, or `with_parameters`.")
@@ -118,12 +120,12 @@ def pose_shooting(
     else:
         chosen = model.chosen.parameters
         n = len(model.chosen.states)
-        # States and parameters are independent in the prior that `with_parameters` makes, each among themselves may not be.
+        # In the prior of `with_parameters`, states and parameters are independent of each other, but not among themselves.
         centre, known = jnp.stack(model.prior.mean[n:]), model.prior.covariance()[n:, n:]
         values = in_units(chosen, centre)
     if prior is not None:
         known = jnp.diag(spread_on_line(chosen, values, prior) ** 2)
-    # A batch of segments does not tell how many recordings it is made of: then they are one.
+    # A batch of segments does not show the number of its recordings: then they count as one.
     count = int(np.sum(segments.first)) if is_concrete(segments.first) else 1
     counts, tie = jnp.ones(count, centre.dtype), jnp.asarray(tie, centre.dtype)
     return ShootingProblem(
@@ -132,12 +134,12 @@ def pose_shooting(
 
 
 def _check_inside(chosen: tuple[Parameter, ...]) -> None:
-    """Raise for what squares of residuals cannot tell, or what is unknown anyway."""
+    """Raise for parameters that squared residuals cannot determine, or that are unknowns anyway."""
     for p in chosen:
         if p.path.partition(".")[0] != "system":
             raise InputError(
-                f"multiple_shooting: where picked {p.name}; it fits what moves the system (`m.system...`): noise levels are for "
-                "maximum_likelihood, and first states are always found."
+                f"multiple_shooting: where picked {p.name}; it fits parameters of the system (`m.system...`): fit noise levels "
+                "with maximum_likelihood; first states are always found."
             )
 
 
@@ -156,18 +158,18 @@ def multiple_shooting(
 ) -> Fit:
     """Fit the leaves of a model that `where` picks to recordings, by Levenberg-Marquardt on short simulations.
 
-    `where` sees the StateSpace. Of a model whose parameters are states (see `statespace.with_parameters`) those are fitted, with
-    the prior that it has of them. `prior`: relative spreads around the present values, one number or by name; a model's own prior
-    gives way to it. Without any: least squares.
+    `where` is called with the StateSpace. If the model's parameters are states (see `statespace.with_parameters`), those are
+    fitted, with their prior in the model. `prior`: relative standard deviations around the present values, one number or by
+    name; it replaces the model's own prior. Without any prior: least squares.
 
-    The recordings are cut into segments of `window` seconds (Bock 1981); unknown are the parameters and the state at the start
-    of each. Residuals: measurements over their noise's standard deviation; the ends' mismatch with the next start, over the
-    process noise gathered in a window, or over `tie` times the prior's spread for states without process noise; the first states
-    and the parameters against the prior. Under `jit`, `vmap` and `grad` as it is, the first recording's time being concrete; see
-    `solve`.
+    The recordings are cut into segments of `window` seconds (Bock 1981); unknown are the parameters and the state at the
+    start of each segment. Residuals: measurements over their noise's standard deviation; the gap between each end and the
+    next start, over the window's process noise, or `tie` times the prior's standard deviation for states without any; the
+    first states and the parameters against the prior. Works under `jit`, `vmap` and `grad` if the first recording's time is
+    concrete; see `solve`.
 
-    **Returns** a `Fit`; standard errors from the Jacobian at the optimum, the starts marginalised. **Raises** `InputError`
-    for a model without parameters, or logs too short; `FilterError` where the solver does not converge (`throw`).
+    **Returns** a `Fit`; standard errors from the Jacobian at the optimum, with the starts marginalised. **Raises** `InputError`
+    for a model without parameters, or logs too short; `FilterError` if the solver does not converge (`throw`).
     """
     problem = pose_shooting(model, cut(model, recordings, window), where, prior=prior, tie=tie)
     fit = solve(problem, max_steps=max_steps, tolerance=tolerance, standard_errors=standard_errors)
@@ -177,10 +179,10 @@ def multiple_shooting(
 
 
 def residuals(z, problem: ShootingProblem):
-    """What is to be least in squares, at the coordinates z: misfits, ties and deviations from the prior, in one array."""
+    """All residuals at the coordinates z in one array: misfits, ties and deviations from the prior."""
     starts = problem.starts(z)
     ends, misfit = _simulate(problem, z, starts)
-    # Each recording as often as it counts: its segments follow one another from where it starts.
+    # Each recording is weighted by its count: its segments follow one another from its start.
     share = jnp.sqrt(problem.counts)[jnp.cumsum(problem.segments.first) - 1]
     parts = share * misfit, share * _ties(problem, starts, ends), share * _first(problem, starts), _prior(problem, z)
     stacked = jnp.concatenate([part.reshape(-1) for part in parts])
@@ -188,7 +190,7 @@ def residuals(z, problem: ShootingProblem):
 
 
 def _simulate(problem: ShootingProblem, z, starts):
-    """Ends of the segments (a list of (K,)), and measurement residuals (W, m, K), zero where nothing was measured."""
+    """Ends of the segments (a list of (K,)), and measurement residuals (W, m, K), zero where not measured."""
     model, segments = problem.model, problem.segments
     count = segments.first.shape[0]
     wide = lambda value: jnp.broadcast_to(value, (count,))
@@ -219,7 +221,7 @@ def _simulate(problem: ShootingProblem, z, starts):
 
 
 def _ties(problem: ShootingProblem, starts, ends):
-    """Mismatch (n, K) of each end with the next start, in standard deviations; zero where nothing follows."""
+    """Mismatch (n, K) of each end with the next start, in standard deviations; zero where no segment follows."""
     spread = tie_spread(problem, jnp.diff(problem.segments.rows.t, axis=0))
     out = []
     for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
@@ -229,7 +231,7 @@ def _ties(problem: ShootingProblem, starts, ends):
 
 
 def tie_spread(problem: ShootingProblem, steps):
-    """What a state may jump between segments whose rows lie `steps` (W, K) seconds apart, one (K,) array a state."""
+    """Standard deviation of a jump between segments whose rows lie `steps` (W, K) seconds apart, one (K,) array per state."""
     model, tie, states = problem.model, problem.tie, problem.states
     own = dict(zip(model.states, numerics.sqrt(jnp.diagonal(model.prior.covariance())), strict=True))
     spread = {name: tie * own[name] * jnp.ones_like(steps[0]) for name in states}

@@ -28,14 +28,14 @@ from jaxveh.statespace import Gradient, StateSpace, kit
 LOG_2PI = float(np.log(2 * np.pi))
 
 BLOCK = 1
-"""Steps between which the host tells how far it is: each is a pass over all the data."""
+"""Steps between two reports of progress: each is a pass over all the data."""
 
 
 class Target(NamedTuple):
-    """A reference for a reported quantity: `values` by the model's `name`, one (T,) array a recording, NaN for none.
+    """A reference for a reported quantity: `values` of the model's `name`, one (T,) array per recording, NaN for none.
 
-    Each row costs `rho(reported - values) / weight^2` beside the likelihood, rho the pseudo-Huber law with its bend at
-    `bend`; both in the quantity's unit. The filter itself never sees the values.
+    Each row adds `rho(reported - values) / weight^2` to the cost, with the pseudo-Huber function rho that bends at `bend`; both
+    are in the quantity's unit. The filter itself does not use the values.
     """
 
     name: str
@@ -51,11 +51,12 @@ class _Name(eqx.Module):
 
 
 class PredictionErrorProblem(AbstractFilterProblem):
-    """A Gaussian filter's negative log-likelihood of recordings of one length, as squares of its whitened innovations, and what
-    of the model is to be fitted.
+    """A Gaussian filter's negative log-likelihood of recordings of one length, as squares of its whitened innovations, as a
+    function of the chosen parameters of its model.
 
-    `rows` with (K, T) leaves; `counts` (K,): how many times each recording counts. `centre`, `spread` (p,): the prior on the line
-    of the parameters' bijectors, a spread of infinity for none. The first `warm_up` rows of each do not count.
+    `rows` has (K, T) leaves; `counts` (K,): how many times each recording counts. `centre`, `spread` (p,): mean and standard
+    deviation of the prior on the real line of the bijectors; infinite for no prior. The first `warm_up` rows of each recording
+    do not count.
     """
 
     filter: AbstractFilter
@@ -72,7 +73,7 @@ class PredictionErrorProblem(AbstractFilterProblem):
         return _cost(self, self.parts(z)) + self.prior_cost(z)
 
     def unit(self):
-        """What counts as one in a step: the prior's spread, without a prior one on the line, (p,)."""
+        """The unit of a step (p,): the prior's standard deviation, or one on the real line without a prior."""
         return jnp.where(jnp.isfinite(self.spread), self.spread, 1.0)
 
     def search(self, z, max_steps, tolerance):
@@ -89,7 +90,7 @@ class PredictionErrorProblem(AbstractFilterProblem):
         return self.rows.t.shape[0]
 
     def parts(self, z) -> Parts:
-        """What the cost at z is made of."""
+        """The parts of the cost at z."""
         model = self.model_at(z)
         if self.target is None:
             return jax.vmap(lambda rows: self._one(model, rows, None))(self.rows)
@@ -100,7 +101,7 @@ class PredictionErrorProblem(AbstractFilterProblem):
         counts = jnp.arange(rows.t.shape[0]) >= self.warm_up
         present = jnp.stack([jnp.isfinite(getattr(rows.y, n)) & counts for n in model.channels], axis=1)
         white = jnp.where(present, jnp.stack(estimate.info.whitened, axis=1), 0)
-        # The normal law's constant stands with each measurement, so that the cost is the likelihood's.
+        # The normal law's constant is added per measurement, so that the cost equals the negative log-likelihood.
         levels = jnp.where(present, jnp.stack(estimate.info.log_scale, axis=1), 0)
         constant = 0.5 * LOG_2PI * jnp.sum(present, dtype=white.dtype)
         return Parts(white, levels, self._target_residuals(estimate, values, counts, white.dtype), constant)
@@ -116,8 +117,8 @@ class PredictionErrorProblem(AbstractFilterProblem):
 
 
 class Parts(NamedTuple):
-    """Whitened innovations and log-spreads (K, T, m), zero where nothing counts, the target's residuals (K, T), and the constants
-    (K,) of the normal laws."""
+    """Whitened innovations and log standard deviations (K, T, m), zero where not counted, the target's residuals (K, T), and
+    the constants (K,) of the normal laws."""
 
     white: Any
     levels: Any
@@ -137,29 +138,29 @@ def _cost_at(z, problem: PredictionErrorProblem):
 
 
 def quadratic(z, problem: PredictionErrorProblem) -> Quadratic:
-    """Cost, gradient (p,) and expected information (p, p) of the negative log-posterior at z, from one pass forward."""
+    """Cost, gradient (p,) and expected information (p, p) of the negative log-posterior at z, from one forward pass."""
     push = lambda direction: jax.jvp(problem.parts, (z,), (direction,))
     parts, slopes = jax.vmap(push, out_axes=(None, 0))(jnp.eye(z.size, dtype=z.dtype))
     deviation = (z - problem.centre) / problem.spread
     cost = _cost(problem, parts) + 0.5 * jnp.sum(deviation**2)
-    # Each recording as often as it counts: its square root on either side of a product.
+    # Each recording is weighted by its count: the square root on either side of a product.
     weigh = lambda leaf: jnp.sqrt(problem.counts).reshape(-1, *(1,) * (leaf.ndim - 1)) * leaf
     flat = lambda leaf: jax.vmap(weigh)(leaf).reshape(z.size, -1)
     white, levels, supervised = (flat(leaf) for leaf in (slopes.white, slopes.levels, slopes.supervised))
     gradient = white @ weigh(parts.white).reshape(-1) + supervised @ weigh(parts.supervised).reshape(-1)
     gradient = gradient + levels @ weigh(jnp.ones_like(parts.levels)).reshape(-1) + deviation / problem.spread
-    # With w = e / exp(s), dw = de / exp(s) - w ds, whose square holds one of the two ds^2 that (dlog S)^2 / 2 is made of.
+    # With w = e / exp(s), dw = de / exp(s) - w ds, whose square contains one of the two ds^2 in (dlog S)^2 / 2.
     information = white @ white.T + levels @ levels.T + supervised @ supervised.T
     return Quadratic(cost, gradient, information + jnp.diag(1 / problem.spread**2))
 
 
 def uncertainty(at: Quadratic) -> tuple[jax.Array, jax.Array]:
-    """The covariance (p, p) that an information at the optimum says, and that every parameter is in it, (p,)."""
+    """The covariance (p, p) from the information at the optimum, and a mask (p,) that marks every parameter as known."""
     return jnp.linalg.pinv(at.matrix, hermitian=True), jnp.ones(at.gradient.shape, bool)
 
 
 def score(problem: PredictionErrorProblem, z, state, tolerance: float, limit):
-    """Fisher scoring from z, or on from a `state`, until `limit` steps in all: where it ended, and its state."""
+    """Fisher scoring from z, or continued from a `state`, up to `limit` steps in all: the end point and the state."""
     solver = FisherScoring(atol=tolerance, quadratic=quadratic)
     options = {"unit": problem.unit(), "limit": limit} | ({} if state is None else {"state": state})
     found = optx.minimise(_cost_at, solver, z, problem, options=options, max_steps=None, throw=False)
@@ -177,10 +178,10 @@ def pose_prediction_error(
     target: Target | None = None,
     warm_up: int = 0,
 ) -> PredictionErrorProblem:
-    """What `prediction_error` solves, for `solve`; arguments and errors as there."""
+    """The problem of `prediction_error`, for `solve`; arguments and errors as there."""
     recordings = as_list(recordings)
     if len({len(recording) for recording in recordings}) != 1:
-        raise InputError("recordings: must be one or several of the same number of rows; cut them to one length.")
+        raise InputError("recordings: must have the same number of rows; cut them to one length.")
     if (mixture := kit.who_lacks(filter, "whitens")) is not None:
         raise InputError(f"prediction_error: {mixture} has no whitened innovations; use maximum_likelihood with it.")
     kit.check_gradients("prediction_error", filter, Gradient.exact)
@@ -213,18 +214,18 @@ def prediction_error(
 ) -> Fit:
     """Maximise a Gaussian filter's likelihood (with `prior`: its posterior) over the leaves that `where` picks.
 
-    The optimum of `maximum_likelihood` in a dozen steps, each from one forward-mode pass for all parameters (Fisher scoring
-    on innovations e with variance S: information `de de' / S + dlog S dlog S' / 2`; see `FisherScoring`). `progress` is told
-    of each. Under `jit`, `vmap` and `grad` as it is, without telling; see `solve`.
+    It finds the optimum of `maximum_likelihood` in a dozen steps, each from one forward-mode pass for all parameters (Fisher
+    scoring on innovations e with variance S: information `de de' / S + dlog S dlog S' / 2`; see `FisherScoring`). `progress`
+    is called after each step. Works under `jit`, `vmap` and `grad`, then without `progress`; see `solve`.
 
-    `where` sees the StateSpace; `prior`: relative spreads, one number or by name, around the values of `centre` (default:
-    the model's own). `target`: a reference that supervises the fit. Recordings of equal length run as one batch: a long log
-    cut into pieces that overlap by `warm_up` rows, in which each filter finds its state and which do not count, is many
-    times faster than the log in one. Ends when two steps in a row gain less than `tolerance` of log-posterior: for exact
-    derivatives give a small one.
+    `where` is called with the StateSpace; `prior`: relative standard deviations, one number or by name, around the values of
+    `centre` (default: the model's own). `target`: a reference for the fit. Recordings of equal length run as one batch: a
+    long log cut into pieces is many times faster than in one piece. The pieces overlap by `warm_up` rows, in which each
+    filter finds its state and which do not count. The fit ends when two steps in a row gain less than `tolerance` of
+    log-posterior; for exact derivatives, make it small.
 
     **Returns** a `Fit`; standard errors from the expected information. **Raises** `InputError` for a filter without
-    whitened innovations, or recordings of different length; `FilterError` where it does not converge (`throw`).
+    whitened innovations, or recordings of different length; `FilterError` if it does not converge (`throw`).
     """
     check_positive("tolerance", tolerance)
     problem = pose_prediction_error(
@@ -240,7 +241,7 @@ def prediction_error(
 
 
 def _stepwise(problem: PredictionErrorProblem, max_steps: int, tolerance: float, progress: Progress) -> Fit:
-    """The fit of `solve`, a block of steps at a time."""
+    """The fit of `solve`, one block of steps at a time."""
     progress(0, max_steps, "fit (compiling first)")
     z = problem.start()
     state = FisherScoring(atol=tolerance, quadratic=quadratic).begin(z)

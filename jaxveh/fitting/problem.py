@@ -1,4 +1,4 @@
-"""What a fit is: a cost over coordinates, how its optimum is searched, and what the optimum means."""
+"""The definition of a fit: a cost over coordinates, the search for its optimum, and the parameters at the optimum."""
 
 # No postponed annotations here: equinox does not see an AbstractVar in a string.
 
@@ -15,7 +15,7 @@ from jaxveh._core.parameters import Parameters
 
 
 class SearchEnd(NamedTuple):
-    """Where a search ended: the coordinates `z` (n,), the `steps` it took, and whether it `converged`."""
+    """The end of a search: the coordinates `z` (n,), the number of `steps`, and whether it `converged`."""
 
     z: Any
     steps: Any
@@ -23,11 +23,11 @@ class SearchEnd(NamedTuple):
 
 
 class AbstractProblem(eqx.Module):
-    """A cost to be minimised, the negative log-posterior of parameters, `chosen`, given data.
+    """A cost to be minimised: the negative log-posterior of the parameters `chosen`, given data.
 
-    Everything that the optimum depends on is an array leaf (data, noise levels, prior spreads), so that `solve` has a derivative
-    with respect to each. Coordinates z (n,) are the solver's: the parameters, scaled as it likes, and what else is unknown. On
-    the line of their bijectors parameters are arrays (p,).
+    Everything that the optimum depends on is an array leaf (data, noise levels, prior spreads), so that `solve` has a
+    derivative with respect to each. The coordinates z (n,) are the solver's: the parameters, on a scale of its own, and any
+    other unknowns. On the real line of their bijectors the parameters are an array (p,).
     """
 
     chosen: eqx.AbstractVar[tuple[Parameter, ...]]
@@ -42,15 +42,16 @@ class AbstractProblem(eqx.Module):
 
     @abc.abstractmethod
     def search(self, z, max_steps: int, tolerance) -> SearchEnd:
-        """The least cost from the coordinates z (n,), by a solver of optimistix."""
+        """The end of a search for the least cost from the coordinates z (n,), by a solver of optimistix."""
 
     @abc.abstractmethod
     def line(self, z) -> jax.Array:
-        """The parameters (p,) on the line of their bijectors."""
+        """The parameters (p,) on the real line of their bijectors."""
 
     @abc.abstractmethod
     def covariance(self, z) -> tuple[jax.Array, jax.Array]:
-        """The covariance (p, p) of the parameters on their line at an optimum, and which of them (p,) the data know."""
+        """The covariance (p, p) of the parameters on their real line at an optimum, and which of them (p,) the data
+        determine."""
 
     @abc.abstractmethod
     def model_at(self, z) -> Any:
@@ -58,15 +59,15 @@ class AbstractProblem(eqx.Module):
 
     @abc.abstractmethod
     def is_failure(self, cost) -> Any:
-        """Whether this cost is no optimum's, such as a diverged simulation's."""
+        """Whether this cost is not that of an optimum, such as a diverged simulation's."""
 
     @abc.abstractmethod
     def units(self) -> int:
-        """How many parts the data have that could be drawn anew, one by one: rows of rig data, recordings."""
+        """The number of parts of the data that can be resampled one by one: rows of rig data, recordings."""
 
     @abc.abstractmethod
     def with_counts(self, counts) -> "AbstractProblem":
-        """The problem in which each part of the data counts so many times, (units,)."""
+        """The problem in which each part of the data counts the given number of times, (units,)."""
 
 
 def by_name(chosen: tuple[Parameter, ...], values) -> Parameters:
@@ -77,7 +78,7 @@ def by_name(chosen: tuple[Parameter, ...], values) -> Parameters:
 def scalar_parameters(model: Any, where: Where) -> tuple[Parameter, ...]:
     """The scalar parameters that `where` picks from a model.
 
-    **Raises** `InputError` as `resolve`, and for arrays.
+    **Raises** `InputError` as `resolve` does, and for arrays.
     """
     chosen = resolve(model, where)
     for p, value in zip(chosen, pick(model, chosen), strict=True):
@@ -87,10 +88,10 @@ def scalar_parameters(model: Any, where: Where) -> tuple[Parameter, ...]:
 
 
 def on_line(chosen: tuple[Parameter, ...], physical) -> jax.Array:
-    """Physical values on the line of their bijectors, (p,)."""
+    """Physical values on the real line of their bijectors, (p,)."""
     return jnp.stack([p.domain.inverse(value) for p, value in zip(chosen, physical, strict=True)])
 
 
 def in_units(chosen: tuple[Parameter, ...], line) -> list:
-    """Values on the line of their bijectors in physical units."""
+    """Values on the real line of their bijectors in physical units."""
     return [p.domain.forward(line[i]) for i, p in enumerate(chosen)]

@@ -1,4 +1,4 @@
-"""What fits to recordings have in common: their recordings, and the prior on what is fitted."""
+"""The common part of fits to recordings: the recordings, and the prior of the fitted parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jaxveh._core.recording import Recording
 
 
 def as_list(recordings: Recording | Sequence[Recording]) -> list[Recording]:
-    """One recording or several, as a list; raises `InputError` for none."""
+    """One recording or several, as a list; raises `InputError` for an empty list."""
     recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not recordings:
         raise InputError("recordings: empty; give at least one recording.")
@@ -21,7 +21,7 @@ def as_list(recordings: Recording | Sequence[Recording]) -> list[Recording]:
 
 
 def spread_on_line(parameters: tuple[Parameter, ...], values, prior: float | Mapping[str, float] | None) -> jax.Array:
-    """The prior's spreads (p,) on the line of each parameter's bijector, infinite without one."""
+    """The prior's standard deviations (p,) on the real line of each parameter's bijector, infinite without a prior."""
     if prior is None:
         return jnp.full((len(parameters),), jnp.inf, jnp.result_type(*values))
     return jnp.stack(prior_spread(parameters, values, prior))

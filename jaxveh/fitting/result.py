@@ -1,4 +1,4 @@
-"""What a fit returns: fitted parameters with standard errors, in one shape whatever was fitted."""
+"""The result of a fit: fitted parameters with standard errors, in the same form for every fit."""
 
 # No postponed annotations here: equinox does not see an AbstractVar in a string.
 
@@ -25,21 +25,21 @@ OTHER = f"{PARAMETER}_2"
 
 
 class AbstractFit(Kept, eqx.Module):
-    """What all fits return.
+    """The base class of all fits' results.
 
-    `parameters`, `parameters_std`: the fitted parameters in physical units and their standard errors, `Parameters` as those of an
-    `Estimate` (`.front.B`, `["front.B"]`); NaN for a standard error that the data do not give. `unconstrained` (p,), `covariance`
-    (p, p): the same on the line of each parameter's bijector. `cost`: the minimised negative log-posterior, up to a constant.
-    `steps`: taken by the solver. `result`: a code, see `jaxveh.Result`. `model`: what was fitted, with the values in place.
-    `chosen`: what the parameters are (unit, domain), in their order.
+    `parameters`, `parameters_std`: the fitted parameters in physical units and their standard errors, `Parameters` as those
+    of an `Estimate` (`.front.B`, `["front.B"]`); a standard error that the data do not determine is NaN. `unconstrained`
+    (p,), `covariance` (p, p): the same on the real line of each parameter's bijector. `cost`: the minimised negative
+    log-posterior, up to a constant. `steps`: the solver's number of steps. `result`: a code, see `jaxveh.Result`. `model`:
+    the model with the fitted values. `chosen`: the descriptions of the parameters (unit, domain), in their order.
 
-    `save`, `load`, `to_xarray` and `from_xarray` keep all but the functions of the `model`: what comes back has its numbers by
-    their place there, a dict, and `Fit.load(path).with_model(start)` puts them into a model of the same structure.
+    `save`, `load`, `to_xarray` and `from_xarray` keep all but the functions of the `model`. A loaded fit has a dict of the
+    model's numbers by their paths; `Fit.load(path).with_model(start)` puts them into a model of the same structure.
     """
 
     drawn_by = "fit"
     kept_fields: ClassVar[tuple[str, ...]] = ()
-    """Fields of a subclass that are kept, too."""
+    """Fields of a subclass that are also kept."""
 
     parameters: eqx.AbstractVar[Parameters]
     parameters_std: eqx.AbstractVar[Parameters]
@@ -52,14 +52,14 @@ class AbstractFit(Kept, eqx.Module):
     chosen: eqx.AbstractVar[tuple[Parameter, ...]]
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame` with a row a parameter: `parameter`, `unit`, `value` and its standard error `std`; a batch of fits
-        has a column `run` as well."""
+        """A `pandas.DataFrame` with a row per parameter: `parameter`, `unit`, `value` and its standard error `std`; for a batch
+        of fits also a column `run`."""
         return super().to_pandas()
 
     def with_model(self, model: Any) -> Self:
-        """The same fit, with the numbers that the fitted model had put into a `model` of its structure, such as the start.
+        """The same fit, with the numbers of the fitted model put into a `model` of the same structure, such as the start.
 
-        **Raises** `InputError` where the model has other array leaves, or of other shapes.
+        **Raises** `InputError` if the model has other array leaves, or leaves of other shapes.
         """
         numbers, (paths, structure) = _numbers_of(self.model), jtu.tree_flatten_with_path(model)
         there = {jtu.keystr(path): np.shape(leaf) for path, leaf in paths if _is_number(leaf)}
@@ -67,7 +67,7 @@ class AbstractFit(Kept, eqx.Module):
         if there != kept:
             lost = sorted(set(kept) ^ set(there)) or [path for path in kept if kept[path] != there[path]]
             raise InputError(
-                f"with_model: {', '.join(lost[:5])} differ between what was fitted and the model: must be of one structure."
+                f"with_model: {', '.join(lost[:5])} differ between the fitted model and this one: must be of one structure."
             )
         leaves = [numbers.get(jtu.keystr(path), leaf) for path, leaf in paths]
         return dataclasses.replace(self, model=jtu.tree_unflatten(structure, leaves))
@@ -79,7 +79,7 @@ class AbstractFit(Kept, eqx.Module):
 
     @property
     def converged(self):
-        """Whether the fit ended well: a truth value, or one a fit of a batch."""
+        """Whether the fit ended well: a truth value, or one per fit of a batch."""
         return self.result == 0
 
     def _labelled(self) -> Labelled:
@@ -104,12 +104,12 @@ class AbstractFit(Kept, eqx.Module):
         )
 
     def _facts(self) -> dict[str, Any]:
-        """What a subclass keeps beside arrays."""
+        """Values of a subclass other than arrays that are kept."""
         return {}
 
     @classmethod
     def _of_facts(cls, facts: dict[str, Any]) -> dict[str, Any]:
-        """The fields that `_facts` told of."""
+        """The fields that `_facts` returned."""
         return {}
 
     @classmethod
@@ -127,7 +127,7 @@ class AbstractFit(Kept, eqx.Module):
         return Overview(title, ("parameter", "value", "std", "unit"), Lazy(self.chosen, row))
 
     def _ended(self) -> str:
-        """How it went, in words."""
+        """How the fit ended, in words."""
         if not is_known(self.result):
             return ""
         if np.ndim(self.result):
@@ -157,11 +157,11 @@ class Fit(AbstractFit):
 
 
 def raise_unfinished(fit: AbstractFit) -> None:
-    """Raise `FilterError` where the fit did not end well; tracers pass."""
+    """Raise `FilterError` if the fit did not end well; tracers pass."""
     if is_concrete(fit.result) and int(fit.result) != 0:
         raise FilterError(
             f"fit of {', '.join(fit.names)} stopped after {int(fit.steps)} steps: {fit.reason}. "
-            "throw=False returns it as it is."
+            "throw=False returns the unfinished fit."
         )
 
 
@@ -170,7 +170,7 @@ def _is_number(leaf: Any) -> bool:
 
 
 def _numbers_of(model: Any) -> dict[str, Any]:
-    """The array leaves of a model by their place; of what a file gave back they are it."""
+    """The array leaves of a model by their path; the model of a loaded fit is already this dict."""
     if isinstance(model, dict):
         return model
     return {jtu.keystr(path): leaf for path, leaf in jtu.tree_flatten_with_path(model)[0] if _is_number(leaf)}
@@ -183,7 +183,7 @@ def _told(p: Parameter) -> dict[str, Any]:
 
 
 def _parameter(told: dict[str, Any]) -> Parameter:
-    """The parameter that was told. **Raises** `InputError` for a domain of one's own."""
+    """The parameter from its plain values. **Raises** `InputError` for a user's own domain."""
     name, fields = told["domain"]
     kind = {kind.__name__: kind for kind in (bijectors.Real, bijectors.Positive, bijectors.Interval)}.get(name)
     if kind is None:

@@ -31,20 +31,21 @@ from jaxveh.tyres import AbstractTyre, MFTyre
 JOINT = "joint"
 
 KNOWN = ("nominal_load", "reference_load")
-"""Parameters that say where others hold: known, not fitted unless `where` picks them."""
+"""Parameters that state where others hold: known, and not fitted unless `where` picks them."""
 
 
 class RigFit(AbstractFit):
-    """A tyre fitted to rig data: a fit (see `AbstractFit`), and what the rig says of it.
+    """A tyre fitted to rig data: a fit (see `AbstractFit`), and the results of the rig's channels.
 
-    `model`, also as `tyre`: the law with its coefficients, in the canonical one of its twins (`rig_canonical`); standard errors
-    by the Gauss-Newton matrix of the joint stage with the noise estimated from residuals. nan for what stands at its start,
-    because data do not identify it or because it is held unless asked (`rig_stages.HELD_COEFFICIENTS`): in the others' errors it
-    counts with a spread of its own size, or of what it is among ordinary tyres. `identified`: how many directions the data do. By
-    channel (`F_x`, ...): `rmse` of residuals, `peak` (the 99.5th percentile of what was measured), `start_rmse` before the
-    fit, `noise` (standard deviation), and `cross_validation`, the RMSE at rows that a fold's fit did not see (nan without).
-    `residuals` (n,): fitted less measured, nan without a measurement. `stages`: a report each. `problem`: the joint stage's at
-    the fit, for `solve` and `bootstrap`, in which what is held stays; None in what a file gives back.
+    `model`, also as `tyre`: the law with its coefficients, in the canonical one of its twins (`rig_canonical`). Standard
+    errors come from the Gauss-Newton matrix of the joint stage, with the noise estimated from residuals. They are nan for
+    coefficients held at their start, because data do not identify them or by default (`rig_stages.HELD_COEFFICIENTS`); in the
+    others' errors these count with a standard deviation of their own size, or of their variation among ordinary tyres.
+    `identified`: how many directions the data identify. By channel (`F_x`, ...): `rmse` of residuals, `peak` (the 99.5th
+    percentile of the measurements), `start_rmse` before the fit, `noise` (standard deviation), and `cross_validation`, the
+    RMSE at rows left out of a fold's fit (nan without folds). `residuals` (n,): fitted less measured, nan without a
+    measurement. `stages`: one report per stage. `problem`: the joint stage at the fit, for `solve` and `bootstrap`, in which
+    held coefficients stay; None in a loaded fit.
     """
 
     kept_fields = ("rmse", "start_rmse", "cross_validation", "peak", "noise", "residuals")
@@ -74,8 +75,8 @@ class RigFit(AbstractFit):
         return self.model
 
     def plot(self, rig: RigTable | None = None, *arguments: Any, **options: Any) -> Any:
-        """What the law does to the `rig` data that it was fitted to (`plots.rig_fit`); without them the parameters (`plots.fit`).
-        **Returns** the figure."""
+        """Plot the law against the `rig` data that it was fitted to (`plots.rig_fit`); without them the parameters
+        (`plots.fit`). **Returns** the figure."""
         if rig is None:
             return super().plot(*arguments, **options)
         return above("plots", "rig_fit")(self, rig, *arguments, **options)
@@ -106,26 +107,26 @@ def fit_rig(
     progress: Progress = silent,
     throw: bool = True,
 ) -> RigFit:
-    """Fit a tyre to rig data, from the coefficients that it has.
+    """Fit a tyre to rig data, starting from its present coefficients.
 
-    MF-Tyre goes in stages (pure slip, combined slip, moments) over the coefficients that the data show (those of load where the
-    load varies, and so on), then all of them together; other laws at once. `where` picks coefficients of the law instead.
+    MF-Tyre is fitted in stages (pure slip, combined slip, moments) over the coefficients that the data show (those of load
+    where the load varies, and so on), then all together; other laws at once. `where` picks coefficients of the law instead.
 
-    `free`: names of those that are held unless asked (`lateral.PKY4`, the form of the cornering stiffness over load, which stays
-    at what the law has, 2 in a typical one). What the data do not identify stays at its start. `prior`: relative spreads around
-    the law's own coefficients, one number or by name, as in all fits. `measured`: the forces and moments to be compared; by
-    default those that both data and law have. `weights`: by channel, on top of one over the noise squared, which is estimated.
-    `bounds`: by name, an interval that a coefficient stays in. `robust`: residuals are taken for Student's t with 4 degrees of
-    freedom, on the scale of their median size, so that outliers count little. `folds`: parts for cross-validation, whole runs
-    where the data number them, blocks of rows where not; 0 for none. `staged=False` goes straight to the joint fit, for a law
-    that is near the data already.
+    `free`: names of coefficients to fit that are held by default (`lateral.PKY4`, the form of the cornering stiffness over
+    load, stays at the law's value, 2 in a typical one). Coefficients that the data do not identify stay at their start.
+    `prior`: relative spreads around the law's own coefficients, one number or by name, as in all fits. `measured`: the forces
+    and moments to compare; by default those that both data and law have. `weights`: factors by channel on one over the noise
+    squared, which is estimated. `bounds`: by name, an interval for a coefficient. `robust`: residuals are assumed to follow
+    Student's t with 4 degrees of freedom, on the scale of their median size, so that outliers count little. `folds`: number
+    of parts for cross-validation, whole runs if the data number them, otherwise blocks of rows; 0 for none. `staged=False`
+    skips to the joint fit, for a law that is near the data already.
 
-    A program that looks at the data (which coefficients they show, how noisy they are) and goes through `LevenbergMarquardt`
-    round by round: for `jit`, `vmap` and `grad` see `pose_rig` and `solve`.
+    This program inspects the data (which coefficients they show, how noisy they are) and runs `LevenbergMarquardt` in rounds:
+    for `jit`, `vmap` and `grad` see `pose_rig` and `solve`.
 
     **Raises** `InputError` for a channel, weight or bound that has no match, a start outside its bounds or without finite
     forces, too few rows, rows in which no slip varies, bad `folds` or `max_steps`;
-    `FilterError` where the joint fit does not converge, unless `throw=False`.
+    `FilterError` if the joint fit does not converge, unless `throw=False`.
     """
     check_at_least("max_steps", max_steps, 1)
     data, plan, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust, max_steps, tolerance)
@@ -146,7 +147,7 @@ def fit_rig(
     validation = rms(data.channels, missed) if folds else dict.fromkeys(data.channels, np.nan)
     if throw and not reports[-1].converged:
         steps = reports[-1].steps
-        raise FilterError(f"fit to {rig.source} stopped after {steps} steps; throw=False returns it as it is.")
+        raise FilterError(f"fit to {rig.source} stopped after {steps} steps; throw=False returns the unfinished fit.")
     return _result(data, tyre, joint, settled.held, tuple(reports), data.rmse(law), validation)
 
 
@@ -172,11 +173,11 @@ def pose_rig(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     robust: bool = False,
 ) -> RigProblem:
-    """The joint stage of `fit_rig` from where the law is, for `solve`: all coefficients but those held unless asked, one noise
-    level a channel.
+    """The joint stage of `fit_rig` at the law's coefficients, for `solve`: all coefficients but those held by default, one
+    noise level per channel.
 
     `noise`: standard deviations by channel; by default those of the law's own residuals, so that a problem at a fitted law has
-    the fit's. Other arguments and errors as in `fit_rig`.
+    the noise of the fit. Other arguments and errors as in `fit_rig`.
     """
     data, _, aside = _prepare(law, rig, where, free, prior, measured, weights, bounds, robust)
     levels = data.noise(law) if noise is None else dict(noise)
@@ -192,7 +193,7 @@ def pose_rig(
 def _prepare(
     law, rig, where, free, prior, measured, weights, bounds, robust, max_steps: int = 500, tolerance: float = 1e-6
 ) -> tuple[RigData, list[Stage], tuple[str, ...]]:
-    """The data as all stages share them, after every check, the stages before the joint one, and what is held unless asked."""
+    """The data for all stages, after every check, the stages before the joint one, and the coefficients held by default."""
     contact = contact_of(rig)
     channels = _channels(law, rig, contact, measured)
     extra = {} if weights is None else dict(weights)
@@ -219,7 +220,7 @@ def _joint(data: RigData) -> Stage:
 
 
 def _missed_residuals(data, law, plan, parts, told):
-    """Residuals at rows that a fold's fit did not see, by the fold of each row, `parts` (-1: of none); nan without one."""
+    """Residuals at rows left out of a fold's fit; `parts`: the fold of each row (-1: none); nan for rows without a fold."""
     missed = np.full(data.measured.shape, np.nan)
     for k in range(int(parts.max()) + 1):
         told(k)
@@ -228,7 +229,7 @@ def _missed_residuals(data, law, plan, parts, told):
 
 
 def _unseen_residuals(data: RigData, law: AbstractTyre, plan: list[Stage], rows: np.ndarray) -> np.ndarray:
-    """Residuals (m, n) of a fit from the same start that did not see some rows."""
+    """Residuals (m, n) of a fit from the same start that leaves out some rows."""
     rest = data.without(rows)
     for stage in plan:
         if (rest.present[[data.channels.index(name) for name in stage.channels]] & stage.rows).any():
@@ -268,7 +269,7 @@ def _names(law: AbstractTyre, plan: list[Stage], chosen: tuple[str, ...] | None)
     every = resolve(law, lambda law: jax.tree.leaves(law))
     found = tuple(p.name for p in every if p.name.rpartition(".")[2] not in KNOWN)
     if not found:
-        raise InputError(f"{type(law).__name__} has no coefficient to be fitted.")
+        raise InputError(f"{type(law).__name__} has no coefficient to fit.")
     return found
 
 
@@ -276,7 +277,7 @@ def _result(data: RigData, law, joint: Stage, held: np.ndarray, reports, start_r
     noise, last = data.noise(law), reports[-1]
     problem = _as_uncertain(data.problem(law, joint, noise), held, joint.coefficients)
     fit, known = _summary(problem, jnp.asarray(last.steps), jnp.asarray(last.converged))
-    # The noise is that of the fit, with the degrees of freedom that coefficients take.
+    # The noise is that of the fit, corrected for the degrees of freedom of the coefficients.
     count = int(data.present.sum())
     factor = count / (count - int((~held).sum()))
     if data.chosen.robust:
@@ -308,10 +309,10 @@ def _result(data: RigData, law, joint: Stage, held: np.ndarray, reports, start_r
 
 
 def _as_uncertain(problem: RigProblem, held: np.ndarray, names: Sequence[str]) -> RigProblem:
-    """The problem in which what is held is not known for certain.
+    """The problem in which the held coefficients are uncertain.
 
-    What is held at its start for lack of data may be off by its own size, what is held unless asked by what `HELD_COEFFICIENTS`
-    says, and what is confounded with it by as much.
+    The standard deviation of a coefficient held for lack of data is its own size, and that of one held by default is its
+    value in `HELD_COEFFICIENTS`; coefficients confounded with them become as uncertain.
     """
     spreads = jnp.asarray([HELD_COEFFICIENTS.get(name, np.nan) for name in names])
     size = jnp.where(jnp.isnan(spreads), 1.0, spreads / problem.scale)
@@ -321,6 +322,6 @@ def _as_uncertain(problem: RigProblem, held: np.ndarray, names: Sequence[str]) -
 
 @eqx.filter_jit
 def _summary(problem: RigProblem, steps, converged):
-    """The fit that ended where the problem starts, and how many directions of the coefficients the data identify."""
+    """The fit that ended at the start of the problem, and how many directions of the coefficients the data identify."""
     found = SearchEnd(problem.start(), steps, converged)
     return fit_at(problem, found, problem.cost(found.z), problem.covariance(found.z)), spread_of(found.z, problem)[1]

@@ -1,8 +1,9 @@
-"""Twins of an MF-Tyre: sets of coefficients that are one tyre, and the one of them that is reported.
+"""Twins of an MF-Tyre: different sets of coefficients that give the same tyre; one of them is reported.
 
-The Magic Formula is made of odd functions within odd ones and of even ones, so that some coefficients may change their sign
-together and no force changes: `cos(arctan(RBY2 x))` is even, and `sin(RVY5 arctan(RVY6 x))` stays where both factors turn. A fit
-ends in whichever its start is near; a standard error says nothing of the distance to the others.
+The Magic Formula consists of odd functions within odd ones and of even functions. So some coefficients may change their sign
+together without any change of the forces: `cos(arctan(RBY2 x))` is even, and `sin(RVY5 arctan(RVY6 x))` stays the same where
+both factors change their sign. A fit ends in whichever twin its start is near; a standard error does not include the distance
+to the others.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from jaxveh.tyres import MFTyre
 
 
 class Twin(NamedTuple):
-    """Coefficients that change their sign together; in the form that is reported `lead` is positive."""
+    """Coefficients that change their sign together; in the reported form `lead` is positive."""
 
     lead: str
     others: tuple[str, ...] = ()
 
     @property
     def members(self) -> tuple[str, ...]:
-        """All of them."""
+        """All coefficients of the twin."""
         return (self.lead, *self.others)
 
 
@@ -36,27 +37,27 @@ def _twin(section: str, names: str) -> Twin:
 _SIDE = "RVY1 RVY2 RVY3"
 
 TWINS = (
-    # B = K / (C D): a turned C or D turns B, and the sine curve is odd in it.
+    # B = K / (C D): a change of sign of C or D changes that of B, and the sine curve is odd in it.
     _twin("longitudinal", "PCX1"),
     _twin("longitudinal", "PDX1 PDX2"),
     _twin("lateral", "PCY1"),
-    # Friction scales what slip ratio adds to F_y; B C = K / D scales the residual torque's slope.
+    # Friction scales the effect of slip ratio on F_y; B C = K / D scales the residual torque's slope.
     _twin("lateral", f"PDY1 PDY2 {_SIDE} aligning.QBZ10"),
-    # K = PKY1 F sin(PKY4 arctan(F_z / (F (PKY2 + PKY5 g^2)))), g the camber's sine.
+    # K = PKY1 F sin(PKY4 arctan(F_z / (F (PKY2 + PKY5 g^2)))), where g is the sine of camber.
     _twin("lateral", "PKY4 PKY1"),
     _twin("lateral", "PKY2 PKY5 PKY1"),
-    # Weights of combined slip: a cosine of an odd function, its slope a cosine in turn.
+    # Weights of combined slip: a cosine of an odd function, whose slope is also a cosine.
     _twin("longitudinal", "RBX1 RBX3"),
     _twin("longitudinal", "RBX2"),
     _twin("longitudinal", "RCX1"),
     _twin("lateral", "RBY1 RBY4"),
     _twin("lateral", "RBY2"),
     _twin("lateral", "RCY1"),
-    # What slip ratio adds: (RVY1 + ...) cos(arctan(RVY4 a)) sin(RVY5 arctan(RVY6 k)).
+    # Effect of slip ratio: (RVY1 + ...) cos(arctan(RVY4 a)) sin(RVY5 arctan(RVY6 k)).
     _twin("lateral", "RVY4"),
     _twin("lateral", f"RVY5 {_SIDE}"),
     _twin("lateral", f"RVY6 {_SIDE}"),
-    # Trail: a cosine curve whose curvature has arctan(B C a) in it. Residual torque: cos(arctan(B a)).
+    # Trail: a cosine curve whose curvature contains arctan(B C a). Residual torque: cos(arctan(B a)).
     _twin("aligning", "QCZ1 QEZ4 QEZ5"),
     _twin("aligning", "QBZ1 QBZ2 QBZ3 QEZ4 QEZ5"),
     _twin("aligning", "QBZ9 QBZ10"),
@@ -67,16 +68,16 @@ TWINS = (
     _twin("overturning", "QSX9 QSX8"),
     _twin("overturning", "QSX11 QSX10"),
 )
-"""All sign twins of versions 5.2, 6.1 and 6.2 in what a rig without turn slip shows; others are products of them."""
+"""All sign twins of versions 5.2, 6.1 and 6.2 that a rig without turn slip shows; others are products of them."""
 
 
 def canonical(tyre: MFTyre, fixed: Collection[str] = ()) -> MFTyre:
     """The twin of a tyre whose leading coefficients are positive (`TWINS`); its forces and moments are the same.
 
-    `fixed`: names of coefficients that must stay as they are, such as those that a user holds or bounds; twins that would turn
-    one of them, unless it is zero, are left as they are. A leading coefficient of zero stays.
+    `fixed`: names of coefficients that must not change, such as those that a user holds or bounds; a twin that would change the
+    sign of one of them, unless it is zero, is skipped. A leading coefficient of zero stays.
     """
-    # A later twin may turn the lead of an earlier one only where it is no lead: each lead stands in no other twin's `others`.
+    # No twin changes the lead of another one: no lead is in another twin's `others`.
     for twin in TWINS:
         if float(leaf_of(tyre, twin.lead)) >= 0:
             continue

@@ -1,4 +1,4 @@
-"""Rig data as the stages of a fit see them: what counts, how much, from where, and when it is done."""
+"""Rig data for the stages of a fit: rows that count, weights, starts, and the end of the fit."""
 
 from __future__ import annotations
 
@@ -22,21 +22,22 @@ from jaxveh.io import RigTable
 from jaxveh.tyres import AbstractTyre, Contact
 
 LEAST_NOISE = 1e-4
-"""The least noise over peak that weighs a channel: one that fits perfectly would outweigh all others."""
+"""Lower limit of the noise over peak in a channel's weight: a channel that fits perfectly would outweigh all others."""
 
 ROUND = 100
-"""Steps between which the noise is estimated anew and the pull starts afresh: along valleys that data hardly show, several such
-rounds come further than one long one."""
+"""Steps after which the noise is estimated again and the pull restarts: along valleys that data hardly show, several such
+rounds get further than one long one."""
 
 SETTLED = 0.5
 """A fit has converged where a round lowers the sum of squares, in units of the noise's variance, by less than this: no
-combination of coefficients would move by more than a standard error. What data do not tell apart may drift on without end."""
+combination of coefficients would move by more than a standard error. Coefficients that the data do not distinguish may drift on
+without end."""
 
 
 class StageReport(NamedTuple):
-    """What one stage did: its `name`, `rows` and `coefficients` that counted, the RMS of its channels' residuals over their
-    peak `before` and `after`, `steps` taken from the start that won, and whether it `converged`: by the solver's word, or because
-    a round of steps gained nothing that the noise would let one see."""
+    """The report of one stage: its `name`, the `rows` and `coefficients` that counted, the RMS of its channels' residuals over
+    their peak `before` and `after`, the `steps` from the best start, and whether it `converged`: according to the solver, or
+    because a round of steps gained less than the noise."""
 
     name: str
     rows: int
@@ -48,8 +49,8 @@ class StageReport(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """What a user chose: `weights` and `bounds` by name, `robust`, the most steps a stage, the solver's tolerance; the centre
-    and the spread (p,) of a `prior` on the coefficients' line."""
+    """The user's settings: `weights` and `bounds` by name, `robust`, `max_steps` per stage, the solver's `tolerance`; the
+    centre and the standard deviation (p,) of a `prior` on the coefficients' real line."""
 
     weights: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]
@@ -60,10 +61,10 @@ class Settings(NamedTuple):
 
 
 class RigData:
-    """Rig data, the `channels` that are compared and the `names` of the coefficients that are fitted: what all stages share.
+    """Rig data, the `channels` that are compared and the `names` of the fitted coefficients, shared by all stages.
 
-    `measured` and `present` (m, n): values, zero where there is none, and where there is one; `peak` by channel: the 99.5th
-    percentile of their sizes.
+    `measured` (m, n): values, zero where there is none; `present` (m, n): where there is one; `peak` by channel: the 99.5th
+    percentile of the absolute values.
     """
 
     def __init__(
@@ -82,8 +83,8 @@ class RigData:
             check_positive(f"{rig.source}: largest {name}", size, advice="Leave this channel out: measured=...")
 
     def check(self, law: AbstractTyre) -> None:
-        """Raise for bounds without a coefficient or its start, for a start without finite forces, and for fewer measurements
-        than coefficients."""
+        """Raise for bounds without a coefficient or without its start inside, for a start without finite forces, and for fewer
+        measurements than coefficients."""
         check_names("bounds", self.chosen.bounds, self.names)
         self.parameters(law)
         count, coefficients = int(self.present.sum()), len(self.names)
@@ -103,7 +104,7 @@ class RigData:
         return rest
 
     def parameters(self, law: AbstractTyre) -> tuple[Parameter, ...]:
-        """What is fitted, with its bounds."""
+        """The fitted parameters, with their bounds."""
         found = resolve(law, lambda law: [leaf_of(law, name) for name in self.names])
         return tuple(self._with_bounds(law, p) for p in found)
 
@@ -119,8 +120,8 @@ class RigData:
     def problem(self, law: AbstractTyre, stage: Stage, noise: Mapping[str, float]) -> RigProblem:
         """The stage's problem, weighted by one over the noise of each channel.
 
-        All stages have the same shapes, what a stage does not compare weighing nothing and what it does not fit being held:
-        one compilation, which takes longer than all steps, serves them all.
+        All stages have the same shapes: channels that a stage does not compare have zero weight, and coefficients that it
+        does not fit are held. So one compilation serves them all; it takes longer than all steps.
         """
         parameters = self.parameters(law)
         origin, scale = start_of(law, parameters)
@@ -151,11 +152,11 @@ class RigData:
         return np.where(self.present, found - self.measured, np.nan)
 
     def rmse(self, law: AbstractTyre) -> dict[str, float]:
-        """Of each channel."""
+        """The RMS of each channel's residuals."""
         return rms(self.channels, self.residuals(law))
 
     def noise(self, law: AbstractTyre) -> dict[str, float]:
-        """The spread of residuals: their RMS, or where the fit is robust 1.48 times their median size."""
+        """The standard deviation of residuals: their RMS, or for a robust fit 1.48 times their median size."""
         size = self.residuals(law)
         robust = self.chosen.robust
         spread = TO_DEVIATION * np.nanmedian(np.abs(size), axis=1) if robust else np.sqrt(np.nanmean(size**2, axis=1))
@@ -171,7 +172,7 @@ class RigData:
         return float(np.sqrt(np.nanmean(rows**2)))
 
     def loss(self, law: AbstractTyre, stage: Stage, noise: Mapping[str, float]) -> float:
-        """What the stage minimises, for several laws by the same noise; infinite where a force is not finite."""
+        """The minimised loss of the stage, comparable between laws for the same noise; infinite where a force is not finite."""
         problem = self.problem(law, stage, noise)
         bent = problem.bend(problem.weight * jnp.asarray(np.where(self._counts(stage), self.residuals(law), 0.0)))[0]
         return float(np.nan_to_num(jnp.sum(problem.emphasis[:, None] * bent**2), nan=np.inf))
@@ -180,10 +181,10 @@ class RigData:
         return self.present & stage.rows & np.array([[name in stage.channels] for name in self.channels])
 
     def fit(self, law: AbstractTyre, stage: Stage) -> tuple[AbstractTyre, StageReport]:
-        """One stage: from where the law is, then from its other starts; the best end counts."""
+        """Run one stage: from the law, then from its other starts; the best end is returned."""
         before = self.share(law, stage)
         law, steps, converged = self.descend(law, stage)
-        # The others start from there: near the data in all else, they part from what they would run back to.
+        # The other starts change this end in a few coefficients: near the data in all others, they do not run back to it.
         ends = [self.descend(one, stage, ROUND)[0] for one in starts_of(law, stage, self.chosen.bounds)]
         noise = self.noise(law)
         best = min([law, *ends], key=lambda end: self.loss(end, stage, noise))
@@ -196,9 +197,9 @@ class RigData:
         return law, report
 
     def descend(self, law: AbstractTyre, stage: Stage, most: int | None = None) -> tuple[AbstractTyre, int, bool]:
-        """From one start, in rounds: the noise, which weighs channels and says what is an outlier, has to be found first.
+        """Descend from one start, in rounds: the noise, which weights channels and defines outliers, has to be found first.
 
-        Returns the law, the steps taken (at `most` so many, the user's limit by default), and whether it converged.
+        Returns the law, the number of steps (limited by `most`, by default the user's limit), and whether it converged.
         """
         most = self.chosen.max_steps if most is None else most
         steps, alone = 0, not self.chosen.robust and len(stage.channels) == 1
@@ -212,7 +213,7 @@ class RigData:
 
 
 def rms(channels: tuple[str, ...], residuals: np.ndarray) -> dict[str, float]:
-    """Of residuals (m, n), by channel; nan does not count."""
+    """The RMS of residuals (m, n), by channel; nan does not count."""
     return dict(zip(channels, np.sqrt(np.nanmean(residuals**2, axis=1)).tolist(), strict=True))
 
 
@@ -232,8 +233,8 @@ def _start_from(law: AbstractTyre, start: Sequence[tuple[str, float | None]]) ->
 
 
 def fold_of(rig: RigTable, folds: int) -> np.ndarray:
-    """The fold (n,) of each row: whole runs where the data number them, else blocks of neighbours, which are no copies of
-    each other, dealt in turn."""
+    """The fold (n,) of each row: whole runs if the data number them, otherwise blocks of neighbouring rows (single rows would
+    be nearly copies of their neighbours), dealt in turn."""
     check_at_least("folds", folds, 2)
     if rig.run is not None and len(np.unique(rig.run)) >= folds:
         _, run = np.unique(rig.run, return_inverse=True)
@@ -245,7 +246,7 @@ def fold_of(rig: RigTable, folds: int) -> np.ndarray:
 
 @eqx.filter_jit
 def _descend(problem: RigProblem, limit, tolerance: float) -> Descent:
-    """So many steps from where the law is: a block between which the host looks at the noise."""
+    """Steps from the law's coefficients: a block between two estimates of the noise by the host."""
     return descend(problem, problem.start(), None, tolerance, limit)
 
 

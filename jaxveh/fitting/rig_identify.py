@@ -1,8 +1,8 @@
-"""After a fit to rig data: one end of those that the noise does not tell apart, and starts for what the data do not show.
+"""After a fit to rig data: selects one of the ends that the noise does not distinguish, and holds unidentified coefficients.
 
-A coefficient that the data do not identify would end anywhere along a valley, and with it whatever it is confounded with. It
-stays at its start, one after the other, the least known first, as long as that costs no more than the noise would; the rest is
-fitted anew.
+A coefficient that the data do not identify would end anywhere along a valley, together with the coefficients that it is
+confounded with. It is held at its start, one coefficient after the other, the least known first, as long as that costs no more
+than the noise explains; the others are fitted again.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from jaxveh.fitting.rig_stages import Stage
 from jaxveh.tyres import AbstractTyre, MFTyre
 
 REJECTED = 2.0
-"""Standard deviations from its start beyond which a coefficient is kept as it was fitted, however uncertain: the data reject
-the start."""
+"""Standard deviations from its start beyond which a coefficient keeps its fitted value, however uncertain: the data reject the
+start."""
 
 TIE = 3.84
-"""Two ends whose sums of squares, in units of the noise's variance, differ by less are not told apart (95 %, one degree)."""
+"""Two ends whose sums of squares, in units of the noise's variance, differ by less are not distinguished (95 %, one degree)."""
 
 OTHER_SIDE = {"longitudinal.RCX1": "longitudinal.REX1", "lateral.RCY1": "lateral.REY1"}
 """Shapes C of combined slip, whose fit has an end on either side of 1, and their curvatures E."""
 
 SIDE, CURVATURE = 0.9, 0.5
-"""Where the end at a shape below 1 is looked for."""
+"""Start of the search for the end with a shape below 1."""
 
 
 class Settled(NamedTuple):
-    """A `tyre` whose coefficients `held` (p,) stand at their start, and the `report` of the stage that ended there."""
+    """A `tyre` whose coefficients `held` (p,) are at their start, and the `report` of the stage that ended there."""
 
     tyre: AbstractTyre
     held: np.ndarray
@@ -43,9 +43,9 @@ class Settled(NamedTuple):
 def settle(
     data: RigData, start: AbstractTyre, tyre: AbstractTyre, joint: Stage, aside: Collection[str], report: StageReport
 ) -> Settled:
-    """The tyre of a joint fit in its canonical form, with what the data do not identify at its start, the rest fitted anew.
+    """The tyre of a joint fit in its canonical form, with unidentified coefficients at their start and the others fitted again.
 
-    `joint`: the stage with all coefficients, those `aside` included, which are held whatever the data say.
+    `joint`: the stage with all coefficients, including those `aside`, which are held whatever the data show.
     """
     names = joint.coefficients
     held = np.array([name in aside for name in names])
@@ -66,13 +66,13 @@ def settle(
 
 
 def without(stage: Stage, held: np.ndarray, names: tuple[str, ...]) -> Stage:
-    """The stage less the coefficients that are held, a mask over `names`."""
+    """The stage without the held coefficients; `held` is a mask over `names`."""
     still = {name for name, one in zip(names, held, strict=True) if one}
     return stage._replace(coefficients=tuple(name for name in stage.coefficients if name not in still))
 
 
 def _fixed_signs(data: RigData, joint: Stage) -> list[str]:
-    """What may not change its sign: coefficients that are not fitted, and those with bounds."""
+    """Coefficients that may not change their sign: those that are not fitted, and those with bounds."""
     from_file = [f"{section}.{name}" for section, part in _sections() for name in part]
     return [name for name in from_file if name not in joint.coefficients or name in data.chosen.bounds]
 
@@ -88,7 +88,7 @@ def _sections():
 
 
 def _below_one(data: RigData, tyre: AbstractTyre, joint: Stage) -> tuple[AbstractTyre, int]:
-    """The end with the shapes of combined slip below 1, where a weight keeps its sign, if the data do not tell it apart."""
+    """The end with the shapes of combined slip below 1, where a weight keeps its sign, if the data do not distinguish it."""
     steps = 0
     for shape, curvature in OTHER_SIDE.items():
         if shape not in joint.coefficients or shape in data.chosen.bounds or float(leaf_of(tyre, shape)) <= 1:
@@ -105,9 +105,9 @@ def _below_one(data: RigData, tyre: AbstractTyre, joint: Stage) -> tuple[Abstrac
 def _unidentified_coefficients(
     data: RigData, start, tyre, joint: Stage, held: np.ndarray, kept: np.ndarray
 ) -> list[int]:
-    """Which coefficients the data do not identify, the least known first; each next one where those before are held.
+    """The coefficients that the data do not identify, the least known first; each next one with those before held.
 
-    By the Gauss-Newton matrix: holding one conditions the others on it, and what was confounded with it may be known then.
+    Uses the Gauss-Newton matrix: holding one conditions the others on it, which may identify those confounded with it.
     """
     free = without(joint, held, joint.coefficients)
     problem = data.problem(tyre, free, data.noise(tyre))
@@ -129,7 +129,8 @@ def _unidentified_coefficients(
 
 
 def _hold(data: RigData, start, tyre, joint: Stage, masks, found: list[int], report: StageReport):
-    """Hold as many of those found as the noise allows, the first ones; where it does not allow the first one, that is kept."""
+    """Hold as many of those found as the noise allows, the first ones; if not even the first one is allowed, it keeps its
+    value."""
     held, kept = (mask.copy() for mask in masks)
     noise = data.noise(tyre)
     before, names = data.loss(tyre, joint, noise), joint.coefficients

@@ -21,25 +21,27 @@ from jaxveh.numerics import on_cpu
 from jaxveh.tyres import AbstractTyre, Contact
 
 PULL = 0.1
-"""How hard a coefficient is pulled to its start, in standard deviations a step: 1 % of what a direction is pulled that data
-identify, but what they do not show stays where it was, where it would creep for hundreds of steps."""
+"""Strength with which a coefficient is pulled to its start, in standard deviations per step: 1 % of the pull of the data
+along a direction that they identify. Coefficients that they do not show stay at their start instead of creeping for hundreds
+of steps."""
 
 KINK = 2.0
-"""Standard deviations of a residual where a fit that is robust begins to count it little: Student's t with 2^2 = 4 degrees of
+"""Residual, in standard deviations, beyond which a robust fit reduces its weight: Student's t with 2^2 = 4 degrees of
 freedom."""
 
 BLOCK = 2000
-"""Rows at a time on a CPU; an accelerator takes all at once."""
+"""Rows per block on a CPU; an accelerator takes all at once."""
 
 
 class RigProblem(AbstractProblem):
-    """Rig data, a law and what of it is to be fitted.
+    """Rig data, a law and its coefficients to fit.
 
-    `contact` (n,) arrays; `measured` (m, n), the forces and moments `channels`, zero where there is no measurement; `weight`
-    (m, n), one over the standard deviation, zero where a row does not count; `emphasis` (m,), how many times a channel counts
-    what its noise says. `scale` (p,): the step of each coefficient that counts as one, on its bijector's line, from `origin`
-    (p,); zero where it is held: coordinates z (p,) are steps. `centre`, `spread` (p,): the prior on the line, a spread of
-    infinity for none. `pull`: in standard deviations a step, how hard coefficients are pulled to the origin, all or each (p,).
+    `contact`: of each row, arrays (n,); `measured` (m, n): the forces and moments `channels`, zero where there is no
+    measurement; `weight` (m, n): one over the standard deviation, zero where a row does not count; `emphasis` (m,): factors
+    on the channels' weights from the noise. Coordinates z (p,) are steps: `scale` (p,) is the length of one step of each
+    coefficient on its bijector's real line, from `origin` (p,); zero where it is held. `centre`, `spread` (p,): mean and
+    standard deviation of the prior on that line; infinite for no prior. `pull`: how strongly coefficients are pulled to the
+    origin, in standard deviations per step, one for all or each (p,).
     """
 
     law: AbstractTyre
@@ -70,7 +72,7 @@ class RigProblem(AbstractProblem):
 
     def covariance(self, z):
         spread, _ = spread_of(z, self)
-        # A standard error above one step, a coefficient's own size, is the pull's.
+        # A standard error above one step, a coefficient's own size, comes from the pull.
         return spread * self.scale * self.scale[:, None], jnp.diagonal(spread) <= 1.0
 
     def is_failure(self, cost):
@@ -91,16 +93,16 @@ class RigProblem(AbstractProblem):
         return put(self.law, self.chosen, self.values(z))
 
     def forces(self, law: AbstractTyre):
-        """The channels (m, n) of a law."""
+        """The channels (m, n) that a law gives."""
         found = law.forces(self.contact)
         like = self.measured[0]
         return jnp.stack([jnp.asarray(getattr(found, name), like.dtype) + 0 * like for name in self.channels])
 
     def bend(self, residual):
-        """Residuals in standard deviations, bent beyond `KINK` where the fit is robust, and the slope of the bend."""
+        """Residuals in standard deviations, reduced beyond `KINK` if the fit is robust, and the slope of this function."""
         if not self.robust:
             return residual, jnp.ones_like(residual)
-        # The square of the result is k^2 log(1 + (r / k)^2), what Student's t with k^2 degrees of freedom has in its exponent.
+        # The square of the result is k^2 log(1 + (r / k)^2), the exponent of Student's t with k^2 degrees of freedom.
         x = (residual / KINK) ** 2
         some = jnp.where(x > 1e-8, x, 1.0)
         shrink = jnp.sqrt(jnp.where(x > 1e-8, jnp.log1p(some) / some, 1 - x / 2))
@@ -108,7 +110,7 @@ class RigProblem(AbstractProblem):
 
 
 class Descent(NamedTuple):
-    """Where a search ended, and by how much it `lowered` the loss."""
+    """The end of a search, and by how much it `lowered` the loss."""
 
     found: SearchEnd
     lowered: Any
@@ -131,7 +133,7 @@ def loss(z, problem: RigProblem):
 
 
 def _prior_loss(z, problem: RigProblem) -> Quadratic:
-    """What the prior and the pull add to the loss."""
+    """The part of the prior and the pull in the loss."""
     off, rate = (problem.line(z) - problem.centre) / problem.spread, problem.scale / problem.spread
     cost = 0.5 * jnp.sum(off**2) + 0.5 * jnp.sum((problem.pull * z) ** 2)
     return Quadratic(cost, off * rate + problem.pull**2 * z, jnp.diag(rate**2 + problem.pull**2))
@@ -140,10 +142,10 @@ def _prior_loss(z, problem: RigProblem) -> Quadratic:
 def normal_equations(z, problem: RigProblem) -> Quadratic:
     """The loss at z (p,) with its gradient and Gauss-Newton matrix.
 
-    A row of data sees its own force alone, so that with coefficients as wide as the rows one pass backward a channel gives
-    every derivative of every row: the cost does not grow with the number of coefficients, as that of passes forward does.
-    The rows go in blocks that the processor's cache holds: 0.7 us a row and two channels of MF-Tyre with 68 coefficients, where
-    100,000 rows at once took 1.8 us.
+    Each row depends only on its own coefficients when these are broadcast to all rows. So one reverse pass per channel gives
+    every derivative of every row, and the cost does not grow with the number of coefficients as it does for forward passes.
+    The rows go in blocks that fit the processor's cache: 0.7 us per row and two channels of MF-Tyre with 68 coefficients,
+    where 100,000 rows at once took 1.8 us.
     """
     table, block = _in_blocks(problem)
 
@@ -166,7 +168,7 @@ def _of_data(z, problem: RigProblem) -> Quadratic:
     value, slope = problem.bend(problem.weight * (found - problem.measured))
     gradient, matrix = jnp.zeros_like(z), jnp.zeros((z.size, z.size), z.dtype)
     for k in range(len(problem.channels)):
-        # A row a coefficient: a Jacobian with its rows the other way round would be copied number by number.
+        # One row per coefficient: a Jacobian with the axes swapped would be copied number by number.
         slopes = jnp.stack(pull(jnp.zeros_like(found).at[k].set(problem.weight[k] * slope[k])))
         slopes = slopes * problem.scale[:, None]
         gradient = gradient + problem.emphasis[k] * (slopes @ value[k])
@@ -177,8 +179,8 @@ def _of_data(z, problem: RigProblem) -> Quadratic:
 def spread_of(z, problem: RigProblem) -> tuple[jax.Array, jax.Array]:
     """The covariance (p, p) of the coordinates at an optimum z (p,), and how many directions the data identify.
 
-    Emphasis changes what is minimised, not what is known: the sandwich, and what the data know without it. The pull counts in
-    its middle as in its ends: what data do not show stays unknown.
+    The emphasis changes the minimum, not the information: hence the sandwich, and the number of directions without emphasis.
+    The pull counts in the middle of the sandwich as at its ends: coefficients that data do not show stay unknown.
     """
     e, pull = problem.emphasis, jnp.broadcast_to(problem.pull, z.shape)
     matrix = lambda e: normal_equations(z, dataclasses.replace(problem, emphasis=e)).matrix
@@ -189,7 +191,7 @@ def spread_of(z, problem: RigProblem) -> tuple[jax.Array, jax.Array]:
 
 @eqx.filter_jit
 def spread_at_start(problem: RigProblem) -> jax.Array:
-    """The covariance (p, p) of the coordinates where the problem starts, held ones at what the pull leaves them."""
+    """The covariance (p, p) of the coordinates where the problem starts; for held ones, that of the pull."""
     pull = jnp.broadcast_to(problem.pull, problem.origin.shape)
     return inverse_of(normal_equations(problem.start(), problem).matrix - jnp.diag(pull**2), pull)[0]
 
@@ -197,19 +199,19 @@ def spread_at_start(problem: RigProblem) -> jax.Array:
 def inverse_of(information, pull) -> tuple[jax.Array, jax.Array]:
     """The inverse (p, p) of an information matrix with the pull (p,), and how many directions it identifies.
 
-    A direction is identified where its standard error is below one step, a coefficient's own size: beyond, it is the pull's.
+    A direction is identified if its standard error is below one step, a coefficient's own size: above, it comes from the pull.
     """
     known = jnp.sum(jnp.linalg.eigvalsh(information) > 1.0)
-    # On scales on which the pull is one: no eigenvalue is lost in the largest one's rounding.
+    # On scales on which the pull is one, so that no eigenvalue is lost in the rounding of the largest.
     values, vectors = jnp.linalg.eigh(information / pull / pull[:, None])
     inverse = (vectors / (jnp.maximum(values, 0.0) + 1.0)) @ vectors.T
     return inverse / pull / pull[:, None], known
 
 
 def _in_blocks(problem: RigProblem) -> tuple[Any, Callable[[Any], RigProblem]]:
-    """What has a number a row, cut into blocks (b, ..., size), and the problem of one block of it.
+    """The arrays with one number per row, cut into blocks (b, ..., size), and a function that gives the problem of one block.
 
-    Rows that fill the last block repeat the last one, without weight.
+    The last block is filled up with copies of the last row, without weight.
     """
     rows = problem.measured.shape[1]
     blocks = -(-rows // BLOCK) if on_cpu() else 1
@@ -236,22 +238,22 @@ def contact_of(rig) -> Contact:
         slip_ratio=jnp.asarray(rig.slip_ratio),
         load=jnp.asarray(rig.load),
         camber=0.0 if rig.camber is None else jnp.asarray(rig.camber),
-        # Zero throughout is what rigs write that do not tell it.
+        # Rigs that do not record the speed write zero throughout.
         speed=None if rig.speed is None or not np.any(rig.speed) else jnp.asarray(rig.speed),
         pressure=optional(rig.pressure),
     )
 
 
 def offered_forces(law: AbstractTyre, contact: Contact) -> tuple[str, ...]:
-    """The forces and moments that a law has (those that are no plain zero)."""
+    """The forces and moments that a law computes (those that are not a plain zero)."""
     one = jax.tree.map(lambda values: values[:1] if jnp.ndim(values) else values, contact)
     found = eqx.filter_eval_shape(law.forces, one)
     return tuple(name for name, value in found._asdict().items() if not isinstance(value, float))
 
 
 def start_of(law: AbstractTyre, parameters: tuple[Parameter, ...]) -> tuple[jax.Array, jax.Array]:
-    """Origin and scale (p,) of the coordinates: its own size or the declared scale, the larger; one on the bijector's line
-    (for what is positive a factor of e) for what is positive or bounded."""
+    """Origin and scale (p,) of the coordinates. The scale of a real coefficient is its own size or the declared scale, the
+    larger; of a positive or bounded one it is one on the bijector's real line (for a positive one a factor of e)."""
     origin, scale = [], []
     for p, value in zip(parameters, pick(law, parameters), strict=True):
         value = jnp.asarray(value)

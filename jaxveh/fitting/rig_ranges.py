@@ -1,4 +1,4 @@
-"""The ranges of an MF-Tyre and rig data: where it was measured, and room for what was."""
+"""The ranges of an MF-Tyre and rig data: set to the measured ranges, or widened to contain the data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RANGES = {
 """Inputs and the names of their ranges."""
 
 SIGNED = ("slip_ratio", "slip_angle", "camber")
-"""Inputs of either sign: rigs that brake only would leave a tyre that cannot drive, so that the larger reach counts for both."""
+"""Inputs of either sign: with data from a rig that only brakes, the tyre could not drive, so the larger end counts for both."""
 
 
 class Widened(NamedTuple):
@@ -34,10 +34,10 @@ class Widened(NamedTuple):
 
 
 def measured_ranges(tyre: MFTyre, rig: RigTable) -> MFTyre:
-    """The tyre with the ranges of the rig data: beyond them it holds their edge and does not extrapolate.
+    """The tyre with the ranges of the rig data: outside them it holds the value at the edge and does not extrapolate.
 
-    Slips and camber reach as far to either side; loads go down to zero, where a wheel lifts. An input that does not vary in the
-    data leaves its range as it is.
+    The ranges of slips and camber are symmetric; those of loads start at zero, where a wheel lifts. The range of an input
+    that does not vary in the data stays unchanged.
     """
     varies = varying_inputs(rig)
     found = {}
@@ -56,7 +56,7 @@ def measured_ranges(tyre: MFTyre, rig: RigTable) -> MFTyre:
 
 
 def widened_ranges(tyre: MFTyre, rig: RigTable) -> tuple[MFTyre, tuple[Widened, ...]]:
-    """The tyre with ranges that hold all the data, and which had to be widened: rows beyond would count as at the edge."""
+    """The tyre with ranges that contain all data, and the ranges that were widened: rows outside would count as at the edge."""
     found = []
     for name, ends in RANGES.items():
         values = getattr(rig, name)
@@ -66,7 +66,7 @@ def widened_ranges(tyre: MFTyre, rig: RigTable) -> tuple[MFTyre, tuple[Widened, 
         values = -values if name == "slip_angle" else values
         for key, value, beyond in zip(ends, (np.min(values), np.max(values)), (np.less, np.greater), strict=True):
             before = float(getattr(tyre.ranges, key))
-            # FZMIN is no edge of loads: below it moments fade.
+            # FZMIN is not an edge of loads: below it moments fade.
             if key != "FZMIN" and beyond(value, before):
                 found.append(Widened(key, before, float(value)))
     return _with(tyre, {one.name: one.after for one in found}), tuple(found)

@@ -1,8 +1,8 @@
-"""Outliers of rig data: whether residuals have heavier tails than normal noise, and what a robust fit knows.
+"""Outliers of rig data: whether residuals have heavier tails than normal noise, and the uncertainty of a robust fit.
 
-A robust fit takes residuals for Student's t with 4 degrees of freedom, on the scale of their median size: iterated weights
-1 / (1 + r^2 / 4) of residuals r in standard deviations (K. L. Lange, R. J. A. Little and J. M. G. Taylor, Robust statistical
-modeling using the t distribution, J. Am. Stat. Assoc. 84 (1989)).
+A robust fit assumes Student's t with 4 degrees of freedom for the residuals, on the scale of their median size: iterated
+weights 1 / (1 + r^2 / 4) for residuals r in standard deviations (K. L. Lange, R. J. A. Little and J. M. G. Taylor, Robust
+statistical modeling using the t distribution, J. Am. Stat. Assoc. 84 (1989)).
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ import numpy as np
 from jaxveh.fitting.rig_problem import KINK
 
 FAR_RESIDUAL = 4.0
-"""Robust standard deviations beyond which a residual is far: of normal noise, 0.006 % of rows."""
+"""Robust standard deviations beyond which a residual counts as far: for normal noise, 0.006 % of rows."""
 
 LEAST_SHARE, LEAST_ROWS = 0.002, 3
-"""Share and number of far rows from which tails are heavy."""
+"""Share and number of far rows from which tails count as heavy."""
 
 TO_DEVIATION = 1.4826
 """The standard deviation of normal noise over its median size."""
 
 
 class Tails(NamedTuple):
-    """Residuals with heavy tails: the `share` of rows that lie beyond `FAR_RESIDUAL` robust standard deviations, that `deviation`
-    (in the channel's unit), and the `ratio` of their RMS to it (1 for normal noise)."""
+    """Residuals with heavy tails: the `share` of rows beyond `FAR_RESIDUAL` robust standard deviations, this standard
+    `deviation` (in the channel's unit), and the `ratio` of their RMS to it (1 for normal noise)."""
 
     share: float
     deviation: float
@@ -33,9 +33,10 @@ class Tails(NamedTuple):
 
 
 def heavy_tails(residuals: np.ndarray) -> Tails | None:
-    """What tells that residuals (n,) of one channel are no normal noise; None where they may be, nan does not count.
+    """The tails of residuals (n,) of one channel if they are heavier than those of normal noise, otherwise None; nan is left
+    out.
 
-    Outliers make such tails, and so does a law that misses some rows by far more than the others.
+    Heavy tails come from outliers, or from a law that fits some rows much worse than the others.
     """
     known = residuals[np.isfinite(residuals)]
     deviation = TO_DEVIATION * float(np.median(np.abs(known))) if known.size else 0.0
@@ -48,10 +49,10 @@ def heavy_tails(residuals: np.ndarray) -> Tails | None:
 
 
 def inflation(residuals: np.ndarray) -> float:
-    """The variance of a robust fit's coefficients over what its Gauss-Newton matrix has, for residuals in standard deviations.
+    """The variance of a robust fit's coefficients over that of its Gauss-Newton matrix, for residuals in standard deviations.
 
-    That of an M-estimator is E[psi^2] / E[psi']^2 (P. J. Huber, Robust Statistics (1981), section 7.6), with psi the loss's
-    slope r / (1 + r^2 / 4); the Gauss-Newton matrix counts a row by the squared slope of the bent residual.
+    The variance of an M-estimator is E[psi^2] / E[psi']^2 (P. J. Huber, Robust Statistics (1981), section 7.6), where psi is
+    the loss's slope r / (1 + r^2 / 4); the Gauss-Newton matrix counts a row by the squared slope of the bent residual.
     """
     r = residuals[np.isfinite(residuals)]
     x = (r / KINK) ** 2

@@ -1,8 +1,8 @@
-"""The signs of rig data: slopes that every tyre has in one direction tell axes that were told wrongly.
+"""The signs of rig data: slopes with the opposite sign to every tyre's reveal a wrong declaration of the axes.
 
-In this package's axes (z up) a positive slip angle gives a positive F_y, a positive slip ratio a positive F_x, the force of a
-slip angle acts behind the contact's centre, so that M_z falls with it, and a wheel is pushed to the side that its top leans
-to: camber, about x forwards, is positive to the right, where F_y is negative.
+In this package's axes (z up) a positive slip angle gives a positive F_y, and a positive slip ratio a positive F_x. The force
+of a slip angle acts behind the contact's centre, so M_z falls with it. A wheel is pushed to the side to which its top leans:
+camber, about x forwards, is positive to the right, where F_y is negative.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ SMALL = {"slip_angle": np.radians(2.0), "slip_ratio": 0.02}
 """Slips below which forces follow slip and camber, to the precision of a sign."""
 
 LEAST_ROWS, LEAST_LOAD = 8, 0.2
-"""Rows that a sign needs, and the share of the median load below which a row says nothing."""
+"""The least number of rows for a sign, and the share of the median load below which a row is not counted."""
 
 SURE = 3.0
-"""Standard errors that a slope must have the wrong sign by."""
+"""The number of standard errors by which a slope must have the wrong sign."""
 
 LEAST_SLOPE = {"F_y, slip_angle": 1.0, "F_x, slip_ratio": 1.0, "M_z, slip_angle": 0.02, "F_y, camber": 0.1}
-"""Slopes over load (1/rad, per slip ratio; m/rad for M_z) below which a wrong sign is none: an ordinary tyre's are 15,
+"""Slopes over load (1/rad, per slip ratio; m/rad for M_z) below which a wrong sign is not reported: an ordinary tyre's are 15,
 15, -0.5 and -1."""
 
 EXPECTED = {"F_y, slip_angle": 1.0, "F_x, slip_ratio": 1.0, "M_z, slip_angle": -1.0, "F_y, camber": -1.0}
-"""What each slope's sign must be."""
+"""The required sign of each slope."""
 
 WORDS = {
     "F_y, slip_angle": "F_y falls with slip_angle: a positive slip angle must give a positive force",
@@ -39,8 +39,8 @@ WORDS = {
 
 
 class WrongSign(NamedTuple):
-    """A slope of the wrong sign: `pair` of what it is of (`F_y, camber`), the `slope` over load with its standard `error`, and
-    what is the matter in `words`."""
+    """A slope of the wrong sign: its `pair` of force and input (`F_y, camber`), the `slope` over load with its standard
+    `error`, and a description in `words`."""
 
     pair: str
     slope: float
@@ -49,7 +49,7 @@ class WrongSign(NamedTuple):
 
 
 def wrong_signs(rig: RigTable) -> tuple[WrongSign, ...]:
-    """The slopes of a rig table that no tyre has, as in data whose axes are others than those that were told."""
+    """The slopes of a rig table that no tyre has, as in data whose axes were declared wrongly."""
     found = []
     for pair, sign in EXPECTED.items():
         channel, name = pair.split(", ")
@@ -61,17 +61,17 @@ def wrong_signs(rig: RigTable) -> tuple[WrongSign, ...]:
 
 def _in_words(rig: RigTable, pair: str, slope: float, error: float) -> str:
     return (
-        f"{rig.source}: {WORDS[pair]} (slope over load {slope:.3g}, standard error {error:.1g}): are the axes of the data those "
-        "that were told (--axes sae, adapted-sae, iso-w or ours)?"
+        f"{rig.source}: {WORDS[pair]} (slope over load {slope:.3g}, standard error {error:.1g}): do the data have the axes that "
+        "were given (--axes sae, adapted-sae, iso-w or ours)?"
     )
 
 
 def slope_of(rig: RigTable, channel: str, name: str) -> tuple[float, float]:
-    """The slope over load of a force or moment over slip angle, slip ratio or camber, where slips are small, and its
+    """The slope over load of a force or moment against slip angle, slip ratio or camber, where slips are small, and its
     standard error.
 
-    Least squares with an offset and, for what acts sideways, slip angle and camber together; where few rows have a small slip,
-    the smallest of those that are swept. nan where the data do not tell.
+    Least squares with an offset and, for lateral forces and moments, slip angle and camber together; where few rows have a
+    small slip, the smallest ones are used. nan where the data do not determine it.
     """
     values = getattr(rig, channel)
     inputs = ["slip_ratio"] if name == "slip_ratio" else ["slip_angle", "camber"]

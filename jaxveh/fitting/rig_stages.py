@@ -1,4 +1,4 @@
-"""In which order a tyre is fitted to rig data: pure slip first, then what combined slip adds, then moments."""
+"""The order in which a tyre is fitted to rig data: pure slip first, then combined slip, then moments."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ PURE_ANGLE, PURE_RATIO = np.radians(0.5), 0.01
 LEAST_SPREAD = {
     "slip_angle": np.radians(1.0), "slip_ratio": 0.02, "camber": np.radians(0.5), "load": 0.15, "pressure": 0.05, "speed": 0.1,
 }  # fmt: skip
-"""How far an input must vary (from its 2nd to its 98th percentile) to show its coefficients; of the last three relative to
-their median."""
+"""The least variation of an input (from its 2nd to its 98th percentile) to show its coefficients; for the last three relative
+to their median."""
 
 
 CURVATURES, SHAPES = (-3.0, -1.0, 0.5, 0.7, 0.9), (0.9,)
@@ -34,22 +34,22 @@ STARTS = {
     "overturning.QSX6": (1.0,),
     "overturning.QSX8": (-1.0, 1.0),
 }
-"""Where else a coefficient starts. Curvatures E end at 1, beyond which no data pull them back, and a fit from one start may stop
-there; in combined slip the shape C has a good end on either side of 1; a typical tyre's M_x has factors of zero, which hide
-what they multiply."""
+"""Other starting values of coefficients. Curvatures E end at 1, beyond which no data pull them back, and a fit from one start
+may stop there; in combined slip the shape C has a good end on either side of 1; a typical tyre's M_x has factors of zero,
+which hide the coefficients that they multiply."""
 
 
 HELD_COEFFICIENTS = {"lateral.PKY4": 0.5}
-"""Coefficients that are held where the law has them unless somebody asks, and how far from there an ordinary tyre's may be
-(standard deviation). PKY4, the form of the cornering stiffness over load, is 2 in the book's simple form (4.E25); beside PKY1 and
-PKY2 the three or four loads of a rig hardly show it, and all three run along one valley."""
+"""Coefficients that are held at the law's value by default, and their standard deviation about it among ordinary tyres. PKY4,
+the form of the cornering stiffness over load, is 2 in the book's simple form (4.E25); next to PKY1 and PKY2 the three or four
+loads of a rig hardly show it, and all three run along one valley."""
 
 
 class Stage(NamedTuple):
     """One fit: its `name`, the `channels` that it compares, the names of its coefficients, and which rows count (n,).
 
-    `starts`: coefficients and other values from which the stage starts, in every combination; the best end counts. `aside`: those
-    of `HELD_COEFFICIENTS` that belong here and nobody asked for.
+    `starts`: coefficients and other values from which the stage starts, in every combination; the best end is taken. `aside`:
+    those of `HELD_COEFFICIENTS` that belong to this stage and are not to be fitted.
     """
 
     name: str
@@ -61,9 +61,9 @@ class Stage(NamedTuple):
 
 
 class CoefficientGroup(NamedTuple):
-    """Coefficients that show in one force or moment: always, and where load, camber or pressure vary (names split at blanks).
+    """Coefficients that one force or moment shows: always, and where load, camber or pressure vary (names separated by blanks).
 
-    Those of `asked` show where the load varies, and are fitted where somebody asks for them alone (`HELD_COEFFICIENTS`).
+    Those of `asked` show where the load varies, and are fitted only if the user names them (`HELD_COEFFICIENTS`).
     """
 
     section: str
@@ -76,14 +76,14 @@ class CoefficientGroup(NamedTuple):
     asked: str = ""
 
     def identifiable(self, varies: set[str], asked: Collection[str] = ()) -> tuple[str, ...]:
-        """Those that data show in which these inputs vary, and those among `asked`, by their full names."""
+        """The coefficients that data show in which these inputs vary, and those among `asked`, by their full names."""
         found = self.always.split() + [name for name in self.asked.split() if f"{self.section}.{name}" in asked]
         for name in ("load", "camber", "pressure", "speed"):
             found += getattr(self, name).split() if name in varies else []
         return tuple(f"{self.section}.{name}" for name in found)
 
     def aside(self, varies: set[str], free: Collection[str]) -> tuple[str, ...]:
-        """Those that data would show in which these inputs vary, and that nobody let `free`."""
+        """The coefficients that data would show in which these inputs vary, and that the user did not let `free`."""
         names = (f"{self.section}.{name}" for name in self.asked.split())
         return tuple(name for name in names if "load" in varies and name not in free)
 
@@ -140,8 +140,8 @@ def stages_of(
     chosen: tuple[str, ...] | None,
     free: Collection[str] = (),
 ) -> list[Stage]:
-    """The stages for a law and data; the coefficients `chosen` by the user, where given, instead of those that data show, or
-    those besides them that the user lets `free`.
+    """The stages for a law and data. The coefficients are those `chosen` by the user, if given, otherwise those that data show
+    and those that the user lets `free`.
 
     A law other than MF-Tyre is fitted at once, all its parameters to all its forces.
     """
@@ -167,7 +167,7 @@ def stages_of(
         shown = combined if needs == "both" else (not needs or needs in varies)
         if group.channel not in measured or not shown:
             continue
-        # Rows of pure slip show its coefficients alone; without one that was measured, all rows have to do.
+        # Rows of pure slip show their coefficients alone; if none of them was measured, all rows are used.
         seen = np.isfinite(getattr(rig, group.channel))
         rows = rows & seen if np.any(rows & seen) else seen
         names = group.identifiable(varies, free if chosen is None else chosen)

@@ -1,4 +1,4 @@
-"""Where a fit to rig data starts: a law by its name, its coefficients guessed from the data."""
+"""The start of a fit to rig data: a law by its name, with coefficients estimated from the data."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from jaxveh.tyres import (
 )
 
 LEAST_ROWS = 5
-"""Rows that a slope needs; where fewer have a small slip, that many of the smallest count."""
+"""The least number of rows for a slope; where fewer have a small slip, that many of the smallest are used."""
 
 LEAST_LOAD = 0.2
-"""Share of the median load below which a row says nothing of friction: there it is noise over little."""
+"""Share of the median load below which a row is not used for friction: there it is noise divided by a small load."""
 
 NEAR_LOAD = 1.4
-"""Loads within this factor of the median give the slope there; other loads where none is so near."""
+"""Rows with loads within this factor of the median give the slope; other loads are used only if there are too few."""
 
 GENERIC_RIG = {"speed": 16.7, "pressure": 220000.0}
-"""m/s and Pa, where the data are silent."""
+"""m/s and Pa, used if the data do not have them."""
 
 
 class RigFacts(NamedTuple):
-    """What rig data say at a glance: the median `load` (N), `pressure` (Pa) and `speed` (m/s); `cornering_stiffness` (N/rad)
+    """Simple facts from rig data: the median `load` (N), `pressure` (Pa) and `speed` (m/s); `cornering_stiffness` (N/rad)
     and `slip_stiffness` (N) at that load; `friction`, the largest force over load."""
 
     load: float
@@ -50,7 +50,7 @@ class RigFacts(NamedTuple):
 
 
 def rig_facts(rig: RigTable) -> RigFacts:
-    """What rig data say at a glance; an ordinary tyre's numbers where they say nothing.
+    """Simple facts from rig data; an ordinary tyre's numbers where the data do not give them.
 
     A direction without measurements takes the other one's stiffness.
     """
@@ -58,7 +58,7 @@ def rig_facts(rig: RigTable) -> RigFacts:
     median = lambda name: float(np.median(getattr(rig, name)) if getattr(rig, name) is not None else GENERIC_RIG[name])
     across, along = _slope(rig, "F_y", load), _slope(rig, "F_x", load)
     generic = kit.GENERIC_TYRE.stiffness * load
-    # `speed` of a table may be zero where the rig did not tell it.
+    # `speed` of a table may be zero if the rig did not record it.
     return RigFacts(
         load=load,
         pressure=median("pressure"),
@@ -70,11 +70,11 @@ def rig_facts(rig: RigTable) -> RigFacts:
 
 
 def _slope(rig: RigTable, channel: str, load: float) -> float | None:
-    """The slope of a force over its slip at the median load, where it is small; None where nothing was measured there."""
+    """The slope of a force over its slip at the median load, for small slips; None if it was not measured there."""
     force, share = getattr(rig, channel), rig.load / load
     name, other = ("slip_angle", "slip_ratio") if channel == "F_y" else ("slip_ratio", "slip_angle")
     slip = getattr(rig, name)
-    # What stands still but for noise says nothing of a slope.
+    # A slip that varies only by noise does not determine a slope.
     if force is None or np.ptp(np.percentile(slip, [2, 98])) < LEAST_SPREAD[name]:
         return None
     rows = np.isfinite(force) & (np.abs(getattr(rig, other)) <= SMALL[other]) & (slip != 0) & (share > LEAST_LOAD)
@@ -113,7 +113,7 @@ def _magic_formula(facts: RigFacts) -> MagicFormula:
 
 
 def _linear_with_load(facts: RigFacts) -> LinearWithLoad:
-    # Its stiffness is greatest at twice the median load: at the median it is 4/5 of that.
+    # Its stiffness is greatest at twice the median load; at the median it is 4/5 of that.
     return LinearWithLoad(1.25 * facts.cornering_stiffness, 2 * facts.load, facts.slip_stiffness / facts.load)
 
 
@@ -133,20 +133,20 @@ RIG_STARTS: dict[str, Callable[[RigFacts], AbstractTyre]] = {
     "linear-with-load": _linear_with_load,
     "hsri": _of_stiffness(HSRI),
 }
-"""Laws by the names that programs know them by."""
+"""Laws by their names in programs."""
 
 
 def starting_tyre(model: str, rig: RigTable) -> AbstractTyre:
     """A law to start a fit from, by its name (`RIG_STARTS`).
 
     MF-Tyre (`mf61`, `mf52`, `mf62`) is `tyres.typical_mf_tyre` with the median load, pressure and speed of the data as nominal
-    ones. Others take their stiffnesses from the slope of forces at small slip, and their friction from the largest force
+    values. Others take their stiffnesses from the slope of forces at small slip, and their friction from the largest force
     over load.
 
-    **Raises** `InputError` for an unknown name, and for a slope that no tyre has, as in data of other axes
-    (`rig_signs.wrong_signs`): who knows such a tyre starts from one of his own.
+    **Raises** `InputError` for an unknown name, and for a slope that no tyre has, as in data with other axes
+    (`rig_signs.wrong_signs`): for a tyre that does have it, start from a tyre of your own.
     """
     check_one_of("model", model, tuple(RIG_STARTS))
     for wrong in wrong_signs(rig):
-        raise InputError(f"{wrong.words} If they are, start from a tyre of your own (--start).")
+        raise InputError(f"{wrong.words} If they do, start from a tyre of your own (--start).")
     return RIG_STARTS[model](rig_facts(rig))

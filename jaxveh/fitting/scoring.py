@@ -12,22 +12,23 @@ import optimistix as optx
 from jaxveh.fitting.levenberg_marquardt import Quadratic, termination
 
 FIRST_DAMPING, RAISED, LOWERED, LEAST_RAISED = 1e-2, 5.0, 0.2, 1e-3
-"""Levenberg's damping at the start, its factors after a step that raised and one that lowered the cost, and its least value after
-one that raised it."""
+"""Levenberg's damping at the start, its factors after a step that raised and one that lowered the cost, and its least value
+after a step that raised it."""
 
 SECANTS = 10
-"""How many of the last steps correct the curvature."""
+"""The number of last steps that correct the curvature."""
 
 LONGEST_STEP = 2.0
-"""In the parameters' units: how far one step may move one."""
+"""The largest change of a parameter in one step, in the parameters' units."""
 
 LEAST_STEP = 1e-3
-"""In the parameters' units: where a refused step is shorter, no step is small enough to gain."""
+"""In the parameters' units: if a refused step is shorter, no smaller step can gain."""
 
 
 class _Search(NamedTuple):
-    """The point's `at`, the `trial` to be looked at next, the last steps and the changes of the gradient over them (S, n), oldest
-    first, zero where there is none; `small`: how many steps in a row gained little."""
+    """The state of a search: the `Quadratic` `at` the point, the `trial` to be evaluated next, the last steps and the changes
+    of the gradient over them (S, n), oldest first, zero where there is none; `small`: how many steps in a row gained
+    little."""
 
     at: Quadratic
     trial: Any
@@ -40,13 +41,14 @@ class _Search(NamedTuple):
 
 
 class FisherScoring(optx.AbstractMinimiser):
-    """Newton's steps with the expected information for curvature (Ljung 1999, ch. 10; Gupta & Mehra 1974), damped after
-    Levenberg, and corrected to the changes of the gradient that were seen (BFGS): the expected information is the curvature only
-    on average; where they differ, plain scoring creeps.
+    """Newton steps with the expected information as curvature (Ljung 1999, ch. 10; Gupta & Mehra 1974), with Levenberg's
+    damping, and corrected by the observed changes of the gradient (BFGS). The expected information is the curvature only on
+    average; where they differ, plain scoring creeps.
 
-    `quadratic(y, args)`: the `Quadratic` of the cost at y (n,), its matrix the information. It ends when two steps in a row gain
-    less than `atol` of cost, or cannot gain. `options` of `optimistix.minimise`: `unit` (n,), the length of each coordinate in
-    which steps are bounded, by default one; `limit`, the most steps as an array; `state`, a search to be gone on with.
+    `quadratic(y, args)`: the `Quadratic` of the cost at y (n,), whose matrix is the information. The search ends when two
+    steps in a row gain less than `atol` of cost, or cannot gain. `options` of `optimistix.minimise`: `unit` (n,), the unit of
+    each coordinate in which steps are limited, by default one; `limit`, the most steps as an array; `state`, a search to
+    continue.
     """
 
     atol: float
@@ -55,21 +57,21 @@ class FisherScoring(optx.AbstractMinimiser):
     norm: Callable = eqx.field(static=True, default=optx.max_norm)
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):
-        """Nothing is computed before the first step, which looks at the start."""
+        """The first state; nothing is computed before the first step, which evaluates the start."""
         if "state" in options:
             return options["state"]
         return self.begin(y)
 
     def begin(self, y) -> _Search:
-        """A search that has not looked at anything."""
-        # Of a type of their own, as they come back: weak ones would be another program.
+        """The state of a search before its first evaluation."""
+        # With the types of the returned state: weak types would compile another program.
         none, past = jnp.zeros((), int), jnp.zeros((SECANTS, y.size), y.dtype)
         at = Quadratic(jnp.full((), jnp.inf, y.dtype), jnp.zeros_like(y), jnp.zeros((y.size, y.size), y.dtype))
         damping = jnp.full((), FIRST_DAMPING, y.dtype)
         return _Search(at, y, past, past, damping, none, none - 1, jnp.asarray(False))
 
     def step(self, fn, y, args, options, state, tags):
-        """A look at the trial, which is taken where it is better, and the next trial."""
+        """Evaluate the trial, accept it if it is better, and choose the next trial."""
         first = state.steps < 0
         unit = options.get("unit", jnp.ones_like(y))
         found, move = self.quadratic(state.trial, args), state.trial - y
@@ -77,7 +79,7 @@ class FisherScoring(optx.AbstractMinimiser):
         last = lambda past, new: jnp.where(seen & ~first, jnp.concatenate([past[1:], new[None]]), past)
         moves, changes = last(state.moves, move), last(state.changes, found.gradient - state.at.gradient)
         better = seen & jnp.all(jnp.isfinite(found.matrix)) & (found.cost < state.at.cost)
-        # Without a finite cost there is nothing to be compared with: that is no small gain.
+        # Without a finite cost there is nothing to compare with: this does not count as a small gain.
         still = jnp.isfinite(state.at.cost) & (jnp.max(jnp.abs(move / unit)) < LEAST_STEP)
         little = jnp.where(better, state.at.cost - found.cost < self.atol, still)
         small = jnp.where(little, state.small + 1, 0)
@@ -90,11 +92,11 @@ class FisherScoring(optx.AbstractMinimiser):
         return y, state, None
 
     def terminate(self, fn, y, args, options, state, tags):
-        """Where it is done, or has taken as many steps as `limit` says."""
+        """Whether the search has ended, or has taken `limit` steps."""
         return termination(state, options)
 
     def postprocess(self, fn, y, aux, args, options, state, tags, result):
-        """The best point was kept."""
+        """The best point, which is the last one."""
         return y, aux, {}
 
 
@@ -107,7 +109,8 @@ def _step(at: Quadratic, moves, changes, damping, unit):
 
 
 def with_secants(curvature, moves, changes):
-    """A curvature (n, n) corrected to steps (S, n) and changes of the gradient over them, oldest first (BFGS); zeros are none."""
+    """A curvature (n, n) corrected by steps (S, n) and the changes of the gradient over them, oldest first (BFGS); zero steps
+    are ignored."""
     for move, change in zip(moves, changes, strict=True):
         along = curvature @ move
         fits = change @ move > 1e-2 * move @ along

@@ -18,7 +18,7 @@ from jaxveh.statespace import Row, StateSpace
 class Segments(NamedTuple):
     """Rows as (W+1, K) leaves: K segments of W rows, the last row being the next segment's first.
 
-    `linked`: (K,) whether the next segment goes on where this one ends. `first`: (K,) whether a recording starts here.
+    `linked`: (K,) whether the next segment continues this one. `first`: (K,) whether a recording starts here.
     """
 
     rows: Any
@@ -37,13 +37,13 @@ def cut(model: StateSpace, recordings: Recording | Sequence[Recording], window: 
     if length < 2:
         raise InputError(f"window = {window} s: must span at least two steps of the recording.")
     parts = [cut_rows(model.rows(recording), length) for recording in recordings]
-    # Which segments are whose is known before anything is traced.
+    # Which recording a segment belongs to is known before anything is traced.
     join = lambda *leaves: (np if isinstance(leaves[0], np.ndarray) else jnp).concatenate(leaves, axis=-1)
     return jax.tree.map(join, *parts)
 
 
 def cut_rows(rows: Row, length: int) -> Segments:
-    """Cut rows (T,) into segments of `length` of them: the pure part of `cut`."""
+    """Cut rows (T,) into segments of `length` rows: the pure part of `cut`."""
     count = rows.t.shape[0]
     if count < 3:
         raise InputError(f"recording has {count} rows: a fit needs at least 3.")
@@ -52,7 +52,7 @@ def cut_rows(rows: Row, length: int) -> Segments:
     inside = index < count
     clipped = np.minimum(index, count - 1)
     take = lambda leaf: leaf[clipped]
-    # Past the log's end: time goes on evenly, inputs are held, nothing is measured.
+    # Past the log's end: time continues evenly, inputs are held, nothing is measured.
     step = (rows.t[-1] - rows.t[0]) / (count - 1)
     t = take(rows.t) + jnp.asarray(index - clipped, rows.t.dtype) * step
     y = jax.tree.map(lambda leaf: jnp.where(inside, take(leaf), jnp.nan), rows.y)

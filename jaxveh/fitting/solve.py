@@ -22,16 +22,16 @@ def solve(
     tolerance: float = 1e-8,
     standard_errors: bool = True,
 ) -> Fit:
-    """The fit of a problem: arrays in, arrays out, under `jit`, `vmap` and `grad`.
+    """Fit a problem: arrays in, arrays out, under `jit`, `vmap` and `grad`.
 
-    Every array of the `problem` has its derivative: with F the cost, an optimum z moves by -(d2F/dz2)^-1 d2F/dz d(data), so that
-    no derivative goes through the search. It holds where the search has converged. `start`: coordinates (n,), by default
-    the problem's own; the optimum does not depend on it, and has no derivative with respect to it. `tolerance`: of the
-    problem's solver. Without `standard_errors` they are NaN.
+    The fit has a derivative with respect to every array of the `problem`. With F the cost, an optimum z moves by
+    -(d2F/dz2)^-1 d2F/dz d(data), so no derivative goes through the search. It is valid where the search has converged.
+    `start`: coordinates (n,), by default the problem's own; the optimum does not depend on it, and has no derivative with
+    respect to it. `tolerance`: of the problem's solver. Without `standard_errors` they are NaN.
 
-    **Returns** a `Fit`; how it ended is its `result`.
+    **Returns** a `Fit`; its `result` states how it ended.
     """
-    # An array: with another tolerance it is the same program.
+    # As an array, so that another tolerance does not compile another program.
     return _solve(problem, start, jnp.asarray(tolerance), max_steps=max_steps, standard_errors=standard_errors)
 
 
@@ -44,7 +44,7 @@ def _solve(problem: AbstractProblem, start, tolerance, *, max_steps: int, standa
 
 @eqx.filter_custom_jvp
 def optimum(problem: AbstractProblem, start, *, max_steps: int, tolerance) -> SearchEnd:
-    """Where a search from the coordinates `start` (n,) ends."""
+    """The end of a search from the coordinates `start` (n,)."""
     return problem.search(start, max_steps, tolerance)
 
 
@@ -65,8 +65,8 @@ def _of_optimum(primals, tangents, **settings):
 def curvature(cost, z, free):
     """Second derivatives of a cost of z (n,) and a tree of arrays: of z twice (n, n), and of z and each array (n, ...).
 
-    Both from one pass backward over one forward, a coordinate after another: it is compiled once, and nothing more is needed for
-    the derivative of an optimum in either mode, which is what keeps its compilation short.
+    Both from one reverse pass over one forward pass, one coordinate after another: it is compiled once. The derivative of an
+    optimum in either mode needs nothing more, which keeps its compilation short.
     """
 
     def row(direction):
@@ -77,7 +77,8 @@ def curvature(cost, z, free):
 
 
 def fit_at(problem: AbstractProblem, found: SearchEnd, cost, uncertainty: tuple[jax.Array, jax.Array] | None) -> Fit:
-    """The fit that ended at these coordinates, with this cost and what the problem's `covariance` says, or nothing of it."""
+    """The fit that ended at these coordinates, with this cost and the problem's `covariance` as `uncertainty`, None for
+    none."""
     chosen, line = problem.chosen, problem.line(found.z)
     values = in_units(chosen, line)
     unknown = jnp.full((line.size, line.size), jnp.nan, line.dtype), jnp.zeros(line.shape, bool)

@@ -1,4 +1,4 @@
-"""Observers: models that are pulled towards the measurements, without covariances."""
+"""Observers: models that are corrected towards the measurements, without covariances."""
 
 from jaxveh.observers.adaptive import Adaptive
 from jaxveh.observers.base import AbstractObserver, PointBelief

@@ -1,4 +1,4 @@
-"""An observer that adapts parameters beside the states."""
+"""An observer that adapts parameters in addition to the states."""
 
 from __future__ import annotations
 
@@ -26,36 +26,36 @@ def _bounds(given: Mapping[str, tuple[float, float]]) -> tuple[tuple[str, float,
 
 
 class Adaptive(AbstractObserver):
-    """A Luenberger observer of the states with a gradient law for parameters theta, joined so that both errors die out.
+    """A Luenberger observer of the states with a gradient law for parameters theta, combined so that both errors decay.
 
-    (Q. Zhang, IEEE Trans. Autom. Control 47, 2002; A. Guyader & Q. Zhang, SYSID 2003; the law, projection, leakage and dead zone:
-    P. Ioannou & J. Sun, Robust Adaptive Control, 1996, ch. 4 and 8; with `a_y` seen and friction adapted it stands for
-    H. Grip et al., Automatica 44, 2008.)
+    (Q. Zhang, IEEE Trans. Autom. Control 47, 2002; A. Guyader & Q. Zhang, SYSID 2003; the law, projection, leakage and dead
+    zone: P. Ioannou & J. Sun, Robust Adaptive Control, 1996, ch. 4 and 8; with `a_y` measured and friction adapted it
+    represents H. Grip et al., Automatica 44, 2008.)
 
         Y- = dx-/dtheta,    phi = dh/dx Y- + dh/dtheta,    e = y - h(x-, theta)
         dtheta = G phi^T (R + phi G phi^T)^-1 e,    G = rate dt
         x = x- + gain e + Y dtheta,    Y = Y- - gain phi,    theta += dtheta
 
-    Y (n, p), the estimate's slope with respect to the parameters, is filtered along; R the measurement noise's covariance, which
-    weighs the channels; slopes are those of the model at the estimate.
+    Y (n, p), the estimate's slope with respect to the parameters, is filtered along; R is the measurement noise's covariance,
+    which weights the channels; slopes are those of the model at the estimate.
 
-    - `gain` (states that are not adapted, channels): `place_poles` of the model without the parameters makes one.
-    - `rate`: by state's name, those adapted; they are constant in the transition, as `statespace.with_parameters` makes them,
-      and on the real line of their own (a positive one's is its logarithm). In unit squared per second, what a Kalman filter's
-      random walk has as variance per second, but no covariance gathers. Theta follows with about `phi^T phi rate / R` (1/s):
-      best near the placed poles. Far larger rates meet each row exactly and are slow again, for rows that are alike teach one
-      direction only.
-    - `bounds` by name, (low, high) in physical units: an estimate beyond is projected onto them. `leakage` (1/s): towards the
-      prior's mean, sigma-modification, which leaves a bias. `dead_zone`: errors within this many of a channel's spreads adapt
-      nothing, and larger ones by what is beyond.
+    - `gain` (states that are not adapted, channels): computed by `place_poles` for the model without the parameters.
+    - `rate`: by state's name, for the states that are adapted. They are constant in the transition, as with
+      `statespace.with_parameters`, and on their own real line (a positive one as its logarithm). In unit squared per second,
+      like the variance per second of a random walk in a Kalman filter, but no covariance accumulates. Theta follows with
+      about `phi^T phi rate / R` (1/s): best near the placed poles. Far larger rates fit each row exactly and are slow again,
+      since similar rows determine only one direction.
+    - `bounds` by name, (low, high) in physical units: an estimate outside is projected onto them. `leakage` (1/s): pulls
+      towards the prior's mean, sigma-modification, which leaves a bias. `dead_zone`: errors within this many standard
+      deviations of a channel adapt nothing; of larger ones only the excess counts.
 
-    **Stability**, on a model linear in x and theta, possibly varying in time, without noise: x's error less Y times theta's obeys
-    `(I - gain H) F` alone; once it has died out, `V = (theta - truth)^T rate^-1 (theta - truth)` never rises, whatever the
-    excitation and however large the rate, and projection onto bounds that hold the truth lowers it. **Both errors die out
-    exponentially only under persistent excitation**: the sum of `phi^T phi` over every window of some length is positive
-    definite. Without, theta stays where it is or drifts along what is not excited under noise or a wrong model; then use bounds,
-    leakage or a dead zone of the size of what is not modelled. On a nonlinear model this holds near the truth, where slopes tell
-    what differences do, and nothing is proven far from it.
+    **Stability**, on a model linear in x and theta, possibly varying in time, without noise: x's error less Y times theta's
+    obeys `(I - gain H) F` alone; once it has decayed, `V = (theta - truth)^T rate^-1 (theta - truth)` never rises, whatever
+    the excitation and however large the rate, and projection onto bounds that contain the truth lowers it. **Both errors
+    decay exponentially only under persistent excitation**: the sum of `phi^T phi` over every window of some length is
+    positive definite. Otherwise theta stays where it is, or drifts along directions without excitation under noise or a wrong
+    model; then use bounds, leakage or a dead zone of the size of the unmodelled effects. On a nonlinear model this holds near
+    the truth, where slopes represent differences, and nothing is proven far from it.
 
     **Raises** `InputError` for names that are no states, a gain of another shape, rates that are not positive, bounds that are
     empty or outside the parameter's domain, and a measurement noise without a covariance.
@@ -83,7 +83,7 @@ class Adaptive(AbstractObserver):
         check_gain("Adaptive.gain", self.gain, model, tuple(name for name in model.states if name not in self.rate))
         kit.check_fixed("Adaptive", model.measurement_noise, "Take a filter.")
         if not model.measurement_noise.has_covariance:
-            raise InputError("Adaptive: the measurement noise has no covariance, which weighs the channels.")
+            raise InputError("Adaptive: the measurement noise has no covariance, which weights the channels.")
         for name, low, high in self.bounds:
             for value in (low, high):
                 try:
@@ -96,7 +96,7 @@ class Adaptive(AbstractObserver):
         return jnp.zeros((len(own), len(adapted)), model.prior.mean[0].dtype)
 
     def _places(self, model: StateSpace) -> tuple[np.ndarray, np.ndarray]:
-        """Where the states and the parameters stand in the state, (n,) and (p,)."""
+        """Indices of the states (n,) and of the parameters (p,) in the state."""
         adapts = np.array([name in self.rate for name in model.states])
         return np.flatnonzero(~adapts), np.flatnonzero(adapts)
 
@@ -123,7 +123,7 @@ class Adaptive(AbstractObserver):
         return correction.at[adapted].set(change), sensitivity
 
     def _parameter_change(self, model, belief, row, error, here, phi):
-        """What the row changes in the parameters (p,)."""
+        """The change of the parameters (p,) by the row."""
         dtype, dt = error.dtype, row.t - belief.t
         _, adapted = self._places(model)
         names = [model.states[i] for i in adapted]

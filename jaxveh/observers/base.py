@@ -1,4 +1,4 @@
-"""What an observer is: a model that is pulled towards the measurements, without a covariance."""
+"""The definition of an observer: a model that is corrected towards the measurements, without a covariance."""
 
 import abc
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ from jaxveh.statespace import AbstractBelief, AbstractTwoPartFilter, Info, Row, 
 
 
 class PointBelief(AbstractBelief):
-    """A state without a spread: `vector` (n,) in the order of the state's fields, and what the observer remembers, `memory`."""
+    """A state without a spread: `vector` (n,) in the order of the state's fields, and the observer's `memory`."""
 
     vector: jax.Array
     memory: Any
@@ -37,12 +37,12 @@ class PointBelief(AbstractBelief):
 
 
 class AbstractObserver(AbstractTwoPartFilter):
-    """An observer moves its state by the model's transition, then by a correction of what the measurement says against it:
+    """An observer moves its state by the model's transition, then by a correction from the measurement's error:
 
         x- = f(x, u),    e = y - h(x-, u),    x = x- + correction(e)
 
-    Missing channels have e = 0 and correct nothing. Spreads, NIS and log-likelihoods are NaN: an observer does not know them.
-    `init` starts at the prior's mean and corrects it, `run` is that of filters.
+    Missing channels have e = 0 and correct nothing. Standard deviations, NIS and log-likelihoods are NaN: an observer does not
+    compute them. `init` starts at the prior's mean and corrects it; `run` works as for filters.
     """
 
     # No postponed annotations in this file: they would make fields of class variables.
@@ -55,13 +55,14 @@ class AbstractObserver(AbstractTwoPartFilter):
 
     @abc.abstractmethod
     def predict(self, model: StateSpace, belief: PointBelief, row: Row) -> tuple[Any, Any]:
-        """The state (n,) at the row's time before its measurement, most often `advance`, and the memory then."""
+        """The state (n,) at the row's time before its measurement, most often by `advance`, and the memory then."""
 
     @abc.abstractmethod
     def correct(self, model: StateSpace, belief: PointBelief, row: Row, error: Any, here: Any) -> tuple[Any, Any]:
-        """The state's correction (n,) by the errors (m,) of the channels that are `here` (m,), and the memory after it.
+        """The state's correction (n,) from the errors (m,) of the channels that are present, `here` (m,), and the memory
+        after it.
 
-        The belief holds the predicted state and memory; its `t` is still the last row's (at the first row, this one's).
+        The belief contains the predicted state and memory; its `t` is still the last row's (at the first row, this row's).
         """
 
     def _start(self, model, row, key):
@@ -86,14 +87,14 @@ class AbstractObserver(AbstractTwoPartFilter):
 
 
 def advance(model: StateSpace, belief: PointBelief, row: Row, vector: Any) -> Any:
-    """Where a state (n,) at the belief's time is at the row's time: (n,)."""
+    """Move a state (n,) from the belief's time to the row's time: (n,)."""
     u = model.step_inputs(belief.t, row.t, belief.u, row.u)
     moved = model.transition(belief.t, row.t, belief.state_type(*vector), u)
     return jnp.stack([jnp.asarray(value, vector.dtype) for value in moved])
 
 
 def observe(model: StateSpace, row: Row, vector: Any) -> Any:
-    """What the sensors would say of a state (n,): (m,), in the order of the channels."""
+    """The measurements without noise for a state (n,): (m,), in the order of the channels."""
     found = model.observation(row.t, type(model.prior.mean)(*vector), row.u)
     return jnp.stack([jnp.asarray(getattr(found, name), vector.dtype) for name in model.channels])
 
@@ -113,7 +114,7 @@ def _info(model, row, error, present, vector) -> Info:
 
 
 def check_gain(name: str, gain: Any, model: StateSpace, states: tuple[str, ...] | None = None) -> None:
-    """Raise `InputError` unless a gain is finite and (states, channels); `states` are the model's unless given."""
+    """Raise `InputError` unless a gain is finite and (states, channels); `states`: by default the model's."""
     states = model.states if states is None else states
     expected = (len(states), len(model.channels))
     if gain.shape != expected:

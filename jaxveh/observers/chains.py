@@ -8,12 +8,12 @@ from jaxveh._core.errors import InputError
 
 
 def chained_gain(F: np.ndarray, C: np.ndarray, poles: np.ndarray) -> np.ndarray:
-    """The gain L (n, m) that puts the eigenvalues of `F - L C` (n, n) at the poles (n,), all equal unless m is 1.
+    """The gain L (n, m) that places the eigenvalues of `F - L C` (n, n) at the poles (n,), all equal unless m is 1.
 
-    Ackermann's formula for several channels: the observability matrix is gathered into one chain a channel (D. Luenberger,
-    Canonical forms for linear multivariable systems, IEEE Trans. Autom. Control 12, 1967), each with a polynomial of its own.
+    Ackermann's formula for several channels: the observability matrix is divided into one chain per channel (D. Luenberger,
+    Canonical forms for linear multivariable systems, IEEE Trans. Autom. Control 12, 1967), each with its own polynomial.
     """
-    # Rates over the fastest wanted one: powers of F, which is near the identity, would lose the chains' digits.
+    # Rates over the fastest placed one: powers of F, which is near the identity, would lose the chains' digits.
     n, scale = len(F), np.max(np.abs(1.0 - poles))
     size = np.linalg.norm(C, axis=1)
     A, B = (F - np.eye(n)).T / scale, (C / np.where(size > 0, size, 1.0)[:, None]).T
@@ -52,7 +52,7 @@ def _chain_lengths(A: np.ndarray, B: np.ndarray) -> list[int]:
 
 
 def _apart(found: np.ndarray, head: np.ndarray) -> np.ndarray:
-    """What of a direction is not in the span of the orthonormal columns found."""
+    """The part of a direction outside the span of the orthonormal columns `found`."""
     rest = head / (np.linalg.norm(head) or 1.0)
     rest = rest - found @ (found.T @ rest)
     return rest - found @ (found.T @ rest)

@@ -1,4 +1,4 @@
-"""Whether an observer of a nonlinear model is stable where the car will be."""
+"""Stability of an observer of a nonlinear model in the region of its use."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from jaxveh.statespace import StateSpace
 def contraction_rate(
     model: StateSpace, gain: Any, points: Iterable[tuple[Any, Any]], *, dt: float, leave: tuple[str, ...] = ()
 ) -> float:
-    """The rate (1/s) at which a `Luenberger` observer's error dies out at the slowest of the points, in one quadratic form.
+    """The rate (1/s) at which a `Luenberger` observer's error decays at the slowest of the points, in one quadratic form.
 
-    `V = e^T P e` solves Lyapunov's equation at the first point, weighed by the prior's covariance; `V` falls by
-    `exp(-2 rate dt)` a step or more at each of them. A positive rate over a convex region that the estimate and the truth do not
-    leave is a proof (contraction in a constant metric, W. Lohmiller & J.-J. Slotine, Automatica 34, 1998); over `points` it is
-    the evidence for one. Zero or below says nothing against the observer but that this form proves nothing.
+    `V = e^T P e` solves Lyapunov's equation at the first point, weighted by the prior's covariance; `V` falls at least by the
+    factor `exp(-2 rate dt)` per step at each of them. A positive rate over a convex region that the estimate and the truth do
+    not leave is a proof (contraction in a constant metric, W. Lohmiller & J.-J. Slotine, Automatica 34, 1998); over `points`
+    it is evidence. A rate of zero or below does not show that the observer is unstable, only that this form proves nothing.
 
     **Arguments**: `gain` (n, m); `points`, pairs of a state, its NamedTuple, and inputs by name; `dt` (s); `leave` as in
     `place_poles`.
 
-    **Raises** `InputError` where the observer is not stable at the first point.
+    **Raises** `InputError` if the observer is not stable at the first point.
     """
     check_positive("dt", dt, "s")
     points, gain = list(points), array(gain)
@@ -43,7 +43,7 @@ def contraction_rate(
         raise InputError(
             f"contraction_rate: at the first point a step multiplies the error by {fastest:.6g}: must be below 1."
         )
-    # SciPy comes with JAX; whoever imports the package need not wait for this part of it.
+    # SciPy comes with JAX; imported here so that importing the package does not wait for it.
     from scipy import linalg
 
     weight = np.linalg.inv(np.asarray(model.prior.covariance(), float)[np.ix_(kept, kept)])

@@ -1,4 +1,4 @@
-"""The extended-state observer: disturbances estimated beside the states, all poles at one bandwidth."""
+"""The extended-state observer: estimates disturbances in addition to the states, with all poles at one bandwidth."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ def extended_state(
 
     (J. Han, From PID to active disturbance rejection control, IEEE Trans. Ind. Electron. 56, 2009; one bandwidth for all gains:
     Z. Gao, Scaling and bandwidth-parameterization based controller tuning, ACC 2003; the poles of a step of `dt` s are
-    exp(-bandwidth dt).) The other arguments are those of `place_poles`. On a linear model a constant disturbance is found
-    exactly, its error falling as t^k exp(-bandwidth t); one that changes is followed about k / bandwidth seconds late, k the
-    number of poles on the way from it to a channel. A larger bandwidth follows faster and passes more noise.
+    exp(-bandwidth dt).) The other arguments are those of `place_poles`. On a linear model a constant disturbance is estimated
+    exactly, with an error that falls as t^k exp(-bandwidth t). A changing one is followed with a delay of about k / bandwidth
+    seconds, where k is the number of poles between it and a channel. A larger bandwidth follows faster and passes more noise.
 
         banked = statespace.with_disturbances(model, {"v_y": 1.0})
         estimate = run(observers.extended_state(banked, 10.0, dt=0.01, u={"v_x": 25.0}, leave=("yaw",)), banked, drive)
         estimate.mean.disturbance_v_y                                   # m/s^2: -g sin(bank)
 
-    **Raises** `InputError` for a model without disturbances, a bandwidth that is not positive, and what `place_poles` raises
-    for: a disturbance needs a channel that it reaches, and no more of them than channels can be told apart.
+    **Raises** `InputError` for a model without disturbances, for a bandwidth that is not positive, and as `place_poles` does:
+    each disturbance must reach a channel, and the channels must be able to distinguish them.
     """
     if not any(name.startswith(kit.DISTURBANCE_PREFIX) for name in model.states):
         raise InputError("extended_state: the model has no disturbances; statespace.with_disturbances adds them.")

@@ -12,12 +12,12 @@ from jaxveh.observers.base import AbstractObserver, advance, check_gain, check_o
 
 
 def array(value: Any) -> jax.Array:
-    """A strong float array of numbers or of an array."""
+    """A float array (not weakly typed) from numbers or from an array."""
     return float_array(value if eqx.is_array(value) else np.asarray(value, float))
 
 
 class AbstractMemoryless(AbstractObserver):
-    """An observer that remembers nothing but its state, which the model alone moves between rows."""
+    """An observer without memory beyond its state, which only the model moves between rows."""
 
     def start(self, model):
         return ()
@@ -27,12 +27,13 @@ class AbstractMemoryless(AbstractObserver):
 
 
 class Luenberger(AbstractMemoryless):
-    """`x = x- + gain e`, a constant `gain` (n, m) a step (D. Luenberger 1964). `place_poles` makes one.
+    """`x = x- + gain e`, with a constant `gain` (n, m) per step (D. Luenberger 1964), computed by `place_poles`.
 
-    The estimate's error obeys `(I - gain H) F`: on a linear model it dies out with these poles. On another it dies out as long as
-    one quadratic form falls wherever the car may be (`contraction_rate`). With gains from `a_y` to `v_y` this is the observer of
-    lateral velocity of L. Imsland et al. (Automatica 42, 2006), whose acceleration is the measured one and which is drawn to
-    where the tyres' forces agree with it: their condition is that those forces fall with v_y, so not beyond the tyres' peak.
+    The estimate's error obeys `(I - gain H) F`: on a linear model it decays with these poles. On a nonlinear one it decays if
+    one quadratic form falls at every state that the car may reach (`contraction_rate`). With gains from `a_y` to `v_y` this
+    is the observer of lateral velocity of L. Imsland et al. (Automatica 42, 2006): it integrates the measured acceleration
+    and is drawn to the velocity at which the tyres' forces agree with it. Their condition is that these forces fall with v_y,
+    so it does not hold beyond the tyres' peak.
     """
 
     gain: jax.Array = eqx.field(converter=array)
@@ -45,13 +46,13 @@ class Luenberger(AbstractMemoryless):
 
 
 class SlidingMode(AbstractMemoryless):
-    """`x = x- + gain e + switching s(e / boundary)`, s(z) = z / (1 + |z|) for the sign, without its chatter.
+    """`x = x- + gain e + switching s(e / boundary)`, with s(z) = z / (1 + |z|) instead of the sign, to avoid its chatter.
 
-    (J.-J. Slotine, J. Hedrick & E. Misawa 1987.) The switching gain (n, m) bounds what a wrong model may add in a step; within
-    the `boundary` (m,), in each channel's unit, the observer is close to linear with `gain + switching / boundary`: a boundary of
-    at least H switching, or the steps chatter. With one channel that is the state and without `gain`, what adds d a step is
-    rejected for |d| < switching: the error is within the boundary in finite time and ends at `boundary q / (1 - q)`,
-    q = |d| / switching.
+    (J.-J. Slotine, J. Hedrick & E. Misawa 1987.) The switching gain (n, m) limits the error per step of a wrong model that the
+    observer rejects. Within the `boundary` (m,), in each channel's unit, the observer is close to linear with the gain
+    `gain + switching / boundary`; so the boundary must be at least H switching, otherwise the steps chatter. With one channel
+    that measures the state and without `gain`, a disturbance of d per step is rejected for |d| < switching: the error is within
+    the boundary in finite time and ends at `boundary q / (1 - q)`, q = |d| / switching.
     """
 
     gain: jax.Array = eqx.field(converter=array)

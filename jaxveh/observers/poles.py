@@ -1,4 +1,4 @@
-"""Gains from poles."""
+"""Observer gains from poles."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from jaxveh.statespace import Row, StateSpace, cast
 def place_poles(
     model: StateSpace, poles: Any, *, dt: float, x: Any = None, u: Any = None, leave: tuple[str, ...] = ()
 ) -> np.ndarray:
-    """The gain (n, m) of a `Luenberger` observer whose error dies out with these `poles`, 1/s, on the model linearised.
+    """The gain (n, m) of a `Luenberger` observer whose error decays with these `poles`, 1/s, on the linearised model.
 
-    **Arguments**: `poles`, continuous, one a state that is not left: real negative numbers or conjugate pairs. None is repeated
-    more often than there are channels, unless all are equal or there is one channel; `dt` (s), the step; `x`, the state about
-    which the model is linearised (the prior's mean), a NamedTuple; `u`, its inputs by name (zeros); `leave`, states that nothing
-    else depends on, such as a car's yaw: they get no correction. The steps' poles are exp(pole dt). By SciPy's `place_poles`
-    (A. Tits & Y. Yang 1996), repeated ones in chains (`chained_gain`).
+    **Arguments**: `poles`, continuous, one per state that is not left out, real negative numbers or conjugate pairs. None
+    may be repeated more often than there are channels, unless all are equal or there is one channel; `dt` (s), the step; `x`,
+    the state about which the model is linearised (default: the prior's mean), a NamedTuple; `u`, its inputs by name (default:
+    zeros); `leave`, states that nothing else depends on, such as a car's yaw: they get no correction. The poles of a step are
+    exp(pole dt). By SciPy's `place_poles` (A. Tits & Y. Yang 1996), repeated ones in chains (`chained_gain`).
 
-    **Raises** `InputError` for poles that are not stable, for a state that cannot be left, and for a model that is not
-    observable, naming the mode that leaves no trace.
+    **Raises** `InputError` for poles that are not stable, for a state that cannot be left out, and for a model that is not
+    observable, naming the mode that does not reach the channels.
     """
     check_positive("dt", dt, "s")
     F, H, kept = slopes_without(model, dt, x, u, leave)
@@ -57,15 +57,17 @@ def _place_poles(F: np.ndarray, H: np.ndarray, poles: np.ndarray) -> np.ndarray:
         return signal.place_poles(F.T, C.T, poles).gain_matrix.T
     if len(distinct) > 1 and len(C) > 1:
         raise InputError(
-            f"a pole is repeated {counts.max()} times with {len(C)} channels: must be at most once a channel, or all poles equal."
+            f"a pole is repeated {counts.max()} times with {len(C)} channels: must be at most once per channel, or all "
+            "poles equal."
         )
     return chained_gain(F, C, poles)
 
 
 def linearised_step(model: StateSpace, dt: float, x: Any = None, u: Any = None) -> tuple[np.ndarray, np.ndarray]:
-    """Slopes of a step of `dt` seconds (n, n) and of the observation (m, n), at the state `x` and the inputs `u` (see above).
+    """Slopes of a step of `dt` seconds (n, n) and of the observation (m, n), at the state `x` and the inputs `u` of
+    `place_poles`.
 
-    In the default precision, whatever the model's: gains are made in float64 where there is one.
+    In the default precision, whatever the model's: gains are computed in float64 if it is enabled.
     """
     dtype = jax.dtypes.canonicalize_dtype(float)
     model = cast(model, dtype)
@@ -91,9 +93,9 @@ def _slopes(model: StateSpace, end: Any, vector: Any, inputs: Any):
 
 
 def slopes_without(model: StateSpace, dt: float, x: Any, u: Any, leave: tuple[str, ...]):
-    """The slopes of the states that are not left, (k, k) and (m, k), and their places in the state (k,).
+    """The slopes of the states not in `leave`, (k, k) and (m, k), and their indices in the state (k,).
 
-    **Raises** `InputError` where another state or a channel depends on one that is left.
+    **Raises** `InputError` if another state or a channel depends on a state in `leave`.
     """
     check_names("leave", leave, model.states)
     F, H = linearised_step(model, dt, x, u)
@@ -103,7 +105,9 @@ def slopes_without(model: StateSpace, dt: float, x: Any, u: Any, leave: tuple[st
         moved = [model.states[k] for k in kept if F[k, i] != 0]
         seen = [name for name, slope in zip(model.channels, H[:, i], strict=True) if slope != 0]
         if moved or seen:
-            raise InputError(f"leave: {', '.join(moved + seen)} depends on {model.states[i]}, which cannot be left.")
+            raise InputError(
+                f"leave: {', '.join(moved + seen)} depends on {model.states[i]}, which cannot be left out."
+            )
     return F[np.ix_(kept, kept)], H[:, kept], kept
 
 
@@ -114,7 +118,7 @@ def _check_observable(F: np.ndarray, H: np.ndarray, dt: float, names: tuple[str,
     size = np.linalg.norm(rates) or 1.0
     H = H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), np.finfo(float).tiny)
     singular = np.linalg.svd(np.vstack([H @ np.linalg.matrix_power(rates / size, k) for k in range(n)]))[1]
-    # Rounding of the step's slopes is larger by 1 / dt in the rates.
+    # In the rates, the rounding of the step's slopes is larger by 1 / dt.
     seen = int(np.sum(singular > singular[0] * n * eps * max(1.0, 1.0 / (dt * size))))
     if seen == n and singular[0] > 0:
         return
@@ -126,5 +130,5 @@ def _check_observable(F: np.ndarray, H: np.ndarray, dt: float, names: tuple[str,
     speed = f"{mode.real:.3g}" + (f" +- {abs(mode.imag):.3g} i" if abs(mode.imag) > 1e-6 * size else "")
     raise InputError(
         f"the model is not observable there: {seen} of {n} directions of the state reach the channels; the mode of "
-        f"{speed} 1/s in {who} does not. Leave a state that nothing depends on (`leave`), or measure more."
+        f"{speed} 1/s in {who} does not. Leave out a state that nothing depends on (`leave`), or measure more."
     )

@@ -11,18 +11,18 @@ from jaxveh.statespace import kit
 
 
 class RecursiveLeastSquares(AbstractObserver):
-    """Least squares of a measurement that is linear in the states, which stay: `y = phi^T theta` (L. Ljung & T. Soderstrom 1983).
+    """Least squares for a measurement that is linear in constant states: `y = phi^T theta` (L. Ljung & T. Soderstrom 1983).
 
         K = P phi / (R + phi^T P phi),    theta += K e,    P <- (P - K phi^T P) / forgetting
 
-    `forgetting`: one factor, or one a state, then `P <- Lambda^-1/2 (P - K phi^T P) Lambda^-1/2` (S. Saelid & B. Foss 1983).
-    `separate`: each state has a variance of its own, P stays diagonal, updated as if the others were known (A. Vahidi,
-    A. Stefanopoulou & H. Peng, Vehicle System Dynamics 43, 2005: mass slowly, grade fast), which keeps one that is slow from
-    taking up what a fast one did. R: the measurement noise's variances, weights of the channels. P starts as the prior's
-    covariance. `ceiling`: no state's variance grows beyond this multiple of its prior's, for what is not excited winds up under
-    forgetting. `reset`: where a channel's innovation exceeds this many of its predicted spreads, P starts anew: what is estimated
-    has jumped (None: never). The phi of each row is the observation's slope at the estimate; with one that is not linear this
-    is the recursive prediction error method.
+    `forgetting`: one factor, or one per state, then `P <- Lambda^-1/2 (P - K phi^T P) Lambda^-1/2` (S. Saelid & B. Foss
+    1983). `separate`: each state has its own variance, P stays diagonal, updated as if the others were known (A. Vahidi, A.
+    Stefanopoulou & H. Peng, Vehicle System Dynamics 43, 2005: mass slowly, grade fast), which prevents a slow state from
+    absorbing the changes of a fast one. R: the measurement noise's variances, weights of the channels. P starts as the
+    prior's covariance. `ceiling`: the limit of each state's variance as a multiple of its prior's, since variances without
+    excitation wind up under forgetting. `reset`: if a channel's innovation exceeds this many of its predicted standard
+    deviations, P starts anew, since the parameters have jumped (None: never). The phi of each row is the observation's slope
+    at the estimate; for a nonlinear observation this is the recursive prediction error method.
     """
 
     forgetting: jax.Array = eqx.field(converter=array, default=0.99)
@@ -41,7 +41,9 @@ class RecursiveLeastSquares(AbstractObserver):
         check_one_or_each("RecursiveLeastSquares.forgetting", self.forgetting, model.states)
         kit.check_fixed("RecursiveLeastSquares", model.measurement_noise, "Take a filter.")
         if not model.measurement_noise.has_covariance:
-            raise InputError("RecursiveLeastSquares: the measurement noise has no variances, which weigh the channels.")
+            raise InputError(
+                "RecursiveLeastSquares: the measurement noise has no variances, which weight the channels."
+            )
 
     def start(self, model):
         P = model.prior.covariance()
@@ -64,7 +66,7 @@ class RecursiveLeastSquares(AbstractObserver):
         after = self._alone(P, slope, noise) if self.separate else _joseph_update(P, gain, slope, noise)
         root = jnp.sqrt(1 / jnp.broadcast_to(self.forgetting.astype(P.dtype), P.shape[:1]))
         after = jnp.where(jnp.any(here), after * root[:, None] * root[None, :], P)
-        # Scaled back where a variance has grown beyond its ceiling; correlations stay.
+        # Scaled back where a variance exceeds its ceiling; correlations stay.
         limit = jnp.sqrt(self.ceiling * jnp.diagonal(start) / jnp.diagonal(after))
         shrink = jnp.minimum(limit, 1)
         return gain @ error, after * shrink[:, None] * shrink[None, :]

@@ -1,4 +1,4 @@
-"""The one contract that a filter sees: models by name, noise laws, discretisation, chosen parameters as states."""
+"""The contract between models and filters: models by name, noise laws, discretisation, chosen parameters as states."""
 
 from jaxveh.statespace import kit
 from jaxveh.statespace.belief import AbstractBelief, Info

@@ -1,4 +1,4 @@
-"""What a filter knows after a row, and what it tells of it."""
+"""The result of a filter's step: the belief, and information about the row."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from jaxveh.statespace.model import StateSpace
 
 
 class Info(NamedTuple):
-    """What a person wants to know of one step.
+    """Information about one step of a filter.
 
-    `log_likelihood`: the increment, log p(y_k | y_0..k-1). `innovation`, `innovation_std`: measurement less prediction
-    and its predicted spread, NamedTuples by channel, NaN where missing. `nis`: normalised innovation squared over the
-    channels present (Gaussian filters; expected value: their number). `ess`: effective sample size after the
-    measurement, (particle filters, else NaN). `result`: code, see `jaxveh.Result`. `whitened`, `log_scale`: innovations
-    decorrelated in the order of the channels and the logarithm of what each was divided by, zero where missing (Gaussian
-    filters, else None): `-0.5 whitened^2 - log_scale - 0.5 log(2 pi)` of the channels present add up to the log-likelihood.
-    `remark` (particle filters, else None): the code of what a person should know though the filter went on, else zero.
+    `log_likelihood`: the increment, log p(y_k | y_0..k-1). `innovation`, `innovation_std`: measurement less prediction and
+    its predicted standard deviation, NamedTuples by channel, NaN where missing. `nis`: normalised innovation squared over the
+    channels present (Gaussian filters; expected value: their number). `ess`: effective sample size after the measurement
+    (particle filters, otherwise NaN). `result`: code, see `jaxveh.Result`. `whitened`, `log_scale`: innovations decorrelated
+    in the order of the channels and the logarithm of the divisor of each, zero where missing (Gaussian filters, otherwise
+    None): the sum of `-0.5 whitened^2 - log_scale - 0.5 log(2 pi)` over the channels present is the log-likelihood. `remark`
+    (particle filters, otherwise None): the code of a warning with which the filter went on, otherwise zero.
     """
 
     log_likelihood: Any
@@ -37,7 +37,7 @@ class Info(NamedTuple):
 
 
 class AbstractBelief(eqx.Module):
-    """What a filter knows after a row: all that the next step needs, its `t`, `u` and the `count` of rows included."""
+    """A filter's belief after a row: all that the next step needs, including its `t`, `u` and the `count` of rows."""
 
     @abc.abstractmethod
     def moments(self, model: StateSpace) -> tuple[Any, Any]:
@@ -45,16 +45,16 @@ class AbstractBelief(eqx.Module):
 
     @property
     def mean(self) -> Any:
-        """The state's mean (parameters on the real line), the state's NamedTuple."""
+        """The state's mean, the state's NamedTuple (parameters on the real line)."""
         raise self._lacks("mean")
 
     @property
     def covariance(self) -> Any:
-        """(n, n) in the order of the state's fields."""
+        """The state's covariance (n, n) in the order of the state's fields."""
         raise self._lacks("covariance")
 
     def sample(self, key, draws: int) -> Any:
-        """Draws: the state's NamedTuple with (draws,) in each field; of a Gaussian, unless the belief is something else."""
+        """Draws as the state's NamedTuple with (draws,) in each field; from a Gaussian unless a subclass has another law."""
         mean = jnp.stack(self.mean)
         white = numerics.normal(key, (mean.shape[0], draws), mean.dtype)
         return type(self.mean)(*(mean[:, None] + numerics.cholesky(self.covariance) @ white))

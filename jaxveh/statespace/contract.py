@@ -1,4 +1,4 @@
-"""What a filter is: `init` applies the first row, `step` propagates and applies the next; both report `info`."""
+"""The definition of a filter: `init` applies the first row, `step` propagates and applies the next; both return `info`."""
 
 # No postponed annotations in this file: they would make fields of class variables.
 
@@ -14,13 +14,13 @@ from jaxveh.statespace.belief import AbstractBelief, Info
 from jaxveh.statespace.model import Row, StateSpace
 
 KEPT = "kept for the backward pass"
-"""Name (`jax.ad_checkpoint.checkpoint_name`) of what a step keeps for its gradient: small, and long to compute again."""
+"""Name (`jax.ad_checkpoint.checkpoint_name`) of the values that a step keeps for its gradient: small, but slow to recompute."""
 
 
 class Smoothing(enum.Enum):
-    """How a filter can be smoothed: `none`; `gaussian`, by the steps back of Rauch, Tung & Striebel, since it predicts by the
-    transition and the process noise of its `adapted` model, through the rule inside all wrappers, and nothing else; `particles`,
-    by ancestors or backward sampling, since its weighted particles are all that it knows of a row."""
+    """How a filter can be smoothed: `none`; `gaussian`, by the backward steps of Rauch, Tung & Striebel, since it predicts with
+    exactly the transition and the process noise of its `adapted` model, by the rule of the filter inside all wrappers;
+    `particles`, by ancestors or backward sampling, since its weighted particles are its whole belief."""
 
     none = "none"
     gaussian = "gaussian"
@@ -28,8 +28,8 @@ class Smoothing(enum.Enum):
 
 
 class Gradient(enum.Enum):
-    """What the derivatives of a filter's log-likelihood are: `none`, not to be followed; `on_average`, right on average over
-    keys, while for a given key the value jumps where other particles are chosen; `exact`, the slopes of its value."""
+    """The kind of derivatives of a filter's log-likelihood: `none`, not usable; `on_average`, correct on average over keys,
+    while for a given key the value jumps where other particles are chosen; `exact`, the derivatives of its value."""
 
     none = 0
     on_average = 1
@@ -44,25 +44,25 @@ class AbstractFilter(eqx.Module):
     previous row over the time between, then applies the row's measurement with its own inputs. Both return the
     info of their row, so that the log-likelihoods add up to that of all measurements.
 
-    Both are final: they run `_init` and `_step`, which a filter writes, as programs of their own, so that a scan, a live loop and
-    a resumed run agree bit for bit. Most filters predict and then update: they are an `AbstractTwoPartFilter`.
+    Both are final: they run `_init` and `_step`, which a filter implements, as separate programs, so that a scan, a live loop
+    and a resumed run agree bit for bit. Most filters predict and then update: they derive from `AbstractTwoPartFilter`.
 
-    What a filter can is declared where it is true, and is *no* otherwise:
+    A filter declares its capabilities; the default of each is *no*:
 
-    - `whitens`: its info carries whitened innovations.
+    - `whitens`: its info has whitened innovations.
     - `has_covariance`: its belief has the `mean` and the `covariance` of the state.
-    - `gradients`: what the derivatives of its log-likelihood are (`gradients_of`).
-    - `smooths`: how it can be smoothed. Each class declares it for itself: what predicts otherwise than the class it comes from
-      would be smoothed wrongly without a word, so that this is not inherited (`smoothing_of`).
-    - `noise_by_row`: the model's measurement noise may be another in each row, and is taken as it is there. (Not where a filter
-      learns a noise of its own.)
-    - `written_out`: in a batch its steps are written out in scalars where the states are few (`numerics.scan_written_out`), and
-      have the batch's axis last up to 14 (`numerics.scan_batch_last`).
-    - `shares_covariances`: in a batch of runs with the same noises, of which no row is missing, it has one covariance for all.
-    - `rows_between`: rows may be put between others, since what it does in a step depends on the time that passes alone. (Not
-      where each step adds noise, or learns of one.)
+    - `gradients`: the kind of derivatives of its log-likelihood (`gradients_of`).
+    - `smooths`: how it can be smoothed. It is not inherited (`smoothing_of`): each class declares its own, since a class that
+      predicts differently from its base class would be smoothed wrongly without a warning.
+    - `noise_by_row`: the model's measurement noise may differ from row to row, and is used as given. (Not if the filter learns
+      a noise of its own.)
+    - `written_out`: in a batch its steps are written out in scalars if there are few states (`numerics.scan_written_out`), and
+      have the batch's axis last for up to 14 states (`numerics.scan_batch_last`).
+    - `shares_covariances`: in a batch of runs with the same noises and no missing row, it has one covariance for all.
+    - `rows_between`: rows may be inserted between others, since its step depends only on the time that passes. (Not if each
+      step adds noise, or learns noise.)
 
-    A wrapper can what it declares and what the filters inside it can, too (`AbstractWrapper`).
+    A wrapper has a capability if it and the filters inside it declare it (`AbstractWrapper`).
     """
 
     whitens: ClassVar[bool] = False
@@ -81,7 +81,7 @@ class AbstractFilter(eqx.Module):
 
     @property
     def gradients(self) -> Gradient:
-        """What the derivatives of its log-likelihood are."""
+        """The kind of derivatives of its log-likelihood."""
         return Gradient.none
 
     @property
@@ -93,7 +93,7 @@ class AbstractFilter(eqx.Module):
     def init(self, model: StateSpace, row: Row, key=None) -> tuple[AbstractBelief, Info]:
         """The belief after the first row.
 
-        **Raises** `InputError` without a key where the filter draws random numbers.
+        **Raises** `InputError` if the filter draws random numbers and there is no key.
         """
         return apart(self._init, row.t, model, row, key_for(self, key))
 
@@ -104,11 +104,11 @@ class AbstractFilter(eqx.Module):
 
     @abc.abstractmethod
     def check(self, model: StateSpace) -> None:
-        """Raise `InputError` early, by name, where the model asks for what this filter cannot."""
+        """Raise `InputError` early, by name, if this filter does not support the model."""
 
     @abc.abstractmethod
     def _init(self, model: StateSpace, row: Row, key: Any) -> tuple[AbstractBelief, Info]:
-        """The belief after the first row; `key` is None where the filter needs none."""
+        """The belief after the first row; `key` is None if the filter needs none."""
 
     @abc.abstractmethod
     def _step(self, model: StateSpace, belief: Any, row: Row) -> tuple[AbstractBelief, Info]:
@@ -116,10 +116,10 @@ class AbstractFilter(eqx.Module):
 
 
 class AbstractTwoPartFilter(AbstractFilter):
-    """A filter that predicts, then updates: a wrapper that changes one of the two writes that one alone.
+    """A filter that predicts, then updates: a wrapper that changes one of the two implements only that one.
 
-    What `_start` and `_predict` hand to `_update` is the filter's own business (a belief, or particles that wait for their
-    weights), and opaque to wrappers.
+    The value that `_start` and `_predict` pass to `_update` is the filter's own (a belief, or particles without their weights),
+    and opaque to wrappers.
     """
 
     @abc.abstractmethod
@@ -128,11 +128,11 @@ class AbstractTwoPartFilter(AbstractFilter):
 
     @abc.abstractmethod
     def _predict(self, model: StateSpace, belief: Any, row: Row) -> Any:
-        """What is known at the row's time, before its measurement."""
+        """The prediction at the row's time, before its measurement."""
 
     @abc.abstractmethod
     def _update(self, model: StateSpace, ahead: Any, row: Row) -> tuple[AbstractBelief, Info]:
-        """The belief after the row's measurement, of what was known `ahead` of it."""
+        """The belief after the row's measurement, from the prediction `ahead`."""
 
     @final
     def _init(self, model, row, key):
@@ -154,7 +154,7 @@ class AbstractWrapper(AbstractFilter):
 
 
 class AbstractTwoPartWrapper(AbstractTwoPartFilter, AbstractWrapper):
-    """A wrapper that changes the prediction, the update, or both: what it does not write is that of the filter `inner`."""
+    """A wrapper that changes the prediction, the update, or both: the part that it does not implement is that of `inner`."""
 
     inner: eqx.AbstractVar[AbstractTwoPartFilter]
 
@@ -188,12 +188,12 @@ class AbstractTwoPartWrapper(AbstractTwoPartFilter, AbstractWrapper):
 
 
 def check_told(filter: Any, model: Any) -> None:
-    """Raise unless these are a filter, made, and a model, in this order."""
+    """Raise unless these are a filter instance and a model, in this order."""
     if isinstance(filter, type) and issubclass(filter, AbstractFilter):
         raise InputError(f"filter = {filter.__name__}: is a class; make one of it: {filter.__name__}(...).")
     for name, value, kind, example in (
         ("filter", filter, AbstractFilter, "a filter, such as filters.Unscented()"),
-        ("model", model, StateSpace, "a StateSpace, as estimators.state_space makes it"),
+        ("model", model, StateSpace, "a StateSpace, as returned by estimators.state_space"),
     ):
         if not isinstance(value, kind):
             raise InputError(
@@ -215,9 +215,9 @@ def innermost(filter: Any) -> Any:
 
 
 def key_for(filter: AbstractFilter, key: Any) -> Any:
-    """The key, None where the filter needs none.
+    """The key, or None if the filter needs none.
 
-    **Raises** `InputError` where it needs one and there is none.
+    **Raises** `InputError` if it needs a key and there is none.
     """
     if not filter.needs_key:
         return None
@@ -229,13 +229,13 @@ def key_for(filter: AbstractFilter, key: Any) -> Any:
 
 
 def smoothing_of(filter: Any) -> Smoothing:
-    """How a filter can be smoothed: as its own class and those of all filters inside declare, if they agree."""
+    """How a filter can be smoothed: as declared by its own class and those of all filters inside, if they agree."""
     kinds = {_declared_smoothing(layer) for layer in layers(filter)}
     return kinds.pop() if len(kinds) == 1 else Smoothing.none
 
 
 def check_smooths(who: str, filter: Any) -> Smoothing:
-    """How the filter can be smoothed, or an `InputError` that says which one cannot."""
+    """How the filter can be smoothed; raises `InputError` naming the filter that cannot."""
     kind = smoothing_of(filter)
     if kind is not Smoothing.none:
         return kind
@@ -244,19 +244,19 @@ def check_smooths(who: str, filter: Any) -> Smoothing:
     ).__name__
     raise InputError(
         f"{who}: {name} has no smoother: its class does not declare one (`smooths`, which is not inherited). Take a Gaussian "
-        "filter or a particle filter that does; a filter of your own declares smooths = Smoothing.gaussian where it predicts as "
+        "filter or a particle filter that does; a filter of your own declares smooths = Smoothing.gaussian if it predicts like "
         "the filter inside."
     )
 
 
 def who_lacks(filter: Any, capability: str) -> str | None:
-    """The name of the outermost filter, of a filter and all inside it, that does not declare a capability (`whitens`,
+    """The name of the outermost filter, among a filter and all inside it, that does not declare a capability (`whitens`,
     `has_covariance`, `noise_by_row`, `rows_between`), or None."""
     return next((type(layer).__name__ for layer in layers(filter) if not getattr(layer, capability)), None)
 
 
 def gradients_of(filter: Any) -> Gradient:
-    """What the derivatives of a filter's log-likelihood are: the least that it and the filters inside declare."""
+    """The kind of derivatives of a filter's log-likelihood: the least that it and the filters inside declare."""
     return min((layer.gradients for layer in layers(filter)), key=lambda kind: kind.value)
 
 
@@ -269,7 +269,7 @@ def check_gradients(who: str, filter: Any, least: Gradient) -> None:
         if least is Gradient.on_average:
             wanted += ", or a particle filter with gradient='score'"
         raise InputError(
-            f"{who}: follows derivatives, and those of this {name} are `Gradient.{kind.name}`: must be at least "
+            f"{who}: needs derivatives, and those of this {name} are `Gradient.{kind.name}`: must be at least "
             f"`Gradient.{least.name}`. Take {wanted}."
         )
 
@@ -277,27 +277,27 @@ def check_gradients(who: str, filter: Any, least: Gradient) -> None:
 def check_covariance(who: str, filter: Any) -> None:
     """Raise `InputError` where the filter's belief has no covariance of the state."""
     says = (
-        "knows no covariance of the state (`has_covariance`). Take a Gaussian filter, an ensemble or a particle filter."
+        "has no covariance of the state (`has_covariance`). Take a Gaussian filter, an ensemble or a particle filter."
     )
     _check_declared("has_covariance", who, filter, says)
 
 
 def check_noise_by_row(who: str, filter: Any) -> None:
-    """Raise `InputError` where a filter inside takes a measurement noise of its own for the one that it is given."""
+    """Raise `InputError` where a filter inside replaces the given measurement noise by its own."""
     says = (
-        "inside it does not take its measurement noise row by row (`noise_by_row`), and would replace what {who} says. "
+        "inside it does not take its measurement noise row by row (`noise_by_row`), and would replace that of {who}. "
     )
     _check_declared("noise_by_row", who, filter, says + "Put {who} inside: {kind}({who}(...)).")
 
 
 def check_rows_between(who: str, filter: Any) -> None:
-    """Raise `InputError` where a filter's step is another with a row put in between."""
-    says = "inside it takes no late rows (`rows_between`): what it does in each step it would do once more. "
+    """Raise `InputError` if inserting a row would change the filter's result."""
+    says = "inside it takes no late rows (`rows_between`): it would repeat its work of each step. "
     _check_declared("rows_between", who, filter, says + "Take a filter that does, or give the rows in their order.")
 
 
 def _check_declared(capability: str, who: str, filter: Any, says: str) -> None:
-    """Raise `InputError` where a filter, or one inside it, the `kind`, does not declare what `who` needs."""
+    """Raise `InputError` if a filter, or one inside it, the `kind`, does not declare the capability that `who` needs."""
     kind = who_lacks(filter, capability)
     if kind is not None:
         raise InputError(f"{who}: {kind} {says.format(who=who, kind=kind)}")

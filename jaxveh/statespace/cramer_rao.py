@@ -1,4 +1,4 @@
-"""The posterior Cramer-Rao bound: how well any filter can do on a model."""
+"""The posterior Cramer-Rao bound: the least error that any filter can have on a model."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from jaxveh.statespace.model import StateSpace
 
 
 class PosteriorBound(NamedTuple):
-    """Bounds of the root mean square error of any estimate from the rows up to each.
+    """Bounds of the root mean square error of any estimate from the rows up to each one.
 
-    `time` (T,); `std`: the state's NamedTuple with (T,) in each field, of the model's states as they are (parameters on the real
-    line); `covariance` (T, n, n): no estimate's mean square error matrix is below it; `runs`: over which expectations were taken.
-    NaN for states of which nothing is said (see `posterior_cramer_rao`).
+    `time` (T,); `std`: the state's NamedTuple with (T,) in each field, of the model's states (parameters on the real line);
+    `covariance` (T, n, n): a lower bound of any estimate's mean square error matrix; `runs`: the number of draws for the
+    expectations. NaN for states without a bound (see `posterior_cramer_rao`).
     """
 
     time: np.ndarray
@@ -37,21 +37,21 @@ def posterior_cramer_rao(model: StateSpace, schedule: Recording, key, runs: int 
         J' = D22 - D12^T (J + D11)^-1 D12 + E[H^T R^-1 H]
         D11 = E[F^T Q^-1 F],   D12 = -E[F^T] Q^-1,   D22 = Q^-1
 
-    with Jacobians F and H of transition and observation, and expectations over `runs` draws of the model, so that the bound has
-    their scatter (none on linear models, where it is the Kalman filter's covariance). For Student-t noise Q^-1 and R^-1 are the
+    with Jacobians F and H of transition and observation, and expectations over `runs` draws of the model, whose scatter the
+    bound has (none on linear models, where it is the Kalman filter's covariance). For Student-t noise, Q^-1 and R^-1 are the
     Fisher informations of its location.
 
-    Exact also where some states carry no process noise and **move linearly** (constant parameters, integrals of states): their
-    new values are then linear in the old state, whose joint information with the noisy states' new values is the recursion's.
-    Noise-free states that move nonlinearly have no such recursion: `InputError`.
+    The bound is also exact if some states have no process noise and **move linearly** (constant parameters, integrals of
+    states): their new values are then linear in the old state, whose joint information with the noisy states' new values
+    follows from the recursion. Noise-free states that move nonlinearly have no such recursion: `InputError`.
 
     **Arguments**: `schedule`: as in `draw`: times, inputs, and which measurements are missing. float64 is advised.
 
-    The bound holds for the mean over draws of the model, prior included, not for a single trajectory, and may be far below
-    what can be reached where posteriors have several peaks.
+    The bound holds for the mean over draws of the model, prior included, not for a single trajectory. It may be far below the
+    errors that can be reached where posteriors have several peaks.
 
-    **Raises** `InputError` for laws whose information is not known, noise-free states as above, or fewer than one run;
-    `FilterError` where a draw diverges.
+    **Raises** `InputError` for laws whose information is unknown, noise-free states as above, or fewer than one run;
+    `FilterError` if a draw diverges.
     """
     check_whole("runs", runs)
     rows = schedule_rows(model, schedule)
@@ -74,7 +74,7 @@ def posterior_cramer_rao(model: StateSpace, schedule: Recording, key, runs: int 
 
 
 class _Terms(NamedTuple):
-    """Expectations of each row: `seen` (T, n, n) E[H^T R^-1 H]; of each step, (T - 1, ...): `F` E[F], `spread` of F over the
+    """Expectations for each row: `seen` (T, n, n) E[H^T R^-1 H]; for each step, (T - 1, ...): `F` E[F], `spread` of F over the
     draws (largest deviation), `largest` |F|, `pull` E[F^T Q^-1 F] over noisy rows, `Q` (q, q)."""
 
     seen: Any
@@ -102,7 +102,7 @@ def _terms(model: StateSpace, rows: Any, keys: Any) -> tuple[Any, _Terms]:
 
 
 def _measured_information(model: StateSpace, row, states):
-    """E[H^T R^-1 H] over states (R,) of the channels present."""
+    """E[H^T R^-1 H] over states (R,), for the channels present."""
     kind = type(model.prior.mean)
     here = jnp.stack([jnp.isfinite(getattr(row.y, name)) for name in model.channels])
 
@@ -112,14 +112,14 @@ def _measured_information(model: StateSpace, row, states):
 
     H = jax.vmap(jax.jacfwd(see))(jnp.stack(states, axis=1))
     H = jnp.where(here[:, None], H, 0)
-    # The marginal of the channels present: absent ones become independent, and tell nothing.
+    # The marginal of the channels present: absent ones become independent, and add no information.
     R = location_covariance(model.measurement_noise)
     R = jnp.where(here[:, None] & here[None, :], R, jnp.eye(len(here), dtype=R.dtype))
     return jnp.mean(jnp.swapaxes(H, 1, 2) @ jnp.linalg.solve(R, H), axis=0)
 
 
 def _step(model: StateSpace, row, after, states):
-    """E[F], the largest deviation from it, the largest |F|, E[F^T Q^-1 F] over noisy states, and Q, of states (R,)."""
+    """E[F], the largest deviation from it, the largest |F|, E[F^T Q^-1 F] over noisy states, and Q, for states (R,)."""
     kind = type(model.prior.mean)
     u = model.step_inputs(row.t, after.t, row.u, after.u)
     move = lambda vector: jnp.stack(propagate(model, row.t, after.t, kind(*vector), u))
@@ -134,9 +134,9 @@ def _step(model: StateSpace, row, after, states):
 
 
 def _with_recursion(model: StateSpace, noisy: tuple[str, ...], terms: _Terms) -> np.ndarray:
-    """Places of the states that have a recursion: all but those without process noise whose Jacobian differs between draws.
+    """Indices of the states that have a recursion: all but those without process noise whose Jacobian differs between draws.
 
-    **Raises** `InputError` where one that has none matters for the others, or none has one.
+    **Raises** `InputError` if a state without a recursion affects the others, or if no state has one.
     """
     rounding = 1e3 * np.finfo(model.prior.mean[0].dtype).eps
     bent = (terms.spread > rounding * (1 + np.abs(terms.F))).any(axis=(0, 2))
@@ -147,7 +147,7 @@ def _with_recursion(model: StateSpace, noisy: tuple[str, ...], terms: _Terms) ->
         if kept.size == 0 or terms.largest[:, kept, i].any() or terms.seen[:, i, i].any():
             raise InputError(
                 f"posterior_cramer_rao: {name} carries no process noise and its transition is not linear, for which there is no "
-                "recursion, and what is measured depends on it. Give it a little noise."
+                "recursion, and the other states or the measurements depend on it. Give it a little noise."
             )
     return kept
 
@@ -168,7 +168,7 @@ def _recursion(states: list[str], noisy: tuple[str, ...], start: np.ndarray, ter
     found = [np.linalg.inv(J)]
     for k in range(len(terms.F)):
         F, Q_inverse = terms.F[k], np.linalg.inv(terms.Q[k])
-        # Of the old state and the noisy states' new values together.
+        # For the old state and the noisy states' new values together.
         cross = -F[moving].T @ Q_inverse
         joint = np.block([[J + terms.pull[k], cross], [cross.T, Q_inverse]])
         # The new state is linear in both.

@@ -13,18 +13,19 @@ from jaxveh.statespace.noise import AbstractNoise, Gaussian
 
 
 class StateDependent(eqx.Module):
-    """A law of measurement noise for each state and input: stochastic volatility, a sensor that is worse in large slip.
+    """A law of measurement noise that depends on state and input: stochastic volatility, a sensor that is worse in large slip.
 
-    **Arguments**: `function(system, t, x, u) -> law`, of one point (a NamedTuple of scalars `x`), with `system` that of the
-    `StateSpace`, so that gradients, fits and chosen parameters reach the numbers in it; a mapping of standard deviations (in the
-    channels' units) becomes a `Gaussian`. `names`: the channels, every one of which the law must have.
+    **Arguments**: `function(system, t, x, u) -> law`, at one point (a NamedTuple of scalars `x`), where `system` is that of the
+    `StateSpace`, so that gradients, fits and chosen parameters include its numbers; a mapping of standard deviations (in the
+    channels' units) becomes a `Gaussian`. `names`: the channels; the law must have every one of them.
 
         StateDependent(lambda system, t, x, u: {"returns": system.beta * jnp.exp(0.5 * x.h)}, "returns")
 
-    Particle filters, guided ones included, weigh each particle by its own law: exact. Gaussian filters take the covariance at
-    the mean of their prediction, without what the state's own spread adds to it, and learn nothing of the state from the
-    noise's size; whoever estimates the size itself (volatility) needs particles. `Kalman` takes laws of the inputs alone.
-    What needs one law for all rows (learned or varying variances, least squares, Cramer-Rao bounds, observers) refuses.
+    Particle filters, including guided ones, weight each particle by its own law, which is exact. Gaussian filters use the
+    covariance at the mean of their prediction: they neglect the spread of the state in it, and learn nothing about the state
+    from the size of the noise. To estimate the size itself (volatility), use particles. `Kalman` accepts laws that depend on
+    the inputs only. Methods that need one law for all rows (learned or varying variances, least squares, Cramer-Rao bounds,
+    observers) raise.
     """
 
     function: Callable = eqx.field(static=True)
@@ -54,16 +55,16 @@ class StateDependent(eqx.Module):
         return law
 
     def around(self, wrap: Callable) -> StateDependent:
-        """The same with the function `wrap(function)`, of another system or state."""
+        """The same noise with the function `wrap(function)`, for another system or state."""
         return StateDependent(wrap(self.function), self.names)
 
 
 MeasurementNoise = AbstractNoise | StateDependent
-"""What a `StateSpace` takes as its measurement noise."""
+"""The kinds of measurement noise of a `StateSpace`."""
 
 
 def around(noise: MeasurementNoise, wrap: Callable) -> MeasurementNoise:
-    """The noise of a model whose system or state is wrapped: a law that sees neither stays as it is."""
+    """The noise of a model whose system or state is wrapped: a law that depends on neither stays unchanged."""
     return noise.around(wrap) if isinstance(noise, StateDependent) else noise
 
 

@@ -1,4 +1,4 @@
-"""Unknown accelerations as states: what pushes a model from outside."""
+"""Unknown accelerations as states: external pushes on a model."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from jaxveh.statespace.noise import Gaussian
 from jaxveh.statespace.process import Continuous, join
 
 DISTURBANCE_PREFIX = "disturbance_"
-"""A disturbance's state is called this and the state that it pushes."""
+"""A disturbance's state has this prefix before the name of the state that it pushes."""
 
 
 class Disturbances(eqx.Module):
-    """Which states are pushed, and which channels feel it: pairs of names."""
+    """The states that are pushed, and the channels that measure the pushes: pairs of names."""
 
     states: tuple[str, ...] = eqx.field(static=True)
     felt: tuple[tuple[str, str], ...] = eqx.field(static=True)
@@ -33,7 +33,7 @@ class Disturbances(eqx.Module):
 
 
 class AbstractDisturbed(eqx.Module):
-    """One of the model's functions, of a state that disturbances follow; `state_type` is the model's own."""
+    """One of the model's functions, for a state that is followed by the disturbances; `state_type` is the model's own."""
 
     function: Callable = eqx.field(static=True)
     disturbances: Disturbances = eqx.field(static=True)
@@ -58,7 +58,7 @@ class DisturbedTransition(AbstractDisturbed):
 
 
 class DisturbedObservation(AbstractDisturbed):
-    """The model's own observation, with what its channels feel of the disturbances."""
+    """The model's own observation, plus the disturbances in the channels that measure them."""
 
     def __call__(self, system, t, x, u):
         state, rates = self.split(x)
@@ -69,7 +69,7 @@ class DisturbedObservation(AbstractDisturbed):
 
 
 class DisturbedNoise(AbstractDisturbed):
-    """The law of the model's own state: a disturbance is no noise of a sensor."""
+    """The noise law of the model's own state: a disturbance is not a sensor's noise."""
 
     def __call__(self, system, t, x, u):
         return self.function(system, t, self.split(x)[0], u)
@@ -92,14 +92,14 @@ def with_disturbances(
 ) -> StateSpace:
     """The model with an unknown, slowly changing push on chosen states: `disturbance_v_y`, in the state's unit per second.
 
-    **Arguments**: `prior`, the spread of each push at the start by the state that it acts on, its mean is zero; `walk`, the
-    spread of its random walk per root second by the same names (none: constant, as observers have it; a Kalman filter then stops
-    following it); `felt`, channels to which a push adds, by the state (`{"v_y": "a_y"}`: an accelerometer feels a crosswind,
-    but no gravity on a banked road).
+    **Arguments**: `prior`, the standard deviation of each push at the start, by the state that it acts on, with mean zero;
+    `walk`, the standard deviation of its random walk per root second, by the same names (none: constant, as in observers; a
+    Kalman filter then stops following it); `felt`, channels to which a push adds, by the state (`{"v_y": "a_y"}`: an
+    accelerometer measures a crosswind, but not gravity on a banked road).
 
-    The push acts whatever the model does with its state: below a speed at which a car's states are held, it moves them still.
+    The push always acts, also below the speed at which a car's states are held: there it still moves them.
 
-    **Raises** `InputError` for names that are no states or channels, and spreads that are not positive.
+    **Raises** `InputError` for names that are no states or channels, and standard deviations that are not positive.
     """
     walk, felt = dict(walk or {}), dict(felt or {})
     if not prior:

@@ -1,4 +1,4 @@
-"""Draws of a model: states and measurements as it says they come about."""
+"""Draws of states and measurements from a model."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jaxveh.statespace.model import Row, StateSpace
 
 class Drawn(NamedTuple):
     """A draw: `states`, the state's NamedTuple with (T,) in each field; `recording` with the model's inputs, the measured
-    channels and the truth of what the model reports (`recording.truth`)."""
+    channels and the true values of the model's report (`recording.truth`)."""
 
     states: Any
     recording: Recording
@@ -27,9 +27,9 @@ class Drawn(NamedTuple):
 def draw(model: StateSpace, schedule: Recording, key) -> Drawn:
     """States and measurements drawn from the prior, the transition and the noises of a model.
 
-    **Arguments**: `schedule`: a recording with the times and the model's inputs; where it has a measured channel, that is missing
-    (NaN) in the same rows of the draw, and otherwise its values do not matter (`Recording(times, {})` where there are no inputs).
-    `key` draws everything.
+    **Arguments**: `schedule`: a recording with the times and the model's inputs. If it has a measured channel, that channel is
+    missing (NaN) in the same rows of the draw; its values do not matter otherwise (`Recording(times, {})` for a model without
+    inputs). `key`: for all draws.
 
     Angles are drawn unwrapped. **Raises** `InputError` for a schedule without the model's inputs.
     """
@@ -44,14 +44,14 @@ def draw(model: StateSpace, schedule: Recording, key) -> Drawn:
 
 
 def schedule_rows(model: StateSpace, schedule: Recording) -> Row:
-    """The rows of a schedule, (T,) leaves: measured channels that it lacks are present throughout."""
+    """The rows of a schedule, (T,) leaves: measured channels that it does not have count as present in every row."""
     lacking = [name for name in model.channels if name not in schedule]
     return model.rows(schedule.replace(**{name: np.zeros(len(schedule)) for name in lacking}))
 
 
 def draw_rows(model: StateSpace, rows: Row, key) -> tuple[Any, Row]:
     """A draw at the times and with the inputs of `rows` ((T,) leaves), for use inside jit: states with (T,) leaves, and rows
-    whose measurements are missing where those given are."""
+    whose measurements are missing where those of `rows` are."""
     prior_key, process_key, measurement_key = jax.random.split(key, 3)
     first = model.prior.sample(prior_key)
     before = jax.tree.map(lambda leaf: leaf[:-1], (rows.t, rows.u))
@@ -87,7 +87,7 @@ def _errors(model: StateSpace, rows: Row, states: Any, key) -> dict:
 
 
 def propagate(model: StateSpace, t0, t1, x, u):
-    """The transition of one state, each field in the precision of the state, so that it can be carried through a scan."""
+    """The transition of one state, each field in the dtype of the state, so that it can be carried through a scan."""
     to = lambda value, like: jnp.broadcast_to(jnp.asarray(value), jnp.shape(like)).astype(like.dtype)
     return jax.tree.map(to, model.transition(t0, t1, x, u), x)
 

@@ -1,4 +1,4 @@
-"""The scan over a recording, and the Estimate that comes out of it."""
+"""The scan over a recording, and its Estimate."""
 
 from __future__ import annotations
 
@@ -29,32 +29,33 @@ FEW = 6
 """States up to which the steps of a batch are written out in scalars."""
 
 SOME = 14
-"""States up to which the steps of a batch are taken with its axis last. Of 7 to 14, with jax 0.12, extended, cubature, unscented,
-Gauss-Hermite and square-root filters, their smoothers, and consider, dual, H-infinity and matched ones gain four to nine times,
-an iterated one 1.6, singular values 1.2; they compile for 1.2 to 2.2 times as long. Of more it is not measured."""
+"""States up to which the steps of a batch are taken with its axis last. For 7 to 14 states, with jax 0.12, extended,
+cubature, unscented, Gauss-Hermite and square-root filters, their smoothers, and consider, dual, H-infinity and matched ones
+are four to nine times as fast, an iterated one 1.6, singular values 1.2; compiling takes 1.2 to 2.2 times as long. Not
+measured for more states."""
 
 TOGETHER = 64
-"""Runs of a block of these: their matrices stay in a processor's own cache."""
+"""Runs in one block of these: their matrices fit a processor core's own cache."""
 
 WORTH = 10_000
-"""Rows of all runs of a batch together from which on it is written out: fewer take some milliseconds either way, and compile in
-less time as they are. A small batch that is run thousands of times would gain nonetheless."""
+"""Rows of all runs of a batch together from which it is written out: fewer take some milliseconds either way, and compile
+faster otherwise. A small batch that is run thousands of times would still gain."""
 
 SHOWN = ("mean", "std", "info")
-"""What an `Estimate` has row by row, where nobody says otherwise."""
+"""The per-row parts of an `Estimate` by default."""
 
 
 class Estimate(Estimated, eqx.Module):
-    """What a filter made of a recording.
+    """The result of a filter on a recording.
 
     `time` (T,); `mean`, `std`: NamedTuples of the model's report with (T,) in each field, in physical units;
     `log_likelihood`: scalar, of all measurements; `info`: `filters.Info` with (T,) leaves; `result`: the first failing
-    code (`jaxveh.Result`) and `failed_at` its row, 0 and -1 where all went well; `belief`: after the last row, ready
+    code (`jaxveh.Result`) and `failed_at` its row, 0 and -1 if there was no failure; `belief`: after the last row, ready
     for `filter.step`. `parameters` and `parameters_std`: `Parameters` with (T,) each, as in the car
-    (`.front.B`); None without. What was not to be kept is None, too.
+    (`.front.B`); None if the model has none. Parts that were not kept are None, too.
 
-    `save`, `load`, `to_xarray` and `from_xarray` keep all but the `belief`, which `filters.save_belief` keeps; NamedTuples come
-    back with the same names and fields.
+    `save`, `load`, `to_xarray` and `from_xarray` keep all but the `belief`, which `filters.save_belief` keeps; NamedTuples are
+    restored with the same names and fields.
     """
 
     by_row = ("mean", "std", "info", "parameters", "parameters_std")
@@ -84,14 +85,14 @@ def run(
 
     **Arguments**: `filter` (`Unscented()`, `ParticleFilter(1000)`, `AuxiliaryParticleFilter(1000)`, ...), `model` (a
     `StateSpace`), `recording` with the model's inputs and measured channels (NaN: missing), `key` for particle filters. `keep`:
-    what the estimate has row by row: "mean", "std", "info", or fields of it such as "info.nis". A thousand runs spend more time
-    on writing all that than on anything else: take `keep=()` where the log-likelihood is enough.
+    the parts that the estimate keeps for every row: "mean", "std", "info", or fields of it such as "info.nis". A thousand runs
+    spend most of their time on writing these: take `keep=()` if the log-likelihood is enough.
 
     Gradients with respect to any array leaf of `model` work through `jax.grad` and `jax.value_and_grad`; steps are
     checkpointed. Inside jit the checks are skipped, and failures are left in `result`.
 
-    **Raises** `InputError` where model, filter and recording do not go together; `FilterError` with step, time and
-    reason where the filter failed, and **warns** (`JaxvehWarning`) where it went on but remarks on rows (`info.remark`),
+    **Raises** `InputError` if model, filter and recording do not match; `FilterError` with step, time and
+    reason if the filter failed, and **warns** (`JaxvehWarning`) if it went on but has remarks on rows (`info.remark`),
     unless `throw=False`.
     """
     check_told(filter, model)
@@ -110,11 +111,11 @@ def run(
 def scan(filter: AbstractFilter, model: StateSpace, rows: Row, key=None, keep: tuple[str, ...] = SHOWN) -> Estimate:
     """The compiled part of `run`, over rows with (T,) leaves.
 
-    Under `jax.vmap` a Gaussian filter of up to 14 states is another program, from `WORTH` rows of all runs together on. Up to six
-    states a batch of runs is in each of its scalars: 14 times as fast for the log-likelihoods of 1000 unscented filters of three
-    states, five to seven times where all rows are kept. Of more the batch is the last axis of its matrices: six times as fast
-    with 11 states.
-    Differentiate what is summed over the batch; the gradients of each run by itself, batched, are three times as slow.
+    Under `jax.vmap` a Gaussian filter of up to 14 states is another program, if all runs together have `WORTH` rows or more.
+    Up to six states, each scalar of the program holds the whole batch of runs: 14 times as fast for the log-likelihoods of
+    1000 unscented filters of three states, five to seven times if all rows are kept. For more states the batch is the last
+    axis of the matrices: six times as fast with 11 states. Differentiate the sum over the batch; a batch of the gradients of
+    each run takes three times as long.
     """
     return scan_and_keep(filter, model, rows, key, _nothing, keep)[0]
 
@@ -130,16 +131,16 @@ def scan_and_keep(
     for name in keep:
         check_one_of("keep", name, (*SHOWN, *(f"info.{field}" for field in Info._fields)))
     form = functools.partial(scan_in_form, of_belief=of_belief, keep=keep)
-    # A long run of which no row is shown need not be that of a live loop to the last bit; written out, one of three states takes
-    # 180 instead of 203 ns a row (unscented, float64, jax 0.12; before, twice as long as it is).
+    # A long run of which no row is shown need not equal a live loop to the last bit; written out, a run of three states takes
+    # 180 instead of 203 ns per row (unscented, float64, jax 0.12; with older jax, twice as long as on whole arrays).
     shows_nothing = not keep and of_belief is _nothing and len(rows.t) >= WORTH
     alone = Steps.written_out if shows_nothing and numerics.pays_alone() else Steps.whole
     return in_form_for_batches(form, filter, model, rows, key, alone=alone)
 
 
 class Steps(enum.Enum):
-    """How steps are taken: on `whole` arrays, programs of their own; so, but in a batch with its axis last (`batch_last`);
-    `written_out` in scalars; and so where it is known that each row is `complete`."""
+    """How steps are taken: on `whole` arrays, as separate programs; the same, but in a batch with its axis last (`batch_last`);
+    `written_out` in scalars; and the same for rows that are known to be `complete`."""
 
     whole = "whole"
     batch_last = "batch last"
@@ -150,10 +151,10 @@ class Steps(enum.Enum):
 def in_form_for_batches(
     form: Callable, filter: AbstractFilter, model: StateSpace, rows: Row, *more: Any, alone: Steps = Steps.whole
 ) -> Any:
-    """`form(filter, model, rows, *more, steps=...)`: on whole arrays, but in a batch written out up to `FEW` states, and
-    with the batch's axis last up to `SOME`. A run that is `alone` has steps of this kind up to `FEW`.
+    """`form(filter, model, rows, *more, steps=...)`: on whole arrays, but in a batch written out for up to `FEW` states, and
+    with the batch's axis last for up to `SOME`. A single run takes steps of the kind `alone` for up to `FEW` states.
 
-    Where a filter that is written out shares covariances, and of a block of runs no row is missing, they are reckoned once.
+    If a written-out filter shares covariances and no row of a block of runs is missing, the covariances are computed once.
     """
     whole = functools.partial(form, steps=Steps.whole)
     if len(model.states) > SOME or who_lacks(filter, "written_out") is not None:
@@ -179,7 +180,7 @@ def in_form_for_batches(
 def scan_in_form(
     filter: AbstractFilter, model: StateSpace, rows: Row, key, of_belief: Callable, keep: tuple[str, ...], steps: Steps
 ) -> tuple[Estimate, Any]:
-    """What `scan_and_keep` gives, by steps of a kind."""
+    """The results of `scan_and_keep`, with steps of one kind."""
     whole, complete = steps is Steps.whole, steps is Steps.complete
     first, rest = jax.tree.map(lambda leaf: leaf[0], rows), jax.tree.map(lambda leaf: leaf[1:], rows)
 
@@ -208,7 +209,7 @@ def scan_in_form(
 
 
 def scan_by(steps: Steps, body: Callable, start: Any, rows: Any, *, reverse: bool = False) -> tuple[Any, Any]:
-    """`jax.lax.scan(body, start, rows, reverse=reverse)`, its steps taken so, and checkpointed."""
+    """`jax.lax.scan(body, start, rows, reverse=reverse)` with checkpointed steps of the kind `steps`."""
     if steps is Steps.whole:
         body = jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(KEPT))
         return jax.lax.scan(body, start, rows, reverse=reverse)
@@ -218,7 +219,7 @@ def scan_by(steps: Steps, body: Callable, start: Any, rows: Any, *, reverse: boo
 
 
 class Shown(NamedTuple):
-    """What an estimate has of a row; None for what is not kept."""
+    """The kept parts of an estimate for one row; None for a part that is not kept."""
 
     mean: Any
     std: Any
@@ -226,7 +227,7 @@ class Shown(NamedTuple):
 
 
 def _kept_of(info: Info, keep: tuple[str, ...]) -> Info | None:
-    """What is kept of a row's info; remarks always are, so that they can be told."""
+    """The kept fields of a row's info; remarks are always kept, so that they can be reported."""
     if "info" in keep:
         return info
     fields = {name.removeprefix("info.") for name in keep if name.startswith("info.")} | {"remark"}
@@ -235,7 +236,7 @@ def _kept_of(info: Info, keep: tuple[str, ...]) -> Info | None:
 
 
 def raise_failure(estimate: Estimate, filter, model: StateSpace, recording: Recording) -> None:
-    """Raise `FilterError` naming the row, the time, the reason and what was measured there; tracers pass."""
+    """Raise `FilterError` naming the row, the time, the reason and the values measured there; tracers pass."""
     if not is_concrete(estimate.result):
         return
     codes = np.asarray(estimate.result)
@@ -246,16 +247,16 @@ def raise_failure(estimate: Estimate, filter, model: StateSpace, recording: Reco
     shown = ", ".join(f"{name} = {np.asarray(recording[name])[k]:.6g}" for name in (*model.inputs, *model.channels))
     raise FilterError(
         f"{type(filter).__name__} failed in row {k} (t = {np.asarray(recording.time)[k]:.6g} s; {shown}): {reason.message}. "
-        "throw=False returns what there is."
+        "throw=False returns the estimate nonetheless."
     )
 
 
 WORTH_TELLING = {Result.lookahead_misled: 0.05, Result.transport_not_converged: 0.0}
-"""The share of rows above which a remark is told: of a look-ahead, some surprises are chance."""
+"""The share of rows above which a remark is reported: a look-ahead has some surprises by chance."""
 
 
 def warn_of_remarks(estimate: Estimate, filter) -> None:
-    """Warn of what the filter remarked on in more rows than chance has it; tracers pass."""
+    """Warn of remarks that the filter made in more rows than chance explains; tracers pass."""
     remarks = None if estimate.info is None else estimate.info.remark
     if remarks is None or not is_concrete(remarks):
         return

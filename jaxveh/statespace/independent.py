@@ -1,4 +1,4 @@
-"""Several noise laws as one."""
+"""Several noise laws combined into one."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ class Independent(AbstractNoise):
 def whiten(law: AbstractNoise, residual: Mapping, present: Mapping) -> dict[str, jax.Array]:
     """Residuals as independent numbers of unit variance, by the law's covariance; zero where absent (batches broadcast).
 
-    **Raises** `InputError` for what is no law by itself, as `StateDependent` noise.
+    **Raises** `InputError` for a noise that is not one law, such as `StateDependent`.
     """
     if not isinstance(law, AbstractNoise):
         raise InputError(
-            f"residuals are weighed by one law, and {type(law).__name__} has another for each state. "
+            f"residuals are weighted by one law, and {type(law).__name__} has another for each state. "
             "Take a filter's likelihood (fitting.maximum_likelihood), or one law."
         )
     if isinstance(law, Independent):
@@ -81,7 +81,7 @@ def whiten(law: AbstractNoise, residual: Mapping, present: Mapping) -> dict[str,
 
 
 def combine(*laws: AbstractNoise | None) -> AbstractNoise | None:
-    """One law of several over disjoint fields; independent Gaussians merge into one, so that one draw serves all."""
+    """Several laws over disjoint fields as one law; independent Gaussians merge into one, so that one draw serves all."""
     given = [law for law in laws if law is not None]
     if not given:
         return None

@@ -1,4 +1,4 @@
-"""What those who add a filter, an observer or a driver build with."""
+"""The parts for adding a filter, an observer or a driver."""
 
 from jaxveh._core.parameter import UNNAMED
 from jaxveh.statespace.contract import (

@@ -1,4 +1,4 @@
-"""What noise laws tell of a shift: the Fisher information of location."""
+"""The information of noise laws about a shift: the Fisher information of location."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from jaxveh.statespace.noise import AbstractNoise, Gaussian, MultivariateGaussia
 def location_covariance(law: AbstractNoise) -> jax.Array:
     """(k, k) inverse of the Fisher information of the law's location, in the order of its names.
 
-    The covariance of a Gaussian; scale^2 (dof + 3) / (dof + 1) of Student's t, which exists for every dof and is less than the
-    variance: heavy tails with a sharp middle tell more than a Gaussian of the same spread.
+    It is the covariance of a Gaussian, and scale^2 (dof + 3) / (dof + 1) for Student's t, which exists for every dof and is
+    less than the variance: heavy tails with a sharp middle hold more information than a Gaussian of the same standard
+    deviation.
 
     **Raises** `InputError` for other laws.
     """

@@ -1,4 +1,4 @@
-"""A row's measurements: which are there, and what is wrong with them."""
+"""A row's measurements: which are present, and whether they are valid."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jaxveh.statespace.model import Row, StateSpace
 def presence(model: StateSpace, row: Row) -> tuple[dict, dict]:
     """Measurements with missing ones replaced by zero, and which are present: two mappings by channel.
 
-    NaN means missing; so does infinity here, and `input_result` reports it.
+    NaN means missing; infinity also counts as missing here, and `input_result` reports it.
     """
     values = {name: getattr(row.y, name) for name in model.channels}
     present = {name: jnp.isfinite(value) for name, value in values.items()}

@@ -1,4 +1,4 @@
-"""The one contract that a filter sees: transition, observation, noises, prior, by name."""
+"""The contract between models and filters: transition, observation, noises, prior, by name."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from jaxveh.statespace.noise import AbstractNoise, Gaussian
 from jaxveh.statespace.process import AbstractProcessNoise
 
 COARSEST = 0.05
-"""The coarsest resolution of a live loop's time, s: in float32 that of four days, and UNIX stamps have one of two minutes."""
+"""The coarsest resolution of a live loop's time, s: that of float32 after four days; at UNIX time stamps it is two minutes."""
 
 
 class Row(NamedTuple):
-    """What a filter is given at one instant: time `t`, inputs `u` and measurements `y`, NaN where missing.
+    """A filter's input at one instant: time `t`, inputs `u` and measurements `y`, NaN where missing.
 
     `u` and `y` are NamedTuples of scalars; for a whole recording each leaf is (T,).
     """
@@ -56,7 +56,7 @@ class Prior(eqx.Module):
         if missing:
             raise InputError(
                 f"prior: no spread for {', '.join(missing)}; every state needs a positive one "
-                "(what is known exactly is an input or a parameter, not a state)."
+                "(a quantity that is known exactly is an input or a parameter, not a state)."
             )
 
     def sample(self, key, shape: tuple[int, ...] = ()):
@@ -76,20 +76,20 @@ class Prior(eqx.Module):
 class StateSpace(eqx.Module):
     """A state-space model, by name.
 
-    - `system`: whatever the functions need, a tree of float arrays (a vehicle with its sensors; None where nothing). It is
-      held once, so that a gradient with respect to a parameter is one number.
-    - `transition(system, t0, t1, x, u) -> x`: the state at `t1` without noise. `observation(system, t, x, u) -> y`: what the
-      sensors would say without noise, a NamedTuple whose fields include every channel of `measurement_noise`.
+    - `system`: the data that the functions need, a tree of float arrays (a vehicle with its sensors; None for none). It is
+      stored once, so that a gradient with respect to a parameter is one number.
+    - `transition(system, t0, t1, x, u) -> x`: the state at `t1` without noise. `observation(system, t, x, u) -> y`: the
+      measurements without noise, a NamedTuple whose fields include every channel of `measurement_noise`.
     - `process_noise`: `Continuous(law)`, `Discrete(law)` or None; `measurement_noise`: a law whose names are the measured
       channels, or `StateDependent(function, channels)`; `prior`: the belief before the first measurement.
-    - `inputs`: the recording's channels that `u` carries. `input_path`: `"held"` (u of the step's first row throughout)
+    - `inputs`: the recording's channels in `u`. `input_path`: `"held"` (u of the step's first row throughout)
       or `"linear"` (the transition gets a `LinearInput`, which `Propagate` evaluates along the step).
-    - `report(system, t, x, u) -> NamedTuple`: the quantities an Estimate shows (means and spreads); default the state.
+    - `report(system, t, x, u) -> NamedTuple`: the outputs of an Estimate (means and standard deviations); default the state.
     - `angles`: measured channels whose innovations wrap into (-pi, pi].
 
     `x`, `u`, `y` are NamedTuples of scalars; a batch of states has arrays in the fields, and the functions are
-    elementwise in them (`PerPoint(f)` makes a function of single points so). States that are angles are unwrapped reals.
-    The functions are static (plain functions, or modules without arrays), so a new lambda each time compiles each time.
+    elementwise in them (`PerPoint(f)` makes a function of single points elementwise). States that are angles are unwrapped
+    reals. The functions are static (plain functions, or modules without arrays), so every new lambda is compiled again.
     """
 
     system: Any = eqx.field(metadata=UNNAMED)
@@ -133,7 +133,7 @@ class StateSpace(eqx.Module):
             if not isinstance(self.process_noise, AbstractProcessNoise):
                 raise InputError(
                     f"process_noise = {type(self.process_noise).__name__}: must be Continuous(law) (unit per root "
-                    "second) or Discrete(law) (a step), or None."
+                    "second) or Discrete(law) (per step), or None."
                 )
             check_names("process noise", self.process_noise.law.names, self.states)
         check_names("angles", self.angles, self.channels)
@@ -153,13 +153,13 @@ class StateSpace(eqx.Module):
     def rows(self, recording: Recording) -> Row:
         """The recording as rows for this model: each leaf (T,); host-side checks, skipped for tracers.
 
-        Raises `InputError` for a missing channel, NaN in an input (fill it on request first), or infinite values.
-        Where float32 rules, times count from the first row, so that steps keep their digits.
+        Raises `InputError` for a missing channel, NaN in an input (fill it first with `recording.fill`), or infinite values.
+        In float32, times count from the first row, so that steps keep their digits.
         """
         if not isinstance(recording, Recording):
             raise InputError(
-                f"recording = {type(recording).__name__}: must be a Recording: jaxveh.Recording(time, {{name: values}}), or what "
-                "io.read_log and simulate return."
+                f"recording = {type(recording).__name__}: must be a Recording: jaxveh.Recording(time, {{name: values}}), or the "
+                "result of io.read_log or simulate."
             )
         check_names("recording lacks a channel the model needs", (*self.inputs, *self.channels), recording.names)
         dtype = self.prior.mean[0].dtype
@@ -192,7 +192,7 @@ class StateSpace(eqx.Module):
         return moved
 
     def observation(self, t, x, u):
-        """What the sensors would say without noise."""
+        """The measurements without noise."""
         seen = trace_once(self.observation_function, self.system, t, x, u)
         lacks = [name for name in self.channels if name not in getattr(seen, "_fields", ())]
         if lacks:
@@ -208,16 +208,16 @@ class StateSpace(eqx.Module):
         return noise.at(self.system, t, x, u) if isinstance(noise, StateDependent) else noise
 
     def report(self, t, x, u):
-        """What an Estimate shows of a state (or of a batch of states), in physical units."""
+        """The outputs of an Estimate for a state (or for a batch of states), in physical units."""
         return x if self.report_function is None else self.report_function(self.system, t, x, u)
 
     def step_inputs(self, t0, t1, u0, u1):
-        """What `transition` gets as `u` between two rows."""
+        """The `u` that `transition` receives between two rows."""
         return u0 if self.input_path == "held" or not self.inputs else LinearInput(t0, t1, u0, u1)
 
 
 def _describe(value: Any) -> str:
-    """What a function of a model returned, in words."""
+    """The type of a model function's result, in words."""
     fields = getattr(value, "_fields", None)
     return f"a {type(value).__name__}" if fields is None else f"a NamedTuple with {', '.join(fields)}"
 
@@ -232,16 +232,16 @@ def scalar_row(t, numbers: list, dtype) -> tuple:
 
 
 def _check_stamp(t, dtype) -> None:
-    """Raise `InputError` for a time so large that it has no digits left for a step."""
+    """Raise `InputError` for a time so large that no digits are left for a step."""
     if is_concrete(t) and np.isfinite(t) and np.spacing(np.abs(np.asarray(t, dtype))) > COARSEST:
         raise InputError(
-            f"row: t = {float(t)} s is known to {float(np.spacing(np.asarray(t, dtype))):.3g} s only in {np.dtype(dtype).name}: "
-            "count time from the first row, or use float64."
+            f"row: t = {float(t)} s has a resolution of {float(np.spacing(np.asarray(t, dtype))):.3g} s in "
+            f"{np.dtype(dtype).name}: count time from the first row, or use float64."
         )
 
 
 def _scalars(numbers: list, dtype) -> tuple:
-    """Numbers as arrays. All at once: each on its own would take longer to hand over than a filter's step to compute."""
+    """Numbers as arrays, all at once: passing each one separately would take longer than computing a filter's step."""
     if is_concrete(*numbers) and not any(np.ndim(number) for number in numbers):
         return _split(np.array(numbers, dtype))
     return tuple(jnp.asarray(number, dtype) for number in numbers)
@@ -260,7 +260,7 @@ def _channel(recording: Recording, name: str, dtype, is_input: bool):
             k = int(np.argmax(np.isnan(array)))
             raise InputError(
                 f"input channel {name} is NaN in {int(np.isnan(array).sum())} rows, first at t = {recording.time[k]} s: "
-                f'an input must be known. Fill it on request: recording.fill("{name}", "linear", max_gap=0.1).'
+                f'an input must be known in every row. Fill it with: recording.fill("{name}", "linear", max_gap=0.1).'
             )
         if np.isinf(array).any():
             k = int(np.argmax(np.isinf(array)))
@@ -287,7 +287,7 @@ class LinearInput(eqx.Module):
 class PerPoint(eqx.Module):
     """Makes a function of single points, `f(system, *times, x, u)`, elementwise over a batch of states by `vmap`.
 
-    For models with matrices or branches inside; a function that is elementwise already is faster without.
+    For models with matrices or branches inside; a function that is already elementwise is faster without it.
     """
 
     function: Callable = eqx.field(static=True)
@@ -303,7 +303,7 @@ class PerPoint(eqx.Module):
 def cast(tree, dtype):
     """The same model, state or recording with every float array in `dtype` (float32 or float64).
 
-    NumPy arrays stay as they are: a recording's stamps need float64 whatever the channels are.
+    NumPy arrays stay unchanged: a recording's time stamps need float64 whatever dtype the channels have.
     """
     to = lambda leaf: leaf.astype(dtype) if isinstance(leaf, jax.Array) and eqx.is_inexact_array(leaf) else leaf
     return jax.tree.map(to, tree)

@@ -1,4 +1,4 @@
-"""Noise laws by field name: what is not named carries no noise."""
+"""Noise laws by field name: fields without a name in the law carry no noise."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class AbstractNoise(eqx.Module):
 
     A batch is a mapping from each name to an array of any common shape.
 
-    What a law is beside that is declared where it is true, and is *no* otherwise: `is_gaussian`, `adds_up`.
+    Further properties are declared where they hold; the default is *no*: `is_gaussian`, `adds_up`.
     """
 
     @property
@@ -36,12 +36,12 @@ class AbstractNoise(eqx.Module):
 
     @property
     def adds_up(self) -> bool:
-        """Whether n independent draws add up to the law `times` by sqrt(n), as white noise in continuous time must."""
+        """Whether the sum of n independent draws follows the law `times` sqrt(n), as for white noise in continuous time."""
         return False
 
     @property
     def parts(self) -> tuple[AbstractNoise, ...]:
-        """The independent laws that it is made of."""
+        """The independent laws of which it consists."""
         return (self,)
 
     # Not an `eqx.AbstractVar`: under postponed annotations that would be a field of the dataclass.
@@ -87,7 +87,7 @@ def _scales(values, what: str):
 
 
 def mask_absent(residual, present, name):
-    """The residual with zero where absent: replaced before the arithmetic, so that gradients stay finite."""
+    """The residual, zero where absent: replaced before the arithmetic, so that gradients stay finite."""
     here = present[name]
     return jnp.where(here, residual[name], jnp.zeros_like(residual[name])), here
 
@@ -165,7 +165,7 @@ class MultivariateGaussian(AbstractNoise):
         return log_prob.reshape(jnp.broadcast_shapes(*[jnp.shape(residual[name]) for name in self.fields]))
 
     def _white(self, residual, present):
-        """Factor of the marginal covariance (k, k), whitened residuals (k, batch) and presence (k,), itself no batch."""
+        """Factor of the marginal covariance (k, k), whitened residuals (k, batch) and presence (k,), which is not batched."""
         values, here = zip(*[mask_absent(residual, present, name) for name in self.fields], strict=True)
         here, values = jnp.stack(here), jnp.stack(jnp.broadcast_arrays(*values))
         # The marginal of the present fields: absent ones become independent with unit variance and zero residual.
@@ -174,7 +174,7 @@ class MultivariateGaussian(AbstractNoise):
         return factor, numerics.solve_lower(factor, values.reshape(len(self.fields), -1)), here
 
     def _log_prob_by_element(self, residual, present):
-        """Where what is present differs within the batch, each element has a covariance of its own."""
+        """The same where presence differs within the batch: each element has its own covariance."""
         flat, shape = flatten_batch(self.fields, residual, present)
         return jax.vmap(self.log_prob)(*flat).reshape(shape)
 
@@ -212,7 +212,7 @@ class StudentT(AbstractNoise):
 
     @property
     def has_covariance(self):
-        """False where the degrees of freedom are known to be 2 or fewer; under jit they are not known."""
+        """False where the degrees of freedom are known to be 2 or fewer; under jit they are unknown."""
         return not is_concrete(self.dof) or bool(self.dof > 2)
 
     @property
@@ -236,7 +236,7 @@ class StudentT(AbstractNoise):
     def covariance(self):
         check("degrees of freedom", self.dof, lambda dof: dof > 2, "above 2 for a covariance to exist",
               "Use a particle filter, or more degrees of freedom.")  # fmt: skip
-        # Under jit the check is skipped: NaN then says what a negative variance would hide.
+        # Under jit the check is skipped: NaN then shows an error that a negative variance would hide.
         factor = jnp.where(self.dof > 2, self.dof / jnp.where(self.dof > 2, self.dof - 2, 1), jnp.nan)
         return jnp.diag(jnp.stack([scale**2 * factor for scale in self.scale]))
 
@@ -245,11 +245,11 @@ class StudentT(AbstractNoise):
 
 
 class CauchyGaussianMixture(AbstractNoise):
-    """With probability `weight` a Cauchy law of `scale`, else a Gaussian of `std`, by field name.
+    """With probability `weight` a Cauchy law of `scale`, otherwise a Gaussian of `std`, by field name.
 
     Approximates an alpha-stable law (Qin et al. 2014, eqs 12 to 14, with the weight `(4 - alpha^2) / (3 alpha^2)` on the
     Cauchy part, 1 <= alpha <= 2; erratum: the Gaussian density needs `exp(-x^2 / (2 R)) / sqrt(2 pi R)`). It has no
-    covariance, and as a law of a step it cannot be continuous in time.
+    covariance, and as it is the law of one step, it cannot be noise in continuous time.
     """
 
     has_covariance: ClassVar[bool] = False

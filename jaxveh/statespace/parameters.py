@@ -1,4 +1,4 @@
-"""Chosen parameters as states: they leave the model and become part of what is estimated."""
+"""Chosen parameters as states: they are removed from the model and estimated as part of the state."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from jaxveh.statespace.process import Continuous, join
 
 
 class Chosen(eqx.Module):
-    """Which fields of a joint state are the model's own, and which are parameters (on the real line; their paths begin at the
-    system)."""
+    """The fields of a joint state that are the model's own, and those that are parameters (on the real line; their paths
+    start at the system)."""
 
     states: tuple[str, ...] = eqx.field(static=True)
     parameters: tuple[Parameter, ...] = eqx.field(static=True)
@@ -68,7 +68,7 @@ class JointTransition(eqx.Module):
 
 
 class JointObservation(eqx.Module):
-    """Observes the model's own state, or says its noise, with the parameters of the joint state."""
+    """Observes the model's own state, or gives its noise law, with the parameters of the joint state."""
 
     function: Callable = eqx.field(static=True)
     chosen: Chosen = eqx.field(static=True)
@@ -99,18 +99,19 @@ def with_parameters(
     walk: float | Mapping[str, float] = 0.0,
     domain: AbstractBijector | None = None,
 ) -> StateSpace:
-    """The model with the leaves of its system that `where` picks made states.
+    """The model with the leaves of its system that `where` picks turned into states.
 
-    The leaves are removed from `model.system` and become the prior's mean, so that a gradient never silently is zero: it
+    The leaves are removed from `model.system` and become the prior's mean, so that a gradient is never silently zero: it
     reaches the start values as `model.prior.mean`. Each parameter walks on the real line of its own bijector.
 
-    **Arguments**: `where` sees the StateSpace, `lambda m: m.system.vehicle.front.B`. `prior`: the relative
-    spread, one number or by name (`{"B": 0.1, "rear.D": 0.05}`); a positive parameter's is on its logarithm, an
-    unbounded one's times its declared scale. `walk`: the random walk's spread relative likewise, per root second
-    (zero: the parameters are constant and carry no process noise). `domain` overrides every parameter's own bijector
-    (`Real()`: an additive walk in physical units, as papers print it; spreads are then relative to the value or scale).
+    **Arguments**: `where` is called with the StateSpace, `lambda m: m.system.vehicle.front.B`. `prior`: the relative standard
+    deviation, one number or by name (`{"B": 0.1, "rear.D": 0.05}`); for a positive parameter it is that of its logarithm, for
+    an unbounded one a multiple of its declared scale. `walk`: the random walk's standard deviation, relative in the same way,
+    per root second (zero: the parameters are constant and carry no process noise). `domain` overrides every parameter's own
+    bijector (`Real()`: an additive walk in physical units, as in papers; standard deviations are then relative to the value
+    or scale).
 
-    **Raises** `InputError` where a spread is zero or negative, or where `where` picks no leaf of the system.
+    **Raises** `InputError` if a standard deviation is zero or negative, or if `where` picks no leaf of the system.
     """
     if model.chosen is not None:
         raise InputError("with_parameters: this model estimates parameters already; choose them all in one `where`.")
@@ -120,7 +121,7 @@ def with_parameters(
     values = pick(model.system, parameters)
     shaped = [p.name for p, value in zip(parameters, values, strict=True) if jnp.ndim(value) > 0]
     if shaped:
-        raise InputError(f"where picked {shaped[0]}, an array: parameters that are states are scalars.")
+        raise InputError(f"where picked {shaped[0]}, an array: parameters that are states must be scalars.")
     chosen = Chosen(model.states, parameters, type(model.prior.mean))
     starts = [p.domain.inverse(value) for p, value in zip(parameters, values, strict=True)]
     spreads = dict(zip([p.field for p in parameters], prior_spread(parameters, values, prior), strict=True))
@@ -146,7 +147,7 @@ def with_parameters(
 
 
 def _of_system(p: Parameter) -> Parameter:
-    """The parameter with its path from the system on."""
+    """The parameter with its path relative to the system."""
     whole, _, path = p.path.partition(".")
     if whole != "system" or not path:
         raise InputError(
@@ -185,7 +186,7 @@ def start_from(model: StateSpace, **physical) -> StateSpace:
 
 
 def parameters_of(model: StateSpace, report) -> Parameters | None:
-    """The parameters of a report (a state's, a mean's or a std's), by name: `.front.B`; None of a model without."""
+    """The parameters of a report (a state's, a mean's or a std's), by name: `.front.B`; None for a model without parameters."""
     return None if model.chosen is None else model.chosen.of_report(report)
 
 

@@ -17,16 +17,16 @@ class AbstractProcessNoise(eqx.Module):
 
     @property
     def grows_with_time(self) -> bool:
-        """Whether a step of some length adds what several shorter ones do, as white noise in continuous time."""
+        """Whether one long step adds the same noise as several shorter ones, as for white noise in continuous time."""
         return False
 
     @abc.abstractmethod
     def over(self, dt) -> AbstractNoise:
-        """The law of the noise gathered over `dt` seconds."""
+        """The law of the noise accumulated over `dt` seconds."""
 
 
 class Continuous(AbstractProcessNoise):
-    """White noise in continuous time: standard deviations in unit per root second, covariance `std^2 dt` a step."""
+    """White noise in continuous time: standard deviations in unit per root second, covariance `std^2 dt` per step."""
 
     law: AbstractNoise
 
@@ -44,7 +44,7 @@ class Continuous(AbstractProcessNoise):
 
 
 class Discrete(AbstractProcessNoise):
-    """The law of one step whatever its length, as papers print it."""
+    """The law of one step whatever its length, as printed in papers."""
 
     law: AbstractNoise
 
@@ -70,7 +70,7 @@ class Together(AbstractProcessNoise):
 
 
 def join(a: AbstractProcessNoise | None, b: AbstractProcessNoise | None) -> AbstractProcessNoise | None:
-    """One process noise of two over disjoint fields; those in continuous time, and those a step, become one law each."""
+    """Two process noises over disjoint fields as one; those in continuous time, and those per step, become one law each."""
     if a is None or b is None:
         return a if b is None else b
     flat = [part for noise in (a, b) for part in (noise.parts if isinstance(noise, Together) else (noise,))]

@@ -18,7 +18,7 @@ from jaxveh.statespace.model import LinearInput
 
 
 class AbstractOneStep(diffrax.AbstractSolver):
-    """An explicit method that knows nothing but the state at the step's start, without an error estimate."""
+    """An explicit method that uses only the state at the step's start, without an error estimate."""
 
     term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[Callable] = diffrax.LocalLinearInterpolation
@@ -46,8 +46,8 @@ class AbstractOneStep(diffrax.AbstractSolver):
 class RK4(AbstractOneStep):
     """The classical Runge-Kutta method of fourth order (Kutta 1901), fixed step, no error estimate.
 
-    The stages are written out: a Butcher tableau keeps a stage buffer that costs 1.3 times in a batch and 2 to 4 times
-    under `vmap`. A fence after each stage keeps XLA from computing a stage anew in every consumer.
+    The stages are written out: the stage buffer of a Butcher tableau would take 1.3 times as long in a batch and 2 to 4 times
+    under `vmap`. A fence after each stage keeps XLA from recomputing a stage wherever it is used.
     """
 
     step_order: ClassVar[int] = 4
@@ -71,11 +71,12 @@ class RK4(AbstractOneStep):
 
 
 class RolledRK4(AbstractOneStep):
-    """The same method as `RK4` with its four stages in a loop: a quarter of the program.
+    """The same method as `RK4` with its four stages in a loop: a quarter of the program's size.
 
-    For gradients through rates of hundreds of operations: reverse mode keeps the states of the stages alone and computes each
-    stage again for its slopes. Value and gradient of 100 7-DOF cars over 1000 steps of 1 ms take 6.0 times the value and 1.1 MB
-    (8.8 and 6.3 MB with `RK4`), and compile in 7 instead of 60 s. Forwards it takes 1.05 times as long as `RK4`.
+    For gradients through rates of hundreds of operations: reverse mode keeps only the states of the stages and recomputes each
+    stage for its slopes. Value and gradient of 100 7-DOF cars over 1000 steps of 1 ms take 6.0 times as long as the value and
+    1.1 MB (8.8 times and 6.3 MB with `RK4`), and compile in 7 instead of 60 s. Without gradients it takes 1.05 times as long as
+    `RK4`.
     """
 
     step_order: ClassVar[int] = 4
@@ -100,7 +101,7 @@ class RolledRK4(AbstractOneStep):
 class Heun(AbstractOneStep):
     """Heun's method of second order (1900), fixed step, no error estimate: half the work of `RK4`.
 
-    For models whose poles are slow against the step, such as handling at 100 Hz. Written out as `RK4` is.
+    For models whose poles are slow compared with the step, such as handling at 100 Hz. Written out like `RK4`.
     """
 
     step_order: ClassVar[int] = 2
@@ -115,8 +116,8 @@ class Heun(AbstractOneStep):
 class Propagate(eqx.Module):
     """A continuous model as a filter's `transition(system, t0, t1, x, u)`: explicit fixed steps of a diffrax solver.
 
-    `derivatives(system, t, x, u) -> dx/dt` is elementwise in a batch of states, so that a whole batch is one call. `steps`
-    divides the interval between two rows. The solver's `step` is called directly, never `diffeqsolve` per particle.
+    `derivatives(system, t, x, u) -> dx/dt` is elementwise in a batch of states, so that a whole batch is one call. `steps`:
+    the number of steps between two rows. The solver's `step` is called directly, never `diffeqsolve` per particle.
     """
 
     derivatives: Callable = eqx.field(static=True)

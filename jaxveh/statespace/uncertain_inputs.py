@@ -1,4 +1,4 @@
-"""Inputs that are measured with noise of their own: their errors become states."""
+"""Inputs that are measured with noise: their errors become states."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ from jaxveh.statespace.process import AbstractProcessNoise, join
 def uncertain_inputs(
     model: StateSpace, std: Mapping[str, float], correlation: Mapping[str, float] | None = None
 ) -> StateSpace:
-    """The model with inputs known up to an error, which counts in transition and observation alike: u + e.
+    """The model with inputs that have an error, the same in transition and observation: u + e.
 
-    `std`: the error's standard deviation by input, in its unit. White from row to row, unless `correlation` gives its time
-    constant (s): then `e` is a Gauss-Markov process of this spread, as of a sensor whose offset wanders. Each error is a state
-    `<input>_error`, reported with the rest where the model has no report of its own. With inputs that run linearly the error
-    of a step's first row holds throughout it.
+    `std`: the error's standard deviation by input, in its unit. It is white from row to row, unless `correlation` gives its
+    time constant (s). Then `e` is a Gauss-Markov process with this standard deviation, as for a sensor whose offset wanders.
+    Each error is a state `<input>_error`, reported with the other states if the model has no report of its own. For inputs
+    that are linear over a step, the error at the step's first row is held over the step.
 
-    Leaving input noise out makes a filter too sure of itself: half a degree of hand wheel is as much as a gyroscope's noise.
+    Neglecting the noise of inputs makes a filter overconfident: half a degree of hand wheel matters as much as a gyroscope's
+    noise.
 
-    **Raises** `InputError` for an input that the model lacks, a number that is not positive, a model with chosen parameters
-    (do this before choosing).
+    **Raises** `InputError` for an unknown input, a number that is not positive, or a model with chosen parameters (make the
+    inputs uncertain first).
     """
     times = dict(correlation or {})
     check_names("uncertain_inputs", std, model.inputs)
@@ -61,7 +62,7 @@ def uncertain_inputs(
 
 
 class Errors(eqx.Module):
-    """The errors' inputs, their time constants (s; 0: white), and the state that the model had before."""
+    """The inputs with errors, the errors' time constants (s; 0: white), and the model's own state type."""
 
     inputs: tuple[str, ...] = eqx.field(static=True)
     times: tuple[float, ...] = eqx.field(static=True)
@@ -78,14 +79,14 @@ class Errors(eqx.Module):
         return self.inside(*x[:n]), list(x[n:])
 
     def add(self, u, errors):
-        """The inputs with their errors, at an instant or along a step."""
+        """The inputs plus their errors, at an instant or along a step."""
         if isinstance(u, LinearInput):
             return LinearInput(u.t0, u.t1, self.add(u.u0, errors), self.add(u.u1, errors))
         return u._replace(**{n: getattr(u, n) + error for n, error in zip(self.inputs, errors, strict=True)})
 
 
 class Moved(eqx.Module):
-    """Moves the model's own state with inputs that are off by the errors, which fade."""
+    """Moves the model's own state with the inputs plus their errors, which decay."""
 
     function: Callable = eqx.field(static=True)
     errors: Errors = eqx.field(static=True)
@@ -98,7 +99,7 @@ class Moved(eqx.Module):
 
 
 class Observed(eqx.Module):
-    """What the sensors say, their noise law, or a report, of the model's own state with inputs that are off by the errors."""
+    """The observation, the noise law or the report for the model's own state, with the inputs plus their errors."""
 
     function: Callable = eqx.field(static=True)
     errors: Errors = eqx.field(static=True)
@@ -109,7 +110,8 @@ class Observed(eqx.Module):
 
 
 class Wandering(AbstractProcessNoise):
-    """What a Gauss-Markov process of the spread `law` and these time constants (s; 0: white) gets anew in a step."""
+    """The new noise per step of a Gauss-Markov process with standard deviations `law` and these time constants (s; 0:
+    white)."""
 
     law: Gaussian
     times: tuple[float, ...] = eqx.field(static=True)
@@ -128,5 +130,5 @@ class Wandering(AbstractProcessNoise):
 
 
 def _share_left(dt, time: float):
-    """How much of an error is left after `dt` (s)."""
+    """The share of an error that is left after `dt` (s)."""
     return jnp.exp(-dt / time) if time else jnp.zeros_like(dt)

@@ -454,7 +454,7 @@ def broken(kept, change):
     [
         (
             lambda text: re.sub('(?m)^version = ".*"', 'version = "77.2.0"', text),
-            f"of another version than {__version__}",
+            f"not written by version {__version__}",
         ),
         (lambda text: text[: len(text) // 2], "broken.toml"),
         (lambda text: text[: text.index("[covariance]")], "no covariance"),

@@ -491,7 +491,7 @@ def test_a_fit_gets_its_model_back(made, tmp_path):
     again = fitting.Fit.load(tmp_path / "fit.nc").with_model(MODEL)
     assert jax.tree.structure(again) == jax.tree.structure(one) and again.model.measurement_noise.std.y == 0.125
     assert again.chosen == one.chosen
-    with pytest.raises(InputError, match="with_model: .* differ between what was fitted and the model"):
+    with pytest.raises(InputError, match="with_model: .* differ between the fitted model and this one"):
         again.with_model(tyres.Brush(8e4, 6e4, 0.9))
 
 

@@ -209,7 +209,7 @@ def test_a_file_a_vehicle_a_model_and_a_calibration_are_sources(name):
         assert all(np.all(np.asarray(a) >= 0.999 * np.asarray(b)) for a, b in zip(found.std, expected.std, strict=True))
     other = estimators.Calibration("another", SimpleNamespace(model=model), (estimators.Span(0.0, 1.0),))
     for call in (lambda: one.estimate(other, log), lambda: one.live(other)):
-        with pytest.raises(InputError, match=f"{name}: the calibration is one of another: must be made by {name}"):
+        with pytest.raises(InputError, match=f"{name}: the calibration was made by another: must be made by {name}"):
             call()
 
 

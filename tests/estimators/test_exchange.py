@@ -86,5 +86,5 @@ def test_what_does_not_go_together_is_said():
     with pytest.raises(InputError, match=r"gives\['mass'\]: no method reads it"):
         Exchange({"speed": SPEED, "sideslip": SIDESLIP}, {"mass": "speed.v_x"})
     wrong = Exchange({"speed": SPEED, "sideslip": SIDESLIP}, {"v_x": "speed.v_y"})
-    with pytest.raises(InputError, match="speed.v_y: it says v_x"):
+    with pytest.raises(InputError, match="speed.v_y: the method reports v_x"):
         kit.follow("wrong", wrong, method_logs.log(wrong.needs))

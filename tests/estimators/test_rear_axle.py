@@ -222,7 +222,7 @@ def test_a_span_in_which_nothing_drives_or_is_measured_is_refused():
 def test_a_steer_that_is_none_leaves_the_front_axle_as_told():
     log = drive_of(test_sideslip.CAR)
     calibration = estimators.sideslip.calibrate(test_sideslip.CAR, log.without("v_y"))
-    with pytest.warns(UserWarning, match="steer says nothing of the front axle"):
+    with pytest.warns(UserWarning, match="the front axle cannot be fitted to steer"):
         fitted = estimators.sideslip.fitted_car(
             calibration, test_sideslip.CAR, recording=log.replace(steer=-np.asarray(log["steer"]))
         )

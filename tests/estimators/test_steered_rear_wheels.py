@@ -46,6 +46,7 @@ def test_the_baseline_knows_a_ratio_and_refuses_an_angle_of_its_own():
     ratio = turns(vehicles.FourWheelSteering(0.25)) / turns(vehicles.FrontSteering())
     np.testing.assert_allclose(ratio, 0.75, rtol=1e-3)
     with pytest.raises(
-        InputError, match="car.steering = RearSteering: needs steer, steer_rear; must be one by steer alone"
+        InputError,
+        match="car.steering = RearSteering: needs steer, steer_rear; must be a steering whose only input is steer",
     ):
         turns(vehicles.RearSteering())

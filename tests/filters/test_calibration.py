@@ -203,7 +203,7 @@ def test_what_is_kept_of_every_row():
 
 def test_mistakes_are_named():
     model, key = linear(), jax.random.key(0)
-    with pytest.raises(InputError, match="monte_carlo: FixedLag knows no covariance of the state"):
+    with pytest.raises(InputError, match="monte_carlo: FixedLag has no covariance of the state"):
         filters.monte_carlo(filters.FixedLag(filters.Kalman(), 2), model, schedule(), key, runs=2)
     with pytest.raises(InputError, match=r"truth: its states are x0, x1, x2, the filter's model's x0, x1"):
         filters.monte_carlo(filters.Kalman(), model, schedule(), key, truth=linear_model(3, 2))

@@ -55,7 +55,7 @@ def test_a_fit_asks_for_derivatives(filter_, who):
     model, _ = batch("linear")
     where = lambda m: m.measurement_noise.std.y0
     with pytest.raises(
-        InputError, match=f"maximum_likelihood: follows derivatives, and those of this {who} are `Gradient.none`"
+        InputError, match=f"maximum_likelihood: needs derivatives, and those of this {who} are `Gradient.none`"
     ):
         fitting.maximum_likelihood(filter_, model, recordings("linear")[0], where, key=jax.random.key(0))
 
@@ -63,12 +63,12 @@ def test_a_fit_asks_for_derivatives(filter_, who):
 def test_prediction_errors_ask_for_exact_ones():
     model, _ = batch("linear")
     where = lambda m: m.measurement_noise.std.y0
-    with pytest.raises(InputError, match=r"prediction_error: follows derivatives.*SquareRoot\(\)\.$"):
+    with pytest.raises(InputError, match=r"prediction_error: needs derivatives.*SquareRoot\(\)\.$"):
         fitting.prediction_error(filters.Cubature(form=filters.SingularValues()), model, recordings("linear"), where)
 
 
 def test_calibration_asks_for_a_covariance():
     model, _ = batch("linear")
     blind = observers.Luenberger(jnp.zeros((3, 2)))
-    with pytest.raises(InputError, match="monte_carlo: Luenberger knows no covariance of the state"):
+    with pytest.raises(InputError, match="monte_carlo: Luenberger has no covariance of the state"):
         filters.monte_carlo(blind, model, recordings("linear")[0], jax.random.key(0), runs=2)

@@ -324,11 +324,11 @@ def chosen_beta():
         ),
         (
             lambda m: fitting.multiple_shooting(chosen_beta(), returns(60), window=10.0),
-            "residuals are weighed by one law, and StateDependent has another for each state",
+            "residuals are weighted by one law, and StateDependent has another for each state",
         ),
         (
             lambda m: ss.kit.whiten(m.measurement_noise, {}, {}),
-            "residuals are weighed by one law, and StateDependent has another for each state",
+            "residuals are weighted by one law, and StateDependent has another for each state",
         ),
     ],
 )

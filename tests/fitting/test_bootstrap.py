@@ -52,7 +52,7 @@ def test_errors_are_named(fit):
         fitting.bootstrap(fit.problem, key, count=1)
     with pytest.raises(InputError, match=r"groups has shape \(3,\): must be \(270,\)"):
         fitting.bootstrap(fit.problem, key, groups=[0, 1, 2])
-    with pytest.raises(InputError, match="the data have 3 parts to be drawn anew"):
+    with pytest.raises(InputError, match="the data have 3 parts to resample"):
         fitting.bootstrap(fit.problem, key, groups=RUN % 3)
 
 

@@ -62,7 +62,7 @@ def test_axes_told_wrongly_are_noticed(data, true, told):
         return
     found = wrong_signs(RigTable(**columns))
     assert found
-    with pytest.raises(InputError, match="are the axes of the data those that were told"):
+    with pytest.raises(InputError, match="do the data have the axes that were given"):
         starting_tyre("brush", RigTable(**columns))
 
 

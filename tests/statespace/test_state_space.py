@@ -139,7 +139,7 @@ def test_what_the_functions_return_is_looked_at():
 
 def test_a_stamp_without_digits_left_for_a_step_is_refused():
     model, given = ss.cast(make(), jnp.float32), ({"force": 1.0}, {"y": 0.1})
-    with pytest.raises(InputError, match=r"row: t = 1700000000\.0 s is known to 128 s only in float32: count time"):
+    with pytest.raises(InputError, match=r"row: t = 1700000000\.0 s has a resolution of 128 s in float32: count time"):
         model.row(1.7e9, *given)
     assert float(model.row(86400.0, *given).t) == 86400.0
     assert float(make().row(1.7e9, *given).t) == 1.7e9
