@@ -40,7 +40,7 @@ LEVEL = Ground()
 
 
 def under(road: AbstractRoad, x: Any, y: Any, yaw: Any, wheels: Sequence[tuple[Any, Any]]) -> Ground:
-    """The ground under a car at the world's `x`, `y` (m) with the heading `yaw` (rad, positive to the left of the road's direction).
+    """The ground under a car at the world's `x`, `y` (m) with the heading `yaw` (rad, to the left of the road's direction).
 
     `wheels`: the wheels' positions (forward, left) relative to the centre of gravity in m, in the order front left, front
     right, rear left, rear right. Friction and height are those under each wheel, slopes those under the centre of gravity:
