@@ -35,7 +35,7 @@ class Contact(NamedTuple):
       slips are relative to the speed itself.
     - `direction` (-): 1 if the wheel travels forwards, -1 backwards, with a smooth transition in a vehicle. The pneumatic trail
       lies behind the wheel's centre as seen in this direction. Laws with an aligning moment multiply it by this value, sgn V_cx
-      of the book. The rest of a law is that of forward travel, rolling resistance too: the vehicle reverses the sign of the latter.
+      of the book. The rest of a law is that of forward travel. This includes rolling resistance, whose sign the vehicle reverses.
     """
 
     slip_angle: Any = 0.0

@@ -22,8 +22,9 @@ EVALUATION_INPUTS = {
     "Vx": ("in_Vx", "Vx", "speed"),
     "P": ("in_P", "P", "pressure"),
 }
-"""The column names that a table may use for each input: load (N), slip ratio, slip angle, camber (rad), turn slip (1/m), speed
-(m/s), pressure (Pa). The load is required. Without a column the speed is LONGVL, the pressure INFLPRES and any other input zero."""
+"""The column names that a table may use for each input: load (N), slip ratio, slip angle, camber (rad), turn slip (1/m),
+speed (m/s), pressure (Pa). The load is required. An input without a column is LONGVL for the speed, INFLPRES for the pressure
+and zero for the others."""
 
 OUTPUTS = {
     "Re": "R_e", "rho": "rho", "t": "trail", "mux": "mu_x", "muy": "mu_y", "omega": "omega", "Rl": "R_l", "Mzr": "M_zr",
@@ -48,7 +49,7 @@ def evaluate(tyre: MFTyre, columns: Mapping[str, np.ndarray], *, axes: str = "is
     given = {name: _column(columns, names) for name, names in EVALUATION_INPUTS.items()}
     if given["Fz"] is None:
         raise InputError(
-            f"no load among the columns {', '.join(columns)}: there must be one of {', '.join(EVALUATION_INPUTS['Fz'])}."
+            f"no load among the columns {', '.join(columns)}: one of {', '.join(EVALUATION_INPUTS['Fz'])} is needed."
         )
     rows = len(given["Fz"])
     for name, value in given.items():
@@ -56,7 +57,7 @@ def evaluate(tyre: MFTyre, columns: Mapping[str, np.ndarray], *, axes: str = "is
             raise InputError(
                 f"{EVALUATION_INPUTS[name][0]}: {len(value)} rows, {EVALUATION_INPUTS['Fz'][0]} has {rows}; must be equal."
             )
-    _refuse(given["Vx"], lambda x: x < 0, "speed", "must be at least 0; for backward travel turn the wheel's axes")
+    _refuse(given["Vx"], lambda x: x < 0, "speed", "must be at least 0: turn the wheel's axes instead")
     filled = {name: np.zeros(rows) if value is None else value for name, value in given.items()}
     if given["Vx"] is None:
         filled["Vx"] = np.full(rows, float(tyre.structure.LONGVL))
