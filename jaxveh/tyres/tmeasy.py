@@ -61,7 +61,7 @@ class _Numbers(NamedTuple):
 
 
 class TMeasyTrail(eqx.Module):
-    """The pneumatic trail over the lateral slip: `start` (m) at zero slip, first zero at the slip `s_zero` (-), zero from `s_end` (-) on.
+    """The pneumatic trail over lateral slip: `start` (m) at zero slip, its first zero at `s_zero` (-), zero from `s_end` (-) on.
 
     **Raises** `InputError` for numbers that are not positive, or `s_end` not above `s_zero`.
     """
