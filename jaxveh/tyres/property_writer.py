@@ -63,7 +63,7 @@ WHOLE = {
 """The parts of a tyre with a section of their own."""
 
 ROUNDS = 2
-"""Rounds of changes: a nominal pressure that is written can change the default of a missing INFLPRES; a second round corrects it."""
+"""Rounds of changes: a nominal pressure that is written can change the default of a missing INFLPRES. A second round adds it."""
 
 
 class _Coefficient(NamedTuple):

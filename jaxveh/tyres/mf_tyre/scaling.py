@@ -13,8 +13,8 @@ class Scaling(eqx.Module):
     """The section [SCALING_COEFFICIENTS].
 
     Factors of nominal load (`LFZO`); shape, friction, curvature, stiffness and shifts of F_x (`LCX` to `LVX`) and F_y (`LCY` to
-    `LVY`); camber stiffness of F_y and M_z (`LKYC`, `LKZC`); pneumatic trail and residual torque (`LTR`, `LRES`); combined slip (`LXAL`,
-    `LYKA`, `LVYKA`, moment arm `LS`); overturning (`LMX`, `LVMX`), rolling resistance (`LMY`) and parking moment
+    `LVY`); camber stiffness of F_y and M_z (`LKYC`, `LKZC`); pneumatic trail and residual torque (`LTR`, `LRES`); combined slip
+    (`LXAL`, `LYKA`, `LVYKA`, moment arm `LS`); overturning (`LMX`, `LVMX`), rolling resistance (`LMY`) and parking moment
     (`LMP`); relaxation lengths of version 5.2 (`LSGKP`, `LSGAL`).
     """
 
