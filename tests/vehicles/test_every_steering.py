@@ -312,7 +312,7 @@ def test_the_law_of_no_sideslip_has_none_at_any_speed():
 def test_gains_over_a_steer_that_is_no_input_are_refused():
     car = linear(vehicles.IndependentSteering())
     for gain in (car.yaw_rate_gain, car.sideslip_gain, car.system):
-        with pytest.raises(InputError, match=r"no input steer.*Take FourWheelSteering or RearSteering"):
+        with pytest.raises(InputError, match=r"no input steer.*Use FourWheelSteering or RearSteering"):
             gain(20.0)
 
 
@@ -381,5 +381,5 @@ def test_a_car_s_file_makes_and_remembers_every_steering(name):
 
 def test_a_steering_that_no_file_can_say_is_refused():
     numbers = dataclasses.replace(vehicles.sets.sedan(), steering=vehicles.Ackermann(0.5))
-    with pytest.raises(InputError, match=r"a car's file cannot say this steering; it knows front, ackermann"):
+    with pytest.raises(InputError, match=r"a car's file cannot describe this steering; it can have front, ackermann"):
         vehicles.specification_of(numbers)
