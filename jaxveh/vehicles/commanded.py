@@ -26,8 +26,8 @@ class Commanded(AbstractVehicle):
     `steer_rate`, they are the limited ones. If it has the input `a_x`, that is the signal of an accelerometer,
     `dv_x/dt - v_y yaw_rate` less gravity along the road.
 
-    **Inputs**: `steer_rate` (rad/s at the road wheels) and `acceleration` (m/s^2). The outputs also have `steer`, `steer_rate` and
-    `v_x_rate`, with limits applied, unless the vehicle has them itself.
+    **Inputs**: `steer_rate` (rad/s at the road wheels) and `acceleration` (m/s^2). The outputs also have `steer`, `steer_rate`
+    and `v_x_rate`, with limits applied, unless the vehicle has them itself.
 
     **Raises** `InputError` for a vehicle without the inputs `steer` and `v_x`, or with inputs other than those and `a_x`,
     `v_x_rate`, `steer_rate`.

@@ -156,8 +156,9 @@ def planar_loads(car: WheelWeights, a_x: Any, a_y: Any, g_z: Any) -> Wheels:
     track_front, track_rear = car.track_front, car.track_rear
     front, rear = axle_loads(car, a_x, g_z)
     half_front, half_rear = 0.5 * front, 0.5 * rear
-    # The rear takes the part of the moment that the front leaves, then the front the part that the rear leaves. Both wheels of an
-    # axle and the other axle use each result. Computed once, a step of 7-DOF cars takes 180 instead of 192 ns (float32, 1000 runs).
+    # The rear takes the part of the moment that the front leaves, then the front the part that the rear leaves. Both wheels of
+    # an axle and the other axle use each result: computed once, a step of 7-DOF cars takes 180 instead of 192 ns (float32, 1000
+    # runs).
     first_front = limit_transfer(share / track_front * moment, half_front)
     moved_rear = limit_transfer(moment * (1.0 / track_rear) - first_front * (track_front / track_rear), half_rear)
     moved_rear = numerics.fence(moved_rear)

@@ -54,8 +54,8 @@ class Longitudinal(AbstractVehicle):
 
         (m + 4 J_w / r^2) dv/dt = (T_drive - s T_brake) / r - s f_r m g cos(theta) - drag v |v| - m g sin(theta)
 
-    Brakes and rolling resistance change sign smoothly below `wheels.STANDSTILL`, so that standstill is a regular point. A car
-    that is held by its brakes on a slope therefore creeps.
+    Brakes and rolling resistance change sign smoothly below 0.94 m/s (`wheels.STANDSTILL`), so that standstill is a regular
+    point. A car that is held by its brakes on a slope therefore creeps.
 
     **Parameters**: `mass` (kg), `wheel_radius` (m), `wheel_inertia` (kg m^2, of one wheel), `drag` (N s^2/m^2, half the air's
     density times c_d times the area), `rolling_resistance` f_r (-).

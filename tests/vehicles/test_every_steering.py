@@ -44,9 +44,9 @@ STEERED = {kind: name for kind, name in ONE_EACH.items() if hasattr(innermost(CA
 REFUSED = {
     ("Commanded", "RearSteering"): "inputs steer, steer_rear, v_x: must be steer and v_x",
     ("Commanded", "IndependentSteering"): "inputs steer_fl, .*: must be steer and v_x",
-    ("KinematicCrawl", "RearSteering"): "must steer the front wheels alone",
-    ("KinematicCrawl", "FourWheelSteering"): "must steer the front wheels alone.*crawl_speed serves any",
-    ("KinematicCrawl", "IndependentSteering"): "must steer the front wheels alone",
+    ("KinematicCrawl", "RearSteering"): "must steer only the front wheels",
+    ("KinematicCrawl", "FourWheelSteering"): "must steer only the front wheels.*crawl_speed works with any",
+    ("KinematicCrawl", "IndependentSteering"): "must steer only the front wheels",
     ("Steered", "IndependentSteering"): "inputs are steer_fl, .*; steer must be one of them",
 }
 """Who cannot take what, and what it says."""
