@@ -20,7 +20,7 @@ from jaxveh.roads.slopes import Banked
 
 
 class NamedRoad(NamedTuple):
-    """How to make a road (`make`), its `help` text, and whether it is `random`; a random road can be made from a key."""
+    """A road by name. `make`: the function that makes it; `help`: its description; `random`: whether it is made from a key."""
 
     make: Callable[..., AbstractRoad]
     help: str

@@ -74,7 +74,7 @@ def rough(
     with the scale `slant`. The coherence of two tracks at the distance w is then `exp(-2 pi slant n w)`, the usual exponential
     law for parallel tracks. The default of the scale is our own choice: tracks 1.5 m apart have the coherence 1/2 in waves of
     8 m. `count` is the number of waves, drawn evenly over the logarithm of the wavenumber. Slants beyond 32 times the scale do
-    not occur. `friction` (-) is as in `Rough`.
+    not occur. `friction` (-, that of the road).
 
     **Raises** `InputError` for an unknown class, or values out of range.
     """

@@ -25,7 +25,7 @@ class Brush(AbstractTwoStiffnesses):
     With theoretical slips sigma and `g = |C sigma| / (3 mu F_z)` bristles stick in the leading part `1 - g` of the contact and
     slide behind it. From g = 1 on all slide.
 
-    `slides` is the direction of the force of a sliding bristle. Both choices are the same if the two stiffnesses are equal:
+    `slides`: the direction of the force of a sliding bristle. Both choices are the same if the two stiffnesses are equal:
 
     - `along deflection` (the default): the force keeps the direction in which the bristle was deflected, `C sigma`. The force
       is `mu F_z (1 - (1 - g)^3)` in that direction, and the trail `a / 3 (1 - g)^3 / (1 - g + g^2 / 3)`.

@@ -8,8 +8,8 @@ from jaxveh.tyres.magic_formula import MagicFormula
 
 
 class GenericTyre(NamedTuple):
-    """An ordinary tyre: `friction` coefficient and shape (`C`, `E`) of its Magic Formula, and `stiffness` over load (1/rad, or
-    per unit slip ratio)."""
+    """An ordinary tyre. `friction`: the friction coefficient of its Magic Formula; `C`, `E`: the shape and curvature factors of
+    that; `stiffness`: the stiffness over load, 1/rad or per unit slip ratio."""
 
     friction: float = 1.0
     C: float = 1.3

@@ -13,8 +13,7 @@ from jaxveh.tyres.base import AbstractTyre, Contact, Forces
 class Linear(AbstractTyre):
     """`F_y = cornering_stiffness * slip_angle` and `F_x = slip_stiffness * slip_ratio`, both without limit.
 
-    `cornering_stiffness` (N/rad) and `slip_stiffness` (N). Load, friction and camber have no effect. Without a slip stiffness
-    (None) there is no longitudinal force.
+    `cornering_stiffness` (N/rad), `slip_stiffness` (N; None: no longitudinal force). Load, friction and camber have no effect.
 
     **Raises** `InputError` for stiffnesses that are not positive.
     """

@@ -44,10 +44,11 @@ GRID = 11
 
 
 def check_property_file(source: str | Path | PropertyFile) -> list[PropertyFinding]:
-    """Findings about a .tir file, given as a path or as a `PropertyFile` (`source`); an empty list if there are none.
+    """Findings about a .tir file; an empty list if there are none.
 
-    It reports missing values, odd ranges and units, scaling factors other than 1, entries that are not read or cannot be read,
-    and unusual behaviour of the tyre. **Raises** `InputError` where `from_property_file` does.
+    `source`: the path, or the `PropertyFile`. The function reports missing values, odd ranges and units, scaling factors other
+    than 1, entries that are not read or cannot be read, and unusual behaviour of the tyre. **Raises** `InputError` where
+    `from_property_file` does.
     """
     file = source if isinstance(source, PropertyFile) else read_property_file(source)
     tyre = from_property_file(file)

@@ -61,7 +61,9 @@ class _Numbers(NamedTuple):
 
 
 class TMeasyTrail(eqx.Module):
-    """The pneumatic trail over lateral slip: `start` (m) at zero slip, its first zero at `s_zero` (-), zero from `s_end` (-) on.
+    """The pneumatic trail over lateral slip.
+
+    `start` (m, at zero slip), `s_zero` (-, the slip of its first zero), `s_end` (-, the slip from which on it is zero).
 
     **Raises** `InputError` for numbers that are not positive, or `s_end` not above `s_zero`.
     """
@@ -88,8 +90,8 @@ class TMeasyTrail(eqx.Module):
 class TMeasy(AbstractTyre):
     """TMeasy in combined slip (G. Rill, Road Vehicle Dynamics: Fundamentals and Modeling, CRC Press, 2012, ch. 3).
 
-    `longitudinal`, `lateral` are the curves at the `nominal_load` (N), `twice_longitudinal`, `twice_lateral` those at twice that
-    load (None: forces and slopes double, slips stay the same). `trail` is a `TMeasyTrail` (None: no aligning moment).
+    `longitudinal`, `lateral`: the curves at the `nominal_load` (N). `twice_longitudinal`, `twice_lateral`: the curves at twice
+    that load (None: forces and slopes double, slips stay the same). `trail`: the pneumatic trail (None: no aligning moment).
 
     - Load: forces and slopes lie on the parabola through zero and both loads, slips on the line through both loads. From three
       nominal loads on, forces are proportional to the load.

@@ -19,8 +19,8 @@ def typical_mf_tyre(
     """A typical car tyre as MF-Tyre `version` (52, 61 or 62): a start for fits, not a measured tyre.
 
     `load` (N) is its nominal load, `pressure` (Pa) its nominal and inflation pressure, `radius` (m) its unloaded radius, `speed`
-    (m/s) its nominal measurement speed LONGVL; `limits` as in `MFTyre`. Its coefficients are the defaults of a property file
-    (`mf_tyre.typical.TYPICAL_COEFFICIENTS`); forces scale with the load.
+    (m/s) its nominal measurement speed LONGVL; `limits`: as in `MFTyre`. The coefficients are the defaults of a property file,
+    `mf_tyre.typical.TYPICAL_COEFFICIENTS`; forces scale with the load.
 
     **Raises** `InputError` for numbers that are not positive, and for an unknown version.
     """

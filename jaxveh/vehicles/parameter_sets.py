@@ -46,7 +46,7 @@ def _printed_car(front_axle_to_cg: float, rear_axle_to_cg: float) -> SingleTrack
 
 
 def axle_from_stiffness(stiffness, load) -> MagicFormula:
-    """A generic Magic Formula axle with a given cornering `stiffness` (N/rad) at a static `load` (N).
+    """A generic Magic Formula axle with a given cornering stiffness (N/rad) at a static load (N).
 
     The peak force D is the load (friction coefficient 1), C = 1.3 and E = -0.5 are those of an ordinary tyre, and
     `B = stiffness / (C D)`. The force scales with load (`nominal_load` is the static load).

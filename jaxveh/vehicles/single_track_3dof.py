@@ -42,7 +42,7 @@ class SingleTrack3DOF(AbstractSpinless, AbstractOnAxleTyres):
 
     Wheel spin is not modelled: the longitudinal forces of the axles are torque over radius, and share the road's grip with the
     lateral forces as in `traction.within_grip`. The tyres' own F_x has no effect. Load moves between the axles with the a_x of
-    `load_transfer` (its a_y has no effect, although `LaggedLoads` has it as a state).
+    `load_transfer`. The a_y of that has no effect, although `LaggedLoads` has it as a state.
 
     **Parameters**: `cg_height` (m). The torques of the wheels of an axle are added.
 

@@ -20,7 +20,7 @@ def regularised_speed(v: jax.Array, crawl: float) -> jax.Array:
 
 
 def slip_angle(v_x: jax.Array, v_y: jax.Array, crawl: float) -> jax.Array:
-    """The slip angle, rad, of a wheel whose contact point moves with (`v_x`, `v_y`) m/s in the wheel's axes.
+    """The slip angle, rad, of a wheel whose contact point moves with `v_x`, `v_y` (m/s) in the wheel's axes.
 
     `-atan2(v_y, |v_x|)`: a wheel that slides to the left (v_y > 0) has a negative slip angle and gets a force to the right, in
     forward and in backward travel. |v_x| is regularised below the `crawl` speed (m/s).

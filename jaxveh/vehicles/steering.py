@@ -103,8 +103,8 @@ class RearSteering(AbstractSteering):
 class FourWheelSteering(AbstractSteering):
     """The rear wheels are turned in a ratio to the front wheels, which may depend on speed, as in production cars.
 
-    The rear angle is k `steer`, with k = `rear_ratio` (-) at all speeds. With a `fast_ratio` (-) k changes from `rear_ratio` at
-    standstill to `fast_ratio` at high speed; half of the change is reached at `middle_speed` v_m (m/s):
+    The rear angle is k `steer`, with k = `rear_ratio` (-) at all speeds. With `fast_ratio` (-, at high speed) k changes from
+    `rear_ratio` at standstill to `fast_ratio`; half of the change is reached at `middle_speed` v_m (m/s):
 
         k = (rear_ratio + fast_ratio (v / v_m)^2) / (1 + (v / v_m)^2)
 
@@ -236,8 +236,8 @@ def steer_outputs(steering: AbstractSteering, angles: Wheels) -> dict[str, Any]:
 class AbstractSteeredByRoadWheels(AbstractVehicle):
     """A car with steered road wheels.
 
-    **Parameters** of the steering: `steering`, which wheels are steered and how (`FrontSteering`, `Ackermann`, `RearSteering`,
-    `FourWheelSteering`, `IndependentSteering`); on one track the angle of an axle is the mean over its wheels.
+    **Parameters** of the steering: `steering` (which wheels are steered and how: a `FrontSteering`, `Ackermann`, `RearSteering`,
+    `FourWheelSteering` or `IndependentSteering`); on one track the angle of an axle is the mean over its wheels.
 
     **Raises** `InputError` for a steering that is not a steering of `jaxveh.vehicles`.
     """

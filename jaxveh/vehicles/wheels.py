@@ -55,8 +55,10 @@ def sum_of_wheels(wheels: Wheels) -> Any:
 
 
 def corners(a: Any, b: Any, track_front: Any, track_rear: Any) -> Wheels:
-    """The positions (x, y), m, of the wheels relative to the centre of gravity: `a` and `b` (m) are the distances of the axles
-    from it, tracks (m) are measured between the wheels' middles."""
+    """The positions (x, y), m, of the wheels relative to the centre of gravity.
+
+    `a`, `b` (m, distances of front and rear axle from it), `track_front`, `track_rear` (m, between the wheels' middles).
+    """
     return Wheels((a, 0.5 * track_front), (a, -0.5 * track_front), (-b, 0.5 * track_rear), (-b, -0.5 * track_rear))
 
 

@@ -14,8 +14,11 @@ from jaxveh.tyres.mf_tyre.formula import coefficient
 
 
 class RollingCoefficients(eqx.Module):
-    """The section [ROLLING_COEFFICIENTS]: constant part `QSY1`, dependence on F_x (`2`), speed (`3`, `4`) and camber (`5`, `6`),
-    exponents of load (`7`) and pressure (`8`)."""
+    """The section [ROLLING_COEFFICIENTS].
+
+    Constant part `QSY1`; dependence on F_x `QSY2`, on speed `QSY3`, `QSY4`, on camber `QSY5`, `QSY6`; exponents of load `QSY7`
+    and of pressure `QSY8`.
+    """
 
     QSY1: jax.Array = coefficient(scale=0.01)
     QSY2: jax.Array = coefficient(scale=0.01)

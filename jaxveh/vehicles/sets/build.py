@@ -19,7 +19,7 @@ V = TypeVar("V", bound=AbstractVehicle)
 
 
 def build(numbers: CarNumbers, kind: type[V], **options: Any) -> V:
-    """The vehicle of class `kind`, such as `SevenDOF`, with the `numbers` of a car.
+    """The vehicle of class `kind`, such as `SevenDOF`, with the numbers of a car.
 
     Each parameter of the class gets the number with its name. The tyres are a `wheel_tyre` per axle for cars with tracks and an
     `axle_tyre` for cars on one track; `drive` is an `AxleDrive` with the car's shares, or `FourMotors`. A class without a

@@ -20,9 +20,9 @@ SHIFTS = ("PHX1", "PVX1", "PHY1", "PVY1")
 def wheel_tyre(numbers: TyreNumbers, load: float, radius: float | None = None) -> AbstractTyre:
     """The tyre of one wheel, for combined slip and any load.
 
-    It is that of the property file of the `numbers` if there is one, or an MF-Tyre 5.2 (without shifts) with their coefficients.
-    Otherwise it is a typical MF-Tyre 6.1 with their stiffnesses and friction at the static `load` (N). `radius` (m) is that of
-    the wheel, by default 0.32.
+    If the numbers name a property file, it is the tyre of that file; if they have coefficients, it is an MF-Tyre 5.2 without
+    shifts. Otherwise it is a typical MF-Tyre 6.1 with their stiffnesses and friction at the static `load` (N). `radius` (m) is
+    that of the wheel, by default 0.32.
     """
     radius = 0.32 if radius is None else radius
     if numbers.property_file is not None:
@@ -48,7 +48,7 @@ def wheel_tyre(numbers: TyreNumbers, load: float, radius: float | None = None) -
 
 
 def axle_tyre(numbers: TyreNumbers, load: float) -> MagicFormula:
-    """Both tyres of an axle as one Magic Formula: the `axle_formula` of the `numbers` if there is one, otherwise one with their
+    """Both tyres of an axle as one Magic Formula: the `axle_formula` of the numbers if there is one, otherwise one with their
     stiffness and friction at the axle's static `load` (N) and the shape of an ordinary tyre (`tyres.kit.GENERIC_TYRE`), with
     the force proportional to load."""
     if numbers.axle_formula is not None:
