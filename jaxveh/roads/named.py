@@ -20,7 +20,7 @@ from jaxveh.roads.slopes import Banked
 
 
 class NamedRoad(NamedTuple):
-    """A road by name. `make`: the function that makes it; `help`: its description; `random`: whether it is made from a key."""
+    """A road by name. `make`: the function that makes it; `help`: its description; `random`: whether `make` takes a key."""
 
     make: Callable[..., AbstractRoad]
     help: str

@@ -34,8 +34,8 @@ class Brush(AbstractTwoStiffnesses):
       contact's centre, `-a (1 - g)^2 ((4 (1 - g) / 3 - 1) C_y sigma_y + 3 mu F_z g^2 sigma_y / |sigma|)`. At full sliding this
       is Coulomb's law. J. Svendenius, Tire Modeling and Friction Estimation (thesis, Lund, 2007), compares both.
 
-    The forces of the two forms differ in each direction by up to 11 % of `mu F_z` if one stiffness is 4/3 of the other, and by
-    up to 26 % if it is twice the other. The difference is largest at full sliding.
+    The forces of the two choices differ in each direction by up to 11 % of `mu F_z` if one stiffness is 4/3 of the other, and
+    by up to 26 % if it is twice the other. The difference is largest at full sliding.
 
     **Raises** `InputError` for parameters that are not positive, an unknown `slides`, or a contact without a load.
     """

@@ -16,7 +16,7 @@ class Exponential(AbstractTyre):
     """`F_y = mu_s F_z (1 - exp(-k |alpha|)) sgn(alpha)` with `mu_s = sqrt(mu^2 - (F_x / F_z)^2)`.
 
     J. Zuurbier & P. Bremmer, AVEC 2002 (the review's [32] says 2000); eq. 6 of the sideslip review (Chen, Gao & Xu, 2013;
-    erratum: `k` is in 1/rad, no stiffness in N/rad).
+    erratum: `k` is in 1/rad, not a stiffness in N/rad).
 
     - `stiffness_factor` (1/rad): k, cornering stiffness over `mu F_z`.
     - `friction` (-): mu.

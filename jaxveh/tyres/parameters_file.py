@@ -41,8 +41,8 @@ def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", ov
     The file has one table `[tyre]` with `model`, the law's name, and a number for each parameter (a string for an option).
     Parameters that are None are left out.
 
-    **Raises** `InputError` for a law that is not in `MODELS`, parameters that are not finite scalars, or a file that exists
-    while `overwrite` is not set.
+    **Raises** `InputError` for a law that is not in `MODELS`, parameters that are not finite scalars, or an existing file without
+    `overwrite`.
     """
     name = type(tyre).__name__
     if MODELS.get(name) is not type(tyre):
@@ -70,8 +70,7 @@ def write_parameters(tyre: AbstractTyre, path: str | Path, *, note: str = "", ov
 def read_parameters(path: str | Path) -> AbstractTyre:
     """The tyre of a file in the format of `write_parameters`; parameters with a default may be missing.
 
-    **Raises** `InputError` for a file that is not TOML, an unknown model or parameter, or a parameter that is missing, not a
-    number or out of range.
+    **Raises** `InputError` for a file that is not TOML, an unknown model, or an unknown, missing or invalid parameter.
     """
     path = Path(path)
     content = kit.read_toml(path)

@@ -29,8 +29,7 @@ class Commanded(AbstractVehicle):
     **Inputs**: `steer_rate` (rad/s at the road wheels) and `acceleration` (m/s^2). The outputs also have `steer`, `steer_rate`
     and `v_x_rate`, with limits applied, unless the vehicle has them itself.
 
-    **Raises** `InputError` for a vehicle without the inputs `steer` and `v_x`, or with inputs other than those and `a_x`,
-    `v_x_rate`, `steer_rate`.
+    **Raises** `InputError` unless the vehicle has the inputs `steer` and `v_x`, and optionally `a_x`, `v_x_rate`, `steer_rate`.
     """
 
     vehicle: AbstractVehicle
@@ -42,7 +41,7 @@ class Commanded(AbstractVehicle):
         if not set(OWN) <= set(inputs) <= set(KNOWN):
             raise InputError(
                 f"Commanded.vehicle has the inputs {', '.join(inputs)}: "
-                "must be steer and v_x, and no others than a_x, v_x_rate, steer_rate."
+                "must be steer and v_x, and optionally a_x, v_x_rate, steer_rate."
             )
 
     @property

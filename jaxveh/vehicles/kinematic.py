@@ -89,8 +89,8 @@ class Kinematic(AbstractKinematic):
 
         dyaw/dt = v_x (tan(delta_f) - tan(delta_r)) / L,    v_y = v_x tan(delta_r) + d dyaw/dt,    sideslip = atan(v_y / v_x)
 
-    **Parameters**: `wheelbase` (m), `rear_axle_to_reference` d (m): the reference point of position and speeds; 0 for the rear
-    axle, or the distance of the centre of gravity from it.
+    **Parameters**: `wheelbase` (m), `rear_axle_to_reference` (m, the distance d of the reference point of position and speeds
+    ahead of the rear axle; 0: the rear axle itself).
 
     **Inputs**: those of `steering` (`steer`, rad at the road wheels) and `v_x` (m/s), which is the same at all points of the
     car's longitudinal axis.

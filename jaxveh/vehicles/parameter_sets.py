@@ -18,7 +18,7 @@ def passenger_car() -> SingleTrack:
 
     1420 kg, 2124 kg m^2, wheelbase 2.55 m, Magic Formula axles (B C D is 88 kN/rad in front and 127 kN/rad behind).
 
-    **Erratum**: the paper prints the two distances in exchanged order (`passenger_car_as_printed`). Its front axle would then
+    **Erratum**: the paper prints the two distances in exchanged order (`passenger_car_as_printed`). The front axle would then
     need a friction coefficient of 1.5, and the car would spin in a double lane change at 25 m/s with 2 degrees of steer.
     Swapped, as here, it is an ordinary understeering car. Its cornering stiffnesses are in kN/rad, and are not the printed 117
     and 144.

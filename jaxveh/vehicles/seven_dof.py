@@ -58,7 +58,7 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
         return (*self.steering.inputs, *self.drive.inputs, *self.load_transfer.inputs)
 
     def at_rest(self, v_x):
-        """Wheels that roll freely."""
+        """The spins of freely rolling wheels at `v_x` (m/s)."""
         return dict.fromkeys(SPINS, v_x / self.wheel_radius)
 
     def evaluate(self, t, x, u, ground: Ground = LEVEL):
@@ -88,8 +88,7 @@ class SevenDOF(AbstractDriven, AbstractUprightTwoTrack):
         return each_wheel(lambda omega: omega * self.wheel_radius, wheels_of(x, "omega"))
 
     def steady_a_x(self, x, u, ground: Ground, g: tuple[Any, Any, Any]):
-        """The longitudinal acceleration due to the torques, m/s^2, without a limit by grip; computed only if the load transfer
-        uses it."""
+        """The longitudinal acceleration due to the torques, m/s^2, not limited by grip; computed only for loads that use it."""
         del ground, g
         drive, brake = self.drive.torques(u)
         torque = sum_of_wheels(drive) - sum_of_wheels(brake) * travel_direction(x.v_x)

@@ -54,7 +54,7 @@ class TurnSlip(eqx.Module):
     def spin(self, at, turn_slip, omega, radius, least_speed) -> Spin:
         """The spin and its factors at an operating point.
 
-        `turn_slip` is phi_t (1/m), with limits faded and projected; `omega` (rad/s) and `radius` R_0 (m) are those of the wheel.
+        `turn_slip` is phi_t (1/m), faded if the tyre has limits; `omega` (rad/s) and `radius` R_0 (m) are those of the wheel.
         The angular speed about the road's normal is that of the path plus that of a cambered wheel, reduced by epsilon_gamma
         (4.76).
         """

@@ -109,8 +109,8 @@ class MFTyre(AbstractTyre):
         across = self.lateral.pure(at, s, nominal, self.version)
         weight_y = self.lateral.weight(at, s)
         added = self.lateral.ply_steer(at, s, across.mu)
-        # All three moments use F_x and F_y. The fences take 554 instead of 647 ns per contact before jax 0.12 (float64), where
-        # they must be here.
+        # All three moments use F_x and F_y. With the fences a contact takes 554 instead of 647 ns before jax 0.12 (float64),
+        # which needs them exactly here.
         F_x = numerics.fence_blocks(self.longitudinal.weight(at, s) * along.force)
         F_y = numerics.fence_blocks(weight_y * across.force + added)
         if self.version == 52:

@@ -15,8 +15,8 @@ NOT_NEGATIVE = (
 
 
 def check_fourteen_dof(car: AbstractSuspendedTwoTrack) -> None:
-    """Raise `InputError` unless the inertia is positive definite, the tyres can carry the car, and either the steering or
-    `ackermann` sets the angles of the single front wheels, not both."""
+    """Raise `InputError` unless the inertia is positive definite, the tyres can carry the car, and only one of the steering and
+    `ackermann` gives the front wheels different angles."""
     kind = type(car).__name__
     if isinstance(car.steering, Ackermann | IndependentSteering):
         told = f"0 with {type(car.steering).__name__}, which sets the angle of each front wheel"
