@@ -47,7 +47,7 @@ class Profile(AbstractRoad):
             shape = np.shape(getattr(self, name))
             if shape not in ((), (count,)):
                 raise InputError(
-                    f"Profile.{name} has the shape {shape}: must be one number, or ({count},) like distance."
+                    f"Profile.{name} has the shape {shape}: must be one number, or ({count},) as distance."
                 )
         for name in ("grade", "bank"):
             angle = getattr(self, name)

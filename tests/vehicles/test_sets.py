@@ -320,5 +320,5 @@ def test_a_file_would_say_the_same_of_a_car_on_one_track(name):
 
 
 def test_what_has_no_mass_has_no_file():
-    with pytest.raises(InputError, match="semi_trailer: mass, yaw_inertia, front, rear must be known"):
+    with pytest.raises(InputError, match="semi_trailer: a car's file needs mass, yaw_inertia, front, rear"):
         vehicles.specification_of(sets.CARS["semi_trailer"]())

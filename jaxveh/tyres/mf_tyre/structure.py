@@ -13,7 +13,7 @@ from jaxveh._core.parameter import check_parameters, positive
 from jaxveh.tyres.mf_tyre.formula import coefficient, unless_zero
 
 RADIUS_ITERATIONS = 12
-"""Iterations for the rolling radius: it depends weakly on the wheel's speed, and the speed on the radius. 12 give full precision."""
+"""Iterations for the rolling radius: it depends weakly on the wheel's speed, and that on the radius; 12 give full precision."""
 
 
 class Wheel(NamedTuple):

@@ -58,7 +58,7 @@ def specification_of(numbers: CarNumbers) -> CarSpecification:
     """
     missing = [name for name in ("mass", "yaw_inertia", "front", "rear") if getattr(numbers, name) is None]
     if missing:
-        raise InputError(f"{numbers.name}: {', '.join(missing)} missing: a car's file needs it.")
+        raise InputError(f"{numbers.name}: a car's file needs {', '.join(missing)}, missing from its numbers.")
     loads = {axle: 2.0 * load for axle, load in zip(("front", "rear"), numbers.wheel_loads(), strict=True)}
     tyres = {axle: axle_tyre(getattr(numbers, axle), load) for axle, load in loads.items()}
     optional = ("cg_height", "drag", "rolling_resistance")
